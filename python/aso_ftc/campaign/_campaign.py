@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
-import itertools
 import json
-import math
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
@@ -20,76 +17,25 @@ from .. import _core
 from .._errors import ConfigurationError, Error
 from .._paper import paper
 from .._system import System, fault
+from ._changes import arguments, changes
+from ._entries import TABLES, fail, finite, only, positive, table
+from ._faults import KINDS, NO_FAULT, FaultCase, cases, disturbances
 from ._measures import PAPER_CLAIMS, Expression
-from ._parameters import Parameter, Place, Sampled, columns_of_table, sample, text
+from ._parameters import Parameter, Sampled, columns_of_table, sample, text
 
 if TYPE_CHECKING:
     from ._analysis import Outcome
 
-__all__ = ["Campaign", "FaultCase", "Place", "Plan", "arguments", "changed", "changes"]
+__all__ = ["Campaign", "Plan"]
 
 PathLike = Union[str, "os.PathLike[str]"]
 
-# Tables of a system.toml whose entries a parameter can set.
-_TABLES = ("algorithm", "experiment")
-_KINDS = (
-    "bias", "gain", "drift", "stuck", "dropout", "delay", "quantisation", "saturation", "noise", "inversion",
-)  # fmt: skip
-# The entry of each kind that is its size, for tables and heat maps.
-_SIZES = {
-    "bias": "value", "gain": "factor", "drift": "rate", "stuck": "value", "delay": "seconds",
-    "quantisation": "step", "noise": "deviation", "dropout": "probability", "saturation": "max",
-}  # fmt: skip
-_RANDOM = ("noise", "dropout")
 _ENTRIES = {
     "name", "system", "seed", "design", "parameters", "disturbances", "faults", "measures", "claims",
     "limits", "keep", "stop", "record-every", "runs-per-task", "isolate", "time-limit", "memory-limit",
     "settings", "algorithm", "experiment",
 }  # fmt: skip
 _NAME = re.compile(r"[\w.\-\[\], ()]+")
-
-
-def _fail(place: str, text: str) -> ConfigurationError:
-    return ConfigurationError(f"{place}: {text}", "Campaign", {"name": place})
-
-
-def _table(place: str, value: Any) -> dict[str, Any]:
-    if not isinstance(value, Mapping):
-        raise _fail(place, f"expected a table, found {value!r}")
-    return dict(value)
-
-
-def _only(place: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
-    for entry in table:
-        if entry not in known:
-            raise _fail(f"{place}.{entry}" if place else entry, f"unknown entry, expected {', '.join(known)}")
-
-
-def _finite(place: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise _fail(place, f"{value!r}: expected a finite number")
-    return float(value)
-
-
-def _positive(place: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < math.inf:
-        raise _fail(place, f"{value!r}: expected a number above 0")
-    return float(value)
-
-
-@dataclass(frozen=True)
-class FaultCase:
-    """The fault of a run: one entry of ``[[scenario.fault]]`` and its columns in the results."""
-
-    label: str
-    connection: str | None
-    kind: str | None
-    size: float | None
-    start: float | None
-    entry: dict[str, Any] | None
-
-
-NO_FAULT = FaultCase("", None, None, None, None, None)
 
 
 @dataclass(frozen=True)
@@ -185,27 +131,27 @@ class Campaign:
         return own
 
     def _read(self, entries: dict[str, Any], folder: Path) -> None:
-        _only("", entries, sorted(_ENTRIES))
+        only("", entries, sorted(_ENTRIES))
         self.name = str(entries.get("name", "campaign"))
         if not _NAME.fullmatch(self.name):
-            raise _fail("name", f"{self.name!r}: expected letters, digits, spaces, dots, - and _")
+            raise fail("name", f"{self.name!r}: expected letters, digits, spaces, dots, - and _")
         self.seed = entries.get("seed", 0)
         if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
-            raise _fail("seed", f"{self.seed!r}: expected a whole number of at least 0")
+            raise fail("seed", f"{self.seed!r}: expected a whole number of at least 0")
         self.system = _system(entries, folder)
         self.isolate = bool(entries.get("isolate", False))
         limit = entries.get("time-limit")
-        self.time_limit = None if limit is None else _positive("time-limit", limit)
+        self.time_limit = None if limit is None else positive("time-limit", limit)
         self.memory_limit = entries.get("memory-limit")
         if self.memory_limit is not None and not self.isolate:
-            raise _fail("memory-limit", "a limit of memory needs isolate = true")
+            raise fail("memory-limit", "a limit of memory needs isolate = true")
         self.record_every = entries.get("record-every", "step")
         self._variables = {variable.name: variable for variable in self.system.variables()}
-        self.disturbances = _disturbances(entries.get("disturbances", {}))
+        self.disturbances = disturbances(entries.get("disturbances", {}))
         self.parameters = self._parameters(entries, folder)
-        self.cases = _cases(entries.get("faults", []), self._inputs)
+        self.cases = cases(entries.get("faults", []), self._inputs)
         self._measures(entries, folder)
-        design = _table("design", entries.get("design", {"method": "grid"}))
+        design = table("design", entries.get("design", {"method": "grid"}))
         complete, sampled = sample(design, self.parameters, self.seed)
         self.plan = Plan(complete, sampled, self.cases or (NO_FAULT,))
         self.keep = self._keep(entries.get("keep"))
@@ -214,7 +160,7 @@ class Campaign:
         share = min(50, max(10, len(self.plan) // 64))
         per_task = entries.get("runs-per-task", share)
         if isinstance(per_task, bool) or not isinstance(per_task, int) or not 1 <= per_task <= 10_000:
-            raise _fail("runs-per-task", f"{per_task!r}: expected a whole number from 1 to 10000")
+            raise fail("runs-per-task", f"{per_task!r}: expected a whole number from 1 to 10000")
         self.runs_per_task = per_task
 
     # The parts of a campaign.toml, in the order in which they are read.
@@ -238,23 +184,23 @@ class Campaign:
         return self.system.start_values.get(place, variable.start), variable.unit
 
     def _parameters(self, entries: Mapping[str, Any], folder: Path) -> list[Parameter]:
-        own = _table("parameters", entries.get("parameters", {}))
+        own = table("parameters", entries.get("parameters", {}))
         design = entries.get("design", {})
         if isinstance(design, Mapping) and design.get("method") == "table":
             columns = columns_of_table(design.get("file"), folder)
             for name in own:
                 if name not in columns:
                     known = ", ".join(columns)
-                    raise _fail(f"parameters.{name}", f"the table has no such column, it has {known}")
+                    raise fail(f"parameters.{name}", f"the table has no such column, it has {known}")
             stated = own or dict.fromkeys(columns, {})
             own = {
-                name: {**_table(f"parameters.{name}", entry), "values": columns[name]}
+                name: {**table(f"parameters.{name}", entry), "values": columns[name]}
                 for name, entry in stated.items()
             }
         parameters = []
         for name, entry in own.items():
             if not _NAME.fullmatch(name):
-                raise _fail(f"parameters.{name}", "a name has letters, digits, dots and brackets")
+                raise fail(f"parameters.{name}", "a name has letters, digits, dots and brackets")
             parameter = Parameter.read(name, entry, self._nominal)
             for place in parameter.places:
                 self._check_place(f"parameters.{name}", place)
@@ -263,33 +209,33 @@ class Campaign:
         for parameter in parameters:
             for place in parameter.places:
                 if place in taken:
-                    raise _fail(f"parameters.{parameter.name}", f"{place} is set by {taken[place]}, too")
+                    raise fail(f"parameters.{parameter.name}", f"{place} is set by {taken[place]}, too")
                 taken[place] = parameter.name
         return parameters
 
     def _check_place(self, where: str, place: str) -> None:
         table, _, entry = place.partition(".")
         if table in self.disturbances and entry:
-            kind = next(key for key in self.disturbances[table] if key in _KINDS)
+            kind = next(key for key in self.disturbances[table] if key in KINDS)
             if not isinstance(self.disturbances[table][kind], Mapping):
-                raise _fail(where, f"the disturbance {table} has no entries")
-        elif table not in _TABLES and place not in self._variables:
+                raise fail(where, f"the disturbance {table} has no entries")
+        elif table not in TABLES and place not in self._variables:
             near = [
                 name
                 for name in self._variables
                 if name.lower() == place.lower() or name.endswith(f".{place}")
             ]
             hint = f", did you mean {near[0]}" if near else ""
-            raise _fail(
+            raise fail(
                 where, f"{place} is neither a variable of the system nor an entry of a disturbance{hint}"
             )
 
     def _measures(self, entries: Mapping[str, Any], folder: Path) -> None:
-        own = _table("measures", entries.get("measures", {}))
+        own = table("measures", entries.get("measures", {}))
         if entries.get("claims", False):
             own = {**PAPER_CLAIMS, **own}
         if not own:
-            raise _fail(
+            raise fail(
                 "measures", 'a campaign needs at least one measure, such as peak = "max(abs(plant.x))"'
             )
         self.expressions: dict[str, Expression] = {}
@@ -298,53 +244,53 @@ class Campaign:
         columns = {"run", "status", "reason", "seconds", "fault", *(own.name for own in self.parameters)}
         for name, entry in own.items():
             if name in columns or name.startswith(("fault.", "unit:")):
-                raise _fail(f"measures.{name}", "a column of the results has this name, choose another one")
-            stated = {"expression": entry} if isinstance(entry, str) else _table(f"measures.{name}", entry)
+                raise fail(f"measures.{name}", "a column of the results has this name, choose another one")
+            stated = {"expression": entry} if isinstance(entry, str) else table(f"measures.{name}", entry)
             if "unfinished" in stated:
-                self.unfinished[name] = _finite(f"measures.{name}.unfinished", stated.pop("unfinished"))
+                self.unfinished[name] = finite(f"measures.{name}.unfinished", stated.pop("unfinished"))
             if set(stated) == {"expression"}:
                 self.expressions[name] = Expression(name, str(stated["expression"]))
             elif set(stated) == {"python"}:
                 self.functions[name] = _function(f"measures.{name}", stated["python"], folder)
             else:
-                raise _fail(f"measures.{name}", 'expected an expression, or { python = "file.py:function" }')
-        self.limits = _table("limits", entries.get("limits", {}))
+                raise fail(f"measures.{name}", 'expected an expression, or { python = "file.py:function" }')
+        self.limits = table("limits", entries.get("limits", {}))
         for name, limit in self.limits.items():
             if name not in own:
-                raise _fail(f"limits.{name}", f"no measure has this name, there are {', '.join(own)}")
-            limit = _table(f"limits.{name}", limit)
+                raise fail(f"limits.{name}", f"no measure has this name, there are {', '.join(own)}")
+            limit = table(f"limits.{name}", limit)
             if len(limit) != 1 or not set(limit) <= {"below", "above"}:
-                raise _fail(f"limits.{name}", "expected { below = number } or { above = number }")
-            _finite(f"limits.{name}", next(iter(limit.values())))
+                raise fail(f"limits.{name}", "expected { below = number } or { above = number }")
+            finite(f"limits.{name}", next(iter(limit.values())))
 
     def _keep(self, entry: Any) -> dict[str, Any]:
-        keep = _table("keep", {} if entry is None else entry)
-        _only("keep", keep, ["runs", "unfinished", "outside", "record", "every"])
+        keep = table("keep", {} if entry is None else entry)
+        only("keep", keep, ["runs", "unfinished", "outside", "record", "every"])
         for run in keep.get("runs", []):
             if isinstance(run, bool) or not isinstance(run, int) or not 0 <= run < len(self.plan):
-                raise _fail("keep.runs", f"{run!r}: expected numbers of runs, 0 to {len(self.plan) - 1}")
+                raise fail("keep.runs", f"{run!r}: expected numbers of runs, 0 to {len(self.plan) - 1}")
         for name in keep.get("outside", []):
             if name not in self.limits:
-                raise _fail("keep.outside", f"{name!r} has no limit")
+                raise fail("keep.outside", f"{name!r} has no limit")
         return keep
 
     def _stop(self, entry: Any) -> dict[str, Any]:
-        stop = _table("stop", {} if entry is None else entry)
+        stop = table("stop", {} if entry is None else entry)
         if not stop:
             return stop
-        _only("stop", stop, ["limit", "width", "confidence"])
+        only("stop", stop, ["limit", "width", "confidence"])
         if stop.get("limit") not in self.limits:
-            raise _fail("stop.limit", f"{stop.get('limit')!r}: expected a measure with a limit")
+            raise fail("stop.limit", f"{stop.get('limit')!r}: expected a measure with a limit")
         if self.plan.design["method"] != "random":
-            raise _fail("stop", "only runs of a design random are independent, so that they can end early")
+            raise fail("stop", "only runs of a design random are independent, so that they can end early")
         if len(self.plan.faults) > 1:
-            raise _fail(
+            raise fail(
                 "stop", "a campaign with several faults has one probability for each, it cannot end early"
             )
         stop.setdefault("confidence", 0.95)
         for name in ("width", "confidence"):
-            if not _positive(f"stop.{name}", stop.get(name)) < 1:
-                raise _fail(f"stop.{name}", f"{stop[name]!r}: expected a number below 1")
+            if not positive(f"stop.{name}", stop.get(name)) < 1:
+                raise fail(f"stop.{name}", f"{stop[name]!r}: expected a number below 1")
         return stop
 
     # What a run does.
@@ -423,13 +369,13 @@ class Campaign:
         for name in recorded:
             if name not in self._variables:
                 reader = next(key for key, own in self.expressions.items() if name in own.signals)
-                raise _fail(f"measures.{reader}", f"the system has no variable {name}")
+                raise fail(f"measures.{reader}", f"the system has no variable {name}")
         zeros = {name: np.zeros(2) for name in recorded}
         known = self.plan.row(0)[0]
         for key, expression in self.expressions.items():
             for name in expression.parameters:
                 if name not in known:
-                    raise _fail(f"measures.{key}", f"the campaign has no parameter {name}")
+                    raise fail(f"measures.{key}", f"the campaign has no parameter {name}")
             expression.value(zeros, np.array([0.0, 1.0]), known)
 
     def run(
@@ -463,73 +409,9 @@ class Campaign:
         return f"Campaign({self.name!r}, {len(self)} runs of {self.system!r})"
 
 
-def changed(system: System, new: Mapping[str, Any]) -> System:
-    """Return a copy of the system with the changes of a run."""
-    own = system.copy()
-    own.start_values.update(new["start_values"])
-    for name in _TABLES:
-        getattr(own, name).update(new[name])
-    own.scenario.setdefault("fault", []).extend(new["faults"])
-    return own
-
-
-def changes(
-    parameters: Sequence[Place],
-    disturbances: Mapping[str, Any],
-    case: FaultCase,
-    values: Mapping[str, Any],
-    seed: int,
-    run: int,
-) -> dict[str, Any]:
-    """Return what a run changes in its system: start values, entries of tables, faults.
-
-    Noise and random dropouts without a seed of their own get one that depends on the seed of the
-    campaign, the number of the run and their position.
-    """
-    own: dict[str, Any] = {"start_values": {}, "algorithm": {}, "experiment": {}}
-    faults = copy.deepcopy(dict(disturbances))
-    for parameter in parameters:
-        value = values[parameter.name]
-        for place in parameter.places:
-            table, _, entry = place.partition(".")
-            if table in faults and entry:
-                kind = next(key for key in faults[table] if key in _KINDS)
-                faults[table][kind][entry] = value
-            elif table in _TABLES:
-                own[table][entry] = value
-            else:
-                own["start_values"][place] = value
-    entries: list[dict[str, Any]] = []
-    for disturbance in faults.values():
-        connections = disturbance.pop("connection")
-        for connection in [connections] if isinstance(connections, str) else connections:
-            entries.append({"connection": connection, **copy.deepcopy(disturbance)})
-    if case.entry is not None:
-        entries.append(copy.deepcopy(case.entry))
-    for position, disturbed in enumerate(entries):
-        for kind in _RANDOM:
-            if kind in disturbed and "seed" not in disturbed[kind]:
-                drawn = np.random.SeedSequence([seed, run, position]).generate_state(1, np.uint32)
-                disturbed[kind]["seed"] = int(drawn[0])
-    own["faults"] = entries
-    return own
-
-
-def arguments(own: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the changes of a run as arguments of :meth:`System.run`."""
-    experiment = {name.replace("-", "_"): value for name, value in own["experiment"].items()}
-    for name in experiment:
-        if name not in ("start_time", "stop_time", "tolerance"):
-            raise _fail(f"experiment.{name}", "expected start-time, stop-time or tolerance")
-    found: dict[str, Any] = {"start_values": own["start_values"], "faults": own["faults"], **experiment}
-    if own["algorithm"]:
-        found["algorithm"] = own["algorithm"]
-    return found
-
-
 def _system(entries: dict[str, Any], folder: Path) -> System:
     if "system" not in entries:
-        raise _fail("system", 'a campaign needs a system: a system.toml, an SSP or "paper"')
+        raise fail("system", 'a campaign needs a system: a system.toml, an SSP or "paper"')
     given = entries["system"]
     if isinstance(given, System):
         system = given.copy()
@@ -538,85 +420,25 @@ def _system(entries: dict[str, Any], folder: Path) -> System:
     elif isinstance(given, (str, os.PathLike)):
         path = folder / given
         if not path.exists():
-            raise _fail("system", f"there is no file {path}")
+            raise fail("system", f"there is no file {path}")
         system = System.from_toml(path) if path.suffix == ".toml" else System.from_ssp(path)
     else:
-        raise _fail("system", f'{given!r}: expected a path or "paper"')
-    for name, value in _table("settings", entries.get("settings", {})).items():
+        raise fail("system", f'{given!r}: expected a path or "paper"')
+    for name, value in table("settings", entries.get("settings", {})).items():
         system.start_values[name] = value
-    for name in _TABLES:
-        getattr(system, name).update(_table(name, entries.get(name, {})))
+    for name in TABLES:
+        getattr(system, name).update(table(name, entries.get(name, {})))
     system.results.pop("file", None)
     return system
-
-
-def _disturbances(entry: Any) -> dict[str, dict[str, Any]]:
-    own = {
-        name: _table(f"disturbances.{name}", value) for name, value in _table("disturbances", entry).items()
-    }
-    for name, value in own.items():
-        place = f"disturbances.{name}"
-        if name in _TABLES or "." in name:
-            raise _fail(place, "choose another name: it is a table of the system, or has a dot")
-        _check_fault(place, value)
-    return own
-
-
-def _check_fault(place: str, value: Mapping[str, Any]) -> str:
-    kinds = [kind for kind in _KINDS if kind in value]
-    if len(kinds) != 1:
-        raise _fail(place, f"expected exactly one of {', '.join(_KINDS)}")
-    _only(place, value, ["connection", "unit", kinds[0]])
-    _table(f"{place}.{kinds[0]}", value[kinds[0]])
-    if "connection" not in value:
-        raise _fail(place, "expected a connection, such as controller.x_p")
-    return kinds[0]
-
-
-def _cases(entries: Any, inputs: Any) -> tuple[FaultCase, ...]:
-    """The faults of a fault campaign, the run without a fault first."""
-    if not isinstance(entries, (list, tuple)):
-        raise _fail("faults", "expected a list: [[faults]]")
-    cases: list[FaultCase] = []
-    for number, entry in enumerate(entries):
-        place = f"faults[{number}]"
-        own = _table(place, entry)
-        own.setdefault("connection", "all")
-        kind = _check_fault(place, own)
-        connections = inputs() if own["connection"] == "all" else own["connection"]
-        connections = [connections] if isinstance(connections, str) else connections
-        if not connections:
-            raise _fail(place, "the system has no connection that a fault can disturb")
-        body = dict(own[kind])
-        names = list(body)
-        lists = [value if isinstance(value, (list, tuple)) else [value] for value in body.values()]
-        for connection, *values in itertools.product(connections, *lists):
-            filled = dict(zip(names, values, strict=True))
-            full = {"connection": connection, kind: filled}
-            if "unit" in own:
-                full["unit"] = own["unit"]
-            size, start = filled.get(_SIZES.get(kind, "")), filled.get("from")
-            text = ", ".join(f"{key} = {value}" for key, value in filled.items())
-            cases.append(
-                FaultCase(
-                    f"{kind} on {connection}" + (f": {text}" if text else ""),
-                    connection,
-                    kind,
-                    float(size) if isinstance(size, (int, float)) else None,
-                    float(start) if isinstance(start, (int, float)) else None,
-                    full,
-                )
-            )
-    return (NO_FAULT, *cases) if cases else ()
 
 
 def _function(place: str, text: Any, folder: Path) -> tuple[str, str]:
     path, _, name = str(text).rpartition(":")
     if not path or not name.isidentifier():
-        raise _fail(place, f'{text!r}: expected "file.py:function"')
+        raise fail(place, f'{text!r}: expected "file.py:function"')
     file = (folder / path).absolute()
     if not file.is_file():
-        raise _fail(place, f"there is no file {file}")
+        raise fail(place, f"there is no file {file}")
     return str(file), name
 
 

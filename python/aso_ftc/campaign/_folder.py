@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any
 from .. import _core
 from .._errors import ConfigurationError, ResultsError
 from .._system import System
-from ._campaign import FaultCase, Place, changed, changes
+from ._changes import changed, changes
+from ._faults import FaultCase
 from ._packages import package
-from ._parameters import text
+from ._parameters import Place, text
 
 if TYPE_CHECKING:
     from ._campaign import Campaign

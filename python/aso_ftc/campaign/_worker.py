@@ -17,9 +17,12 @@ import numpy as np
 from .. import _core
 from .._errors import Error, RunError, TimeLimitError
 from .._system import System
-from ._campaign import Campaign, FaultCase, Place, arguments, changes
+from ._campaign import Campaign
+from ._changes import arguments, changes
+from ._faults import FaultCase
 from ._folder import parquet_bytes
 from ._measures import Expression
+from ._parameters import Place
 
 __all__ = ["Job", "Row", "pack"]
 
