@@ -75,7 +75,7 @@ def _page(outcome: Outcome, script: str) -> str:
     influence = "".join(f'<div class="of-measure">{_influence(outcome, name)}</div>' for name in measures)
     options = "".join(f'<option value="{at}">{escape(name)}</option>' for at, name in enumerate(measures))
     inputs = "".join(
-        f'<option value="{at}">{escape(name)}</option>' for at, name in enumerate(outcome.inputs)
+        f'<option value="{at}">{escape(name)}</option>' for at, name in enumerate([*outcome.inputs, "run"])
     )
     method = outcome.manifest["design"]["method"]
     parallel = (
@@ -91,17 +91,19 @@ def _page(outcome: Outcome, script: str) -> str:
         ("What was run", _summary(outcome) + _parameters(outcome)),
         ("Limits", _limits(outcome)),
         ("", f'<p class="choice"><label>Measure: <select id="measure">{options}</select></label></p>'),
-        ("Influence of each parameter", influence),
+        ("Influence of each parameter", influence if outcome.inputs else ""),
         (
             _INDICES.get(method, ("", ""))[1],
             indices + '<div id="indices"></div>' if method in _INDICES else "",
         ),
-        ("Parallel coordinates", parallel),
+        ("Parallel coordinates", parallel if outcome.inputs else ""),
         ("Parameter and measure", scatter),
         ("Distribution of each measure", _histograms(data["measures"])),
         ("Faults", heat if _faults(outcome) else ""),
         ("Runs that did not finish", _unfinished(outcome)),
     ]
+    if not measures:
+        sections = [sections[0], sections[-1]]
     body = "".join(
         (f"<section><h2>{escape(title)}</h2>{text}</section>" if title else text)
         for title, text in sections
@@ -457,6 +459,7 @@ def _columns(outcome: Outcome, measures: list[str], rows: NDArray[np.int64]) -> 
                 entry["values"] = _numbers(frame[name])
             else:
                 texts = frame[name].astype(str)
+                texts = texts.replace("", "(none)") if kinds[name] == "input" else texts
                 labels = sorted(set(texts))
                 codes = {text: code for code, text in enumerate(labels)}
                 entry |= {"labels": labels, "values": [codes[text] for text in texts]}
@@ -515,11 +518,12 @@ const byId = id => document.getElementById(id);
 const color = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
 // plotly reads a small HTML in its texts.
 const plain = text => String(text).replace(/&/g, '&amp;').replace(/</g, '&lt;').replace(/>/g, '&gt;');
-const short = text => text.length > 26 ? text.slice(0, 25) + '…' : text;
-const titled = own => plain(own.name) + (own.unit ? ' in ' + plain(own.unit) : '');
+const short = (text, length) => text.length > length ? text.slice(0, length - 1) + '…' : text;
+const titled = own => plain(short(own.name + (own.unit ? ' in ' + own.unit : ''), 50));
 // More lines than these hide each other.
 const LINES = 1500;
 const inputs = data.columns.filter(own => own.kind === 'input');
+const across = [...inputs, {name: 'run', unit: null, values: data.runs}];
 const column = (name, kind) => data.columns.find(own => own.kind === kind && own.name === name);
 const status = column('status', 'status'), fault = column('fault', 'fault');
 const shown = (own, at) => own.labels ? own.labels[own.values[at]] : own.values[at];
@@ -559,6 +563,7 @@ function drawIndices() {
 
 function drawParallel() {
   const own = measure(), all = values(), place = byId('parallel');
+  if (!place) return;
   if (!document.createElement('canvas').getContext('webgl')) {
     place.textContent = 'This browser has no WebGL, which parallel coordinates need.';
     return;
@@ -574,12 +579,12 @@ function drawParallel() {
     let low = finite.reduce((a, b) => Math.min(a, b), Infinity), high = finite.reduce((a, b) => Math.max(a, b), -Infinity);
     if (!(low < high)) { const half = Math.abs(low) / 10 || 1; low -= half; high += half; }
     // A run without a value of this axis, such as the size of a fault that has none, is at its lower end.
-    return {label: plain(short(from.name + (from.unit ? ' in ' + from.unit : ''))), values: picked.map(value => value === null ? low : value), range: [low, high]};
+    return {label: plain(short(from.name + (from.unit ? ' in ' + from.unit : ''), 26)), values: picked.map(value => value === null ? low : value), range: [low, high]};
   };
-  const dimensions = inputs.map(from => {
+  const dimensions = inputs.filter(from => rows.some(at => from.values[at] !== null)).map(from => {
     const found = dimension(from, at => from.values[at]);
-    if (from.labels) Object.assign(found, {range: [-0.5, from.labels.length - 0.5],
-      tickvals: from.labels.map((_, at) => at), ticktext: from.labels.map(text => plain(short(text)))});
+    if (from.labels && from.labels.length <= 40) Object.assign(found, {range: [-0.5, from.labels.length - 0.5],
+      tickvals: from.labels.map((_, at) => at), ticktext: from.labels.map(text => short(text, 26))});
     return found;
   });
   const last = dimension(own, at => scaled(all[at]));
@@ -605,7 +610,7 @@ function drawParallel() {
 }
 
 function drawScatter() {
-  const own = measure(), all = values(), from = inputs[byId('input').value], place = byId('scatter');
+  const own = measure(), all = values(), from = across[byId('input').value], place = byId('scatter');
   const groups = {good: [], bad: [], none: []};
   data.runs.forEach((_, at) => {
     if (from.values[at] === null) return;
@@ -700,10 +705,13 @@ function drawMeasure() {
   document.querySelectorAll('.of-measure').forEach((block, at) => { block.hidden = at % count !== index; });
   drawIndices(); drawParallel(); drawScatter(); drawHeat();
 }
-function drawAll() { data.measures.forEach(drawHistogram); drawMeasure(); }
+function drawAll() {
+  data.measures.forEach(drawHistogram);
+  if (data.measures.length) drawMeasure();
+}
 
-byId('measure').addEventListener('change', drawMeasure);
-byId('input').addEventListener('change', drawScatter);
+byId('measure')?.addEventListener('change', drawMeasure);
+byId('input')?.addEventListener('change', drawScatter);
 document.addEventListener('click', event => {
   if (!event.target.classList.contains('copy')) return;
   const button = event.target, code = button.parentElement.querySelector('code');
@@ -717,6 +725,6 @@ document.addEventListener('click', event => {
 });
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', drawAll);
 let pending;
-addEventListener('resize', () => { clearTimeout(pending); pending = setTimeout(() => { drawParallel(); drawHeat(); }, 200); });
+addEventListener('resize', () => { clearTimeout(pending); pending = setTimeout(() => { if (data.measures.length) { drawParallel(); drawHeat(); } }, 200); });
 drawAll();
 """
