@@ -21,7 +21,10 @@ pub(crate) fn campaign(options: &Options) -> ExitCode {
     let python = std::env::var_os(VARIABLE).unwrap_or_else(|| PYTHON.into());
     let shown = python.to_string_lossy().into_owned();
     let found = Command::new(&python)
-        .args(["-c", "import importlib.util as u, sys; sys.exit(0 if u.find_spec('aso_ftc') else 9)"])
+        .args([
+            "-c",
+            "import importlib.util as u, sys; sys.exit(0 if u.find_spec('aso_ftc') else 9)",
+        ])
         .status();
     let sentence = match found {
         Ok(status) if status.success() => {

@@ -14,8 +14,10 @@
 //! | amplification at one frequency | [`frequency_response`] |
 //! | z for a step or a ramp of w | [`step_response`], [`ramp_response`] |
 //! | bounds of errors and states of the loop of [`crate::aso`] under bounded faults | [`fault_bounds`] |
+//! | the same of a sampled loop between its samples, too | [`gains_between_samples`] |
 //! | response of that loop to a reversal of friction | [`reversal`] |
 
+mod between_samples;
 mod energy;
 mod fault;
 mod fault_loop;
@@ -26,6 +28,7 @@ mod peak_gain;
 mod trace;
 mod transient;
 
+pub use between_samples::{GainsBetweenSamples, gains_between_samples};
 pub use energy::{Energy, energy};
 pub use fault::{FaultBounds, Reversal, fault_bounds, reversal};
 pub use fault_loop::{fault_rate_system, fault_system};

@@ -1,8 +1,8 @@
 //! Analyses the closed loop of a design: the numbers of the report.
 
 use control::response::{
-    energy, fault_rate_system, fault_system, frequency_grid, frequency_response, h_infinity,
-    peak_gain, ramp_response, step_response,
+    energy, fault_rate_system, fault_system, frequency_grid, frequency_response,
+    gains_between_samples, h_infinity, peak_gain, ramp_response, step_response,
 };
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
@@ -13,6 +13,8 @@ use super::signals::Fault;
 
 /// Relative width of the brackets of peak gains and norms.
 const WIDTH: f64 = 1e-3;
+/// The parts of a sampling interval in which a fault may change and at which the states are read.
+const PARTS: u32 = 16;
 /// Relative band of the settling time: a response has settled when it stays within this fraction of
 /// its largest distance.
 const SETTLED: f64 = 0.02;
@@ -72,16 +74,28 @@ impl<'a> Loops<'a> {
         channels.zip(&designed.linear.faults)
     }
 
+    /// Returns the peak-to-peak gains of [x; e; eps] from faults, from their rates, and from the part of
+    /// them that the compensation leaves. Those of a sampled loop hold between its samples, too.
+    fn peak_gains(&self) -> Result<[DMatrix<f64>; 3], Error> {
+        let ControllerDesign { extended, plant, gains, domain, .. } = self.designed;
+        if let Domain::Sampled { period } = *domain {
+            let found = gains_between_samples(extended, plant, gains, period, (PARTS, WIDTH))?;
+            return Ok([found.of_faults, found.of_rates, found.uncancelled]);
+        }
+        let gliding = peak_gain(&self.of_rates, WIDTH)?.upper;
+        let q = plant.f_a.ncols();
+        let [rates, left] = [0, q].map(|first| gliding.columns(first, q).into_owned());
+        Ok([peak_gain(&self.of_faults, WIDTH)?.upper, rates, left])
+    }
+
     /// Returns the peak-to-peak gains from each fault to each output, and the resulting bounds.
     pub(crate) fn bounds(&self) -> Result<Vec<Bound>, Error> {
-        let jumping = peak_gain(&self.of_faults, WIDTH)?.upper;
-        let gliding = peak_gain(&self.of_rates, WIDTH)?.upper;
-        let q = self.designed.plant.f_a.ncols();
+        let [jumping, gliding, uncancelled] = self.peak_gains()?;
         let mut found = Vec::new();
         for (column, fault) in self.faults() {
             for (at, &row) in self.outputs.positions.iter().enumerate() {
                 let (of_fault, of_rate) = (jumping[(row, column)], gliding[(row, column)]);
-                let left = gliding[(row, q + column)];
+                let left = uncancelled[(row, column)];
                 let constant = self.designed.extended.plant.a_f.row(column).amax() <= 0.0;
                 let by_rate = match (fault.rate_bound, fault.bound) {
                     (Some(rate), Some(bound)) if constant => Some(of_rate * rate + left * bound),

@@ -74,7 +74,7 @@ pub fn fault_rate_system(
 }
 
 /// The state matrix of both systems: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0, `A_0` - L `C_0`].
-fn loop_dynamics(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
+pub(super) fn loop_dynamics(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
     let (n, q) = plant.f_a.shape();
     let mut a = DMatrix::zeros(2 * n + q, 2 * n + q);
     a.view_mut((0, 0), (n, n)).copy_from(&gains.controlled_dynamics(plant));

@@ -57,8 +57,8 @@ pub fn step_response(system: &StateSpace, input: usize) -> Result<TimeResponse, 
 /// Computes the response to an input that rises linearly from 0 to 1 over `duration` and then stays
 /// at 1.
 ///
-/// Same as [`step_response`], with a new grid at the end of the ramp. In sampled time the duration
-/// is rounded to samples, at least one.
+/// Same as [`step_response`], with a new grid at the end of the ramp. In sampled time the input has the
+/// values of the ramp at the samples; the end of the ramp may lie between two of them.
 ///
 /// # Errors
 ///
@@ -87,15 +87,24 @@ fn response(system: &StateSpace, input: usize, rise: Option<f64>) -> Result<Time
     let modes = Modes::new(&eigenvalues, system.domain);
     let mut simulation = GridSimulation::from_rest(system);
     if let Some(rise) = rise {
-        let rise = modes.whole(rise);
+        let (whole, rest) = modes.samples_in(rise);
         simulation.slope[input] = 1.0 / rise;
-        simulation.follow(&modes.segments(rise)?)?;
+        if whole > 0.0 {
+            simulation.follow(&modes.segments(whole)?)?;
+        }
+        if rest > 0.0 {
+            simulation.slope[input] = (1.0 - whole / rise) / rest;
+            simulation.follow(&[Segment { step: rest, count: 1 }])?;
+        }
         simulation.slope[input] = 0.0;
     }
     simulation.input[input] = 1.0;
     simulation.follow(&modes.segments(f64::INFINITY)?)?;
     simulation.finished()
 }
+
+/// Relative distance from a whole number of samples within which a duration is one.
+const ON_A_SAMPLE: f64 = 1e-9;
 
 /// Time constants of a system, and its time step.
 struct Modes {
@@ -131,6 +140,20 @@ impl Modes {
         let mut lives: Vec<_> = exponents.map(life).collect();
         lives.sort_by(|x, y| x.0.total_cmp(&y.0));
         Self { lives, period }
+    }
+
+    /// Divides the duration of a ramp: the whole samples in it, and one more, or none, that reaches its
+    /// end. In continuous time all of it, and nothing.
+    fn samples_in(&self, time: f64) -> (f64, f64) {
+        if self.period == 0.0 {
+            return (time, 0.0);
+        }
+        let samples = time / self.period;
+        let nearest = samples.round();
+        if nearest > 0.0 && (samples - nearest).abs() <= ON_A_SAMPLE * nearest {
+            return (nearest * self.period, 0.0);
+        }
+        (samples.floor() * self.period, self.period)
     }
 
     /// Rounds a time to samples, at least one.

@@ -1,3 +1,4 @@
+mod between;
 mod extremes;
 mod fault;
 mod norms;

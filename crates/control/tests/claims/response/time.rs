@@ -76,10 +76,12 @@ fn sampled_responses_are_those_of_the_recursion() {
     let a = matrix(3, 3, &[0.99, 0.1, 0.0, 0.0, -0.6, 0.5, 0.0, 0.0, 0.0]);
     let period = 0.01;
     let system = single(a, &[1.0, 0.5, 1.0], &[1.0, 2.0, -1.0], Domain::Sampled { period });
-    for rise in [0_i32, 7] {
-        let trace = match rise {
-            0 => step_response(&system, 0).unwrap(),
-            _ => ramp_response(&system, 0, f64::from(rise) * period).unwrap(),
+    // The ends of the last two ramps lie between two samples.
+    for rise in [0.0, 7.0, 7.4, 0.3] {
+        let trace = if rise > 0.0 {
+            ramp_response(&system, 0, rise * period).unwrap()
+        } else {
+            step_response(&system, 0).unwrap()
         };
         let mut state = matrix(3, 1, &[0.0; 3]);
         let mut seen = 0;
@@ -90,7 +92,7 @@ fn sampled_responses_are_those_of_the_recursion() {
                 assert!((trace.output[(0, seen)] - exact).abs() < 1e-11, "{rise} {k}");
                 seen += 1;
             }
-            let input = if rise > 0 { f64::from(k.min(rise)) / f64::from(rise) } else { 1.0 };
+            let input = if rise > 0.0 { (f64::from(k) / rise).min(1.0) } else { 1.0 };
             state = &system.a * state + &system.b * input;
         }
         assert_eq!(seen, trace.time.len());

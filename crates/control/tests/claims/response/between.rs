@@ -1,0 +1,120 @@
+//! Sampled loops between their samples, against a simulation in steps of a fraction of the sample time.
+
+use crate::paper::CONTROLLER_POLES;
+use control::aso::{Estimator, FaultyPlant, Gains};
+use control::controller::controller;
+use control::faults::ExtendedPlant;
+use control::hold::zero_order_hold;
+use control::placement::real_poles;
+use control::response::{fault_rate_system, fault_system, gains_between_samples, peak_gain};
+use control::sampled::{design, sampled_poles};
+use control::{Domain, StateSpace};
+use nalgebra::{DMatrix, DVector};
+
+const WIDTH: f64 = 1e-3;
+
+/// The pendulum of the paper, and its controller sampled at `period`.
+fn sampled(period: f64, estimator: Estimator) -> (ExtendedPlant, FaultyPlant, Gains) {
+    let extended = ExtendedPlant::without_filter(crate::paper::plant());
+    let feedback = sampled_poles(&real_poles(&CONTROLLER_POLES), period).unwrap();
+    let fast = real_poles(&[-1200.0, -1500.0, -1800.0, -2100.0, -3000.0]);
+    let observer = sampled_poles(&fast, period).unwrap();
+    let made = design(&extended, period, estimator, &feedback, &observer, None).unwrap();
+    (extended, made.plant, made.gains)
+}
+
+/// The sums of the moduli of the states' impulse responses, from the impulses of each part of an
+/// interval; of each state the largest over the parts at which it is read. `fault` gives the fault at
+/// a part, counted from the impulse.
+fn simulated(
+    extended: &ExtendedPlant,
+    (controller, period): (&StateSpace, f64),
+    (parts, samples): (usize, usize),
+    fault: impl Fn(usize) -> f64,
+) -> DVector<f64> {
+    let FaultyPlant { a, b, c, f_a, .. } = &extended.plant;
+    let n = a.nrows();
+    let (phi, gamma) = zero_order_hold(a, b, period / parts as f64).unwrap();
+    let (_, entry) = zero_order_hold(a, f_a, period / parts as f64).unwrap();
+    let mut sums = DMatrix::<f64>::zeros(n, parts);
+    for impulse in 0..parts {
+        let mut x = DVector::zeros(n);
+        let mut own = DVector::zeros(controller.a.nrows());
+        for k in 0..samples {
+            let y = c * &x;
+            let u = &controller.c * &own + &controller.d * &y;
+            own = &controller.a * own + &controller.b * y;
+            for part in 0..parts {
+                let mut sum = sums.column_mut(part);
+                sum += x.abs();
+                let at = k * parts + part;
+                let f = if at < impulse { 0.0 } else { fault(at - impulse) };
+                x = &phi * x + &gamma * &u + &entry * DVector::from_element(1, f);
+            }
+        }
+    }
+    DVector::from_iterator(n, sums.row_iter().map(|row| row.max()))
+}
+
+#[test]
+fn gains_between_samples_are_those_of_a_simulation_in_small_steps() {
+    for (estimator, period) in [(Estimator::Prediction, 0.002), (Estimator::Current, 0.01)] {
+        let (extended, plant, gains) = sampled(period, estimator);
+        let domain = Domain::Sampled { period };
+        let own = controller(&plant, &gains, domain).unwrap();
+        let found = gains_between_samples(&extended, &plant, &gains, period, (8, WIDTH)).unwrap();
+        let samples = (4.0 / period) as usize;
+        let pulse = |at: usize| f64::from(u8::from(at == 0));
+        let same = simulated(&extended, (&own, period), (8, samples), pulse);
+        let finer = simulated(&extended, (&own, period), (32, samples), pulse);
+        let part = period / 8.0;
+        let ramp = |at: usize| if at == 0 { 0.0 } else { part };
+        let rates = simulated(&extended, (&own, period), (8, samples), ramp);
+        for state in 0..4 {
+            let gain = found.of_faults[(state, 0)];
+            assert!(
+                (gain / same[state] - 1.0).abs() < 2.0 * WIDTH,
+                "{state}: {gain} {}",
+                same[state]
+            );
+            assert!((finer[state] / gain - 1.0).abs() < 0.05, "{state}: {gain} {}", finer[state]);
+            let of_rate = found.of_rates[(state, 0)];
+            assert!(
+                (of_rate / rates[state] - 1.0).abs() < 2.0 * WIDTH,
+                "{state}: {of_rate} {}",
+                rates[state]
+            );
+        }
+    }
+}
+
+#[test]
+fn with_one_part_the_gains_are_those_at_the_samples() {
+    for estimator in [Estimator::Prediction, Estimator::Current] {
+        let period = 0.005;
+        let (extended, plant, gains) = sampled(period, estimator);
+        let domain = Domain::Sampled { period };
+        let found = gains_between_samples(&extended, &plant, &gains, period, (1, WIDTH)).unwrap();
+        let of_faults = peak_gain(&fault_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
+        let of_rates =
+            peak_gain(&fault_rate_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
+        for row in 0..9 {
+            let [own, other] = [found.of_faults[(row, 0)], of_faults.upper[(row, 0)]];
+            assert!((own / other - 1.0).abs() < 3.0 * WIDTH, "{row}: {own} {other}");
+            let [own, other] = [found.of_rates[(row, 0)], period * of_rates.upper[(row, 0)]];
+            assert!((own / other - 1.0).abs() < 3.0 * WIDTH, "{row}: {own} {other}");
+        }
+    }
+}
+
+#[test]
+fn a_slow_sampled_loop_is_farther_from_rest_between_its_samples_than_at_them() {
+    let period = 0.01;
+    let (extended, plant, gains) = sampled(period, Estimator::Prediction);
+    let found = gains_between_samples(&extended, &plant, &gains, period, (16, WIDTH)).unwrap();
+    let domain = Domain::Sampled { period };
+    let at_samples = peak_gain(&fault_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
+    for state in 2..4 {
+        assert!(found.of_faults[(state, 0)] > 1.02 * at_samples.lower[(state, 0)]);
+    }
+}
