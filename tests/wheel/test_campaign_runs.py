@@ -425,3 +425,14 @@ def test_the_command_passes_campaigns_to_python(campaign, tmp_path):
     found = subprocess.run(words, capture_output=True, text=True, env=nowhere)
     assert found.returncode == 2
     assert found.stderr.startswith("error: campaigns need Python, and /nowhere/python cannot be started")
+
+
+def test_the_claims_of_the_paper_have_the_values_of_the_command(campaign, tmp_path):
+    file = campaign(text='system = "paper"\nclaims = true\n')
+    assert done(file, "--out", tmp_path / "out", "--workers", 1)[0] == 0
+    row = af.campaign.load(tmp_path / "out").table.iloc[0]
+    # The table of docs/how-to/reproduce.md, which the command checks.
+    shown = {"cart limit cycle": 0.1647, "pendulum limit cycle": 0.112, "cart residual": 0.962e-3}
+    shown |= {"pendulum residual": 1.75e-3, "rms of f_fric - f_hat": 0.28}
+    for name, value in shown.items():
+        assert row[name] == pytest.approx(value, rel=2e-2), name
