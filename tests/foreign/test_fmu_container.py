@@ -3,7 +3,6 @@
 import logging
 import re
 
-import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
@@ -99,23 +98,27 @@ def test_a_container_of_both_fmus_is_valid(packed, unpacked, tmp_path, complaint
     assert complaints() == [LOOP]
 
 
-def test_a_container_couples_both_fmus_with_the_bits_of_fmpy(packed, unpacked, tmp_path, capfd):
+# The library of the container once crashed in a process in which other tests had loaded libraries before.
+SIMULATION = """
+import sys
+import fmpy, numpy
+
+path, step, stop, *columns = sys.argv[1:]
+options = {"step_size": float(step), "output_interval": float(step), "output": columns}
+result = fmpy.simulate_fmu(path, stop_time=float(stop), debug_logging=True, **options)
+numpy.save(path + ".npy", result)
+"""
+
+
+def test_a_container_couples_both_fmus_with_the_bits_of_fmpy(packed, unpacked, tmp_path, python):
     path = container(packed, unpacked, tmp_path)
     names, expected = held_loop(unpacked, [(k * STEP, STEP) for k in range(COUNT)])
     columns = [f"{role}.{name}" for role, name in names]
-    capfd.readouterr()
-    result = fmpy.simulate_fmu(
-        str(path),
-        stop_time=COUNT * STEP,
-        step_size=STEP,
-        output_interval=STEP,
-        output=columns,
-        debug_logging=True,
-    )
+    done = python("-c", SIMULATION, path, STEP, COUNT * STEP, *columns)
+    assert (done.returncode, done.stderr) == (0, "")
+    result = np.load(f"{path}.npy")
     assert result["time"] == pytest.approx(np.arange(COUNT + 1) * STEP, abs=1e-9)
     expect_equal(names, expected, np.transpose([result[column][1:] for column in columns]))
-    log = capfd.readouterr()
-    entries = [LOG_LINE.fullmatch(line) for line in log.out.splitlines()]
-    assert all(entries), log.out
+    entries = [LOG_LINE.fullmatch(line) for line in done.stdout.splitlines()]
+    assert all(entries), done.stdout
     assert {entry.groups() for entry in entries if entry[1] != "OK"} == PROGRESS
-    assert log.err == ""
