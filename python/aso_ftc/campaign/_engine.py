@@ -35,6 +35,9 @@ _AHEAD = 2
 _SETTLING = 1.0
 # Seconds for which the number of threads of a cluster is taken as known.
 _KNOWN = 5.0
+_LOGGERS = [
+    f"distributed{name}" for name in ("", ".client", ".scheduler", ".nanny", ".worker", ".core", ".batched")
+]
 # Seconds between two looks at the tasks.
 _PAUSE = 0.005
 
@@ -49,19 +52,30 @@ def execute(
     if not folder.manifest["complete"]:
         work = _Work(campaign, folder, progress)
         if work.open_parts:
-            with _client(workers, scheduler) as client:
+            with _quiet(), _client(workers, scheduler) as client:
                 work.perform(client, scheduler)
         work.close()
     return load(folder.path)
 
 
 @contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Silence Dask's messages: what happens to workers is in the results."""
+    loggers = [logging.getLogger(name) for name in _LOGGERS]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
+
+
+@contextlib.contextmanager
 def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     """A client of the scheduler at an address, or of local processes."""
     distributed = package("distributed")
-    # What happens to workers is in the results: Dask's own messages repeat it.
-    for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
-        logging.getLogger(name).setLevel(logging.CRITICAL)
     if scheduler is not None:
         if workers is not None:
             raise ConfigurationError("workers are for local processes, a scheduler has its own")
@@ -85,6 +99,7 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
             processes=True,
             dashboard_address=":0",
             local_directory=place,
+            silence_logs=logging.CRITICAL,
         )
         client = distributed.Client(cluster, set_as_default=False)
         try:
