@@ -73,7 +73,7 @@ def test_regulators_of_stabilisable_plants_are_those_of_scipy(aso_ftc, tmp_path,
     assert gain(report, "K_x") == pytest.approx(expected, rel=1e-7, abs=1e-7 * np.abs(expected).max())
     assert "(A, B) is stabilisable" in [check["condition"] for check in report["checks"]]
     values = " ".join(report["warnings"])
-    assert "eigenvalue -0.7 1/s" in values and "eigenvalue -1.2 + 2i 1/s" in values
+    assert "eigenvalue -0.7 1/s" in values and "eigenvalues -1.2 ± 2i 1/s" in values
 
 
 @pytest.mark.parametrize("sampled", [False, True])
@@ -139,6 +139,27 @@ def test_an_observer_assigns_what_the_measurements_show(aso_ftc, tmp_path, sampl
     found = np.linalg.eigvals(a_0 - l @ np.hstack([c, np.zeros((1, 1))]))
     for value in wanted:
         assert np.abs(found - value).min() < 1e-6
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+@pytest.mark.parametrize("norm", ["", "h_infinity = 40"])
+def test_regions_and_norms_are_met_where_the_fixed_modes_are_inside(aso_ftc, tmp_path, sampled, norm):
+    """Two states of their own, and one that is neither reached nor shown."""
+    a = np.array([[0.0, 1, 0], [2, -1, 0], [0, 0, -4]])
+    b, c = np.array([[0.0], [1], [0]]), np.array([[1.0, 0, 0]])
+    text = matrices(A=a, B=b, C=c) + 'actuator_faults = "all"\nrobustness.cases = 10\n'
+    for table, decay in (("feedback", 2), ("observer", 3)):
+        region = f"decay = {decay}" if sampled else f"decay = {decay}, disc = {{ center = -10, radius = 8 }}"
+        text += f"{table}.region = {{ {region} }}\n"
+        text += f"{table}.{norm}\n" if norm else ""
+    text += f"sample_time = {PERIOD}\n" if sampled else ""
+    report = reported(aso_ftc, tmp_path, text)
+    for table, decay in (("feedback", 2), ("observer", 3)):
+        found = np.array([complex(*pair) for pair in report[table]["eigenvalues"]])
+        found = np.log(found) / PERIOD if sampled else found
+        assert (found.real < -decay).all() and np.abs(found + 4).min() < 1e-9
+        assert sampled or (np.abs(found + 10) < 8).all()
+    assert sum("keeps its eigenvalue" in warning for warning in report["warnings"]) == 2
 
 
 PLANT = """A = [[1, 0], [0, -2]]

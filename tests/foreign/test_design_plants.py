@@ -12,6 +12,8 @@ from pythonfmu import FmuBuilder
 
 from build import linearised_pendulum
 from conftest import ROOT
+from design_loop import packed_plant
+from test_design_refusals import NO_DERIVATIVES, NO_EXCHANGE, SERVO, poorer
 from test_swap import shared_python
 
 HERE = ROOT / "tests" / "foreign"
@@ -160,3 +162,24 @@ def test_an_fmu_whose_library_is_missing_names_the_option_and_one_that_fails_to_
     (tmp_path / "plant.toml").write_text(text, encoding="utf-8")
     done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml")
     assert done.returncode == 2 and "plant.toml:9:11: " in done.stderr and "libnothing.so" in done.stderr
+
+
+def test_an_fmu_without_a_step_is_linearised_like_one_with_a_step(aso_ftc, tmp_path):
+    """DcServo by steps, with and without its stepSize; held by friction no step gives a result."""
+    found = []
+    for step in ((), ((r' stepSize="[^"]*"', ""),)):
+        changes = (NO_EXCHANGE, NO_DERIVATIVES, *step)
+        poorer(packed_plant(aso_ftc, "DcServo"), tmp_path / "Servo.fmu", *changes)
+        text = 'states = ["theta", "omega"]\n' + SERVO
+        (tmp_path / "plant.toml").write_text(text, encoding="utf-8")
+        done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml", "--json")
+        assert done.returncode == 0, done.stderr
+        found.append(json.loads(done.stdout)["plant"]["matrices"])
+    for one, other in zip(*found, strict=True):
+        assert np.array(one["values"]) == pytest.approx(np.array(other["values"]), rel=1e-9, abs=1e-9)
+    (tmp_path / "plant.toml").write_text(text.replace("friction = 0", "friction = 1"), encoding="utf-8")
+    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml")
+    assert done.returncode == 2 and "plant.toml:2:9: " in done.stderr
+    assert (
+        "states no stepSize in its DefaultExperiment" in done.stderr and "`linearisation_step`" in done.stderr
+    )

@@ -168,7 +168,8 @@ fn check_controllable(
     let refuse = |error: Error| file.error(&["B", "actuators"], error.to_string());
     let rank = controllability(&linear.a, &linear.b).map_err(refuse)?;
     let state = |at: usize| linear.states[at].name.clone();
-    for mode in uncontrollable_modes(&linear.a, &linear.b).map_err(refuse)? {
+    let modes = uncontrollable_modes(&linear.a, &linear.b).map_err(refuse)?;
+    for mode in modes.into_iter().filter(above_or_on_the_real_axis) {
         let stable = is_clearly_stable(mode.eigenvalue, &linear.a, Domain::Continuous);
         let stable = stable.map_err(refuse)? && rank.rank > 0;
         let message = format!(
@@ -186,6 +187,11 @@ fn check_controllable(
         warnings.push(error);
     }
     Ok((rank, from_uncontrollable(&linear.a, &linear.b).map_err(refuse)?))
+}
+
+/// Selects one mode of each complex pair.
+fn above_or_on_the_real_axis(mode: &Mode) -> bool {
+    mode.eigenvalue.im >= 0.0
 }
 
 /// What follows from a mode that no gain moves.
@@ -207,7 +213,8 @@ fn check_detectable(
     let found = detectability(&extended.plant, Domain::Continuous)
         .map_err(|error| file.error(&FAULTS, error.to_string()))?;
     let measurements = names(linear.measurements.iter().map(|signal| signal.name.as_str()));
-    for (mode, stable) in &found.unobservable {
+    let modes = found.unobservable.iter();
+    for (mode, stable) in modes.filter(|(mode, _)| above_or_on_the_real_axis(mode)) {
         let message = format!(
             "the measurements {measurements} show {} of {} states only: no observer moves {}{}",
             found.observability.rank,

@@ -33,16 +33,16 @@ fn described_at(
 ) -> String {
     let states: Vec<_> = mode.dominant.iter().map(|&state| name(state)).collect();
     let verb = if states.len() == 1 { "dominates" } else { "dominate" };
-    format!("the eigenvalue {}{unit}, which {} {verb}", shown(eigenvalue), states.join(", "))
+    let kind = if eigenvalue.im == 0.0 { "the eigenvalue" } else { "the eigenvalues" };
+    format!("{kind} {}{unit}, which {} {verb}", shown(eigenvalue), states.join(", "))
 }
 
-/// Six digits, such that a number read from the text is within 1e-5 of the value.
+/// Six digits, such that a number read from the text is within 1e-5 of the value; a complex eigenvalue
+/// with its conjugate.
 fn shown(value: Complex<f64>) -> String {
-    let real = digits(value.re);
     match value.im {
-        0.0 => real,
-        im if im > 0.0 => format!("{real} + {}i", digits(im)),
-        im => format!("{real} - {}i", digits(-im)),
+        0.0 => digits(value.re),
+        im => format!("{} ± {}i", digits(value.re), digits(im.abs())),
     }
 }
 
@@ -65,6 +65,6 @@ mod tests {
         let values =
             [(-2.0, 0.0), (-1.234_567_8, 2.0 / 3.0), (0.0, -1.0), (1e-17, 0.0), (-4e7, 0.0)];
         let texts = values.map(|(re, im)| shown(Complex::new(re, im)));
-        assert_eq!(texts, ["-2", "-1.23457 + 0.666667i", "0 - 1i", "1e-17", "-4e7"]);
+        assert_eq!(texts, ["-2", "-1.23457 ± 0.666667i", "0 ± 1i", "1e-17", "-4e7"]);
     }
 }
