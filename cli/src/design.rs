@@ -3,6 +3,7 @@
 mod outputs;
 mod terminal;
 
+use std::ffi::OsString;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -31,6 +32,9 @@ pub(crate) struct Options {
     /// Also write the worst plant within the tolerances, as a plant file
     #[arg(long, value_name = "FILE")]
     worst_case: Option<PathBuf>,
+    /// Load a shared library first, its symbols visible to the plant's FMU; may be repeated
+    #[arg(long, value_name = "LIBRARY")]
+    preload: Vec<OsString>,
     /// Overwrite files that another design, or another program, has written
     #[arg(long)]
     force: bool,
@@ -47,6 +51,9 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     outputs.extend(options.fmu.as_deref().map(|path| ("--fmu", path)));
     outputs.extend(options.worst_case.as_deref().map(|path| ("--worst-case", path)));
     check_distinct(&inputs(options, None), &outputs)?;
+    for library in &options.preload {
+        fmu_import::preload(library)?;
+    }
     let mut made = design::design(&options.plant)?;
     check_distinct(&inputs(options, made.model.as_deref()), &outputs)?;
     if !options.force {

@@ -94,6 +94,12 @@ impl<D: Number> StribeckLaw<D> {
         }
     }
 
+    /// Whether there is static friction, so that a cart can be held.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.limit() > D::zero()
+    }
+
     /// The largest friction at rest in N: `F_s`, rounded exactly as `magnitude(0.0)` is.
     ///
     /// As both are the same number, rounding never starts a cart that breaks away backward.

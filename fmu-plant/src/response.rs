@@ -20,6 +20,8 @@ impl<D: Number> Response<D> {
     /// `g(v) sign(v)` of a sliding cart, the balancing force of a held one.
     ///
     /// A force that has just jumped can exceed the largest friction; the friction is then `F_s`.
+    /// Where there is no static friction, nothing holds the cart: its derivatives with respect to
+    /// state and force are those of a cart without friction.
     #[must_use]
     pub fn new(
         functions: &impl Functions<D>,
@@ -30,6 +32,9 @@ impl<D: Number> Response<D> {
     ) -> Self {
         let body = RigidBody::new(parameters);
         let law = StribeckLaw::new(parameters);
+        if regime == Regime::Stick && !law.holds() {
+            return Self { friction: D::zero(), slope: body.slide(functions, state, force) };
+        }
         if regime == Regime::Stick {
             let friction = law.holding(body.balancing_force(functions, state, force));
             return Self { friction, slope: body.stick(functions, state) };

@@ -42,6 +42,16 @@ class Matrices:
         return a_0 - gain @ c_0 @ (a_0 if self.current else np.eye(len(a_0)))
 
 
+def commands(own):
+    """u = K_x x_hat + K_f f_hat as a matrix for [x; x_hat; f_hat]; with a current estimator after the correction."""
+    n, q = own.n, own.q
+    x, x_hat, f_hat = np.split(np.eye(2 * n + q), [n, 2 * n])
+    if own.current:
+        innovation = own.C @ (x - x_hat)
+        x_hat, f_hat = x_hat + own.L_x @ innovation, f_hat + own.L_f @ innovation
+    return own.K_x @ x_hat + own.K_f @ f_hat
+
+
 def closed_loop(own, losses=None):
     """A, B, C, D of the loop; `losses` reduce the effect of each actuator of the plant."""
     n, q = own.n, own.q

@@ -13,6 +13,7 @@ from design_loop import Designed, changed, coupled, packed_plant
 from design_oracle import (
     Matrices,
     closed_loop,
+    commands,
     frequency_response,
     lyapunov,
     responses,
@@ -178,13 +179,13 @@ def test_the_peak_gains_are_integrals_of_the_impulse_response(case):
             assert bound["largest"] is None
 
 
-def driven(system, fault, rate, size, period, times):
+def driven(system, direction, rate, size, period, times):
     """States and fault after a jump by `size`, or a rise to it at a rate: one row for each time."""
     a, b, *_ = system
     n = len(a)
     # [states; fault; its rate]
     whole = np.zeros((n + 2, n + 2))
-    whole[:n, :n], whole[:n, n] = a, b[:, fault]
+    whole[:n, :n], whole[:n, n] = a, b @ direction
     start = np.zeros(n + 2)
     if period is not None:
         assert rate is None
@@ -200,24 +201,63 @@ def driven(system, fault, rate, size, period, times):
     return np.where((times < end)[:, None], before, after)
 
 
+def between(report, states, commands, fault, times):
+    """The plant's states after `times` within a sample, from those at the sample, with held commands and faults."""
+    a, b, f_a = (plant_matrix(report, name) for name in ("A", "B", "F_a"))
+    n = len(a)
+    inputs = np.hstack([b, f_a])
+    whole = np.zeros((n + inputs.shape[1],) * 2)
+    whole[:n, :n], whole[:n, n:] = a, inputs
+    rows = zip(states[:, :n], commands, times, strict=True)
+    return np.array([(expm(whole * t) @ np.concatenate([x, u, fault]))[:n] for x, u, t in rows])
+
+
+def plant_matrix(report, name):
+    """A matrix of the plant in continuous time."""
+    return np.array(next(own["values"] for own in report["plant"]["matrices"] if own["name"] == name))
+
+
 def test_the_responses_to_changes_of_faults_are_those_of_scipy(case):
+    """States, errors and commands, each fault alone and all together; between samples, too."""
     designed, own, _ = case
     system = closed_loop(own)
     names, order = outputs(designed), len(system[0])
+    actuators = [f"command {actuator['name']}" for actuator in designed.design["actuators"]]
+    together = [steps for steps in designed.report["steps"] if len(steps["parts"]) > 1]
+    assert len(together) == (len(stated_faults(designed)) > 1)
     for steps in designed.report["steps"]:
-        fault = faults(designed).index(steps["fault"])
-        row = np.hstack([system[2], system[3][:, [fault]]])
+        direction = np.zeros(own.q)
+        for part in steps["parts"]:
+            direction[faults(designed).index(part["name"])] = part["value"] / steps["size"]
+        rows = np.hstack([system[2], system[3] @ direction[:, None]])
+        rows = np.vstack([rows, np.hstack([commands(own), np.zeros((len(actuators), 1))])])
+        every = [*names, *actuators]
+        shown = [curve["name"] for curve in steps["curves"]]
+        assert set(actuators) <= set(shown)
         for curve in steps["curves"]:
-            at, times = names.index(curve["name"]), np.array(curve["times"])
-            change = (fault, steps["rate"], steps["size"], own.period, times[::7])
-            wanted = driven(system, *change)[:, : order + 1] @ row[at]
+            at, times = every.index(curve["name"]), np.array(curve["times"])
+            some = times[::7]
+            samples = some if own.period is None else np.floor(some / own.period + 1e-6) * own.period
+            change = (direction, steps["rate"], steps["size"], own.period, samples)
+            states = driven(system, *change)[:, : order + 1]
+            wanted = states @ rows[at]
+            within = np.flatnonzero(some - samples > 1e-6 * (own.period or np.inf))
+            if own.period is not None:
+                is_state = at < len(designed.report["plant"]["states"])
+                assert (len(within) > 0) == (is_state or curve["name"] in actuators)
+                if is_state:
+                    u = states[within] @ rows[len(names) :].T
+                    fault = direction * steps["size"]
+                    elapsed = (some - samples)[within]
+                    wanted[within] = between(designed.report, states[within], u, fault, elapsed)[:, at]
             found = np.array(curve["values"])
             # If the fault does not affect an error, the error is due to rounding.
             band = 1e-5 * abs(found).max() + 1e-17 * steps["size"]
             assert found[::7] == pytest.approx(wanted, abs=band), curve["name"]
             assert abs(found).max() <= abs(curve["peak"]) * (1 + 1e-12)
             assert abs(found).max() == pytest.approx(abs(curve["peak"]), rel=1e-2)
-            last = np.flatnonzero(abs(found - found[-1]) > 0.02 * abs(found).max())[-1]
+            distance = abs(found - found[-1])
+            last = np.flatnonzero(distance > 0.02 * distance.max())[-1]
             assert times[last] <= curve["settling_time"] <= times[last + 1]
 
 
@@ -293,9 +333,7 @@ def test_theorem_1_is_that_of_scipy(case):
     assert np.array(printed["p"]) == pytest.approx(p, rel=1e-6, abs=1e-6 * abs(p).max())
     free = certificate["free"]
     assert free["delta"] < printed["delta"]
-    assert 2 * beta * np.linalg.norm(np.array(free["p"]) @ fault, 2) == pytest.approx(
-        free["delta"], rel=1e-6
-    )
+    assert 2 * beta * np.linalg.norm(np.array(free["p"]) @ fault, 2) == pytest.approx(free["delta"], rel=1e-6)
     slowest = -np.linalg.eigvals(dynamics).real.max()
     assert 0.99 * slowest < free["decay"] < slowest
 
@@ -323,9 +361,7 @@ def test_the_largest_stable_loss_is_where_an_eigenvalue_becomes_unstable(aso_ftc
     assert low - 1e-3 <= found["largest_stable_loss"] <= high + 1e-3
 
 
-def test_bounds_and_predictions_bracket_the_simulation(
-    aso_ftc, python, packed, tmp_path
-):
+def test_bounds_and_predictions_bracket_the_simulation(aso_ftc, python, packed, tmp_path):
     """Within a factor of 3, as control::response::fault_bounds and reversal state.
 
     Compares bounds of positions and of the error of the estimate, the peaks of the positions after a
@@ -362,9 +398,7 @@ def test_an_fmu_is_made_without_a_compiler(aso_ftc, tmp_path):
 
 
 @pytest.mark.parametrize("period", [0.001, 0.004])
-def test_the_bound_for_a_rate_in_seconds_holds_for_any_sample_time(
-    aso_ftc, python, tmp_path, period
-):
+def test_the_bound_for_a_rate_in_seconds_holds_for_any_sample_time(aso_ftc, python, tmp_path, period):
     """A fault that grows at its largest rate causes nearly the largest error."""
     rate = 10.0  # V/s
     fault = f'faults = [{{ name = "f_u", actuator = "u", bound = 100, rate_bound = {rate} }}]'

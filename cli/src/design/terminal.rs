@@ -38,6 +38,9 @@ pub(crate) fn summarise(report: &Report) {
     for check in report.checks.iter().filter(|check| !check.holds) {
         println!("does not hold: {} ({})", check.condition, check.explanation);
     }
+    for warning in &report.warnings {
+        println!("warning: {warning}");
+    }
     println!("verdict: {}", report.verdict.level.word());
     let checked = |reason: &&String| !reason.starts_with("does not hold: ");
     for reason in report.verdict.reasons.iter().filter(checked) {

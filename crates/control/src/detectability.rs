@@ -10,6 +10,7 @@ pub use visibility::Visibility;
 use crate::aso::FaultyPlant;
 use crate::distance::{Distance, from_unobservable};
 use crate::rank::{Mode, Rank, observability, unobservable_modes};
+use crate::stability::is_clearly_stable;
 use crate::zeros::{Zeros, zeros};
 use crate::{Domain, Error};
 
@@ -93,14 +94,15 @@ impl Detectability {
 pub fn detectability(plant: &FaultyPlant, domain: Domain) -> Result<Detectability, Error> {
     plant.check()?;
     let with_stability = |mode: Mode| {
-        let stable = domain.excess(mode.eigenvalue) < 0.0;
-        (mode, stable)
+        let stable = is_clearly_stable(mode.eigenvalue, &plant.a, domain)?;
+        Ok((mode, stable))
     };
     let modes = unobservable_modes(&plant.a, &plant.c)?;
+    let modes = modes.into_iter().map(with_stability).collect::<Result<_, Error>>()?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     Ok(Detectability {
         observability: observability(&plant.a, &plant.c)?,
-        unobservable: modes.into_iter().map(with_stability).collect(),
+        unobservable: modes,
         hidden: hidden_faults(plant)?,
         augmented: observability(&a_0, &c_0)?,
         distance: from_unobservable(&a_0, &c_0)?,

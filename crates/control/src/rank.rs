@@ -3,8 +3,10 @@
 //!
 //! [`crate::distance`] measures the distance of a pair from the nearest one without the property.
 
+mod part;
 mod staircase;
 
+pub use part::{ControllablePart, controllable_part};
 pub(crate) use staircase::Staircase;
 
 use crate::blocks::to_complex;
@@ -165,7 +167,10 @@ pub fn unobservable_modes(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Vec<Mode
 }
 
 fn uncontrollable_part(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
-    let staircase = Staircase::new(a, b)?;
+    modes_of(&Staircase::new(a, b)?)
+}
+
+fn modes_of(staircase: &Staircase) -> Result<Vec<Mode>, Error> {
     if staircase.answer.is_full() {
         return Ok(Vec::new());
     }
@@ -178,7 +183,7 @@ fn uncontrollable_part(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mode>, 
         let svd = ComplexSvd::new(&shifted)?;
         let (value, vector) = svd.nth_smallest(earlier.count());
         let vector = if value <= same { vector } else { svd.nth_smallest(0).1 };
-        Ok(mode_in_given_coordinates(eigenvalue, &staircase, &vector))
+        Ok(mode_in_given_coordinates(eigenvalue, staircase, &vector))
     };
     found.iter().enumerate().map(mode).collect()
 }

@@ -21,6 +21,7 @@
 mod channel;
 mod delay;
 mod disk;
+mod entries;
 mod hold_time;
 mod noise;
 mod scaling;
@@ -32,6 +33,7 @@ mod worst_case;
 pub use channel::{ChannelMargins, channel_margins};
 pub use delay::{delay_margin, sampled_delay_margin};
 pub use disk::{DiskMargin, disk_margin, scaled_peak};
+pub use entries::{PeakDerivatives, peak_derivatives};
 pub use hold_time::{longest_hold, longest_period};
 pub use noise::noise_gains;
 pub use scaling::ScaledPeak;

@@ -4,6 +4,9 @@ use crate::eigen::eigenvalues;
 use crate::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
+/// Relative error of an eigenvalue near the stability limit.
+const ROUNDING: f64 = 1e-12;
+
 /// How far a matrix is beyond the stability limit; negative when it is stable.
 ///
 /// ```text
@@ -31,6 +34,25 @@ use nalgebra::{Complex, DMatrix};
 pub fn instability(a: &DMatrix<f64>, domain: Domain) -> Result<f64, Error> {
     domain.check()?;
     Ok(largest_excess(&eigenvalues(a)?, domain))
+}
+
+/// Whether an eigenvalue of A is stable by more than its rounding error: 1e-12 of the largest
+/// modulus of the eigenvalues of A.
+///
+/// `a`: n x n. Use it for a mode that no gain moves: one on the stability limit, computed a little
+/// inside, is not stable.
+///
+/// # Errors
+///
+/// Same as [`eigenvalues`]; [`Error::OutOfRange`] for a bad period.
+pub fn is_clearly_stable(
+    eigenvalue: Complex<f64>,
+    a: &DMatrix<f64>,
+    domain: Domain,
+) -> Result<bool, Error> {
+    domain.check()?;
+    let size = eigenvalues(a)?.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    Ok(domain.excess(eigenvalue) < -ROUNDING * size)
 }
 
 /// The largest [`Domain::excess`] of the eigenvalues.

@@ -2,22 +2,19 @@
 
 use control::response::{
     energy, fault_rate_system, fault_system, frequency_grid, frequency_response,
-    gains_between_samples, h_infinity, peak_gain, ramp_response, step_response,
+    gains_between_samples, h_infinity, peak_gain,
 };
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 use super::designed::ControllerDesign;
-use super::report::{Bound, Curve, Frequency, Norm, StepResponse};
+use super::report::{Bound, Frequency, Norm};
 use super::signals::Fault;
 
 /// Relative width of the brackets of peak gains and norms.
 const WIDTH: f64 = 1e-3;
 /// The parts of a sampling interval in which a fault may change and at which the states are read.
 const PARTS: u32 = 16;
-/// Relative band of the settling time: a response has settled when it stays within this fraction of
-/// its largest distance.
-const SETTLED: f64 = 0.02;
 const POINTS_PER_DECADE: u32 = 20;
 
 /// The outputs of the loop: states, state estimation errors, fault estimation errors.
@@ -25,7 +22,7 @@ pub(crate) struct Outputs {
     pub(crate) names: Vec<String>,
     pub(crate) units: Vec<Option<String>>,
     /// Positions in [x; e; eps] of quantities known to the user, without filter states and rates.
-    positions: Vec<usize>,
+    pub(crate) positions: Vec<usize>,
 }
 
 impl Outputs {
@@ -113,38 +110,6 @@ impl<'a> Loops<'a> {
             }
         }
         Ok(found)
-    }
-
-    /// Returns the responses to a change of each fault: as a step, or as a ramp at the bound of its
-    /// rate.
-    pub(crate) fn steps(&self) -> Result<Vec<StepResponse>, Error> {
-        let response = |(column, fault, rate): (usize, &Fault, Option<f64>)| {
-            let size = fault.step.or(fault.bound).unwrap_or(1.0);
-            let mut curves = Vec::new();
-            let trace = match rate {
-                None => step_response(&self.of_faults, column)?,
-                Some(rate) => ramp_response(&self.of_faults, column, size / rate)?,
-            };
-            for (at, &row) in self.outputs.positions.iter().enumerate() {
-                let found = trace.transient(row, SETTLED);
-                curves.push(Curve {
-                    name: self.outputs.names[at].clone(),
-                    unit: self.outputs.units[at].clone(),
-                    peak: size * found.peak,
-                    peak_time: found.peak_time,
-                    settling_time: found.settling_time,
-                    times: trace.time.clone(),
-                    values: trace.output.row(row).iter().map(|value| size * value).collect(),
-                });
-            }
-            let (fault, unit) = (fault.name.clone(), fault.unit.clone());
-            Ok(StepResponse { fault, unit, size, rate, curves })
-        };
-        let each = |(column, fault): (usize, &'a Fault)| {
-            let at_rate = fault.rate_bound.map(|rate| (column, fault, Some(rate)));
-            std::iter::once((column, fault, None)).chain(at_rate)
-        };
-        self.faults().flat_map(each).map(response).collect()
     }
 
     /// Returns the transfer function from the faults, as `system` has them, to their estimation

@@ -1,27 +1,31 @@
 //! Computes the gains for a plant file.
 
+use super::fixed_mode::{described, described_in};
 use super::gains::{FeedbackProblem, GainResult, Refusal, feedback, observer};
 use super::linear_plant::LinearPlant;
 use super::plant_file::PlantFile;
-use super::requirements::Request;
+use super::plausibility::{check_faults, check_limits};
+use super::requirements::{Request, Requirement};
 use control::aso::{Estimator, FaultyPlant, Gains};
 use control::controller::{closed_loop, controller};
 use control::detectability::{Detectability, detectability};
 use control::distance::{Distance, from_uncontrollable};
 use control::faults::ExtendedPlant;
-use control::rank::{Rank, controllability};
+use control::rank::{Mode, Rank, controllability, uncontrollable_modes};
 use control::sampled;
-use control::stability::instability;
+use control::stability::{instability, is_clearly_stable};
 use control::{Domain, Error, StateSpace};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
 /// The entries that errors about faults point at.
-const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
+pub(crate) const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
 
 /// A designed controller with the intermediate results.
 pub(crate) struct ControllerDesign {
     pub(crate) linear: LinearPlant,
+    /// What is unusual in the plant file, with its place.
+    pub(crate) warnings: Vec<PlaceError>,
     /// The plant with fault models and measurement filter, in continuous time.
     pub(crate) extended: ExtendedPlant,
     pub(crate) domain: Domain,
@@ -49,14 +53,16 @@ pub(crate) struct ControllerDesign {
 /// Designs the controller for `file`.
 pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Error> {
     let linear = LinearPlant::of(file)?;
+    let mut warnings = check_limits(file, &linear)?;
     let filter = file.filter.as_deref().unwrap_or_default();
     let LinearPlant { a, b, c, models, .. } = &linear;
     let extended = ExtendedPlant::new(a, b, c, models, filter)
         .map_err(|error| file.error(&["A"], error.to_string()))?;
-    let (controllability, distance) = check_controllable(file, &linear)?;
-    let detectability = check_detectable(file, &linear, &extended)?;
+    let (controllability, distance) = check_controllable(file, &linear, &mut warnings)?;
+    check_faults(file, &linear, &extended)?;
+    let detectability = check_detectable(file, &linear, &extended, &mut warnings)?;
     let (domain, plant) = in_domain(file, &extended)?;
-    let (feedback, observer) = compute_gains(file, &extended, (&plant, c), domain)?;
+    let (feedback, observer) = compute_gains((file, &linear), &extended, (&plant, c), domain)?;
     let n = plant.a.nrows();
     let gains = Gains {
         estimator: estimator(file),
@@ -77,6 +83,7 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
         instability: instability(&whole, domain)?,
         filter: sampled::filter(&extended, domain),
         linear,
+        warnings,
         extended,
         domain,
         plant,
@@ -109,13 +116,14 @@ fn in_domain(
     let refuse =
         |error: Error| file.error(&["sample_time"], format!("sampled every {period} s: {error}"));
     let plant = sampled::sample(extended, period).map_err(refuse)?;
-    plant.check_observer_exists().map_err(refuse)?;
-    Ok((Domain::Sampled { period }, plant))
+    let domain = Domain::Sampled { period };
+    plant.check_detectable(domain).map_err(refuse)?;
+    Ok((domain, plant))
 }
 
 /// Computes the gains of feedback and observer; `c` is the output matrix without extensions.
 fn compute_gains(
-    file: &PlantFile<'_>,
+    (file, linear): (&PlantFile<'_>, &LinearPlant),
     extended: &ExtendedPlant,
     (plant, c): (&FaultyPlant, &DMatrix<f64>),
     domain: Domain,
@@ -127,14 +135,17 @@ fn compute_gains(
         c,
         f_a: &plant.f_a.rows(0, n).into(),
     };
-    let feedback = feedback(&file.feedback.requirement, &problem, domain)
-        .map_err(|refusal| refused(file, &file.feedback, refusal, n, "states"))?;
+    let feedback = feedback(&file.feedback.requirement, &problem, domain).map_err(|refusal| {
+        let name = |at: usize| linear.states[at].name.clone();
+        refused((file, domain), &file.feedback, refusal, (n, "states"), name)
+    })?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let pair = (&a_0, &c_0, plant.f_a.ncols());
     let observer = observer(&file.observer.requirement, pair, domain, estimator(file));
     let observer = observer.map_err(|refusal| {
-        let meaning = "states, filters, faults and rates of ramps";
-        refused(file, &file.observer, refusal, a_0.nrows(), meaning)
+        let order = (a_0.nrows(), "states, filters, faults and rates of ramps");
+        let names = observer_states(linear, extended);
+        refused((file, domain), &file.observer, refusal, order, |at| names[at].clone())
     })?;
     Ok((feedback, observer))
 }
@@ -148,22 +159,48 @@ fn cancellation_residual(extended: &ExtendedPlant) -> Result<f64, Error> {
     Ok(if whole > 0.0 { left.rows(0, *states).norm() / whole } else { 0.0 })
 }
 
+/// Checks that the commands reach every mode that is not stable; the error names the mode.
 fn check_controllable(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
+    warnings: &mut Vec<PlaceError>,
 ) -> Result<(Rank, Distance), crate::Error> {
     let refuse = |error: Error| file.error(&["B", "actuators"], error.to_string());
     let rank = controllability(&linear.a, &linear.b).map_err(refuse)?;
-    if !rank.is_full() {
+    let state = |at: usize| linear.states[at].name.clone();
+    let modes = uncontrollable_modes(&linear.a, &linear.b).map_err(refuse)?;
+    for mode in modes.into_iter().filter(above_or_on_the_real_axis) {
+        let stable = is_clearly_stable(mode.eigenvalue, &linear.a, Domain::Continuous);
+        let stable = stable.map_err(refuse)? && rank.rank > 0;
         let message = format!(
-            "the commands {} reach {} of {} states only",
+            "the commands {} reach {} of {} states only: no feedback moves {}{}",
             names(linear.actuators.iter().map(|signal| signal.name.as_str())),
             rank.rank,
-            rank.n
+            rank.n,
+            described(&mode, state),
+            consequence(stable, &mode),
         );
-        return Err(file.error(&["B", "actuators"], message).into());
+        let error = file.error(&["B", "actuators"], message);
+        if !stable {
+            return Err(error.into());
+        }
+        warnings.push(error);
     }
     Ok((rank, from_uncontrollable(&linear.a, &linear.b).map_err(refuse)?))
+}
+
+/// Selects one mode of each complex pair.
+fn above_or_on_the_real_axis(mode: &Mode) -> bool {
+    mode.eigenvalue.im >= 0.0
+}
+
+/// What follows from a mode that no gain moves.
+fn consequence(stable: bool, mode: &Mode) -> &'static str {
+    match stable {
+        true => "; it is stable and keeps its eigenvalue",
+        false if mode.eigenvalue.re < 0.0 => "",
+        false => "; expected that only stable modes are out of reach",
+    }
 }
 
 /// Checks that the augmented observer exists; the error names the faults and the measurements.
@@ -171,16 +208,25 @@ fn check_detectable(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
     extended: &ExtendedPlant,
+    warnings: &mut Vec<PlaceError>,
 ) -> Result<Detectability, crate::Error> {
     let found = detectability(&extended.plant, Domain::Continuous)
         .map_err(|error| file.error(&FAULTS, error.to_string()))?;
     let measurements = names(linear.measurements.iter().map(|signal| signal.name.as_str()));
-    if !found.observability.is_full() {
+    let modes = found.unobservable.iter();
+    for (mode, stable) in modes.filter(|(mode, _)| above_or_on_the_real_axis(mode)) {
         let message = format!(
-            "the measurements {measurements} show {} of {} states only",
-            found.observability.rank, found.observability.n
+            "the measurements {measurements} show {} of {} states only: no observer moves {}{}",
+            found.observability.rank,
+            found.observability.n,
+            described(mode, |at| state_name(linear, at).to_owned()),
+            consequence(*stable, mode),
         );
-        return Err(file.error(&["C", "measurements"], message).into());
+        let error = file.error(&["C", "measurements"], message);
+        if !stable {
+            return Err(error.into());
+        }
+        warnings.push(error);
     }
     let fault_names = fault_names(linear, extended);
     if let Some(&unseen) = found.invisible_faults().first() {
@@ -212,7 +258,7 @@ fn check_detectable(
     }
     extended
         .plant
-        .check_observer_exists()
+        .check_detectable(Domain::Continuous)
         .map_err(|error| file.error(&FAULTS, error.to_string()))?;
     Ok(found)
 }
@@ -253,18 +299,38 @@ fn names<'a>(list: impl Iterator<Item = &'a str>) -> String {
     list.collect::<Vec<_>>().join(", ")
 }
 
-/// Converts the failure of a gain to an error at the requirement in the file.
+/// Returns the names of the states of the observer: states, filters, faults.
+fn observer_states(linear: &LinearPlant, extended: &ExtendedPlant) -> Vec<String> {
+    let plain = (0..extended.plant.a.nrows()).map(|at| state_name(linear, at).to_owned());
+    plain.chain(fault_names(linear, extended)).collect()
+}
+
+/// Converts the failure of a gain to an error at the requirement in the file; `name` returns the
+/// name of a state.
 fn refused(
-    file: &PlantFile<'_>,
+    (file, domain): (&PlantFile<'_>, Domain),
     request: &Request,
     refusal: Refusal,
-    order: usize,
-    meaning: &str,
+    (order, meaning): (usize, &str),
+    name: impl Fn(usize) -> String,
 ) -> PlaceError {
     let message = match refusal {
         Refusal::Conflict(message) => message,
-        Refusal::Control(Error::PoleCount { found, .. }) => {
+        Refusal::Fixed(mode) => fixed(&request.requirement, &mode, domain, &name),
+        Refusal::Control(Error::PoleCount { .. }) => {
+            let found = request.requirement.eigenvalues().len();
             format!("expected {order} eigenvalues, one for each of the {meaning}, found {found}")
+        }
+        Refusal::Control(ref error @ Error::Unweighted { weight: "W", .. }) => {
+            match request.requirement.without_noise() {
+                Some(at) => format!(
+                    "W states no noise for `{}` (its row {} is zero), so that the observer would not \
+                     correct it; expected a number above 0 there",
+                    name(at),
+                    at + 1
+                ),
+                None => error.to_string(),
+            }
         }
         Refusal::Control(error) => error.to_string(),
     };
@@ -273,6 +339,24 @@ fn refused(
             file.error_at(place, message)
         }
         _ => file.error_at(&request.place, message),
+    }
+}
+
+/// Says that a requirement excludes the eigenvalue of a mode that no gain moves.
+fn fixed(
+    requirement: &Requirement,
+    mode: &Mode,
+    domain: Domain,
+    name: impl Fn(usize) -> String,
+) -> String {
+    let sampled = matches!(requirement, Requirement::SampledEigenvalues(_));
+    let described = described_in(mode, (domain, sampled), name);
+    match requirement {
+        Requirement::Eigenvalues(_) | Requirement::SampledEigenvalues(_) => format!(
+            "no gain moves {described}; expected it among the requested eigenvalues, or `region` or \
+             weights in place of eigenvalues"
+        ),
+        _ => format!("no gain moves {described}, into the region; expected a region around it"),
     }
 }
 

@@ -3,12 +3,17 @@
 use control::aso::Estimator;
 use control::lmi::{self, Norm, Outcome, Performance, Synthesis};
 use control::placement::{Placement, Quality, place, place_balanced, place_discrete};
+use control::rank::{ControllablePart, Mode, controllable_part, uncontrollable_modes};
 use control::riccati::{Weights, kalman, lqr};
 use control::sampled::{place_estimator, sampled_poles};
 use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
 use super::requirements::{Region, Requirement};
+
+const IN_REGION: &str = "Eigenvalues in the region by linear matrix inequalities";
+/// Relative distance within which a requested eigenvalue is that of a mode that no gain moves.
+const SAME: f64 = 1e-4;
 
 /// A gain and the method that found it.
 pub(crate) struct GainResult {
@@ -27,6 +32,8 @@ pub(crate) enum Refusal {
     Control(Error),
     /// The requirements contradict each other, or no result could be verified.
     Conflict(String),
+    /// The requirement excludes the eigenvalue of a mode that no gain moves.
+    Fixed(Mode),
 }
 
 impl From<Error> for Refusal {
@@ -44,6 +51,8 @@ pub(crate) struct FeedbackProblem<'a> {
 }
 
 /// Computes K of u = K x.
+///
+/// Modes that the commands do not reach keep their eigenvalues, which the requirement must allow.
 pub(crate) fn feedback(
     required: &Requirement,
     problem: &FeedbackProblem<'_>,
@@ -51,14 +60,16 @@ pub(crate) fn feedback(
 ) -> Result<GainResult, Refusal> {
     let FeedbackProblem { a, b, c, f_a } = problem;
     match required {
-        Requirement::Eigenvalues(continuous) => {
-            let (required, sampled) = in_domain(continuous, domain)?;
-            let found =
-                if sampled { place_discrete(a, b, &required) } else { place(a, b, &required) };
-            Ok(assigned(found?, required))
-        }
-        Requirement::SampledEigenvalues(required) => {
-            Ok(assigned(place_discrete(a, b, required)?, required.clone()))
+        Requirement::Eigenvalues(_) | Requirement::SampledEigenvalues(_) => {
+            let part = controllable_part(a, b)?;
+            let Assignment { required, movable } = movable(required, &part.fixed, domain)?;
+            let sampled = domain != Domain::Continuous;
+            let assign = if sampled { place_discrete } else { place };
+            if part.fixed.is_empty() {
+                return Ok(assigned(assign(a, b, &movable)?, required));
+            }
+            let gain = part.gain(&assign(&part.a, &part.b, &movable)?.gain);
+            Ok(partly_assigned(gain, required, &part))
         }
         Requirement::Weights { states, channels } => {
             let weights = Weights { q: states.clone(), r: channels.clone(), n: None };
@@ -66,10 +77,18 @@ pub(crate) fn feedback(
             Ok(weighted(found.gain, "Linear-quadratic regulator", found.residual))
         }
         Requirement::Region(region) => {
-            let found = lmi::state_feedback(a, b, &region.stated(), None, domain)?;
-            synthesised(found, "Eigenvalues in the region by linear matrix inequalities")
+            let part = controllable_part(a, b)?;
+            region.require(&part.fixed, domain)?;
+            let found = if part.fixed.is_empty() {
+                lmi::state_feedback(a, b, &region.stated(), None, domain)?
+            } else {
+                lmi::state_feedback(&part.a, &part.b, &region.stated(), None, domain)?
+            };
+            let found = synthesised(found, IN_REGION)?;
+            Ok(if part.fixed.is_empty() { found } else { found.mapped(|gain| part.gain(gain)) })
         }
         Requirement::HInfinity { bound, region } => {
+            region.require(&uncontrollable_modes(a, b)?, domain)?;
             let (m, p) = (b.ncols(), c.nrows());
             let mut feedthrough = DMatrix::zeros(p + m, m);
             feedthrough.view_mut((p, 0), (m, m)).fill_with_identity();
@@ -90,6 +109,8 @@ pub(crate) fn feedback(
 
 /// Computes L of the observer for the pair (`a_0`, `c_0`), whose last `faults` states are the
 /// states of the fault model. For a current estimator it is the gain of the correction.
+///
+/// Modes that the measurements do not show keep their eigenvalues, which the requirement must allow.
 pub(crate) fn observer(
     required: &Requirement,
     (a_0, c_0, faults): (&DMatrix<f64>, &DMatrix<f64>, usize),
@@ -97,17 +118,31 @@ pub(crate) fn observer(
     estimator: Estimator,
 ) -> Result<GainResult, Refusal> {
     let seen = estimator.output_matrix(a_0, c_0);
+    let (a_dual, b_dual) = (a_0.transpose(), seen.transpose());
     match required {
-        Requirement::Eigenvalues(continuous) => {
-            let (required, sampled) = in_domain(continuous, domain)?;
-            if sampled {
-                return estimated(a_0, &seen, required);
+        Requirement::Eigenvalues(_) | Requirement::SampledEigenvalues(_) => {
+            let part = controllable_part(&a_dual, &b_dual)?;
+            let Assignment { required, movable } = movable(required, &part.fixed, domain)?;
+            let (a_1, b_1) = match part.fixed.as_slice() {
+                [] => (&a_dual, &b_dual),
+                _ => (&part.a, &part.b),
+            };
+            let placed = match domain {
+                Domain::Continuous => {
+                    let placed = place_balanced(a_1, b_1, &movable)?;
+                    Placement { gain: -placed.gain.transpose(), ..placed }
+                }
+                Domain::Sampled { .. } => {
+                    let found = place_estimator(&a_1.transpose(), &b_1.transpose(), &movable)?;
+                    Placement { gain: found.0, quality: found.1 }
+                }
+            };
+            if part.fixed.is_empty() {
+                return Ok(assigned(placed, required));
             }
-            let placed = place_balanced(&a_0.transpose(), &seen.transpose(), &required)?;
-            let gain = -placed.gain.transpose();
-            Ok(assigned(Placement { gain, ..placed }, required))
+            let gain = part.gain(&placed.gain.transpose()).transpose();
+            Ok(partly_assigned(gain, required, &part))
         }
-        Requirement::SampledEigenvalues(required) => estimated(a_0, &seen, required.clone()),
         Requirement::Weights { states, channels } => {
             let found = kalman(a_0, c_0, states, channels, domain)?;
             let gain = found
@@ -117,10 +152,19 @@ pub(crate) fn observer(
             Ok(weighted(gain, "Kalman filter", found.residual))
         }
         Requirement::Region(region) => {
-            let found = lmi::observer_gain(a_0, &seen, &region.stated(), None, domain)?;
-            synthesised(found, "Eigenvalues in the region by linear matrix inequalities")
+            let part = controllable_part(&a_dual, &b_dual)?;
+            region.require(&part.fixed, domain)?;
+            if part.fixed.is_empty() {
+                let found = lmi::observer_gain(a_0, &seen, &region.stated(), None, domain)?;
+                return synthesised(found, IN_REGION);
+            }
+            let (a_1, c_1) = (part.a.transpose(), part.b.transpose());
+            let found = lmi::observer_gain(&a_1, &c_1, &region.stated(), None, domain)?;
+            let found = synthesised(found, IN_REGION)?;
+            Ok(found.mapped(|gain| part.gain(&gain.transpose()).transpose()))
         }
         Requirement::HInfinity { bound, region } => {
+            region.require(&uncontrollable_modes(&a_dual, &b_dual)?, domain)?;
             let performance = rate_to_error((a_0.nrows(), c_0.nrows(), faults), *bound);
             let region = region.stated();
             let found = lmi::observer_gain(a_0, &seen, &region, Some(&performance), domain)?;
@@ -128,6 +172,39 @@ pub(crate) fn observer(
             synthesised(found, &least_certified(method, *bound))
         }
     }
+}
+
+/// Required eigenvalues in the plane of the domain.
+struct Assignment {
+    /// All, those of fixed modes included.
+    required: Vec<Complex<f64>>,
+    /// Those of the movable part.
+    movable: Vec<Complex<f64>>,
+}
+
+/// Returns what to assign: each fixed mode takes the nearest of the required eigenvalues.
+fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Assignment, Refusal> {
+    let sampling = match (required, domain) {
+        (Requirement::Eigenvalues(_), Domain::Sampled { period }) => Some(period),
+        _ => None,
+    };
+    let mut rest = required.eigenvalues().to_vec();
+    let mut taken = Vec::new();
+    for mode in fixed {
+        let stated = sampling.map_or(mode.eigenvalue, |period| mode.eigenvalue.ln() / period);
+        let near = |one: &Complex<f64>| (one - stated).norm();
+        let nearest = (0..rest.len()).min_by(|&i, &j| near(&rest[i]).total_cmp(&near(&rest[j])));
+        match nearest.filter(|&at| near(&rest[at]) <= SAME * stated.norm()) {
+            Some(at) => drop(rest.swap_remove(at)),
+            None => return Err(Refusal::Fixed(mode.clone())),
+        }
+        taken.push(mode.eigenvalue);
+    }
+    let movable = match sampling {
+        Some(period) => sampled_poles(&rest, period)?,
+        None => rest,
+    };
+    Ok(Assignment { required: movable.iter().copied().chain(taken).collect(), movable })
 }
 
 /// Returns the performance channel from the rates of the faults, the last states of the observer,
@@ -142,30 +219,22 @@ fn rate_to_error(
     Performance { disturbance: rate, output, feedthrough, norm: Norm::HInfinity, gamma }
 }
 
-/// Returns the eigenvalues in the plane of the domain, and whether that is the z-plane.
-fn in_domain(
-    continuous: &[Complex<f64>],
-    domain: Domain,
-) -> Result<(Vec<Complex<f64>>, bool), Error> {
-    match domain {
-        Domain::Continuous => Ok((continuous.to_vec(), false)),
-        Domain::Sampled { period } => Ok((sampled_poles(continuous, period)?, true)),
-    }
-}
-
-/// Computes the estimator gain of a sampled loop.
-fn estimated(
-    a_0: &DMatrix<f64>,
-    seen: &DMatrix<f64>,
-    required: Vec<Complex<f64>>,
-) -> Result<GainResult, Refusal> {
-    let (gain, quality) = place_estimator(a_0, seen, &required)?;
-    Ok(assigned(Placement { gain, quality }, required))
-}
-
 fn assigned(found: Placement, required: Vec<Complex<f64>>) -> GainResult {
     let method = "Eigenvalues assigned, with well-conditioned eigenvectors.".to_owned();
     GainResult { gain: found.gain, method, required, quality: Some(found.quality) }
+}
+
+fn partly_assigned(
+    gain: DMatrix<f64>,
+    required: Vec<Complex<f64>>,
+    part: &ControllablePart,
+) -> GainResult {
+    let (movable, all) = (part.a.nrows(), part.coordinates.ncols());
+    let method = format!(
+        "{movable} of {all} eigenvalues assigned, with well-conditioned eigenvectors; no gain moves \
+         the others."
+    );
+    GainResult { gain, method, required, quality: None }
 }
 
 fn weighted(gain: DMatrix<f64>, method: &str, residual: f64) -> GainResult {
@@ -218,7 +287,33 @@ fn contradiction(conflict: &[&str]) -> String {
     }
 }
 
+impl GainResult {
+    /// The result with another gain.
+    fn mapped(self, map: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
+        Self { gain: map(&self.gain), ..self }
+    }
+}
+
 impl Region {
+    /// Checks that the eigenvalues of modes that no gain moves are in the region.
+    fn require(self, fixed: &[Mode], domain: Domain) -> Result<(), Refusal> {
+        match fixed.iter().find(|mode| !self.contains(mode.eigenvalue, domain)) {
+            Some(mode) => Err(Refusal::Fixed(mode.clone())),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether an eigenvalue of the loop is in the region; for a sampled loop one in the z-plane.
+    fn contains(self, value: Complex<f64>, domain: Domain) -> bool {
+        let decay = self.decay.unwrap_or(0.0);
+        if let Domain::Sampled { period } = domain {
+            return value.norm() < (-decay * period).exp();
+        }
+        value.re < -decay
+            && self.disc.is_none_or(|(center, radius)| (value - center).norm() < radius)
+            && self.sector.is_none_or(|angle| value.im.atan2(-value.re).abs() < angle.to_radians())
+    }
+
     /// Converts the region for the linear matrix inequalities; angles in rad.
     fn stated(self) -> lmi::Region {
         lmi::Region {

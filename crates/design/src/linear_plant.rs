@@ -120,8 +120,13 @@ fn linearised(
 /// Linearises the FMU of the file; returns its name and the result.
 fn linearisation(
     file: &PlantFile<'_>,
-    plant_file::PlantFmu { path, operating_point, states }: &plant_file::PlantFmu,
+    own: &plant_file::PlantFmu,
 ) -> Result<(String, Linearisation), crate::Error> {
+    let plant_file::PlantFmu { path, operating_point, states, preload, step } = own;
+    for library in preload {
+        fmu_import::preload(library.as_ref())
+            .map_err(|error| file.error(&["preload"], sentence(&error)))?;
+    }
     let fmu = Fmu::open_any(path).map_err(|error| file.error(&["plant"], sentence(&error)))?;
     let names = |signals: &[Signal]| signals.iter().map(|signal| signal.name.clone()).collect();
     let inputs = file.faults.iter().filter_map(|fault| match &fault.entry_point {
@@ -134,14 +139,20 @@ fn linearisation(
         outputs: names(&file.measurements),
         states: states.clone(),
         at: operating_point.iter().map(|(name, value)| (name.clone(), value.to_string())).collect(),
+        step: *step,
         ..Linearise::default()
     };
     let found = linearise(&fmu, &request).map_err(|error| {
         let place = match &error {
             LineariseError::UnknownVariable { name, .. } => stating(file, operating_point, name),
+            LineariseError::NoStep { .. } => "linearisation_step",
             _ => "plant",
         };
-        file.error(&[place, "plant"], format!("{}: {error}", path.display()))
+        let help = match &error {
+            LineariseError::NoStep { .. } => " (`linearisation_step` states it)",
+            _ => "",
+        };
+        file.error(&[place, "plant"], format!("{}: {error}{help}", path.display()))
     })?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     Ok((format!("{} ({name})", fmu.description().model_name), found))

@@ -6,9 +6,12 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
 
+use super::plausibility::check_names;
 use super::requirements::{Request, request};
 use super::robustness_limits::RobustnessLimits;
-use super::signals::{EntryPoint, Fault, Signal, all_actuator_faults, faults, signals};
+use super::signals::{
+    EntryPoint, Fault, Signal, all_actuator_faults, description, faults, signals,
+};
 use files::{Entry, Place, PlaceError, Source, Table};
 
 /// A plant file whose entries are valid and consistent.
@@ -56,6 +59,10 @@ pub(crate) struct PlantFmu {
     pub(crate) operating_point: Vec<(String, f64)>,
     /// Names of the states, for an FMU whose description does not list them.
     pub(crate) states: Vec<String>,
+    /// Shared libraries to load before the FMU.
+    pub(crate) preload: Vec<String>,
+    /// Communication step, s, of an FMU that is linearised by steps.
+    pub(crate) step: Option<f64>,
 }
 
 /// The sampling of the controller.
@@ -67,12 +74,14 @@ pub(crate) struct Sampling {
     pub(crate) current: bool,
 }
 
-const KEYS: [&str; 22] = [
+const KEYS: [&str; 24] = [
     "description",
     "t_on",
     "monitor",
     "plant",
     "operating_point",
+    "preload",
+    "linearisation_step",
     "A",
     "B",
     "C",
@@ -92,7 +101,7 @@ const KEYS: [&str; 22] = [
     "D",
 ];
 /// Entries that errors of later steps point at.
-const PLACES: [&str; 15] = [
+const PLACES: [&str; 17] = [
     "A",
     "B",
     "C",
@@ -100,6 +109,8 @@ const PLACES: [&str; 15] = [
     "actuator_faults",
     "plant",
     "operating_point",
+    "preload",
+    "linearisation_step",
     "states",
     "actuators",
     "measurements",
@@ -136,10 +147,7 @@ impl<'a> PlantFile<'a> {
         let found = Self {
             source,
             places: PLACES.iter().filter_map(place).collect(),
-            description: file
-                .get("description")
-                .map(|e| e.text().map(str::to_owned))
-                .transpose()?,
+            description: Some(description(file)?).filter(|text| !text.is_empty()),
             t_on: file.get("t_on").map_or(Ok(0.0), |entry| entry.number())?,
             monitor: file.get("monitor").map_or(Ok(false), |entry| entry.flag())?,
             filter: filter(file, &measurements, &faults)?,
@@ -155,6 +163,7 @@ impl<'a> PlantFile<'a> {
             sampling,
         };
         found.check_columns(file)?;
+        check_names(&found)?;
         Ok(found)
     }
 
@@ -169,6 +178,15 @@ impl<'a> PlantFile<'a> {
             Model::Fmu(fmu) => Some(&fmu.path),
             Model::Matrices { .. } => None,
         }
+    }
+
+    /// Returns the states that the file states, the actuators and the measurements.
+    pub(crate) fn signals(&self) -> impl Iterator<Item = &Signal> {
+        let states: &[Signal] = match &self.model {
+            Model::Matrices { states, .. } => states,
+            Model::Fmu(_) => &[],
+        };
+        states.iter().chain(&self.actuators).chain(&self.measurements)
     }
 
     /// Returns the text of the file.
@@ -246,6 +264,8 @@ fn linearised(
         path: folder.join(plant.text()?),
         operating_point,
         states: states.unwrap_or_default().into_iter().map(|signal| signal.name).collect(),
+        preload: file.get("preload").map_or(Ok(Vec::new()), |entry| texts(&entry))?,
+        step: file.get("linearisation_step").map(|entry| entry.positive()).transpose()?,
     });
     let actuators = file.require("actuators", "the inputs of the FMU that the controller sets")?;
     let meaning = "the outputs of the FMU that the controller reads";
@@ -253,8 +273,21 @@ fn linearised(
     Ok((model, [signals(&actuators, true)?, signals(&measurements, false)?]))
 }
 
+/// Reads a text, or a list of texts.
+fn texts(entry: &Entry<'_>) -> Result<Vec<String>, PlaceError> {
+    if entry.is_text() {
+        return Ok(vec![entry.text()?.to_owned()]);
+    }
+    entry.list()?.iter().map(|member| member.text().map(str::to_owned)).collect()
+}
+
 /// Reads a plant whose matrices the file states.
 fn stated(file: &Table<'_>) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
+    for key in ["preload", "linearisation_step"] {
+        if let Some(entry) = file.get(key) {
+            return Err(entry.error("it belongs to `plant`, an FMU"));
+        }
+    }
     if let Some(entry) = file.get("operating_point") {
         let advice = "it belongs to `plant`; with matrices, `operating` in each signal states it";
         return Err(entry.error(advice));

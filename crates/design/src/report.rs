@@ -1,12 +1,14 @@
 //! The data of a design report: the output of `--json` and the content of the page.
 
 use nalgebra::{Complex, DMatrix};
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
 use serde::{Serialize, Serializer};
 
-use super::robust_report::{Robustness, Verdict};
+use super::robust_report::{Number, Robustness, Verdict};
 
 /// The data of a design report.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Report {
     /// A description of the controller.
     pub description: String,
@@ -16,6 +18,8 @@ pub struct Report {
     pub plant: Plant,
     /// The verdict on the design.
     pub verdict: Verdict,
+    /// What is unusual in the plant file, each as `plant.toml:3:5: sentence`.
+    pub warnings: Vec<String>,
     /// The conditions that were checked.
     pub checks: Vec<Check>,
     /// K_x, K_f, L_x, L_f and the other matrices of the controller.
@@ -32,8 +36,8 @@ pub struct Report {
     pub certificate: Certificate,
     /// Bounds of the errors, one entry for each pair of a fault and an error.
     pub bounds: Vec<Bound>,
-    /// Responses to a change of each fault: as a step, or as a ramp if the bound of its rate is
-    /// stated.
+    /// Responses to a change of each fault: as a step, and as a ramp if the bound of its rate is
+    /// stated; with several faults, also to steps of all of them together.
     pub steps: Vec<StepResponse>,
     /// Singular values over frequency.
     pub frequency: Vec<Frequency>,
@@ -46,7 +50,7 @@ pub struct Report {
 }
 
 /// The plant of the design.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Plant {
     /// The source of the matrices, in a sentence.
     pub origin: String,
@@ -65,7 +69,7 @@ pub struct Plant {
 }
 
 /// A signal.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Signal {
     /// Its name.
     pub name: String,
@@ -80,7 +84,7 @@ pub struct Signal {
 }
 
 /// A matrix with names of its rows and columns.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Matrix {
     /// Symbol, for example `K_x`.
     pub name: String,
@@ -95,7 +99,7 @@ pub struct Matrix {
 }
 
 /// A condition that was checked.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Check {
     /// The condition, in a sentence.
     pub condition: String,
@@ -108,7 +112,7 @@ pub struct Check {
 }
 
 /// Eigenvalues of a closed loop.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Loop {
     /// The matrix, for example `A + B K_x`.
     pub matrix: String,
@@ -129,7 +133,7 @@ pub struct Loop {
 }
 
 /// A required region of eigenvalues, in 1/s and degrees.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Region {
     /// Minimum decay rate in 1/s.
     pub decay: Option<f64>,
@@ -142,7 +146,7 @@ pub struct Region {
 }
 
 /// The sampling of a design.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Sampled {
     /// Sample time, s.
     pub sample_time: f64,
@@ -151,24 +155,27 @@ pub struct Sampled {
 }
 
 /// Theorem 1 and related certificates.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Certificate {
     /// Theorem 1 as printed, or the reason why it does not hold.
     #[serde(serialize_with = "or_reason")]
+    #[schemars(with = "OrReason<Theorem1>")]
     pub printed: Result<Theorem1, String>,
     /// Theorem 1 with P from linear matrix inequalities, or the reason why there is none.
     #[serde(serialize_with = "or_reason")]
+    #[schemars(with = "OrReason<FreeP>")]
     pub free: Result<FreeP, String>,
     /// The ultimate bound of the error for bounded rates of the faults, or the reason why there is
     /// none.
     #[serde(serialize_with = "or_reason")]
+    #[schemars(with = "OrReason<Ultimate>")]
     pub ultimate: Result<Ultimate, String>,
     /// Norms from the rates of the faults to the estimation errors.
     pub norms: Vec<Norm>,
 }
 
 /// The quantities of Theorem 1 (Patton and Klinkhieo 2009, (12), (16)).
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Theorem1 {
     /// alpha of (12).
     pub alpha: f64,
@@ -187,7 +194,7 @@ pub struct Theorem1 {
 }
 
 /// The certificate with P from linear matrix inequalities.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct FreeP {
     /// Largest certified decay rate, 1/s.
     pub decay: f64,
@@ -202,7 +209,7 @@ pub struct FreeP {
 }
 
 /// The ball that [e; eps] converges to, eps = f_hat - f.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Ultimate {
     /// Bound of the norm of the faults' rates, per s.
     pub rate: f64,
@@ -215,7 +222,7 @@ pub struct Ultimate {
 }
 
 /// A norm of the error dynamics.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Norm {
     /// Name of the norm.
     pub name: String,
@@ -230,7 +237,7 @@ pub struct Norm {
 }
 
 /// The bound of an error for a bounded fault.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Bound {
     /// The fault.
     pub fault: String,
@@ -246,23 +253,25 @@ pub struct Bound {
     pub largest: Option<f64>,
 }
 
-/// The response of the compensated loop to a change of a fault.
-#[derive(Serialize)]
+/// The response of the compensated loop to a change of a fault, or of all faults together.
+#[derive(Serialize, JsonSchema)]
 pub struct StepResponse {
-    /// The fault.
+    /// The fault; several names with `and` between them if they change together.
     pub fault: String,
-    /// Its unit.
+    /// Its unit; none for several faults.
     pub unit: Option<String>,
-    /// Size of the change, in the unit of the fault.
+    /// Size of the change, in the unit of the fault; 1 for several faults.
     pub size: f64,
+    /// Each fault that changes, with the size of its change.
+    pub parts: Vec<Number>,
     /// Rate of the change, per s; none for a step.
     pub rate: Option<f64>,
-    /// The responding signals.
+    /// The responding signals: states, errors of estimates, commands.
     pub curves: Vec<Curve>,
 }
 
 /// The response of a signal.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Curve {
     /// The signal.
     pub name: String,
@@ -282,7 +291,7 @@ pub struct Curve {
 }
 
 /// Singular values over frequency.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Frequency {
     /// Input and output of the transfer function.
     pub name: String,
@@ -293,7 +302,7 @@ pub struct Frequency {
 }
 
 /// Stability under loss of effectiveness.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Effectiveness {
     /// The actuator.
     pub actuator: String,
@@ -302,7 +311,7 @@ pub struct Effectiveness {
 }
 
 /// A variable of the controller FMU.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Variable {
     /// Its name.
     pub name: String,
@@ -316,6 +325,45 @@ pub struct Variable {
     pub start: Option<String>,
     /// Description.
     pub description: String,
+}
+
+/// A result as it is serialized, for the schema.
+#[derive(JsonSchema)]
+#[schemars(untagged)]
+#[expect(dead_code, reason = "describes the form only")]
+enum OrReason<T> {
+    /// The value.
+    Found(T),
+    /// Why there is none.
+    Missing {
+        /// The reason, in a sentence.
+        reason: String,
+    },
+}
+
+/// Returns the JSON schema (draft 2020-12) of the serialized report.
+///
+/// All properties are required, and there are no others. A number that has no limit is `null`.
+#[must_use]
+pub fn schema() -> serde_json::Value {
+    let settings = SchemaSettings::draft2020_12().for_serialize();
+    let mut schema = settings.into_generator().into_root_schema_for::<Report>().to_value();
+    close(&mut schema);
+    schema
+}
+
+/// Requires all properties of each object and allows no others.
+fn close(schema: &mut serde_json::Value) {
+    if let Some(object) = schema.as_object_mut() {
+        if let Some(properties) = object.get("properties").and_then(|found| found.as_object()) {
+            let all: Vec<_> = properties.keys().cloned().collect();
+            object.insert("required".to_owned(), all.into());
+            object.insert("additionalProperties".to_owned(), false.into());
+        }
+        object.values_mut().for_each(close);
+    } else if let Some(list) = schema.as_array_mut() {
+        list.iter_mut().for_each(close);
+    }
 }
 
 /// Serializes a value, or `{ "reason": ... }` if there is none.

@@ -15,10 +15,12 @@ use super::checks::checks;
 use super::designed::{ControllerDesign, fault_names};
 use super::gains::GainResult;
 use super::plant_file::PlantFile;
+use super::plausibility::line;
 use super::report::{
     Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal, pairs, rows,
 };
 use super::requirements::{self, Requirement};
+use super::responses::responses;
 use super::robustness::{robustness, verdict};
 use super::signals::{self, EntryPoint, Fault, FaultDynamics};
 
@@ -38,6 +40,7 @@ pub(crate) fn report(
         plant_file: file.name(),
         plant: self::plant(designed, &names)?,
         verdict: verdict(&checks, robustness.as_ref(), &file.robustness),
+        warnings: designed.warnings.iter().map(|warning| line(file, warning)).collect(),
         checks,
         robustness,
         gains: names.gains(designed),
@@ -62,7 +65,7 @@ pub(crate) fn report(
         },
         certificate: certificate(designed, loops.norms()?),
         bounds: loops.bounds()?,
-        steps: loops.steps()?,
+        steps: responses(designed)?,
         frequency: loops.frequency()?,
         effectiveness: effectiveness(designed)?,
         assumptions: assumptions(designed, &linear.faults),
@@ -298,7 +301,8 @@ fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
     }
     if let Domain::Sampled { period } = designed.domain {
         all.push(format!(
-            "Commands are constant over a sample time of {period} s; responses are shown at samples."
+            "Commands are constant over a sample time of {period} s; in the responses a \
+             fault changes at samples; states and commands are shown between them, too."
         ));
     }
     if designed.linear.models.iter().any(|m| matches!(m.entry, FaultEntry::LossOfEffectiveness(_)))

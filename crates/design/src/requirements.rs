@@ -41,6 +41,26 @@ pub(crate) struct Request {
     pub(crate) other: Option<(String, Place)>,
 }
 
+impl Requirement {
+    /// The eigenvalues that are stated.
+    pub(crate) fn eigenvalues(&self) -> &[Complex<f64>] {
+        match self {
+            Self::Eigenvalues(all) | Self::SampledEigenvalues(all) => all,
+            _ => &[],
+        }
+    }
+
+    /// The index of the first state without noise.
+    pub(crate) fn without_noise(&self) -> Option<usize> {
+        match self {
+            Self::Weights { states, .. } => {
+                (0..states.nrows()).find(|&row| states.row(row).amax() == 0.0)
+            }
+            _ => None,
+        }
+    }
+}
+
 const KEYS: [&str; 4] = ["eigenvalues", "sampled_eigenvalues", "region", "h_infinity"];
 
 /// Reads `[feedback]` (weights Q, R) or `[observer]` (weights W, V).

@@ -1,11 +1,12 @@
 //! The part of a design report on robustness.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::report::{Frequency, Matrix};
 
 /// How a design is judged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
     /// All checks hold and all limits are met.
@@ -30,7 +31,7 @@ impl Level {
 }
 
 /// The verdict on a design.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Verdict {
     /// The level.
     pub level: Level,
@@ -41,7 +42,7 @@ pub struct Verdict {
 }
 
 /// The limits of the verdict, as stated in the plant file or by default.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Limits {
     /// Peak of S above which a design is amber.
     pub amber: f64,
@@ -53,14 +54,16 @@ pub struct Limits {
 
 /// The robustness of the loop of plant and controller. A number without a limit is infinite, in
 /// JSON `null`.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Robustness {
     /// The loop opened at the commands and at the measurements.
     pub points: Vec<LoopPoint>,
     /// Largest delay, s, common to all commands.
+    #[schemars(with = "Option<f64>")]
     pub delay_margin: f64,
     /// The longest time, s, over which the signals may be held; for a sampled design the longest
     /// sample time with the same matrices of the controller.
+    #[schemars(with = "Option<f64>")]
     pub longest_hold: f64,
     /// The noise of each measurement that `noise` assumes, in the order of its columns.
     pub noise_of_measurements: Vec<f64>,
@@ -74,65 +77,88 @@ pub struct Robustness {
     pub comparison: Vec<Compared>,
     /// Stability while the parameters vary.
     pub tolerance: ToleranceResult,
+    /// How the judged peak of S depends on the parameters, one entry for each point.
+    pub sensitivity: Vec<PeakSensitivity>,
     /// Singular values of S and T over frequency.
     pub curves: Vec<Frequency>,
 }
 
 /// The margins of the loop opened at one place.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct LoopPoint {
     /// `input` (commands) or `output` (measurements).
     pub point: String,
     /// Peak of the largest singular value of S, in the units of the plant file.
     pub s_peak: f64,
     /// Its frequency, rad/s.
+    #[schemars(with = "Option<f64>")]
     pub s_frequency: f64,
     /// Peak of the largest singular value of T, in the units of the plant file.
     pub t_peak: f64,
     /// Its frequency, rad/s.
+    #[schemars(with = "Option<f64>")]
     pub t_frequency: f64,
     /// Peak of the structured singular value of S: the peak in the units that make it least.
     pub s_peak_scaled: f64,
     /// The peak that is judged: `s_peak`, or `s_peak_scaled` if the channels have different units.
     pub judged: f64,
+    /// Its frequency, rad/s.
+    #[schemars(with = "Option<f64>")]
+    pub judged_frequency: f64,
     /// All channels change at the same time and independently.
     pub together: Disk,
     /// Each channel alone, the others exact.
     pub channels: Vec<Channel>,
 }
 
+/// The derivatives of the judged peak of S with respect to the entries of the plant.
+#[derive(Serialize, JsonSchema)]
+pub struct PeakSensitivity {
+    /// `input` (commands) or `output` (measurements).
+    pub point: String,
+    /// A, B and C: each entry that is not 0, 1 or -1, times the derivative with respect to it. A
+    /// change of the entry by 1 % changes the peak by 0.01 times this number.
+    pub matrices: Vec<Matrix>,
+}
+
 /// A symmetric disk margin.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Disk {
     /// Size alpha of the disk.
     pub alpha: f64,
     /// The size for which stability is certain.
     pub certified: f64,
     /// Its frequency, rad/s.
+    #[schemars(with = "Option<f64>")]
     pub frequency: f64,
     /// Gain factors within the disk.
+    #[schemars(with = "[Option<f64>; 2]")]
     pub gain: [f64; 2],
     /// Angle within the disk, degrees.
+    #[schemars(with = "Option<f64>")]
     pub phase: f64,
 }
 
 /// The margins of one channel.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Channel {
     /// The command or the measurement.
     pub name: String,
     /// Gain factors between which the loop is stable.
+    #[schemars(with = "[Option<f64>; 2]")]
     pub gain: [f64; 2],
     /// Phase margin, degrees.
+    #[schemars(with = "Option<f64>")]
     pub phase: f64,
     /// Delay margin, s.
+    #[schemars(with = "Option<f64>")]
     pub delay: f64,
     /// The disk margin.
     pub disk: Disk,
 }
 
 /// A named number.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Number {
     /// Its name.
     pub name: String,
@@ -143,7 +169,7 @@ pub struct Number {
 }
 
 /// A number of the design and of the linear-quadratic design of the same speed.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Compared {
     /// What is compared.
     pub name: String,
@@ -154,7 +180,7 @@ pub struct Compared {
 }
 
 /// Stability while the parameters of the plant vary within their tolerances.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct ToleranceResult {
     /// Number of entries that vary.
     pub entries: u32,
@@ -169,6 +195,7 @@ pub struct ToleranceResult {
     pub worst_instability: f64,
     /// The multiple of the tolerances, in the direction of the worst plant, below which the loop is
     /// stable.
+    #[schemars(with = "Option<f64>")]
     pub first_unstable: f64,
     /// A, B and C of the worst plant.
     pub worst: Vec<Matrix>,

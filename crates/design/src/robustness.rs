@@ -6,16 +6,18 @@ use control::hold::zero_order_hold;
 use control::response::{frequency_grid, frequency_response, h_infinity};
 use control::robustness::{
     DiskMargin, Loop, Point, Tolerances, channel_margins, delay_margin, disk_margin, longest_hold,
-    longest_period, noise_gains, regulator_of_same_speed, sampled_delay_margin, scaled_peak,
-    tolerance_test,
+    longest_period, noise_gains, peak_derivatives, regulator_of_same_speed, sampled_delay_margin,
+    scaled_peak, tolerance_test,
 };
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 use super::designed::ControllerDesign;
+use super::linear_plant::LinearPlant;
 use super::report::{Check, Frequency, Matrix, rows};
 use super::robust_report::{
-    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Robustness, ToleranceResult, Verdict,
+    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, PeakSensitivity, Robustness,
+    ToleranceResult, Verdict,
 };
 use super::robustness_limits::RobustnessLimits;
 use super::signals::Signal;
@@ -54,6 +56,7 @@ pub(crate) fn robustness(
         comparison: comparison(designed, &physical, &points)?,
         tolerance: tolerance(designed, &physical, limits)?,
         curves: curves(&own)?,
+        sensitivity: sensitivity(designed, &physical, &points)?,
         points,
         delay_margin: delay,
         longest_hold: hold,
@@ -146,8 +149,8 @@ fn point(own: &Loop, at: Point, name: &str, signals: &[Signal]) -> Result<LoopPo
     let sensitivity = own.sensitivity(at);
     let s = h_infinity(&sensitivity, WIDTH)?;
     let t = h_infinity(&own.complementary(at), WIDTH)?;
-    let scaled = scaled_peak(&sensitivity)?.value;
-    let same_unit = signals.iter().all(|signal| signal.unit == signals[0].unit);
+    let scaled = scaled_peak(&sensitivity)?;
+    let same_unit = same_unit(signals);
     let channel = |(index, signal): (usize, &Signal)| {
         let found = channel_margins(own, at, index)?;
         Ok(Channel {
@@ -164,11 +167,60 @@ fn point(own: &Loop, at: Point, name: &str, signals: &[Signal]) -> Result<LoopPo
         s_frequency: s.frequency,
         t_peak: t.lower,
         t_frequency: t.frequency,
-        s_peak_scaled: scaled,
-        judged: if same_unit { s.lower } else { scaled },
+        s_peak_scaled: scaled.value,
+        judged: if same_unit { s.lower } else { scaled.value },
+        judged_frequency: if same_unit { s.frequency } else { scaled.frequency },
         together: disk(&disk_margin(own, at, None)?),
         channels: signals.iter().enumerate().map(channel).collect::<Result<_, Error>>()?,
     })
+}
+
+fn same_unit(signals: &[Signal]) -> bool {
+    signals.iter().all(|signal| signal.unit == signals[0].unit)
+}
+
+/// Returns how the judged peaks depend on the entries of the plant.
+fn sensitivity(
+    designed: &ControllerDesign,
+    physical: &Physical,
+    points: &[LoopPoint],
+) -> Result<Vec<PeakSensitivity>, Error> {
+    let linear = &designed.linear;
+    let plant = &physical.plant;
+    let one = |((point, name), found): ((Point, &str), &LoopPoint)| {
+        let signals = match point {
+            Point::Input => &linear.actuators,
+            Point::Output => &linear.measurements,
+        };
+        let at = (point, found.judged_frequency, !same_unit(signals));
+        let slopes = peak_derivatives(plant, &physical.controller, at)?;
+        // One for the entries that tolerances vary, zero for structural ones.
+        let [in_a, in_b, in_c] = Tolerances::of_values(plant, [1.0; 3]).of;
+        let matrix = |name: &str, of: (&[Signal], &[Signal]), effects: &DMatrix<f64>| Matrix {
+            name: name.to_owned(),
+            meaning: "entry times derivative of the peak of S".to_owned(),
+            rows: names(of.0),
+            columns: names(of.1),
+            values: rows(effects),
+        };
+        let times = |varied: DMatrix<f64>, values: &DMatrix<f64>, slopes: &DMatrix<f64>| {
+            varied.component_mul(values).component_mul(slopes)
+        };
+        let LinearPlant { states, actuators, measurements, .. } = linear;
+        Ok(PeakSensitivity {
+            point: name.to_owned(),
+            matrices: vec![
+                matrix("A", (states, states), &times(in_a, &plant.a, &slopes.a)),
+                matrix("B", (states, actuators), &times(in_b, &plant.b, &slopes.b)),
+                matrix("C", (measurements, states), &times(in_c, &plant.c, &slopes.c)),
+            ],
+        })
+    };
+    POINTS.into_iter().zip(points).map(one).collect()
+}
+
+fn names(signals: &[Signal]) -> Vec<String> {
+    signals.iter().map(|signal| signal.name.clone()).collect()
 }
 
 fn disk(found: &DiskMargin) -> Disk {
@@ -288,9 +340,6 @@ fn tolerance(
     let tolerances = Tolerances::of_values(&physical.plant, limits.tolerance);
     let request = (limits.cases, u64::from(limits.seed));
     let found = tolerance_test(&physical.plant, &physical.controller, &tolerances, request)?;
-    let names = |signals: &[Signal]| -> Vec<String> {
-        signals.iter().map(|signal| signal.name.clone()).collect()
-    };
     let linear = &designed.linear;
     let (states, actuators) = (names(&linear.states), names(&linear.actuators));
     let matrix = |name: &str, values: &DMatrix<f64>, of: &[String], by: &[String]| Matrix {

@@ -1,6 +1,7 @@
 //! The signals of a plant file: states, actuators, measurements and faults.
 
 use fmu_description::unit::Unit;
+use fmu_description::xml::is_character;
 
 use files::{Entry, Place, PlaceError, Table};
 
@@ -14,12 +15,16 @@ pub(crate) struct Signal {
     pub(crate) operating: Option<f64>,
     /// The limits of an actuator: smallest and largest value.
     pub(crate) limits: Option<[f64; 2]>,
+    /// The places of name and limits, if the file states them.
+    pub(crate) places: [Option<Place>; 2],
 }
 
 impl Signal {
     /// Creates a signal with a name only.
     pub(crate) fn named(name: String) -> Self {
-        Self { name, unit: None, description: String::new(), operating: None, limits: None }
+        let (unit, operating, limits) = (None, None, None);
+        let (description, places) = (String::new(), [None, None]);
+        Self { name, unit, description, operating, limits, places }
     }
 
     /// Fills missing fields from `other`.
@@ -110,29 +115,47 @@ pub(crate) fn signals(entry: &Entry<'_>, limited: bool) -> Result<Vec<Signal>, P
 
 fn signal(entry: &Entry<'_>, limited: bool) -> Result<Signal, PlaceError> {
     if entry.is_text() {
-        return Ok(Signal::named(name(entry)?));
+        let places = [Some(entry.place.clone()), None];
+        return Ok(Signal { places, ..Signal::named(name(entry)?) });
     }
     let table = entry.table()?;
     table.allow(if limited { &ACTUATOR } else { &SIGNAL })?;
+    let named = table.require("name", "the name of the signal")?;
     Ok(Signal {
-        name: name(&table.require("name", "the name of the signal")?)?,
+        name: name(&named)?,
         unit: unit(&table)?,
         description: description(&table)?,
         operating: table.get("operating").map(|entry| entry.number()).transpose()?,
         limits: table.get("limits").map(|entry| limits(&entry)).transpose()?,
+        places: [Some(named.place), table.get("limits").map(|entry| entry.place)],
     })
 }
 
 fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
     match entry.text()? {
         "" => Err(entry.error("expected a name, found an empty text")),
-        name => Ok(name.to_owned()),
+        name => match name.chars().find(|sign| sign.is_control() || !is_character(*sign)) {
+            None => Ok(name.to_owned()),
+            Some(sign) => Err(entry.error(format!(
+                "expected a name of one line without control characters, found {sign:?} in it"
+            ))),
+        },
     }
 }
 
-fn description(table: &Table<'_>) -> Result<String, PlaceError> {
-    let text = table.get("description").map(|entry| entry.text().map(str::to_owned));
-    Ok(text.transpose()?.unwrap_or_default())
+/// Reads the entry `description`, in which XML allows all characters.
+pub(crate) fn description(table: &Table<'_>) -> Result<String, PlaceError> {
+    let Some(entry) = table.get("description") else {
+        return Ok(String::new());
+    };
+    let text = entry.text()?;
+    match text.chars().find(|sign| !is_character(*sign)) {
+        None => Ok(text.to_owned()),
+        Some(sign) => {
+            let message = format!("found {sign:?}, which the XML of an FMU cannot hold");
+            Err(entry.error(message))
+        }
+    }
 }
 
 fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {

@@ -22,7 +22,7 @@ observer.eigenvalues = [-5, { re = -6, im = 2.5 }]
 "#;
 
 /// What is replaced in `MASS`, by what, and a part of the error.
-const REFUSALS: [(&str, &str, &str); 42] = [
+const REFUSALS: [(&str, &str, &str); 55] = [
     (
         "A = [[0, 1], [0, 0]]",
         "A = [[0, 1], [0]]",
@@ -157,6 +157,51 @@ const REFUSALS: [(&str, &str, &str); 42] = [
         "robustness.noise = [-1]\nC = ",
         "robustness.noise[1]: expected no less than 0, found -1",
     ),
+    ("C = ", "actuators = [\"motor 1\"]\nC = ", "3:14: `motor 1` cannot be the name of a variable"),
+    (
+        "C = ",
+        "measurements = [{ name = \"φ\" }]\nC = ",
+        "3:26: `φ` cannot be the name of a variable of the controller FMU: expected letters A to Z",
+    ),
+    ("C = ", "actuators = [\"y1\"]\nC = ", "3:13: the actuator and the measurement `y1` would be"),
+    (
+        "C = ",
+        "actuators = [\"v\"]\nmeasurements = [\"v\"]\nC = ",
+        "4:17: the actuator and the measurement `v` would be one variable",
+    ),
+    ("C = ", "measurements = [\"compensate\"]\nC = ", "3:17: the controller FMU has a variable"),
+    ("C = ", "measurements = [\"f_hat\"]\nC = ", "3:17: the controller FMU has a variable `f_hat`"),
+    (
+        "C = ",
+        "actuators = [\"x_hat[2]\"]\nC = ",
+        "3:14: the controller FMU has a variable `x_hat[2]`",
+    ),
+    (
+        "C = ",
+        "actuators = [\"K_x[9,9]\"]\nC = ",
+        "3:14: the controller FMU has a variable `K_x[9,9]`",
+    ),
+    ("C = ", "measurements = [\"der(f_hat)\"]\nC = ", "3:17: the controller FMU has a variable"),
+    (
+        "C = ",
+        "measurements = [\"q[1]\"]\nactuators = [\"q[2]\"]\nC = ",
+        "4:14: in the controller FMU the variable q[2] stands apart from the other elements of q",
+    ),
+    (
+        "C = ",
+        "faults = [{ name = \"f_u1\", actuator = \"u1\" }]\nC = ",
+        "3:11: two faults have the name `f_u1`; expected different names",
+    ),
+    (
+        "actuator_faults = \"all\"",
+        "F_a = [[0, 0], [1, 1]]\nfaults = [{ name = \"f\", kind = \"ramp\" }, { name = \"f_rate\" }]",
+        "5:42: fault `f_rate` has the name of the rate of the ramp `f`; expected another name",
+    ),
+    (
+        "C = ",
+        "states = [\"p\", \"v\\u0007\"]\nC = ",
+        "3:16: states[2]: expected a name of one line without control characters, found '\\u{7}'",
+    ),
 ];
 
 fn read<T>(text: &str, look: impl Fn(&PlantFile<'_>) -> T) -> Result<T, String> {
@@ -208,6 +253,18 @@ fn each_error_states_position_expectation_and_finding() {
         let message = refusal(from, to);
         assert!(message.contains(expected), "{to}: {message}");
         assert!(message.starts_with("plant.toml:"), "{message}");
+    }
+}
+
+/// They are the names of variables that the FMU of this design does not have.
+#[test]
+fn names_like_those_of_the_controller_fmu_are_accepted() {
+    for name in
+        ["f_hat[1]", "x_hat", "A", "y_f", "T_s", "u_min", "x_op[1]", "'motor 1'", "a.b[3].c"]
+    {
+        for key in ["actuators", "measurements"] {
+            read(&MASS.replace("C = ", &format!("{key} = [\"{name}\"]\nC = ")), |_| ()).unwrap();
+        }
     }
 }
 
@@ -296,6 +353,75 @@ fn an_observer_that_is_unstable_before_t_on_fails_a_check_unless_it_estimates_fr
     assert!(failed(&pendulum.replace("monitor = false", "monitor = true")).is_empty());
 }
 
+/// The first line of the error of a design, or its warnings.
+fn designed(text: &str) -> Result<Vec<String>, String> {
+    let found = read(text, |file| {
+        let first = |error: crate::Error| error.to_string().lines().next().unwrap().to_owned();
+        let line = |warning: &files::PlaceError| super::plausibility::line(file, warning);
+        let found = design(file).map_err(first)?;
+        Ok(found.warnings.iter().map(line).collect())
+    });
+    found.unwrap()
+}
+
+#[test]
+fn limits_that_exclude_the_operating_point_are_refused_and_a_limit_at_it_is_a_warning() {
+    let with = |actuator: &str| {
+        designed(
+            &MASS.replace("C = ", &format!("actuators = [{{ name = \"u\", {actuator} }}]\nC = ")),
+        )
+    };
+    let refused = with("unit = \"N\", limits = [1, 5]").unwrap_err();
+    let expected = "plant.toml:3:49: the operating point of the actuator `u`, 0 N, is outside of its \
+                    limits 1 and 5; expected";
+    assert!(refused.starts_with(expected), "{refused}");
+    let refused = with("limits = [-1, 5], operating = 5.5").unwrap_err();
+    assert!(refused.contains(":37: the operating point of the actuator `u`, 5.5, is"), "{refused}");
+    let expected =
+        ["plant.toml:3:37: the operating point of the actuator `u`, 0, is at a limit, so that \
+                     the controller acts in one direction only"];
+    assert_eq!(with("limits = [0, 5]").unwrap(), expected);
+    assert!(with("limits = [1, 5], operating = 2").unwrap().is_empty());
+}
+
+#[test]
+fn faults_that_no_measurement_can_tell_apart_are_named_with_the_reason() {
+    let two = MASS.replace("C = [[1, 0]]", "C = [[1, 0], [0, 1]]").replace("[-5,", "[-4, -5,");
+    let of = |text: &str, f_a: &str, names: &[&str]| {
+        let names: Vec<_> = names.iter().map(|name| format!("{{ name = \"{name}\" }}")).collect();
+        let faults = format!("F_a = {f_a}\nfaults = [{}]", names.join(", "));
+        designed(&text.replace("actuator_faults = \"all\"", &faults)).unwrap_err()
+    };
+    let found = of(&two, "[[0, 0], [1, -2]]", &["wind", "slope"]);
+    let expected = "plant.toml:5:30: the faults `wind` and `slope` act on the plant in the same \
+                    direction (their columns of F_a are parallel)";
+    assert!(found.starts_with(expected), "{found}");
+    let found = of(&two, "[[0, 1, 2], [1, 0, 3]]", &["a", "b", "c"]);
+    let expected = "plant.toml:5:43: fault `c` acts on the plant as a combination of `a`, `b` does";
+    assert!(found.starts_with(expected), "{found}");
+    let found = of(&two, "[[0, 0], [1, 0]]", &["a", "b"]);
+    let expected =
+        "plant.toml:5:27: fault `b` has no effect on the plant: its column of F_a is zero";
+    assert_eq!(found, expected);
+    let found = of(MASS, "[[0, 1], [1, 0]]", &["a", "b"]);
+    let expected = "plant.toml:5:27: 2 faults (a, b) cannot be estimated from 1 measurement (y1): \
+                    expected at least as many independent measurements as faults";
+    assert_eq!(found, expected);
+    let copies = two.replace("C = [[1, 0], [0, 1]]", "C = [[1, 0], [-3, 0]]");
+    let found = of(&copies, "[[0, 1], [1, 0]]", &["a", "b"]);
+    assert!(found.contains("from 1 independent measurement (y1, y2)"), "{found}");
+}
+
+/// The second state and its fault reach no measurement.
+#[test]
+fn a_fault_of_a_mode_that_no_measurement_shows_is_refused() {
+    let text = "A = [[1, 0], [0, -2]]\nB = [[1], [0]]\nC = [[1, 0]]\nF_a = [[0], [1]]\n\
+                faults = [{ name = \"leak\" }]\nfeedback.Q = [1, 1]\nfeedback.R = [1]\n\
+                observer.W = [1, 1, 1]\nobserver.V = [1]\n";
+    let found = designed(text).unwrap_err();
+    assert_eq!(found, "plant.toml:5:11: fault `leak` cannot be seen from the measurements y1");
+}
+
 /// The level and the reasons of a plant file.
 fn judged(text: &str) -> (Level, String) {
     read(text, |file| {
@@ -351,4 +477,16 @@ fn the_worst_plant_is_a_plant_file() {
         [a[(1, 0)], a[(1, 1)]]
     });
     assert_eq!(stated.unwrap().map(f64::to_bits), [a[1][0], a[1][1]].map(f64::to_bits));
+}
+
+/// `BLESS=1 cargo test -p aso-design --lib schema` writes the file.
+#[test]
+fn the_schema_in_the_book_is_that_of_the_report() {
+    let file =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/design.schema.json");
+    let expected = serde_json::to_string_pretty(&super::report::schema()).unwrap() + "\n";
+    if std::env::var_os("BLESS").is_some() {
+        std::fs::write(&file, &expected).unwrap();
+    }
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), expected);
 }

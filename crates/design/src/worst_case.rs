@@ -41,8 +41,9 @@ pub(crate) fn plant_file(
 
 /// Replaces what refers to the plant's FMU; false if a fault cannot be stated without it.
 fn without_fmu(table: &mut Table, designed: &ControllerDesign) -> bool {
-    table.remove("plant");
-    table.remove("operating_point");
+    for key in ["plant", "operating_point", "preload", "linearisation_step"] {
+        table.remove(key);
+    }
     let linear = &designed.linear;
     let names = linear.states.iter().map(|signal| Value::String(signal.name.clone()));
     table.insert("states".to_owned(), Value::Array(names.collect()));

@@ -24,7 +24,7 @@ pub use kind::{
 pub use model_structure::{ModelStructure, Unknown};
 pub(crate) use parse::read_xml;
 pub use parse::{ParseError, Position, Warning};
-pub use rules::Problem;
+pub use rules::{Problem, array_element, is_structured_name, misplaced_elements};
 pub use variable::{Dimension, Elements, ScalarVariable};
 pub use version::Version;
 pub use words::{Causality, DependencyKind, Initial, Variability};

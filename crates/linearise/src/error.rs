@@ -149,11 +149,19 @@ pub enum LineariseError {
         /// Candidates: outputs and local variables that can be read, as part of a sentence.
         candidates: String,
     },
-    /// The size of the communication step is unknown.
-    #[error("{model} states no stepSize in its DefaultExperiment: give a communication step in s")]
+    /// The FMU states no communication step, and those that were tried give no result.
+    #[error(
+        "{model} states no stepSize in its DefaultExperiment, and communication steps of {} s give no \
+         result: give a communication step in s; with the first: {reason}",
+        tried.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")
+    )]
     NoStep {
         /// `modelName` of the FMU.
         model: String,
+        /// The steps tried, in s.
+        tried: Vec<f64>,
+        /// The error with the first of them.
+        reason: Box<LineariseError>,
     },
     /// Pulses of the inputs do not excite all states.
     #[error(

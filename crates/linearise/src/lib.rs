@@ -34,6 +34,11 @@ use parts::{Part, Parts, State};
 use point::{Equations, NAME, all_settable, initialise, read};
 use result::{MethodResult, RawResult, assemble};
 
+/// Communication steps in s that are tried if the FMU states none.
+const STEPS: [f64; 3] = [1e-3, 1e-2, 1e-4];
+/// Relative error at which no further step is tried.
+const ACCURATE: f64 = 1e-6;
+
 /// A request: the FMU variables of the linear plant, and its operating point.
 ///
 /// All named variables are continuous Reals. The operating point need not be an equilibrium.
@@ -59,7 +64,8 @@ pub struct Linearise {
     /// Time of the operating point in s.
     pub start_time: f64,
     /// The communication step in s of the third method; the default is `stepSize` of the
-    /// `DefaultExperiment`.
+    /// `DefaultExperiment`. Without either, a thousandth of the experiment, 1 ms, 10 ms and 0.1 ms are
+    /// tried, and the most accurate result is used.
     pub step: Option<f64>,
 }
 
@@ -216,22 +222,26 @@ fn by_steps(
     request: &Linearise,
 ) -> Result<Linearisation, LineariseError> {
     all_settable(parts, &[])?;
-    let model = parts.description.model_name.clone();
     let states = parts.named_states(request)?;
     if parts.inputs.is_empty() {
         return Err(LineariseError::Empty { list: "inputs" });
     }
     if states.is_empty() {
+        let model = parts.description.model_name.clone();
         let candidates = candidates(parts.description);
         return Err(LineariseError::StatesNotNamed { model, candidates });
     }
     let preferred = parts.description.default_experiment.and_then(|default| default.step_size);
-    let step = request.step.or(preferred).ok_or(LineariseError::NoStep { model })?;
-    if !(step.is_finite() && step > 0.0) {
-        let (what, expected) = ("the step".to_owned(), "a finite number of s above zero");
-        return Err(LineariseError::Number { what, value: step, expected });
-    }
-    let found = steps::of_steps(fmu, parts, &states, request, step)?;
+    let (step, found) = match request.step.or(preferred) {
+        None => by_derived_step(fmu, parts, &states, request)?,
+        Some(step) if step.is_finite() && step > 0.0 => {
+            (step, steps::of_steps(fmu, parts, &states, request, step)?)
+        }
+        Some(value) => {
+            let (what, expected) = ("the step".to_owned(), "a finite number of s above zero");
+            return Err(LineariseError::Number { what, value, expected });
+        }
+    };
     let heights = parts.inputs.iter().map(|part| part.name.clone()).zip(found.heights).collect();
     let how = Differences::OfSteps { step, count: found.count, heights, missed: found.missed };
     let findings = RawResult {
@@ -244,6 +254,47 @@ fn by_steps(
         how: MethodResult::Differences(how, found.errors),
     };
     assemble(parts, request, findings)
+}
+
+/// Linearises by communication steps of several sizes, for an FMU that states none; returns the step
+/// of the most accurate result, and that.
+fn by_derived_step(
+    fmu: &Fmu,
+    parts: &Parts,
+    states: &[Part],
+    request: &Linearise,
+) -> Result<(f64, steps::RecordResult), LineariseError> {
+    let experiment = parts.description.default_experiment;
+    let length = experiment.and_then(|own| Some(own.stop_time? - own.start_time.unwrap_or(0.0)));
+    let of_length = length.filter(|length| length.is_finite() && *length > 0.0);
+    let mut tried: Vec<f64> = of_length.map(|length| length / 1000.0).into_iter().collect();
+    tried.extend(
+        STEPS.iter().filter(|step| tried.first() != Some(step)).copied().collect::<Vec<_>>(),
+    );
+    let mut best: Option<(f64, steps::RecordResult)> = None;
+    let mut reason = None;
+    for &step in &tried {
+        match steps::of_steps(fmu, parts, states, request, step) {
+            Ok(found) => {
+                let enough = found.relative < ACCURATE;
+                if best.as_ref().is_none_or(|(_, known)| found.relative < known.relative) {
+                    best = Some((step, found));
+                }
+                if enough {
+                    break;
+                }
+            }
+            Err(error) => reason = reason.or(Some(error)),
+        }
+    }
+    match (best, reason) {
+        (Some(best), _) => Ok(best),
+        (None, reason) => {
+            let model = parts.description.model_name.clone();
+            let reason = reason.unwrap_or(LineariseError::Empty { list: "communication steps" });
+            Err(LineariseError::NoStep { model, tried, reason: Box::new(reason) })
+        }
+    }
 }
 
 /// Lists the continuous Reals that may be states, as part of a sentence.

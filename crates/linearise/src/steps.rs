@@ -46,7 +46,7 @@ pub(super) struct RecordResult {
     /// Relative prediction error for an input signal that the fit did not use.
     pub(super) missed: f64,
     /// The largest error relative to its row.
-    relative: f64,
+    pub(super) relative: f64,
 }
 
 /// [A, B, x'; C, D, 0] for one step size, and the standard deviations.

@@ -1,9 +1,10 @@
 //! The plant with faults.
 
 use crate::detectability::{HiddenFault, hidden_faults};
-use crate::rank::require_observable;
+use crate::rank::{Mode, require_observable, unobservable_modes};
+use crate::stability::is_clearly_stable;
 use crate::svd::Svd;
-use crate::{Error, check};
+use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
 /// Singular values of B below this part of the largest count as zero.
@@ -103,6 +104,32 @@ impl FaultyPlant {
         }
         require_observable(&self.augmented_dynamics(), &self.augmented_output())?;
         Ok(())
+    }
+
+    /// Checks that an augmented observer exists whose error decays: (`A_0`, `C_0`) is detectable.
+    /// Its fixed eigenvalues are those of the unobservable modes of (A, C), which are returned.
+    ///
+    /// The conditions of [`FaultyPlant::check_observer_exists`] with (A, C) detectable in place of
+    /// observable.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotDetectable`], [`Error::TooManyFaults`], [`Error::HiddenFault`] with the condition
+    /// that fails; same as [`FaultyPlant::check`] otherwise.
+    pub fn check_detectable(&self, domain: Domain) -> Result<Vec<Mode>, Error> {
+        self.check()?;
+        let hidden = hidden_faults(self)?;
+        if let Some(first) = hidden.first() {
+            return Err(refusal(first, self.c.nrows()));
+        }
+        let (a_0, c_0) = (self.augmented_dynamics(), self.augmented_output());
+        let modes = unobservable_modes(&a_0, &c_0)?;
+        for Mode { eigenvalue, .. } in &modes {
+            if !is_clearly_stable(*eigenvalue, &a_0, domain)? {
+                return Err(Error::NotDetectable { eigenvalue: *eigenvalue });
+            }
+        }
+        Ok(modes)
     }
 
     /// The `K_f`, m x q, that minimises the norm of B `K_f` + `F_a`; if there are several, the one

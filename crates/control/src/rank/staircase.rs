@@ -14,7 +14,7 @@ const TOLERANCE_PER_STATE: f64 = 100.0 * f64::EPSILON;
 pub(crate) struct Staircase {
     pub(crate) answer: Rank,
     /// Q1, n x rank, orthonormal: the controllable states.
-    reached_basis: DMatrix<f64>,
+    pub(crate) reached_basis: DMatrix<f64>,
     /// Q2, n x (n - rank), orthonormal: the uncontrollable states, Q2' S^-1 A S = R Q2'.
     pub(crate) rest_basis: DMatrix<f64>,
     /// R.

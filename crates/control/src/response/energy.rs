@@ -2,8 +2,10 @@
 
 use crate::blocks::symmetric_part;
 use crate::lyapunov::{discrete_lyapunov, lyapunov};
+use crate::rank::Staircase;
 use crate::svd::norm_2;
 use crate::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
 
 /// The H2 norm and the generalised H2 norms of a system.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +55,23 @@ pub struct Energy {
 /// as [`lyapunov`] and [`discrete_lyapunov`].
 pub fn energy(system: &StateSpace) -> Result<Energy, Error> {
     system.check()?;
+    let covariance = match covariance(system) {
+        // States that w does not reach have the covariance zero, of which only rounding is found.
+        Err(error @ Error::ResidualTooLarge { .. }) => match reached_part(system)? {
+            Some(part) => covariance(&part)?,
+            None => return Err(error),
+        },
+        found => found?,
+    };
+    Ok(Energy {
+        h2: covariance.trace().max(0.0).sqrt(),
+        peak: norm_2(&covariance)?.sqrt(),
+        peaks: covariance.diagonal().iter().map(|entry| entry.max(0.0).sqrt()).collect(),
+    })
+}
+
+/// C W C', in sampled time C W C' + D D'.
+fn covariance(system: &StateSpace) -> Result<DMatrix<f64>, Error> {
     let StateSpace { a, b, c, d, domain } = system;
     let noise = symmetric_part(&(b * b.transpose()));
     let covariance = match domain {
@@ -69,10 +88,20 @@ pub fn energy(system: &StateSpace) -> Result<Energy, Error> {
             c * state * c.transpose() + d * d.transpose()
         }
     };
-    let covariance = symmetric_part(&covariance);
-    Ok(Energy {
-        h2: covariance.trace().max(0.0).sqrt(),
-        peak: norm_2(&covariance)?.sqrt(),
-        peaks: covariance.diagonal().iter().map(|entry| entry.max(0.0).sqrt()).collect(),
-    })
+    Ok(symmetric_part(&covariance))
+}
+
+/// The states that w reaches; None if these are all, or none.
+fn reached_part(system: &StateSpace) -> Result<Option<StateSpace>, Error> {
+    let staircase = Staircase::new(&system.a, &system.b)?;
+    if staircase.answer.is_full() || staircase.answer.rank == 0 {
+        return Ok(None);
+    }
+    let (c, _) = staircase.reached_output(&system.c.transpose());
+    Ok(Some(StateSpace {
+        a: staircase.reached_dynamics(),
+        b: staircase.reached_input(&system.b),
+        c: c.transpose(),
+        ..system.clone()
+    }))
 }

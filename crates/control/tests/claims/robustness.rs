@@ -6,8 +6,8 @@ use control::hold::zero_order_hold;
 use control::response::h_infinity;
 use control::robustness::{
     Loop, Point, Tolerances, channel_margins, delay_margin, disk_margin, longest_hold,
-    longest_period, noise_gains, regulator_of_same_speed, sampled_delay_margin, scaled_peak,
-    tolerance_test,
+    longest_period, noise_gains, peak_derivatives, regulator_of_same_speed, sampled_delay_margin,
+    scaled_peak, tolerance_test,
 };
 use control::stability::instability;
 use control::{Domain, Error, StateSpace};
@@ -79,6 +79,64 @@ fn peaks_of_sensitivities_agree_with_slicot() {
             assert_near(norm(&closed.sensitivity(point)), expected, 1e-6, &what);
             let expected = case.number(&format!("t_{name}"));
             assert_near(norm(&closed.complementary(point)), expected, 1e-6, &what);
+        }
+    }
+}
+
+/// Returns A, B or C.
+type Field = fn(&mut StateSpace) -> &mut DMatrix<f64>;
+
+/// Checks the derivatives of a peak against differences of `peak`, entry by entry, relative to the
+/// largest effect of a relative change.
+fn assert_derivatives(
+    case: &Case,
+    (point, frequency, scaled): (Point, f64, bool),
+    (step, tolerance): (f64, f64),
+    peak: impl Fn(&Loop) -> f64,
+) {
+    let (plant, controller) = parts(case);
+    let found = peak_derivatives(&plant, &controller, (point, frequency, scaled)).expect("a peak");
+    let reached = peak(&closed(case));
+    assert_near(found.value, reached, 1e-4, case.name);
+    let fields: [(&DMatrix<f64>, Field); 3] =
+        [(&found.a, |own| &mut own.a), (&found.b, |own| &mut own.b), (&found.c, |own| &mut own.c)];
+    let mut effects = Vec::new();
+    for (derivatives, field) in fields {
+        let values = field(&mut plant.clone()).clone();
+        for at in (0..values.len()).filter(|&at| values[at] != 0.0) {
+            let moved = |factor: f64| {
+                let mut plant = plant.clone();
+                field(&mut plant)[at] *= factor;
+                if let Domain::Sampled { period } = controller.domain {
+                    (plant.a, plant.b) =
+                        zero_order_hold(&plant.a, &plant.b, period).expect("a loop");
+                    plant.domain = controller.domain;
+                }
+                peak(&Loop::new(plant, controller.clone()).expect("a loop"))
+            };
+            let expected = (moved(1.0 + step) - moved(1.0 - step)) / (2.0 * step);
+            effects.push((derivatives[at] * values[at], expected));
+        }
+    }
+    let largest = effects.iter().map(|(_, expected)| expected.abs()).fold(0.0, f64::max);
+    assert!(largest > 0.1, "{} {point:?}: {largest}", case.name);
+    for (found, expected) in effects {
+        let error = (found - expected).abs() / largest;
+        assert!(error < tolerance, "{} {point:?}: {found} {expected}", case.name);
+    }
+}
+
+#[test]
+fn derivatives_of_the_peaks_are_those_of_the_peaks_of_changed_plants() {
+    for case in cases(RECORDED, "loop") {
+        for (_, point) in POINTS {
+            let norm = |own: &Loop| h_infinity(&own.sensitivity(point), 1e-8).unwrap();
+            let frequency = norm(&closed(&case)).frequency;
+            let at = (point, frequency, false);
+            assert_derivatives(&case, at, (1e-4, 1e-3), |own| norm(own).lower);
+            let scaled = |own: &Loop| scaled_peak(&own.sensitivity(point)).unwrap();
+            let at = (point, scaled(&closed(&case)).frequency, true);
+            assert_derivatives(&case, at, (5e-3, 5e-2), |own| scaled(own).value);
         }
     }
 }

@@ -95,6 +95,8 @@ pub(super) fn responses(report: &Report) -> Markup {
     html! {
         p {
             "The fault changes at time 0 by the size stated and then stays; the loop was at rest. \
+             States and commands are deviations from the operating point; the command of a sampled \
+             controller is constant between samples. \
              The time axes show decades, so that the fast part of the observer and the slow part \
              of the feedback loop both have room. Each curve has its own scale. Where a fault turns \
              round again and again, as dry friction does, the largest magnitude of a state predicts \
@@ -109,10 +111,19 @@ pub(super) fn responses(report: &Report) -> Markup {
 fn response(id: &str, response: &StepResponse) -> Markup {
     let unit = response.unit.as_deref().unwrap_or_default();
     let title = html! {
-        "A change of " (response.fault) " by " (number(response.size)) " " (unit) " "
-        @match response.rate {
-            None => "at once",
-            Some(rate) => { "at " (number(rate)) " " (unit) " per s" }
+        @if response.parts.len() > 1 {
+            "All faults together: "
+            @for (index, part) in response.parts.iter().enumerate() {
+                @if index > 0 { ", " }
+                (part.name) " by " (number(part.value)) " " (part.unit.as_deref().unwrap_or_default())
+            }
+            " at once"
+        } @else {
+            "A change of " (response.fault) " by " (number(response.size)) " " (unit) " "
+            @match response.rate {
+                None => "at once",
+                Some(rate) => { "at " (number(rate)) " " (unit) " per s" }
+            }
         }
     };
     let rows: Vec<Vec<Cell>> = response
@@ -131,7 +142,8 @@ fn response(id: &str, response: &StepResponse) -> Markup {
     let caption = format!("Peaks and settling after a change of {}", response.fault);
     let heads = ["signal", "unit", "largest magnitude", "at time (s)", "settled after (s)"];
     let mut entries = vec![(line_sample("mark"), "settled, within 2 %".to_owned())];
-    if response.curves.iter().any(|curve| curve.unit == response.unit) {
+    let sized = |curve: &Curve| response.parts.len() == 1 && curve.unit == response.unit;
+    if response.curves.iter().any(sized) {
         entries.push((line_sample("size"), "size of the change, in the same unit".to_owned()));
     }
     html! {
@@ -174,7 +186,7 @@ fn curve(id: &str, curve: &Curve, response: &StepResponse) -> Markup {
             }
             (chart.draw(&html! {
                 (chart.level(0.0, "zero"))
-                @if curve.unit == response.unit { (chart.level(response.size, "size")) }
+                @if response.parts.len() == 1 && curve.unit == response.unit { (chart.level(response.size, "size")) }
                 (chart.upright(curve.settling_time, "mark"))
                 (chart.curve(&curve.times, &curve.values, "line-1"))
             }))

@@ -6,8 +6,11 @@ use super::curves::frequency;
 use super::matrix::matrices;
 use super::number::number;
 use super::table::{Cell, table};
-use crate::report::Report;
-use crate::robust_report::{Disk, Robustness, ToleranceResult};
+use crate::report::{Matrix, Report};
+use crate::robust_report::{Disk, PeakSensitivity, Robustness, ToleranceResult};
+
+/// Number of parameters in the table of the sensitivities.
+const SHOWN: usize = 12;
 
 pub(super) fn robustness(report: &Report) -> Markup {
     html! { @if let Some(found) = &report.robustness { (section(report, found)) } }
@@ -46,6 +49,8 @@ fn section(report: &Report, found: &Robustness) -> Markup {
         (noise(report, found))
         h3 id="comparison" { "Comparison" }
         (comparison(found))
+        h3 id="parameters" { "Sensitivity to the parameters" }
+        (parameters(report, found))
         h3 id="tolerances" { "Tolerances of the parameters" }
         (tolerances(report, &found.tolerance))
     }
@@ -86,6 +91,7 @@ fn peaks(found: &Robustness) -> Markup {
             point.t_peak.into(),
             point.t_frequency.into(),
             point.judged.into(),
+            point.judged_frequency.into(),
         ]
     };
     let rows: Vec<Vec<Cell>> = found.points.iter().map(row).collect();
@@ -97,6 +103,7 @@ fn peaks(found: &Robustness) -> Markup {
         "peak of T",
         "at rad/s",
         "judged",
+        "at rad/s",
     ];
     table("Peaks of the largest singular value", &heads, &rows)
 }
@@ -158,6 +165,51 @@ fn comparison(found: &Robustness) -> Markup {
              larger has eigenvalues that the plant resists."
         }
         (table("Norms and peaks", &["quantity", "this design", "linear-quadratic"], &rows))
+    }
+}
+
+/// Shows the parameters with the largest effect on the peaks of S.
+fn parameters(report: &Report, found: &Robustness) -> Markup {
+    let entries = |own: &PeakSensitivity| -> Vec<(String, f64)> {
+        let named = |matrix: &Matrix| -> Vec<(String, f64)> {
+            let at = |(i, row): (usize, &Vec<f64>)| -> Vec<(String, f64)> {
+                let name = |j: usize| format!("{}[{}, {}]", matrix.name, i + 1, j + 1);
+                row.iter().enumerate().map(|(j, value)| (name(j), *value)).collect()
+            };
+            matrix.values.iter().enumerate().flat_map(at).collect()
+        };
+        own.matrices.iter().flat_map(named).collect()
+    };
+    let all: Vec<_> = found.sensitivity.iter().map(entries).collect();
+    let Some(first) = all.first() else { return html! {} };
+    let size = |at: usize| all.iter().map(|own| own[at].1.abs()).fold(0.0, f64::max);
+    let mut order: Vec<usize> = (0..first.len()).filter(|&at| size(at) > 0.0).collect();
+    order.sort_by(|&i, &j| size(j).total_cmp(&size(i)));
+    let values: Vec<f64> = ["A", "B", "C"]
+        .iter()
+        .filter_map(|name| report.plant.matrices.iter().find(|own| own.name == *name))
+        .flat_map(|own| own.values.iter().flatten().copied())
+        .collect();
+    let row = |&at: &usize| {
+        let value = Cell::from(values.get(at).copied());
+        let effects = all.iter().map(|own| Cell::from(0.01 * own[at].1));
+        [first[at].0.as_str().into(), value].into_iter().chain(effects).collect()
+    };
+    let rows: Vec<Vec<Cell>> = order.iter().take(SHOWN).map(row).collect();
+    let points = found.sensitivity.iter().map(|own| format!("change at the {}", own.point));
+    let heads: Vec<String> =
+        ["entry", "value"].into_iter().map(str::to_owned).chain(points).collect();
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    html! {
+        p {
+            "The change of the judged peak of S for a change of one entry of the plant by +1 %, to \
+             first order; the " (rows.len()) " entries with the largest effect."
+        }
+        (table("Sensitivity of the peaks of S", &heads, &rows))
+        @for (index, own) in found.sensitivity.iter().enumerate() {
+            p { "At the " (own.point) ", for a change by 100 %:" }
+            (matrices(&format!("sensitivity-of-{}", index + 1), &own.matrices))
+        }
     }
 }
 

@@ -38,6 +38,10 @@ pub(super) fn verdict(report: &Report) -> Markup {
                     }
                 }
             }
+            @if !report.warnings.is_empty() {
+                p.outcome { "Warnings" }
+                ul { @for warning in &report.warnings { li { (warning) } } }
+            }
             @if !warnings.is_empty() {
                 p.outcome { "Robustness: " (level.word()) }
                 ul { @for warning in &warnings { li { (warning) } } }

@@ -10,6 +10,8 @@ mod variables;
 use std::collections::HashSet;
 use std::fmt;
 
+pub use names::{array_element, is_structured_name, misplaced_elements};
+
 use super::{DefaultExperiment, ModelDescription, Version};
 
 /// A rule that a model description breaks.

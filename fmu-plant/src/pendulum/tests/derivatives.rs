@@ -59,6 +59,48 @@ fn at_a_point_they_are_the_difference_quotients_in_all_regimes() {
     }
 }
 
+/// At rest in its equilibrium a cart without friction counts as sticking, but nothing holds it. The
+/// linearised equations (20), with the determinant D = (M + m) J - (m l)^2, are
+///
+/// ```text
+/// v'     = (J (u - F_x v) - m l (m l g theta - F_theta omega)) / D
+/// omega' = (-m l (u - F_x v) + (M + m) (m l g theta - F_theta omega)) / D
+/// ```
+#[test]
+fn without_friction_the_derivatives_at_rest_are_those_of_a_free_cart() {
+    for (exponent, angle) in [(2.0, 0.0), (0.5, 0.0), (2.0, std::f64::consts::PI)] {
+        let model = started(|model| {
+            (model.parameters.coulomb, model.parameters.static_friction) = (0.0, 0.0);
+            model.parameters.stribeck_exponent = exponent;
+            model.initial = [0.0, angle, 0.0, 0.0];
+        });
+        let p = &model.parameters;
+        let moment = p.pendulum_mass * p.length * angle.cos();
+        let total = p.cart_mass + p.pendulum_mass;
+        let determinant = total * p.inertia - moment * moment;
+        let weight = moment * p.gravity;
+        let pair = |push: f64, torque: f64| {
+            let v = (p.inertia * push - moment * torque) / determinant;
+            [v, (total * torque - moment * push) / determinant]
+        };
+        for (known, [v, omega]) in [
+            ("u", pair(1.0, 0.0)),
+            ("f_a", pair(1.0, 0.0)),
+            ("x_p", [0.0; 2]),
+            ("theta", pair(0.0, weight)),
+            ("v_p", pair(-p.cart_damping, 0.0)),
+            ("omega", pair(0.0, -p.pendulum_damping)),
+        ] {
+            let found = column(&model, &NOW, known);
+            for (name, expected) in [("der(v_p)", v), ("der(omega)", omega), ("f_fric", 0.0)] {
+                let at = UNKNOWNS.iter().position(|unknown| *unknown == name).unwrap();
+                let error = (found[at] - expected).abs();
+                assert!(error < 1e-12 * expected.abs().max(1.0), "d {name} / d {known}: {error}");
+            }
+        }
+    }
+}
+
 #[test]
 fn at_initialization_they_are_the_difference_quotients_in_every_known() {
     for exponent in [2.0, 1.4] {

@@ -8,7 +8,8 @@ use crate::report::{
 };
 
 use crate::robust_report::{
-    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Robustness, ToleranceResult, Verdict,
+    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, PeakSensitivity, Robustness,
+    ToleranceResult, Verdict,
 };
 
 pub(super) const MARKUP: &str = "</code></pre><script>alert(1)</script>";
@@ -204,6 +205,7 @@ fn robustness(numbers: &mut Numbers) -> Robustness {
         t_frequency: 12.0,
         s_peak_scaled: 3.0,
         judged: 3.0,
+        judged_frequency: f64::INFINITY,
         together: disk(),
         channels: vec![channel(MARKUP), channel(QUOTES)],
     };
@@ -228,6 +230,10 @@ fn robustness(numbers: &mut Numbers) -> Robustness {
             first_unstable: 0.75,
             worst: vec![numbers.matrix("A", 10, 10)],
         },
+        sensitivity: vec![PeakSensitivity {
+            point: QUOTES.to_owned(),
+            matrices: vec![numbers.matrix("A", 10, 10)],
+        }],
         curves: vec![frequency(2)],
     }
 }
@@ -246,6 +252,7 @@ pub(super) fn hostile() -> Report {
         description: format!("Tanks «Überlauf» {MARKUP}"),
         plant_file: format!("C:\\plants\\{QUOTES}.toml"),
         plant: plant(&mut numbers),
+        warnings: vec![format!("{MARKUP}:1:2: {QUOTES}")],
         verdict: Verdict {
             level: Level::Red,
             reasons: vec![format!("the peak of S {MARKUP}")],
@@ -274,6 +281,7 @@ pub(super) fn hostile() -> Report {
                 unit: None,
                 size: 0.375,
                 rate: Some(12.25),
+                parts: Vec::new(),
                 curves: (1..=5).map(curve).collect(),
             })
             .collect(),
@@ -303,6 +311,7 @@ pub(super) fn bare() -> Report {
         description: String::new(),
         plant_file: "plant.toml".to_owned(),
         plant: bare_plant(),
+        warnings: vec![format!("{MARKUP}:1:2: {QUOTES}")],
         verdict: Verdict {
             level: Level::Green,
             reasons: Vec::new(),

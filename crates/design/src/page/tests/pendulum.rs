@@ -90,6 +90,7 @@ impl Design {
             unit: Some("N".to_owned()),
             size,
             rate: None,
+            parts: Vec::new(),
             curves,
         }
     }
@@ -258,6 +259,7 @@ pub(super) fn pendulum() -> Report {
         description: "Fault-tolerant controller of the inverted pendulum".to_owned(),
         plant_file: "pendulum.toml".to_owned(),
         plant: plant(&design, matrices),
+        warnings: Vec::new(),
         verdict: Verdict {
             level: Level::Green,
             reasons: Vec::new(),

@@ -18,7 +18,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     }
     for variable in &description.variables {
         let name = &variable.name;
-        problems.demand(is_structured(name), section, || {
+        problems.demand(is_structured_name(name), section, || {
             format!("variable {name:?} is not a structured name")
         });
         let real = variable.kind.as_real().is_some();
@@ -28,44 +28,49 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     }
     // Arrays of FMI 3.0 are variables, not names.
     if description.version() == Version::V2 {
-        check_arrays(names(), problems);
+        for (_, text) in misplaced_elements(names()) {
+            problems.add(section, text);
+        }
     }
 }
 
-/// Checks that the elements of each array are adjacent, with the last index running fastest. Only
-/// arrays of scalars are checked: names with indices at their end.
-fn check_arrays<'a>(names: impl Iterator<Item = &'a str>, problems: &mut Problems) {
-    let section = problems.sections.names;
+/// Returns the positions of the names that break the order of array elements (FMI 2.0.5, section
+/// 2.2.9), each with the reason: the elements of an array are adjacent, with the last index running
+/// fastest. Only arrays of scalars are checked: names with indices at their end.
+pub fn misplaced_elements<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(usize, String)> {
+    let mut found = Vec::new();
     let mut seen = HashSet::new();
     let mut last: Option<(&str, Vec<u32>)> = None;
-    for name in names {
-        let Some((array, indices)) = element(name) else {
+    for (position, name) in names.enumerate() {
+        let Some((array, indices)) = array_element(name) else {
             last = None;
             continue;
         };
-        match &last {
-            Some((other, before)) if *other == array => {
-                problems.demand(*before < indices, section, || {
-                    format!("variable {name} does not follow in row-major order")
-                });
-            }
-            _ => problems.demand(seen.insert(array), section, || {
+        let text = match &last {
+            Some((other, before)) if *other == array => (*before >= indices)
+                .then(|| format!("variable {name} does not follow in row-major order")),
+            _ => (!seen.insert(array)).then(|| {
                 format!("variable {name} stands apart from the other elements of {array}")
             }),
-        }
+        };
+        found.extend(text.map(|text| (position, text)));
         last = Some((array, indices));
     }
+    found
 }
 
-/// Splits `a.b[1,2]` into `a.b` and its indices.
-fn element(name: &str) -> Option<(&str, Vec<u32>)> {
+/// Splits `a.b[1,2]` into `a.b` and its indices; `None` if the name does not end in indices.
+#[must_use]
+pub fn array_element(name: &str) -> Option<(&str, Vec<u32>)> {
     let (array, indices) = name.strip_suffix(']')?.split_once('[')?;
     let indices = indices.split(',').map(str::parse).collect::<Result<_, _>>().ok()?;
     Some((array, indices))
 }
 
+/// Returns whether `name` follows the convention of structured names (FMI 2.0.5, section 2.2.9):
 /// `name = identifier | "der(" identifier [ "," unsignedInteger ] ")"`.
-fn is_structured(name: &str) -> bool {
+#[must_use]
+pub fn is_structured_name(name: &str) -> bool {
     let derivative = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
     let Some(inner) = derivative else {
         return is_identifier(name);

@@ -1,0 +1,69 @@
+//! The controllable part of a pair, for feedback of a pair that is only stabilisable.
+
+use super::{Mode, Staircase, modes_of};
+use crate::balance::divide_columns;
+use crate::{Error, check};
+use nalgebra::DMatrix;
+
+/// The controllable part of x' = A x + B u, and the modes that no feedback moves.
+///
+/// ```text
+/// z = T x:  z' = A_1 z + (rest) + B_1 u
+/// eigenvalues of A + B K_1 T = those of A_1 + B_1 K_1 and those of the fixed modes
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct ControllablePart {
+    /// `A_1`, r x r with r the rank of the controllability matrix.
+    pub a: DMatrix<f64>,
+    /// `B_1`, r x m.
+    pub b: DMatrix<f64>,
+    /// T, r x n.
+    pub coordinates: DMatrix<f64>,
+    /// The n - r uncontrollable modes, see [`super::uncontrollable_modes`].
+    pub fixed: Vec<Mode>,
+}
+
+impl ControllablePart {
+    /// K, m x n, of the feedback u = `K_1` z of the controllable part: K = `K_1` T.
+    #[must_use]
+    pub fn gain(&self, of_part: &DMatrix<f64>) -> DMatrix<f64> {
+        of_part * &self.coordinates
+    }
+}
+
+/// Splits x' = A x + B u into the controllable part and the uncontrollable modes.
+///
+/// `a`: n x n; `b`: n x m. T = `Q_1`' S^-1 with the balancing S and the orthonormal basis `Q_1` of
+/// the staircase form. Method, cost and tolerance: see [`super::controllability`].
+///
+/// # Example
+///
+/// The mode -2 is not controllable; the other eigenvalue is moved to -3:
+///
+/// ```
+/// use nalgebra::DMatrix;
+/// let a = DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 0.0, -2.0]);
+/// let b = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
+/// let part = control::rank::controllable_part(&a, &b)?;
+/// let k_1 = DMatrix::from_element(1, 1, (-3.0 - part.a[(0, 0)]) / part.b[(0, 0)]);
+/// let closed = control::eigen::eigenvalues(&(&a + &b * part.gain(&k_1)))?;
+/// assert!((closed[0] + 3.0).norm() < 1e-14 && (closed[1] + 2.0).norm() < 1e-14);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix,
+/// [`Error::NotConverged`] when an inner iteration does not end.
+pub fn controllable_part(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<ControllablePart, Error> {
+    let n = check::square("A", a)?;
+    check::shape("B", b, (n, b.ncols()))?;
+    let staircase = Staircase::new(a, b)?;
+    Ok(ControllablePart {
+        a: staircase.reached_dynamics(),
+        b: staircase.reached_input(b),
+        coordinates: divide_columns(&staircase.reached_basis.transpose(), &staircase.scale),
+        fixed: modes_of(&staircase)?,
+    })
+}

@@ -1,0 +1,70 @@
+//! Modes that no gain moves, in words.
+
+use control::Domain;
+use control::rank::Mode;
+use nalgebra::Complex;
+
+/// Returns `the eigenvalue -2 1/s, which x2 dominates`; `name` returns the name of a state.
+pub(crate) fn described(mode: &Mode, name: impl Fn(usize) -> String) -> String {
+    described_at(mode.eigenvalue, " 1/s", mode, name)
+}
+
+/// The same with the eigenvalue in the plane in which the plant file states it: of the sampled loop
+/// if `sampled`, otherwise in 1/s.
+pub(crate) fn described_in(
+    mode: &Mode,
+    (domain, sampled): (Domain, bool),
+    name: impl Fn(usize) -> String,
+) -> String {
+    match domain {
+        Domain::Sampled { period } if !sampled => {
+            described_at(mode.eigenvalue.ln() / period, " 1/s", mode, name)
+        }
+        Domain::Sampled { .. } => described_at(mode.eigenvalue, " of the sampled loop", mode, name),
+        Domain::Continuous => described(mode, name),
+    }
+}
+
+fn described_at(
+    eigenvalue: Complex<f64>,
+    unit: &str,
+    mode: &Mode,
+    name: impl Fn(usize) -> String,
+) -> String {
+    let states: Vec<_> = mode.dominant.iter().map(|&state| name(state)).collect();
+    let verb = if states.len() == 1 { "dominates" } else { "dominate" };
+    let kind = if eigenvalue.im == 0.0 { "the eigenvalue" } else { "the eigenvalues" };
+    format!("{kind} {}{unit}, which {} {verb}", shown(eigenvalue), states.join(", "))
+}
+
+/// Six digits, such that a number read from the text is within 1e-5 of the value; a complex eigenvalue
+/// with its conjugate.
+fn shown(value: Complex<f64>) -> String {
+    match value.im {
+        0.0 => digits(value.re),
+        im => format!("{} ± {}i", digits(value.re), digits(im.abs())),
+    }
+}
+
+fn digits(value: f64) -> String {
+    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    // No sign for zero.
+    let rounded = rounded + 0.0;
+    match rounded.abs() {
+        size if size == 0.0 || (1e-4..1e6).contains(&size) => rounded.to_string(),
+        _ => format!("{rounded:e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_eigenvalue_has_six_digits() {
+        let values =
+            [(-2.0, 0.0), (-1.234_567_8, 2.0 / 3.0), (0.0, -1.0), (1e-17, 0.0), (-4e7, 0.0)];
+        let texts = values.map(|(re, im)| shown(Complex::new(re, im)));
+        assert_eq!(texts, ["-2", "-1.23457 ± 0.666667i", "0 ± 1i", "1e-17", "-4e7"]);
+    }
+}
