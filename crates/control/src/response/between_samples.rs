@@ -40,7 +40,7 @@ pub struct GainsBetweenSamples {
 /// any sequence of values, and x is read at the start of each part; with growing N the gains
 /// approach those of arbitrary faults, with an error of the order of 1/N. The gains of the
 /// [`super::peak_gain`] of [`super::fault_system`] are those of N = 1: a fault that changes at the
-/// samples only, seen at the samples only. Every (i, j) is the sum of |h_ij| over all parts and
+/// samples only, seen at the samples only. Every (i, j) is the sum of |`h_ij`| over all parts and
 /// samples. The sums end where the contraction of the loop bounds the rest, which is added.
 ///
 /// Source: lifting of a sampled loop, T. Chen and B. A. Francis, Optimal Sampled-Data Control
@@ -63,7 +63,7 @@ pub fn gains_between_samples(
     let a = loop_dynamics(plant, gains);
     stability::require_stable("A", &a, Domain::Sampled { period })?;
     let lifted = Lifted::new(extended, plant, gains, (period, parts))?;
-    let sums = |inputs: &Inputs| lifted.sums(&a, inputs, width);
+    let sums = |inputs: &Effects| lifted.sums(&a, inputs, width);
     Ok(GainsBetweenSamples {
         of_faults: sums(&lifted.faults())?,
         of_rates: sums(&lifted.rates())?,
@@ -88,15 +88,15 @@ struct Lifted<'a> {
 }
 
 /// How an input acts: on x at the end of the interval, on x at the start of each part, and on eps.
-struct Inputs {
+struct Effects {
     /// For each part of the input: its effect on x[k+1], n + filters rows.
-    on_state: Vec<DMatrix<f64>>,
+    states_after: Vec<DMatrix<f64>>,
     /// [i][j]: the effect of part j of the input on x at the start of part i.
-    on_output: Vec<Vec<DMatrix<f64>>>,
+    outputs: Vec<Vec<DMatrix<f64>>>,
     /// The effect on eps[k+1], a factor for each part.
-    on_error: Vec<f64>,
+    next_error: Vec<f64>,
     /// The effect on eps[k], a factor for each part.
-    on_present_error: Vec<f64>,
+    present_error: Vec<f64>,
 }
 
 impl<'a> Lifted<'a> {
@@ -132,10 +132,10 @@ impl<'a> Lifted<'a> {
     }
 
     /// Completes a matrix of the plant's states by the rows of the filter.
-    fn with_filter(&self, states: DMatrix<f64>, filter: DMatrix<f64>) -> DMatrix<f64> {
+    fn with_filter(&self, states: &DMatrix<f64>, filter: &DMatrix<f64>) -> DMatrix<f64> {
         let mut all = DMatrix::zeros(self.plant.a.nrows(), states.ncols());
-        all.rows_mut(0, self.states).copy_from(&states);
-        all.rows_mut(self.states, filter.nrows()).copy_from(&filter);
+        all.rows_mut(0, self.states).copy_from(states);
+        all.rows_mut(self.states, filter.nrows()).copy_from(filter);
         all
     }
 
@@ -146,46 +146,44 @@ impl<'a> Lifted<'a> {
     }
 
     /// The input f, one value for each part.
-    fn faults(&self) -> Inputs {
+    fn faults(&self) -> Effects {
         let count = self.parts();
         let filter = |j| self.at_samples() * f64::from(u8::from(j == 0));
-        let on_state = |j| self.with_filter(self.effect(count, j), filter(j));
-        Inputs {
-            on_state: (0..count).map(on_state).collect(),
-            on_output: (0..count)
-                .map(|i| (0..count).map(|j| self.effect(i, j)).collect())
-                .collect(),
-            on_error: vec![0.0; count],
-            on_present_error: (0..count).map(|j| if j == 0 { -1.0 } else { 0.0 }).collect(),
+        let states_after = |j| self.with_filter(&self.effect(count, j), &filter(j));
+        Effects {
+            states_after: (0..count).map(states_after).collect(),
+            outputs: (0..count).map(|i| (0..count).map(|j| self.effect(i, j)).collect()).collect(),
+            next_error: vec![0.0; count],
+            present_error: (0..count).map(|j| if j == 0 { -1.0 } else { 0.0 }).collect(),
         }
     }
 
     /// The input f', one value for each part: f in part j is f[k] + h times the sum of those before.
-    fn rates(&self) -> Inputs {
+    fn rates(&self) -> Effects {
         let count = self.parts();
         let sum = |i: usize, r: usize| {
             let zero = &self.entry * 0.0;
             (r + 1..i).fold(zero, |sum, j| sum + self.effect(i, j)) * self.part
         };
         let nothing = self.at_samples() * 0.0;
-        let on_state = |r| self.with_filter(sum(count, r), nothing.clone());
-        Inputs {
-            on_state: (0..count).map(on_state).collect(),
-            on_output: (0..count).map(|i| (0..count).map(|r| sum(i, r)).collect()).collect(),
-            on_error: vec![-self.part; count],
-            on_present_error: vec![0.0; count],
+        let states_after = |r| self.with_filter(&sum(count, r), &nothing);
+        Effects {
+            states_after: (0..count).map(states_after).collect(),
+            outputs: (0..count).map(|i| (0..count).map(|r| sum(i, r)).collect()).collect(),
+            next_error: vec![-self.part; count],
+            present_error: vec![0.0; count],
         }
     }
 
     /// The input f[k] of a fault without jumps: `F_a` + B `K_f` of the sampled plant.
-    fn uncancelled(&self) -> Inputs {
+    fn uncancelled(&self) -> Effects {
         let Gains { k_f, .. } = self.gains;
         let until = |i: usize| (0..i).fold(&self.gamma[i] * k_f, |sum, j| sum + self.effect(i, j));
-        Inputs {
-            on_state: vec![self.with_filter(until(self.parts()), self.at_samples())],
-            on_output: (0..self.parts()).map(|i| vec![until(i)]).collect(),
-            on_error: vec![0.0],
-            on_present_error: vec![0.0],
+        Effects {
+            states_after: vec![self.with_filter(&until(self.parts()), &self.at_samples())],
+            outputs: (0..self.parts()).map(|i| vec![until(i)]).collect(),
+            next_error: vec![0.0],
+            present_error: vec![0.0],
         }
     }
 
@@ -205,36 +203,36 @@ impl<'a> Lifted<'a> {
     }
 
     /// The effect of part j on the state of the loop.
-    fn input(&self, inputs: &Inputs, j: usize) -> DMatrix<f64> {
+    fn input(&self, inputs: &Effects, j: usize) -> DMatrix<f64> {
         let (n, q) = self.plant.f_a.shape();
-        let on_state = &inputs.on_state[j];
-        let mut seen = on_state.clone().resize_vertically(n + q, 0.0);
-        seen.rows_mut(n, q).fill_diagonal(inputs.on_error[j]);
+        let states_after = &inputs.states_after[j];
+        let mut seen = states_after.clone().resize_vertically(n + q, 0.0);
+        seen.rows_mut(n, q).fill_diagonal(inputs.next_error[j]);
         if self.gains.estimator == Estimator::Current {
-            seen -= self.gains.observer_gain() * &self.plant.c * on_state;
+            seen -= self.gains.observer_gain() * &self.plant.c * states_after;
         }
         let mut column = DMatrix::zeros(2 * n + q, q);
-        column.view_mut((0, 0), (n, q)).copy_from(on_state);
+        column.view_mut((0, 0), (n, q)).copy_from(states_after);
         column.view_mut((n, 0), (n + q, q)).copy_from(&seen);
         column
     }
 
     /// The sum of |h| over all parts and samples; of x the largest over the parts of an interval.
-    fn sums(&self, a: &DMatrix<f64>, inputs: &Inputs, width: f64) -> Result<DMatrix<f64>, Error> {
+    fn sums(&self, a: &DMatrix<f64>, inputs: &Effects, width: f64) -> Result<DMatrix<f64>, Error> {
         let (n, q) = self.plant.f_a.shape();
-        let (own, order, count) = (self.states, 2 * n + q, inputs.on_state.len());
-        let reads = inputs.on_output.len();
+        let (own, order, count) = (self.states, 2 * n + q, inputs.states_after.len());
+        let reads = inputs.outputs.len();
         // All columns at once, and all rows: x at the start of each part, then [x; e; eps].
         let mut b = DMatrix::zeros(order, count * q);
         let mut c = DMatrix::zeros(reads * own + order, order);
         let mut sums = DMatrix::zeros(reads * own + order, q);
         for j in 0..count {
             b.columns_mut(j * q, q).copy_from(&self.input(inputs, j));
-            for (i, effects) in inputs.on_output.iter().enumerate() {
+            for (i, effects) in inputs.outputs.iter().enumerate() {
                 let mut rows = sums.rows_mut(i * own, own);
                 rows += effects[j].abs();
             }
-            let present = inputs.on_present_error[j].abs();
+            let present = inputs.present_error[j].abs();
             for fault in 0..q {
                 sums[(reads * own + 2 * n + fault, fault)] += present;
             }

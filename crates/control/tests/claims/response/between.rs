@@ -8,19 +8,22 @@ use control::hold::zero_order_hold;
 use control::placement::real_poles;
 use control::response::{fault_rate_system, fault_system, gains_between_samples, peak_gain};
 use control::sampled::{design, sampled_poles};
-use control::{Domain, StateSpace};
+use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
 const WIDTH: f64 = 1e-3;
 
 /// The pendulum of the paper, and its controller sampled at `period`.
-fn sampled(period: f64, estimator: Estimator) -> (ExtendedPlant, FaultyPlant, Gains) {
+fn sampled(
+    period: f64,
+    estimator: Estimator,
+) -> Result<(ExtendedPlant, FaultyPlant, Gains), Error> {
     let extended = ExtendedPlant::without_filter(crate::paper::plant());
-    let feedback = sampled_poles(&real_poles(&CONTROLLER_POLES), period).unwrap();
+    let feedback = sampled_poles(&real_poles(&CONTROLLER_POLES), period)?;
     let fast = real_poles(&[-1200.0, -1500.0, -1800.0, -2100.0, -3000.0]);
-    let observer = sampled_poles(&fast, period).unwrap();
-    let made = design(&extended, period, estimator, &feedback, &observer, None).unwrap();
-    (extended, made.plant, made.gains)
+    let observer = sampled_poles(&fast, period)?;
+    let made = design(&extended, period, estimator, &feedback, &observer, None)?;
+    Ok((extended, made.plant, made.gains))
 }
 
 /// The sums of the moduli of the states' impulse responses, from the impulses of each part of an
@@ -29,14 +32,14 @@ fn sampled(period: f64, estimator: Estimator) -> (ExtendedPlant, FaultyPlant, Ga
 fn simulated(
     extended: &ExtendedPlant,
     (controller, period): (&StateSpace, f64),
-    (parts, samples): (usize, usize),
-    fault: impl Fn(usize) -> f64,
-) -> DVector<f64> {
+    (parts, samples): (u32, u32),
+    fault: impl Fn(u32) -> f64,
+) -> Result<DVector<f64>, Error> {
     let FaultyPlant { a, b, c, f_a, .. } = &extended.plant;
     let n = a.nrows();
-    let (phi, gamma) = zero_order_hold(a, b, period / parts as f64).unwrap();
-    let (_, entry) = zero_order_hold(a, f_a, period / parts as f64).unwrap();
-    let mut sums = DMatrix::<f64>::zeros(n, parts);
+    let (phi, gamma) = zero_order_hold(a, b, period / f64::from(parts))?;
+    let (_, entry) = zero_order_hold(a, f_a, period / f64::from(parts))?;
+    let mut sums = DMatrix::<f64>::zeros(n, parts as usize);
     for impulse in 0..parts {
         let mut x = DVector::zeros(n);
         let mut own = DVector::zeros(controller.a.nrows());
@@ -45,7 +48,7 @@ fn simulated(
             let u = &controller.c * &own + &controller.d * &y;
             own = &controller.a * own + &controller.b * y;
             for part in 0..parts {
-                let mut sum = sums.column_mut(part);
+                let mut sum = sums.column_mut(part as usize);
                 sum += x.abs();
                 let at = k * parts + part;
                 let f = if at < impulse { 0.0 } else { fault(at - impulse) };
@@ -53,23 +56,24 @@ fn simulated(
             }
         }
     }
-    DVector::from_iterator(n, sums.row_iter().map(|row| row.max()))
+    Ok(DVector::from_iterator(n, sums.row_iter().map(|row| row.max())))
 }
 
 #[test]
 fn gains_between_samples_are_those_of_a_simulation_in_small_steps() {
-    for (estimator, period) in [(Estimator::Prediction, 0.002), (Estimator::Current, 0.01)] {
-        let (extended, plant, gains) = sampled(period, estimator);
+    for (estimator, milliseconds) in [(Estimator::Prediction, 2), (Estimator::Current, 10)] {
+        let period = 1e-3 * f64::from(milliseconds);
+        let (extended, plant, gains) = sampled(period, estimator).unwrap();
         let domain = Domain::Sampled { period };
         let own = controller(&plant, &gains, domain).unwrap();
         let found = gains_between_samples(&extended, &plant, &gains, period, (8, WIDTH)).unwrap();
-        let samples = (4.0 / period) as usize;
-        let pulse = |at: usize| f64::from(u8::from(at == 0));
-        let same = simulated(&extended, (&own, period), (8, samples), pulse);
-        let finer = simulated(&extended, (&own, period), (32, samples), pulse);
+        let samples = 4000 / milliseconds;
+        let pulse = |at: u32| f64::from(u8::from(at == 0));
+        let same = simulated(&extended, (&own, period), (8, samples), pulse).unwrap();
+        let finer = simulated(&extended, (&own, period), (32, samples), pulse).unwrap();
         let part = period / 8.0;
-        let ramp = |at: usize| if at == 0 { 0.0 } else { part };
-        let rates = simulated(&extended, (&own, period), (8, samples), ramp);
+        let ramp = |at: u32| if at == 0 { 0.0 } else { part };
+        let rates = simulated(&extended, (&own, period), (8, samples), ramp).unwrap();
         for state in 0..4 {
             let gain = found.of_faults[(state, 0)];
             assert!(
@@ -92,7 +96,7 @@ fn gains_between_samples_are_those_of_a_simulation_in_small_steps() {
 fn with_one_part_the_gains_are_those_at_the_samples() {
     for estimator in [Estimator::Prediction, Estimator::Current] {
         let period = 0.005;
-        let (extended, plant, gains) = sampled(period, estimator);
+        let (extended, plant, gains) = sampled(period, estimator).unwrap();
         let domain = Domain::Sampled { period };
         let found = gains_between_samples(&extended, &plant, &gains, period, (1, WIDTH)).unwrap();
         let of_faults = peak_gain(&fault_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
@@ -110,7 +114,7 @@ fn with_one_part_the_gains_are_those_at_the_samples() {
 #[test]
 fn a_slow_sampled_loop_is_farther_from_rest_between_its_samples_than_at_them() {
     let period = 0.01;
-    let (extended, plant, gains) = sampled(period, Estimator::Prediction);
+    let (extended, plant, gains) = sampled(period, Estimator::Prediction).unwrap();
     let found = gains_between_samples(&extended, &plant, &gains, period, (16, WIDTH)).unwrap();
     let domain = Domain::Sampled { period };
     let at_samples = peak_gain(&fault_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
