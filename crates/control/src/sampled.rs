@@ -5,12 +5,12 @@
 //! time at which the sampled plant is controllable and observable.
 
 use crate::aso::{Estimator, FaultyPlant, Gains, place_controller};
-use crate::balance::{divide_columns, multiply_columns, multiply_rows, power_of_two};
+use crate::balance::power_of_two;
 use crate::blocks::{block_2x2, stacked};
 use crate::controller::{closed_loop, controller};
 use crate::faults::ExtendedPlant;
 use crate::hold::FirstOrderHold;
-use crate::placement::{Quality, place_discrete, place_discrete_as_given};
+use crate::placement::{Coordinates, DISCRETE, Quality, place_discrete, place_in};
 use crate::stability::instability;
 use crate::{Domain, Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -260,11 +260,10 @@ pub fn place_estimator(
         let unit = power_of_two(1.0 / energy.sqrt());
         if unit.is_normal() { unit } else { 1.0 }
     });
-    let a = divide_columns(&multiply_rows(&a_0.transpose(), &scale), &scale);
-    let b = multiply_rows(&output.transpose(), &scale);
-    let placed = place_discrete_as_given(&a, &b, poles)?;
-    let gain = multiply_columns(&placed.gain, &scale);
-    Ok((-gain.transpose(), placed.quality))
+    let units = scale.map(|unit| 1.0 / unit);
+    let (a, b) = (a_0.transpose(), output.transpose());
+    let placed = place_in(&Coordinates::Scaled(&units), &a, &b, poles, &DISCRETE)?;
+    Ok((-placed.gain.transpose(), placed.quality))
 }
 
 /// The coefficients of the measurement filter in `domain`: the rates w, in sampled time the gains 1

@@ -10,9 +10,8 @@ const ENOUGH: f64 = 1e-4;
 const FLATTER: f64 = 0.9;
 /// Relative rounding error of a value; within it a step is accepted if it reduces the slope.
 const NOISE: f64 = 1e-15;
-/// The descent ends when this many iterations lower the value by less than `STALLED`.
+/// The descent ends when this many iterations lower the value by less than the tolerance.
 const PATIENCE: usize = 10;
-const STALLED: f64 = 1e-6;
 /// The descent ends at a gradient shorter than this.
 const FLAT: f64 = 1e-12;
 
@@ -26,7 +25,7 @@ struct Point {
 }
 
 /// Minimises a function from the starting point zero; returns the point and its value (infinite if
-/// the function is undefined at zero).
+/// the function is undefined at zero). `tolerance`: decrease in ten iterations at which it ends.
 ///
 /// BFGS with a line search by bisection for the weak Wolfe conditions: A. S. Lewis and M. L.
 /// Overton, Nonsmooth optimization via quasi-Newton methods, Math. Program. 141 (2013), algorithms
@@ -34,6 +33,7 @@ struct Point {
 pub(crate) fn minimise(
     function: &dyn Fn(&DVector<f64>) -> Evaluation,
     dimension: usize,
+    tolerance: f64,
 ) -> (DVector<f64>, f64) {
     let start = DVector::zeros(dimension);
     let Some((value, gradient)) = function(&start) else {
@@ -54,7 +54,7 @@ pub(crate) fn minimise(
         update(&mut inverse_hessian, &step, &change);
         here = next;
         if iteration % PATIENCE == 0 {
-            if here.value > mark - STALLED {
+            if here.value > mark - tolerance {
                 break;
             }
             mark = here.value;
@@ -117,7 +117,7 @@ mod tests {
             let gradient = DVector::from_vec(vec![5.0 * x.signum(), 2.0 * y]);
             Some((5.0 * x.abs() + y * y, gradient))
         };
-        let (at, value) = minimise(&kinked, 2);
+        let (at, value) = minimise(&kinked, 2, 1e-6);
         assert!(value < 1e-6, "{value}");
         assert!((at - DVector::from_vec(vec![1.0, -2.0])).norm() < 1e-3);
     }
@@ -131,7 +131,7 @@ mod tests {
                 DVector::from_vec(vec![2.0 * (x - 1.0) - 400.0 * x * across, 200.0 * across]);
             Some(((x - 1.0).powi(2) + 100.0 * across * across, gradient))
         };
-        let (at, _) = minimise(&valley, 2);
+        let (at, _) = minimise(&valley, 2, 1e-6);
         assert!((at - DVector::from_element(2, 1.0)).norm() < 1e-8);
     }
 }

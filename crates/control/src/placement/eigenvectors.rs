@@ -1,25 +1,47 @@
-//! The choice of the eigenvectors with the smallest condition number.
+//! Eigenvectors of large volume and of small condition number.
 
 use super::descent::minimise;
 use super::subspace::{AssignableSubspace, AssignableSubspaces};
 use crate::Error;
+use crate::balance::multiply_rows;
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector, RowDVector};
 
-const STARTS: usize = 3;
+/// Number of starts of the largest volume, and of those from which the condition number is minimised.
+const STARTS: usize = 6;
+const DESCENTS: usize = 3;
 /// A later start is preferred only if it is better by more than rounding.
 const BETTER: f64 = 1.0 - 1e-5;
 const SWEEPS: usize = 20;
 const ROUNDS: usize = 5;
-/// The descent ends when a round lowers ln(condition) by less than this.
-const WORTHWHILE: f64 = 1e-6;
+/// Order up to which the condition number itself is minimised: each step is a singular value
+/// decomposition by Jacobi rotations.
+const LARGEST_DESCENT: usize = 24;
+/// Decrease of ln(condition) at which the descent ends.
+const CONDITION_TOLERANCE: f64 = 1e-6;
 
-/// The directions w, of length one, of the best of several descents from fixed starts.
-pub(crate) fn best_directions(problem: &AssignableSubspaces) -> Result<Vec<DVector<f64>>, Error> {
-    let mut best: Option<(f64, Vec<DVector<f64>>)> = None;
+/// Directions w of length one, one for each eigenvalue or pair.
+pub(crate) type Directions = Vec<DVector<f64>>;
+
+/// The directions of largest volume from each of several fixed starts.
+pub(crate) fn widest_directions(problem: &AssignableSubspaces) -> Result<Vec<Directions>, Error> {
     let starts = if problem.inputs() == 1 { 1 } else { STARTS };
-    for start in 0..starts {
-        let directions = descend(problem, project(problem, spread(problem, start))?)?;
+    (0..starts).map(|start| project(problem, spread(problem, start))).collect()
+}
+
+/// The directions of least condition number that descents from `starts` find; above the order
+/// `LARGEST_DESCENT` those of the best start.
+pub(crate) fn best_conditioned(
+    problem: &AssignableSubspaces,
+    starts: &[Directions],
+) -> Result<Directions, Error> {
+    let mut best: Option<(f64, Directions)> = None;
+    for start in starts.iter().take(DESCENTS) {
+        let mut directions = start.clone();
+        if problem.scale.len() <= LARGEST_DESCENT {
+            let condition = |directions: &[DVector<f64>]| condition_slope(problem, directions);
+            directions = descend(problem, directions, &condition, CONDITION_TOLERANCE)?;
+        }
         let value = condition(&problem.eigenvectors(&directions))?;
         if best.as_ref().is_none_or(|(least, _)| value < BETTER * least) {
             best = Some((value, directions));
@@ -100,22 +122,44 @@ fn widest(space: &AssignableSubspace, normals: &DMatrix<f64>) -> Result<DVector<
     Ok(if size(&highest) >= size(&lowest) { highest } else { lowest })
 }
 
-/// Descent on ln(condition) in local coordinates that are centred anew in each round.
-fn descend(
+/// The value of a function of directions, and its gradients with respect to the eigenvectors V and,
+/// unless it does not depend on them, to the responses G; None where it is not defined.
+pub(crate) type Slope = Option<(f64, DMatrix<f64>, Option<DMatrix<f64>>)>;
+
+/// Descent in local coordinates that are centred anew in each round, until a round lowers the value
+/// by less than `tolerance`.
+pub(crate) fn descend(
     problem: &AssignableSubspaces,
-    mut directions: Vec<DVector<f64>>,
-) -> Result<Vec<DVector<f64>>, Error> {
+    mut directions: Directions,
+    function: &dyn Fn(&[DVector<f64>]) -> Slope,
+    tolerance: f64,
+) -> Result<Directions, Error> {
     let mut value = f64::INFINITY;
     for _ in 0..ROUNDS {
         let chart = Chart::around(problem, directions)?;
-        let (at, lowest) = minimise(&|t| chart.objective(problem, t), chart.dimension());
+        let local = |t: &DVector<f64>| {
+            let directions = chart.directions(t);
+            let (value, of_v, of_g) = function(&directions)?;
+            Some((value, chart.gradient(problem, &directions, t, (&of_v, of_g.as_ref()))))
+        };
+        let (at, lowest) = minimise(&local, chart.dimension(), tolerance);
         directions = chart.directions(&at);
-        if value <= lowest + WORTHWHILE {
+        if value <= lowest + tolerance {
             break;
         }
         value = lowest;
     }
     Ok(directions)
+}
+
+/// ln(s1 / sn) of the eigenvector matrix V = sum of s x u', and its gradient: ds = x' dV u.
+fn condition_slope(problem: &AssignableSubspaces, directions: &[DVector<f64>]) -> Slope {
+    let v = Svd::new(&problem.eigenvectors(directions).transpose()).ok()?;
+    let last = v.values.len() - 1;
+    let value = v.condition().ln();
+    let of_columns = v.right.column(0) * (v.left.column(0) / v.values[0]).transpose()
+        - v.right.column(last) * (v.left.column(last) / v.values[last]).transpose();
+    value.is_finite().then_some((value, of_columns, None))
 }
 
 /// Directions near given ones: w = (w0 + N t) / |w0 + N t|.
@@ -148,31 +192,35 @@ impl Chart {
         self.centres.iter().zip(&self.normals).map(direction).collect()
     }
 
-    /// ln(s1 / sn) of the eigenvector matrix V = sum of s x u', and its gradient: ds = x' dV u.
-    fn objective(
+    /// The gradient with respect to the local coordinates t of `directions`, from those with respect
+    /// to V and G.
+    fn gradient(
         &self,
         problem: &AssignableSubspaces,
+        directions: &[DVector<f64>],
         t: &DVector<f64>,
-    ) -> Option<(f64, DVector<f64>)> {
-        let directions = self.directions(t);
-        let v = Svd::new(&problem.eigenvectors(&directions).transpose()).ok()?;
-        let last = v.values.len() - 1;
-        let value = v.condition().ln();
-        let of_columns = v.right.column(0) * (v.left.column(0) / v.values[0]).transpose()
-            - v.right.column(last) * (v.left.column(last) / v.values[last]).transpose();
+        (of_v, of_g): (&DMatrix<f64>, Option<&DMatrix<f64>>),
+    ) -> DVector<f64> {
+        let of_g = of_g.map(|of_g| multiply_rows(of_g, &problem.response_scale));
         let mut gradient = DVector::zeros(t.len());
         let (mut column, mut first) = (0, 0);
-        for ((space, normals), w) in problem.spaces.iter().zip(&self.normals).zip(&directions) {
+        for ((space, normals), w) in problem.spaces.iter().zip(&self.normals).zip(directions) {
             let (count, free) = (space.poles.count(), normals.ncols());
-            let own = of_columns.columns(column, count).into_owned();
-            let slope = space.states.tr_mul(&DVector::from_column_slice(own.as_slice()));
+            let stacked = |m: &DMatrix<f64>| {
+                let own = m.columns(column, count).into_owned();
+                DVector::from_column_slice(own.as_slice())
+            };
+            let mut slope = space.states.tr_mul(&stacked(of_v));
+            if let Some(of_g) = &of_g {
+                slope += space.responses.tr_mul(&stacked(of_g));
+            }
             let tangential = &slope - w * w.dot(&slope);
             let length = (1.0 + t.rows(first, free).norm_squared()).sqrt();
             gradient.rows_mut(first, free).copy_from(&(normals.tr_mul(&tangential) / length));
             column += count;
             first += free;
         }
-        value.is_finite().then_some((value, gradient))
+        gradient
     }
 }
 

@@ -16,6 +16,11 @@ pub(crate) struct PoleBlock {
 }
 
 impl PoleBlock {
+    /// p.
+    pub(crate) fn pole(self) -> Complex<f64> {
+        self.pole
+    }
+
     /// Number of eigenvalues: 1 or 2.
     pub(crate) fn count(self) -> usize {
         if self.pole.im > 0.0 { 2 } else { 1 }

@@ -10,14 +10,18 @@ pub(crate) struct PoleTolerance {
     pub(crate) origin: f64,
     /// Largest relative distance.
     pub(crate) allowed: f64,
+    /// Whether the eigenvalues are those of a sampled system.
+    pub(crate) sampled: bool,
 }
 
 /// The tolerance for x' = A x.
-pub(crate) const CONTINUOUS: PoleTolerance = PoleTolerance { origin: 0.0, allowed: 1e-6 };
+pub(crate) const CONTINUOUS: PoleTolerance =
+    PoleTolerance { origin: 0.0, allowed: 1e-2, sampled: false };
 /// The tolerance for `x[k+1] = A x[k]`, where 1 - z is about -s times the sample time for slow
 /// eigenvalues. Rounding errors of A + B K move a cluster of k eigenvalues near zero by about their
 /// k-th root.
-pub(crate) const DISCRETE: PoleTolerance = PoleTolerance { origin: 1.0, allowed: 1e-2 };
+pub(crate) const DISCRETE: PoleTolerance =
+    PoleTolerance { origin: 1.0, allowed: 1e-2, sampled: true };
 
 impl PoleTolerance {
     /// The largest relative error, with requested and assigned eigenvalues paired, nearest first.

@@ -31,7 +31,7 @@ pub(crate) struct AssignableSubspace {
     /// length one gives eigenvectors of length one.
     pub(crate) states: DMatrix<f64>,
     /// Y, in units of `response_scale`.
-    responses: DMatrix<f64>,
+    pub(crate) responses: DMatrix<f64>,
 }
 
 impl AssignableSubspaces {
@@ -44,15 +44,15 @@ impl AssignableSubspaces {
         let (n, r) = b.shape();
         let mut units = DVector::from_element(n + r, 1.0);
         units.rows_mut(0, n).copy_from(&Balance::new(a).scale);
-        let mut solutions = in_units(a, b, blocks, &units)?;
         for _ in 0..SCALING_PASSES {
-            let factors = row_sizes(&solutions, blocks, n);
+            let rough = in_units(a, b, blocks, &units, &rough_basis)?;
+            let factors = row_sizes(&rough, blocks, n);
             if factors.iter().all(|factor| (factor - 1.0).abs() <= 0.0) {
                 break;
             }
             units.component_mul_assign(&factors);
-            solutions = in_units(a, b, blocks, &units)?;
         }
+        let solutions = in_units(a, b, blocks, &units, &basis)?;
         let scale: DVector<f64> = units.rows(0, n).into();
         let space = |(solution, &poles): (&DMatrix<f64>, &PoleBlock)| {
             let count = poles.count();
@@ -91,7 +91,12 @@ impl AssignableSubspaces {
         side_by_side(self.inputs(), columns)
     }
 
-    /// The same with the states divided by `units`, eigenvectors of length one.
+    /// The columns of all G = K V side by side.
+    pub(crate) fn responses(&self, directions: &[DVector<f64>]) -> DMatrix<f64> {
+        multiply_rows(&self.scaled_responses(directions), &self.response_scale)
+    }
+
+    /// The columns of all V side by side with the states divided by `units`, eigenvectors of length one.
     pub(crate) fn unit_eigenvectors(
         &self,
         directions: &[DVector<f64>],
@@ -103,6 +108,18 @@ impl AssignableSubspaces {
             v.normalize() * root(count)
         });
         side_by_side(units.len(), columns)
+    }
+
+    /// The directions of given eigenvectors: one column for a real eigenvalue, two for a pair, of
+    /// length one.
+    pub(crate) fn directions_of(&self, eigenvectors: &DMatrix<f64>) -> Vec<DVector<f64>> {
+        let mut column = 0;
+        let direction = |space: &AssignableSubspace| {
+            let own = eigenvectors.columns(column, space.poles.count()).into_owned();
+            column += space.poles.count();
+            space.states.tr_mul(&DVector::from_column_slice(own.as_slice())).normalize()
+        };
+        self.spaces.iter().map(direction).collect()
     }
 
     /// Inverse of the matrix of eigenvectors, in the given coordinates; None if singular.
@@ -133,12 +150,13 @@ fn in_units(
     b: &DMatrix<f64>,
     blocks: &[PoleBlock],
     units: &DVector<f64>,
+    basis: &dyn Fn(&DMatrix<f64>) -> Result<DMatrix<f64>, Error>,
 ) -> Result<Vec<DMatrix<f64>>, Error> {
     let (n, r) = b.shape();
     let (of_states, of_responses) = (units.rows(0, n).into(), units.rows(n, r).into());
     let a = divide_rows(&multiply_columns(a, &of_states), &of_states);
     let b = divide_rows(&multiply_columns(b, &of_responses), &of_states);
-    blocks.iter().map(|&poles| solutions(&a, &b, poles)).collect()
+    blocks.iter().map(|&poles| basis(&equations(&a, &b, poles))).collect()
 }
 
 /// Orthonormal basis of the solutions (V; G) of A V - V M + B G = 0, columns stacked.
@@ -147,12 +165,30 @@ pub(crate) fn solutions(
     b: &DMatrix<f64>,
     poles: PoleBlock,
 ) -> Result<DMatrix<f64>, Error> {
+    basis(&equations(a, b, poles))
+}
+
+/// A V - V M + B G as a matrix that multiplies the stacked columns of V and G.
+fn equations(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: PoleBlock) -> DMatrix<f64> {
     let ((n, r), count) = (b.shape(), poles.count());
     let one = DMatrix::identity(count, count);
     let shifted = one.kronecker(a) - poles.block().transpose().kronecker(&DMatrix::identity(n, n));
     let mut equations = shifted.resize_horizontally(count * (n + r), 0.0);
     equations.columns_mut(count * n, count * r).copy_from(&one.kronecker(b));
-    Ok(Svd::new(&equations)?.right.columns(count * n, count * r).into())
+    equations
+}
+
+/// Orthonormal basis of the null space of independent rows, small entries included.
+fn basis(equations: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+    let (rank, all) = equations.shape();
+    Ok(Svd::new(equations)?.right.columns(rank, all - rank).into())
+}
+
+/// The same by reflections, faster, with rounding errors relative to the largest entry.
+fn rough_basis(equations: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+    let (rank, all) = equations.shape();
+    let q = equations.clone().resize_vertically(all, 0.0).transpose().qr().q();
+    Ok(q.columns(rank, all - rank).into())
 }
 
 /// Size of each state and each response over all solutions, as powers of two around one.

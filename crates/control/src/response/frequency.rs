@@ -24,8 +24,9 @@ pub struct FrequencyPoint {
 /// Computes G at the given frequencies.
 ///
 /// `frequencies`: in rad per unit of time, not negative. G exists unless j w is an eigenvalue of A;
-/// the system need not be stable. Method: balancing, one complex LU decomposition for each
-/// frequency, one-sided Jacobi rotations for the singular values; about 4 n^3 multiplications each.
+/// the system need not be stable. Method: balancing and Hessenberg form of A, about 8 n^3
+/// multiplications; for each frequency an elimination with 4 n^2 (1 + m) and one-sided Jacobi
+/// rotations for the singular values.
 /// Error: about 1e-16 times the condition number of s I - A in balanced coordinates.
 ///
 /// # Example
@@ -92,9 +93,14 @@ pub fn frequency_grid(system: &StateSpace, per_decade: u32) -> Result<Vec<f64>, 
     Ok((0..=steps).map(|k| point(k).min(to)).collect())
 }
 
-/// A system in balanced coordinates.
+/// A system in coordinates in which A is balanced and in Hessenberg form, so that each frequency needs
+/// n^2 multiplications only.
+///
+/// Source: A. J. Laub, Efficient multivariable frequency response computations, IEEE Trans. Autom.
+/// Control 26 (1981).
 pub(crate) struct Transfer<'a> {
-    a: DMatrix<f64>,
+    /// The transpose of A.
+    transposed: DMatrix<f64>,
     b: DMatrix<Complex<f64>>,
     c: DMatrix<Complex<f64>>,
     d: &'a DMatrix<f64>,
@@ -104,9 +110,15 @@ pub(crate) struct Transfer<'a> {
 impl<'a> Transfer<'a> {
     pub(crate) fn new(system: &'a StateSpace) -> Self {
         let Balance { matrix, scale } = Balance::new(&system.a);
-        let b = to_complex(&divide_rows(&system.b, &scale));
-        let c = to_complex(&multiply_columns(&system.c, &scale));
-        Self { a: matrix, b, c, d: &system.d, domain: system.domain }
+        let (b, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
+        let (q, h) = matrix.hessenberg().unpack();
+        Self {
+            transposed: h.transpose(),
+            b: to_complex(&q.tr_mul(&b)),
+            c: to_complex(&(c * q)),
+            d: &system.d,
+            domain: system.domain,
+        }
     }
 
     pub(super) fn point(&self, frequency: f64) -> Result<FrequencyPoint, Error> {
@@ -127,14 +139,48 @@ impl<'a> Transfer<'a> {
             Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
         };
         let overflow = Error::Overflow { what: "the frequency response" };
-        let n = self.a.nrows();
-        let resolvent = DMatrix::from_diagonal_element(n, n, s) - to_complex(&self.a);
-        let states = resolvent.lu().solve(&self.b).ok_or(overflow.clone())?;
-        let gain = &self.c * states + to_complex(self.d);
+        let gain = &self.c * self.states(s) + to_complex(self.d);
         if gain.iter().any(|entry| !(entry.re.is_finite() && entry.im.is_finite())) {
             return Err(overflow);
         }
         Ok(gain)
+    }
+
+    /// (s I - A)^-1 B by elimination with an exchange of adjacent rows; not finite if s is an
+    /// eigenvalue.
+    fn states(&self, s: Complex<f64>) -> DMatrix<Complex<f64>> {
+        let n = self.transposed.nrows();
+        // Column k is row k of s I - A.
+        let mut rows = self.transposed.map(|entry| Complex::new(-entry, 0.0));
+        let mut states = self.b.clone();
+        for k in 0..n {
+            rows[(k, k)] += s;
+        }
+        for k in 1..n {
+            let (mut done, mut open) = rows.columns_range_pair_mut(k - 1, k);
+            if open[k - 1].norm_sqr() > done[k - 1].norm_sqr() {
+                done.iter_mut().zip(open.iter_mut()).for_each(|(x, y)| std::mem::swap(x, y));
+                states.swap_rows(k - 1, k);
+            }
+            let factor = open[k - 1] / done[k - 1];
+            for column in k..n {
+                open[column] -= factor * done[column];
+            }
+            for input in 0..states.ncols() {
+                let above = states[(k - 1, input)];
+                states[(k, input)] -= factor * above;
+            }
+        }
+        for mut column in states.column_iter_mut() {
+            for k in (0..n).rev() {
+                let mut sum = column[k];
+                for (entry, state) in rows.column(k).iter().zip(column.iter()).skip(k + 1) {
+                    sum -= entry * state;
+                }
+                column[k] = sum / rows[(k, k)];
+            }
+        }
+        states
     }
 
     /// The largest singular value.

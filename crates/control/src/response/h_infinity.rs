@@ -9,6 +9,10 @@ use nalgebra::DMatrix;
 use std::f64::consts::SQRT_2;
 
 const ROUNDS: usize = 100;
+/// Logarithmic steps of the frequency about a local maximum; the smallest one relative to the root of
+/// the width, as the maximum is flat.
+const FIRST_STEP: f64 = 0.05;
+const SMALLEST_STEP: f64 = 0.02;
 
 /// The H-infinity norm and the frequency of its maximum.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,10 +39,10 @@ pub struct HInfinity {
 ///
 /// so that gamma, a little above the largest value known, is the norm when the largest singular
 /// value stays below gamma at the imaginary parts of all eigenvalues and midway between them. It
-/// need not be decided which eigenvalues are imaginary. Otherwise the largest value found replaces
-/// gamma; the convergence is quadratic. A sampled system is first transformed to a continuous one
-/// by z = (1 + s) / (1 - s). About 100 n^3 multiplications for the eigenvalues and 4 n^3 for each
-/// of the 4 n frequencies in a round; usually 3 to 6 rounds.
+/// need not be decided which eigenvalues are imaginary. Otherwise the largest value found, raised to
+/// the local maximum about it, replaces gamma. A sampled system is first transformed to a continuous one
+/// by z = (1 + s) / (1 - s). About 100 n^3 multiplications for the eigenvalues and 4 n^2 (1 + m) for
+/// each of the 4 n frequencies in a round; usually 1 or 2 rounds.
 ///
 /// Source: N. A. Bruinsma and M. Steinbuch, A fast algorithm to compute the H-infinity norm of a
 /// transfer function matrix, Systems & Control Letters 14 (1990); S. Boyd and V. Balakrishnan, 15
@@ -83,6 +87,7 @@ pub fn h_infinity(system: &StateSpace, width: f64) -> Result<HInfinity, Error> {
     for frequency in resonances {
         best.offer(&transfer, frequency)?;
     }
+    best.climb(&transfer, width, system.domain)?;
     for _ in 0..ROUNDS {
         if best.lower == 0.0 {
             return Ok(best);
@@ -91,9 +96,11 @@ pub fn h_infinity(system: &StateSpace, width: f64) -> Result<HInfinity, Error> {
         for frequency in crossings(&continuous, best.upper)? {
             best.offer(&transfer, original_frequency(frequency, system.domain))?;
         }
-        if best.lower < best.upper {
-            return Ok(best);
+        if best.lower >= best.upper {
+            best.climb(&transfer, width, system.domain)?;
+            continue;
         }
+        return Ok(best);
     }
     Err(Error::NotConverged { what: "the H-infinity norm", iterations: ROUNDS })
 }
@@ -107,6 +114,22 @@ impl HInfinity {
         let mut best = Self { lower, upper: lower, frequency };
         best.offer(transfer, 0.0)?;
         Ok(best)
+    }
+
+    /// Raises the lower bound to the local maximum about its frequency, by steps that grow while they
+    /// climb and shrink otherwise: each of them saves eigenvalues of a Hamiltonian matrix.
+    fn climb(&mut self, transfer: &Transfer, width: f64, domain: Domain) -> Result<(), Error> {
+        let last = original_frequency(f64::INFINITY, domain);
+        if self.frequency <= 0.0 || self.frequency >= last {
+            return Ok(());
+        }
+        let mut step = FIRST_STEP;
+        while step.abs() > SMALLEST_STEP * width.sqrt() {
+            let before = self.frequency;
+            self.offer(transfer, (before * step.exp()).min(last))?;
+            step *= if self.frequency > before || self.frequency < before { 1.5 } else { -0.5 };
+        }
+        Ok(())
     }
 
     /// Raises the lower bound to the value at `frequency` if that is larger.

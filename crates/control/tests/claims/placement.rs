@@ -6,6 +6,7 @@ use control::exponential::exponential;
 use control::placement::{Placement, place, place_balanced, place_discrete, real_poles};
 use nalgebra::{Complex, DMatrix};
 
+mod loops;
 mod scipy;
 
 /// p and its conjugate.
@@ -102,9 +103,10 @@ fn the_coordinates_decide_which_condition_number_is_low() {
     assert!(balanced.balanced_condition < 0.95 * given.balanced_condition);
 }
 
-/// Up to the powers of two that limit the balancing.
+/// Up to the powers of two that limit the balancing, and to the figures in the given units that the
+/// choice takes into account.
 #[test]
-fn the_balanced_placement_does_not_depend_on_the_units_of_the_states() {
+fn the_balanced_placement_hardly_depends_on_the_units_of_the_states() {
     let (a, c) = observer();
     let units = [1.0, 1024.0, 0.125, 8.0, 1.0 / 65536.0];
     let scaled_a = DMatrix::from_fn(5, 5, |i, j| a[(i, j)] * units[j] / units[i]);
@@ -114,22 +116,22 @@ fn the_balanced_placement_does_not_depend_on_the_units_of_the_states() {
     let given = place_balanced(&a, &c, &poles).unwrap();
     let scaled = place_balanced(&scaled_a, &scaled_c, &poles).unwrap();
     let ratio = scaled.quality.balanced_condition / given.quality.balanced_condition;
-    assert!(0.8 < ratio && ratio < 1.25, "{ratio}");
+    assert!(0.7 < ratio && ratio < 1.4, "{ratio}");
     assert_assigned(&a, &c, &given, &poles);
     assert_assigned(&scaled_a, &scaled_c, &scaled, &poles);
 }
 
-/// With as many inputs as states every closed-loop matrix is possible; the best has orthogonal
-/// eigenvectors.
+/// With as many inputs as states every closed-loop matrix is possible; the best conditioned has
+/// orthogonal eigenvectors, of which gain and peak of S take at most 8 %.
 #[test]
-fn as_many_inputs_as_states_give_orthogonal_eigenvectors() {
+fn as_many_inputs_as_states_give_almost_orthogonal_eigenvectors() {
     let a = integers(3, 3, |i, j| (3 * i * i + 2 * i * j + j) % 7 - 3);
     let b = matrix(3, 3, &[1., 2., 0., 0., 1., 3., 1., 0., 1.]);
     for poles in
         [real_poles(&[-1.0, -2.0, -3.0]), [&pair(-1.0, 5.0)[..], &real_poles(&[-2.0])].concat()]
     {
         let placement = place(&a, &b, &poles).unwrap();
-        assert!(placement.quality.condition < 1.0 + 1e-7, "{:?}", placement.quality);
+        assert!(placement.quality.condition < 1.08, "{:?}", placement.quality);
     }
 }
 
@@ -266,4 +268,86 @@ fn a_slow_eigenvalue_in_discrete_time_is_judged_by_its_distance_from_one() {
     let far = (found[0] - poles[1]).norm() / (poles[1] - 1.0).norm();
     assert!((placement.quality.pole_error - far).abs() < 1e-13, "{far:e}");
     assert!(far < 1e-9, "{far:e}");
+}
+
+/// A chain of equal masses, springs and dampers, forces on every fifth mass.
+fn chain(masses: usize) -> (DMatrix<f64>, DMatrix<f64>) {
+    let mut a = DMatrix::zeros(2 * masses, 2 * masses);
+    a.view_mut((0, masses), (masses, masses)).fill_with_identity();
+    for i in 0..masses {
+        a[(masses + i, i)] = -2.0;
+        a[(masses + i, masses + i)] = -0.02;
+        if i > 0 {
+            a[(masses + i, i - 1)] = 1.0;
+            a[(masses + i - 1, i)] = 1.0;
+        }
+    }
+    let b =
+        DMatrix::from_fn(
+            2 * masses,
+            masses / 5,
+            |i, j| {
+                if i == masses + 5 * j + 2 { 1.0 } else { 0.0 }
+            },
+        );
+    (a, b)
+}
+
+#[test]
+fn fifty_eigenvalues_of_a_chain_of_masses_are_moved_to_the_left() {
+    let (a, b) = chain(25);
+    let poles: Vec<_> = eigenvalues(&a).unwrap().iter().map(|pole| pole - 0.3).collect();
+    let placement = place(&a, &b, &poles).unwrap();
+    assert!(placement.quality.pole_error < 1e-11, "{:?}", placement.quality);
+    let found = eigenvalues(&(&a + &b * &placement.gain)).unwrap();
+    let far = |pole: &Complex<f64>| {
+        found.iter().map(|found| (found - pole).norm()).fold(f64::INFINITY, f64::min)
+    };
+    assert!(poles.iter().map(far).fold(0.0, f64::max) < 1e-11);
+}
+
+/// Forty real eigenvalues side by side make the eigenvectors of a chain almost parallel.
+#[test]
+fn an_eigenvalue_error_that_rounding_leaves_is_stated() {
+    let (a, b) = chain(20);
+    let poles: Vec<f64> = (0..40).map(|k| -0.5 - 0.05 * f64::from(k)).collect();
+    let placement = place(&a, &b, &real_poles(&poles)).unwrap();
+    let stated = placement.quality.pole_error;
+    assert!(1e-8 < stated && stated < 1e-2, "{stated:e}");
+    let found = eigenvalues(&(&a + &b * &placement.gain)).unwrap();
+    let error = |pole: &f64| {
+        found.iter().map(|found| (found - pole).norm() / pole.abs()).fold(f64::INFINITY, f64::min)
+    };
+    assert!(poles.iter().map(error).fold(0.0, f64::max) <= stated * (1.0 + 1e-9));
+}
+
+/// Also with a pair that the plant keeps.
+#[test]
+fn the_eigenvalues_of_a_plant_with_several_inputs_may_be_requested() {
+    let a = integers(6, 6, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
+    let b = integers(6, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3);
+    let poles = eigenvalues(&a).unwrap();
+    for way in [place, place_balanced, place_discrete] {
+        let placement = way(&a, &b, &poles).unwrap();
+        assert!(placement.quality.pole_error < 1e-9, "{:?}", placement.quality);
+        assert_assigned(&a, &b, &placement, &poles);
+    }
+    let decoupled = DMatrix::from_diagonal(&vec![-1.0, -2.0, -3.0, -4.0].into());
+    let b = matrix(4, 2, &[1., 0., 0., 1., 1., 1., 1., -1.]);
+    let kept = real_poles(&[-1.0, -2.0, -3.0, -4.0]);
+    assert_assigned(&decoupled, &b, &place(&decoupled, &b, &kept).unwrap(), &kept);
+}
+
+#[test]
+fn inputs_in_units_of_very_different_size_are_placed_alike() {
+    let a = integers(6, 6, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
+    let b = integers(6, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3);
+    let poles = [&pair(-2.0, 1.0)[..], &real_poles(&[-1.0, -3.0, -4.0, -5.0])].concat();
+    let plain = place(&a, &b, &poles).unwrap();
+    let units = vec![1e-9, 1e7].into();
+    let scaled_b = &b * DMatrix::from_diagonal(&units);
+    let scaled = place(&a, &scaled_b, &poles).unwrap();
+    assert_assigned(&a, &scaled_b, &scaled, &poles);
+    let ratio = scaled.quality.condition / plain.quality.condition;
+    assert!(0.5 < ratio && ratio < 2.0, "{:?} {:?}", scaled.quality, plain.quality);
 }

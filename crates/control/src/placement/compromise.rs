@@ -1,0 +1,164 @@
+//! The choice among eigenvectors by condition number, gain and peak of S together.
+
+use super::eigenvectors::{Directions, descend};
+use super::figures::{COUNT, FeedbackLoop};
+use crate::Error;
+use nalgebra::DVector;
+
+/// Factors by which the figures of the first candidate may exceed their references.
+const ACCEPTABLE: Figures = [1.11, 1.11, 1.02];
+/// The same for condition number and gain of directions among which the least peak of S is searched.
+const LIMIT: f64 = 1.05;
+/// The references are below the figures of largest volume by this factor, where the candidates show
+/// that it is possible.
+const MARGIN: f64 = 0.9;
+/// Sharpness of the smooth maximum over the figures and of the smooth limits.
+const SHARPNESS: f64 = 40.0;
+/// Weight of the excess over a limit.
+const PENALTY: f64 = 10.0;
+/// Relative decrease at which a descent ends.
+const TOLERANCE: f64 = 1e-3;
+
+/// Number of descents of the peak of S.
+const DESCENTS: usize = 5;
+
+type Figures = [f64; COUNT];
+
+/// Chooses directions by three figures: condition number, gain norm, peak of S.
+///
+/// `candidates`: those of least condition number, in the coordinates asked for and in those of A;
+/// `widest`: those of largest volume, which the methods of Kautsky, Nichols and Van Dooren and of
+/// Tits and Yang find. The references of condition number and gain are the least among `widest`, or
+/// up to 10 % lower if a candidate is; that of S is the least peak that descents find with condition
+/// number and gain within 5 % of their references, or as near as possible. The first candidate is kept (None) if it is
+/// within 11 % in condition number and gain and within 2 % in S. Otherwise descents minimise a smooth
+/// maximum of the three relative figures; of all directions that were found, those whose largest
+/// relative figure is least are returned.
+pub(crate) fn compromise(
+    feedback: &FeedbackLoop<'_>,
+    candidates: &[Directions],
+    widest: &[Directions],
+) -> Result<Option<Directions>, Error> {
+    let mut search = Search { feedback, found: vec![] };
+    let (of_candidates, smooth_of_candidates) = search.offer(candidates)?;
+    let own = search.found.first().map(|(figures, _)| *figures);
+    let (of_widest, smooth_of_widest) = search.offer(widest)?;
+    if !of_widest.iter().all(|figure| figure.is_normal()) {
+        return Ok(None);
+    }
+    let mut reference = of_widest;
+    let mut smooth = smooth_of_widest;
+    for figure in 0..COUNT {
+        reference[figure] =
+            of_candidates[figure].clamp(MARGIN * of_widest[figure], of_widest[figure]);
+        let least = smooth_of_widest[figure];
+        smooth[figure] = smooth_of_candidates[figure].clamp(least + MARGIN.ln(), least);
+    }
+    let is_acceptable = |reference: Figures| {
+        let limits = std::array::from_fn(|figure| ACCEPTABLE[figure] * reference[figure]);
+        own.is_some_and(|own| ratio(own, limits) <= 1.0)
+    };
+    // No loop has a lower peak than 1.
+    if is_acceptable([reference[0], reference[1], 1.0]) {
+        return Ok(None);
+    }
+    let mut starts = search.found.clone();
+    starts.sort_by(|x, y| ratio(x.0, reference).total_cmp(&ratio(y.0, reference)));
+    for (_, start) in starts.iter().take(DESCENTS) {
+        search.descend(start, &|figures| least_peak(figures, &smooth))?;
+    }
+    if let Some((figures, directions)) = search.least_peak(reference) {
+        reference[2] = figures[2];
+        smooth[2] = feedback.smooth(directions).unwrap_or(smooth)[2];
+    }
+    if is_acceptable(reference) {
+        return Ok(None);
+    }
+    let best = search.best(reference).cloned();
+    for start in candidates.first().cloned().into_iter().chain(best) {
+        search.descend(&start, &|figures| maximum(figures, &smooth))?;
+    }
+    Ok(search.best(reference).cloned())
+}
+
+/// The directions that were found, with their figures.
+struct Search<'a> {
+    feedback: &'a FeedbackLoop<'a>,
+    found: Vec<(Figures, Directions)>,
+}
+
+impl Search<'_> {
+    /// Adds directions; returns their least figures and the least logarithms of the smooth ones.
+    fn offer(&mut self, all: &[Directions]) -> Result<(Figures, Figures), Error> {
+        let (mut exact, mut smooth) = ([f64::INFINITY; COUNT], [f64::INFINITY; COUNT]);
+        for directions in all {
+            let values = (self.feedback.figures(directions)?, self.feedback.smooth(directions));
+            if let (Some(figures), Some(logarithms)) = values {
+                exact = least(exact, figures);
+                smooth = least(smooth, logarithms);
+                self.found.push((figures, directions.clone()));
+            }
+        }
+        Ok((exact, smooth))
+    }
+
+    /// The directions of least peak of S within the limits of condition number and gain; if there are
+    /// none, those nearest to the references of both.
+    fn least_peak(&self, reference: Figures) -> Option<&(Figures, Directions)> {
+        let excess = |figures: Figures| {
+            let largest = ratio(figures, [reference[0], reference[1], f64::INFINITY]);
+            if largest <= LIMIT { 0.0 } else { largest }
+        };
+        let order =
+            |x: Figures, y: Figures| excess(x).total_cmp(&excess(y)).then(x[2].total_cmp(&y[2]));
+        self.found.iter().min_by(|x, y| order(x.0, y.0))
+    }
+
+    /// The directions whose largest relative figure is least.
+    fn best(&self, reference: Figures) -> Option<&Directions> {
+        let worst = |(figures, _): &(Figures, Directions)| ratio(*figures, reference);
+        self.found.iter().min_by(|x, y| worst(x).total_cmp(&worst(y))).map(|(_, found)| found)
+    }
+
+    fn descend(
+        &mut self,
+        start: &Directions,
+        weigh: &dyn Fn(&Figures) -> (f64, Figures),
+    ) -> Result<(), Error> {
+        let slope = |directions: &[DVector<f64>]| self.feedback.objective(directions, weigh);
+        let problem = self.feedback.problem();
+        self.offer(&[descend(problem, start.clone(), &slope, TOLERANCE)?])?;
+        Ok(())
+    }
+}
+
+fn least(a: Figures, b: Figures) -> Figures {
+    std::array::from_fn(|figure| a[figure].min(b[figure]))
+}
+
+/// The largest figure relative to its reference.
+fn ratio(figures: Figures, reference: Figures) -> f64 {
+    figures.iter().zip(reference).map(|(figure, reference)| figure / reference).fold(0.0, f64::max)
+}
+
+/// ln(sum of e^(k x)) / k of the differences x, near their largest, and its partial derivatives.
+fn maximum(figures: &Figures, reference: &Figures) -> (f64, Figures) {
+    let excess: Figures = std::array::from_fn(|figure| figures[figure] - reference[figure]);
+    let largest = excess.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weights = excess.map(|excess| (SHARPNESS * (excess - largest)).exp());
+    let total: f64 = weights.iter().sum();
+    (largest + total.ln() / SHARPNESS, weights.map(|weight| weight / total))
+}
+
+/// The peak of S with a penalty on condition number and gain above their references, and its partial
+/// derivatives.
+fn least_peak(figures: &Figures, reference: &Figures) -> (f64, Figures) {
+    let mut value = figures[COUNT - 1];
+    let mut weights = [0.0, 0.0, 1.0];
+    for figure in 0..COUNT - 1 {
+        let steep = SHARPNESS * (figures[figure] - reference[figure]);
+        value += PENALTY * (steep.max(0.0) + (-steep.abs()).exp().ln_1p()) / SHARPNESS;
+        weights[figure] = PENALTY / (1.0 + (-steep).exp());
+    }
+    (value, weights)
+}

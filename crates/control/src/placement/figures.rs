@@ -1,0 +1,289 @@
+//! The figures by which eigenvectors are chosen: condition number, gain norm and peak of S.
+
+use super::eigenvectors::{Slope, condition};
+use super::pole_block::PoleBlock;
+use super::subspace::AssignableSubspaces;
+use crate::Error;
+use crate::blocks::to_complex;
+use crate::svd::{ComplexSvd, norm_2};
+use nalgebra::{Complex, ComplexField, DMatrix, DVector};
+use std::f64::consts::PI;
+
+/// Number of figures.
+pub(crate) const COUNT: usize = 3;
+/// Frequencies for each decade at which S is evaluated, from a tenth of the slowest eigenvalue to
+/// ten times the fastest, and their largest number.
+const PER_DECADE: f64 = 12.0;
+const MOST_FREQUENCIES: f64 = 80.0;
+/// Exponent of the mean over the frequencies that takes the place of the maximum in the descent.
+const MEAN: f64 = 24.0;
+
+/// The feedback u = K x of a plant, as a function of the chosen eigenvectors.
+///
+/// With the real matrix V of eigenvectors, G = K V and (A + B K) V = V M,
+///
+/// ```text
+/// K = G V^-1,   S(s) = (I - K (s I - A)^-1 B)^-1 = I + G (s I - M)^-1 V^-1 B
+/// ```
+pub(crate) struct FeedbackLoop<'a> {
+    problem: &'a AssignableSubspaces,
+    /// Columns X for which B X is orthonormal: the responses of the problem are in this basis.
+    basis: &'a DMatrix<f64>,
+    b: &'a DMatrix<f64>,
+    /// The points s, or z, of the frequencies; empty if a requested eigenvalue is unstable.
+    points: Vec<Complex<f64>>,
+}
+
+/// V, V^-1, G and V^-1 B for chosen directions.
+struct Eigenstructure {
+    v: DMatrix<f64>,
+    inverse: DMatrix<f64>,
+    g: DMatrix<f64>,
+    input: DMatrix<f64>,
+}
+
+/// The logarithm of a figure, smooth, and its gradients with respect to V and to G.
+struct Smooth {
+    value: f64,
+    of_v: DMatrix<f64>,
+    of_g: DMatrix<f64>,
+}
+
+impl<'a> FeedbackLoop<'a> {
+    pub(crate) fn new(
+        problem: &'a AssignableSubspaces,
+        basis: &'a DMatrix<f64>,
+        b: &'a DMatrix<f64>,
+        sampled: bool,
+    ) -> Self {
+        let poles: Vec<_> = problem.spaces.iter().map(|space| space.poles.pole()).collect();
+        Self { problem, basis, b, points: points(&poles, sampled) }
+    }
+
+    /// The problem whose eigenvectors are chosen.
+    pub(crate) fn problem(&self) -> &AssignableSubspaces {
+        self.problem
+    }
+
+    fn blocks(&self) -> impl Iterator<Item = PoleBlock> {
+        self.problem.spaces.iter().map(|space| space.poles)
+    }
+
+    fn at(&self, directions: &[DVector<f64>]) -> Option<Eigenstructure> {
+        let v = self.problem.eigenvectors(directions);
+        let inverse = self.problem.inverse(directions)?;
+        let g = self.basis * self.problem.responses(directions);
+        let input = &inverse * self.b;
+        Some(Eigenstructure { v, inverse, g, input })
+    }
+
+    /// Condition number of the eigenvectors, 2-norm of K, largest singular value of S over the
+    /// frequencies (1 without frequencies); None where the eigenvectors are dependent.
+    pub(crate) fn figures(
+        &self,
+        directions: &[DVector<f64>],
+    ) -> Result<Option<[f64; COUNT]>, Error> {
+        let Some(found) = self.at(directions) else {
+            return Ok(None);
+        };
+        let condition = condition(&found.v)?;
+        let gain = norm_2(&(&found.g * &found.inverse).transpose())?;
+        let mut peak = 1.0_f64;
+        for point in &self.points {
+            let s = self.sensitivity(&found, &self.resolvent(*point, &to_complex(&found.input)));
+            peak = peak.max(ComplexSvd::new(&s)?.values()[0]);
+        }
+        let figures = [condition, gain, peak];
+        Ok(figures.iter().all(|figure| figure.is_finite()).then_some(figures))
+    }
+
+    /// The logarithms of smooth bounds of the figures: Schatten norms of order 16 in place of the
+    /// 2-norms, a mean over the frequencies in place of the maximum.
+    pub(crate) fn smooth(&self, directions: &[DVector<f64>]) -> Option<[f64; COUNT]> {
+        let found = self.at(directions)?;
+        Some(self.all(&found).map(|figure| figure.value))
+    }
+
+    /// `weigh` maps the values of [`Self::smooth`] to an objective and its partial derivatives;
+    /// returns the objective and its gradients with respect to V and to G, in the given inputs.
+    pub(crate) fn objective(
+        &self,
+        directions: &[DVector<f64>],
+        weigh: &dyn Fn(&[f64; COUNT]) -> (f64, [f64; COUNT]),
+    ) -> Slope {
+        let found = self.at(directions)?;
+        let figures = self.all(&found);
+        let (value, weights) = weigh(&[0, 1, 2].map(|figure: usize| figures[figure].value));
+        let mut of_v = DMatrix::zeros(found.v.nrows(), found.v.ncols());
+        let mut of_g = DMatrix::zeros(found.g.nrows(), found.g.ncols());
+        for (figure, weight) in figures.iter().zip(weights) {
+            of_v += &figure.of_v * weight;
+            of_g += &figure.of_g * weight;
+        }
+        let finite = of_v.iter().chain(&of_g).all(|entry| entry.is_finite());
+        (value.is_finite() && finite).then(|| (value, of_v, Some(self.basis.tr_mul(&of_g))))
+    }
+
+    fn all(&self, found: &Eigenstructure) -> [Smooth; COUNT] {
+        [found.condition(), found.gain(), self.peak(found)]
+    }
+
+    /// (s I - M)^-1 N.
+    fn resolvent(&self, s: Complex<f64>, n: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
+        let mut solved = n.clone();
+        let mut row = 0;
+        for poles in self.blocks() {
+            let pole = poles.pole();
+            let diagonal = s - pole.re;
+            if poles.count() == 1 {
+                solved.row_mut(row).iter_mut().for_each(|entry| *entry /= diagonal);
+            } else {
+                let determinant = diagonal * diagonal + pole.im * pole.im;
+                for column in 0..n.ncols() {
+                    let (first, second) = (n[(row, column)], n[(row + 1, column)]);
+                    solved[(row, column)] = (diagonal * first + second * pole.im) / determinant;
+                    solved[(row + 1, column)] = (diagonal * second - first * pole.im) / determinant;
+                }
+            }
+            row += poles.count();
+        }
+        solved
+    }
+
+    /// I + G Z, with Z = (s I - M)^-1 V^-1 B.
+    fn sensitivity(
+        &self,
+        found: &Eigenstructure,
+        z: &DMatrix<Complex<f64>>,
+    ) -> DMatrix<Complex<f64>> {
+        let m = self.b.ncols();
+        let (re, im) = (&found.g * z.map(|entry| entry.re), &found.g * z.map(|entry| entry.im));
+        DMatrix::from_fn(m, m, |i, j| {
+            Complex::new(re[(i, j)] + if i == j { 1.0 } else { 0.0 }, im[(i, j)])
+        })
+    }
+
+    /// dS = dG Z - G (s I - M)^-1 V^-1 dV V^-1 B.
+    fn peak(&self, found: &Eigenstructure) -> Smooth {
+        let (n, m) = found.input.shape();
+        let mut of_v = DMatrix::zeros(n, n);
+        let mut of_g = DMatrix::zeros(m, n);
+        let input = to_complex(&found.input);
+        let norms = self.points.iter().map(|&point| {
+            let z = self.resolvent(point, &input);
+            let (value, gradient) = schatten(&self.sensitivity(found, &z));
+            (point, z, value, gradient)
+        });
+        let norms: Vec<_> = norms.collect();
+        let largest = norms.iter().map(|(_, _, value, _)| *value).fold(f64::NEG_INFINITY, f64::max);
+        let weight = |value: f64| (MEAN * (value - largest)).exp();
+        let total: f64 = norms.iter().map(|(_, _, value, _)| weight(*value)).sum();
+        if norms.is_empty() {
+            return Smooth { value: 0.0, of_v, of_g };
+        }
+        let mut back = DMatrix::zeros(n, m);
+        let transposed = found.g.transpose();
+        for (point, z, value, gradient) in norms {
+            let share = weight(value) / total;
+            if share < f64::EPSILON {
+                continue;
+            }
+            let (re, im) = (gradient.map(|entry| entry.re), gradient.map(|entry| entry.im));
+            of_g += (&re * z.map(|entry| entry.re).transpose()
+                + &im * z.map(|entry| entry.im).transpose())
+                * share;
+            // (s I - M)^-H G' D: the resolvent of M' at the conjugate point.
+            let (re, im) = (&transposed * re, &transposed * im);
+            let d = DMatrix::from_fn(n, m, |i, j| Complex::new(re[(i, j)], -im[(i, j)]));
+            back += self.transposed_resolvent(point, &d).map(|entry| entry.re) * share;
+        }
+        of_v -= found.inverse.tr_mul(&back) * found.input.transpose();
+        Smooth { value: largest + total.ln() / MEAN, of_v, of_g }
+    }
+
+    /// (s I - M')^-1 N: the rows of a pair change their roles.
+    fn transposed_resolvent(
+        &self,
+        s: Complex<f64>,
+        n: &DMatrix<Complex<f64>>,
+    ) -> DMatrix<Complex<f64>> {
+        let swapped = |m: &DMatrix<Complex<f64>>| {
+            let mut m = m.clone();
+            let mut row = 0;
+            for poles in self.blocks() {
+                if poles.count() == 2 {
+                    m.swap_rows(row, row + 1);
+                }
+                row += poles.count();
+            }
+            m
+        };
+        swapped(&self.resolvent(s, &swapped(n)))
+    }
+}
+
+impl Eigenstructure {
+    /// d V^-1 = -V^-1 dV V^-1.
+    fn condition(&self) -> Smooth {
+        let (size, mut of_v) = schatten(&self.v);
+        let (of_inverse, gradient) = schatten(&self.inverse);
+        of_v -= self.inverse.tr_mul(&gradient) * self.inverse.transpose();
+        let of_g = DMatrix::zeros(self.g.nrows(), self.g.ncols());
+        Smooth { value: size + of_inverse, of_v, of_g }
+    }
+
+    /// dK = dG V^-1 - K dV V^-1.
+    fn gain(&self) -> Smooth {
+        let k = &self.g * &self.inverse;
+        let (value, gradient) = schatten(&k);
+        let of_g = gradient * self.inverse.transpose();
+        let of_v = -k.tr_mul(&of_g);
+        Smooth { value, of_v, of_g }
+    }
+}
+
+/// The logarithm of the Schatten norm of order 16, (trace (M M*)^8)^(1/16), and its gradient
+/// (M M*)^7 M / trace (M M*)^8. The norm is between the 2-norm and k^(1/16) times it, k the rank.
+fn schatten<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> (f64, DMatrix<T>) {
+    if m.nrows() > m.ncols() {
+        let (value, gradient) = schatten(&m.adjoint());
+        return (value, gradient.adjoint());
+    }
+    let unit = m.norm();
+    if unit <= 0.0 {
+        return (f64::MIN_POSITIVE.ln(), m.clone());
+    }
+    let m = m.unscale(unit);
+    let power = &m * m.adjoint();
+    let square = &power * &power;
+    let fourth = &square * &square;
+    let total = fourth.norm_squared();
+    let gradient = (fourth * (square * (power * m))).unscale(total * unit);
+    (unit.ln() + total.ln() / 16.0, gradient)
+}
+
+/// Points of the imaginary axis, or of the unit circle, for stable eigenvalues.
+fn points(poles: &[Complex<f64>], sampled: bool) -> Vec<Complex<f64>> {
+    let stable = |pole: &Complex<f64>| if sampled { pole.norm() < 1.0 } else { pole.re < 0.0 };
+    if !poles.iter().all(stable) {
+        return vec![];
+    }
+    let modes: Vec<Complex<f64>> = if sampled {
+        poles.iter().filter(|pole| pole.norm() > f64::EPSILON).map(|pole| pole.ln()).collect()
+    } else {
+        poles.to_vec()
+    };
+    let slowest = modes.iter().map(|mode| mode.norm()).fold(1.0 / f64::EPSILON, f64::min);
+    let fastest = modes.iter().map(|mode| mode.norm()).fold(0.0, f64::max);
+    let last = if sampled { PI } else { 10.0 * fastest };
+    let first = (0.1 * slowest).min(0.1 * last);
+    let steps = (PER_DECADE * (last / first).log10()).ceil().clamp(2.0, MOST_FREQUENCIES);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 80")]
+    let count = steps as u32;
+    let grid = (0..=count).map(|k| (first * (last / first).powf(f64::from(k) / steps)).min(last));
+    let resonances = modes.iter().filter(|mode| mode.im > 0.0).map(|mode| mode.im.min(last));
+    let frequencies = std::iter::once(0.0).chain(grid).chain(resonances);
+    frequencies
+        .map(|w| if sampled { Complex::from_polar(1.0, w) } else { Complex::new(0.0, w) })
+        .collect()
+}
