@@ -4,6 +4,7 @@ use crate::balance::{Balance, divide_rows, multiply_columns, power_of_two};
 use crate::hold::zero_order_hold;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
+use std::rc::Rc;
 
 /// The shortest interval of continuous time, relative to the norm of A; h is nearly linear over it.
 const SHORTEST: f64 = 1.0 / 4096.0;
@@ -16,8 +17,8 @@ const LENGTHS: usize = 120;
 pub(super) struct Length {
     /// Time, or number of samples.
     pub(super) time: f64,
-    /// The state at the end.
-    pub(super) phi: DMatrix<f64>,
+    /// The state at the end, the same for all outputs.
+    pub(super) phi: Rc<DMatrix<f64>>,
     /// A row: the integral of h.
     pub(super) sum: DMatrix<f64>,
     /// x' X x: the integral of h^2.
@@ -25,13 +26,14 @@ pub(super) struct Length {
 }
 
 impl Length {
-    /// The interval of twice the length.
-    fn doubled(&self) -> Self {
+    /// The interval of twice the length, whose `phi` is given.
+    fn doubled(&self, phi: Rc<DMatrix<f64>>) -> Self {
+        let own = &*self.phi;
         Self {
             time: 2.0 * self.time,
-            phi: &self.phi * &self.phi,
-            sum: &self.sum + &self.sum * &self.phi,
-            gram: &self.gram + self.phi.tr_mul(&self.gram) * &self.phi,
+            phi,
+            sum: &self.sum + &self.sum * own,
+            gram: &self.gram + own.tr_mul(&self.gram) * own,
         }
     }
 
@@ -58,11 +60,14 @@ impl Length {
     }
 }
 
-/// Balanced states of unit size, and the shortest interval for each output.
+/// Balanced states of unit size, and the shortest interval.
 pub(super) struct Intervals {
     /// Columns of B in balanced coordinates: the states after an impulse.
     pub(super) starts: DMatrix<f64>,
-    shortest: Vec<Length>,
+    outputs: DMatrix<f64>,
+    shortest: Shortest,
+    /// The states at the end of intervals, each of twice the length of the one before.
+    powers: Vec<Rc<DMatrix<f64>>>,
 }
 
 impl Intervals {
@@ -70,52 +75,73 @@ impl Intervals {
         let Balance { matrix, scale } = Balance::new(&system.a);
         let starts = divide_rows(&system.b, &scale);
         let outputs = multiply_columns(&system.c, &scale);
-        let shortest = (0..outputs.nrows())
-            .map(|i| shortest(&matrix, &outputs.rows(i, 1).into(), system.domain));
-        Ok(Self { starts, shortest: shortest.collect::<Result<_, _>>()? })
+        let (phi, shortest) = Shortest::new(matrix, system.domain)?;
+        Ok(Self { starts, outputs, shortest, powers: vec![Rc::new(phi)] })
     }
 
-    /// Lengths for one output, each twice the one before, until the tail of h for one input is
-    /// below `part` of a lower bound of the integral before it.
-    pub(super) fn lengths(
-        &self,
-        output: usize,
+    /// The shortest interval for one output, the first of its lengths.
+    pub(super) fn first(&self, output: usize) -> Length {
+        self.shortest.length(&self.powers[0], &self.outputs.rows(output, 1).into())
+    }
+
+    /// Adds lengths for one output, each twice the one before, until the tail of h for one input is
+    /// below `part` of a lower bound of the integral before it; returns how many are needed.
+    pub(super) fn extend(
+        &mut self,
+        lengths: &mut Vec<Length>,
         input: usize,
         part: f64,
-    ) -> Result<Vec<Length>, Error> {
-        let first = &self.shortest[output];
-        let mut lengths = vec![Length {
-            time: first.time,
-            phi: first.phi.clone(),
-            sum: first.sum.clone(),
-            gram: first.gram.clone(),
-        }];
+    ) -> Result<usize, Error> {
         let start: DVector<f64> = self.starts.column(input).into();
         let mut before = 0.0_f64;
-        for _ in 0..LENGTHS {
-            let longest = &lengths[lengths.len() - 1];
+        for count in 1..=LENGTHS {
+            let longest = &lengths[count - 1];
             before = before.max(longest.bounds(&start)[0]);
-            if longest.tail(&(&longest.phi * &start)) <= part * before {
-                return Ok(lengths);
+            if longest.tail(&(&*longest.phi * &start)) <= part * before {
+                return Ok(count);
             }
-            lengths.push(longest.doubled());
+            if count == lengths.len() {
+                if count == self.powers.len() {
+                    self.powers.push(Rc::new(&*longest.phi * &*longest.phi));
+                }
+                let next = longest.doubled(Rc::clone(&self.powers[count]));
+                lengths.push(next);
+            }
         }
         Err(Error::NotConverged { what: "the impulse response", iterations: LENGTHS })
     }
 }
 
-fn shortest(a: &DMatrix<f64>, row: &DMatrix<f64>, domain: Domain) -> Result<Length, Error> {
-    let n = a.nrows();
-    let gram = row.tr_mul(row);
-    if let Domain::Sampled { .. } = domain {
-        return Ok(Length { time: 1.0, phi: a.clone(), sum: row.clone(), gram });
+/// What the shortest interval has for every output.
+struct Shortest {
+    time: f64,
+    /// The integral of the state, and the state in the middle; None in sampled time.
+    continuous: Option<(DMatrix<f64>, DMatrix<f64>)>,
+}
+
+impl Shortest {
+    /// Returns the state at the end, too.
+    fn new(a: DMatrix<f64>, domain: Domain) -> Result<(DMatrix<f64>, Self), Error> {
+        if let Domain::Sampled { .. } = domain {
+            return Ok((a, Self { time: 1.0, continuous: None }));
+        }
+        let identity = DMatrix::identity(a.nrows(), a.nrows());
+        let time = power_of_two(SHORTEST / a.norm());
+        let (phi, integral) = zero_order_hold(&a, &identity, time)?;
+        let (half, _) = zero_order_hold(&a, &identity, 0.5 * time)?;
+        Ok((phi, Self { time, continuous: Some((integral, half)) }))
     }
-    let time = power_of_two(SHORTEST / a.norm());
-    let (phi, integral) = zero_order_hold(a, &DMatrix::identity(n, n), time)?;
-    // Simpson's rule: over 1 / 4096 of a time constant its error is below the rounding.
-    let (half, _) = zero_order_hold(a, &DMatrix::identity(n, n), 0.5 * time)?;
-    let middle = half.tr_mul(&gram) * &half;
-    let end = phi.tr_mul(&gram) * &phi;
-    let gram = (gram + middle * 4.0 + end) * (time / 6.0);
-    Ok(Length { time, phi, sum: row * integral, gram })
+
+    fn length(&self, phi: &Rc<DMatrix<f64>>, row: &DMatrix<f64>) -> Length {
+        let gram = row.tr_mul(row);
+        let (time, phi) = (self.time, Rc::clone(phi));
+        let Some((integral, half)) = &self.continuous else {
+            return Length { time, phi, sum: row.clone(), gram };
+        };
+        // Simpson's rule: over 1 / 4096 of a time constant its error is below the rounding.
+        let middle = half.tr_mul(&gram) * half;
+        let end = phi.tr_mul(&gram) * &*phi;
+        let gram = (gram + middle * 4.0 + end) * (time / 6.0);
+        Length { time, phi, sum: row * integral, gram }
+    }
 }

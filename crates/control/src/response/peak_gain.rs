@@ -33,7 +33,7 @@ pub struct Bracket {
 /// halved where the two differ most, so that fast and slow modes get the steps they need; the
 /// contraction of the state bounds the integral after the last interval. The bracket is proven up
 /// to rounding; it is not narrowed below the rounding error of the integral of h^2. Cost: for each
-/// channel about 100 n^3, and for each time constant or oscillation some 50 intervals of 3 n^2
+/// output about 100 n^3, and for each time constant or oscillation some 50 intervals of 3 n^2
 /// multiplications.
 ///
 /// Source: M. A. Dahleh and J. B. Pearson, L1-optimal compensators for continuous-time systems,
@@ -69,14 +69,15 @@ pub struct Bracket {
 pub fn peak_gain(system: &StateSpace, width: f64) -> Result<Bracket, Error> {
     system.stable_eigenvalues()?;
     check::positive("width", width)?;
-    let intervals = Intervals::new(system)?;
+    let mut intervals = Intervals::new(system)?;
     let mut lower = system.d.abs();
     let mut upper = lower.clone();
     for output in 0..system.c.nrows() {
+        let mut lengths = vec![intervals.first(output)];
         for input in 0..system.b.ncols() {
-            let lengths = intervals.lengths(output, input, 0.25 * width)?;
+            let count = intervals.extend(&mut lengths, input, 0.25 * width)?;
             let start = intervals.starts.column(input).into();
-            let (least, most) = integral(&lengths, start, 0.5 * width)?;
+            let (least, most) = integral(&lengths[..count], start, 0.5 * width)?;
             lower[(output, input)] += least;
             upper[(output, input)] += most;
         }
@@ -107,7 +108,7 @@ impl Piece {
 /// Bounds of the integral of |h| over all time.
 fn integral(lengths: &[Length], start: DVector<f64>, width: f64) -> Result<(f64, f64), Error> {
     let longest = lengths.len() - 1;
-    let tail = lengths[longest].tail(&(&lengths[longest].phi * &start));
+    let tail = lengths[longest].tail(&(&*lengths[longest].phi * &start));
     let mut pieces = vec![Piece::new(lengths, longest, start)];
     for _ in 0..ROUNDS {
         let lower: f64 = pieces.iter().map(|piece| piece.lower).sum();
@@ -132,6 +133,6 @@ fn integral(lengths: &[Length], start: DVector<f64>, width: f64) -> Result<(f64,
 
 fn halves(lengths: &[Length], piece: Piece) -> Vec<Piece> {
     let half = piece.length - 1;
-    let middle = &lengths[half].phi * &piece.state;
+    let middle = &*lengths[half].phi * &piece.state;
     vec![Piece::new(lengths, half, piece.state), Piece::new(lengths, half, middle)]
 }

@@ -17,14 +17,17 @@ const SEMIDEFINITE: f64 = 1e-13;
 /// Checks that (A, B) is stabilisable and that every mode on the stability limit appears in Q.
 pub(super) fn require(problem: &ScaledProblem) -> Result<(), Error> {
     let (a, b, domain) = (&problem.free, &problem.equation.b, problem.equation.domain);
-    for eigenvalue in eigenvalues(a)? {
+    let weighted = smallest_weight(a, &problem.free_q);
+    for eigenvalue in eigenvalues(a)?.into_iter().filter(|eigenvalue| eigenvalue.im >= 0.0) {
         if domain.excess(eigenvalue) >= -NEAR * a.norm()
             && deficient(&a.transpose(), &b.transpose(), eigenvalue)?
         {
             return Err(Error::NotStabilisable { eigenvalue });
         }
         let limit = on_limit(eigenvalue, domain);
-        if deficient(a, &problem.free_q, limit)? {
+        let largest = 2.0 * a.norm() + limit.norm();
+        let appears = weighted > tolerance(a) * largest;
+        if !appears && deficient(a, &problem.free_q, limit)? {
             return Err(Error::Unweighted { weight: "Q", eigenvalue: limit });
         }
     }
@@ -48,9 +51,21 @@ fn deficient(a: &DMatrix<f64>, c: &DMatrix<f64>, lambda: Complex<f64>) -> Result
     for i in 0..n {
         pencil[(i, i)] -= lambda;
     }
+    Ok(ComplexSvd::new(&pencil)?.rank(tolerance(a)) < n)
+}
+
+fn tolerance(a: &DMatrix<f64>) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-    let tolerance = TOLERANCE_PER_STATE * n as f64;
-    Ok(ComplexSvd::new(&pencil)?.rank(tolerance) < n)
+    let n = a.nrows() as f64;
+    TOLERANCE_PER_STATE * n
+}
+
+/// A lower bound of the singular values of [A - lambda I; Q] for every lambda, Q scaled to the size
+/// of A: the smallest eigenvalue of Q, less its rounding.
+fn smallest_weight(a: &DMatrix<f64>, q: &DMatrix<f64>) -> f64 {
+    let (size, n) = (a.norm() / q.norm(), q.nrows());
+    let found = SymmetricEigen::try_new(q.clone(), f64::EPSILON, 100 * n);
+    found.map_or(0.0, |found| size * (found.eigenvalues.min() - tolerance(a) * q.norm()))
 }
 
 /// Checks that `m` is positive semidefinite up to rounding. `before` is the matrix from which it
