@@ -18,6 +18,9 @@ const MOST_FREQUENCIES: f64 = 80.0;
 /// Exponent of the mean over the frequencies that takes the place of the maximum in the descent.
 const MEAN: f64 = 24.0;
 
+/// Maps the logarithms of the figures to an objective and its partial derivatives.
+pub(crate) type Weigh<'a> = dyn Fn(&[f64; COUNT]) -> (f64, [f64; COUNT]) + 'a;
+
 /// The feedback u = K x of a plant, as a function of the chosen eigenvectors.
 ///
 /// With the real matrix V of eigenvectors, G = K V and (A + B K) V = V M,
@@ -94,7 +97,7 @@ impl<'a> FeedbackLoop<'a> {
             peak = peak.max(ComplexSvd::new(&s)?.values()[0]);
         }
         let figures = [condition, gain, peak];
-        Ok(figures.iter().all(|figure| figure.is_finite()).then_some(figures))
+        Ok(figures.iter().copied().all(f64::is_finite).then_some(figures))
     }
 
     /// The logarithms of smooth bounds of the figures: Schatten norms of order 16 in place of the
@@ -106,11 +109,7 @@ impl<'a> FeedbackLoop<'a> {
 
     /// `weigh` maps the values of [`Self::smooth`] to an objective and its partial derivatives;
     /// returns the objective and its gradients with respect to V and to G, in the given inputs.
-    pub(crate) fn objective(
-        &self,
-        directions: &[DVector<f64>],
-        weigh: &dyn Fn(&[f64; COUNT]) -> (f64, [f64; COUNT]),
-    ) -> Slope {
+    pub(crate) fn objective(&self, directions: &[DVector<f64>], weigh: &Weigh) -> Slope {
         let found = self.at(directions)?;
         let figures = self.all(&found);
         let (value, weights) = weigh(&[0, 1, 2].map(|figure: usize| figures[figure].value));
@@ -120,7 +119,7 @@ impl<'a> FeedbackLoop<'a> {
             of_v += &figure.of_v * weight;
             of_g += &figure.of_g * weight;
         }
-        let finite = of_v.iter().chain(&of_g).all(|entry| entry.is_finite());
+        let finite = of_v.iter().chain(&of_g).copied().all(f64::is_finite);
         (value.is_finite() && finite).then(|| (value, of_v, Some(self.basis.tr_mul(&of_g))))
     }
 

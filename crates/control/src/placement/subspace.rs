@@ -45,14 +45,15 @@ impl AssignableSubspaces {
         let mut units = DVector::from_element(n + r, 1.0);
         units.rows_mut(0, n).copy_from(&Balance::new(a).scale);
         for _ in 0..SCALING_PASSES {
-            let rough = in_units(a, b, blocks, &units, &rough_basis)?;
+            let rough = in_units(a, b, blocks, &units).iter().map(rough_basis).collect::<Vec<_>>();
             let factors = row_sizes(&rough, blocks, n);
             if factors.iter().all(|factor| (factor - 1.0).abs() <= 0.0) {
                 break;
             }
             units.component_mul_assign(&factors);
         }
-        let solutions = in_units(a, b, blocks, &units, &basis)?;
+        let solutions =
+            in_units(a, b, blocks, &units).iter().map(basis).collect::<Result<Vec<_>, _>>()?;
         let scale: DVector<f64> = units.rows(0, n).into();
         let space = |(solution, &poles): (&DMatrix<f64>, &PoleBlock)| {
             let count = poles.count();
@@ -144,19 +145,18 @@ fn repeated(v: &DVector<f64>, times: usize) -> DVector<f64> {
     DVector::from_fn(times * v.len(), |i, _| v[i % v.len()])
 }
 
-/// [`solutions`] in the given units of states and responses.
+/// [`equations`] in the given units of states and responses.
 fn in_units(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
     blocks: &[PoleBlock],
     units: &DVector<f64>,
-    basis: &dyn Fn(&DMatrix<f64>) -> Result<DMatrix<f64>, Error>,
-) -> Result<Vec<DMatrix<f64>>, Error> {
+) -> Vec<DMatrix<f64>> {
     let (n, r) = b.shape();
     let (of_states, of_responses) = (units.rows(0, n).into(), units.rows(n, r).into());
     let a = divide_rows(&multiply_columns(a, &of_states), &of_states);
     let b = divide_rows(&multiply_columns(b, &of_responses), &of_states);
-    blocks.iter().map(|&poles| basis(&equations(&a, &b, poles))).collect()
+    blocks.iter().map(|&poles| equations(&a, &b, poles)).collect()
 }
 
 /// Orthonormal basis of the solutions (V; G) of A V - V M + B G = 0, columns stacked.
@@ -185,10 +185,10 @@ fn basis(equations: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
 }
 
 /// The same by reflections, faster, with rounding errors relative to the largest entry.
-fn rough_basis(equations: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+fn rough_basis(equations: &DMatrix<f64>) -> DMatrix<f64> {
     let (rank, all) = equations.shape();
     let q = equations.clone().resize_vertically(all, 0.0).transpose().qr().q();
-    Ok(q.columns(rank, all - rank).into())
+    q.columns(rank, all - rank).into()
 }
 
 /// Size of each state and each response over all solutions, as powers of two around one.

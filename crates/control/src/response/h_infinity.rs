@@ -125,9 +125,9 @@ impl HInfinity {
         }
         let mut step = FIRST_STEP;
         while step.abs() > SMALLEST_STEP * width.sqrt() {
-            let before = self.frequency;
-            self.offer(transfer, (before * step.exp()).min(last))?;
-            step *= if self.frequency > before || self.frequency < before { 1.5 } else { -0.5 };
+            let before = self.lower;
+            self.offer(transfer, (self.frequency * step.exp()).min(last))?;
+            step *= if self.lower > before { 1.5 } else { -0.5 };
         }
         Ok(())
     }

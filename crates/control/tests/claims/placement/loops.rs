@@ -27,12 +27,13 @@ fn designed(fields: &[&str]) -> (FaultyPlant, Gains, Domain) {
     let (feedback, observer) = (poles(9), poles(11));
     let period = numbers(1)[0];
     if period == 0.0 {
-        let gains = design(&plant, &feedback, &observer, None).unwrap().gains;
+        let gains = design(&plant, &feedback, &observer, None).expect("a design").gains;
         return (plant, gains, Domain::Continuous);
     }
     let estimator = if fields[2] == "current" { Estimator::Current } else { Estimator::Prediction };
     let extended = ExtendedPlant::without_filter(plant);
-    let found = sampled::design(&extended, period, estimator, &feedback, &observer, None).unwrap();
+    let found = sampled::design(&extended, period, estimator, &feedback, &observer, None)
+        .expect("a design");
     (found.plant, found.gains, Domain::Sampled { period })
 }
 

@@ -46,7 +46,8 @@ impl System {
         let (a, d) = (&self.a + b * k, DMatrix::identity(m, m));
         let s = StateSpace { a, b: b.clone(), c: k.clone(), d, domain: self.domain };
         let [condition, norm, peak] = self.figures;
-        let own = if peak.is_nan() { 0.0 } else { h_infinity(&s, 1e-4).unwrap().lower / peak };
+        let own =
+            if peak.is_nan() { 0.0 } else { h_infinity(&s, 1e-4).expect("a norm").lower / peak };
         [placement.quality.condition / condition, gain / norm.max(1e-12), own]
     }
 }
