@@ -351,3 +351,18 @@ fn inputs_in_units_of_very_different_size_are_placed_alike() {
     let ratio = scaled.quality.condition / plain.quality.condition;
     assert!(0.5 < ratio && ratio < 2.0, "{:?} {:?}", scaled.quality, plain.quality);
 }
+
+/// `L_x` and `L_f` of fmu-controller/resources/design.toml, to the last bit.
+#[test]
+fn the_shipped_observer_of_the_pendulum_keeps_its_gain() {
+    let (a, c) = observer();
+    let gain = -place_balanced(&a, &c, &real_poles(&OBSERVER_POLES)).unwrap().gain.transpose();
+    let file = include_str!("../../../../fmu-controller/resources/design.toml");
+    let of = |name: &str| -> Vec<f64> {
+        let text = file.split(&format!("{name} = [")).nth(1).expect(name);
+        let text = text.split("\n]").next().expect("an end").replace(['[', ']', '\n', ' '], "");
+        text.split(',').filter(|text| !text.is_empty()).map(|text| text.parse().unwrap()).collect()
+    };
+    let shipped = [of("L_x"), of("L_f").iter().map(|value| -value).collect()].concat();
+    assert_eq!(gain, matrix(5, 2, &shipped));
+}
