@@ -1,8 +1,9 @@
-"""The FMUs of scripts/cross: each binary runs on its platform, or its file is examined.
+"""The FMUs of scripts/cross and the wheels of scripts/wheel --platform: each binary runs on its platform,
+or its file is examined.
 
 Libraries for Linux run directly and with an old glibc, those for Windows under wine, those for ARM
 Linux under qemu. Files for macOS are examined only. The folder of the FMUs is target/cross/dist, or
-the one that the environment variable PLATFORM_FMUS names.
+the one that the environment variable PLATFORM_FMUS names; PLATFORM_WHEEL names a wheel.
 """
 
 import hashlib
@@ -383,3 +384,80 @@ def test_checksums_and_bills_of_materials_match_the_fmus(fmus):
         own = [name.split("/") for name in texts if name.startswith("documentation/licenses/")]
         packed = {parts[2] for parts in own if len(parts) > 3}
         assert {name for name in packed if not name.startswith("rust-")} <= listed
+
+
+@pytest.fixture
+def wheel(tmp_path):
+    """The folder of the package in the wheel of scripts/wheel --platform, unpacked."""
+    path = os.environ.get("PLATFORM_WHEEL")
+    if not path:
+        pytest.skip("scripts/wheel --platform NAME --test sets PLATFORM_WHEEL")
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path / "wheel")
+    return tmp_path / "wheel" / "aso_ftc"
+
+
+@pytest.fixture
+def wheel_command(wheel, request):
+    """Runs the command of a wheel for Windows or ARM Linux; returns the finished process."""
+    command = next((wheel / "bin").iterdir())
+    command.chmod(0o755)
+    windows = command.suffix == ".exe"
+    environment = request.getfixturevalue("wine") if windows else None
+    runner = RUN["win64" if windows else "aarch64-linux"][2]
+
+    def run(*words):
+        return subprocess.run([*runner, command, *words], env=environment, capture_output=True, text=True)
+
+    return run
+
+
+def test_the_module_in_the_wheel_exports_what_python_calls(wheel):
+    (module,) = [path for path in wheel.glob("_core.*") if path.suffix in (".so", ".pyd")]
+    (part,) = slices(module.read_bytes())
+    assert exported(part) == {"PyInit__core"}
+
+
+def test_the_command_in_the_wheel_has_the_version_of_the_wheel(wheel, wheel_command):
+    (information,) = wheel.parent.glob("aso_ftc-*.dist-info")
+    version = information.stem.removeprefix("aso_ftc-")
+    done = wheel_command("--version")
+    assert done.stdout.split() == ["aso-ftc", version], done.stderr
+
+
+def test_the_command_in_the_wheel_writes_the_results_file_of_linux(
+    wheel, wheel_command, packed, aso_ftc, tmp_path
+):
+    drive = "Z:" if (wheel / "bin" / "aso-ftc.exe").exists() else ""
+    options = ["run", "--stop-time", "20", "--record-every", "0.01"]
+    own = [f"--{role}={drive}{wheel / 'fmus' / model}.fmu" for role, model in MODELS.items()]
+    done = wheel_command(*options, *own, f"--out={drive}{tmp_path / 'there'}")
+    assert done.returncode == 0, done.stderr
+    here = [f"--{role}={path}" for role, path in packed.items()]
+    done = aso_ftc(*options, *here, f"--out={tmp_path / 'here'}")
+    assert done.returncode == 0, done.stderr
+    there, here = (tmp_path / name / "results.csv" for name in ("there", "here"))
+    assert here.read_bytes().count(b"\n") == 2_002
+    assert there.read_bytes() == here.read_bytes()
+
+
+def test_the_command_in_the_wheel_designs_what_linux_designs(wheel, wheel_command, aso_ftc, root, tmp_path):
+    drive = "Z:" if (wheel / "bin" / "aso-ftc.exe").exists() else ""
+    plant = root / "fmu-controller" / "pendulum.toml"
+    options = ["--json", "--out"]
+    there = wheel_command("design", f"{drive}{plant}", *options, f"{drive}{tmp_path / 'there.toml'}")
+    here = aso_ftc("design", plant, *options, tmp_path / "here.toml")
+    # The verdict on the paper's design is red.
+    assert (there.returncode, here.returncode) == (1, 1), there.stderr + here.stderr
+    there, here = (list(leaves(json.loads(done.stdout))) for done in (there, here))
+    assert len(here) > 100 and there == here
+
+
+def leaves(value, place=""):
+    """The places and values in JSON; numbers of eight digits, because the functions of the systems' libraries
+    round in other ways."""
+    parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
+    if parts is None:
+        yield place, f"{value:.7e}" if isinstance(value, float) else value
+    for name, part in parts or ():
+        yield from leaves(part, f"{place}/{name}")
