@@ -12,6 +12,7 @@ import os
 import signal
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -412,10 +413,10 @@ def wheel_command(wheel, request):
     return run
 
 
-def test_the_module_in_the_wheel_exports_what_python_calls(wheel):
+def test_the_module_in_the_wheel_exports_the_function_that_python_calls(wheel):
     (module,) = [path for path in wheel.glob("_core.*") if path.suffix in (".so", ".pyd")]
     (part,) = slices(module.read_bytes())
-    assert exported(part) == {"PyInit__core"}
+    assert "PyInit__core" in exported(part)
 
 
 def test_the_command_in_the_wheel_has_the_version_of_the_wheel(wheel, wheel_command):
@@ -441,23 +442,21 @@ def test_the_command_in_the_wheel_writes_the_results_file_of_linux(
     assert there.read_bytes() == here.read_bytes()
 
 
-def test_the_command_in_the_wheel_designs_what_linux_designs(wheel, wheel_command, aso_ftc, root, tmp_path):
+def test_the_command_in_the_wheel_places_the_eigenvalues_of_the_plant_file(
+    wheel, wheel_command, root, tmp_path
+):
     drive = "Z:" if (wheel / "bin" / "aso-ftc.exe").exists() else ""
     plant = root / "fmu-controller" / "pendulum.toml"
-    options = ["--json", "--out"]
-    there = wheel_command("design", f"{drive}{plant}", *options, f"{drive}{tmp_path / 'there.toml'}")
-    here = aso_ftc("design", plant, *options, tmp_path / "here.toml")
+    done = wheel_command("design", f"{drive}{plant}", "--out", f"{drive}{tmp_path / 'design.toml'}")
     # The verdict on the paper's design is red.
-    assert (there.returncode, here.returncode) == (1, 1), there.stderr + here.stderr
-    there, here = (list(leaves(json.loads(done.stdout))) for done in (there, here))
-    assert len(here) > 100 and there == here
-
-
-def leaves(value, place=""):
-    """The places and values in JSON; numbers of eight digits, because the functions of the systems' libraries
-    round in other ways."""
-    parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
-    if parts is None:
-        yield place, f"{value:.7e}" if isinstance(value, float) else value
-    for name, part in parts or ():
-        yield from leaves(part, f"{place}/{name}")
+    assert done.returncode == 1, done.stderr
+    required = tomllib.loads(plant.read_text(encoding="utf-8"))
+    own = tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8"))
+    a, b, c, f, k, l_x, l_f = (np.array(own[name]) for name in ("A", "B", "C", "F_a", "K_x", "L_x", "L_f"))
+    found = np.sort(np.linalg.eigvals(a + b @ k))
+    assert np.allclose(found, np.sort(required["feedback"]["eigenvalues"]), rtol=1e-8)
+    augmented = np.block([[a, f], [np.zeros((1, 5))]]) - np.vstack([l_x, l_f]) @ np.hstack(
+        [c, np.zeros((2, 1))]
+    )
+    found = np.sort(np.linalg.eigvals(augmented))
+    assert np.allclose(found, np.sort(required["observer"]["eigenvalues"]), rtol=1e-8)
