@@ -1,8 +1,9 @@
-"""The FMUs of scripts/cross: each binary runs on its platform, or its file is examined.
+"""The FMUs of scripts/cross and the wheels of scripts/wheel --platform: each binary runs on its platform,
+or its file is examined.
 
 Libraries for Linux run directly and with an old glibc, those for Windows under wine, those for ARM
 Linux under qemu. Files for macOS are examined only. The folder of the FMUs is target/cross/dist, or
-the one that the environment variable PLATFORM_FMUS names.
+the one that the environment variable PLATFORM_FMUS names; PLATFORM_WHEEL names a wheel.
 """
 
 import hashlib
@@ -11,6 +12,7 @@ import os
 import signal
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -383,3 +385,78 @@ def test_checksums_and_bills_of_materials_match_the_fmus(fmus):
         own = [name.split("/") for name in texts if name.startswith("documentation/licenses/")]
         packed = {parts[2] for parts in own if len(parts) > 3}
         assert {name for name in packed if not name.startswith("rust-")} <= listed
+
+
+@pytest.fixture
+def wheel(tmp_path):
+    """The folder of the package in the wheel of scripts/wheel --platform, unpacked."""
+    path = os.environ.get("PLATFORM_WHEEL")
+    if not path:
+        pytest.skip("scripts/wheel --platform NAME --test sets PLATFORM_WHEEL")
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path / "wheel")
+    return tmp_path / "wheel" / "aso_ftc"
+
+
+@pytest.fixture
+def wheel_command(wheel, request):
+    """Runs the command of a wheel for Windows or ARM Linux; returns the finished process."""
+    command = next((wheel / "bin").iterdir())
+    command.chmod(0o755)
+    windows = command.suffix == ".exe"
+    environment = request.getfixturevalue("wine") if windows else None
+    runner = RUN["win64" if windows else "aarch64-linux"][2]
+
+    def run(*words):
+        return subprocess.run([*runner, command, *words], env=environment, capture_output=True, text=True)
+
+    return run
+
+
+def test_the_module_in_the_wheel_exports_the_function_that_python_calls(wheel):
+    (module,) = [path for path in wheel.glob("_core.*") if path.suffix in (".so", ".pyd")]
+    (part,) = slices(module.read_bytes())
+    assert "PyInit__core" in exported(part)
+
+
+def test_the_command_in_the_wheel_has_the_version_of_the_wheel(wheel, wheel_command):
+    (information,) = wheel.parent.glob("aso_ftc-*.dist-info")
+    version = information.stem.removeprefix("aso_ftc-")
+    done = wheel_command("--version")
+    assert done.stdout.split() == ["aso-ftc", version], done.stderr
+
+
+def test_the_command_in_the_wheel_writes_the_results_file_of_linux(
+    wheel, wheel_command, packed, aso_ftc, tmp_path
+):
+    drive = "Z:" if (wheel / "bin" / "aso-ftc.exe").exists() else ""
+    options = ["run", "--stop-time", "20", "--record-every", "0.01"]
+    own = [f"--{role}={drive}{wheel / 'fmus' / model}.fmu" for role, model in MODELS.items()]
+    done = wheel_command(*options, *own, f"--out={drive}{tmp_path / 'there'}")
+    assert done.returncode == 0, done.stderr
+    here = [f"--{role}={path}" for role, path in packed.items()]
+    done = aso_ftc(*options, *here, f"--out={tmp_path / 'here'}")
+    assert done.returncode == 0, done.stderr
+    there, here = (tmp_path / name / "results.csv" for name in ("there", "here"))
+    assert here.read_bytes().count(b"\n") == 2_002
+    assert there.read_bytes() == here.read_bytes()
+
+
+def test_the_command_in_the_wheel_places_the_eigenvalues_of_the_plant_file(
+    wheel, wheel_command, root, tmp_path
+):
+    drive = "Z:" if (wheel / "bin" / "aso-ftc.exe").exists() else ""
+    plant = root / "fmu-controller" / "pendulum.toml"
+    done = wheel_command("design", f"{drive}{plant}", "--out", f"{drive}{tmp_path / 'design.toml'}")
+    # The verdict on the paper's design is red.
+    assert done.returncode == 1, done.stderr
+    required = tomllib.loads(plant.read_text(encoding="utf-8"))
+    own = tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8"))
+    a, b, c, f, k, l_x, l_f = (np.array(own[name]) for name in ("A", "B", "C", "F_a", "K_x", "L_x", "L_f"))
+    found = np.sort(np.linalg.eigvals(a + b @ k))
+    assert np.allclose(found, np.sort(required["feedback"]["eigenvalues"]), rtol=1e-8)
+    augmented = np.block([[a, f], [np.zeros((1, 5))]]) - np.vstack([l_x, l_f]) @ np.hstack(
+        [c, np.zeros((2, 1))]
+    )
+    found = np.sort(np.linalg.eigvals(augmented))
+    assert np.allclose(found, np.sort(required["observer"]["eigenvalues"]), rtol=1e-8)

@@ -43,7 +43,7 @@ def python():
 
     def run(text, **options):
         return subprocess.run(
-            [sys.executable, "-P", "-c", text], capture_output=True, text=True, check=False, **options
+            [sys.executable, "-I", "-c", text], capture_output=True, text=True, check=False, **options
         )
 
     return run

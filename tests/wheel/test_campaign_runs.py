@@ -62,7 +62,7 @@ def campaign(tmp_path):
 
 def command(*words, **options):
     """Starts the command; returns the process."""
-    line = [sys.executable, "-P", "-m", "aso_ftc", "campaign", *map(str, words)]
+    line = [sys.executable, "-I", "-m", "aso_ftc", "campaign", *map(str, words)]
     return subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 
 
@@ -130,7 +130,7 @@ class Cluster:
         self.processes = {}
 
     def start(self, name, *words):
-        line = [sys.executable, "-P", "-m", *words]
+        line = [sys.executable, "-I", "-m", *words]
         log = open(self.folder / f"{name}.log", "ab")
         with log:
             self.processes[name] = subprocess.Popen(line, stdout=log, stderr=log, start_new_session=True)

@@ -4,6 +4,7 @@ import doctest
 import inspect
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 import aso_ftc as af
@@ -26,7 +27,7 @@ def test_the_stubs_are_those_of_the_extension_and_types_are_complete(tmp_path):
     )
 
     def run(*words):
-        words = [sys.executable, "-P", "-m", *map(str, words)]
+        words = [sys.executable, "-I", "-m", *map(str, words)]
         done = subprocess.run(words, check=False, capture_output=True, text=True, cwd=tmp_path)
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout
@@ -61,8 +62,8 @@ def test_importing_loads_neither_numpy_nor_other_packages(python):
 
 def test_the_command_and_the_module_are_one_program():
     expected = f"aso-ftc {af.__version__}\n"
-    scripts = Path(sys.executable).parent / "aso-ftc"
-    for words in ([str(af.command())], [sys.executable, "-P", "-m", "aso_ftc"], [str(scripts)]):
+    script = Path(sysconfig.get_path("scripts"), "aso-ftc")
+    for words in ([str(af.command())], [sys.executable, "-I", "-m", "aso_ftc"], [str(script)]):
         done = subprocess.run([*words, "--version"], check=True, capture_output=True, text=True)
         assert done.stdout == expected
 

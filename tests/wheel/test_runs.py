@@ -2,6 +2,7 @@
 
 import copy
 import logging
+import os
 import pickle
 import signal
 import threading
@@ -210,6 +211,7 @@ def test_a_thousand_runs_leave_no_memory_and_no_files_open(paper):
     assert len(list(Path("/proc/self/fd").iterdir())) == files
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_an_fmu_is_opened_once_and_closed_at_the_end(python, tmp_path):
     program = """
 import os, aso_ftc as af
