@@ -8,6 +8,8 @@ import aso_ftc as af
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+# For the modules that tests share.
+sys.path.insert(0, str(Path(__file__).parent))
 
 
 def pytest_sessionstart(session):

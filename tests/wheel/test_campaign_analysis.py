@@ -1,81 +1,18 @@
 """Analysis of a campaign, against closed forms and other formulas."""
 
 import gc
-import json
 import os
 import subprocess
 import sys
 
 import numpy as np
 import pytest
-
-import pyarrow
-import pyarrow.parquet
 from aso_ftc import ConfigurationError, ResultsError
 from aso_ftc.campaign import load
 from SALib.sample import fast_sampler, morris, sobol
 from scipy import stats
 
-
-def write(
-    folder,
-    design,
-    columns,
-    measures,
-    *,
-    unit=None,
-    limits=None,
-    status=None,
-    faults=None,
-    parts=3,
-    changes=None,
-    **more,
-):
-    """Writes the folder of a campaign: columns of parameters and measures, positions of a sample."""
-    names = list(columns)
-    runs = len(next(iter(columns.values())))
-    numeric = {name: np.asarray(own).dtype.kind in "fi" for name, own in columns.items()}
-    manifest = {
-        "name": "test",
-        "runs": runs,
-        "design": design,
-        "parameters": [{"name": name, "unit": None, "numeric": numeric[name]} for name in names],
-        "faults": faults is not None,
-        "measures": {name: {"expression": "last(plant.x_p)", "unit": "m"} for name in measures},
-        "limits": limits or {},
-        "complete": True,
-        **more,
-        **(changes or {}),
-    }
-    (folder / "runs").mkdir(parents=True)
-    (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
-    plan = {"row": np.arange(runs), **columns}
-    for at, name in enumerate(names if unit is not None else []):
-        plan[f"unit:{name}"] = unit[:, at]
-    pyarrow.parquet.write_table(pyarrow.table(plan), folder / "plan.parquet")
-    statuses = np.array(["ok"] * runs, dtype=object) if status is None else np.asarray(status, dtype=object)
-    reasons = np.where(statuses == "ok", "", "the FMU ended the process")
-    table = pyarrow.table(
-        {
-            "run": np.arange(runs),
-            **columns,
-            **(faults or {}),
-            **measures,
-            "status": statuses,
-            "reason": reasons,
-        }
-        | {"seconds": np.full(runs, 0.1)}
-    )
-    # The order of the parts is not the order of the runs.
-    for part, rows in enumerate(np.array_split(np.random.default_rng(3).permutation(runs), parts)):
-        pyarrow.parquet.write_table(table.take(rows), folder / "runs" / f"part-{part:06}.parquet")
-    return load(folder)
-
-
-def ishigami(unit, a=7.0, b=0.1):
-    x = (2 * unit - 1) * np.pi
-    return np.sin(x[:, 0]) + a * np.sin(x[:, 1]) ** 2 + b * x[:, 2] ** 4 * np.sin(x[:, 0])
-
+from campaign_folder import campaign, fault_campaign, ishigami, problem, random_campaign, write
 
 # Closed form of Ishigami and Homma (1990) with a = 7, b = 0.1.
 ISHIGAMI = {"S1": [0.3139, 0.4424, 0.0], "ST": [0.5576, 0.4424, 0.2437]}
@@ -92,16 +29,6 @@ def sobol_g_indices():
     total = np.prod(1 + own) - 1
     rest = [np.prod(1 + np.delete(own, i)) for i in range(len(A))]
     return {"S1": own / total, "ST": own * rest / total}
-
-
-def problem(count):
-    return {"num_vars": count, "names": [f"plant.p{i}" for i in range(count)], "bounds": [[0.0, 1.0]] * count}
-
-
-def campaign(folder, design, unit, function, **more):
-    """A campaign whose parameters are the positions of the sample scaled to 0 to 10."""
-    columns = {name: 10 * own for name, own in zip(problem(unit.shape[1])["names"], unit.T)}
-    return write(folder, design, columns, {"y": function(unit)}, unit=unit, **more)
 
 
 @pytest.mark.parametrize("second_order", [True, False])
@@ -227,12 +154,6 @@ def test_a_stated_value_of_unfinished_runs_completes_a_design(tmp_path):
     assert found.sobol("y").equals(finished.sobol("y"))
 
 
-def random_campaign(folder, values, limit, **more):
-    columns = {"p": np.random.default_rng(0).random(len(values))}
-    design = more.pop("design", {"method": "random", "seed": 1})
-    return write(folder, design, columns, {"y": np.asarray(values, float)}, limits={"y": limit}, **more)
-
-
 @pytest.mark.parametrize(("failures", "runs"), [(0, 300), (3, 40), (40, 40), (17, 1000)])
 @pytest.mark.parametrize("confidence", [0.9, 0.95])
 def test_failure_probability_has_clopper_pearson_bounds(tmp_path, failures, runs, confidence):
@@ -324,22 +245,6 @@ def test_influence_has_the_rank_correlation_and_the_failures_of_the_tenths(tmp_p
         and list(kinds["runs"]) == [1000] * 2
     )
     assert np.isclose(kinds.loc["a", "median"], np.median(values[1::2]))
-
-
-def fault_campaign(folder, limit):
-    kinds = ["stuck", "stuck", "stuck", "gain", "gain", "gain", None]
-    faults = {
-        "fault": ["stuck 0", "stuck 0", "stuck 1", "gain 2", "gain 2", "gain 3", ""],
-        "fault.connection": ["a.y", "a.y", "b.y", "a.y", "a.y", "a.y", None],
-        "fault.kind": kinds,
-        "fault.size": pyarrow.array([None, None, None, 2.0, 2.0, 3.0, None], pyarrow.float64()),
-        "fault.from": pyarrow.array([1.0, 1.0, 1.0, 1.0, 1.0, 5.0, None], pyarrow.float64()),
-    }
-    values = {"y": np.array([1.0, 4.0, np.nan, 2.0, 3.0, 5.0, 99.0])}
-    status = ["ok", "ok", "crashed", "ok", "ok", "ok", "ok"]
-    columns = {"p": np.array([0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0])}
-    more = {"limits": {"y": limit}, "status": status, "faults": faults}
-    return write(folder, {"method": "random"}, columns, values, **more)
 
 
 def test_the_heat_map_has_the_worst_value_of_each_fault(tmp_path):

@@ -8,13 +8,10 @@ import time
 
 import numpy as np
 import pytest
-
-for package in ("SALib", "pandas", "plotly", "pyarrow", "scipy"):
-    pytest.importorskip(package)
-
 from aso_ftc import ConfigurationError, ResultsError
 from SALib.sample import sobol
-from test_campaign_analysis import campaign, fault_campaign, ishigami, problem, random_campaign, write
+
+from campaign_folder import campaign, fault_campaign, ishigami, problem, random_campaign, write
 
 HOSTILE = "</script><script>alert(1)</script><img src=http://example.com/x onerror=alert(2)>\"'&%{x}"
 

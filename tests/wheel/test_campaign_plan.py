@@ -196,7 +196,7 @@ def test_a_measure_has_the_value_of_its_definition(text, expected, tolerance):
         ({"measures": {"m": "parameter('k')"}}, "no parameter k"),
         ({"measures": {}}, "at least one measure"),
         ({"limits": {"speed": {"below": 1.0}}}, "no measure"),
-        ({"limits": {"peak": {"below": "1 mm"}}}, "a number"),
+        ({"limits": {"peak": {"below": "1 mm"}}}, "a finite number"),
         ({"faults": [{"connection": "plant.u", "bias": {"value": "x"}}]}, "value"),
         ({"faults": [{"connection": "plant.z", "bias": {"value": 1.0}}]}, "plant.z"),
         ({"faults": [{"connection": "plant.u", "biass": {"value": 1.0}}]}, "exactly one of"),

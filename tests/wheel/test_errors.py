@@ -92,5 +92,7 @@ def test_a_missing_package_is_named_with_the_command_that_installs_it(paper, mon
     results = paper.run()
     monkeypatch.setattr(importlib, "import_module", refuse)
     for call in (results.to_arrow, results.to_pandas, results.to_polars, results.to_xarray, results.plot):
-        with pytest.raises(af.MissingPackageError, match=r"needs the package (\w+): python -m pip install \1$"):
+        with pytest.raises(
+            af.MissingPackageError, match=r"needs the package (\w+): python -m pip install \1$"
+        ):
             call()

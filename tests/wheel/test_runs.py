@@ -20,8 +20,7 @@ SSP = Path(__file__).resolve().parents[2] / "dist" / "InvertedPendulum.ssp"
 def same(first, second):
     """Whether two results have the same columns, bit for bit."""
     return first.names == second.names and all(
-        np.array_equal(first[name], second[name], equal_nan=first[name].dtype.kind == "f")
-        for name in first
+        np.array_equal(first[name], second[name], equal_nan=first[name].dtype.kind == "f") for name in first
     )
 
 

@@ -17,7 +17,11 @@ def pendulum():
 def test_the_description_is_that_of_fmpy():
     for path in af.fmus().values():
         own, theirs = af.read_model_description(path), fmpy.read_model_description(str(path))
-        assert (own.model_name, own.guid, own.fmi_version) == (theirs.modelName, theirs.guid, theirs.fmiVersion)
+        assert (own.model_name, own.guid, own.fmi_version) == (
+            theirs.modelName,
+            theirs.guid,
+            theirs.fmiVersion,
+        )
         assert own.model_identifier == theirs.coSimulation.modelIdentifier
         assert own.capabilities["canGetAndSetFMUstate"] == theirs.coSimulation.canGetAndSetFMUstate
         assert len(own.variables) == len(theirs.modelVariables)
