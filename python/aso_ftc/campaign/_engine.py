@@ -39,7 +39,7 @@ _LOGGERS = [
     f"distributed{name}" for name in ("", ".client", ".scheduler", ".nanny", ".worker", ".core", ".batched")
 ]
 # Seconds between two looks at the tasks.
-_PAUSE = 0.005
+_PAUSE = 0.02
 
 
 def execute(
