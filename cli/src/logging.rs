@@ -1,11 +1,11 @@
 //! Log messages on standard error, as text or JSON, drawn above the progress bar.
 
-use std::fmt::{self, Write as _};
+use std::fmt;
 use std::io::{self, Write};
 use std::sync::OnceLock;
 
 use indicatif::MultiProgress;
-use tracing::field::{Field, Visit};
+use study::LogFields;
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::filter::LevelFilter;
 use tracing_subscriber::fmt::format::Writer;
@@ -29,20 +29,6 @@ pub(crate) fn start(verbose: u8, json: bool) {
     } else {
         tracing::subscriber::set_global_default(builder.event_format(Sentence).finish())
     };
-}
-
-/// Joins an error and its causes to one sentence. Leaves out a cause that an error above it already
-/// quotes.
-pub(crate) fn sentence(error: &anyhow::Error) -> String {
-    let mut said = String::new();
-    for cause in error.chain().map(ToString::to_string) {
-        if said.is_empty() {
-            said = cause;
-        } else if !said.contains(&cause) {
-            said = format!("{said}: {cause}");
-        }
-    }
-    said
 }
 
 /// Returns the display of progress bars.
@@ -89,7 +75,7 @@ where
         event: &Event<'_>,
     ) -> fmt::Result {
         let metadata = event.metadata();
-        let mut parts = Parts::default();
+        let mut parts = LogFields::default();
         event.record(&mut parts);
         let word = match *metadata.level() {
             Level::ERROR => "error",
@@ -101,7 +87,7 @@ where
         if metadata.target() != FMU {
             return writeln!(writer, "{word}: {}{}", parts.message, parts.others);
         }
-        let Parts { message, instance, category, time, others } = parts;
+        let LogFields { message, instance, category, time, others } = parts;
         write!(writer, "{word}: {}", plain(&instance))?;
         if let Some(time) = time {
             write!(writer, ", t = {time} s")?;
@@ -118,45 +104,4 @@ where
 fn plain(text: &str) -> String {
     let text = text.trim_end();
     text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
-}
-
-/// The fields of a message.
-#[derive(Default)]
-struct Parts {
-    message: String,
-    instance: String,
-    category: String,
-    time: Option<f64>,
-    others: String,
-}
-
-impl Visit for Parts {
-    fn record_f64(&mut self, field: &Field, value: f64) {
-        if field.name() == "time" {
-            self.time = Some(value);
-        } else {
-            self.record_debug(field, &value);
-        }
-    }
-
-    fn record_str(&mut self, field: &Field, value: &str) {
-        match field.name() {
-            "message" => value.clone_into(&mut self.message),
-            "instance" => value.clone_into(&mut self.instance),
-            "category" => value.clone_into(&mut self.category),
-            _ => self.record_debug(field, &value),
-        }
-    }
-
-    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
-        match field.name() {
-            "message" => self.message = format!("{value:?}"),
-            // The message text contains this number already.
-            "lost" => {}
-            name => {
-                // Writing to a String cannot fail.
-                let _ = write!(self.others, ", {name} = {value:?}");
-            }
-        }
-    }
 }

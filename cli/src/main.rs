@@ -84,7 +84,7 @@ fn perform(verb: Command) -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {}", logging::sentence(&error));
+            eprintln!("error: {}", files::sentence(error.as_ref()));
             ExitCode::from(2)
         }
     }

@@ -29,13 +29,13 @@ const LISTED: usize = 20;
 pub(crate) fn run(options: &Options) -> ExitCode {
     logging::start(options.verbose, options.log_json);
     if let Err(error) = interrupt::listen() {
-        tracing::warn!("{}", logging::sentence(&error));
+        tracing::warn!("{}", files::sentence(error.as_ref()));
     }
     match prepare(options) {
         Ok(None) => ExitCode::SUCCESS,
         Ok(Some(started)) => started.go(),
         Err(error) => {
-            tracing::error!("{}", logging::sentence(&error));
+            tracing::error!("{}", files::sentence(error.as_ref()));
             ExitCode::from(2)
         }
     }
@@ -207,7 +207,7 @@ impl Started {
             }
         };
         if let Err(error) = written {
-            tracing::error!("{}", logging::sentence(&error));
+            tracing::error!("{}", files::sentence(error.as_ref()));
             return ExitCode::from(status.max(1));
         }
         ExitCode::from(status)

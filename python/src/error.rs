@@ -217,7 +217,7 @@ fn called(error: Exception, call: &CallError) -> Exception {
 
 /// Returns the exception of a design.
 pub(crate) fn design(error: &design::Error) -> Exception {
-    let sentence = sentence(error);
+    let sentence = files::sentence(error);
     match error {
         design::Error::Entry(place) => entry(DESIGN, place, sentence),
         design::Error::Control(_) => Exception::new(DESIGN, "Control", sentence),
@@ -232,25 +232,10 @@ pub(crate) fn design(error: &design::Error) -> Exception {
 
 /// Returns the exception of a result file.
 pub(crate) fn results(error: &results::ResultsError) -> Exception {
-    Exception::new(RESULTS, "Results", sentence(error))
+    Exception::new(RESULTS, "Results", files::sentence(error))
 }
 
 /// Returns the exception of an FMU that cannot be read.
 pub(crate) fn package(error: &fmu_description::package::PackageError) -> Exception {
-    Exception::new(FMU, "Package", sentence(error))
-}
-
-/// Joins an error and its causes to one sentence. Leaves out a cause that the error above it already
-/// quotes.
-fn sentence(error: &dyn std::error::Error) -> String {
-    let mut said = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        let text = error.to_string();
-        if !said.contains(&text) {
-            said = format!("{said}: {text}");
-        }
-        cause = error.source();
-    }
-    said
+    Exception::new(FMU, "Package", files::sentence(error))
 }

@@ -4,12 +4,11 @@
 //! that is attached to the interpreter passes them on: at the end of each call, and during a run each
 //! time that it looks for signals.
 
-use std::fmt::{self, Write as _};
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use pyo3::prelude::*;
-use tracing::field::{Field, Visit};
+use study::LogFields;
 use tracing::span::{Attributes, Id, Record};
 use tracing::subscriber::Interest;
 use tracing::{Event, Level, Metadata, Subscriber};
@@ -98,10 +97,10 @@ impl Subscriber for Collector {
 
     fn event(&self, event: &Event<'_>) {
         let metadata = event.metadata();
-        let mut parts = Parts::default();
-        event.record(&mut parts);
+        let mut fields = LogFields::default();
+        event.record(&mut fields);
         let from_fmu = metadata.target() == FMU;
-        let text = if from_fmu { parts.of_fmu() } else { parts.message + &parts.others };
+        let text = if from_fmu { of_fmu(fields) } else { fields.message + &fields.others };
         let mut messages = MESSAGES.lock().unwrap_or_else(PoisonError::into_inner);
         if messages.len() < WAITING {
             messages.push(Message { level: level(*metadata.level()), from_fmu, text });
@@ -126,52 +125,10 @@ fn level(level: Level) -> u8 {
     }
 }
 
-/// The fields of a message.
-#[derive(Default)]
-struct Parts {
-    message: String,
-    instance: String,
-    category: String,
-    time: Option<f64>,
-    others: String,
-}
-
-impl Parts {
-    /// Returns the message of an FMU with its name, time and category.
-    fn of_fmu(self) -> String {
-        let Self { message, instance, category, time, others } = self;
-        let time = time.map(|time| format!(", t = {time} s")).unwrap_or_default();
-        let category = if category.is_empty() { category } else { format!(", {category}") };
-        format!("{instance}{time}{category}: {}{others}", message.trim_end())
-    }
-}
-
-impl Visit for Parts {
-    fn record_f64(&mut self, field: &Field, value: f64) {
-        if field.name() == "time" {
-            self.time = Some(value);
-        } else {
-            self.record_debug(field, &value);
-        }
-    }
-
-    fn record_str(&mut self, field: &Field, value: &str) {
-        match field.name() {
-            "message" => value.clone_into(&mut self.message),
-            "instance" => value.clone_into(&mut self.instance),
-            "category" => value.clone_into(&mut self.category),
-            _ => self.record_debug(field, &value),
-        }
-    }
-
-    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
-        match field.name() {
-            "message" => self.message = format!("{value:?}"),
-            "lost" => {}
-            name => {
-                // Writing to a String does not fail.
-                let _ = write!(self.others, ", {name} = {value:?}");
-            }
-        }
-    }
+/// Returns the message of an FMU with its name, time and category.
+fn of_fmu(fields: LogFields) -> String {
+    let LogFields { message, instance, category, time, others } = fields;
+    let time = time.map(|time| format!(", t = {time} s")).unwrap_or_default();
+    let category = if category.is_empty() { category } else { format!(", {category}") };
+    format!("{instance}{time}{category}: {}{others}", message.trim_end())
 }

@@ -3,7 +3,6 @@
 mod compromise;
 mod deflation;
 mod descent;
-
 mod eigenvectors;
 mod figures;
 mod pole_block;

@@ -37,8 +37,8 @@ fn described_at(
     format!("{kind} {}{unit}, which {} {verb}", shown(eigenvalue), states.join(", "))
 }
 
-/// Six digits, such that a number read from the text is within 1e-5 of the value; a complex eigenvalue
-/// with its conjugate.
+/// Returns an eigenvalue as text with six digits; a complex one together with its conjugate. A number
+/// that is read from the text differs by less than 1e-5 relative to the eigenvalue.
 fn shown(value: Complex<f64>) -> String {
     match value.im {
         0.0 => digits(value.re),

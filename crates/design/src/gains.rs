@@ -182,7 +182,8 @@ struct Assignment {
     movable: Vec<Complex<f64>>,
 }
 
-/// Returns what to assign: each fixed mode takes the nearest of the required eigenvalues.
+/// Divides the required eigenvalues: each fixed mode takes the nearest one, the others are assigned to
+/// the movable part.
 fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Assignment, Refusal> {
     let sampling = match (required, domain) {
         (Requirement::Eigenvalues(_), Domain::Sampled { period }) => Some(period),

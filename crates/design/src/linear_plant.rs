@@ -125,9 +125,10 @@ fn linearisation(
     let plant_file::PlantFmu { path, operating_point, states, preload, step } = own;
     for library in preload {
         fmu_import::preload(library.as_ref())
-            .map_err(|error| file.error(&["preload"], sentence(&error)))?;
+            .map_err(|error| file.error(&["preload"], files::sentence(&error)))?;
     }
-    let fmu = Fmu::open_any(path).map_err(|error| file.error(&["plant"], sentence(&error)))?;
+    let fmu =
+        Fmu::open_any(path).map_err(|error| file.error(&["plant"], files::sentence(&error)))?;
     let names = |signals: &[Signal]| signals.iter().map(|signal| signal.name.clone()).collect();
     let inputs = file.faults.iter().filter_map(|fault| match &fault.entry_point {
         EntryPoint::Input(name) => Some(name.clone()),
@@ -256,10 +257,4 @@ fn entry(
             Err(file.error_at(&fault.place, message).into())
         }
     }
-}
-
-/// Returns the text of an error and of its causes.
-fn sentence(error: &dyn std::error::Error) -> String {
-    let causes = std::iter::successors(error.source(), |cause| cause.source());
-    causes.fold(error.to_string(), |said, cause| format!("{said}: {cause}"))
 }

@@ -142,8 +142,10 @@ impl<'a> ShownLoop<'a> {
         found
     }
 
-    /// Returns the points of a curve: for each point k of the trace its value (None), and where the
-    /// trace has each sample, the values between samples, which `value` may not have.
+    /// Returns the points of a curve, each a time and a value.
+    ///
+    /// `value(k, None)` is the value at point k of the trace, `value(k, Some(i))` the one at the i-th time
+    /// after it. Times between samples are added where the trace has neighbouring samples.
     fn times(
         &self,
         trace: &TimeResponse,

@@ -1,13 +1,15 @@
 //! Input files whose errors point at the place, and atomic output files.
 //!
 //! [`document`] reads TOML: each value knows its name and its place in the text. [`whole`] writes a
-//! file beside its target and renames it.
+//! file beside its target and renames it. [`sentence`] joins an error and its causes.
 #![forbid(unsafe_code)]
 
 pub mod document;
+mod sentence;
 pub mod whole;
 
 pub use document::{Entry, Place, PlaceError, Source, Table};
+pub use sentence::sentence;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

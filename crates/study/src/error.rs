@@ -1,6 +1,5 @@
 //! Errors of reading, preparing and running a study.
 
-use std::error::Error as _;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -77,16 +76,7 @@ impl Error {
     /// already quotes.
     #[must_use]
     pub fn sentence(&self) -> String {
-        let mut said = self.to_string();
-        let mut cause = self.source();
-        while let Some(error) = cause {
-            let text = error.to_string();
-            if !said.contains(&text) {
-                said = format!("{said}: {text}");
-            }
-            cause = error.source();
-        }
-        said
+        files::sentence(self)
     }
 
     pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {

@@ -13,6 +13,7 @@ mod error;
 #[cfg(feature = "load")]
 mod instances;
 mod link;
+mod log_fields;
 #[cfg(feature = "load")]
 mod plan;
 #[cfg(feature = "load")]
@@ -33,6 +34,7 @@ pub use assemble::{AssembledSystem, AssemblyOptions, assemble, assemble_with};
 pub use config::{Config, ConnectionEntry, Every, Interface, LoadedConfig, Memory, Solver};
 pub use error::Error;
 pub use link::link;
+pub use log_fields::LogFields;
 #[cfg(feature = "load")]
 pub use plan::{Plan, plan};
 #[cfg(feature = "load")]

@@ -308,7 +308,7 @@ class Outcome:
             One row for each parameter, columns ``S1``, ``S1_conf``, ``ST``, ``ST_conf``; no unit.
 
         Raises:
-            ConfigurationError: another design, or a run without a value.
+            ConfigurationError: the campaign has another design, or a run has no value of the measure.
         """
         problem, values = self._sample(measure, "saltelli", "Sobol indices")
         rows = values.reshape(-1, self._block)
@@ -361,7 +361,7 @@ class Outcome:
             deviation (nonlinearity and interactions).
 
         Raises:
-            ConfigurationError: another design, or a run without a value.
+            ConfigurationError: the campaign has another design, or a run has no value of the measure.
         """
         problem, values = self._sample(measure, "morris", "Morris indices")
         parquet = package("pyarrow.parquet")
@@ -398,7 +398,7 @@ class Outcome:
             One row for each parameter, columns ``S1``, ``S1_conf``, ``ST``, ``ST_conf``; no unit.
 
         Raises:
-            ConfigurationError: another design, or a run without a value.
+            ConfigurationError: the campaign has another design, or a run has no value of the measure.
         """
         problem, values = self._sample(measure, "fast", "FAST indices")
         analyze = package("SALib.analyze.fast").analyze
