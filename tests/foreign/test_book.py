@@ -130,6 +130,14 @@ def test_the_first_tutorial_shows_the_printed_output_and_the_files_unchanged(cop
     assert (files / "biased.toml").read_text(encoding="utf-8") == f"{whole}\n{added}"
 
 
+def test_the_page_on_campaigns_shows_the_printed_summary_and_the_file_unchanged(copy):
+    page = ROOT / "docs" / "how-to" / "campaigns.md"
+    (command,) = [b[2] for b in blocks(page) if b[1] == "sh" and "campaigns/faults.toml" in b[2]]
+    assert set(shown(page, 0)) <= set(copy(command).stdout.splitlines()), copy(command).stdout
+    (file,) = [b[2] for b in blocks(page) if b[1] == "toml"]
+    assert file == (page.parent / "campaigns" / "faults.toml").read_text(encoding="utf-8")
+
+
 def test_the_swapped_controller_has_the_residual_shown_on_the_page(copy):
     page = ROOT / "docs" / "tutorials" / "swap.md"
     build, theirs, ours = [b[2] for b in blocks(page) if b[1] == "sh"][:3]

@@ -117,8 +117,11 @@ def test_outliers_and_decades_do_not_hide_the_distribution(tmp_path):
     values = np.random.default_rng(3).normal(size=(20_000))
     values[7] = -1e30
     measures = {"outlier": values, "decades": 10 ** np.linspace(-6, 3, 20_000)}
+    measures["even"] = np.random.default_rng(4).uniform(size=20_000)
+    measures["large"] = np.where(np.arange(20_000) == 9, 160.0, measures["even"] + 0.5)
     outcome = write(tmp_path / "c", {"method": "random"}, {"p": np.arange(20_000.0)}, measures)
-    outlier, decades = page(outcome, tmp_path / "p.html").data["measures"]
+    outlier, decades, even, large = page(outcome, tmp_path / "p.html").data["measures"]
+    assert large["logarithmic"] and not even["logarithmic"]
     assert outlier["histogram"]["edges"][0] > -10
     assert sum(outlier["histogram"]["counts"]) + outlier["histogram"]["outside"] == 20_000
     assert not outlier["logarithmic"] and decades["logarithmic"]

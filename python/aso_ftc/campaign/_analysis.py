@@ -274,7 +274,8 @@ class Outcome:
         if counts:
             sentence = (
                 f"{what} need every run of the design; {int(bad.sum()) + absent} of "
-                f"{self.manifest['runs']} have no value: {', '.join(counts)}"
+                f"{self.manifest['runs']} have no value: {', '.join(counts)}. A measure may state a value for "
+                "runs that do not finish: `unfinished`"
             )
             raise ConfigurationError(sentence, "IncompleteRuns", {"missing": int(bad.sum()) + absent})
         if values.min() == values.max():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
+import textwrap
 import warnings
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from ._folder import MANIFEST, system_of
 __all__ = ["main"]
 
 _REPORT = "report.html"
+# Characters of a reason in the summary.
+_LONGEST = 100
 # Faults or parameters that the summary names.
 _SHOWN = 3
 
@@ -97,9 +100,9 @@ def _summary(outcome: Outcome) -> str:
     statuses = {name: count for name, count in outcome.statuses.items() if name != "ok"}
     if statuses:
         shown = ", ".join(f"{count} {name}" for name, count in statuses.items())
-        lines.append(
-            f"{sum(statuses.values())} of {runs} runs did not finish ({shown}); the report has the reasons"
-        )
+        first = int(outcome.runs[outcome.unfinished][0])
+        reason = textwrap.shorten(outcome.read(["reason"], runs=[first])["reason"].iloc[0], _LONGEST)
+        lines.append(f"{sum(statuses.values())} of {runs} runs did not finish ({shown}); run {first}: {reason}")
     for name, limit in outcome.limits.items():
         failures = int(outcome.failed(name).sum())
         line = f"{name} {describe(limit)}: {runs - failures} of {runs} runs"

@@ -26,8 +26,9 @@ _MARK = '<meta name="generator" content="aso-ftc campaign">'
 _POINTS = 10_000
 _ROWS = 50
 _BINS = 60
-# Positive values that span more than this ratio are drawn on a logarithmic axis.
-_WIDE = 300.0
+# An axis of positive values is logarithmic if the largest is above the median by this factor, or the median
+# above the lowest hundredth by twice this factor.
+_WIDE = 50.0
 _INDICES = {
     "saltelli": ("sobol", "Sobol indices"),
     "morris": ("morris", "Elementary effects of Morris"),
@@ -344,11 +345,12 @@ def _indices_note(outcome: Outcome, measure: Mapping[str, Any]) -> str:
 
 
 def _is_wide(values: NDArray[np.float64]) -> bool:
+    """Whether positive values need a logarithmic axis: some are far above the median, or many far below."""
     finite = values[np.isfinite(values)]
     if not len(finite) or finite.min() <= 0:
         return False
-    low, high = np.quantile(finite, [0.001, 0.999])
-    return bool(high > _WIDE * low)
+    low, middle = np.quantile(finite, [0.01, 0.5])
+    return bool(finite.max() > _WIDE * middle or middle > 2 * _WIDE * low)
 
 
 def _histogram(values: NDArray[np.float64]) -> dict[str, Any]:
