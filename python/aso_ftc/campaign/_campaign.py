@@ -19,7 +19,7 @@ from .._paper import paper
 from .._system import System, fault
 from ._changes import arguments, changes
 from ._entries import TABLES, fail, finite, only, positive, table
-from ._faults import KINDS, NO_FAULT, FaultCase, cases, disturbances
+from ._faults import NO_FAULT, FaultCase, cases, disturbances
 from ._measures import PAPER_CLAIMS, Expression
 from ._parameters import Parameter, Sampled, columns_of_table, sample, text
 
@@ -214,21 +214,14 @@ class Campaign:
         return parameters
 
     def _check_place(self, where: str, place: str) -> None:
-        table, _, entry = place.partition(".")
-        if table in self.disturbances and entry:
-            kind = next(key for key in self.disturbances[table] if key in KINDS)
-            if not isinstance(self.disturbances[table][kind], Mapping):
-                raise fail(where, f"the disturbance {table} has no entries")
-        elif table not in TABLES and place not in self._variables:
-            near = [
-                name
-                for name in self._variables
-                if name.lower() == place.lower() or name.endswith(f".{place}")
-            ]
-            hint = f", did you mean {near[0]}" if near else ""
-            raise fail(
-                where, f"{place} is neither a variable of the system nor an entry of a disturbance{hint}"
-            )
+        first, _, entry = place.partition(".")
+        if (first in self.disturbances and entry) or first in TABLES or place in self._variables:
+            return
+        near = [
+            name for name in self._variables if name.lower() == place.lower() or name.endswith(f".{place}")
+        ]
+        hint = f", did you mean {near[0]}" if near else ""
+        raise fail(where, f"{place} is neither a variable of the system nor an entry of a disturbance{hint}")
 
     def _measures(self, entries: Mapping[str, Any], folder: Path) -> None:
         own = table("measures", entries.get("measures", {}))
@@ -364,12 +357,16 @@ class Campaign:
             ConfigurationError, FmuError: the first error.
         """
         recorded = self.signals
-        for run in sorted({0, len(self.plan) - 1}):
-            self.system.check(**arguments(self.changes(run)), record=recorded or None)
         for name in recorded:
             if name not in self._variables:
                 reader = next(key for key, own in self.expressions.items() if name in own.signals)
                 raise fail(f"measures.{reader}", f"the system has no variable {name}")
+        for run in sorted({0, len(self.plan) - 1}):
+            try:
+                self.system.check(**arguments(self.changes(run)), record=recorded or None)
+            except ConfigurationError as error:
+                text = f"{self.name}, run {run}: {error}"
+                raise ConfigurationError(text, error.kind, error.fields) from None
         zeros = {name: np.zeros(2) for name in recorded}
         known = self.plan.row(0)[0]
         for key, expression in self.expressions.items():

@@ -102,7 +102,9 @@ def _summary(outcome: Outcome) -> str:
         shown = ", ".join(f"{count} {name}" for name, count in statuses.items())
         first = int(outcome.runs[outcome.unfinished][0])
         reason = textwrap.shorten(outcome.read(["reason"], runs=[first])["reason"].iloc[0], _LONGEST)
-        lines.append(f"{sum(statuses.values())} of {runs} runs did not finish ({shown}); run {first}: {reason}")
+        lines.append(
+            f"{sum(statuses.values())} of {runs} runs did not finish ({shown}); run {first}: {reason}"
+        )
     for name, limit in outcome.limits.items():
         failures = int(outcome.failed(name).sum())
         line = f"{name} {describe(limit)}: {runs - failures} of {runs} runs"
