@@ -3,6 +3,12 @@
 use design::Report;
 use design::report::{Loop, Matrix};
 
+/// The most rows or columns of a gain that are printed; the design file has all.
+const LARGEST_SHOWN: usize = 16;
+
+/// Entries of a gain that are smaller than this part of its largest one are printed as 0.
+const ROUNDING: f64 = 1e-14;
+
 /// Prints gains, eigenvalues, the three figures that matter, and the verdict.
 pub(crate) fn summarise(report: &Report) {
     for matrix in &report.gains {
@@ -48,20 +54,35 @@ pub(crate) fn summarise(report: &Report) {
     }
 }
 
+/// Prints a gain, or only its size and its norm if it would fill more than a screen.
 fn print_gain(matrix: &Matrix) {
-    println!("{} ({}):", matrix.name, matrix.meaning);
-    for row in &matrix.values {
-        let entries: Vec<_> = row.iter().map(|entry| format!("{:>12}", number(*entry))).collect();
-        println!("  {}", entries.join(" "));
+    let Matrix { name, meaning, values, .. } = matrix;
+    let (rows, columns) = (values.len(), values.first().map_or(0, Vec::len));
+    let largest = values.iter().flatten().fold(0.0, |largest: f64, entry| largest.max(entry.abs()));
+    if rows > LARGEST_SHOWN || columns > LARGEST_SHOWN {
+        let largest = number(largest);
+        println!("{name} ({meaning}): {rows} x {columns}, entries up to {largest} in size");
+        return;
+    }
+    println!("{name} ({meaning}):");
+    for row in values {
+        let entries = row.iter().map(|entry| {
+            let rounding = entry.abs() < ROUNDING * largest;
+            format!("{:>12}", number(if rounding { 0.0 } else { *entry }))
+        });
+        println!("  {}", entries.collect::<Vec<_>>().join(" "));
     }
 }
 
 fn print_loop(own: &Loop) {
     println!("{}: {}", own.matrix, own.method);
-    let shown = own.eigenvalues.iter().filter(|[_, im]| *im >= 0.0).map(|[re, im]| {
+    let shown: Vec<_> = own.eigenvalues.iter().filter(|[_, im]| *im >= 0.0).collect();
+    let text = shown.iter().take(LARGEST_SHOWN).map(|[re, im]| {
         if *im == 0.0 { number(*re) } else { format!("{} ± {}i", number(*re), number(*im)) }
     });
-    println!("    eigenvalues {}", shown.collect::<Vec<_>>().join(", "));
+    let rest = shown.len().saturating_sub(LARGEST_SHOWN);
+    let rest = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+    println!("    eigenvalues {}{rest}", text.collect::<Vec<_>>().join(", "));
     if let Some(condition) = own.condition {
         println!("    condition of the eigenvectors {condition:.3e}");
     }

@@ -419,16 +419,25 @@ pub(crate) fn verdict(
         let unstable = found.stable < 1.0 || found.worst_instability >= 0.0;
         if unstable {
             level = Level::Red;
-            let [a, b, c] = limits.tolerance.map(|tolerance| 100.0 * tolerance);
-            reasons.push(format!(
-                "parameters within ±{a} % of A, ±{b} % of B, ±{c} % of C make the loop unstable: \
-                 {:.1} % of {} random cases, the worst case from {:.3} of the tolerances on",
-                100.0 * (1.0 - found.stable),
-                found.cases,
-                found.first_unstable
-            ));
+            reasons.push(instability(found, limits.tolerance));
         }
     }
     let RobustnessLimits { amber, red, tolerance, .. } = *limits;
     Verdict { level, reasons, limits: Limits { amber, red, tolerance } }
+}
+
+/// The sentence about a loop that parameters within their tolerances make unstable.
+fn instability(found: &ToleranceResult, tolerance: [f64; 3]) -> String {
+    let [a, b, c] = tolerance.map(|part| 100.0 * part);
+    let range = format!("parameters within ±{a} % of A, ±{b} % of B, ±{c} % of C");
+    let worst = format!("the worst case found, from {:.3} of the tolerances on", found.first_unstable);
+    let cases = found.cases;
+    if found.stable < 1.0 {
+        let unstable = 100.0 * (1.0 - found.stable);
+        format!("{range} make the loop unstable: {unstable:.1} % of {cases} random cases, and {worst}")
+    } else if cases > 0 {
+        format!("{range} make the loop unstable: none of {cases} random cases, but {worst}")
+    } else {
+        format!("{range} make the loop unstable: {worst}")
+    }
 }

@@ -1,0 +1,33 @@
+"""The published plants of examples/plants: the report's figures computed again with numpy, and the placement beside scipy's."""
+
+import sys
+import warnings
+
+import pytest
+
+from conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "scripts"))
+
+import published_plants  # noqa: E402
+
+PLANTS = sorted((ROOT / "examples" / "plants").glob("*.toml"))
+
+
+@pytest.mark.parametrize("sampled", [False, True], ids=["continuous", "sampled"])
+@pytest.mark.parametrize("file", PLANTS, ids=lambda file: file.stem)
+def test_figures_of_a_report_are_those_of_its_gains_and_its_gains_as_small_as_scipys(file, sampled):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # place_poles warns of slow convergence
+        report, own, scipy = published_plants.compared(file, sampled)
+    peaks = [point["s_peak"] for point in report["robustness"]["points"]]
+    assert peaks == pytest.approx([own.input, own.output], rel=1e-3)
+    assert report["feedback"]["condition"] == pytest.approx(own.feedback, rel=1e-3)
+    assert report["observer"]["condition"] == pytest.approx(own.observer, rel=1e-3)
+    assert own.gain <= 1.15 * scipy.gain
+    assert own.feedback <= 1.1 * scipy.feedback
+    assert own.observer <= 1.1 * scipy.observer
+
+
+def test_every_published_plant_has_a_sample_time():
+    assert {file.stem for file in PLANTS} == set(published_plants.SAMPLE_TIMES)
