@@ -430,11 +430,14 @@ pub(crate) fn verdict(
 fn instability(found: &ToleranceResult, tolerance: [f64; 3]) -> String {
     let [a, b, c] = tolerance.map(|part| 100.0 * part);
     let range = format!("parameters within ±{a} % of A, ±{b} % of B, ±{c} % of C");
-    let worst = format!("the worst case found, from {:.3} of the tolerances on", found.first_unstable);
+    let worst =
+        format!("the worst case found, from {:.3} of the tolerances on", found.first_unstable);
     let cases = found.cases;
     if found.stable < 1.0 {
         let unstable = 100.0 * (1.0 - found.stable);
-        format!("{range} make the loop unstable: {unstable:.1} % of {cases} random cases, and {worst}")
+        format!(
+            "{range} make the loop unstable: {unstable:.1} % of {cases} random cases, and {worst}"
+        )
     } else if cases > 0 {
         format!("{range} make the loop unstable: none of {cases} random cases, but {worst}")
     } else {
