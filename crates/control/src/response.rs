@@ -31,7 +31,7 @@ mod transient;
 pub use between_samples::{GainsBetweenSamples, gains_between_samples};
 pub use energy::{Energy, energy};
 pub use fault::{FaultBounds, Reversal, fault_bounds, reversal};
-pub use fault_loop::{fault_rate_system, fault_system};
+pub use fault_loop::{fault_gains, fault_rate_system, fault_system};
 pub(crate) use frequency::Transfer;
 pub use frequency::{FrequencyPoint, frequency_grid, frequency_response};
 pub use h_infinity::{HInfinity, h_infinity};

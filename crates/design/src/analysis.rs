@@ -1,8 +1,8 @@
 //! Analyses the closed loop of a design: the numbers of the report.
 
 use control::response::{
-    energy, fault_rate_system, fault_system, frequency_grid, frequency_response,
-    gains_between_samples, h_infinity, peak_gain,
+    energy, fault_gains, fault_rate_system, fault_system, frequency_grid, frequency_response,
+    gains_between_samples, h_infinity,
 };
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
@@ -79,10 +79,7 @@ impl<'a> Loops<'a> {
             let found = gains_between_samples(extended, plant, gains, period, (PARTS, WIDTH))?;
             return Ok([found.of_faults, found.of_rates, found.uncancelled]);
         }
-        let gliding = peak_gain(&self.of_rates, WIDTH)?.upper;
-        let q = plant.f_a.ncols();
-        let [rates, left] = [0, q].map(|first| gliding.columns(first, q).into_owned());
-        Ok([peak_gain(&self.of_faults, WIDTH)?.upper, rates, left])
+        fault_gains(plant, gains, *domain, WIDTH)
     }
 
     /// Returns the peak-to-peak gains from each fault to each output, and the resulting bounds.

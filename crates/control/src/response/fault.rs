@@ -1,9 +1,6 @@
 //! The effect of bounded faults and of reversals of friction on the closed loop.
 
-use super::{
-    TimeResponse, Transient, fault_rate_system, fault_system, peak_gain, ramp_response,
-    step_response,
-};
+use super::{TimeResponse, Transient, fault_gains, fault_system, ramp_response, step_response};
 use crate::aso::{FaultyPlant, Gains};
 use crate::{Domain, Error, check};
 
@@ -29,8 +26,8 @@ pub struct FaultBounds {
 /// |z_i| <= sum over j of min(gain_f[i,j] F_j, gain_r[i,j] R_j + gain_d[i,j] F_j)
 /// ```
 ///
-/// z = [x; e; eps]; `gain_f` is the [`peak_gain`] of [`fault_system`], `gain_r` and `gain_d` that
-/// of the two halves of the inputs of [`fault_rate_system`]. `magnitudes`: F, q, bounds of |`f_j`|;
+/// z = [x; e; eps]; `gain_f` is the [`super::peak_gain`] of [`fault_system`], `gain_r` and `gain_d` that
+/// of the two halves of the inputs of [`super::fault_rate_system`]. `magnitudes`: F, q, bounds of |`f_j`|;
 /// `rates`: R, q, bounds of |`r_j`|, r = f' - `A_f` f, infinite if the fault may jump (in sampled
 /// time `r[k] = f[k+1] - A_f f[k]`). The bounds hold for every such fault of the linear loop from
 /// rest with the commands within the limits of the actuators, and each of the two terms alone is
@@ -47,7 +44,7 @@ pub struct FaultBounds {
 ///
 /// # Errors
 ///
-/// Same as [`Gains::check`] and [`peak_gain`]; [`Error::Shape`], [`Error::OutOfRange`] for
+/// Same as [`Gains::check`] and [`super::peak_gain`]; [`Error::Shape`], [`Error::OutOfRange`] for
 /// `magnitudes` and `rates`; [`Error::NotHurwitz`], [`Error::NotSchur`] when the loop is not
 /// stable.
 pub fn fault_bounds(
@@ -70,16 +67,15 @@ pub fn fault_bounds(
             check::positive("rate", rate)?;
         }
     }
-    let gain_of_fault = peak_gain(&fault_system(plant, gains, domain)?, WIDTH)?.upper;
-    let gain_of_rate = peak_gain(&fault_rate_system(plant, gains, domain)?, WIDTH)?.upper;
+    let [gain_of_fault, gain_of_rate, uncancelled] = fault_gains(plant, gains, domain, WIDTH)?;
     let bound = |output: usize| {
         let of_fault = |j: usize| {
             let by_size = gain_of_fault[(output, j)] * magnitudes[j];
             if rates[j] == f64::INFINITY {
                 return by_size;
             }
-            let uncancelled = gain_of_rate[(output, q + j)] * magnitudes[j];
-            by_size.min(gain_of_rate[(output, j)] * rates[j] + uncancelled)
+            let left = uncancelled[(output, j)] * magnitudes[j];
+            by_size.min(gain_of_rate[(output, j)] * rates[j] + left)
         };
         (0..q).map(of_fault).sum::<f64>()
     };

@@ -1,5 +1,6 @@
 //! Plant and controller of [`crate::aso`] as one system with the fault as its input.
 
+use super::peak_gain;
 use crate::aso::{Estimator, FaultyPlant, Gains};
 use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
@@ -71,6 +72,33 @@ pub fn fault_rate_system(
     b.view_mut((0, q), (n, q)).copy_from(&(&plant.f_a + &plant.b * &gains.k_f));
     let (c, d) = (DMatrix::identity(order, order), DMatrix::zeros(order, 2 * q));
     Ok(StateSpace { a: loop_dynamics(plant, gains), b, c, d, domain })
+}
+
+/// Computes upper bounds of the peak gains to [x; e; eps]: from faults, from their rates, and from
+/// the part of them that the compensation leaves.
+///
+/// The first are those of [`fault_system`], the others those of [`fault_rate_system`], each of 2n +
+/// q rows and q columns. `width`: see [`peak_gain`]. Both systems have the same dynamics, so that one
+/// call of [`peak_gain`] serves both.
+///
+/// # Errors
+///
+/// Same as [`Gains::check`] and [`peak_gain`].
+pub fn fault_gains(
+    plant: &FaultyPlant,
+    gains: &Gains,
+    domain: Domain,
+    width: f64,
+) -> Result<[DMatrix<f64>; 3], Error> {
+    let mut all = fault_system(plant, gains, domain)?;
+    let of_rates = fault_rate_system(plant, gains, domain)?;
+    let q = plant.f_a.ncols();
+    all.b = all.b.resize_horizontally(3 * q, 0.0);
+    all.d = all.d.resize_horizontally(3 * q, 0.0);
+    all.b.columns_mut(q, 2 * q).copy_from(&of_rates.b);
+    all.d.columns_mut(q, 2 * q).copy_from(&of_rates.d);
+    let found = peak_gain(&all, width)?.upper;
+    Ok([0, 1, 2].map(|part| found.columns(part * q, q).into_owned()))
 }
 
 /// The state matrix of both systems: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0, `A_0` - L `C_0`].

@@ -23,18 +23,22 @@ pub(super) struct Length {
     pub(super) sum: DMatrix<f64>,
     /// x' X x: the integral of h^2.
     pub(super) gram: DMatrix<f64>,
+    /// |X|, entry by entry.
+    gram_size: DMatrix<f64>,
 }
 
 impl Length {
+    fn new(time: f64, phi: Rc<DMatrix<f64>>, sum: DMatrix<f64>, gram: DMatrix<f64>) -> Self {
+        let gram_size = gram.abs();
+        Self { time, phi, sum, gram, gram_size }
+    }
+
     /// The interval of twice the length, whose `phi` is given.
     fn doubled(&self, phi: Rc<DMatrix<f64>>) -> Self {
         let own = &*self.phi;
-        Self {
-            time: 2.0 * self.time,
-            phi,
-            sum: &self.sum + &self.sum * own,
-            gram: &self.gram + own.tr_mul(&self.gram) * own,
-        }
+        // Products by blocks, which `tr_mul` does not use.
+        let moved = own.transpose() * (&self.gram * own);
+        Self::new(2.0 * self.time, phi, &self.sum + &self.sum * own, &self.gram + moved)
     }
 
     /// Bounds of the integral of |h|: |integral of h|, and by Cauchy and Schwarz the root of the
@@ -43,7 +47,7 @@ impl Length {
         let lower = (&self.sum * state)[0].abs();
         let square = (&self.gram * state).dot(state).max(0.0);
         let size = state.abs();
-        let error = ROUNDING * (self.gram.abs() * &size).dot(&size);
+        let error = ROUNDING * (&self.gram_size * &size).dot(&size);
         let (upper, blurred) = (square.sqrt(), (square + error).sqrt());
         let root = self.time.sqrt();
         [lower, (root * upper).max(lower), root * (blurred - upper)]
@@ -136,12 +140,16 @@ impl Shortest {
         let gram = row.tr_mul(row);
         let (time, phi) = (self.time, Rc::clone(phi));
         let Some((integral, half)) = &self.continuous else {
-            return Length { time, phi, sum: row.clone(), gram };
+            return Length::new(time, phi, row.clone(), gram);
         };
         // Simpson's rule: over 1 / 4096 of a time constant its error is below the rounding.
-        let middle = half.tr_mul(&gram) * half;
-        let end = phi.tr_mul(&gram) * &*phi;
+        // The gram is c'c: over a step it stays the square of a row.
+        let square = |end: &DMatrix<f64>| {
+            let moved = row * end;
+            moved.tr_mul(&moved)
+        };
+        let (middle, end) = (square(half), square(&phi));
         let gram = (gram + middle * 4.0 + end) * (time / 6.0);
-        Length { time, phi, sum: row * integral, gram }
+        Length::new(time, phi, row * integral, gram)
     }
 }

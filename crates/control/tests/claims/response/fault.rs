@@ -9,7 +9,7 @@ use control::faults::ExtendedPlant;
 use control::hold::zero_order_hold;
 use control::placement::real_poles;
 use control::response::{
-    fault_bounds, fault_rate_system, fault_system, peak_gain, reversal, step_response,
+    fault_bounds, fault_gains, fault_rate_system, fault_system, peak_gain, reversal, step_response,
 };
 use control::sampled::{design, sampled_poles};
 use control::{Domain, Error};
@@ -45,6 +45,12 @@ fn the_gains_of_the_loop_agree_with_modal_decomposition_in_high_precision() {
     let from_fault = peak_gain(&fault_system(&plant, &gains, CONTINUOUS).unwrap(), 1e-3).unwrap();
     let from_rate = fault_rate_system(&plant, &gains, CONTINUOUS).unwrap();
     let from_rate = peak_gain(&from_rate, 1e-3).unwrap();
+    let [of_fault, of_rate, uncancelled] = fault_gains(&plant, &gains, CONTINUOUS, 1e-3).unwrap();
+    assert!((of_fault - &from_fault.upper).amax() <= 1e-12 * from_fault.upper.amax());
+    for (together, column) in [(of_rate, 0), (uncancelled, 1)] {
+        let alone = from_rate.upper.column(column);
+        assert!((together - alone).amax() <= 1e-12 * from_rate.upper.amax(), "input {column}");
+    }
     for (name, found) in [("gain_f", from_fault), ("gain_r", from_rate)] {
         for (output, &exact) in case.get(name).iter().enumerate() {
             let (lower, upper) = (found.lower[(output, 0)], found.upper[(output, 0)]);
