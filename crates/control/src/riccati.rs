@@ -12,9 +12,11 @@ mod doubling;
 mod equation;
 mod existence;
 mod kalman;
+mod norm_filter;
 mod problem;
 
 pub use kalman::{KalmanFilter, kalman};
+pub use norm_filter::{NormFilterProblem, norm_filter};
 
 use crate::{Domain, Error, stability};
 use nalgebra::{Complex, DMatrix};

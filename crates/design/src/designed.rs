@@ -3,6 +3,7 @@
 use super::fixed_mode::{described, described_in};
 use super::gains::{FeedbackProblem, GainResult, Refusal, feedback, observer};
 use super::linear_plant::LinearPlant;
+use super::norm_gains::ObserverProblem;
 use super::plant_file::PlantFile;
 use super::plausibility::{check_faults, check_limits};
 use super::requirements::{Request, Requirement};
@@ -140,8 +141,16 @@ fn compute_gains(
         refused((file, domain), &file.feedback, refusal, (n, "states"), name)
     })?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-    let pair = (&a_0, &c_0, plant.f_a.ncols());
-    let observer = observer(&file.observer.requirement, pair, domain, estimator(file));
+    let filter = sampled::filter(extended, domain);
+    let problem = ObserverProblem {
+        a_0: &a_0,
+        c_0: &c_0,
+        channels: &extended.channels,
+        faults: plant.f_a.ncols(),
+        filter: filter.as_deref(),
+        estimator: estimator(file),
+    };
+    let observer = observer(&file.observer.requirement, &problem, domain);
     let observer = observer.map_err(|refusal| {
         let order = (a_0.nrows(), "states, filters, faults and rates of ramps");
         let names = observer_states(linear, extended);

@@ -1,7 +1,7 @@
 //! Computes the gains that satisfy the requirements of the plant file.
 
 use control::aso::Estimator;
-use control::lmi::{self, Norm, Outcome, Performance, Synthesis};
+use control::lmi::{self, Outcome, Synthesis};
 use control::placement::{Placement, Quality, place, place_balanced, place_discrete};
 use control::rank::{ControllablePart, Mode, controllable_part, uncontrollable_modes};
 use control::riccati::{Weights, kalman, lqr};
@@ -9,6 +9,7 @@ use control::sampled::{place_estimator, sampled_poles};
 use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
+use super::norm_gains::{NormRequirement, ObserverProblem};
 use super::requirements::{Region, Requirement};
 
 const IN_REGION: &str = "Eigenvalues in the region by linear matrix inequalities";
@@ -58,7 +59,7 @@ pub(crate) fn feedback(
     problem: &FeedbackProblem<'_>,
     domain: Domain,
 ) -> Result<GainResult, Refusal> {
-    let FeedbackProblem { a, b, c, f_a } = problem;
+    let FeedbackProblem { a, b, .. } = problem;
     match required {
         Requirement::Eigenvalues(_) | Requirement::SampledEigenvalues(_) => {
             let part = controllable_part(a, b)?;
@@ -87,36 +88,23 @@ pub(crate) fn feedback(
             let found = synthesised(found, IN_REGION)?;
             Ok(if part.fixed.is_empty() { found } else { found.mapped(|gain| part.gain(gain)) })
         }
-        Requirement::HInfinity { bound, region } => {
+        Requirement::HInfinity { bound, region, channel } => {
             region.require(&uncontrollable_modes(a, b)?, domain)?;
-            let (m, p) = (b.ncols(), c.nrows());
-            let mut feedthrough = DMatrix::zeros(p + m, m);
-            feedthrough.view_mut((p, 0), (m, m)).fill_with_identity();
-            let performance = Performance {
-                disturbance: (*f_a).clone(),
-                output: (*c).clone().resize_vertically(p + m, 0.0),
-                feedthrough,
-                norm: Norm::HInfinity,
-                gamma: *bound,
-            };
-            let region = region.stated();
-            let found = lmi::state_feedback(a, b, &region, Some(&performance), domain)?;
-            let method = "H-infinity norm from the faults to measurements and commands";
-            synthesised(found, &least_certified(method, *bound))
+            let required = NormRequirement { bound: *bound, region: *region, channel };
+            problem.by_norm(required, domain)
         }
     }
 }
 
-/// Computes L of the observer for the pair (`a_0`, `c_0`), whose last `faults` states are the
-/// states of the fault model. For a current estimator it is the gain of the correction.
+/// Computes L of the observer. For a current estimator it is the gain of the correction.
 ///
 /// Modes that the measurements do not show keep their eigenvalues, which the requirement must allow.
 pub(crate) fn observer(
     required: &Requirement,
-    (a_0, c_0, faults): (&DMatrix<f64>, &DMatrix<f64>, usize),
+    problem: &ObserverProblem<'_>,
     domain: Domain,
-    estimator: Estimator,
 ) -> Result<GainResult, Refusal> {
+    let ObserverProblem { a_0, c_0, estimator, .. } = *problem;
     let seen = estimator.output_matrix(a_0, c_0);
     let (a_dual, b_dual) = (a_0.transpose(), seen.transpose());
     match required {
@@ -163,13 +151,10 @@ pub(crate) fn observer(
             let found = synthesised(found, IN_REGION)?;
             Ok(found.mapped(|gain| part.gain(&gain.transpose()).transpose()))
         }
-        Requirement::HInfinity { bound, region } => {
+        Requirement::HInfinity { bound, region, channel } => {
             region.require(&uncontrollable_modes(&a_dual, &b_dual)?, domain)?;
-            let performance = rate_to_error((a_0.nrows(), c_0.nrows(), faults), *bound);
-            let region = region.stated();
-            let found = lmi::observer_gain(a_0, &seen, &region, Some(&performance), domain)?;
-            let method = "H-infinity norm from the faults' rates to the errors of their estimates";
-            synthesised(found, &least_certified(method, *bound))
+            let required = NormRequirement { bound: *bound, region: *region, channel };
+            problem.by_norm(required, domain)
         }
     }
 }
@@ -208,18 +193,6 @@ fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Ass
     Ok(Assignment { required: movable.iter().copied().chain(taken).collect(), movable })
 }
 
-/// Returns the performance channel from the rates of the faults, the last states of the observer,
-/// to the fault estimation errors.
-fn rate_to_error(
-    (order, measurements, faults): (usize, usize, usize),
-    gamma: Option<f64>,
-) -> Performance {
-    let mut rate = DMatrix::zeros(order, faults);
-    rate.rows_mut(order - faults, faults).fill_with_identity();
-    let (output, feedthrough) = (rate.transpose(), DMatrix::zeros(measurements, faults));
-    Performance { disturbance: rate, output, feedthrough, norm: Norm::HInfinity, gamma }
-}
-
 fn assigned(found: Placement, required: Vec<Complex<f64>>) -> GainResult {
     let method = "Eigenvalues assigned, with well-conditioned eigenvectors.".to_owned();
     GainResult { gain: found.gain, method, required, quality: Some(found.quality) }
@@ -243,18 +216,7 @@ fn weighted(gain: DMatrix<f64>, method: &str, residual: f64) -> GainResult {
     GainResult { gain, method, required: Vec::new(), quality: None }
 }
 
-/// Says what "least" means: with a region the inequalities are sufficient, not necessary.
-fn least_certified(method: &str, bound: Option<f64>) -> String {
-    if bound.is_some() {
-        return method.to_owned();
-    }
-    format!(
-        "{method}, least certified: designed 5 % above the least bound that one Lyapunov matrix proves for \
-         norm and region together; a gain with a smaller norm in this region may exist"
-    )
-}
-
-fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<GainResult, Refusal> {
+pub(crate) fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<GainResult, Refusal> {
     match found {
         Outcome::Optimal(found) => {
             let bound = found.bound.as_ref();
@@ -305,7 +267,7 @@ impl Region {
     }
 
     /// Whether an eigenvalue of the loop is in the region; for a sampled loop one in the z-plane.
-    fn contains(self, value: Complex<f64>, domain: Domain) -> bool {
+    pub(crate) fn contains(self, value: Complex<f64>, domain: Domain) -> bool {
         let decay = self.decay.unwrap_or(0.0);
         if let Domain::Sampled { period } = domain {
             return value.norm() < (-decay * period).exp();
@@ -316,7 +278,7 @@ impl Region {
     }
 
     /// Converts the region for the linear matrix inequalities; angles in rad.
-    fn stated(self) -> lmi::Region {
+    pub(crate) fn stated(self) -> lmi::Region {
         lmi::Region {
             decay: self.decay,
             disc: self.disc.map(|(center, radius)| lmi::Disc { center, radius }),

@@ -20,6 +20,7 @@ mod gains;
 mod identity;
 mod linear_plant;
 mod matrix;
+mod norm_gains;
 mod page;
 mod plant_file;
 mod plausibility;

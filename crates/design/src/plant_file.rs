@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::DMatrix;
 
 use super::plausibility::check_names;
-use super::requirements::{Request, request};
+use super::requirements::{ChannelSignals, Request, request};
 use super::robustness_limits::RobustnessLimits;
 use super::signals::{
     EntryPoint, Fault, Signal, all_actuator_faults, description, faults, signals,
@@ -134,7 +134,13 @@ impl<'a> PlantFile<'a> {
         let sampling = sampling(file)?;
         let sampled = sampling.is_some();
         let read = |key: &str, weights, meaning: &str| {
-            request(&file.require(key, meaning)?.table()?, weights, sampled)
+            let outputs: Vec<&str> = match key {
+                "observer" => faults.iter().map(|fault| fault.name.as_str()).collect(),
+                _ => measurements.iter().chain(&actuators).map(|one| one.name.as_str()).collect(),
+            };
+            let noises = (key == "observer").then_some(measurements.len());
+            let signals = ChannelSignals { outputs, noises };
+            request(&file.require(key, meaning)?.table()?, weights, &signals, sampled)
         };
         let experiment = file.get("experiment").map(|entry| entry.table()).transpose()?;
         if let Some(table) = &experiment {

@@ -18,7 +18,25 @@ pub(crate) enum Requirement {
     /// and V (Kalman).
     Weights { states: DMatrix<f64>, channels: DMatrix<f64> },
     /// The least H-infinity norm, or a norm below a bound; the eigenvalues also lie in a region.
-    HInfinity { bound: Option<f64>, region: Region },
+    HInfinity { bound: Option<f64>, region: Region, channel: Channel },
+}
+
+/// What the H-infinity norm weights.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Channel {
+    /// Factor of each output of the norm: of the errors of the faults' estimates for the observer, of
+    /// measurements, then commands for the feedback. Empty if all are 1.
+    pub(crate) weights: Vec<f64>,
+    /// Weight of the noise of each measurement, in its unit; empty if the norm has no noise.
+    pub(crate) noise: Vec<f64>,
+}
+
+/// The signals that the norm of a gain is about.
+pub(crate) struct ChannelSignals<'a> {
+    /// Names of its outputs.
+    pub(crate) outputs: Vec<&'a str>,
+    /// Number of measurements whose noise the norm can have.
+    pub(crate) noises: Option<usize>,
 }
 
 /// A region of the left half plane: the intersection of the given parts.
@@ -62,16 +80,24 @@ impl Requirement {
 }
 
 const KEYS: [&str; 4] = ["eigenvalues", "sampled_eigenvalues", "region", "h_infinity"];
+const CHANNEL: [&str; 2] = ["weights", "noise"];
 
 /// Reads `[feedback]` (weights Q, R) or `[observer]` (weights W, V).
 pub(crate) fn request(
     table: &Table<'_>,
     weights: [&str; 2],
+    signals: &ChannelSignals<'_>,
     sampled: bool,
 ) -> Result<Request, PlaceError> {
     let mut known = KEYS.to_vec();
     known.extend(weights);
-    table.allow(&known)?;
+    let allowed: Vec<_> = known.iter().copied().chain(CHANNEL).collect();
+    table.allow(&allowed)?;
+    if table.get("h_infinity").is_none()
+        && let Some(entry) = CHANNEL.iter().find_map(|key| table.get(key))
+    {
+        return Err(entry.error("it belongs to `h_infinity`"));
+    }
     let region = table.get("region");
     if let Some(entry) = region.as_ref().filter(|_| sampled) {
         refuse_unsampled(entry)?;
@@ -86,7 +112,9 @@ pub(crate) fn request(
     };
     if one.name.ends_with(".h_infinity") {
         let region = region.as_ref().map(self::region).transpose()?.unwrap_or_default();
-        let requirement = Requirement::HInfinity { bound: bound(&one, region)?, region };
+        let channel = channel(table, signals)?;
+        let bound = bound(&one, region, !channel.noise.is_empty())?;
+        let requirement = Requirement::HInfinity { bound, region, channel };
         return Ok(Request { requirement, place: one.place, other: None });
     }
     if let Some(entry) = region {
@@ -201,16 +229,55 @@ fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
     }
 }
 
+/// Reads `weights`, a table from names to factors, and `noise`, a number or one for each measurement.
+fn channel(table: &Table<'_>, signals: &ChannelSignals<'_>) -> Result<Channel, PlaceError> {
+    let mut found = Channel::default();
+    if let Some(entry) = table.get("weights") {
+        found.weights = vec![1.0; signals.outputs.len()];
+        for (name, value) in entry.table()?.entries() {
+            let Some(at) = signals.outputs.iter().position(|output| *output == name) else {
+                let known = signals.outputs.join(", ");
+                return Err(value.error(format!("`{name}` has no weight: expected one of {known}")));
+            };
+            found.weights[at] = value.positive()?;
+        }
+    }
+    if let Some(entry) = table.get("noise") {
+        let Some(count) = signals.noises else {
+            return Err(
+                entry.error("a state feedback has no measurement noise: expected it in `observer`")
+            );
+        };
+        found.noise = noises(&entry, count)?;
+    }
+    Ok(found)
+}
+
+/// Reads one number above 0, or one for each measurement.
+fn noises(entry: &Entry<'_>, count: usize) -> Result<Vec<f64>, PlaceError> {
+    if !entry.is_list() {
+        return Ok(vec![entry.positive()?; count]);
+    }
+    let members = entry.list()?;
+    if members.len() != count {
+        let found = members.len();
+        return Err(
+            entry.error(format!("expected {count} numbers, one per measurement, found {found}"))
+        );
+    }
+    members.iter().map(Entry::positive).collect()
+}
+
 /// Reads a bound of the norm, or the text "least" (`None`).
-fn bound(entry: &Entry<'_>, region: Region) -> Result<Option<f64>, PlaceError> {
+fn bound(entry: &Entry<'_>, region: Region, noisy: bool) -> Result<Option<f64>, PlaceError> {
     if !entry.is_text() {
         return entry.positive().map(Some);
     }
     match entry.text()? {
-        "least" if region.disc.is_some() => Ok(None),
+        "least" if region.disc.is_some() || noisy => Ok(None),
         "least" => Err(entry.error(
-            "\"least\" needs a `region` with a disc: without one, ever larger gains lower the norm \
-             without end",
+            "\"least\" needs a `region` with a disc, or for the observer `noise`: without either, ever \
+             larger gains lower the norm without end",
         )),
         other => Err(entry.error(format!("expected a number or \"least\", found {other:?}"))),
     }

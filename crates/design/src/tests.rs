@@ -7,7 +7,7 @@ use nalgebra::Complex;
 use super::checks::checks;
 use super::designed::design;
 use super::plant_file::{Model, PlantFile};
-use super::requirements::{Region, Requirement};
+use super::requirements::{Channel, Region, Requirement};
 use super::robust_report::Level;
 use super::robustness::{robustness, verdict};
 use super::signals::{EntryPoint, FaultDynamics};
@@ -49,7 +49,7 @@ const REFUSALS: [(&str, &str, &str); 55] = [
     (
         "feedback.eigenvalues = [-1, -2]",
         "feedback.h_infinity = \"least\"",
-        "5:23: feedback.h_infinity: \"least\" needs a `region` with a disc",
+        "5:23: feedback.h_infinity: \"least\" needs a `region` with a disc, or",
     ),
     (
         "feedback.eigenvalues = [-1, -2]",
@@ -306,7 +306,8 @@ fn a_region_is_required_alone_or_with_a_norm() {
         Requirement::Region(region)
     );
     let norm = alone.replace("feedback.region", "feedback.h_infinity = \"least\"\nfeedback.region");
-    let expected = Requirement::HInfinity { bound: None, region };
+    let channel = Channel::default();
+    let expected = Requirement::HInfinity { bound: None, region, channel };
     assert_eq!(read(&norm, |file| file.feedback.requirement.clone()).unwrap(), expected);
 }
 
