@@ -7,6 +7,7 @@ use std::ffi::OsString;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use anyhow::Context;
 use outputs::{Outputs, check_distinct, check_own};
@@ -38,6 +39,10 @@ pub(crate) struct Options {
     /// Overwrite files that another design, or another program, has written
     #[arg(long)]
     force: bool,
+    /// The time in s that certificates and bounds of large plants may take before the rest of them is
+    /// left out; 0 leaves all out
+    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = seconds)]
+    certificate_time: Duration,
     /// Print the numbers of the report as JSON
     #[arg(long)]
     json: bool,
@@ -54,7 +59,7 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     for library in &options.preload {
         fmu_import::preload(library)?;
     }
-    let mut made = design::design(&options.plant)?;
+    let mut made = design::design_within(&options.plant, options.certificate_time)?;
     check_distinct(&inputs(options, made.model.as_deref()), &outputs)?;
     if !options.force {
         outputs.iter().try_for_each(|(_, path)| check_own(path, &made.identity))?;
@@ -88,6 +93,11 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         }
     }
     Ok(made.holds())
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse().ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    seconds.ok_or_else(|| format!("expected a time in s, 0 or more, found {text}"))
 }
 
 /// The paths of design and report.

@@ -5,8 +5,9 @@ use control::response::{
     gains_between_samples, h_infinity,
 };
 use control::{Domain, Error, StateSpace};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, RowDVector};
 
+use super::budget::Budget;
 use super::designed::ControllerDesign;
 use super::report::{Bound, Frequency, Norm};
 use super::signals::Fault;
@@ -16,6 +17,8 @@ const WIDTH: f64 = 1e-3;
 /// The parts of a sampling interval in which a fault may change and at which the states are read.
 const PARTS: u32 = 16;
 const POINTS_PER_DECADE: u32 = 20;
+/// Number of outputs between two looks at the clock.
+const OUTPUTS_AT_ONCE: usize = 16;
 
 /// The outputs of the loop: states, state estimation errors, fault estimation errors.
 pub(crate) struct Outputs {
@@ -71,25 +74,47 @@ impl<'a> Loops<'a> {
         channels.zip(&designed.linear.faults)
     }
 
-    /// Returns the peak-to-peak gains of [x; e; eps] from faults, from their rates, and from the part of
+    /// Returns the peak-to-peak gains of the outputs from faults, from their rates, and from the part of
     /// them that the compensation leaves. Those of a sampled loop hold between its samples, too.
-    fn peak_gains(&self) -> Result<[DMatrix<f64>; 3], Error> {
+    ///
+    /// An output is None if the time of `budget` was over before; the errors of the faults come first.
+    fn peak_gains(&self, budget: &Budget) -> Result<Vec<Option<[RowDVector<f64>; 3]>>, Error> {
         let ControllerDesign { extended, plant, gains, domain, .. } = self.designed;
+        let positions = &self.outputs.positions;
+        let mut found = vec![None; positions.len()];
         if let Domain::Sampled { period } = *domain {
-            let found = gains_between_samples(extended, plant, gains, period, (PARTS, WIDTH))?;
-            return Ok([found.of_faults, found.of_rates, found.uncancelled]);
+            if budget.is_over() {
+                return Ok(found);
+            }
+            let all = gains_between_samples(extended, plant, gains, period, (PARTS, WIDTH))?;
+            let all = [all.of_faults, all.of_rates, all.uncancelled];
+            for (place, row) in found.iter_mut().zip(positions) {
+                *place = Some(all.each_ref().map(|gains| gains.row(*row).into_owned()));
+            }
+            return Ok(found);
         }
-        fault_gains(plant, gains, *domain, WIDTH)
+        let mut rest = positions.len();
+        while rest > 0 && !budget.is_over() {
+            let first = rest.saturating_sub(OUTPUTS_AT_ONCE);
+            let all = fault_gains(plant, gains, *domain, (&positions[first..rest], WIDTH))?;
+            for (row, place) in found[first..rest].iter_mut().enumerate() {
+                *place = Some(all.each_ref().map(|gains| gains.row(row).into_owned()));
+            }
+            rest = first;
+        }
+        Ok(found)
     }
 
-    /// Returns the peak-to-peak gains from each fault to each output, and the resulting bounds.
-    pub(crate) fn bounds(&self) -> Result<Vec<Bound>, Error> {
-        let [jumping, gliding, uncancelled] = self.peak_gains()?;
+    /// Returns the peak-to-peak gains from each fault to each output, and the resulting bounds; and the
+    /// number of outputs that were left out because the time of `budget` was over.
+    pub(crate) fn bounds(&self, budget: &Budget) -> Result<(Vec<Bound>, usize), Error> {
+        let gains = self.peak_gains(budget)?;
         let mut found = Vec::new();
         for (column, fault) in self.faults() {
-            for (at, &row) in self.outputs.positions.iter().enumerate() {
-                let (of_fault, of_rate) = (jumping[(row, column)], gliding[(row, column)]);
-                let left = uncancelled[(row, column)];
+            for (at, gains) in gains.iter().enumerate() {
+                let Some([jumping, gliding, uncancelled]) = gains else { continue };
+                let (of_fault, of_rate) = (jumping[column], gliding[column]);
+                let left = uncancelled[column];
                 let constant = self.designed.extended.plant.a_f.row(column).amax() <= 0.0;
                 let by_rate = match (fault.rate_bound, fault.bound) {
                     (Some(rate), Some(bound)) if constant => Some(of_rate * rate + left * bound),
@@ -106,7 +131,7 @@ impl<'a> Loops<'a> {
                 });
             }
         }
-        Ok(found)
+        Ok((found, gains.iter().filter(|gains| gains.is_none()).count()))
     }
 
     /// Returns the transfer function from the faults, as `system` has them, to their estimation

@@ -4,6 +4,7 @@ use control::Domain;
 use control::lmi::Outcome;
 use control::theorem1::{self, certify, largest_decay, smallest_radius, ultimate_bound};
 
+use super::budget::Budget;
 use super::designed::ControllerDesign;
 use super::report::{Certificate, FreeP, Norm, Theorem1, Ultimate, rows};
 
@@ -15,13 +16,21 @@ const ALPHA: f64 = 1.0;
 const LARGEST_ORDER: usize = 30;
 
 /// Returns all certificates for `designed`; `norms` were computed before.
-pub(crate) fn certificate(designed: &ControllerDesign, norms: Vec<Norm>) -> Certificate {
+pub(crate) fn certificate(
+    designed: &ControllerDesign,
+    norms: Vec<Norm>,
+    budget: &Budget,
+) -> Certificate {
     Certificate {
         printed: printed(designed),
-        free: free(designed),
-        ultimate: ultimate(designed),
+        free: in_time(budget, || free(designed)),
+        ultimate: in_time(budget, || ultimate(designed)),
         norms,
     }
+}
+
+fn in_time<T>(budget: &Budget, solve: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    if budget.is_over() { Err(budget.reason()) } else { solve() }
 }
 
 /// Returns the largest norm of the fault vector, from the bounds of the plant file.

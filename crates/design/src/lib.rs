@@ -9,6 +9,7 @@
 #![forbid(unsafe_code)]
 
 mod analysis;
+mod budget;
 mod certificate;
 mod checks;
 mod controller_fmu;
@@ -37,6 +38,7 @@ mod tests;
 mod worst_case;
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use files::{Source, Table};
 
@@ -48,6 +50,9 @@ pub use robust_report::Level;
 use controller_fmu::Content;
 use designed::ControllerDesign;
 use plant_file::PlantFile;
+
+/// The time that certificates and bounds may take unless something else is asked for.
+pub const CERTIFICATE_TIME: Duration = Duration::from_secs(30);
 
 /// A designed controller.
 pub struct Design {
@@ -74,8 +79,18 @@ pub struct Design {
 /// [`Error`]: an entry of the file is wrong, with its line; the plant cannot be controlled, its faults
 /// cannot be told apart, or no gain meets the requirements.
 pub fn design(path: &Path) -> Result<Design, Error> {
+    design_within(path, CERTIFICATE_TIME)
+}
+
+/// [`design()`] in which certificates and bounds may take `certificate_time`; the rest of them is left
+/// out, and the report says so. Zero leaves all of them out.
+///
+/// # Errors
+///
+/// Same as [`design()`].
+pub fn design_within(path: &Path, certificate_time: Duration) -> Result<Design, Error> {
     let source = Source::read(path).map_err(Error::file("read", path))?;
-    design_source(&source)
+    design_source(&source, certificate_time)
 }
 
 /// Designs the controller that `text`, the content of a plant file, asks for. `path` appears in errors;
@@ -85,16 +100,17 @@ pub fn design(path: &Path) -> Result<Design, Error> {
 ///
 /// Same as [`design()`].
 pub fn design_text(path: &Path, text: String) -> Result<Design, Error> {
-    design_source(&Source::new(path, text))
+    design_source(&Source::new(path, text), CERTIFICATE_TIME)
 }
 
-fn design_source(source: &Source) -> Result<Design, Error> {
+fn design_source(source: &Source, certificate_time: Duration) -> Result<Design, Error> {
     let parsed = source.parse()?;
     let file = PlantFile::read(source, &Table::whole(source, &parsed))?;
     let designed = designed::design(&file)?;
     let description = description(&file, &designed);
     let text = designed.file(&file, &description)?;
-    let report = reporting::report(&file, &designed, description).map_err(|error| {
+    let report = reporting::report(&file, &designed, description, certificate_time);
+    let report = report.map_err(|error| {
         let what = format!("the design for {} cannot be examined", file.name());
         Error::from(error).within(what)
     })?;

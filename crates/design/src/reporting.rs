@@ -1,5 +1,7 @@
 //! Fills the report with the numbers of a design.
 
+use std::time::Duration;
+
 use control::aso::Estimator;
 use control::eigen::eigenvalues;
 use control::faults::{FaultEntry, loss_tolerance};
@@ -10,6 +12,7 @@ use fmu_description::{ModelDescription, ScalarVariable};
 use nalgebra::{Complex, DMatrix};
 
 use super::analysis::Loops;
+use super::budget::Budget;
 use super::certificate::certificate;
 use super::checks::checks;
 use super::designed::{ControllerDesign, fault_names};
@@ -29,18 +32,28 @@ pub(crate) fn report(
     file: &PlantFile<'_>,
     designed: &ControllerDesign,
     description: String,
+    certificate_time: Duration,
 ) -> Result<Report, Error> {
     let loops = Loops::of(designed)?;
     let ControllerDesign { plant, gains, linear, .. } = designed;
     let names = Names::of(designed);
     let checks = checks(designed);
     let robustness = robustness(designed, &file.robustness)?;
+    let budget = Budget::start(certificate_time);
+    let certificate = certificate(designed, loops.norms()?, &budget);
+    let (bounds, left_out) = loops.bounds(&budget)?;
+    let mut warnings: Vec<_> =
+        designed.warnings.iter().map(|warning| line(file, warning)).collect();
+    if left_out > 0 {
+        warnings
+            .push(format!("the bounds of {left_out} states and errors were {}", budget.reason()));
+    }
     Ok(Report {
         description,
         plant_file: file.name(),
         plant: self::plant(designed, &names)?,
         verdict: verdict(&checks, robustness.as_ref(), &file.robustness),
-        warnings: designed.warnings.iter().map(|warning| line(file, warning)).collect(),
+        warnings,
         checks,
         robustness,
         gains: names.gains(designed),
@@ -63,8 +76,8 @@ pub(crate) fn report(
                 estimator: estimator(designed.gains.estimator).to_owned(),
             }),
         },
-        certificate: certificate(designed, loops.norms()?),
-        bounds: loops.bounds()?,
+        certificate,
+        bounds,
         steps: responses(designed)?,
         frequency: loops.frequency()?,
         effectiveness: effectiveness(designed)?,

@@ -11,6 +11,7 @@ use control::robustness::{
 };
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::designed::ControllerDesign;
 use super::linear_plant::LinearPlant;
@@ -52,9 +53,13 @@ pub(crate) fn robustness(
         ),
     };
     let (noise, noise_together) = noise(designed, &own, &physical.estimates(designed), limits)?;
+    let (comparison, tolerance) = rayon::join(
+        || comparison(designed, &physical, &points),
+        || tolerance(designed, &physical, limits),
+    );
     Ok(Some(Robustness {
-        comparison: comparison(designed, &physical, &points)?,
-        tolerance: tolerance(designed, &physical, limits)?,
+        comparison: comparison?,
+        tolerance: tolerance?,
         curves: curves(&own)?,
         sensitivity: sensitivity(designed, &physical, &points)?,
         points,
@@ -171,7 +176,7 @@ fn point(own: &Loop, at: Point, name: &str, signals: &[Signal]) -> Result<LoopPo
         judged: if same_unit { s.lower } else { scaled.value },
         judged_frequency: if same_unit { s.frequency } else { scaled.frequency },
         together: disk(&disk_margin(own, at, None)?),
-        channels: signals.iter().enumerate().map(channel).collect::<Result<_, Error>>()?,
+        channels: signals.par_iter().enumerate().map(channel).collect::<Result<_, Error>>()?,
     })
 }
 

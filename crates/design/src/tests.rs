@@ -1,9 +1,11 @@
 //! Valid and invalid plant files, and the places that errors point at.
 
 use std::path::Path;
+use std::time::Duration;
 
 use nalgebra::Complex;
 
+use super::budget::Budget;
 use super::checks::checks;
 use super::designed::design;
 use super::plant_file::{Model, PlantFile};
@@ -467,7 +469,8 @@ fn the_worst_plant_is_a_plant_file() {
     let text = format!("{MASS}robustness.tolerance = 0.2\n").replace("[0, 0]]", "[-2.0, -0.5]]");
     let (worst, a) = read(&text, |file| {
         let designed = design(file).unwrap();
-        let report = super::reporting::report(file, &designed, String::new()).unwrap();
+        let time = super::CERTIFICATE_TIME;
+        let report = super::reporting::report(file, &designed, String::new(), time).unwrap();
         let a = report.robustness.as_ref().unwrap().tolerance.worst[0].values.clone();
         (super::worst_case::plant_file(file, &designed, &report).unwrap().unwrap(), a)
     })
@@ -478,6 +481,27 @@ fn the_worst_plant_is_a_plant_file() {
         [a[(1, 0)], a[(1, 1)]]
     });
     assert_eq!(stated.unwrap().map(f64::to_bits), [a[1][0], a[1][1]].map(f64::to_bits));
+}
+
+#[test]
+fn without_time_for_certificates_the_report_says_what_is_left_out() {
+    for text in [MASS.to_owned(), format!("{MASS}sample_time = 0.01\n")] {
+        let [none, all] = [Duration::ZERO, super::CERTIFICATE_TIME].map(|time| {
+            let report = |file: &PlantFile<'_>| {
+                let designed = design(file).unwrap();
+                super::reporting::report(file, &designed, String::new(), time).unwrap()
+            };
+            read(&text, report).unwrap()
+        });
+        assert!(none.bounds.is_empty() && !all.bounds.is_empty());
+        let refused = none.certificate.free.err().unwrap_or_default();
+        assert!(refused.contains("left out after 0 s"), "{refused}");
+        let sentence =
+            format!("the bounds of {} states and errors were left out", all.bounds.len());
+        assert!(none.warnings.iter().any(|warning| warning.starts_with(&sentence)));
+        assert!(all.warnings.iter().all(|warning| !warning.contains("left out")));
+        assert_eq!(none.verdict.level, all.verdict.level);
+    }
 }
 
 /// `BLESS=1 cargo test -p aso-design --lib schema` writes the file.
@@ -535,7 +559,8 @@ fn fifty_states_get_a_linear_quadratic_design_without_linear_matrix_inequalities
     let text = chain(25);
     let (instability, certificate) = read(&text, |file| {
         let designed = design(file).unwrap();
-        (designed.instability, crate::certificate::certificate(&designed, vec![]))
+        let budget = Budget::start(super::CERTIFICATE_TIME);
+        (designed.instability, crate::certificate::certificate(&designed, vec![], &budget))
     })
     .unwrap();
     assert!(instability < 0.0, "{instability}");

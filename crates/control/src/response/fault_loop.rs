@@ -77,26 +77,33 @@ pub fn fault_rate_system(
 /// Computes upper bounds of the peak gains to [x; e; eps]: from faults, from their rates, and from
 /// the part of them that the compensation leaves.
 ///
-/// The first are those of [`fault_system`], the others those of [`fault_rate_system`], each of 2n +
-/// q rows and q columns. `width`: see [`peak_gain`]. Both systems have the same dynamics, so that one
-/// call of [`peak_gain`] serves both.
+/// The first are those of [`fault_system`], the others those of [`fault_rate_system`]. `rows`: the
+/// positions in [x; e; eps] of the outputs; each result has a row for each of them and q columns. `width`:
+/// see [`peak_gain`]. Both systems have the same dynamics, so that one call of [`peak_gain`] serves both.
 ///
 /// # Errors
 ///
-/// Same as [`Gains::check`] and [`peak_gain`].
+/// Same as [`Gains::check`] and [`peak_gain`]; [`Error::OutOfRange`] for a row beyond [x; e; eps].
 pub fn fault_gains(
     plant: &FaultyPlant,
     gains: &Gains,
     domain: Domain,
-    width: f64,
+    (rows, width): (&[usize], f64),
 ) -> Result<[DMatrix<f64>; 3], Error> {
     let mut all = fault_system(plant, gains, domain)?;
+    if let Some(row) = rows.iter().find(|row| **row >= all.c.nrows()) {
+        #[expect(clippy::cast_precision_loss, reason = "an index for a message")]
+        let value = *row as f64;
+        let rule = "an index below the number of states and errors";
+        return Err(Error::OutOfRange { name: "rows", value, rule });
+    }
     let of_rates = fault_rate_system(plant, gains, domain)?;
     let q = plant.f_a.ncols();
     all.b = all.b.resize_horizontally(3 * q, 0.0);
     all.d = all.d.resize_horizontally(3 * q, 0.0);
     all.b.columns_mut(q, 2 * q).copy_from(&of_rates.b);
     all.d.columns_mut(q, 2 * q).copy_from(&of_rates.d);
+    (all.c, all.d) = (all.c.select_rows(rows), all.d.select_rows(rows));
     let found = peak_gain(&all, width)?.upper;
     Ok([0, 1, 2].map(|part| found.columns(part * q, q).into_owned()))
 }

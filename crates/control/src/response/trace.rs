@@ -1,8 +1,10 @@
 //! Step and ramp responses, on a time grid that is adapted to the modes.
 
+use crate::balance::power_of_two;
 use crate::hold::FirstOrderHold;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix, DVector};
+use std::f64::consts::SQRT_2;
 
 /// A mode is followed until it has decayed to e^-25, about 1e-11.
 const FOLLOWED: f64 = 25.0;
@@ -166,6 +168,9 @@ impl Modes {
         let mut segments = Vec::new();
         let (mut from, mut samples) = (0.0, 0.0);
         for first in 0..self.lives.len() {
+            if samples > MOST_SAMPLES {
+                break;
+            }
             let last = first + 1 == self.lives.len();
             let until = if last && end.is_finite() { end } else { self.lives[first].0.min(end) };
             let until = self.whole(until);
@@ -174,6 +179,15 @@ impl Modes {
             }
             let rate = self.lives[first..].iter().fold(0.0_f64, |most, life| most.max(life.1));
             let wanted = 1.0 / (STEPS * rate);
+            if self.period == 0.0 && until < end {
+                // Powers of two, so that neighbouring segments share a step and its propagator.
+                let step = power_of_two(wanted / SQRT_2);
+                let count = ((until - from) / step).ceil();
+                samples += count;
+                from += count * step;
+                segments.push(Segment { step, count: whole(count) });
+                continue;
+            }
             let count = if self.period > 0.0 {
                 let stride = (wanted / self.period).floor().max(1.0) * self.period;
                 ((until - from) / stride).ceil()
@@ -181,10 +195,10 @@ impl Modes {
                 ((until - from) / wanted).ceil()
             };
             samples += count;
-            if samples > MOST_SAMPLES {
-                return Err(Error::NotConverged { what: "the response", iterations: 200_000 });
-            }
             from = Self::push(&mut segments, self.period, from, until, count);
+        }
+        if samples > MOST_SAMPLES {
+            return Err(Error::NotConverged { what: "the response", iterations: 200_000 });
         }
         Ok(segments)
     }
@@ -192,12 +206,6 @@ impl Modes {
     /// Adds `count` steps from `from` to `until`; in sampled time of whole samples, the last one
     /// shorter.
     fn push(list: &mut Vec<Segment>, period: f64, from: f64, until: f64, count: f64) -> f64 {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between 1 and 200000"
-        )]
-        let whole = |x: f64| x as usize;
         if period == 0.0 {
             list.push(Segment { step: (until - from) / count, count: whole(count) });
             return until;
@@ -212,6 +220,11 @@ impl Modes {
         }
         until
     }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of samples")]
+fn whole(samples: f64) -> usize {
+    samples as usize
 }
 
 /// The simulation of a system along the grid.
@@ -253,9 +266,14 @@ impl<'a> GridSimulation<'a> {
         if self.time.is_empty() {
             self.record(0.0);
         }
+        let mut known: Option<(f64, FirstOrderHold)> = None;
         for segment in segments {
             let begin = self.time[self.time.len() - 1];
-            let hold = hold(self.system, segment.step)?;
+            // Neighbouring segments often have the same step.
+            let hold = match known.take().filter(|(step, _)| *step == segment.step) {
+                Some((_, hold)) => hold,
+                None => hold(self.system, segment.step)?,
+            };
             let mut next = DVector::zeros(self.state.len());
             for k in 1..=segment.count {
                 let (state, input, slope) = (&self.state, &self.input, &self.slope);
@@ -270,6 +288,7 @@ impl<'a> GridSimulation<'a> {
                 #[expect(clippy::cast_precision_loss, reason = "at most 200000")]
                 self.record(begin + segment.step * k as f64);
             }
+            known = Some((segment.step, hold));
         }
         Ok(())
     }

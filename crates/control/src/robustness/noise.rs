@@ -8,12 +8,23 @@ use nalgebra::DMatrix;
 ///
 /// Returns p x m. In continuous time the noise has the spectral density 1 (a variance of one unit
 /// squared times the unit of time), in sampled time each sample has the variance 1. Independent
-/// noises add their squares. Method: a Lyapunov equation for each input, see [`energy`].
+/// noises add their squares. Method: a Lyapunov equation for each input, or for each output if these are
+/// fewer (the transposed system has the same norms), see [`energy`].
 ///
 /// # Errors
 ///
 /// Same as [`energy`].
 pub fn noise_gains(system: &StateSpace) -> Result<DMatrix<f64>, Error> {
+    if system.c.nrows() < system.b.ncols() {
+        let transposed = StateSpace {
+            a: system.a.transpose(),
+            b: system.c.transpose(),
+            c: system.b.transpose(),
+            d: system.d.transpose(),
+            domain: system.domain,
+        };
+        return Ok(noise_gains(&transposed)?.transpose());
+    }
     let mut gains = DMatrix::zeros(system.c.nrows(), system.b.ncols());
     for input in 0..system.b.ncols() {
         let one = StateSpace {
