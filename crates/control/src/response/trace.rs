@@ -270,10 +270,11 @@ impl<'a> GridSimulation<'a> {
         for segment in segments {
             let begin = self.time[self.time.len() - 1];
             // Neighbouring segments often have the same step.
-            let hold = match known.take().filter(|(step, _)| *step == segment.step) {
-                Some((_, hold)) => hold,
-                None => hold(self.system, segment.step)?,
-            };
+            let hold =
+                match known.take().filter(|(step, _)| step.to_bits() == segment.step.to_bits()) {
+                    Some((_, hold)) => hold,
+                    None => hold(self.system, segment.step)?,
+                };
             let mut next = DVector::zeros(self.state.len());
             for k in 1..=segment.count {
                 let (state, input, slope) = (&self.state, &self.input, &self.slope);
