@@ -15,7 +15,7 @@
 //! | a delay in all channels | [`delay_margin`], [`sampled_delay_margin`] |
 //! | the longest time over which signals may be held | [`longest_hold`], [`longest_period`] |
 //! | effect of measurement noise | [`noise_gains`] |
-//! | errors of the plant's parameters | [`Tolerances`], [`tolerance_test`] |
+//! | errors of the plant's parameters | [`EntryFamily`], [`PlantFamily`], [`tolerance_test`] |
 //! | gains for comparison | [`regulator_of_same_speed`] |
 
 mod channel;
@@ -38,7 +38,7 @@ pub use hold_time::{longest_hold, longest_period};
 pub use noise::noise_gains;
 pub use scaling::ScaledPeak;
 pub use speed::regulator_of_same_speed;
-pub use tolerance::{ToleranceTest, Tolerances, tolerance_test};
+pub use tolerance::{EntryFamily, PlantFamily, ToleranceTest, Tolerances, tolerance_test};
 
 use crate::blocks::{block_2x2, stacked};
 use crate::{Error, StateSpace, check};

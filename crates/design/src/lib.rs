@@ -23,6 +23,7 @@ mod linear_plant;
 mod matrix;
 mod norm_gains;
 mod page;
+mod parameters;
 mod plant_file;
 mod plausibility;
 pub mod report;
@@ -49,6 +50,7 @@ pub use robust_report::Level;
 
 use controller_fmu::Content;
 use designed::ControllerDesign;
+use parameters::ParameterFamily;
 use plant_file::PlantFile;
 
 /// The time that certificates and bounds may take unless something else is asked for.
@@ -106,13 +108,14 @@ pub fn design_text(path: &Path, text: String) -> Result<Design, Error> {
 fn design_source(source: &Source, certificate_time: Duration) -> Result<Design, Error> {
     let parsed = source.parse()?;
     let file = PlantFile::read(source, &Table::whole(source, &parsed))?;
+    let family = ParameterFamily::of(&file)?;
     let designed = designed::design(&file)?;
     let description = description(&file, &designed);
     let text = designed.file(&file, &description)?;
-    let report = reporting::report(&file, &designed, description, certificate_time);
+    let report =
+        reporting::report((&file, family.as_ref()), &designed, description, certificate_time);
     let report = report.map_err(|error| {
-        let what = format!("the design for {} cannot be examined", file.name());
-        Error::from(error).within(what)
+        error.within(format!("the design for {} cannot be examined", file.name()))
     })?;
     let identity = identity::identity(&report);
     let worst_case = worst_case::plant_file(&file, &designed, &report)?;

@@ -117,33 +117,43 @@ fn linearised(
     })
 }
 
-/// Linearises the FMU of the file; returns its name and the result.
-fn linearisation(
-    file: &PlantFile<'_>,
-    own: &plant_file::PlantFmu,
-) -> Result<(String, Linearisation), crate::Error> {
-    let plant_file::PlantFmu { path, operating_point, states, preload, step } = own;
-    for library in preload {
+/// Opens the FMU of the file, with the libraries that it needs.
+pub(crate) fn open(file: &PlantFile<'_>, own: &plant_file::PlantFmu) -> Result<Fmu, crate::Error> {
+    for library in &own.preload {
         fmu_import::preload(library.as_ref())
             .map_err(|error| file.error(&["preload"], files::sentence(&error)))?;
     }
-    let fmu =
-        Fmu::open_any(path).map_err(|error| file.error(&["plant"], files::sentence(&error)))?;
+    let opened = Fmu::open_any(&own.path);
+    Ok(opened.map_err(|error| file.error(&["plant"], files::sentence(&error)))?)
+}
+
+/// The request for the linear plant at the operating point of the file.
+pub(crate) fn request(file: &PlantFile<'_>, own: &plant_file::PlantFmu) -> Linearise {
     let names = |signals: &[Signal]| signals.iter().map(|signal| signal.name.clone()).collect();
     let inputs = file.faults.iter().filter_map(|fault| match &fault.entry_point {
         EntryPoint::Input(name) => Some(name.clone()),
         _ => None,
     });
-    let request = Linearise {
+    let at = own.operating_point.iter();
+    Linearise {
         inputs: names(&file.actuators),
         faults: inputs.collect(),
         outputs: names(&file.measurements),
-        states: states.clone(),
-        at: operating_point.iter().map(|(name, value)| (name.clone(), value.to_string())).collect(),
-        step: *step,
+        states: own.states.clone(),
+        at: at.map(|(name, value)| (name.clone(), value.to_string())).collect(),
+        step: own.step,
         ..Linearise::default()
-    };
-    let found = linearise(&fmu, &request).map_err(|error| {
+    }
+}
+
+/// Linearises the FMU of the file; returns its name and the result.
+fn linearisation(
+    file: &PlantFile<'_>,
+    own: &plant_file::PlantFmu,
+) -> Result<(String, Linearisation), crate::Error> {
+    let plant_file::PlantFmu { path, operating_point, .. } = own;
+    let fmu = open(file, own)?;
+    let found = linearise(&fmu, &request(file, own)).map_err(|error| {
         let place = match &error {
             LineariseError::UnknownVariable { name, .. } => stating(file, operating_point, name),
             LineariseError::NoStep { .. } => "linearisation_step",

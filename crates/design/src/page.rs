@@ -15,6 +15,7 @@ mod table;
 mod verdict;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+pub(crate) use number::rounded;
 
 use super::report::Report;
 

@@ -17,6 +17,7 @@ use super::certificate::certificate;
 use super::checks::checks;
 use super::designed::{ControllerDesign, fault_names};
 use super::gains::GainResult;
+use super::parameters::ParameterFamily;
 use super::plant_file::PlantFile;
 use super::plausibility::line;
 use super::report::{
@@ -29,16 +30,16 @@ use super::signals::{self, EntryPoint, Fault, FaultDynamics};
 
 /// Returns the report on `designed`.
 pub(crate) fn report(
-    file: &PlantFile<'_>,
+    (file, family): (&PlantFile<'_>, Option<&ParameterFamily<'_>>),
     designed: &ControllerDesign,
     description: String,
     certificate_time: Duration,
-) -> Result<Report, Error> {
+) -> Result<Report, crate::Error> {
     let loops = Loops::of(designed)?;
     let ControllerDesign { plant, gains, linear, .. } = designed;
     let names = Names::of(designed);
     let checks = checks(designed);
-    let robustness = robustness(designed, &file.robustness)?;
+    let robustness = robustness(designed, &file.robustness, family)?;
     let budget = Budget::start(certificate_time);
     let certificate = certificate(designed, loops.norms()?, &budget);
     let (bounds, left_out) = loops.bounds(&budget)?;

@@ -179,11 +179,31 @@ pub struct Compared {
     pub linear_quadratic: Option<f64>,
 }
 
+/// A parameter of the plant's FMU that varies.
+#[derive(Serialize, JsonSchema)]
+pub struct Parameter {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: Option<String>,
+    /// Its value in the design.
+    pub value: f64,
+    /// Its lowest and highest value.
+    pub limits: [f64; 2],
+    /// Its value in the worst plant.
+    pub worst: f64,
+    /// The change of the judged peak of S at the commands and at the measurements when it moves from
+    /// its value to a limit, to first order, averaged over both limits.
+    pub effects: Vec<f64>,
+}
+
 /// Stability while the parameters of the plant vary within their tolerances.
 #[derive(Serialize, JsonSchema)]
 pub struct ToleranceResult {
-    /// Number of entries that vary.
+    /// Number of entries that vary; 0 if `parameters` vary.
     pub entries: u32,
+    /// The parameters of the FMU that vary; empty if the entries vary.
+    pub parameters: Vec<Parameter>,
     /// Number of random cases.
     pub cases: u32,
     /// Seed of the random cases.
@@ -194,7 +214,7 @@ pub struct ToleranceResult {
     /// found.
     pub worst_instability: f64,
     /// The multiple of the tolerances, in the direction of the worst plant, below which the loop is
-    /// stable.
+    /// stable. Parameters are followed to their limits, 1; entries to 16.
     #[schemars(with = "Option<f64>")]
     pub first_unstable: f64,
     /// A, B and C of the worst plant.

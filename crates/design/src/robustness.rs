@@ -5,9 +5,9 @@ use control::controller::controller;
 use control::hold::zero_order_hold;
 use control::response::{frequency_grid, frequency_response, h_infinity};
 use control::robustness::{
-    DiskMargin, Loop, Point, Tolerances, channel_margins, delay_margin, disk_margin, longest_hold,
-    longest_period, noise_gains, peak_derivatives, regulator_of_same_speed, sampled_delay_margin,
-    scaled_peak, tolerance_test,
+    DiskMargin, EntryFamily, Loop, Point, ToleranceTest, Tolerances, channel_margins, delay_margin,
+    disk_margin, longest_hold, longest_period, noise_gains, peak_derivatives,
+    regulator_of_same_speed, sampled_delay_margin, scaled_peak, tolerance_test,
 };
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
@@ -15,10 +15,12 @@ use rayon::prelude::*;
 
 use super::designed::ControllerDesign;
 use super::linear_plant::LinearPlant;
+use super::page::rounded;
+use super::parameters::ParameterFamily;
 use super::report::{Check, Frequency, Matrix, rows};
 use super::robust_report::{
-    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, PeakSensitivity, Robustness,
-    ToleranceResult, Verdict,
+    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Parameter, PeakSensitivity,
+    Robustness, ToleranceResult, Verdict,
 };
 use super::robustness_limits::RobustnessLimits;
 use super::signals::Signal;
@@ -27,11 +29,13 @@ const WIDTH: f64 = 1e-4;
 const POINTS_PER_DECADE: u32 = 20;
 const POINTS: [(Point, &str); 2] = [(Point::Input, "input"), (Point::Output, "output")];
 
-/// Returns the robustness of a design; None if the loop is not stable.
+/// Returns the robustness of a design; None if the loop is not stable. `family`: the plants whose
+/// parameters vary; without it the entries of the matrices vary.
 pub(crate) fn robustness(
     designed: &ControllerDesign,
     limits: &RobustnessLimits,
-) -> Result<Option<Robustness>, Error> {
+    family: Option<&ParameterFamily<'_>>,
+) -> Result<Option<Robustness>, crate::Error> {
     if designed.instability >= 0.0 {
         return Ok(None);
     }
@@ -53,15 +57,19 @@ pub(crate) fn robustness(
         ),
     };
     let (noise, noise_together) = noise(designed, &own, &physical.estimates(designed), limits)?;
+    let slopes = slopes(&designed.linear, &physical, &points)?;
     let (comparison, tolerance) = rayon::join(
         || comparison(designed, &physical, &points),
-        || tolerance(designed, &physical, limits),
+        || match family {
+            None => by_entries(designed, &physical, limits),
+            Some(family) => by_parameters(designed, &physical, (limits, family), &slopes),
+        },
     );
     Ok(Some(Robustness {
         comparison: comparison?,
         tolerance: tolerance?,
         curves: curves(&own)?,
-        sensitivity: sensitivity(designed, &physical, &points)?,
+        sensitivity: sensitivity(designed, &physical.plant, &slopes),
         points,
         delay_margin: delay,
         longest_hold: hold,
@@ -184,21 +192,32 @@ fn same_unit(signals: &[Signal]) -> bool {
     signals.iter().all(|signal| signal.unit == signals[0].unit)
 }
 
-/// Returns how the judged peaks depend on the entries of the plant.
-fn sensitivity(
-    designed: &ControllerDesign,
+/// Returns the derivatives of the judged peaks with respect to the entries of A, B and C.
+fn slopes(
+    linear: &LinearPlant,
     physical: &Physical,
     points: &[LoopPoint],
-) -> Result<Vec<PeakSensitivity>, Error> {
-    let linear = &designed.linear;
-    let plant = &physical.plant;
-    let one = |((point, name), found): ((Point, &str), &LoopPoint)| {
+) -> Result<Vec<[DMatrix<f64>; 3]>, Error> {
+    let one = |((point, _), found): ((Point, &str), &LoopPoint)| {
         let signals = match point {
             Point::Input => &linear.actuators,
             Point::Output => &linear.measurements,
         };
         let at = (point, found.judged_frequency, !same_unit(signals));
-        let slopes = peak_derivatives(plant, &physical.controller, at)?;
+        let slopes = peak_derivatives(&physical.plant, &physical.controller, at)?;
+        Ok([slopes.a, slopes.b, slopes.c])
+    };
+    POINTS.into_iter().zip(points).map(one).collect()
+}
+
+/// Returns how the judged peaks depend on the entries of the plant.
+fn sensitivity(
+    designed: &ControllerDesign,
+    plant: &StateSpace,
+    slopes: &[[DMatrix<f64>; 3]],
+) -> Vec<PeakSensitivity> {
+    let linear = &designed.linear;
+    let one = |((_, name), [to_a, to_b, to_c]): ((Point, &str), &[DMatrix<f64>; 3])| {
         // One for the entries that tolerances vary, zero for structural ones.
         let [in_a, in_b, in_c] = Tolerances::of_values(plant, [1.0; 3]).of;
         let matrix = |name: &str, of: (&[Signal], &[Signal]), effects: &DMatrix<f64>| Matrix {
@@ -212,16 +231,16 @@ fn sensitivity(
             varied.component_mul(values).component_mul(slopes)
         };
         let LinearPlant { states, actuators, measurements, .. } = linear;
-        Ok(PeakSensitivity {
+        PeakSensitivity {
             point: name.to_owned(),
             matrices: vec![
-                matrix("A", (states, states), &times(in_a, &plant.a, &slopes.a)),
-                matrix("B", (states, actuators), &times(in_b, &plant.b, &slopes.b)),
-                matrix("C", (measurements, states), &times(in_c, &plant.c, &slopes.c)),
+                matrix("A", (states, states), &times(in_a, &plant.a, to_a)),
+                matrix("B", (states, actuators), &times(in_b, &plant.b, to_b)),
+                matrix("C", (measurements, states), &times(in_c, &plant.c, to_c)),
             ],
-        })
+        }
     };
-    POINTS.into_iter().zip(points).map(one).collect()
+    POINTS.into_iter().zip(slopes).map(one).collect()
 }
 
 fn names(signals: &[Signal]) -> Vec<String> {
@@ -337,14 +356,38 @@ fn norm(m: &DMatrix<f64>) -> f64 {
     (m * m.transpose()).symmetric_eigenvalues().max().max(0.0).sqrt()
 }
 
-fn tolerance(
+/// Returns what the loop does while the entries of the plant's matrices vary.
+fn by_entries(
     designed: &ControllerDesign,
     physical: &Physical,
     limits: &RobustnessLimits,
-) -> Result<ToleranceResult, Error> {
+) -> Result<ToleranceResult, crate::Error> {
     let tolerances = Tolerances::of_values(&physical.plant, limits.tolerance);
+    let family = EntryFamily::new(&physical.plant, &tolerances)?;
     let request = (limits.cases, u64::from(limits.seed));
-    let found = tolerance_test(&physical.plant, &physical.controller, &tolerances, request)?;
+    let found = tolerance_test(&family, &physical.controller, request)?;
+    let entries = u32::try_from(tolerances.count()).unwrap_or(u32::MAX);
+    Ok(ToleranceResult { entries, ..tested(designed, limits, &found) })
+}
+
+/// Returns what the loop does while the parameters of the plant's FMU vary.
+fn by_parameters(
+    designed: &ControllerDesign,
+    physical: &Physical,
+    (limits, family): (&RobustnessLimits, &ParameterFamily<'_>),
+    slopes: &[[DMatrix<f64>; 3]],
+) -> Result<ToleranceResult, crate::Error> {
+    let request = (limits.cases, u64::from(limits.seed));
+    let found = tolerance_test(family, &physical.controller, request)?;
+    let parameters = family.report(&found.deviations, slopes);
+    Ok(ToleranceResult { parameters, ..tested(designed, limits, &found) })
+}
+
+fn tested(
+    designed: &ControllerDesign,
+    limits: &RobustnessLimits,
+    found: &ToleranceTest,
+) -> ToleranceResult {
     let linear = &designed.linear;
     let (states, actuators) = (names(&linear.states), names(&linear.actuators));
     let matrix = |name: &str, values: &DMatrix<f64>, of: &[String], by: &[String]| Matrix {
@@ -354,8 +397,9 @@ fn tolerance(
         columns: by.to_vec(),
         values: rows(values),
     };
-    Ok(ToleranceResult {
-        entries: u32::try_from(tolerances.count()).unwrap_or(u32::MAX),
+    ToleranceResult {
+        entries: 0,
+        parameters: Vec::new(),
         cases: found.cases,
         seed: limits.seed,
         stable: if found.cases == 0 {
@@ -370,7 +414,7 @@ fn tolerance(
             matrix("B", &found.worst.b, &states, &actuators),
             matrix("C", &found.worst.c, &names(&linear.measurements), &states),
         ],
-    })
+    }
 }
 
 /// Returns the singular values of S and T at both points.
@@ -433,8 +477,16 @@ pub(crate) fn verdict(
 
 /// The sentence about a loop that parameters within their tolerances make unstable.
 fn instability(found: &ToleranceResult, tolerance: [f64; 3]) -> String {
-    let [a, b, c] = tolerance.map(|part| 100.0 * part);
-    let range = format!("parameters within ±{a} % of A, ±{b} % of B, ±{c} % of C");
+    let range = if found.parameters.is_empty() {
+        let [a, b, c] = tolerance.map(|part| 100.0 * part);
+        format!("parameters within ±{a} % of A, ±{b} % of B, ±{c} % of C")
+    } else {
+        let limits = |own: &Parameter| {
+            let [low, high] = own.limits.map(rounded);
+            format!("{} from {low} to {high}", own.name)
+        };
+        found.parameters.iter().map(limits).collect::<Vec<_>>().join(", ")
+    };
     let worst =
         format!("the worst case found, from {:.3} of the tolerances on", found.first_unstable);
     let cases = found.cases;

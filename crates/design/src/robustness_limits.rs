@@ -2,11 +2,15 @@
 
 use files::{Entry, PlaceError, Table};
 
+use super::parameters::{self, ParameterTolerance};
+
 /// What the robustness of a design is tested with, and the limits of its verdict.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RobustnessLimits {
     /// Relative tolerances of the entries of A, B and C.
     pub(crate) tolerance: [f64; 3],
+    /// Tolerances of parameters of the plant's FMU; if there are any, the entries are exact.
+    pub(crate) parameters: Vec<ParameterTolerance>,
     /// Number of random cases.
     pub(crate) cases: u32,
     /// Seed of the random cases.
@@ -20,7 +24,7 @@ pub(crate) struct RobustnessLimits {
     pub(crate) red: f64,
 }
 
-const KEYS: [&str; 6] = ["tolerance", "cases", "seed", "noise", "amber", "red"];
+const KEYS: [&str; 7] = ["tolerance", "parameters", "cases", "seed", "noise", "amber", "red"];
 const TOLERANCE: f64 = 0.1;
 const CASES: u32 = 200;
 const AMBER: f64 = 2.0;
@@ -31,6 +35,7 @@ impl RobustnessLimits {
     pub(crate) fn read(file: &Table<'_>, measurements: usize) -> Result<Self, PlaceError> {
         let mut found = Self {
             tolerance: [TOLERANCE; 3],
+            parameters: Vec::new(),
             cases: CASES,
             seed: 1,
             noise: vec![1.0; measurements],
@@ -44,6 +49,20 @@ impl RobustnessLimits {
         table.allow(&KEYS)?;
         if let Some(entry) = table.get("tolerance") {
             found.tolerance = tolerances(&entry)?;
+        }
+        if let Some(entry) = table.get("parameters") {
+            if file.get("plant").is_none() {
+                let message = "they belong to `plant`, an FMU; with matrices, `tolerance` states \
+                               how far their entries may be off";
+                return Err(entry.error(message));
+            }
+            if table.get("tolerance").is_some() {
+                let message = "expected `tolerance`, of all entries of the matrices, or \
+                               `parameters`, found both";
+                return Err(entry.error(message));
+            }
+            found.parameters = parameters::read(&entry)?;
+            found.tolerance = [0.0; 3];
         }
         if let Some(entry) = table.get("cases") {
             found.cases = whole(&entry, 100_000)?;
@@ -84,7 +103,7 @@ fn tolerances(entry: &Entry<'_>) -> Result<[f64; 3], PlaceError> {
     Ok(found)
 }
 
-fn fraction(entry: &Entry<'_>) -> Result<f64, PlaceError> {
+pub(crate) fn fraction(entry: &Entry<'_>) -> Result<f64, PlaceError> {
     match entry.number()? {
         number if (0.0..1.0).contains(&number) => Ok(number),
         number => Err(entry.error(format!("expected a number from 0 to below 1, found {number}"))),

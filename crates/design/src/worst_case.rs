@@ -7,6 +7,7 @@ use super::designed::ControllerDesign;
 use super::identity::identity;
 use super::plant_file::PlantFile;
 use super::report::Report;
+use super::robust_report::Parameter;
 
 /// Returns the plant file with A, B and C of the worst plant; a plant that is an FMU becomes one
 /// that matrices describe.
@@ -29,13 +30,17 @@ pub(crate) fn plant_file(
         return Ok(None);
     }
     let text = toml::to_string(&table).map_err(|error| unwritable(&error))?;
-    let tolerance = report.verdict.limits.tolerance.map(|tolerance| 100.0 * tolerance);
+    let parameters = &robustness.tolerance.parameters;
+    let within = if parameters.is_empty() {
+        let [a, b, c] = report.verdict.limits.tolerance.map(|tolerance| 100.0 * tolerance);
+        format!("within ±{a} % of A, ±{b} % of B, ±{c} % of C")
+    } else {
+        let worst = |own: &Parameter| format!("{} = {}", own.name, own.worst);
+        format!("with {}", parameters.iter().map(worst).collect::<Vec<_>>().join(", "))
+    };
     Ok(Some(format!(
-        "# Written by {}: the worst plant found within ±{} % of A, ±{} % of B, ±{} % of C.\n\n{text}",
-        identity(report),
-        tolerance[0],
-        tolerance[1],
-        tolerance[2]
+        "# Written by {}: the worst plant found {within}.\n\n{text}",
+        identity(report)
     )))
 }
 
@@ -47,6 +52,9 @@ fn without_fmu(table: &mut Table, designed: &ControllerDesign) -> bool {
     let linear = &designed.linear;
     let names = linear.states.iter().map(|signal| Value::String(signal.name.clone()));
     table.insert("states".to_owned(), Value::Array(names.collect()));
+    if let Some(Value::Table(robustness)) = table.get_mut("robustness") {
+        robustness.remove("parameters");
+    }
     let mut columns = Vec::new();
     if let Some(Value::Array(faults)) = table.get_mut("faults") {
         let own = linear.models.len() - faults.len();

@@ -57,51 +57,78 @@ pub struct ToleranceTest {
     pub worst_instability: f64,
     /// The worst plant that was found.
     pub worst: StateSpace,
+    /// Its deviations, as parts of the tolerances.
+    pub deviations: Vec<f64>,
     /// The multiple of the tolerances, in the direction of the worst plant, below which the loop is
-    /// stable; None if it is stable up to 16.
+    /// stable; None if it is stable at all [`PlantFamily::multiples`].
     pub first_unstable: Option<f64>,
 }
 
-/// Tests the stability of the loop of `plant` and `controller` while the parameters of the plant
-/// vary and the controller does not.
+/// The plants that a controller may meet: each parameter deviates by -1 to 1 of its tolerance.
+pub trait PlantFamily {
+    /// Why a plant cannot be had.
+    type Error: From<Error>;
+
+    /// The number of parameters.
+    fn count(&self) -> usize;
+
+    /// The plant, in continuous time, whose parameters deviate by these parts of their tolerances.
+    ///
+    /// # Errors
+    ///
+    /// The plant cannot be had.
+    fn plant(&self, deviations: &[f64]) -> Result<StateSpace, Self::Error>;
+
+    /// How a quantity changes with each deviation, from its derivatives with respect to the entries
+    /// of A, B and C. It guides the search only.
+    fn slopes(&self, entries: &[DMatrix<f64>; 3]) -> Vec<f64>;
+
+    /// The rising multiples of the tolerances at which the worst direction is tested.
+    fn multiples(&self) -> Vec<f64> {
+        let next = |multiple: &f64| Some(multiple * FACTOR).filter(|next| *next <= REACH);
+        std::iter::successors(Some(FIRST), next).collect()
+    }
+}
+
+/// Tests the stability of the loop of a family's plant and `controller` while the parameters of the
+/// plant vary and the controller does not.
 ///
-/// `plant`: continuous; for a sampled controller each case is discretised with its period. Each
-/// entry is multiplied by 1 + t d, t its tolerance, d uniform in -1 to 1 and independent of the
-/// others, drawn by the generator `SplitMix64` from `seed`. The worst case is searched among the
-/// vertices of the tolerances: from the nominal plant and from the worst random cases, in the
-/// directions that the derivatives of the eigenvalues state. It is a lower bound of what the
-/// tolerances can do: a loop that is found stable may be unstable in a case that was not tried.
+/// For a sampled controller each plant is discretised with its period. The deviations of the random
+/// cases are uniform in -1 to 1 and independent, drawn by the generator `SplitMix64` from `seed`. The
+/// worst case is searched among the vertices of the tolerances: from the nominal plant and from the
+/// worst random cases, in the directions that the derivatives of the eigenvalues state. It is a lower
+/// bound of what the tolerances can do: a loop that is found stable may be unstable in a case that was
+/// not tried.
 ///
 /// # Errors
 ///
-/// Same as [`Loop::new`], [`zero_order_hold`] and [`instability`]; [`Error::Shape`] for tolerances
-/// that do not fit; [`Error::OutOfRange`] for a negative one.
-pub fn tolerance_test(
-    plant: &StateSpace,
+/// Those of the family; same as [`Loop::new`], [`zero_order_hold`] and [`instability`].
+pub fn tolerance_test<F: PlantFamily>(
+    family: &F,
     controller: &StateSpace,
-    tolerances: &Tolerances,
     (cases, seed): (u32, u64),
-) -> Result<ToleranceTest, Error> {
-    let family = Family::new(plant, controller, tolerances)?;
+) -> Result<ToleranceTest, F::Error> {
+    let loops = Loops { family, controller };
     let mut random = seed;
     let mut all = Vec::new();
     let mut stable = 0;
     for _ in 0..cases {
         let deviations: Vec<f64> =
-            (0..family.entries.len()).map(|_| 2.0 * uniform(&mut random) - 1.0).collect();
-        let value = family.instability(&deviations)?;
+            (0..family.count()).map(|_| 2.0 * uniform(&mut random) - 1.0).collect();
+        let value = loops.instability(&deviations)?;
         stable += u32::from(value < 0.0);
         all.push((value, deviations));
     }
     all.sort_by(|x, y| y.0.total_cmp(&x.0));
     all.truncate(2);
-    let (worst_instability, deviations) = worst_case(&family, all)?;
+    let (worst_instability, deviations) = worst_case(&loops, all)?;
     Ok(ToleranceTest {
         cases,
         stable,
         worst_instability,
-        worst: family.plant(&deviations),
-        first_unstable: family.first_unstable(&deviations)?,
+        worst: family.plant(&deviations)?,
+        first_unstable: loops.first_unstable(&deviations)?,
+        deviations,
     })
 }
 
@@ -118,26 +145,27 @@ fn uniform(state: &mut u64) -> f64 {
 }
 
 /// A plant entry that varies: matrix (A, B, C), row, column, and the product of value and tolerance.
-pub(super) struct Entry {
-    pub(super) matrix: usize,
-    pub(super) row: usize,
-    pub(super) column: usize,
-    pub(super) size: f64,
+struct Entry {
+    matrix: usize,
+    row: usize,
+    column: usize,
+    size: f64,
 }
 
-/// The loops of all plants within the tolerances.
-pub(super) struct Family<'a> {
-    pub(super) plant: &'a StateSpace,
-    pub(super) controller: &'a StateSpace,
-    pub(super) entries: Vec<Entry>,
+/// All plants within the tolerances of single entries: each is multiplied by 1 + t d, t its tolerance,
+/// d its deviation.
+pub struct EntryFamily<'a> {
+    plant: &'a StateSpace,
+    entries: Vec<Entry>,
 }
 
-impl<'a> Family<'a> {
-    fn new(
-        plant: &'a StateSpace,
-        controller: &'a StateSpace,
-        tolerances: &Tolerances,
-    ) -> Result<Self, Error> {
+impl<'a> EntryFamily<'a> {
+    /// The plants whose entries are those of `plant` within `tolerances`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`] for tolerances that do not fit; [`Error::OutOfRange`] for a negative one.
+    pub fn new(plant: &'a StateSpace, tolerances: &Tolerances) -> Result<Self, Error> {
         let mut entries = Vec::new();
         let named = [("A", &plant.a), ("B", &plant.b), ("C", &plant.c)];
         for (matrix, ((name, values), of)) in named.into_iter().zip(&tolerances.of).enumerate() {
@@ -156,11 +184,18 @@ impl<'a> Family<'a> {
                 }
             }
         }
-        Ok(Self { plant, controller, entries })
+        Ok(Self { plant, entries })
+    }
+}
+
+impl PlantFamily for EntryFamily<'_> {
+    type Error = Error;
+
+    fn count(&self) -> usize {
+        self.entries.len()
     }
 
-    /// The plant whose entries deviate by these parts of their tolerances.
-    pub(super) fn plant(&self, deviations: &[f64]) -> StateSpace {
+    fn plant(&self, deviations: &[f64]) -> Result<StateSpace, Error> {
         let mut plant = self.plant.clone();
         for (entry, deviation) in self.entries.iter().zip(deviations) {
             let own = match entry.matrix {
@@ -170,9 +205,22 @@ impl<'a> Family<'a> {
             };
             own[(entry.row, entry.column)] += entry.size * deviation;
         }
-        plant
+        Ok(plant)
     }
 
+    fn slopes(&self, entries: &[DMatrix<f64>; 3]) -> Vec<f64> {
+        let of = |entry: &Entry| entries[entry.matrix][(entry.row, entry.column)] * entry.size;
+        self.entries.iter().map(of).collect()
+    }
+}
+
+/// The loops of a controller and all plants of a family.
+pub(super) struct Loops<'a, F> {
+    pub(super) family: &'a F,
+    pub(super) controller: &'a StateSpace,
+}
+
+impl<F: PlantFamily> Loops<'_, F> {
     /// The dynamics of the loop with a plant, which is discretised for a sampled controller.
     pub(super) fn dynamics(&self, mut plant: StateSpace) -> Result<DMatrix<f64>, Error> {
         if let Domain::Sampled { period } = self.controller.domain {
@@ -182,19 +230,20 @@ impl<'a> Family<'a> {
         Ok(Loop::new(plant, self.controller.clone())?.dynamics())
     }
 
-    pub(super) fn instability(&self, deviations: &[f64]) -> Result<f64, Error> {
-        instability(&self.dynamics(self.plant(deviations))?, self.controller.domain)
+    pub(super) fn instability(&self, deviations: &[f64]) -> Result<f64, F::Error> {
+        let plant = self.family.plant(deviations)?;
+        Ok(instability(&self.dynamics(plant)?, self.controller.domain)?)
     }
 
-    fn first_unstable(&self, deviations: &[f64]) -> Result<Option<f64>, Error> {
+    fn first_unstable(&self, deviations: &[f64]) -> Result<Option<f64>, F::Error> {
         let stable = |multiple: f64| {
             let scaled: Vec<f64> = deviations.iter().map(|part| multiple * part).collect();
-            Ok::<_, Error>(self.instability(&scaled)? < 0.0)
+            Ok::<_, F::Error>(self.instability(&scaled)? < 0.0)
         };
-        let (mut good, mut multiple) = (0.0, FIRST);
-        while multiple <= REACH {
+        let mut good = 0.0;
+        for multiple in self.family.multiples() {
             if stable(multiple)? {
-                (good, multiple) = (multiple, multiple * FACTOR);
+                good = multiple;
                 continue;
             }
             let mut bad = multiple;

@@ -1,6 +1,6 @@
 //! The search for the worst plant within tolerances.
 
-use super::tolerance::Family;
+use super::tolerance::{Loops, PlantFamily};
 use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;
 use crate::exponential::exponential;
@@ -17,30 +17,30 @@ const SHIFT: f64 = 1e-9;
 
 /// Returns the largest instability that was found, with its deviations; `starts` are cases to begin
 /// with beside the nominal one.
-pub(super) fn worst_case(
-    family: &Family<'_>,
+pub(super) fn worst_case<F: PlantFamily>(
+    loops: &Loops<'_, F>,
     mut starts: Vec<(f64, Vec<f64>)>,
-) -> Result<(f64, Vec<f64>), Error> {
-    let nominal = vec![0.0; family.entries.len()];
-    starts.push((family.instability(&nominal)?, nominal));
+) -> Result<(f64, Vec<f64>), F::Error> {
+    let nominal = vec![0.0; loops.family.count()];
+    starts.push((loops.instability(&nominal)?, nominal));
     let mut best: Option<(f64, Vec<f64>)> = None;
     for start in starts {
-        let found = ascend(family, start)?;
+        let found = ascend(loops, start)?;
         if best.as_ref().is_none_or(|(value, _)| found.0 > *value) {
             best = Some(found);
         }
     }
-    best.ok_or(Error::NotConverged { what: "the worst case", iterations: 0 })
+    Ok(best.ok_or(Error::NotConverged { what: "the worst case", iterations: 0 })?)
 }
 
-fn ascend(
-    family: &Family<'_>,
+fn ascend<F: PlantFamily>(
+    loops: &Loops<'_, F>,
     (mut value, mut deviations): (f64, Vec<f64>),
-) -> Result<(f64, Vec<f64>), Error> {
+) -> Result<(f64, Vec<f64>), F::Error> {
     for round in 0..ROUNDS {
         let count = if round == 0 { MODES } else { 1 };
         let mut improved = false;
-        for gradient in gradients(family, &deviations, count)? {
+        for gradient in gradients(loops, &deviations, count)? {
             let mut order: Vec<usize> = (0..gradient.len()).collect();
             order.sort_by(|i, j| gradient[*j].abs().total_cmp(&gradient[*i].abs()));
             let mut moved = gradient.len();
@@ -51,7 +51,7 @@ fn ascend(
                         candidate[at] = gradient[at].signum();
                     }
                 }
-                let reached = family.instability(&candidate)?;
+                let reached = loops.instability(&candidate)?;
                 if reached > value {
                     (value, deviations, improved) = (reached, candidate, true);
                     break;
@@ -68,15 +68,15 @@ fn ascend(
 
 /// The derivatives of [`Domain::excess`] of the eigenvalues nearest to instability with respect to
 /// the deviations.
-fn gradients(
-    family: &Family<'_>,
+fn gradients<F: PlantFamily>(
+    loops: &Loops<'_, F>,
     deviations: &[f64],
     count: usize,
-) -> Result<Vec<Vec<f64>>, Error> {
-    let plant = family.plant(deviations);
+) -> Result<Vec<Vec<f64>>, F::Error> {
+    let plant = loops.family.plant(deviations)?;
     let (n, m) = plant.b.shape();
-    let domain = family.controller.domain;
-    let dynamics = family.dynamics(plant.clone())?;
+    let domain = loops.controller.domain;
+    let dynamics = loops.dynamics(plant.clone())?;
     let mut modes: Vec<_> =
         eigenvalues(&dynamics)?.into_iter().filter(|mode| mode.im >= 0.0).collect();
     modes.sort_by(|x, y| domain.excess(*y).total_cmp(&domain.excess(*x)));
@@ -89,7 +89,7 @@ fn gradients(
             Some((to_complex(&exponential(&block)?), period))
         }
     };
-    let own = family.controller;
+    let own = loops.controller;
     let command = to_complex(&own.c);
     let direct = to_complex(&own.d);
     let mut found = Vec::new();
@@ -120,16 +120,17 @@ fn gradients(
             Domain::Continuous => Complex::new(1.0, 0.0),
             Domain::Sampled { .. } => mode.conj() / mode.norm().max(f64::MIN_POSITIVE),
         };
-        let derivative = family.entries.iter().map(|entry| {
-            let (row, column) = (entry.row, entry.column);
-            let change = match entry.matrix {
-                0 => of_plant[row] * input[column],
-                1 => of_plant[row] * input[n + column],
-                _ => of_output[row] * x[column],
-            };
-            (turn * change).re * entry.size
-        });
-        found.push(derivative.collect());
+        let outer = |effect: &Vector, (at, count): (usize, usize), by: &Vector| {
+            DMatrix::from_fn(effect.nrows(), count, |row, column| {
+                (turn * effect[row] * by[at + column]).re
+            })
+        };
+        let entries = [
+            outer(&of_plant, (0, n), &input),
+            outer(&of_plant, (n, m), &input),
+            outer(&of_output, (0, n), &x),
+        ];
+        found.push(loops.family.slopes(&entries));
     }
     Ok(found)
 }

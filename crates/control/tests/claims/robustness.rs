@@ -5,7 +5,7 @@ use crate::{entry_error, matrix};
 use control::hold::zero_order_hold;
 use control::response::h_infinity;
 use control::robustness::{
-    Loop, Point, Tolerances, channel_margins, delay_margin, disk_margin, longest_hold,
+    EntryFamily, Loop, Point, Tolerances, channel_margins, delay_margin, disk_margin, longest_hold,
     longest_period, noise_gains, peak_derivatives, regulator_of_same_speed, sampled_delay_margin,
     scaled_peak, tolerance_test,
 };
@@ -228,8 +228,9 @@ fn the_worst_plant_of_two_parameters_is_a_vertex() {
     let domain = Domain::Continuous;
     let plant = StateSpace { a: one(3.0), b: one(2.0), c: one(1.0), d: one(0.0), domain };
     let tolerances = Tolerances::of_values(&plant, [0.1, 0.1, 0.1]);
+    let family = EntryFamily::new(&plant, &tolerances).expect("fits");
     assert_eq!(tolerances.count(), 2, "C is one");
-    let test = |k: f64| tolerance_test(&plant, &gain(&one(-k), domain), &tolerances, (200, 1));
+    let test = |k: f64| tolerance_test(&family, &gain(&one(-k), domain), (200, 1));
     let found = test(3.0).expect("a test");
     assert_eq!((found.cases, found.stable), (200, 200));
     // The idle state of the controller has -1.
@@ -252,7 +253,9 @@ fn the_worst_case_is_at_least_as_bad_as_random_vertices() {
     for case in cases(RECORDED, "loop") {
         let (plant, controller) = parts(&case);
         let tolerances = Tolerances::of_values(&plant, [0.03; 3]);
-        let found = tolerance_test(&plant, &controller, &tolerances, (40, 7)).expect("a test");
+        let found = EntryFamily::new(&plant, &tolerances)
+            .and_then(|family| tolerance_test(&family, &controller, (40, 7)))
+            .expect("a test");
         let value = |plant: &StateSpace| {
             let mut plant = plant.clone();
             if let Domain::Sampled { period } = controller.domain {

@@ -8,7 +8,7 @@ pub(super) fn exact(value: f64) -> String {
 }
 
 /// Returns the number with five digits, more for whole numbers.
-pub(super) fn rounded(value: f64) -> String {
+pub(crate) fn rounded(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }

@@ -7,7 +7,7 @@ use super::matrix::matrices;
 use super::number::number;
 use super::table::{Cell, table};
 use crate::report::{Matrix, Report};
-use crate::robust_report::{Disk, PeakSensitivity, Robustness, ToleranceResult};
+use crate::robust_report::{Disk, Parameter, PeakSensitivity, Robustness, ToleranceResult};
 
 /// Number of parameters in the table of the sensitivities.
 const SHOWN: usize = 12;
@@ -215,18 +215,55 @@ fn parameters(report: &Report, found: &Robustness) -> Markup {
 
 fn tolerances(report: &Report, found: &ToleranceResult) -> Markup {
     let [a, b, c] = report.verdict.limits.tolerance;
+    let tried = if found.parameters.is_empty() { 16.0 } else { 1.0 };
     html! {
         p {
-            "Each of " (number(f64::from(found.entries))) " entries of A (±" (number(a)) ", relative), B (±" (number(b))
-            ") and C (±" (number(c)) ") that is not 0, 1 or −1 varies by itself; the controller \
-             does not. Of " (number(f64::from(found.cases))) " random cases (seed "
+            @if found.parameters.is_empty() {
+                "Each of " (number(f64::from(found.entries))) " entries of A (±" (number(a)) ", relative), B (±" (number(b))
+                ") and C (±" (number(c)) ") that is not 0, 1 or −1 varies by itself; "
+            } @else {
+                "The parameters of the table vary between their limits, and the FMU is linearised \
+                 with each set of them at the same operating point; "
+            }
+            "the controller does not. Of " (number(f64::from(found.cases))) " random cases (seed "
             (number(f64::from(found.seed))) ") the \
              fraction " (number(found.stable)) " is stable. The worst plant found has the stability \
              figure " (number(found.worst_instability)) " (negative: stable; "
             @if report.sampling.is_some() { "largest modulus less 1" } @else { "largest real part, 1/s" }
-            "). In its direction the loop is stable up to " (number(found.first_unstable))
-            " of the tolerances. A case that was not tried may be worse."
+            "). In its direction the loop is stable up to " (number(found.first_unstable.min(tried)))
+            " of the tolerances" @if found.first_unstable > tried { ", the most that was tried" }
+            ". A case that was not tried may be worse."
         }
+        @if !found.parameters.is_empty() { (limits(&found.parameters)) }
         (matrices("worst", &found.worst))
+    }
+}
+
+fn limits(all: &[Parameter]) -> Markup {
+    let heads = [
+        "parameter",
+        "value",
+        "lowest",
+        "highest",
+        "worst",
+        "change at the commands",
+        "change at the measurements",
+    ];
+    let row = |own: &Parameter| {
+        let name = match &own.unit {
+            Some(unit) => format!("{} ({unit})", own.name),
+            None => own.name.clone(),
+        };
+        let values = [own.value, own.limits[0], own.limits[1], own.worst];
+        let numbers = values.iter().chain(&own.effects).map(|value| Cell::Number(*value));
+        std::iter::once(Cell::Text(name)).chain(numbers).collect()
+    };
+    let rows: Vec<Vec<Cell>> = all.iter().map(row).collect();
+    html! {
+        p {
+            "The last two columns: change of the judged peak of S while the parameter goes from its \
+             value to a limit, to first order."
+        }
+        (table("Parameters of the FMU", &heads, &rows))
     }
 }

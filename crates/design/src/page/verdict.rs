@@ -11,6 +11,8 @@ pub(super) fn verdict(report: &Report) -> Markup {
     let failures = failures(report);
     let count = report.checks.len();
     let limits = &report.verdict.limits;
+    let parameters =
+        report.robustness.as_ref().is_some_and(|found| !found.tolerance.parameters.is_empty());
     let level = if failures.is_empty() { report.verdict.level } else { Level::Red };
     // The checks are shown above with their explanations.
     let checked = |reason: &&String| !reason.starts_with("does not hold: ");
@@ -49,10 +51,15 @@ pub(super) fn verdict(report: &Report) -> Markup {
             p {
                 "Verdict: " (report.verdict.level.word()) ". A peak of S above " (number(limits.amber))
                 " is amber, above " (number(limits.red)) " red, as are parameters within their \
-                 tolerances that make the loop unstable: "
-                @for (index, (name, tolerance)) in ["A", "B", "C"].iter().zip(limits.tolerance).enumerate() {
-                    @if index > 0 { ", " }
-                    (number(tolerance)) " of each entry of " (name)
+                 tolerances that make the loop unstable"
+                @if !parameters {
+                    ": "
+                    @for (index, (name, tolerance)) in ["A", "B", "C"].iter().zip(limits.tolerance).enumerate() {
+                        @if index > 0 { ", " }
+                        (number(tolerance)) " of each entry of " (name)
+                    }
+                } @else {
+                    ": those of the FMU that the section on robustness lists"
                 }
                 "."
             }

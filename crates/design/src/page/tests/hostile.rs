@@ -8,8 +8,8 @@ use crate::report::{
 };
 
 use crate::robust_report::{
-    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, PeakSensitivity, Robustness,
-    ToleranceResult, Verdict,
+    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Parameter, PeakSensitivity,
+    Robustness, ToleranceResult, Verdict,
 };
 
 pub(super) const MARKUP: &str = "</code></pre><script>alert(1)</script>";
@@ -223,6 +223,14 @@ fn robustness(numbers: &mut Numbers) -> Robustness {
         }],
         tolerance: ToleranceResult {
             entries: 12,
+            parameters: vec![Parameter {
+                name: QUOTES.to_owned(),
+                unit: Some(QUOTES.to_owned()),
+                value: 1.0,
+                limits: [0.5, 1.5],
+                worst: 0.5,
+                effects: vec![0.25, 0.75],
+            }],
             cases: 200,
             seed: 1,
             stable: 0.125,
