@@ -9,6 +9,7 @@
 //! | augmented state observer (ASO): estimate and compensate faults | [`aso`], [`faults`], [`sampled`] |
 //! | test which faults can be estimated | [`detectability`] |
 //! | controllability, observability, distance from losing them, zeros | [`rank`], [`distance`], [`zeros`] |
+//! | residual generators | [`residual`] |
 //! | norms, step and frequency responses, the effect of faults | [`response`] |
 //! | margins of a loop: sensitivity, disk, gain, phase, delay, hold time, parameter tolerances | [`robustness`] |
 //! | bound of the estimation error with a proof | [`theorem1`] |
@@ -44,6 +45,7 @@ pub mod lyapunov;
 pub mod placement;
 mod product;
 pub mod rank;
+pub mod residual;
 pub mod response;
 pub mod riccati;
 pub mod robustness;
