@@ -31,6 +31,7 @@ pub(crate) struct AsoController {
     pub(crate) design: Shared<Design>,
     pub(crate) x_hat_0: Vec<f64>,
     pub(crate) f_hat_0: Vec<f64>,
+    pub(crate) x_i_0: Vec<f64>,
     /// Estimates, measurements and commands as the importer sees them.
     pub(crate) values: Values,
     /// The operating point of `design` at the start of the run.
@@ -73,10 +74,11 @@ impl AsoController {
 
     /// Sets the estimate to its initial value.
     fn start(&mut self) {
-        let [x_hat, f_hat, y_f] = self.design.parts_mut(&mut self.values.z);
+        let [x_hat, f_hat, y_f, x_i] = self.design.parts_mut(&mut self.values.z);
         x_hat.copy_from_slice(&self.x_hat_0);
         f_hat.copy_from_slice(&self.f_hat_0);
         y_f.iter_mut().zip(&self.values.y).for_each(|(y_f, y)| *y_f = *y);
+        x_i.copy_from_slice(&self.x_i_0);
         self.operating_point.read(&self.design);
     }
 
@@ -84,8 +86,9 @@ impl AsoController {
     /// `offset + size`.
     fn advance(&mut self, compensating: bool, part: (f64, f64)) -> Result<(), Failure> {
         let mode = self.free_mode(compensating);
-        let Self { design, values, deviations: Signals { z, y, .. }, observer, .. } = self;
-        let conditions = Conditions { design, y: [y, &values.y_slopes], mode };
+        let Self { design, values, deviations: Signals { z, y, r, .. }, observer, .. } = self;
+        let (y, r) = ([&y[..], &values.y_slopes], [&r[..], &values.r_slopes]);
+        let conditions = Conditions { design, y, r, mode };
         observer
             .get_or_insert_with(|| Observer::new(design))
             .advance(z, conditions, part)
@@ -98,7 +101,7 @@ impl AsoController {
         let until_on = self.design.t_on - step.start;
         let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;
         // z has its deviations from the step before, or from the start.
-        self.deviations.set_measurements(&self.values, &self.operating_point, 0.0);
+        self.deviations.set_inputs(&self.values, &self.operating_point, 0.0);
         if inside {
             self.advance(false, (0.0, until_on))?;
             self.advance(true, (until_on, step.size - until_on))?;
@@ -111,13 +114,12 @@ impl AsoController {
         Ok(())
     }
 
-    /// Computes e, u and E_hat at the state and time reached, `offset` s after the measurements were
-    /// set.
+    /// Computes e, u and E_hat at the state and time reached, `offset` s after the inputs were set.
     fn evaluate(&mut self, offset: f64) {
         let Self { design, values, operating_point, deviations, mode, .. } = self;
         deviations.set(values, operating_point, offset);
         if !self.frozen {
-            *mode = mode.limited(design, &deviations.z);
+            *mode = mode.limited(design, &deviations.z, &deviations.r);
         }
         mode.set_limited(design, &mut deviations.u);
         Equations::<f64>::new(design, *mode).set_signals(&mut &mut *deviations);
@@ -142,7 +144,7 @@ impl AsoController {
         let equations = Equations::<f64>::new(design, *mode);
         equations.set_slopes(equations.knowns(&deviations), &mut &mut z_slopes[..]);
         for (j, slope) in u_slopes.iter_mut().enumerate() {
-            let free = equations.free_command(j, equations.estimate(z_slopes));
+            let free = equations.free_command(j, equations.estimate(z_slopes), &values.r_slopes);
             *slope = if mode.is_limited(j) { 0.0 } else { free };
         }
         for loss in &mut self.losses {
@@ -211,11 +213,13 @@ impl Model for AsoController {
     fn new(resources: &Path) -> Result<Self, Failure> {
         let design = Design::read(resources).map_err(|error| Failure::Error(error.to_string()))?;
         let operating = design.states.iter().map(|state| state.operating.unwrap_or_default());
-        let (values, deviations) = (Values::zero(&design), Signals::zero(&design));
+        let (mut values, deviations) = (Values::zero(&design), Signals::zero(&design));
         let operating_point = OperatingPoint::of(&design);
+        values.r.copy_from_slice(&operating_point.r);
         Ok(Self {
             x_hat_0: operating.collect(),
             f_hat_0: vec![0.0; design.faults.len()],
+            x_i_0: vec![0.0; design.integrals()],
             z_slopes: vec![0.0; values.z.len()],
             u_slopes: vec![0.0; values.u.len()],
             has_slopes: false,
@@ -338,7 +342,8 @@ impl Model for AsoController {
         let mut pairs = indicators.chunks_exact_mut(2);
         for (j, actuator) in self.design.actuators.iter().enumerate() {
             let Some([low, high]) = actuator.range() else { continue };
-            let command = equations.free_command(j, equations.estimate(&self.deviations.z));
+            let Signals { z, r, .. } = &self.deviations;
+            let command = equations.free_command(j, equations.estimate(z), r);
             let distances = [command - low, high - command];
             for (side, indicator) in pairs.next().into_iter().flatten().enumerate() {
                 let beyond = if self.mode.is_at(side, j) { -HYSTERESIS } else { HYSTERESIS };
@@ -356,7 +361,7 @@ impl Model for AsoController {
         self.frozen = true;
         self.deviations.set(&self.values, &self.operating_point, 0.0);
         self.mode = self.free_mode(self.is_compensating(time));
-        self.mode = self.mode.limited(&self.design, &self.deviations.z);
+        self.mode = self.mode.limited(&self.design, &self.deviations.z, &self.deviations.r);
         let waiting = self.compensate && !self.mode.compensating;
         Ok(Event { next_event_time: waiting.then_some(self.design.t_on), ..Event::default() })
     }

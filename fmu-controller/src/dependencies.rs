@@ -8,7 +8,7 @@
 //! A sampled controller changes its outputs at samples only (`fmi2DoStep`, `fmi2NewDiscreteStates`),
 //! so at a point in time they depend on nothing. Its initial values are the values of sample 0.
 
-use fmu::description::DependencyKind::{self, Dependent, Discrete, Fixed};
+use fmu::description::DependencyKind::{self, Constant, Dependent, Discrete, Fixed};
 
 use crate::design::{Design, Estimator};
 use crate::loss::Loss;
@@ -30,6 +30,12 @@ fn measurements(design: &Design) -> Vec<String> {
     design.measurements.iter().map(|signal| signal.name.clone()).collect()
 }
 
+/// The references that commands depend on: those with a feedforward.
+fn fed_forward(design: &Design) -> Vec<String> {
+    let references = if design.n_r.is_some() { &design.references[..] } else { &[] };
+    references.iter().map(|signal| signal.name.clone()).collect()
+}
+
 /// The signals that the innovation is computed from: filtered measurements, or measurements.
 fn observed(design: &Design) -> Vec<String> {
     match design.filter {
@@ -43,33 +49,62 @@ fn kinds_of_feedback(limited: bool) -> [DependencyKind; 2] {
     if limited { [Dependent, Dependent] } else { [Fixed, Discrete] }
 }
 
+/// x_hat, f_hat, x_i and r, from which commands are computed.
+fn of_feedback(design: &Design, [state, fault]: [DependencyKind; 2]) -> Vec<Group> {
+    let mut groups = vec![(state, x_hat(design)), (fault, f_hat(design))];
+    let others = [names::integrals(design).collect(), fed_forward(design)];
+    groups.extend(others.into_iter().filter(|own| !own.is_empty()).map(|own| (state, own)));
+    groups
+}
+
+fn has_limits(design: &Design) -> bool {
+    design.actuators.iter().any(|actuator| actuator.limits.is_some())
+}
+
 /// The dependencies of command `j`.
 pub(crate) fn of_command(design: &Design, j: usize) -> Vec<Group> {
-    let [state, fault] = kinds_of_feedback(design.actuators[j].limits.is_some());
-    vec![(state, x_hat(design)), (fault, f_hat(design))]
+    of_feedback(design, kinds_of_feedback(design.actuators[j].limits.is_some()))
 }
 
 /// The dependencies of each loss of effectiveness.
 pub(crate) fn of_loss(design: &Design) -> Vec<Group> {
-    vec![(Dependent, x_hat(design)), (Dependent, f_hat(design))]
+    of_feedback(design, [Dependent, Dependent])
 }
 
 /// The dependencies of element `i` of z'.
 pub(crate) fn of_slope(design: &Design, i: usize) -> Vec<Group> {
     let (n, q) = (design.states.len(), design.faults.len());
     if i < n {
-        let limited = design.actuators.iter().any(|actuator| actuator.limits.is_some());
-        let [state, fault] = kinds_of_feedback(limited);
-        vec![(Fixed, observed(design)), (state, x_hat(design)), (fault, f_hat(design))]
+        let mut groups = vec![(Fixed, observed(design))];
+        groups.extend(of_feedback(design, kinds_of_feedback(has_limits(design))));
+        groups
     } else if i < n + q {
         let mut groups = vec![(Discrete, observed(design)), (Discrete, x_hat(design))];
         groups.extend(design.a_f.as_ref().map(|_| (Discrete, f_hat(design))));
         groups
+    } else if i >= design.integral_at(0) {
+        of_integral_slope(design, i - design.integral_at(0))
     } else {
         let k = i - n - q;
         let own = [design.measurements[k].name.clone()].into_iter();
         vec![(Fixed, own.chain(names::filtered(design).nth(k)).collect())]
     }
+}
+
+/// The dependencies of element `k` of x_i'.
+fn of_integral_slope(design: &Design, k: usize) -> Vec<Group> {
+    let conditioned = design.l_w.is_some() && has_limits(design);
+    let mut groups = vec![(Fixed, measurements(design))];
+    if !(conditioned && design.n_r.is_some()) {
+        groups.push((Constant, vec![design.references[k].name.clone()]));
+    }
+    if design.f_i.is_some() && !conditioned {
+        groups.push((Fixed, f_hat(design)));
+    }
+    if conditioned {
+        groups.extend(of_feedback(design, [Dependent, Dependent]));
+    }
+    groups
 }
 
 fn row<'a>(name: &'a str, matrix: &'a Matrix, row: usize) -> impl Iterator<Item = String> + 'a {
@@ -114,6 +149,11 @@ fn of_initial_deviation(design: &Design, j: usize) -> Vec<String> {
     names.extend(row("K_x", &design.k_x, j));
     names.extend(row("K_f", &design.k_f, j));
     names.extend(operating_states(design));
+    names.extend(design.k_i.iter().flat_map(|k_i| row("K_i", k_i, j)));
+    if let Some(n_r) = &design.n_r {
+        names.extend(row("N_r", n_r, j));
+        names.extend(of_references(design));
+    }
     if design.actuators[j].limits.is_some() {
         names.extend([0, 1].map(|side| names::limit(design, side, j)));
         names.extend(operating_command(design, j));
@@ -124,6 +164,12 @@ fn of_initial_deviation(design: &Design, j: usize) -> Vec<String> {
         names.extend(whole("L_f", &design.l_f));
     }
     names
+}
+
+/// The dependencies of the initial deviations of the references from the operating point.
+fn of_references(design: &Design) -> Vec<String> {
+    let own = design.references.iter().map(|signal| signal.name.clone());
+    own.chain(names::operating(design, "r_op", design.references.len())).collect()
 }
 
 /// The dependencies of the initial value of command `j`.
@@ -143,6 +189,9 @@ pub(crate) fn of_initial_loss(design: &Design, loss: &Loss) -> Vec<String> {
 /// The dependencies of the initial value of element `i` of z.
 pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
     let (n, q) = (design.states.len(), design.faults.len());
+    if i >= design.integral_at(0) {
+        return names::starts(design).nth(n + q + i - design.integral_at(0)).into_iter().collect();
+    }
     if i >= n + q {
         return vec![design.measurements[i - n - q].name.clone()];
     }
@@ -167,6 +216,8 @@ pub(crate) fn of_initial_slope(design: &Design, i: usize) -> Vec<String> {
         of_initial_state_slope(design, i)
     } else if i < n + q {
         of_initial_fault_slope(design, i - n)
+    } else if i >= design.integral_at(0) {
+        of_initial_integral_slope(design, i - design.integral_at(0))
     } else {
         // y_f starts at y.
         Vec::new()
@@ -180,6 +231,27 @@ fn of_initial_state_slope(design: &Design, i: usize) -> Vec<String> {
         [("A", &design.a), ("B", &design.b), ("F_a", &design.f_a), ("L_x", &design.l_x)]
     {
         names.extend(row(name, matrix, i));
+    }
+    names
+}
+
+fn of_initial_integral_slope(design: &Design, k: usize) -> Vec<String> {
+    let mut names = measurements(design);
+    names.extend(names::operating(design, "y_op", design.measurements.len()));
+    names.extend(design.h.iter().flat_map(|h| row("H", h, k)));
+    let referred = names::operating(design, "r_op", design.references.len());
+    names.push(design.references[k].name.clone());
+    names.extend(referred.skip(k).take(1));
+    if let Some(f_i) = &design.f_i {
+        names.extend(row("F_i", f_i, k));
+        names.extend(names::channels("f_hat_0", design.faults.len()));
+    }
+    if let Some(l_w) = &design.l_w {
+        let limited = design.actuators.iter().enumerate().filter(|(_, own)| own.limits.is_some());
+        for (j, _) in limited {
+            names.extend(row("L_w", l_w, k).skip(j).take(1));
+            names.extend(of_initial_deviation(design, j));
+        }
     }
     names
 }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::matrix::Matrix;
 
 /// The content of a design file. Shapes: n states, m actuators, p measurements, q states of the
-/// fault model.
+/// fault model, t references.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Design {
@@ -57,6 +57,21 @@ pub(crate) struct Design {
     /// L_f, q x p.
     #[serde(rename = "L_f")]
     pub(crate) l_f: Matrix,
+    /// H, t x p, of the integral action x_i' = r - H y + ...; see `equations.rs`.
+    #[serde(rename = "H", default)]
+    pub(crate) h: Option<Matrix>,
+    /// K_i, m x t: the gain of the integral action, stated together with H.
+    #[serde(rename = "K_i", default)]
+    pub(crate) k_i: Option<Matrix>,
+    /// F_i, t x q: H times the estimated sensor faults.
+    #[serde(rename = "F_i", default)]
+    pub(crate) f_i: Option<Matrix>,
+    /// L_w, t x m: the back-calculation of commands at a limit.
+    #[serde(rename = "L_w", default)]
+    pub(crate) l_w: Option<Matrix>,
+    /// N_r, m x t: the feedforward of the references.
+    #[serde(rename = "N_r", default)]
+    pub(crate) n_r: Option<Matrix>,
     /// The n states.
     pub(crate) states: Vec<Signal>,
     /// The m actuators.
@@ -65,6 +80,9 @@ pub(crate) struct Design {
     pub(crate) measurements: Vec<Signal>,
     /// The q states of the fault model.
     pub(crate) faults: Vec<Fault>,
+    /// The t references; the inputs have the same names.
+    #[serde(default)]
+    pub(crate) references: Vec<Signal>,
     /// The experiment that importers run by default.
     pub(crate) experiment: Defaults,
 }
@@ -79,7 +97,7 @@ pub(crate) enum Estimator {
     Prediction,
 }
 
-/// A state or a measurement.
+/// A state, a measurement or a reference.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Signal {
@@ -212,6 +230,7 @@ impl Design {
     /// Sets the missing values of an operating point to 0 where the file states one of them.
     fn complete_the_operating_point(&mut self) {
         let signals = self.states.iter_mut().chain(&mut self.measurements);
+        let signals = signals.chain(&mut self.references);
         let mut values: Vec<_> = signals.map(|signal| &mut signal.operating).collect();
         values.extend(self.actuators.iter_mut().map(|actuator| &mut actuator.operating));
         if values.iter().any(|value| value.is_some()) {
@@ -231,20 +250,31 @@ impl Design {
         self.states.len() + self.faults.len() + k
     }
 
+    /// The position of the integral `k` in z.
+    pub(crate) fn integral_at(&self, k: usize) -> usize {
+        self.filtered_at(self.filter.as_ref().map_or(0, Vec::len)) + k
+    }
+
+    /// The number of integrals: one for each reference, or none.
+    pub(crate) fn integrals(&self) -> usize {
+        self.k_i.as_ref().map_or(0, |k_i| k_i.columns)
+    }
+
     /// The length of z.
     pub(crate) fn order(&self) -> usize {
-        self.filtered_at(self.filter.as_ref().map_or(0, Vec::len))
+        self.integral_at(self.integrals())
     }
 
-    /// x_hat, f_hat and y_f of z.
-    pub(crate) fn parts_mut<'a>(&self, z: &'a mut [f64]) -> [&'a mut [f64]; 3] {
+    /// x_hat, f_hat, y_f and x_i of z.
+    pub(crate) fn parts_mut<'a>(&self, z: &'a mut [f64]) -> [&'a mut [f64]; 4] {
+        let (z, x_i) = z.split_at_mut(self.integral_at(0));
         let (x_hat, rest) = z.split_at_mut(self.states.len());
         let (f_hat, y_f) = rest.split_at_mut(self.faults.len());
-        [x_hat, f_hat, y_f]
+        [x_hat, f_hat, y_f, x_i]
     }
 
-    /// The matrices by the name that the file and the variables have; the last one is A_f, where it
-    /// is stated.
+    /// The matrices by the name that the file and the variables have; those from A_f on only where they
+    /// are stated.
     pub(crate) fn matrices(&self) -> impl Iterator<Item = (&'static str, &Matrix)> {
         let always = [
             ("A", &self.a),
@@ -256,6 +286,15 @@ impl Design {
             ("L_x", &self.l_x),
             ("L_f", &self.l_f),
         ];
-        always.into_iter().chain(self.a_f.as_ref().map(|matrix| ("A_f", matrix)))
+        let stated = [
+            ("A_f", &self.a_f),
+            ("H", &self.h),
+            ("K_i", &self.k_i),
+            ("F_i", &self.f_i),
+            ("L_w", &self.l_w),
+            ("N_r", &self.n_r),
+        ];
+        let stated = stated.into_iter().filter_map(|(name, matrix)| Some((name, matrix.as_ref()?)));
+        always.into_iter().chain(stated)
     }
 }

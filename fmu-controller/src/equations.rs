@@ -1,6 +1,6 @@
 //! The equations of the controller, written once for plain and for dual numbers.
 //!
-//! With z = [x_hat; f_hat; y_f], measurements y and the command u that is really applied (equations
+//! With z = [x_hat; f_hat; y_f; x_i], measurements y, references r and the command u that is really applied (equations
 //! (1), (2), (4), (5), (18) of Patton and Klinkhieo (2009) in the general form)
 //!
 //! ```text
@@ -17,7 +17,19 @@
 //! y_f' = W (y - y_f)
 //! ```
 //!
-//! else z has no y_f. All signals, limits included, are deviations from the operating point, which is
+//! else z has no y_f. In a design with references
+//!
+//! ```text
+//! u    = K_x x_hat + K_f f_hat + K_i x_i + N_r r
+//! x_i' = r - H y + F_i f_hat + L_w (u - (K_x x_hat + K_f f_hat + K_i x_i + N_r r))
+//! ```
+//!
+//! x_i integrates the distance of the references from H y without the estimated sensor faults, -F_i f_hat.
+//! The last term is the back-calculation of Åström and Rundqwist, Integrator windup and how to avoid it
+//! (American Control Conference 1989): it is not zero while a command is at a limit, and then lets x_i
+//! follow the command that is really applied. Each term is there where the design states its matrix.
+//!
+//! All signals, limits included, are deviations from the operating point, which is
 //! zero where the design states none. A sampled controller has the same terms (`sampled.rs`).
 //!
 //! Everything else follows from these functions: the matrices of the exact step (`observer.rs`) are
@@ -35,9 +47,10 @@ use crate::signals::Signals;
 pub(crate) struct Equations<'a, D: Number> {
     design: D::In<'a, Design>,
     mode: Mode,
-    /// Numbers of states and faults: the lengths of the first two parts of z.
+    /// Numbers of states, faults and filters: the lengths of the first three parts of z.
     states: usize,
     faults: usize,
+    filters: usize,
 }
 
 /// The parts of z.
@@ -46,6 +59,7 @@ pub(crate) struct Estimate<'a, D: Number> {
     x_hat: D::In<'a, [f64]>,
     f_hat: D::In<'a, [f64]>,
     y_f: D::In<'a, [f64]>,
+    x_i: D::In<'a, [f64]>,
 }
 
 /// The signals on the right-hand sides.
@@ -53,6 +67,7 @@ pub(crate) struct Estimate<'a, D: Number> {
 pub(crate) struct Knowns<'a, D: Number> {
     pub(crate) z: Estimate<'a, D>,
     pub(crate) y: D::In<'a, [f64]>,
+    pub(crate) r: D::In<'a, [f64]>,
     e: D::In<'a, [f64]>,
     u: D::In<'a, [f64]>,
 }
@@ -66,8 +81,9 @@ impl<D: Number> Knowns<'_, D> {
 
 impl<'a, D: Number> Equations<'a, D> {
     pub(crate) fn new(design: D::In<'a, Design>, mode: Mode) -> Self {
-        let Design { states, faults, .. } = D::values(design);
-        Self { design, mode, states: states.len(), faults: faults.len() }
+        let Design { states, faults, filter, .. } = D::values(design);
+        let filters = filter.as_ref().map_or(0, Vec::len);
+        Self { design, mode, states: states.len(), faults: faults.len(), filters }
     }
 
     /// z as its parts.
@@ -77,7 +93,8 @@ impl<'a, D: Number> Equations<'a, D> {
         Estimate {
             x_hat: D::part(z, |z| &z[..faults.start]),
             f_hat: D::part(z, |z| &z[faults.clone()]),
-            y_f: D::part(z, |z| &z[faults.end..]),
+            y_f: D::part(z, |z| &z[faults.end..faults.end + self.filters]),
+            x_i: D::part(z, |z| &z[faults.end + self.filters..]),
         }
     }
 
@@ -88,12 +105,13 @@ impl<'a, D: Number> Equations<'a, D> {
         Knowns {
             z: self.estimate(D::part(signals, |signals| &signals.z[..])),
             y: D::part(signals, |signals| &signals.y[..]),
+            r: D::part(signals, |signals| &signals.r[..]),
             e: D::part(signals, |signals| &signals.e[..]),
             u: D::part(signals, |signals| &signals.u[..]),
         }
     }
 
-    /// Computes e, the free commands and z' from z and y. The commands at a limit are in u already.
+    /// Computes e, the free commands and z' from z, y and r. The commands at a limit are in u already.
     pub(crate) fn evaluate(
         self,
         signals: &mut D::Out<'_, Signals>,
@@ -103,7 +121,7 @@ impl<'a, D: Number> Equations<'a, D> {
         self.set_slopes(self.knowns(signals), z_slopes);
     }
 
-    /// Computes e and the free commands from z and y.
+    /// Computes e and the free commands from z, y and r.
     pub(crate) fn set_signals(self, signals: &mut D::Out<'_, Signals>) {
         for k in 0..D::values(D::read(signals)).e.len() {
             let Knowns { z, y, .. } = self.knowns(signals);
@@ -113,11 +131,12 @@ impl<'a, D: Number> Equations<'a, D> {
         self.set_free_commands(signals);
     }
 
-    /// Computes the commands that are not at a limit from z.
+    /// Computes the commands that are not at a limit from z and r.
     pub(crate) fn set_free_commands(self, signals: &mut D::Out<'_, Signals>) {
         for j in 0..D::values(D::read(signals)).u.len() {
             if !self.mode.is_limited(j) {
-                let u = self.free_command(j, self.knowns(signals).z);
+                let Knowns { z, r, .. } = self.knowns(signals);
+                let u = self.free_command(j, z, r);
                 D::write(signals, |signals| &mut signals.u[j], u);
             }
         }
@@ -136,20 +155,28 @@ impl<'a, D: Number> Equations<'a, D> {
         observed - self.product(|design| design.c.row(k), x_hat)
     }
 
-    /// Element `j` of K_x x_hat + K_f f_hat, the second term while compensating; limits ignored.
+    /// Element `j` of K_x x_hat + K_f f_hat + K_i x_i + N_r r, the second term while compensating; limits
+    /// ignored.
     #[inline]
-    pub(crate) fn free_command(self, j: usize, z: Estimate<'_, D>) -> D {
+    pub(crate) fn free_command(self, j: usize, z: Estimate<'_, D>, r: D::In<'_, [f64]>) -> D {
         let mut command = self.product(|design| design.k_x.row(j), z.x_hat);
         if self.mode.compensating {
             command += self.product(|design| design.k_f.row(j), z.f_hat);
         }
+        let Design { k_i, n_r, .. } = D::values(self.design);
+        if k_i.is_some() {
+            command += self.product(|design| row(design.k_i.as_ref(), j), z.x_i);
+        }
+        if n_r.is_some() {
+            command += self.product(|design| row(design.n_r.as_ref(), j), r);
+        }
         command
     }
 
-    /// Computes z' = [A x_hat + B u + F_a f_hat + L_x e; A_f f_hat + L_f e; W (y - y_f)], the second part
-    /// 0 unless estimating.
+    /// Computes z' = [A x_hat + B u + F_a f_hat + L_x e; A_f f_hat + L_f e; W (y - y_f); x_i'], the second
+    /// part 0 unless estimating.
     pub(crate) fn set_slopes(self, knowns: Knowns<'_, D>, z_slopes: &mut D::Out<'_, [f64]>) {
-        let Knowns { z: Estimate { x_hat, f_hat, y_f }, y, e, u } = knowns;
+        let Knowns { z: Estimate { x_hat, f_hat, y_f, .. }, y, e, u, .. } = knowns;
         let design = |matrix: fn(&Design) -> &Matrix| D::part(self.design, matrix);
         for i in 0..self.states {
             // -0 + x has the bits of x.
@@ -175,6 +202,29 @@ impl<'a, D: Number> Equations<'a, D> {
             let slope = w * (D::at(y, k) - D::at(y_f, k));
             D::write(z_slopes, |z_slopes| &mut z_slopes[self.states + self.faults + k], slope);
         }
+        let first = self.states + self.faults + self.filters;
+        for i in 0..D::values(self.design).integrals() {
+            let slope = self.integral_slope(i, knowns);
+            D::write(z_slopes, |z_slopes| &mut z_slopes[first + i], slope);
+        }
+    }
+
+    /// Element `i` of x_i' = r - H y + F_i f_hat + L_w (u - free command); in a sampled controller the change
+    /// in a sample, where the first three terms have the factor T.
+    fn integral_slope(self, i: usize, Knowns { z, y, r, u, .. }: Knowns<'_, D>) -> D {
+        let mut slope = D::at(r, i) - self.product(|design| row(design.h.as_ref(), i), y);
+        let Design { f_i, l_w, sample_time, actuators, .. } = D::values(self.design);
+        if f_i.is_some() {
+            slope += self.product(|design| row(design.f_i.as_ref(), i), z.f_hat);
+        }
+        slope *= sample_time.unwrap_or(1.0);
+        if l_w.is_some() {
+            let gains = D::part(self.design, |design| row(design.l_w.as_ref(), i));
+            for j in (0..actuators.len()).filter(|j| self.mode.is_limited(*j)) {
+                slope += D::at(gains, j) * (D::at(u, j) - self.free_command(j, z, r));
+            }
+        }
+        slope
     }
 
     /// Adds [L_x e; L_f e] to x_hat and, while estimating, f_hat.
@@ -209,4 +259,9 @@ impl<'a, D: Number> Equations<'a, D> {
         let row = D::list(D::part(self.design, row));
         row.zip(D::list(vector)).fold(start, |sum, (entry, element)| sum + entry * element)
     }
+}
+
+/// A row of a matrix that a design may state.
+fn row(matrix: Option<&Matrix>, row: usize) -> &[f64] {
+    matrix.map_or(&[], |matrix| matrix.row(row))
 }

@@ -18,15 +18,23 @@ pub(crate) fn filtered(design: &Design) -> impl Iterator<Item = String> {
     channels("y_f", count)
 }
 
-/// `x_hat`, `f_hat` and `y_f`: the continuous states, in the order of z.
-pub(crate) fn estimates(design: &Design) -> impl Iterator<Item = String> {
-    let x_hat = channels("x_hat", design.states.len());
-    x_hat.chain(channels("f_hat", design.faults.len())).chain(filtered(design))
+/// `x_i`, the integrals, where the design has some.
+pub(crate) fn integrals(design: &Design) -> impl Iterator<Item = String> {
+    channels("x_i", design.integrals())
 }
 
-/// `x_hat_0` and `f_hat_0`, in the same order.
+/// `x_hat`, `f_hat`, `y_f` and `x_i`: the continuous states, in the order of z.
+pub(crate) fn estimates(design: &Design) -> impl Iterator<Item = String> {
+    let x_hat = channels("x_hat", design.states.len());
+    let observed = x_hat.chain(channels("f_hat", design.faults.len())).chain(filtered(design));
+    observed.chain(integrals(design))
+}
+
+/// `x_hat_0`, `f_hat_0` and `x_i_0`, in the same order.
 pub(crate) fn starts(design: &Design) -> impl Iterator<Item = String> {
-    channels("x_hat_0", design.states.len()).chain(channels("f_hat_0", design.faults.len()))
+    let x_hat = channels("x_hat_0", design.states.len());
+    let observed = x_hat.chain(channels("f_hat_0", design.faults.len()));
+    observed.chain(channels("x_i_0", design.integrals()))
 }
 
 /// The lower (0) or upper (1) limit of actuator `position`.
@@ -34,7 +42,7 @@ pub(crate) fn limit(design: &Design, side: usize, position: usize) -> String {
     channel(["u_min", "u_max"][side], position, design.actuators.len())
 }
 
-/// `x_op`, `u_op` or `y_op`, where the design has an operating point.
+/// `x_op`, `u_op`, `y_op` or `r_op`, where the design has an operating point.
 pub(crate) fn operating(
     design: &Design,
     name: &'static str,

@@ -1,8 +1,8 @@
 //! The observer with its feedback as one piecewise linear system, stepped exactly.
 //!
-//! While no channel reaches or leaves a limit, the equations are `z' = M z + N [y; w]`, w being the
-//! commands of the channels at a limit, so one step is exact for `y = y_0 + y_1 t`: the hold of
-//! [`FirstOrderHold`].
+//! While no channel reaches or leaves a limit, the equations are `z' = M z + N [y; r; w]`, w being the
+//! commands of the channels at a limit, so one step is exact for `y = y_0 + y_1 t` and r likewise: the
+//! hold of [`FirstOrderHold`].
 
 use std::sync::Arc;
 
@@ -26,9 +26,10 @@ pub(crate) struct Observer {
     cache: Vec<(Mode, f64, Arc<FirstOrderHold>)>,
     /// Position of the propagator that was replaced last.
     replaced: usize,
-    /// Space for [y; w] and its slope, and for z before and after a step.
+    /// Space for [y; r; w] and its slope, for r, and for z before and after a step.
     input: Vec<f64>,
     input_slope: Vec<f64>,
+    reference: Vec<f64>,
     before: Vec<f64>,
     after: Vec<f64>,
 }
@@ -40,14 +41,21 @@ pub(crate) struct Conditions<'a> {
     pub(crate) design: &'a Design,
     /// The measurements at the start of the step, and their slopes.
     pub(crate) y: [&'a [f64]; 2],
+    /// The same of the references.
+    pub(crate) r: [&'a [f64]; 2],
     /// The mode without limits.
     pub(crate) mode: Mode,
 }
 
 impl Conditions<'_> {
-    /// The mode in which z evolves from here.
-    fn mode_at(&self, z: &[f64]) -> Mode {
-        self.mode.limited(self.design, z)
+    /// The mode in which z evolves from here, `time` s after the start of the step; `r` is space for the
+    /// references.
+    fn mode_at(&self, time: f64, z: &[f64], r: &mut [f64]) -> Mode {
+        let [values, slopes] = self.r;
+        for (own, (value, slope)) in r.iter_mut().zip(values.iter().zip(slopes)) {
+            *own = value + slope * time;
+        }
+        self.mode.limited(self.design, z, r)
     }
 }
 
@@ -55,6 +63,7 @@ impl Conditions<'_> {
 fn system(design: &Design, mode: Mode) -> (DMatrix<f64>, DMatrix<f64>) {
     let equations = Equations::<f64>::new(design, mode);
     let (n, p, m) = (design.order(), design.measurements.len(), design.actuators.len());
+    let t = design.references.len();
     let z_slopes = |set: &dyn Fn(&mut Signals)| {
         let mut unit = Signals::zero(design);
         set(&mut unit);
@@ -64,23 +73,27 @@ fn system(design: &Design, mode: Mode) -> (DMatrix<f64>, DMatrix<f64>) {
     };
     let state = (0..n).flat_map(|j| z_slopes(&|unit| unit.z[j] = 1.0));
     let measured = (0..p).flat_map(|k| z_slopes(&|unit| unit.y[k] = 1.0));
+    let referred = (0..t).flat_map(|k| z_slopes(&|unit| unit.r[k] = 1.0));
     let held = (0..m).flat_map(|j| {
         let command = if mode.is_limited(j) { 1.0 } else { 0.0 };
         z_slopes(&|unit| unit.u[j] = command)
     });
-    (DMatrix::from_iterator(n, n, state), DMatrix::from_iterator(n, p + m, measured.chain(held)))
+    let inputs = measured.chain(referred).chain(held);
+    (DMatrix::from_iterator(n, n, state), DMatrix::from_iterator(n, p + t + m, inputs))
 }
 
 impl Observer {
     /// The observer of `design` with an empty cache.
     pub(crate) fn new(design: &Design) -> Self {
-        let inputs = design.measurements.len() + design.actuators.len();
+        let references = design.references.len();
+        let inputs = design.measurements.len() + references + design.actuators.len();
         let states = design.order();
         Self {
             cache: Vec::with_capacity(CACHE_SIZE),
             replaced: 0,
             input: vec![0.0; inputs],
             input_slope: vec![0.0; inputs],
+            reference: vec![0.0; references],
             before: vec![0.0; states],
             after: vec![0.0; states],
         }
@@ -114,7 +127,7 @@ impl Observer {
         conditions: Conditions<'_>,
         span: Span,
     ) -> Result<(), control::Error> {
-        let mode = conditions.mode_at(&self.before);
+        let mode = conditions.mode_at(span.offset, &self.before, &mut self.reference);
         if span.halvings > 0 {
             let stays = self.keeps_mode(mode, conditions, span.half(0))?
                 && self.keeps_mode(mode, conditions, span)?;
@@ -137,20 +150,21 @@ impl Observer {
         span: Span,
     ) -> Result<bool, control::Error> {
         self.propagate(mode, conditions, span)?;
-        Ok(conditions.mode_at(&self.after) == mode)
+        let end = span.offset + span.size;
+        Ok(conditions.mode_at(end, &self.after, &mut self.reference) == mode)
     }
 
     /// Computes `after` from `before` over `span` in `mode`.
     fn propagate(
         &mut self,
         mode: Mode,
-        Conditions { design, y, .. }: Conditions<'_>,
+        Conditions { design, y, r, .. }: Conditions<'_>,
         span: Span,
     ) -> Result<(), control::Error> {
-        let [values, slopes] = y;
-        let (measured, held) = self.input.split_at_mut(values.len());
-        for (k, (value, slope)) in values.iter().zip(slopes).enumerate() {
-            measured[k] = value + slope * span.offset;
+        let given = y[0].iter().zip(y[1]).chain(r[0].iter().zip(r[1]));
+        let (inputs, held) = self.input.split_at_mut(y[0].len() + r[0].len());
+        for (k, (value, slope)) in given.enumerate() {
+            inputs[k] = value + slope * span.offset;
             self.input_slope[k] = *slope;
         }
         for (j, held) in held.iter_mut().enumerate() {

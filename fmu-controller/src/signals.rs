@@ -8,11 +8,14 @@ use crate::mode::Mode;
 /// The signals as the importer sees them.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Values {
-    /// z = [x_hat; f_hat; y_f].
+    /// z = [x_hat; f_hat; y_f; x_i].
     pub(crate) z: Vec<f64>,
     /// The measurements, and their derivatives with respect to time.
     pub(crate) y: Vec<f64>,
     pub(crate) y_slopes: Vec<f64>,
+    /// The references, and their derivatives with respect to time.
+    pub(crate) r: Vec<f64>,
+    pub(crate) r_slopes: Vec<f64>,
     /// The commands.
     pub(crate) u: Vec<f64>,
 }
@@ -20,19 +23,22 @@ pub(crate) struct Values {
 /// The operating point: zero where the design states none.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct OperatingPoint {
-    /// [x_op; 0; y_op], the last part where the design has a filter.
+    /// [x_op; 0; y_op; 0], the last parts where the design has a filter and integrals.
     pub(crate) z: Vec<f64>,
     y: Vec<f64>,
+    pub(crate) r: Vec<f64>,
     u: Vec<f64>,
 }
 
 /// The signals of the equations: deviations from the operating point, or a direction in them.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Signals {
-    /// z = [x_hat; f_hat; y_f].
+    /// z = [x_hat; f_hat; y_f; x_i].
     pub(crate) z: Vec<f64>,
     /// The measurements.
     pub(crate) y: Vec<f64>,
+    /// The references.
+    pub(crate) r: Vec<f64>,
     /// The innovations.
     pub(crate) e: Vec<f64>,
     /// The commands.
@@ -42,8 +48,8 @@ pub(crate) struct Signals {
 impl OperatingPoint {
     /// The operating point of `design`.
     pub(crate) fn of(design: &Design) -> Self {
-        let Signals { z, y, u, .. } = Signals::zero(design);
-        let mut point = Self { z, y, u };
+        let Signals { z, y, r, u, .. } = Signals::zero(design);
+        let mut point = Self { z, y, r, u };
         point.read(design);
         point
     }
@@ -55,10 +61,11 @@ impl OperatingPoint {
                 *to = signal.operating.unwrap_or_default();
             }
         };
-        let [x, _, y_f] = design.parts_mut(&mut self.z);
+        let [x, _, y_f, _] = design.parts_mut(&mut self.z);
         read(x, &design.states);
         read(y_f, &design.measurements);
         read(&mut self.y, &design.measurements);
+        read(&mut self.r, &design.references);
         for (to, actuator) in self.u.iter_mut().zip(&design.actuators) {
             *to = actuator.operating.unwrap_or_default();
         }
@@ -68,28 +75,27 @@ impl OperatingPoint {
 impl Signals {
     /// All signals of `design`, zero.
     pub(crate) fn zero(design: &Design) -> Self {
-        let (p, m) = (design.measurements.len(), design.actuators.len());
-        Self { z: vec![0.0; design.order()], y: vec![0.0; p], e: vec![0.0; p], u: vec![0.0; m] }
+        let zeros = |count| vec![0.0; count];
+        let (p, m, t) =
+            (design.measurements.len(), design.actuators.len(), design.references.len());
+        Self { z: zeros(design.order()), y: zeros(p), r: zeros(t), e: zeros(p), u: zeros(m) }
     }
 
-    /// Sets z and y to the deviations of `values` from `point`, the measurements `offset` s after these
-    /// were given.
+    /// Sets z, y and r to the deviations of `values` from `point`, the inputs `offset` s after these were
+    /// given.
     pub(crate) fn set(&mut self, values: &Values, point: &OperatingPoint, offset: f64) {
         for ((own, value), point) in self.z.iter_mut().zip(&values.z).zip(&point.z) {
             *own = value - point;
         }
-        self.set_measurements(values, point, offset);
+        self.set_inputs(values, point, offset);
     }
 
-    /// Sets y only, `offset` s after the measurements in `values` were given.
-    pub(crate) fn set_measurements(
-        &mut self,
-        values: &Values,
-        point: &OperatingPoint,
-        offset: f64,
-    ) {
+    /// Sets y and r only, `offset` s after the inputs in `values` were given.
+    pub(crate) fn set_inputs(&mut self, values: &Values, point: &OperatingPoint, offset: f64) {
         let measured = values.y.iter().zip(&values.y_slopes).zip(&point.y);
-        for (own, ((value, slope), point)) in self.y.iter_mut().zip(measured) {
+        let referred = values.r.iter().zip(&values.r_slopes).zip(&point.r);
+        let inputs = self.y.iter_mut().chain(&mut self.r);
+        for (own, ((value, slope), point)) in inputs.zip(measured.chain(referred)) {
             *own = value - point + slope * offset;
         }
     }
@@ -98,8 +104,8 @@ impl Signals {
 impl Values {
     /// All signals of `design`, zero.
     pub(crate) fn zero(design: &Design) -> Self {
-        let Signals { z, y, u, .. } = Signals::zero(design);
-        Self { z, y_slopes: y.clone(), y, u }
+        let Signals { z, y, r, u, .. } = Signals::zero(design);
+        Self { z, y_slopes: y.clone(), y, r_slopes: r.clone(), r, u }
     }
 
     /// Sets z, or its first parts, to the operating point plus the deviations `z`.

@@ -51,6 +51,12 @@ fn per_second(unit: Option<&String>) -> Option<String> {
     Unit::parse(&slope).is_ok().then_some(slope)
 }
 
+/// The unit times a second, if it can be written: `m` gives `m.s`.
+fn times_second(unit: Option<&String>) -> Option<String> {
+    let integral = format!("{}.s", unit?);
+    Unit::parse(&integral).is_ok().then_some(integral)
+}
+
 /// Adds dependencies to a variable.
 fn with_dependencies(
     variable: Variable<AsoController>,
@@ -85,6 +91,14 @@ fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
             with_unit(variable, unit).input().derivative(move |model| &mut model.values.y_slopes[k])
         })
         .collect();
+    inputs.extend(design.references.iter().enumerate().map(|(k, signal)| {
+        let Label { unit, meaning } = signal.label();
+        let text = format!("Reference: {meaning}");
+        let variable = Variable::real(&signal.name, text, move |model: &mut AsoController| {
+            &mut model.values.r[k]
+        });
+        with_unit(variable, unit).input().derivative(move |model| &mut model.values.r_slopes[k])
+    }));
     let text = "Whether the estimated fault is compensated from t_on on";
     inputs.push(
         Variable::boolean("compensate", text, |model: &mut AsoController| &mut model.compensate)
@@ -113,27 +127,34 @@ fn commands(design: &Design) -> Vec<Variable<AsoController>> {
 }
 
 /// An element of z.
-struct State<'a> {
+struct State {
     position: usize,
     name: String,
     /// The descriptions of the state and of its derivative.
     texts: [String; 2],
-    unit: Option<&'a String>,
+    /// The units of the state and of its derivative.
+    units: [Option<String>; 2],
 }
 
-fn states(design: &Design) -> Vec<State<'_>> {
+fn states(design: &Design) -> Vec<State> {
     let estimates = design.states.iter().map(Signal::label);
     let estimates = estimates.chain(design.faults.iter().map(Fault::label));
-    let estimates = estimates.map(|label| (["Estimate", "Derivative of the estimate"], label));
-    let filtered = design.measurements.iter().map(Signal::label);
-    let filtered =
-        filtered.map(|label| (["Filtered value", "Derivative of the filtered value"], label));
+    let estimates = estimates.map(|label| ("Estimate", label));
+    let filtered = if design.filter.is_some() { &design.measurements[..] } else { &[] };
+    let filtered = filtered.iter().map(|signal| ("Filtered value", signal.label()));
+    let integrals = if design.k_i.is_some() { &design.references[..] } else { &[] };
+    let integrals = integrals.iter().map(|signal| ("Integral", signal.label()));
     names::estimates(design)
-        .zip(estimates.chain(filtered))
+        .zip(estimates.chain(filtered).chain(integrals))
         .enumerate()
-        .map(|(position, (name, (texts, Label { unit, meaning })))| {
-            let texts = texts.map(|text| format!("{text} of {meaning}"));
-            State { position, name, texts, unit }
+        .map(|(position, (name, (kind, Label { unit, meaning })))| {
+            let derivative = format!("Derivative of the {} of {meaning}", kind.to_lowercase());
+            let texts = [format!("{kind} of {meaning}"), derivative];
+            let units = match kind {
+                "Integral" => [times_second(unit), unit.cloned()],
+                _ => [unit.cloned(), per_second(unit)],
+            };
+            State { position, name, texts, units }
         })
         .collect()
 }
@@ -144,10 +165,10 @@ fn estimates(design: &Design) -> Vec<Variable<AsoController>> {
     faults
         .into_iter()
         .chain(states)
-        .map(|State { position: k, name, texts: [text, _], unit }| {
+        .map(|State { position: k, name, texts: [text, _], units: [unit, _] }| {
             let variable =
                 Variable::real(name, text, move |model: &mut AsoController| &mut model.values.z[k]);
-            output(design, with_unit(variable, unit), Vec::new())
+            output(design, with_unit(variable, unit.as_ref()), Vec::new())
                 .initially(dependencies::of_initial_estimate(design, k))
                 .derivative(move |model| &mut model.with_slopes().z_slopes[k])
         })
@@ -177,12 +198,12 @@ fn losses(controller: &AsoController) -> Vec<Variable<AsoController>> {
 fn slopes(design: &Design) -> Vec<Variable<AsoController>> {
     states(design)
         .into_iter()
-        .map(|State { position: k, name: state, texts: [_, text], unit }| {
+        .map(|State { position: k, name: state, texts: [_, text], units: [_, unit] }| {
             let variable =
                 Variable::real(format!("der({state})"), text, move |model: &mut AsoController| {
                     &mut model.with_slopes().z_slopes[k]
                 });
-            let variable = with_unit(variable, per_second(unit).as_ref()).derivative_of(state);
+            let variable = with_unit(variable, unit.as_ref()).derivative_of(state);
             with_dependencies(variable, dependencies::of_slope(design, k))
                 .initially(dependencies::of_initial_slope(design, k))
         })

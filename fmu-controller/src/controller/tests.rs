@@ -40,9 +40,17 @@ fn ready(mut controller: AsoController) -> AsoController {
     controller
 }
 
+/// A step with the inputs `y`, and the references after them if there are more numbers.
 fn step(controller: &mut AsoController, start: f64, size: f64, y: &[f64], slope: &[f64]) {
-    controller.values.y.copy_from_slice(y);
-    controller.values.y_slopes.copy_from_slice(slope);
+    let values = &mut controller.values;
+    let (y, r) = y.split_at(values.y.len());
+    let (y_slopes, r_slopes) = slope.split_at(values.y.len());
+    values.y.copy_from_slice(y);
+    values.y_slopes.copy_from_slice(y_slopes);
+    if !r.is_empty() {
+        values.r.copy_from_slice(r);
+        values.r_slopes.copy_from_slice(r_slopes);
+    }
     controller.step(&Step { start, size }).unwrap();
 }
 

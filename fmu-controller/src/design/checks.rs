@@ -32,8 +32,24 @@ impl Design {
         let m = ("actuators", self.actuators.len());
         let p = ("measurements", self.measurements.len());
         let q = ("faults", self.faults.len());
-        let expected = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p), (q, q)];
-        for ((what, found), (rows, columns)) in self.matrices().zip(expected) {
+        let t = ("references", self.references.len());
+        let expected = |name| match name {
+            "A" => (n, n),
+            "B" => (n, m),
+            "C" => (p, n),
+            "F_a" => (n, q),
+            "K_x" => (m, n),
+            "K_f" => (m, q),
+            "L_x" => (n, p),
+            "L_f" => (q, p),
+            "H" => (t, p),
+            "K_i" | "N_r" => (m, t),
+            "F_i" => (t, q),
+            "L_w" => (t, m),
+            _ => (q, q),
+        };
+        for (what, found) in self.matrices() {
+            let (rows, columns) = expected(what);
             if (found.rows, found.columns) != (rows.1, columns.1) {
                 return Err(DesignError::Shape {
                     path: path.to_owned(),
@@ -82,7 +98,22 @@ impl Design {
             (None, None, None) => return Some("step_size is missing in experiment".to_owned()),
             _ => {}
         }
-        self.faults.iter().find_map(|fault| self.contradiction_of(fault))
+        let of_faults = self.faults.iter().find_map(|fault| self.contradiction_of(fault));
+        of_faults.or_else(|| self.contradiction_of_references())
+    }
+
+    fn contradiction_of_references(&self) -> Option<String> {
+        let Self { h, k_i, f_i, l_w, n_r, .. } = self;
+        let text = if h.is_some() != k_i.is_some() {
+            "H and K_i belong together, expected both or neither"
+        } else if k_i.is_none() && (f_i.is_some() || l_w.is_some()) {
+            "F_i and L_w belong to K_i, which is missing"
+        } else if self.references.is_empty() == (k_i.is_some() || n_r.is_some()) {
+            "references belong to K_i or N_r, expected [[references]] and one of them, or none"
+        } else {
+            return None;
+        };
+        Some(text.to_owned())
     }
 
     fn contradiction_of(&self, fault: &Fault) -> Option<String> {
@@ -126,7 +157,7 @@ impl Design {
     }
 
     fn refused_signal(&self) -> Option<Refusal> {
-        let signals = self.states.iter().chain(&self.measurements);
+        let signals = self.states.iter().chain(&self.measurements).chain(&self.references);
         let values = signals.map(|signal| (&signal.name, signal.operating));
         let commands = self.actuators.iter().map(|actuator| (&actuator.name, actuator.operating));
         for (name, value) in values.chain(commands) {

@@ -2,7 +2,7 @@
 
 use fmu::Variable;
 
-use super::with_unit;
+use super::{times_second, with_unit};
 use crate::controller::AsoController;
 use crate::design::{Design, Estimator, Fault, Label, Signal};
 use crate::matrix::Matrix;
@@ -12,18 +12,27 @@ use crate::names::channel;
 /// Returns one matrix of a design.
 type Accessor = fn(&mut Design) -> &mut Matrix;
 
-/// Meaning and accessor of the matrices, in the order of [`Design::matrices`].
-const MATRICES: [(&str, Accessor); 9] = [
-    ("system matrix A of (1)", |design| &mut design.a),
-    ("input matrix B of (1)", |design| &mut design.b),
-    ("measurement matrix C of (1)", |design| &mut design.c),
-    ("fault distribution matrix F_a of (1)", |design| &mut design.f_a),
-    ("state feedback gain K_x of (2)", |design| &mut design.k_x),
-    ("fault compensation gain K_f of (2)", |design| &mut design.k_f),
-    ("observer gain L_x of (4)", |design| &mut design.l_x),
-    ("fault observer gain L_f of (5)", |design| &mut design.l_f),
-    ("matrix A_f of the fault model", |design| design.a_f.get_or_insert_default()),
-];
+/// Meaning and accessor of a matrix of [`Design::matrices`].
+fn described(name: &str) -> (&'static str, Accessor) {
+    match name {
+        "A" => ("system matrix A of (1)", |design| &mut design.a),
+        "B" => ("input matrix B of (1)", |design| &mut design.b),
+        "C" => ("measurement matrix C of (1)", |design| &mut design.c),
+        "F_a" => ("fault distribution matrix F_a of (1)", |design| &mut design.f_a),
+        "K_x" => ("state feedback gain K_x of (2)", |design| &mut design.k_x),
+        "K_f" => ("fault compensation gain K_f of (2)", |design| &mut design.k_f),
+        "L_x" => ("observer gain L_x of (4)", |design| &mut design.l_x),
+        "L_f" => ("fault observer gain L_f of (5)", |design| &mut design.l_f),
+        "H" => ("matrix H of the integral action", |design| design.h.get_or_insert_default()),
+        "K_i" => ("gain K_i of the integral action", |design| design.k_i.get_or_insert_default()),
+        "F_i" => ("sensor faults F_i in the integral action", |design| {
+            design.f_i.get_or_insert_default()
+        }),
+        "L_w" => ("back-calculation gain L_w", |design| design.l_w.get_or_insert_default()),
+        "N_r" => ("feedforward gain N_r", |design| design.n_r.get_or_insert_default()),
+        _ => ("matrix A_f of the fault model", |design| design.a_f.get_or_insert_default()),
+    }
+}
 
 pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {
     let mut all = switches(design);
@@ -31,7 +40,8 @@ pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {
     all.extend(filter(design));
     all.extend(operating_point(design));
     all.extend(limits(design));
-    for ((name, matrix), (meaning, place)) in design.matrices().zip(MATRICES) {
+    for (name, matrix) in design.matrices() {
+        let (meaning, place) = described(name);
         all.extend((0..matrix.values.len()).map(|k| {
             Variable::real(matrix.element(name, k), meaning, move |model: &mut AsoController| {
                 &mut place(&mut model.design).values[k]
@@ -72,18 +82,24 @@ fn switches(design: &Design) -> Vec<Variable<AsoController>> {
 
 /// Initial estimates.
 fn starts(design: &Design) -> Vec<Variable<AsoController>> {
-    let order = design.states.len();
+    let (n, q) = (design.states.len(), design.faults.len());
     let labels = design.states.iter().map(Signal::label);
     let labels = labels.chain(design.faults.iter().map(Fault::label));
+    let labels = labels
+        .map(|Label { unit, meaning }| (format!("Initial estimate of {meaning}"), unit.cloned()));
+    let integrals = design.references.iter().map(Signal::label).map(|Label { unit, meaning }| {
+        (format!("Initial integral of {meaning}"), times_second(unit))
+    });
     names::starts(design)
-        .zip(labels)
+        .zip(labels.chain(integrals))
         .enumerate()
-        .map(|(k, (name, Label { unit, meaning }))| {
-            let text = format!("Initial estimate of {meaning}");
-            let variable = Variable::real(name, text, move |model: &mut AsoController| {
-                if k < order { &mut model.x_hat_0[k] } else { &mut model.f_hat_0[k - order] }
+        .map(|(k, (name, (text, unit)))| {
+            let variable = Variable::real(name, text, move |model: &mut AsoController| match k {
+                k if k < n => &mut model.x_hat_0[k],
+                k if k < n + q => &mut model.f_hat_0[k - n],
+                k => &mut model.x_i_0[k - n - q],
             });
-            with_unit(variable, unit).parameter()
+            with_unit(variable, unit.as_ref()).parameter()
         })
         .collect()
 }
@@ -119,6 +135,12 @@ fn operating_point(design: &Design) -> Vec<Variable<AsoController>> {
     for (k, (name, signal)) in measured.zip(&design.measurements).enumerate() {
         all.push(operating(name, signal.label(), move |design| {
             &mut design.measurements[k].operating
+        }));
+    }
+    let referred = names::operating(design, "r_op", design.references.len());
+    for (k, (name, signal)) in referred.zip(&design.references).enumerate() {
+        all.push(operating(name, signal.label(), move |design| {
+            &mut design.references[k].operating
         }));
     }
     all

@@ -149,7 +149,10 @@ fn is_bent((sizes, limits, _): Shape, unknown: &str) -> bool {
             limits.as_bytes()[j - 1] == b'l'
         }
         None if unknown.starts_with("E_hat") => true,
-        None => limits.contains('l') && sizes[0] > 0 && unknown.starts_with("der(x_hat"),
+        None => {
+            let bent = ["der(x_hat", "der(x_i"].iter().any(|state| unknown.starts_with(state));
+            limits.contains('l') && sizes[0] > 0 && bent
+        }
     }
 }
 

@@ -29,7 +29,7 @@ fn each_mode(designs: &[Shape], check: impl Fn(&AsoController, f64)) {
                 let estimate = equations.estimate(&model.deviations.z);
                 let free = |j: usize| {
                     let operating = model.design.actuators[j].operating.unwrap_or_default();
-                    equations.free_command(j, estimate) + operating
+                    equations.free_command(j, estimate, &model.deviations.r) + operating
                 };
                 let middle: Vec<_> = (0..model.values.u.len()).map(free).collect();
                 for (actuator, middle) in model.design.actuators.iter_mut().zip(middle) {

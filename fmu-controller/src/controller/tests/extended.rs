@@ -33,7 +33,7 @@ fn steps_of_any_size_follow_the_equations_of_every_design() {
                 let start = f64::from(k) * size;
                 let begun = &y - &slope * size;
                 step(&mut model, start, size, begun.as_slice(), slope.as_slice());
-                let u = oracle.command(&z, true);
+                let u = oracle.command(&z, &y, true);
                 assert!(agree(&model.values.z, &z.all(), 2e-5), "{of:?} {size}");
                 assert!(agree(&model.values.u, u.as_slice(), 2e-5), "{of:?} {size}");
                 commands.insert(sides(&model));
@@ -53,6 +53,8 @@ fn at_its_operating_point_a_controller_rests() {
         let design = &model.design;
         model.x_hat_0 = design.states.iter().map(|own| own.operating.unwrap()).collect();
         model.f_hat_0.fill(0.0);
+        model.x_i_0.fill(0.0);
+        model.values.r = design.references.iter().map(|own| own.operating.unwrap()).collect();
         model.values.y = design.measurements.iter().map(|own| own.operating.unwrap()).collect();
         let wanted: Vec<_> = design.actuators.iter().map(|own| own.operating.unwrap()).collect();
         let y = model.values.y.clone();

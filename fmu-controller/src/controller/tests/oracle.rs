@@ -19,24 +19,37 @@ pub(super) struct Oracle {
     l_x: DMatrix<f64>,
     l_f: DMatrix<f64>,
     filter: Option<Vector>,
+    tracking: Tracking,
+    r_op: Vector,
+    period: Option<f64>,
     x_op: Vector,
     u_op: Vector,
     y_op: Vector,
     limits: Vec<[f64; 2]>,
 }
 
-/// x_hat, f_hat, y_f.
+/// H, K_i, F_i, L_w, N_r; zero where the design states none.
+struct Tracking {
+    h: DMatrix<f64>,
+    k_i: DMatrix<f64>,
+    f_i: DMatrix<f64>,
+    l_w: DMatrix<f64>,
+    n_r: DMatrix<f64>,
+}
+
+/// x_hat, f_hat, y_f, x_i.
 #[derive(Clone)]
 pub(super) struct Estimate {
     pub(super) x: Vector,
     pub(super) f: Vector,
     pub(super) y_f: Vector,
+    pub(super) x_i: Vector,
 }
 
 impl Estimate {
     /// All numbers.
     pub(super) fn all(&self) -> Vec<f64> {
-        [self.x.as_slice(), self.f.as_slice(), self.y_f.as_slice()].concat()
+        [&self.x, &self.f, &self.y_f, &self.x_i].map(Vector::as_slice).concat()
     }
 
     fn along(&self, slope: &Self, h: f64) -> Self {
@@ -44,6 +57,7 @@ impl Estimate {
             x: &self.x + &slope.x * h,
             f: &self.f + &slope.f * h,
             y_f: &self.y_f + &slope.y_f * h,
+            x_i: &self.x_i + &slope.x_i * h,
         }
     }
 }
@@ -52,7 +66,21 @@ impl Oracle {
     pub(super) fn of(design: &Design) -> Self {
         let operating = |value: Option<f64>| value.unwrap_or(0.0);
         let all = |values: Vec<f64>| Vector::from_vec(values);
+        let (m, p, q) = (design.actuators.len(), design.measurements.len(), design.faults.len());
+        let (t, integrals) = (design.references.len(), design.integrals());
+        let stated = |matrix: &Option<crate::matrix::Matrix>, rows: usize, columns: usize| {
+            matrix.as_ref().map_or(DMatrix::zeros(rows, columns), crate::matrix::Matrix::dense)
+        };
         Self {
+            tracking: Tracking {
+                h: stated(&design.h, integrals, p),
+                k_i: stated(&design.k_i, m, integrals),
+                f_i: stated(&design.f_i, integrals, q),
+                l_w: stated(&design.l_w, integrals, m),
+                n_r: stated(&design.n_r, m, t),
+            },
+            r_op: all(design.references.iter().map(|own| operating(own.operating)).collect()),
+            period: design.sample_time,
             a: design.a.dense(),
             b: design.b.dense(),
             c: design.c.dense(),
@@ -74,18 +102,43 @@ impl Oracle {
         }
     }
 
-    /// The estimate that a controller starts from, and its measurements.
+    /// The estimate that a controller starts from, and its inputs [y; r].
     pub(super) fn start(&self, controller: &AsoController) -> (Estimate, Vector) {
         let y = Vector::from_column_slice(&controller.values.y);
         let filtered = if self.filter.is_some() { y.clone() } else { Vector::zeros(0) };
-        let [x, f] = [&controller.x_hat_0, &controller.f_hat_0];
-        let [x, f] = [x, f].map(|values| Vector::from_column_slice(values));
-        (Estimate { x, f, y_f: filtered }, y)
+        let starts = [&controller.x_hat_0, &controller.f_hat_0, &controller.x_i_0];
+        let [x, f, x_i] = starts.map(|values| Vector::from_column_slice(values));
+        let inputs = [y.as_slice(), &controller.values.r].concat();
+        (Estimate { x, f, y_f: filtered, x_i }, Vector::from_vec(inputs))
     }
 
-    pub(super) fn command(&self, z: &Estimate, on: bool) -> Vector {
+    /// y, and r as deviation, of inputs [y; r].
+    fn inputs(&self, inputs: &Vector) -> (Vector, Vector) {
+        let (p, t) = (self.y_op.len(), self.r_op.len());
+        (inputs.rows(0, p).into(), inputs.rows(p, t) - &self.r_op)
+    }
+
+    /// The command, limits ignored.
+    fn free(&self, z: &Estimate, inputs: &Vector, on: bool) -> Vector {
         let fault = &self.k_f * &z.f * f64::from(u8::from(on));
-        let mut u = &self.u_op + &self.k_x * (&z.x - &self.x_op) + fault;
+        let Tracking { k_i, n_r, .. } = &self.tracking;
+        let reference = k_i * &z.x_i + n_r * self.inputs(inputs).1;
+        &self.u_op + &self.k_x * (&z.x - &self.x_op) + fault + reference
+    }
+
+    /// x_i', without the back-calculation and with it.
+    fn integral(&self, z: &Estimate, inputs: &Vector, on: bool) -> [Vector; 2] {
+        let Tracking { h, f_i, l_w, .. } = &self.tracking;
+        let (y, r) = self.inputs(inputs);
+        let lost = self.command(z, inputs, on) - self.free(z, inputs, on);
+        if h.nrows() == 0 {
+            return [Vector::zeros(0), Vector::zeros(0)];
+        }
+        [r - h * (y - &self.y_op) + f_i * &z.f, l_w * lost]
+    }
+
+    pub(super) fn command(&self, z: &Estimate, inputs: &Vector, on: bool) -> Vector {
+        let mut u = self.free(z, inputs, on);
         for (u, [low, high]) in u.iter_mut().zip(&self.limits) {
             *u = u.clamp(*low, *high);
         }
@@ -97,9 +150,11 @@ impl Oracle {
         source - &self.y_op - &self.c * (&z.x - &self.x_op)
     }
 
-    /// z' at the measurements `y`.
-    fn rate(&self, z: &Estimate, y: &Vector, on: bool) -> Estimate {
-        let (u, e) = (self.command(z, on), self.innovation(z, y));
+    /// z' at the inputs [y; r].
+    fn rate(&self, z: &Estimate, inputs: &Vector, on: bool) -> Estimate {
+        let (y, _) = self.inputs(inputs);
+        let (u, e) = (self.command(z, inputs, on), self.innovation(z, &y));
+        let [x_i, back] = self.integral(z, inputs, on);
         let fault = self.a_f.as_ref().map_or_else(|| &z.f * 0.0, |a_f| a_f * &z.f);
         Estimate {
             x: &self.a * (&z.x - &self.x_op)
@@ -108,10 +163,11 @@ impl Oracle {
                 + &self.l_x * &e,
             f: (fault + &self.l_f * e) * f64::from(u8::from(on)),
             y_f: self.filter.as_ref().map_or(z.y_f.clone(), |w| w.component_mul(&(y - &z.y_f))),
+            x_i: x_i + back,
         }
     }
 
-    /// A classic Runge-Kutta step of `h` from measurements `y` with slopes.
+    /// A classic Runge-Kutta step of `h` from inputs [y; r] with slopes.
     pub(super) fn runge_kutta(
         &self,
         z: &Estimate,
@@ -127,23 +183,24 @@ impl Oracle {
         z.along(&k1, h / 6.0).along(&k2, h / 3.0).along(&k3, h / 3.0).along(&k4, h / 6.0)
     }
 
-    /// A sample at z[k|k-1] with the measurements `y`: the estimate that is used, u, z[k+1|k].
+    /// A sample at z[k|k-1] with the inputs [y; r]: the estimate that is used, u, z[k+1|k].
     pub(super) fn sample(
         &self,
         z: &Estimate,
-        y: &Vector,
+        inputs: &Vector,
         (current, on): (bool, bool),
     ) -> (Estimate, Vector, Estimate) {
-        let e = self.innovation(z, y);
+        let (y, _) = self.inputs(inputs);
+        let e = self.innovation(z, &y);
         let gain = |wanted: bool| if wanted { &e * 1.0 } else { &e * 0.0 };
         let (before, after) = (gain(current), gain(!current));
         let on_number = f64::from(u8::from(on));
         let used = Estimate {
             x: &z.x + &self.l_x * &before,
             f: &z.f + &self.l_f * before * on_number,
-            y_f: z.y_f.clone(),
+            ..z.clone()
         };
-        let u = self.command(&used, on);
+        let u = self.command(&used, inputs, on);
         let x = &self.a * (&used.x - &self.x_op)
             + &self.b * (&u - &self.u_op)
             + &self.f_a * &used.f
@@ -154,9 +211,11 @@ impl Oracle {
             _ => used.f.clone(),
         };
         let f = kept + &self.l_f * after * on_number;
-        let moved = |w: &Vector| &z.y_f + w.component_mul(&(y - &z.y_f));
+        let moved = |w: &Vector| &z.y_f + w.component_mul(&(&y - &z.y_f));
         let y_f = self.filter.as_ref().map_or(z.y_f.clone(), moved);
-        (used, u, Estimate { x, f, y_f })
+        let [x_i, back] = self.integral(&used, inputs, on);
+        let x_i = &z.x_i + x_i * self.period.unwrap_or(f64::NAN) + back;
+        (used, u, Estimate { x, f, y_f, x_i })
     }
 }
 

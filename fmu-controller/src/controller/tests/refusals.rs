@@ -77,6 +77,21 @@ fn each_optional_entry_is_refused_where_it_does_not_fit() {
         ("name = \"f\"", "loss_of = \"u\"\nleast_command = 0.0", "least_command of f = 0"),
         ("name = \"f\"", "loss_of = \"u\"\nleast_command = -1.0", "least_command of f = -1"),
         ("name = \"v\"", "loss_of = \"u\"", "loss_of"),
+        (first, "H = [[1.0]]", "H and K_i belong together"),
+        (first, "K_i = [[1.0]]", "H and K_i belong together"),
+        (first, "L_w = [[1.0]]", "F_i and L_w belong to K_i"),
+        (first, "N_r = [[1.0]]", "references belong to K_i or N_r"),
+        (first, "references = [{ name = \"r\" }]", "references belong to K_i or N_r"),
+        (
+            first,
+            "H = [[1.0, 2.0]]\nK_i = [[1.0]]\nreferences = [{ name = \"r\" }]",
+            "H is 1 x 2, expected 1 x 1 (references x measurements)",
+        ),
+        (
+            first,
+            "N_r = [[1.0, 2.0]]\nreferences = [{ name = \"r\" }]",
+            "N_r is 1 x 2, expected 1 x 1 (actuators x references)",
+        ),
     ];
     for (after, entry, expected) in wrong {
         let message = message("", after, &format!("{after}\n{entry}"));

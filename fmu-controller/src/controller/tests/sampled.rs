@@ -100,7 +100,8 @@ fn in_model_exchange_each_sample_is_a_time_event() {
         assert_eq!(model.model_exchange(), Some(ModelExchange { event_indicators: 0 }));
         for (k, (z, u)) in (0..).zip(&wanted) {
             let time = f64::from(k) * T;
-            model.values.y = y.iter().map(|y| y + SLOPE * time).collect();
+            let inputs = model.values.y.iter_mut().chain(&mut model.values.r);
+            inputs.zip(&y).for_each(|(input, y)| *input = y + SLOPE * time);
             let event = model.event(time).unwrap();
             assert_eq!(event.next_event_time, Some(f64::from(k + 1) * T));
             assert!(agree(&model.values.z, z, 1e-9), "{of:?} {k}");

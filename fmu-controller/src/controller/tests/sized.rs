@@ -9,19 +9,21 @@ use crate::names;
 pub(super) type Sizes = [usize; 4];
 
 /// Sizes; an `l` for each actuator with limits; what else the design has: `a` a fault model A_f, `w`
-/// a filter, `o` an operating point, `e` losses of effectiveness, `c` or `p` samples, with a current
-/// or a prediction estimator.
+/// a filter, `o` an operating point, `e` losses of effectiveness, `i` references with integral action,
+/// `n` references with a feedforward, `c` or `p` samples, with a current or a prediction estimator.
 pub(super) type Shape = (Sizes, &'static str, &'static str);
 
-pub(super) const LIMITED: [Shape; 6] = [
+pub(super) const LIMITED: [Shape; 8] = [
     ([1, 1, 1, 1], "l", ""),
     ([2, 2, 2, 2], "ll", ""),
     ([3, 2, 1, 1], "l-", ""),
     ([4, 3, 2, 3], "-l-", ""),
     ([2, 2, 2, 2], "ll", "o"),
     ([3, 2, 2, 3], "-l", "awoe"),
+    ([2, 2, 2, 2], "ll", "i"),
+    ([3, 2, 2, 3], "-l", "awoein"),
 ];
-pub(super) const FREE: [Shape; 9] = [
+pub(super) const FREE: [Shape; 12] = [
     ([1, 1, 1, 1], "-", ""),
     ([2, 2, 2, 2], "--", ""),
     ([3, 1, 1, 2], "-", ""),
@@ -31,8 +33,11 @@ pub(super) const FREE: [Shape; 9] = [
     ([3, 1, 1, 2], "-", "o"),
     ([2, 2, 1, 2], "--", "e"),
     ([1, 1, 1, 1], "-", "awoe"),
+    ([2, 2, 2, 1], "--", "wi"),
+    ([2, 2, 1, 1], "--", "n"),
+    ([3, 1, 2, 1], "-", "oin"),
 ];
-pub(super) const SAMPLED: [Shape; 8] = [
+pub(super) const SAMPLED: [Shape; 11] = [
     ([1, 1, 1, 1], "l", "c"),
     ([2, 2, 2, 2], "--", "c"),
     ([3, 2, 1, 2], "l-", "cao"),
@@ -41,6 +46,9 @@ pub(super) const SAMPLED: [Shape; 8] = [
     ([1, 1, 1, 1], "l", "p"),
     ([3, 2, 1, 2], "l-", "pae"),
     ([2, 2, 2, 1], "-l", "pawoe"),
+    ([2, 2, 2, 1], "-l", "cawoein"),
+    ([3, 2, 1, 2], "l-", "pi"),
+    ([1, 1, 1, 1], "-", "cn"),
 ];
 
 /// Numbers between -1 and 1, none of them zero, that follow no line.
@@ -72,11 +80,27 @@ fn signals(list: &str, count: usize, (_, limits, features): Shape) -> Vec<String
     lines
 }
 
+/// The number of references of a shape.
+fn references(([_, _, p, _], _, features): Shape) -> usize {
+    if features.contains(['i', 'n']) { p.min(2) } else { 0 }
+}
+
 /// A controller with a full design: no element is zero. Limits are -9 and 9, out of reach.
 pub(super) fn sized(of: Shape) -> AsoController {
     let ([n, m, p, q], _, features) = of;
+    let t = references(of);
     let shapes = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p), (q, q)];
-    let names = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f", "A_f"];
+    let shapes = shapes.into_iter().chain([(t, p), (m, t), (t, q), (t, m), (m, t)]);
+    let names =
+        ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f", "A_f", "H", "K_i", "F_i", "L_w", "N_r"];
+    let has = |letters: &str| letters.chars().all(|letter| features.contains(letter));
+    let stated = |name| match name {
+        "A_f" => has("a"),
+        "H" | "K_i" | "L_w" => has("i"),
+        "F_i" => has("iw"),
+        "N_r" => has("n"),
+        _ => true,
+    };
     let mut lines = vec!["description = \"of any size\"\nt_on = 0.5".to_owned()];
     if features.contains('w') {
         let filter = (0..p).map(|k| 0.5 + 0.4 * number(k + 90)).collect::<Vec<_>>();
@@ -87,18 +111,23 @@ pub(super) fn sized(of: Shape) -> AsoController {
             lines.push(format!("sample_time = 0.1\nestimator = {estimator:?}"));
         }
     }
-    let stated = if features.contains('a') { 9 } else { 8 };
-    for (seed, (name, shape)) in names.iter().zip(shapes).enumerate().take(stated) {
-        lines.push(format!("{name} = {}", matrix(shape, 5 * seed)));
+    for (seed, (name, shape)) in names.into_iter().zip(shapes).enumerate() {
+        if stated(name) {
+            lines.push(format!("{name} = {}", matrix(shape, 5 * seed)));
+        }
     }
     lines.push("[experiment]\nstop_time = 1.0\nstep_size = 0.1".to_owned());
-    for (list, count) in [("states", n), ("actuators", m), ("measurements", p), ("faults", q)] {
+    for (list, count) in
+        [("states", n), ("actuators", m), ("measurements", p), ("faults", q), ("references", t)]
+    {
         lines.extend(signals(list, count, of));
     }
     let mut controller = super::with_design(&lines.join("\n")).unwrap();
     let starts = controller.x_hat_0.iter_mut().chain(&mut controller.f_hat_0);
+    let starts = starts.chain(&mut controller.x_i_0);
     starts.enumerate().for_each(|(k, start)| *start = number(k + 40));
-    controller.values.y.iter_mut().enumerate().for_each(|(k, y)| *y = number(k + 60));
+    let inputs = controller.values.y.iter_mut().chain(&mut controller.values.r);
+    inputs.enumerate().for_each(|(k, input)| *input = number(k + 60));
     controller
 }
 
@@ -112,10 +141,14 @@ fn real(name: String, field: impl Fn(&mut AsoController) -> &mut f64 + 'static) 
     Real { name, field: Box::new(field) }
 }
 
-/// The measurements.
+/// The measurements and the references.
 pub(super) fn inputs(controller: &AsoController) -> Vec<Real> {
-    let signals = controller.design.measurements.iter().enumerate();
-    signals.map(|(k, y)| real(y.name.clone(), move |own| &mut own.values.y[k])).collect()
+    let Design { measurements, references, .. } = &*controller.design;
+    let measured = measurements.iter().enumerate();
+    let measured = measured.map(|(k, y)| real(y.name.clone(), move |own| &mut own.values.y[k]));
+    let referred = references.iter().enumerate();
+    let referred = referred.map(|(k, r)| real(r.name.clone(), move |own| &mut own.values.r[k]));
+    measured.chain(referred).collect()
 }
 
 /// Estimates and filtered measurements.
@@ -166,23 +199,47 @@ fn shared(design: &Design) -> Vec<Real> {
     for (k, name) in names::operating(design, "y_op", p).enumerate() {
         all.push(real(name, move |own| own.design.measurements[k].operating.as_mut().unwrap()));
     }
+    for (k, name) in names::operating(design, "r_op", design.references.len()).enumerate() {
+        all.push(real(name, move |own| own.design.references[k].operating.as_mut().unwrap()));
+    }
     all
+}
+
+/// The matrix of this name.
+fn place<'a>(design: &'a mut Design, name: &str) -> &'a mut Matrix {
+    let stated = match name {
+        "A" => return &mut design.a,
+        "B" => return &mut design.b,
+        "C" => return &mut design.c,
+        "F_a" => return &mut design.f_a,
+        "K_x" => return &mut design.k_x,
+        "K_f" => return &mut design.k_f,
+        "L_x" => return &mut design.l_x,
+        "L_f" => return &mut design.l_f,
+        "A_f" => &mut design.a_f,
+        "H" => &mut design.h,
+        "K_i" => &mut design.k_i,
+        "F_i" => &mut design.f_i,
+        "L_w" => &mut design.l_w,
+        "N_r" => &mut design.n_r,
+        other => panic!("no matrix {other}"),
+    };
+    stated.as_mut().unwrap()
 }
 
 /// Inputs and parameters.
 pub(super) fn initial_knowns(controller: &AsoController) -> Vec<Real> {
     let design = &controller.design;
-    let n = design.states.len();
+    let (n, q) = (design.states.len(), design.faults.len());
     let mut all = inputs(controller);
     all.push(real("t_on".to_owned(), |own| &mut own.design.t_on));
     all.extend(shared(design));
     for (k, name) in names::starts(design).enumerate() {
-        all.push(real(
-            name,
-            move |own| {
-                if k < n { &mut own.x_hat_0[k] } else { &mut own.f_hat_0[k - n] }
-            },
-        ));
+        all.push(real(name, move |own| match k {
+            k if k < n => &mut own.x_hat_0[k],
+            k if k < n + q => &mut own.f_hat_0[k - n],
+            k => &mut own.x_i_0[k - n - q],
+        }));
     }
     for (j, actuator) in design.actuators.iter().enumerate() {
         for side in 0..actuator.limits.map_or(0, |limits| limits.len()) {
@@ -191,20 +248,9 @@ pub(super) fn initial_knowns(controller: &AsoController) -> Vec<Real> {
             }));
         }
     }
-    let places: [fn(&mut Design) -> &mut Matrix; 9] = [
-        |design| &mut design.a,
-        |design| &mut design.b,
-        |design| &mut design.c,
-        |design| &mut design.f_a,
-        |design| &mut design.k_x,
-        |design| &mut design.k_f,
-        |design| &mut design.l_x,
-        |design| &mut design.l_f,
-        |design| design.a_f.as_mut().unwrap(),
-    ];
-    for ((name, matrix), place) in design.matrices().zip(places) {
+    for (name, matrix) in design.matrices() {
         all.extend((0..matrix.values.len()).map(|k| {
-            real(matrix.element(name, k), move |own| &mut place(&mut own.design).values[k])
+            real(matrix.element(name, k), move |own| &mut place(&mut own.design, name).values[k])
         }));
     }
     all
