@@ -8,6 +8,10 @@
 //!   certificate P.
 //! * [`observer_gain`], [`state_feedback`]: compute a gain that places the eigenvalues in a region
 //!   and keeps or minimises such a bound.
+//! * [`certify_common`], [`common_feedback`]: the same for a family of systems, with one P and one
+//!   gain for all of them.
+//! * [`certify_schedule`]: proves that a sampled loop that depends on a scheduling variable is
+//!   stable, with a P that depends on it, too.
 //!
 //! Problems are solved by an interior point method (Clarabel) in coordinates in which the data are
 //! about one. Its result is never trusted: a certificate is returned only if the eigenvalues of its
@@ -20,33 +24,38 @@ mod gain;
 mod observer;
 mod problem;
 mod region;
+mod schedule;
 mod solver;
 mod synthesis;
+mod vertices;
 
 pub use affine::Affine;
 pub use gain::{GainBound, Norm, certify_gain};
 pub use problem::Problem;
 pub use region::{Disc, Region, RegionCertificate, certify_region};
+pub use schedule::{Interval, ScheduleCertificate, bernstein, certify_schedule, largest_change};
 pub use synthesis::{Performance, Synthesis, observer_gain, state_feedback};
+pub use vertices::{CommonFeedback, Vertex, certify_common, common_feedback, largest_scaling};
 
 use nalgebra::{DMatrix, DVector};
 
-/// The outcome of a problem with inequalities.
+/// The outcome of a problem with inequalities; `C` identifies a requirement.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Outcome<T> {
+pub enum Outcome<T, C = &'static str> {
     /// A solution whose inequalities were verified by eigenvalues.
     Optimal(T),
     /// According to the solver no solution exists: these requirements contradict each other, and
     /// every one of them is necessary for the contradiction.
     Infeasible {
-        /// Their names, in the order in which they were stated.
-        conflict: Vec<&'static str>,
+        /// Their names, in the order in which they were stated; for a family the indices of its
+        /// members.
+        conflict: Vec<C>,
     },
     /// Neither a solution nor a contradiction was found in double precision, with the reason.
     Inconclusive(&'static str),
 }
 
-impl<T> Outcome<T> {
+impl<T, C> Outcome<T, C> {
     /// The solution, if there is one.
     pub fn optimal(self) -> Option<T> {
         match self {
@@ -56,7 +65,10 @@ impl<T> Outcome<T> {
     }
 
     /// Applies a function to the solution; any other outcome is passed on.
-    fn then<U, E>(self, next: impl FnOnce(T) -> Result<Outcome<U>, E>) -> Result<Outcome<U>, E> {
+    fn then<U, E>(
+        self,
+        next: impl FnOnce(T) -> Result<Outcome<U, C>, E>,
+    ) -> Result<Outcome<U, C>, E> {
         match self {
             Self::Optimal(answer) => next(answer),
             Self::Infeasible { conflict } => Ok(Outcome::Infeasible { conflict }),

@@ -26,7 +26,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 /// The bound for which a gain is designed, relative to the smallest bound.
 const RELAXED_BOUND: f64 = 1.05;
 /// The bound of norm(P L) within which a gain is designed, relative to the smallest one.
-const RELAXED_GAIN: f64 = 2.0;
+pub(super) const RELAXED_GAIN: f64 = 2.0;
 /// How often the coordinates are refined before the search ends without a gain.
 const REFINEMENTS: usize = 3;
 /// Bound of P and of norm(P L) in the solver's coordinates when a performance is required.
@@ -63,7 +63,7 @@ impl ObserverRequirements<'_> {
         self,
         proof: impl Fn(Candidate) -> Result<Outcome<Synthesis>, Error>,
     ) -> Result<Outcome<Synthesis>, Error> {
-        let (speed, unit) = self.speed()?;
+        let (speed, unit) = speed(self.a, &self.region, self.domain)?;
         let mut coordinates = Coordinates::of_observation(self.a, self.c, speed, unit)?;
         let mut refinements = 0;
         loop {
@@ -93,28 +93,31 @@ impl ObserverRequirements<'_> {
         }
         Ok(outcome)
     }
-
-    /// A power of two near the distance by which eigenvalues are moved, and the unit of frequency.
-    ///
-    /// The distance is that from the mean eigenvalue of A to the target (the centre of the disc,
-    /// else the limit of the decay rate), at least the largest distance of an eigenvalue of A from
-    /// the mean. The unit of frequency is that distance in continuous time, 1 in sampled time.
-    fn speed(self) -> Result<(f64, f64), Error> {
-        let mean = mean_eigenvalue(self.a);
-        let distance = |value: &Complex<f64>| (value - Complex::new(mean, 0.0)).norm();
-        let spread = eigenvalues(self.a)?.iter().map(distance).fold(0.0, f64::max);
-        let limit = |alpha: f64| match self.domain {
-            Domain::Continuous => -alpha,
-            Domain::Sampled { period } => (-alpha * period).exp(),
-        };
-        let disc = self.region.disc.map(|Disc { center, .. }| center);
-        let target = disc.or(self.region.decay.map(limit)).unwrap_or(mean);
-        let speed = spread.max((target - mean).abs());
-        let speed = if speed > 0.0 { power_of_two(speed) } else { 1.0 };
-        Ok((speed, if self.domain == Domain::Continuous { speed } else { 1.0 }))
-    }
 }
 
+/// A power of two near the distance by which eigenvalues are moved, and the unit of frequency.
+///
+/// The distance is that from the mean eigenvalue of A to the target (the centre of the disc,
+/// else the limit of the decay rate), at least the largest distance of an eigenvalue of A from
+/// the mean. The unit of frequency is that distance in continuous time, 1 in sampled time.
+pub(super) fn speed(
+    a: &DMatrix<f64>,
+    region: &Region,
+    domain: Domain,
+) -> Result<(f64, f64), Error> {
+    let mean = mean_eigenvalue(a);
+    let distance = |value: &Complex<f64>| (value - Complex::new(mean, 0.0)).norm();
+    let spread = eigenvalues(a)?.iter().map(distance).fold(0.0, f64::max);
+    let limit = |alpha: f64| match domain {
+        Domain::Continuous => -alpha,
+        Domain::Sampled { period } => (-alpha * period).exp(),
+    };
+    let disc = region.disc.map(|Disc { center, .. }| center);
+    let target = disc.or(region.decay.map(limit)).unwrap_or(mean);
+    let speed = spread.max((target - mean).abs());
+    let speed = if speed > 0.0 { power_of_two(speed) } else { 1.0 };
+    Ok((speed, if domain == Domain::Continuous { speed } else { 1.0 }))
+}
 /// The semidefinite program for L in given coordinates.
 struct ObserverProgram<'a> {
     requirements: ObserverRequirements<'a>,
@@ -261,7 +264,7 @@ impl<'a> ObserverProgram<'a> {
 }
 
 /// [t I, Z; Z', t I], which is positive semidefinite if and only if the norm of Z is at most t.
-fn norm_below(z: &Affine, t: &Affine) -> Affine {
+pub(super) fn norm_below(z: &Affine, t: &Affine) -> Affine {
     let (rows, cols) = z.shape();
     let t_identity = |order: usize| t.times(&DMatrix::identity(order, order));
     Affine::blocks(&[&[&t_identity(rows), z], &[&z.transpose(), &t_identity(cols)]])

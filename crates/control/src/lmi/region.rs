@@ -8,11 +8,12 @@ use crate::domain::Domain;
 use crate::eigen::eigenvalues;
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix};
+use std::slice::from_ref;
 
 /// Margin of the inequalities in the solver's coordinates, where the data are about one.
 pub(super) const MARGIN: f64 = 2e-7;
 
-const NO_P: &str = "the region could not be proven in double precision";
+pub(super) const NO_P: &str = "the region could not be proven in double precision";
 
 /// A disc around a real number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -142,7 +143,7 @@ impl Region {
     }
 
     /// Names of the parts that do not contain all eigenvalues.
-    fn violated(&self, values: &[Complex<f64>], domain: Domain) -> Vec<&'static str> {
+    pub(super) fn violated(&self, values: &[Complex<f64>], domain: Domain) -> Vec<&'static str> {
         let parts = self.parts(domain, 1.0);
         let outside = |part: &&Part| values.iter().any(|value| !part.shape.contains(value));
         parts.iter().filter(outside).map(|part| part.name).collect()
@@ -227,53 +228,57 @@ pub fn certify_region(
         return Ok(Outcome::Infeasible { conflict });
     }
     match Coordinates::of_dynamics(a)? {
-        Some(coordinates) => certify_in(&coordinates, a, region, domain),
+        Some(coordinates) => certify_in(&coordinates, from_ref(a), region, domain),
         None => Ok(Outcome::Inconclusive(NO_P)),
     }
 }
 
-/// [`certify_region`] with the program solved in given coordinates.
+/// One P for all `vertices`, with the program solved in given coordinates.
 pub(super) fn certify_in(
     coordinates: &Coordinates,
-    a: &DMatrix<f64>,
+    vertices: &[DMatrix<f64>],
     region: &Region,
     domain: Domain,
 ) -> Result<Outcome<RegionCertificate>, Error> {
-    let n = a.nrows();
+    let n = vertices[0].nrows();
     let mut problem = Problem::new();
     let p = problem.symmetric(n);
     problem.constrain(&p, MARGIN);
     problem.constrain(&(&Affine::identity(n, 1.0) - &p), MARGIN);
-    let product = &p * &coordinates.dynamics(a);
-    for (_, matrix) in region.inequalities(&p, &product, domain, coordinates.unit) {
-        problem.constrain(&matrix, MARGIN);
+    for a in vertices {
+        let product = &p * &coordinates.dynamics(a);
+        for (_, matrix) in region.inequalities(&p, &product, domain, coordinates.unit) {
+            problem.constrain(&matrix, MARGIN);
+        }
     }
     match problem.solve()? {
         Outcome::Optimal(solution) => {
-            verify(a, region, domain, coordinates.certificate(&solution.value(&p)))
+            verify(vertices, region, domain, coordinates.certificate(&solution.value(&p)))
         }
         _ => Ok(Outcome::Inconclusive(NO_P)),
     }
 }
 
-/// Verifies the inequalities for P in the units of the data.
+/// Verifies the inequalities of all vertices for P in the units of the data.
 fn verify(
-    a: &DMatrix<f64>,
+    vertices: &[DMatrix<f64>],
     region: &Region,
     domain: Domain,
     p: DMatrix<f64>,
 ) -> Result<Outcome<RegionCertificate>, Error> {
-    let product = AccurateProduct::new(&p, a);
     let matrices = |p: &DMatrix<f64>, product: &DMatrix<f64>| {
         let (p, product) = (Affine::constant(p), Affine::constant(product));
         region.inequalities(&p, &product, domain, 1.0)
     };
     let zero = DMatrix::zeros(p.nrows(), p.nrows());
-    let rounded = matrices(&p, &product.high);
-    let corrections = matrices(&zero, &product.low);
     let mut smallest = margin(&p)?;
-    for ((_, matrix), (_, correction)) in rounded.iter().zip(&corrections) {
-        smallest = smallest.min(margin(&(&matrix.constant + &correction.constant))?);
+    for a in vertices {
+        let product = AccurateProduct::new(&p, a);
+        let rounded = matrices(&p, &product.high);
+        let corrections = matrices(&zero, &product.low);
+        for ((_, matrix), (_, correction)) in rounded.iter().zip(&corrections) {
+            smallest = smallest.min(margin(&(&matrix.constant + &correction.constant))?);
+        }
     }
     if smallest > 0.0 {
         return Ok(Outcome::Optimal(RegionCertificate { p, margin: smallest }));

@@ -6,6 +6,7 @@ use super::region::{Region, RegionCertificate, certify_region};
 use super::{Outcome, gain, region};
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
+use std::slice::from_ref;
 
 const NOT_PROVEN: &str = "a gain was found, but the requirements could not be proven for it";
 
@@ -231,7 +232,8 @@ fn prove(
     domain: Domain,
 ) -> Result<Outcome<Synthesis>, Error> {
     let Candidate { gain, coordinates } = candidate;
-    let certificate = match region::certify_in(&coordinates, dynamics, region, domain)?.optimal() {
+    let own = region::certify_in(&coordinates, from_ref(dynamics), region, domain)?;
+    let certificate = match own.optimal() {
         None => certify_region(dynamics, region, domain)?.optimal(),
         certificate => certificate,
     };

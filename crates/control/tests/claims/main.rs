@@ -7,6 +7,8 @@ mod detectability;
 mod distance;
 mod eigen;
 mod exponential;
+#[cfg(feature = "lmi")]
+mod family;
 mod faults;
 mod hold;
 #[cfg(feature = "lmi")]

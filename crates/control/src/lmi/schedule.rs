@@ -1,0 +1,257 @@
+//! The certificate of a sampled loop that depends on a scheduling variable.
+
+use super::coordinates::Coordinates;
+use super::definite::{AccurateProduct, margin};
+use super::region::MARGIN;
+use super::{Affine, Problem};
+use crate::{Error, check};
+use nalgebra::{DMatrix, DVector};
+
+/// Factor between the rates that [`largest_change`] tries, their number, and the bisections after them.
+const FACTOR: f64 = 0.25;
+const RATES: usize = 7;
+const BISECTIONS: usize = 3;
+
+/// A sampled loop on an interval of its scheduling variable theta, a polynomial of t = (theta -
+/// `theta_1`) / length from 0 to 1.
+///
+/// ```text
+/// A(t) = sum over j of C(d, j) t^j (1 - t)^(d - j) A_j
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Interval {
+    /// Length of the interval, above 0, in the unit of theta.
+    pub length: f64,
+    /// The Bernstein coefficients `A_0` to `A_d`, n x n; see [`bernstein`]. A(t) is in their convex
+    /// hull.
+    pub coefficients: Vec<DMatrix<f64>>,
+}
+
+/// A Lyapunov function x' P(theta) x, P piecewise linear over the grid.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct ScheduleCertificate {
+    /// The largest change of theta in a sample, in the unit of theta.
+    pub change: f64,
+    /// P at each grid point, n x n: one more than intervals.
+    pub p: Vec<DMatrix<f64>>,
+    /// Smallest eigenvalue of all inequalities, each scaled to a diagonal of about one; larger than
+    /// the rounding errors.
+    pub margin: f64,
+}
+
+/// The Bernstein coefficients of a polynomial of degree d from its values at t = 0, 1/d, ..., 1.
+///
+/// `values`: d + 1 matrices of one shape. The values of the polynomial between 0 and 1 are in the
+/// convex hull of the coefficients; the first and the last coefficient are the values at the ends.
+/// Method: the linear equations with the values of the Bernstein polynomials; for d up to 6 the
+/// error is below 1e3 units of rounding of the largest value.
+///
+/// # Errors
+///
+/// [`Error::Empty`] without values; [`Error::Shape`] for values of different shapes.
+pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
+    let Some(first) = values.first() else {
+        return Err(Error::Empty { matrix: "values", found: (0, 0) });
+    };
+    for value in values {
+        check::shape("value", value, first.shape())?;
+    }
+    let degree = values.len() - 1;
+    if degree == 0 {
+        return Ok(values.to_vec());
+    }
+    let number = |k: usize| f64::from(u32::try_from(k).unwrap_or(u32::MAX));
+    let basis = DMatrix::from_fn(degree + 1, degree + 1, |at, j| {
+        let t = number(at) / number(degree);
+        let choose = (0..j).fold(1.0, |all, k| all * number(degree - k) / number(k + 1));
+        let power = |base: f64, exponent: usize| (0..exponent).fold(1.0, |all, _| all * base);
+        choose * power(t, j) * power(1.0 - t, degree - j)
+    });
+    let singular = Error::Overflow { what: "the basis of Bernstein polynomials" };
+    let inverse = basis.try_inverse().ok_or(singular)?;
+    let coefficient = |j: usize| match j {
+        0 => first.clone(),
+        j if j == degree => values[degree].clone(),
+        j => values
+            .iter()
+            .enumerate()
+            .fold(first * 0.0, |sum, (at, value)| sum + value * inverse[(j, at)]),
+    };
+    Ok((0..=degree).map(coefficient).collect())
+}
+
+/// Proves that a sampled loop is stable while its scheduling variable changes by at most `change`
+/// from one sample to the next.
+///
+/// ```text
+/// x[k+1] = A(theta[k]) x[k],  |theta[k+1] - theta[k]| <= change,  V = x' P(theta) x
+/// [P(theta), A(theta)' P+; P+ A(theta), P+] > 0,  P+ = P(theta) + D
+/// for D = change P_i', change P_{i+1}', -change P_i', -change P_{i-1}'
+/// ```
+///
+/// `P_i`' is the slope of P in interval i. P(theta[k+1]) - P(theta[k]) is in the convex hull of the
+/// four D, as `change` is at most the length of the shortest interval. The matrices are polynomials
+/// of t in each interval; all their Bernstein coefficients are positive definite, so the proof holds
+/// between the grid points, too. It is sufficient, not necessary.
+///
+/// Returns None if no P was found. The P of the solver is verified by the eigenvalues of all
+/// inequalities in the units of the data, with products in twice the precision. Cost: that of a
+/// program with n (n + 1) / 2 unknowns for each grid point and 4 (d + 2) inequalities of order 2 n
+/// for each interval.
+///
+/// Source: P. Apkarian, P. Gahinet, G. Becker, Self-scheduled H-infinity control of linear
+/// parameter-varying systems, Automatica 31 (1995); F. Wu, X. H. Yang, A. Packard, G. Becker,
+/// Induced L2-norm control for LPV systems with bounded parameter variation rates, Int. J. Robust
+/// Nonlinear Control 6 (1996); in sampled time the inequality of J. Daafouz and J. Bernussou,
+/// Parameter dependent Lyapunov functions for discrete time systems, Systems & Control Letters 43
+/// (2001).
+///
+/// # Errors
+///
+/// [`Error::Empty`], [`Error::Shape`], [`Error::NotFinite`] for bad or missing intervals;
+/// [`Error::OutOfRange`] for a length or a change that is not above 0, or a change beyond the
+/// shortest interval; [`Error::NotConverged`].
+pub fn certify_schedule(
+    intervals: &[Interval],
+    change: f64,
+) -> Result<Option<ScheduleCertificate>, Error> {
+    let shortest = check(intervals)?;
+    check::positive("change", change)?;
+    if change > shortest {
+        let rule = "at most the length of the shortest interval";
+        return Err(Error::OutOfRange { name: "change", value: change, rule });
+    }
+    let Some(mut coordinates) = Coordinates::of_dynamics(&intervals[0].coefficients[0])? else {
+        return Ok(None);
+    };
+    coordinates.unit = 1.0;
+    let inside: Vec<_> = intervals
+        .iter()
+        .map(|own| Interval {
+            length: own.length,
+            coefficients: own.coefficients.iter().map(|a| coordinates.dynamics(a)).collect(),
+        })
+        .collect();
+    let n = intervals[0].coefficients[0].nrows();
+    let mut problem = Problem::new();
+    let p: Vec<_> = (0..=intervals.len()).map(|_| problem.symmetric(n)).collect();
+    for own in &p {
+        problem.constrain(own, MARGIN);
+        problem.constrain(&(&Affine::identity(n, 1.0) - own), MARGIN);
+    }
+    for matrix in inequalities(&inside, &p, change, |p, a| p * a) {
+        problem.constrain(&matrix, MARGIN);
+    }
+    let Some(solution) = problem.solve()?.optimal() else { return Ok(None) };
+    let p: Vec<_> = p.iter().map(|own| coordinates.certificate(&solution.value(own))).collect();
+    verified(intervals, change, p)
+}
+
+/// The largest change of the scheduling variable in a sample that [`certify_schedule`] proves, to
+/// 10 %, between the shortest interval and 1/4096 of it; None if it proves none of these.
+///
+/// # Errors
+///
+/// Same as [`certify_schedule`].
+pub fn largest_change(intervals: &[Interval]) -> Result<Option<ScheduleCertificate>, Error> {
+    let mut change = check(intervals)?;
+    let mut found = None;
+    for _ in 0..RATES {
+        found = certify_schedule(intervals, change)?;
+        if found.is_some() {
+            break;
+        }
+        change *= FACTOR;
+    }
+    let Some(mut best) = found else { return Ok(None) };
+    if change >= check(intervals)? {
+        return Ok(Some(best));
+    }
+    let mut bad = best.change / FACTOR;
+    for _ in 0..BISECTIONS {
+        let middle = (best.change * bad).sqrt();
+        match certify_schedule(intervals, middle)? {
+            Some(better) => best = better,
+            None => bad = middle,
+        }
+    }
+    Ok(Some(best))
+}
+
+/// The length of the shortest interval of a consistent list.
+fn check(intervals: &[Interval]) -> Result<f64, Error> {
+    let none = Error::Empty { matrix: "A", found: (0, 0) };
+    let first = intervals.first().and_then(|own| own.coefficients.first()).ok_or(none.clone())?;
+    let n = check::square("A", first)?;
+    let mut shortest = f64::INFINITY;
+    for Interval { length, coefficients } in intervals {
+        check::positive("length", *length)?;
+        shortest = shortest.min(*length);
+        if coefficients.is_empty() {
+            return Err(none);
+        }
+        for a in coefficients {
+            check::square("A", a)?;
+            check::shape("A", a, (n, n))?;
+        }
+    }
+    Ok(shortest)
+}
+
+/// The Bernstein coefficients of the inequalities; `times` returns the product P A.
+fn inequalities(
+    intervals: &[Interval],
+    p: &[Affine],
+    change: f64,
+    times: impl Fn(&Affine, &DMatrix<f64>) -> Affine,
+) -> Vec<Affine> {
+    let slope = |i: usize| &(&p[i + 1] - &p[i]) * (1.0 / intervals[i].length);
+    let mut all = Vec::new();
+    for (i, Interval { coefficients: a, .. }) in intervals.iter().enumerate() {
+        let right = (i + 1).min(intervals.len() - 1);
+        let left = i.saturating_sub(1);
+        let mut moves = vec![(i, change), (i, -change)];
+        moves.extend((right != i).then_some((right, change)));
+        moves.extend((left != i).then_some((left, -change)));
+        let number = |k: usize| f64::from(u32::try_from(k).unwrap_or(u32::MAX));
+        // The degree of P A is that of A and 1 more.
+        let degree = a.len();
+        for (interval, step) in moves {
+            let by = &slope(interval) * step;
+            let ends = [&p[i] + &by, &p[i + 1] + &by];
+            for j in 0..=degree {
+                let t = number(j) / number(degree);
+                let between = |[from, to]: [&Affine; 2]| &(from * (1.0 - t)) + &(to * t);
+                let now = between([&p[i], &p[i + 1]]);
+                let then = between([&ends[0], &ends[1]]);
+                let (n, _) = now.shape();
+                let mut product = Affine::zeros(n, n);
+                if j < degree {
+                    product = &product + &(&times(&ends[0], &a[j]) * (1.0 - t));
+                }
+                if j > 0 {
+                    product = &product + &(&times(&ends[1], &a[j - 1]) * t);
+                }
+                all.push(Affine::blocks(&[&[&now, &product.transpose()], &[&product, &then]]));
+            }
+        }
+    }
+    all
+}
+
+/// The certificate, if P proves the inequalities in the units of the data.
+fn verified(
+    intervals: &[Interval],
+    change: f64,
+    p: Vec<DMatrix<f64>>,
+) -> Result<Option<ScheduleCertificate>, Error> {
+    let known: Vec<_> = p.iter().map(Affine::constant).collect();
+    let times =
+        |p: &Affine, a: &DMatrix<f64>| Affine::constant(&AccurateProduct::new(&p.constant, a).high);
+    let mut smallest = f64::INFINITY;
+    for matrix in known.iter().cloned().chain(inequalities(intervals, &known, change, times)) {
+        smallest = smallest.min(margin(&matrix.evaluate(&DVector::zeros(0)))?);
+    }
+    Ok((smallest > 0.0).then_some(ScheduleCertificate { change, p, margin: smallest }))
+}

@@ -1,0 +1,417 @@
+//! One certificate, and one state feedback, for all members of a family of systems.
+
+use super::coordinates::Coordinates;
+use super::observer::{RELAXED_GAIN, norm_below, speed};
+use super::region::{MARGIN, NO_P, Region, RegionCertificate, certify_in};
+use super::{Affine, Outcome, Problem};
+use crate::balance::{divide_columns, divide_rows, power_of_two};
+use crate::eigen::eigenvalues;
+use crate::{Domain, Error, check};
+use nalgebra::{DMatrix, DVector};
+
+/// How often the coordinates are refined before a search ends without an answer.
+const REFINEMENTS: usize = 3;
+/// Bisections of [`largest_scaling`]: 1/128 of the family.
+const BISECTIONS: u32 = 7;
+
+const NOT_PROVEN: &str = "a gain was found, but it could not be proven for all members";
+const UNDECIDED: &str = "the inequalities are met or missed by a rounding error";
+
+/// A member of a family of plants x' = A x + B u.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Vertex {
+    /// A, n x n.
+    pub a: DMatrix<f64>,
+    /// B, n x m.
+    pub b: DMatrix<f64>,
+}
+
+/// A state feedback for all members of a family.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct CommonFeedback {
+    /// K of u = K x, m x n.
+    pub gain: DMatrix<f64>,
+    /// The proof, with one P for all closed loops `A_i` + `B_i` K.
+    pub certificate: RegionCertificate,
+}
+
+/// One P that proves for every `A_i` of a family that its eigenvalues are in a region.
+///
+/// ```text
+/// P > 0 and, for each i, the inequalities of certify_region with A = A_i
+/// ```
+///
+/// `vertices`: n x n, at least one. The inequalities are affine in A, so P proves the same for
+/// every matrix in the convex hull of the vertices. With P the function V = x' P x decreases along
+/// x' = A(t) x, or x+ = `A_k` x, while A varies in the hull with time in any way, arbitrarily fast:
+/// V(t) <= exp(-2 alpha t) V(0) for a decay rate alpha. For the disc and the sector P is a
+/// statement on each constant matrix of the hull. One P is sufficient, not necessary, for either.
+///
+/// Of all P <= I the one farthest inside of all inequalities is computed, in the coordinates that
+/// suit the first vertex, then up to three times in those in which the most interior P is the
+/// identity. It is verified for each vertex in the units of the data, as in
+/// [`super::certify_region`]. [`Outcome::Infeasible`] has the indices of vertices whose
+/// eigenvalues are outside of the region, or else of vertices that have no common P, each of them
+/// necessary for the contradiction.
+///
+/// Source: S. Boyd, L. El Ghaoui, E. Feron, V. Balakrishnan, Linear matrix inequalities in system
+/// and control theory (1994), section 5.1; M. Chilali, P. Gahinet, P. Apkarian, Robust pole
+/// placement in LMI regions, IEEE Trans. Autom. Control 44 (1999).
+///
+/// # Example
+///
+/// Both matrices are stable. Switched between them, the state grows, so that there is no common P:
+///
+/// ```
+/// use control::Domain;
+/// use control::lmi::{Outcome, Region, certify_common};
+/// use nalgebra::DMatrix;
+/// let one = DMatrix::from_row_slice(2, 2, &[-0.1, 1.0, -10.0, -0.1]);
+/// let other = DMatrix::from_row_slice(2, 2, &[-0.1, 10.0, -1.0, -0.1]);
+/// let found = certify_common(&[one, other], &Region::default(), Domain::Continuous)?;
+/// let Outcome::Infeasible { conflict } = found else { panic!() };
+/// assert_eq!(conflict, [0, 1]);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for bad or missing vertices;
+/// [`Error::OutOfRange`] for a bad region; [`Error::NotConverged`].
+pub fn certify_common(
+    vertices: &[DMatrix<f64>],
+    region: &Region,
+    domain: Domain,
+) -> Result<Outcome<RegionCertificate, usize>, Error> {
+    let n = order(vertices.first())?;
+    for a in vertices {
+        check::square("A", a)?;
+        check::shape("A", a, (n, n))?;
+    }
+    region.check(domain)?;
+    let mut outside = Vec::new();
+    for (at, a) in vertices.iter().enumerate() {
+        if !region.violated(&eigenvalues(a)?, domain).is_empty() {
+            outside.push(at);
+        }
+    }
+    if !outside.is_empty() {
+        return Ok(Outcome::Infeasible { conflict: outside });
+    }
+    let Some(coordinates) = Coordinates::of_dynamics(&vertices[0])? else {
+        return Ok(Outcome::Inconclusive(NO_P));
+    };
+    Analysis { vertices, region, domain }.certificate(coordinates)
+}
+
+fn order(first: Option<&DMatrix<f64>>) -> Result<usize, Error> {
+    match first {
+        Some(a) => check::square("A", a),
+        None => Err(Error::Empty { matrix: "A", found: (0, 0) }),
+    }
+}
+
+/// The search for a common P of given matrices.
+struct Analysis<'a> {
+    vertices: &'a [DMatrix<f64>],
+    region: &'a Region,
+    domain: Domain,
+}
+
+impl Analysis<'_> {
+    fn certificate(
+        &self,
+        mut coordinates: Coordinates,
+    ) -> Result<Outcome<RegionCertificate, usize>, Error> {
+        let all: Vec<_> = (0..self.vertices.len()).collect();
+        for refinement in 0..=REFINEMENTS {
+            let found = certify_in(&coordinates, self.vertices, self.region, self.domain)?;
+            if let Outcome::Optimal(certificate) = found {
+                return Ok(Outcome::Optimal(certificate));
+            }
+            let (problem, p) = self.decision(&coordinates, &all);
+            let refined = problem.most_interior().map(|unknowns| p.evaluate(&unknowns));
+            match refined.and_then(|p| coordinates.refined(&p)) {
+                Some(refined) if refinement < REFINEMENTS => coordinates = refined,
+                _ => break,
+            }
+        }
+        contradiction(all, |members| self.decision(&coordinates, members).0)
+    }
+
+    /// P >= I and the inequalities of some vertices.
+    fn decision(&self, coordinates: &Coordinates, members: &[usize]) -> (Problem, Affine) {
+        let mut problem = Problem::new();
+        let p = problem.symmetric(self.vertices[0].nrows());
+        problem.constrain(&p, 1.0);
+        for &at in members {
+            let product = &p * &coordinates.dynamics(&self.vertices[at]);
+            let matrices = self.region.inequalities(&p, &product, self.domain, coordinates.unit);
+            for (_, matrix) in matrices {
+                problem.constrain(&matrix, MARGIN);
+            }
+        }
+        (problem, p)
+    }
+}
+
+/// The members that contradict each other, each of them necessary; inconclusive if the program of
+/// all members is not infeasible.
+fn contradiction<T>(
+    all: Vec<usize>,
+    program: impl Fn(&[usize]) -> Problem,
+) -> Result<Outcome<T, usize>, Error> {
+    match program(&all).solve()? {
+        Outcome::Infeasible { .. } => {}
+        Outcome::Optimal(_) => return Ok(Outcome::Inconclusive(NO_P)),
+        Outcome::Inconclusive(_) => return Ok(Outcome::Inconclusive(UNDECIDED)),
+    }
+    let mut conflict = all.clone();
+    for candidate in all {
+        let rest: Vec<_> = conflict.iter().copied().filter(|at| *at != candidate).collect();
+        if !rest.is_empty() && matches!(program(&rest).solve()?, Outcome::Infeasible { .. }) {
+            conflict = rest;
+        }
+    }
+    Ok(Outcome::Infeasible { conflict })
+}
+
+/// One state feedback u = K x that places the eigenvalues of all members of a family in a region.
+///
+/// ```text
+/// A_i + B_i K with P = X^-1, Y = K X:
+/// X > 0 and, for each i, the inequalities of certify_region for (A_i + B_i K)' with the product
+/// X (A_i + B_i K)' = X A_i' + Y' B_i'
+/// ```
+///
+/// `plants`: at least one; the first one is the nominal plant, which selects the coordinates. P
+/// certifies the family as described at [`certify_common`]: the convex hull of the members (A, B),
+/// also while they vary arbitrarily fast. A gain exists for the inequalities if and only if the
+/// program is feasible; a gain with another P for each member may exist when it is not.
+///
+/// X >= I, and Y of a norm up to twice the smallest possible, are chosen as far inside of all
+/// inequalities as possible, in coordinates in which all states are equally controllable; up to
+/// three times more in those in which the most interior X is the identity. The region is then
+/// proven for the closed loops by [`certify_common`] with a P of its own.
+/// [`Outcome::Infeasible`] has the indices of members that have no common gain, each of them
+/// necessary for the contradiction.
+///
+/// Source: J. Bernussou, P. L. D. Peres, J. C. Geromel, A linear programming oriented procedure
+/// for quadratic stabilization of uncertain systems, Systems & Control Letters 13 (1989); Boyd et
+/// al. (1994), section 7.2.1; Chilali, Gahinet, Apkarian (1999).
+///
+/// # Example
+///
+/// A mass of 1 kg to 4 kg, moved by a force:
+///
+/// ```
+/// use control::Domain;
+/// use control::lmi::{Region, Vertex, common_feedback};
+/// use nalgebra::DMatrix;
+/// let plant = |mass: f64| Vertex {
+///     a: DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, 0.0]),
+///     b: DMatrix::from_row_slice(2, 1, &[0.0, 1.0 / mass]),
+/// };
+/// let region = Region { decay: Some(1.0), ..Region::default() };
+/// let plants = [plant(1.0), plant(4.0)];
+/// let found = common_feedback(&plants, &region, Domain::Continuous)?.optimal().unwrap();
+/// for Vertex { a, b } in plants {
+///     for value in control::eigen::eigenvalues(&(a + b * &found.gain))? {
+///         assert!(value.re < -1.0);
+///     }
+/// }
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for bad or missing plants;
+/// [`Error::OutOfRange`] for a bad region; [`Error::NotConverged`].
+pub fn common_feedback(
+    plants: &[Vertex],
+    region: &Region,
+    domain: Domain,
+) -> Result<Outcome<CommonFeedback, usize>, Error> {
+    let n = order(plants.first().map(|own| &own.a))?;
+    let m = plants[0].b.ncols();
+    for Vertex { a, b } in plants {
+        check::square("A", a)?;
+        check::shape("A", a, (n, n))?;
+        check::shape("B", b, (n, m))?;
+    }
+    region.check(domain)?;
+    let (a, c) = (plants[0].a.transpose(), plants[0].b.transpose());
+    let (speed, unit) = speed(&a, region, domain)?;
+    let coordinates = Coordinates::of_observation(&a, &c, speed, unit)?;
+    Synthesis { plants, region, domain }.feedback(coordinates)
+}
+
+/// The largest scaling, from 0 to 1, of a family around its first member for which
+/// [`common_feedback`] finds a gain, to 1/128; None if it finds none for the first member alone.
+///
+/// ```text
+/// A_0 + s (A_i - A_0), B_0 + s (B_i - B_0)
+/// ```
+///
+/// The hull of a family contains that of its scaling, so feasibility is monotonic in s.
+///
+/// # Errors
+///
+/// Same as [`common_feedback`].
+pub fn largest_scaling(
+    plants: &[Vertex],
+    region: &Region,
+    domain: Domain,
+) -> Result<Option<f64>, Error> {
+    let feasible = |s: f64| {
+        let scaled = |to: &Vertex| {
+            let from = &plants[0];
+            Vertex { a: &from.a + (&to.a - &from.a) * s, b: &from.b + (&to.b - &from.b) * s }
+        };
+        let scaled: Vec<_> = plants.iter().map(scaled).collect();
+        Ok::<_, Error>(common_feedback(&scaled, region, domain)?.optimal().is_some())
+    };
+    if feasible(1.0)? {
+        return Ok(Some(1.0));
+    }
+    if common_feedback(&plants[..1], region, domain)?.optimal().is_none() {
+        return Ok(None);
+    }
+    let (mut good, mut bad) = (0.0, 1.0);
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (good + bad);
+        *(if feasible(middle)? { &mut good } else { &mut bad }) = middle;
+    }
+    Ok(Some(good))
+}
+
+/// The search for a common gain, as an observer gain L = -K' of the transposed members.
+struct Synthesis<'a> {
+    plants: &'a [Vertex],
+    region: &'a Region,
+    domain: Domain,
+}
+
+/// What a program requires of the norm of Z.
+#[derive(Clone, Copy)]
+enum Size {
+    /// The least one.
+    Least,
+    /// At most this.
+    AtMost(f64),
+    /// Nothing.
+    Free,
+}
+
+/// A semidefinite program with its unknowns X (n x n) and Z (n x m).
+struct Program {
+    problem: Problem,
+    x: Affine,
+    z: Affine,
+}
+
+impl Synthesis<'_> {
+    fn feedback(
+        &self,
+        mut coordinates: Coordinates,
+    ) -> Result<Outcome<CommonFeedback, usize>, Error> {
+        let all: Vec<_> = (0..self.plants.len()).collect();
+        let mut proposed = false;
+        for refinement in 0..=REFINEMENTS {
+            for (gain, own) in self.candidate(&coordinates, &all)? {
+                proposed = true;
+                if let Some(certificate) = self.proof(&gain, &own)? {
+                    return Ok(Outcome::Optimal(CommonFeedback { gain, certificate }));
+                }
+            }
+            let Program { problem, x, .. } = self.program(&coordinates, &all, Size::Least);
+            let refined = problem.most_interior().map(|unknowns| x.evaluate(&unknowns));
+            match refined.and_then(|x| coordinates.refined(&x)) {
+                Some(refined) if refinement < REFINEMENTS => coordinates = refined,
+                _ => break,
+            }
+        }
+        if proposed {
+            return Ok(Outcome::Inconclusive(NOT_PROVEN));
+        }
+        contradiction(all, |members| self.program(&coordinates, members, Size::Free).problem)
+    }
+
+    /// One P for the closed loops, first in the coordinates of the gain, then in others.
+    fn proof(
+        &self,
+        gain: &DMatrix<f64>,
+        own: &Coordinates,
+    ) -> Result<Option<RegionCertificate>, Error> {
+        let closed: Vec<_> = self.plants.iter().map(|Vertex { a, b }| a + b * gain).collect();
+        let found = certify_in(own, &closed, self.region, self.domain)?;
+        match found.optimal() {
+            None => Ok(certify_common(&closed, self.region, self.domain)?.optimal()),
+            found => Ok(found),
+        }
+    }
+
+    /// Gains K, the preferred one first, with coordinates in which their P is the identity: the most
+    /// interior one for a norm of Z up to twice the smallest, and the one of the smallest norm.
+    fn candidate(
+        &self,
+        coordinates: &Coordinates,
+        members: &[usize],
+    ) -> Result<Vec<(DMatrix<f64>, Coordinates)>, Error> {
+        let units = self.units(coordinates);
+        let program = self.program(coordinates, members, Size::Least);
+        let Some((smallest, _)) = program.problem.minimum() else { return Ok(Vec::new()) };
+        let relaxed = self.program(coordinates, members, Size::AtMost(smallest * RELAXED_GAIN));
+        let mut found = Vec::new();
+        for Program { problem, x, z } in [relaxed, program] {
+            let Outcome::Optimal(solution) = problem.solve()? else { continue };
+            let (x, z) = (solution.value(&x), solution.value(&z));
+            let parts = x.clone().cholesky().zip(coordinates.refined(&x));
+            found.extend(parts.map(|(factor, own)| {
+                let l = divide_columns(&factor.solve(&z), &units);
+                (-coordinates.gain(&l).transpose(), own.transposed())
+            }));
+        }
+        Ok(found)
+    }
+
+    /// Units of the commands: powers of two near the lengths of the columns of B in the coordinates.
+    fn units(&self, coordinates: &Coordinates) -> DVector<f64> {
+        let c = coordinates.output(&self.plants[0].b.transpose());
+        DVector::from_fn(c.nrows(), |row, _| {
+            let norm = c.row(row).norm();
+            if norm > 0.0 { power_of_two(norm) } else { 1.0 }
+        })
+    }
+
+    /// X >= I, the inequalities of `members`, and the size of Z.
+    fn program(&self, coordinates: &Coordinates, members: &[usize], size: Size) -> Program {
+        let units = self.units(coordinates);
+        let (n, m) = self.plants[0].b.shape();
+        let mut problem = Problem::new();
+        let (x, z) = (problem.symmetric(n), problem.rectangular(n, m));
+        problem.constrain(&x, 1.0);
+        for &at in members {
+            let Vertex { a, b } = &self.plants[at];
+            let c = divide_rows(&coordinates.output(&b.transpose()), &units);
+            let product = &(&x * &coordinates.dynamics(&a.transpose())) - &(&z * &c);
+            let matrices = self.region.inequalities(&x, &product, self.domain, coordinates.unit);
+            for (_, matrix) in matrices {
+                problem.constrain(&matrix, MARGIN);
+            }
+        }
+        match size {
+            Size::Least => {
+                let level = problem.scalar();
+                problem.minimise(&level);
+                problem.constrain(&norm_below(&z, &level), MARGIN);
+            }
+            Size::AtMost(level) => {
+                problem.constrain(&norm_below(&z, &Affine::identity(1, level)), MARGIN);
+            }
+            Size::Free => {}
+        }
+        Program { problem, x, z }
+    }
+}
