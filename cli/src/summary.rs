@@ -98,6 +98,7 @@ impl ControllerCertificate {
             k_f: matrix("K_f")?,
             l_x: matrix("L_x")?,
             l_f: matrix("L_f")?,
+            p_f: None,
         };
         let pairs = |matrix: &DMatrix<f64>| -> anyhow::Result<Vec<[f64; 2]>> {
             Ok(eigenvalues(matrix)?.iter().map(|value| [value.re, value.im]).collect())

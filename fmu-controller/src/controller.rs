@@ -40,6 +40,8 @@ pub(crate) struct AsoController {
     pub(crate) deviations: Signals,
     /// z' and u'; see `with_slopes`.
     pub(crate) z_slopes: Vec<f64>,
+    /// f_hat' of a design with a direct term; empty in others.
+    pub(crate) f_slopes: Vec<f64>,
     pub(crate) u_slopes: Vec<f64>,
     /// Whether z', u' and E_hat' belong to `deviations` and `mode`.
     #[serde(skip)]
@@ -119,7 +121,7 @@ impl AsoController {
         let Self { design, values, operating_point, deviations, mode, .. } = self;
         deviations.set(values, operating_point, offset);
         if !self.frozen {
-            *mode = mode.limited(design, &deviations.z, &deviations.r);
+            *mode = mode.limited(design, &deviations.z, [&deviations.y, &deviations.r]);
         }
         mode.set_limited(design, &mut deviations.u);
         Equations::<f64>::new(design, *mode).set_signals(&mut &mut *deviations);
@@ -140,18 +142,25 @@ impl AsoController {
 
     /// Computes z', u' and E_hat'.
     fn set_slopes(&mut self) {
-        let Self { design, values, deviations, z_slopes, u_slopes, mode, .. } = self;
+        let Self { design, values, deviations, z_slopes, f_slopes, u_slopes, mode, .. } = self;
+        let input_slopes = [&values.y_slopes[..], &values.r_slopes];
         let equations = Equations::<f64>::new(design, *mode);
         equations.set_slopes(equations.knowns(&deviations), &mut &mut z_slopes[..]);
         for (j, slope) in u_slopes.iter_mut().enumerate() {
-            let free = equations.free_command(j, equations.estimate(z_slopes), &values.r_slopes);
+            let free = equations.free_command(j, equations.estimate(z_slopes), input_slopes);
             *slope = if mode.is_limited(j) { 0.0 } else { free };
+        }
+        for (i, slope) in f_slopes.iter_mut().enumerate() {
+            *slope = equations.fault(i, equations.estimate(z_slopes), input_slopes[0]);
         }
         for loss in &mut self.losses {
             let (u, f_hat) = (loss.actuator, design.states.len() + loss.fault);
             let lost = loss.effectiveness_lost(
                 Dual64::new(values.u[u], u_slopes[u]),
-                Dual64::new(values.z[f_hat], z_slopes[f_hat]),
+                Dual64::new(
+                    *deviations.f_hat.get(loss.fault).unwrap_or(&values.z[f_hat]),
+                    *f_slopes.get(loss.fault).unwrap_or(&z_slopes[f_hat]),
+                ),
             );
             loss.slope = lost.eps;
         }
@@ -161,7 +170,8 @@ impl AsoController {
     fn set_losses(&mut self) {
         for loss in &mut self.losses {
             let (u, f_hat) = (loss.actuator, self.design.states.len() + loss.fault);
-            loss.estimate = loss.effectiveness_lost(self.values.u[u], self.values.z[f_hat]);
+            let f_hat = *self.deviations.f_hat.get(loss.fault).unwrap_or(&self.values.z[f_hat]);
+            loss.estimate = loss.effectiveness_lost(self.values.u[u], f_hat);
         }
     }
 
@@ -221,6 +231,7 @@ impl Model for AsoController {
             f_hat_0: vec![0.0; design.faults.len()],
             x_i_0: vec![0.0; design.integrals()],
             z_slopes: vec![0.0; values.z.len()],
+            f_slopes: deviations.f_hat.clone(),
             u_slopes: vec![0.0; values.u.len()],
             has_slopes: false,
             compensate: true,
@@ -252,7 +263,7 @@ impl Model for AsoController {
                 )));
             }
         }
-        match self.design.refused_filter() {
+        match self.design.refused_filter().or_else(|| self.design.refused_sliding_mode()) {
             Some((name, value, rule)) => {
                 Err(Failure::Error(format!("{name} = {value}, expected {rule}")))
             }
@@ -324,7 +335,10 @@ impl Model for AsoController {
             let (u, f_hat) = (loss.actuator, design.states.len() + loss.fault);
             let lost = loss.effectiveness_lost(
                 Dual64::new(self.values.u[u], values.u[u]),
-                Dual64::new(self.values.z[f_hat], values.z[f_hat]),
+                Dual64::new(
+                    *self.deviations.f_hat.get(loss.fault).unwrap_or(&self.values.z[f_hat]),
+                    *deviations.f_hat.get(loss.fault).unwrap_or(&values.z[f_hat]),
+                ),
             );
             loss.estimate = lost.eps;
         }
@@ -342,8 +356,8 @@ impl Model for AsoController {
         let mut pairs = indicators.chunks_exact_mut(2);
         for (j, actuator) in self.design.actuators.iter().enumerate() {
             let Some([low, high]) = actuator.range() else { continue };
-            let Signals { z, r, .. } = &self.deviations;
-            let command = equations.free_command(j, equations.estimate(z), r);
+            let Signals { z, y, r, .. } = &self.deviations;
+            let command = equations.free_command(j, equations.estimate(z), [y, r]);
             let distances = [command - low, high - command];
             for (side, indicator) in pairs.next().into_iter().flatten().enumerate() {
                 let beyond = if self.mode.is_at(side, j) { -HYSTERESIS } else { HYSTERESIS };
@@ -361,7 +375,8 @@ impl Model for AsoController {
         self.frozen = true;
         self.deviations.set(&self.values, &self.operating_point, 0.0);
         self.mode = self.free_mode(self.is_compensating(time));
-        self.mode = self.mode.limited(&self.design, &self.deviations.z, &self.deviations.r);
+        let Signals { z, y, r, .. } = &self.deviations;
+        self.mode = self.mode.limited(&self.design, z, [y, r]);
         let waiting = self.compensate && !self.mode.compensating;
         Ok(Event { next_event_time: waiting.then_some(self.design.t_on), ..Event::default() })
     }

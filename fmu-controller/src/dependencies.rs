@@ -22,8 +22,9 @@ fn x_hat(design: &Design) -> Vec<String> {
     names::channels("x_hat", design.states.len()).collect()
 }
 
+/// The part of z that estimates the faults.
 fn f_hat(design: &Design) -> Vec<String> {
-    names::channels("f_hat", design.faults.len()).collect()
+    names::fault_states(design).collect()
 }
 
 fn measurements(design: &Design) -> Vec<String> {
@@ -49,12 +50,27 @@ fn kinds_of_feedback(limited: bool) -> [DependencyKind; 2] {
     if limited { [Dependent, Dependent] } else { [Fixed, Discrete] }
 }
 
-/// x_hat, f_hat, x_i and r, from which commands are computed.
+/// x_hat, f_hat, x_i and r, from which commands are computed; with a direct term also what the innovation
+/// is computed from, and then the factor of x_hat changes with the compensation, too.
 fn of_feedback(design: &Design, [state, fault]: [DependencyKind; 2]) -> Vec<Group> {
-    let mut groups = vec![(state, x_hat(design)), (fault, f_hat(design))];
+    let estimate = if design.p_f.is_some() { fault } else { state };
+    let mut groups = vec![(estimate, x_hat(design)), (fault, f_hat(design))];
+    groups.extend(direct(design, fault));
     let others = [names::integrals(design).collect(), fed_forward(design)];
     groups.extend(others.into_iter().filter(|own| !own.is_empty()).map(|own| (state, own)));
     groups
+}
+
+/// The dependency on what the innovation is computed from, by a direct term.
+fn direct(design: &Design, kind: DependencyKind) -> Option<Group> {
+    design.p_f.as_ref().map(|_| (kind, observed(design)))
+}
+
+/// The dependencies of estimated fault `i` of a design with a direct term.
+pub(crate) fn of_fault(design: &Design, i: usize) -> Vec<Group> {
+    let integral = names::fault_states(design).nth(i).into_iter().collect();
+    let groups = [(Discrete, x_hat(design)), (Constant, integral)];
+    groups.into_iter().chain(direct(design, Discrete)).collect()
 }
 
 fn has_limits(design: &Design) -> bool {
@@ -75,7 +91,9 @@ pub(crate) fn of_loss(design: &Design) -> Vec<Group> {
 pub(crate) fn of_slope(design: &Design, i: usize) -> Vec<Group> {
     let (n, q) = (design.states.len(), design.faults.len());
     if i < n {
-        let mut groups = vec![(Fixed, observed(design))];
+        // A direct term has the measurements among those of the feedback.
+        let measured = design.p_f.is_none().then(|| (Fixed, observed(design)));
+        let mut groups: Vec<_> = measured.into_iter().collect();
         groups.extend(of_feedback(design, kinds_of_feedback(has_limits(design))));
         groups
     } else if i < n + q {
@@ -94,12 +112,18 @@ pub(crate) fn of_slope(design: &Design, i: usize) -> Vec<Group> {
 /// The dependencies of element `k` of x_i'.
 fn of_integral_slope(design: &Design, k: usize) -> Vec<Group> {
     let conditioned = design.l_w.is_some() && has_limits(design);
-    let mut groups = vec![(Fixed, measurements(design))];
+    let read = design.p_f.is_some() && (conditioned || design.f_i.is_some());
+    let mut groups = Vec::new();
+    if !(read && design.filter.is_none()) {
+        groups.push((Fixed, measurements(design)));
+    }
     if !(conditioned && design.n_r.is_some()) {
         groups.push((Constant, vec![design.references[k].name.clone()]));
     }
     if design.f_i.is_some() && !conditioned {
         groups.push((Fixed, f_hat(design)));
+        groups.extend(design.p_f.as_ref().map(|_| (Discrete, x_hat(design))));
+        groups.extend(direct(design, Discrete));
     }
     if conditioned {
         groups.extend(of_feedback(design, [Dependent, Dependent]));
@@ -145,7 +169,11 @@ fn is_current(design: &Design) -> bool {
 /// The dependencies of the initial deviation of command `j` from the operating point.
 fn of_initial_deviation(design: &Design, j: usize) -> Vec<String> {
     let mut names = switches();
-    names.extend(names::starts(design));
+    // A sliding-mode law replaces the initial estimates of the faults.
+    let (n, q) = (design.states.len(), design.faults.len());
+    let replaced = if design.sliding_mode.is_some() { n..n + q } else { 0..0 };
+    let starts = names::starts(design).enumerate().filter(|(k, _)| !replaced.contains(k));
+    names.extend(starts.map(|(_, name)| name));
     names.extend(row("K_x", &design.k_x, j));
     names.extend(row("K_f", &design.k_f, j));
     names.extend(operating_states(design));
@@ -162,8 +190,18 @@ fn of_initial_deviation(design: &Design, j: usize) -> Vec<String> {
         names.extend(of_innovations(design));
         names.extend(whole("L_x", &design.l_x));
         names.extend(whole("L_f", &design.l_f));
+        names.extend(sliding_mode(design));
+    } else if design.p_f.is_some() {
+        names.extend(of_innovations(design));
     }
+    names.extend(design.p_f.iter().flat_map(|p_f| whole("P_f", p_f)));
     names
+}
+
+/// The bounds of a sliding-mode law.
+fn sliding_mode(design: &Design) -> impl Iterator<Item = String> {
+    let count = design.sliding_mode.as_ref().map_or(0, |own| own.rho.len());
+    names::channels("rho", count).chain(names::channels("delta", count))
 }
 
 /// The dependencies of the initial deviations of the references from the operating point.
@@ -182,7 +220,26 @@ pub(crate) fn of_initial_command(design: &Design, j: usize) -> Vec<String> {
 /// The dependencies of the initial value of a loss of effectiveness.
 pub(crate) fn of_initial_loss(design: &Design, loss: &Loss) -> Vec<String> {
     let mut names = of_initial_command(design, loss.actuator);
-    names.extend(of_initial_estimate(design, design.states.len() + loss.fault));
+    if design.p_f.is_some() {
+        names.extend(of_initial_fault(design, loss.fault));
+    } else {
+        names.extend(of_initial_estimate(design, design.states.len() + loss.fault));
+    }
+    names
+}
+
+/// The dependencies of the initial value of estimated fault `i` of a design with a direct term.
+pub(crate) fn of_initial_fault(design: &Design, i: usize) -> Vec<String> {
+    let mut names: Vec<_> =
+        names::starts(design).nth(design.states.len() + i).into_iter().collect();
+    names.extend(switches());
+    names.push("monitor".to_owned());
+    names.extend(of_innovations(design));
+    names.extend(design.p_f.iter().flat_map(|p_f| row("P_f", p_f, i)));
+    if is_current(design) {
+        names.extend(whole("L_x", &design.l_x));
+        names.extend(row("L_f", &design.l_f, i));
+    }
     names
 }
 
@@ -204,6 +261,7 @@ pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
             names.extend(switches());
             names.push("monitor".to_owned());
             names.extend(row("L_f", &design.l_f, i - n));
+            names.extend(sliding_mode(design).skip(i - n).step_by(q));
         }
     }
     names
@@ -245,6 +303,9 @@ fn of_initial_integral_slope(design: &Design, k: usize) -> Vec<String> {
     if let Some(f_i) = &design.f_i {
         names.extend(row("F_i", f_i, k));
         names.extend(names::channels("f_hat_0", design.faults.len()));
+        if design.p_f.is_some() {
+            names.extend((0..design.faults.len()).flat_map(|i| of_initial_fault(design, i)));
+        }
     }
     if let Some(l_w) = &design.l_w {
         let limited = design.actuators.iter().enumerate().filter(|(_, own)| own.limits.is_some());

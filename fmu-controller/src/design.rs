@@ -45,6 +45,12 @@ pub(crate) struct Design {
     /// A_f, q x q; without it the fault is constant.
     #[serde(rename = "A_f", default)]
     pub(crate) a_f: Option<Matrix>,
+    /// P_f, q x p: the direct term of the fault estimate; without it there is none.
+    #[serde(rename = "P_f", default)]
+    pub(crate) p_f: Option<Matrix>,
+    /// Bounds of the correction of a sliding-mode law.
+    #[serde(default)]
+    pub(crate) sliding_mode: Option<SlidingMode>,
     /// K_x, m x n.
     #[serde(rename = "K_x")]
     pub(crate) k_x: Matrix,
@@ -95,6 +101,16 @@ pub(crate) enum Estimator {
     Current,
     /// The measurements before the sample.
     Prediction,
+}
+
+/// The nonlinear injection of a sliding-mode law; each has one number for each fault.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SlidingMode {
+    /// rho: the largest estimate, in the unit of the fault.
+    pub(crate) rho: Vec<f64>,
+    /// delta: the half-width of the boundary layer, in the unit of the fault.
+    pub(crate) delta: Vec<f64>,
 }
 
 /// A state, a measurement or a reference.
@@ -288,6 +304,7 @@ impl Design {
         ];
         let stated = [
             ("A_f", &self.a_f),
+            ("P_f", &self.p_f),
             ("H", &self.h),
             ("K_i", &self.k_i),
             ("F_i", &self.f_i),

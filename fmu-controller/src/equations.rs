@@ -11,7 +11,15 @@
 //! ```
 //!
 //! and every channel of u kept within its limits. A design without A_f has A_f = 0. In a design with
-//! a filter, y_f takes the place of y in e, and
+//! a direct term P_f, z has f_hat_i, the integral part, in place of f_hat, and
+//!
+//! ```text
+//! x_hat'   = A x_hat + B u + F_a f_hat_i + L_x e
+//! f_hat_i' = A_f f_hat_i + L_f e                      while estimating, else 0
+//! f_hat    = f_hat_i + P_f e                          while estimating, else f_hat_i
+//! ```
+//!
+//! In a design with a filter, y_f takes the place of y in e, and
 //!
 //! ```text
 //! y_f' = W (y - y_f)
@@ -36,7 +44,7 @@
 //! their values at unit vectors, the directional derivatives are their values for dual numbers, and
 //! u' is the command at z'.
 
-use crate::design::Design;
+use crate::design::{Design, SlidingMode};
 use crate::matrix::Matrix;
 use crate::mode::Mode;
 use crate::number::Number;
@@ -53,7 +61,7 @@ pub(crate) struct Equations<'a, D: Number> {
     filters: usize,
 }
 
-/// The parts of z.
+/// The parts of z; `f_hat` is f_hat_i in a design with a direct term.
 #[derive(Clone, Copy)]
 pub(crate) struct Estimate<'a, D: Number> {
     x_hat: D::In<'a, [f64]>,
@@ -121,7 +129,7 @@ impl<'a, D: Number> Equations<'a, D> {
         self.set_slopes(self.knowns(signals), z_slopes);
     }
 
-    /// Computes e and the free commands from z, y and r.
+    /// Computes e, the estimates of a design with a direct term, and the free commands from z, y and r.
     pub(crate) fn set_signals(self, signals: &mut D::Out<'_, Signals>) {
         for k in 0..D::values(D::read(signals)).e.len() {
             let Knowns { z, y, .. } = self.knowns(signals);
@@ -131,12 +139,18 @@ impl<'a, D: Number> Equations<'a, D> {
         self.set_free_commands(signals);
     }
 
-    /// Computes the commands that are not at a limit from z and r.
+    /// Computes the estimates of a design with a direct term, and the commands that are not at a
+    /// limit, from z, y and r.
     pub(crate) fn set_free_commands(self, signals: &mut D::Out<'_, Signals>) {
+        for i in 0..D::values(D::read(signals)).f_hat.len() {
+            let Knowns { z, y, .. } = self.knowns(signals);
+            let f_hat = self.fault(i, z, y);
+            D::write(signals, |signals| &mut signals.f_hat[i], f_hat);
+        }
         for j in 0..D::values(D::read(signals)).u.len() {
             if !self.mode.is_limited(j) {
-                let Knowns { z, r, .. } = self.knowns(signals);
-                let u = self.free_command(j, z, r);
+                let Knowns { z, y, r, .. } = self.knowns(signals);
+                let u = self.free_command(j, z, [y, r]);
                 D::write(signals, |signals| &mut signals.u[j], u);
             }
         }
@@ -158,10 +172,15 @@ impl<'a, D: Number> Equations<'a, D> {
     /// Element `j` of K_x x_hat + K_f f_hat + K_i x_i + N_r r, the second term while compensating; limits
     /// ignored.
     #[inline]
-    pub(crate) fn free_command(self, j: usize, z: Estimate<'_, D>, r: D::In<'_, [f64]>) -> D {
+    pub(crate) fn free_command(
+        self,
+        j: usize,
+        z: Estimate<'_, D>,
+        [y, r]: [D::In<'_, [f64]>; 2],
+    ) -> D {
         let mut command = self.product(|design| design.k_x.row(j), z.x_hat);
         if self.mode.compensating {
-            command += self.product(|design| design.k_f.row(j), z.f_hat);
+            command += self.product_with_faults(|design| design.k_f.row(j), z, y);
         }
         let Design { k_i, n_r, .. } = D::values(self.design);
         if k_i.is_some() {
@@ -171,6 +190,33 @@ impl<'a, D: Number> Equations<'a, D> {
             command += self.product(|design| row(design.n_r.as_ref(), j), r);
         }
         command
+    }
+
+    /// Element `i` of f_hat in a design with a direct term: f_hat_i + P_f e, the second term while
+    /// estimating.
+    #[inline]
+    pub(crate) fn fault(self, i: usize, z: Estimate<'_, D>, y: D::In<'_, [f64]>) -> D {
+        let mut fault = D::at(z.f_hat, i);
+        if self.mode.estimating {
+            let gains = D::list(D::part(self.design, |design| row(design.p_f.as_ref(), i)));
+            fault += gains.enumerate().map(|(k, gain)| gain * self.innovation(k, z, y)).sum::<D>();
+        }
+        fault
+    }
+
+    /// A row of a matrix times f_hat.
+    #[inline]
+    fn product_with_faults(
+        self,
+        row: impl Fn(&'a Design) -> &'a [f64],
+        z: Estimate<'_, D>,
+        y: D::In<'_, [f64]>,
+    ) -> D {
+        if D::values(self.design).p_f.is_none() {
+            return self.product(row, z.f_hat);
+        }
+        let gains = D::list(D::part(self.design, row)).enumerate();
+        gains.map(|(i, gain)| gain * self.fault(i, z, y)).sum()
     }
 
     /// Computes z' = [A x_hat + B u + F_a f_hat + L_x e; A_f f_hat + L_f e; W (y - y_f); x_i'], the second
@@ -215,19 +261,20 @@ impl<'a, D: Number> Equations<'a, D> {
         let mut slope = D::at(r, i) - self.product(|design| row(design.h.as_ref(), i), y);
         let Design { f_i, l_w, sample_time, actuators, .. } = D::values(self.design);
         if f_i.is_some() {
-            slope += self.product(|design| row(design.f_i.as_ref(), i), z.f_hat);
+            slope += self.product_with_faults(|design| row(design.f_i.as_ref(), i), z, y);
         }
         slope *= sample_time.unwrap_or(1.0);
         if l_w.is_some() {
             let gains = D::part(self.design, |design| row(design.l_w.as_ref(), i));
             for j in (0..actuators.len()).filter(|j| self.mode.is_limited(*j)) {
-                slope += D::at(gains, j) * (D::at(u, j) - self.free_command(j, z, r));
+                slope += D::at(gains, j) * (D::at(u, j) - self.free_command(j, z, [y, r]));
             }
         }
         slope
     }
 
-    /// Adds [L_x e; L_f e] to x_hat and, while estimating, f_hat.
+    /// Adds [L_x e; L_f e] to x_hat and, while estimating, f_hat. A sliding-mode law replaces f_hat by
+    /// rho L_f e / (|L_f e| + delta), element by element.
     pub(crate) fn correct(self, signals: &mut D::Out<'_, Signals>) {
         for i in 0..self.states {
             let Knowns { z, e, .. } = self.knowns(signals);
@@ -236,9 +283,26 @@ impl<'a, D: Number> Equations<'a, D> {
         }
         for i in (0..self.faults).filter(|_| self.mode.estimating) {
             let Knowns { z, e, .. } = self.knowns(signals);
-            let f_hat = self.sum(D::at(z.f_hat, i), |design| design.l_f.row(i), e);
+            let f_hat = if D::values(self.design).sliding_mode.is_some() {
+                self.injection(i, e)
+            } else {
+                self.sum(D::at(z.f_hat, i), |design| design.l_f.row(i), e)
+            };
             D::write(signals, |signals| &mut signals.z[self.states + i], f_hat);
         }
+    }
+
+    /// Element `i` of rho L_f e / (|L_f e| + delta).
+    fn injection(self, i: usize, e: D::In<'_, [f64]>) -> D {
+        let number = |list: fn(&SlidingMode) -> &Vec<f64>| {
+            let lists = |design: &'a Design| {
+                design.sliding_mode.as_ref().map_or(&[][..], |own| list(own).as_slice())
+            };
+            D::at(D::part(self.design, lists), i)
+        };
+        let seen = self.product(|design| design.l_f.row(i), e);
+        let size = if seen.re() < 0.0 { -seen } else { seen };
+        number(|own| &own.rho) * seen / (size + number(|own| &own.delta))
     }
 
     /// Whether A_f f_hat is part of f_hat'.

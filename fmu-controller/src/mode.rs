@@ -24,14 +24,14 @@ impl Mode {
         Self { compensating, estimating, lower: 0, upper: 0 }
     }
 
-    /// The same mode, with the channels at a limit whose free command at `z` and `r` (deviations) is
-    /// beyond that limit.
-    pub(crate) fn limited(self, design: &Design, z: &[f64], r: &[f64]) -> Self {
+    /// The same mode, with the channels at a limit whose free command at `z` and the inputs y and r
+    /// (deviations) is beyond that limit.
+    pub(crate) fn limited(self, design: &Design, z: &[f64], inputs: [&[f64]; 2]) -> Self {
         let mut mode = Self::free(self.compensating, self.estimating);
         let equations = Equations::<f64>::new(design, mode);
         for (j, actuator) in design.actuators.iter().enumerate() {
             if let Some([low, high]) = actuator.range() {
-                let command = equations.free_command(j, equations.estimate(z), r);
+                let command = equations.free_command(j, equations.estimate(z), inputs);
                 mode.lower |= u64::from(command < low) << j;
                 mode.upper |= u64::from(command > high) << j;
             }

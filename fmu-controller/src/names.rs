@@ -23,10 +23,16 @@ pub(crate) fn integrals(design: &Design) -> impl Iterator<Item = String> {
     channels("x_i", design.integrals())
 }
 
-/// `x_hat`, `f_hat`, `y_f` and `x_i`: the continuous states, in the order of z.
+/// `f_hat`, or `f_hat_i` in a design with a direct term: the part of z that estimates the faults.
+pub(crate) fn fault_states(design: &Design) -> impl Iterator<Item = String> {
+    let name = if design.p_f.is_some() { "f_hat_i" } else { "f_hat" };
+    channels(name, design.faults.len())
+}
+
+/// `x_hat`, `f_hat` (or `f_hat_i`), `y_f` and `x_i`: the continuous states, in the order of z.
 pub(crate) fn estimates(design: &Design) -> impl Iterator<Item = String> {
     let x_hat = channels("x_hat", design.states.len());
-    let observed = x_hat.chain(channels("f_hat", design.faults.len())).chain(filtered(design));
+    let observed = x_hat.chain(fault_states(design)).chain(filtered(design));
     observed.chain(integrals(design))
 }
 

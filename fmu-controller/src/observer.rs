@@ -26,10 +26,10 @@ pub(crate) struct Observer {
     cache: Vec<(Mode, f64, Arc<FirstOrderHold>)>,
     /// Position of the propagator that was replaced last.
     replaced: usize,
-    /// Space for [y; r; w] and its slope, for r, and for z before and after a step.
+    /// Space for [y; r; w] and its slope, for [y; r], and for z before and after a step.
     input: Vec<f64>,
     input_slope: Vec<f64>,
-    reference: Vec<f64>,
+    given: Vec<f64>,
     before: Vec<f64>,
     after: Vec<f64>,
 }
@@ -48,14 +48,15 @@ pub(crate) struct Conditions<'a> {
 }
 
 impl Conditions<'_> {
-    /// The mode in which z evolves from here, `time` s after the start of the step; `r` is space for the
-    /// references.
-    fn mode_at(&self, time: f64, z: &[f64], r: &mut [f64]) -> Mode {
-        let [values, slopes] = self.r;
-        for (own, (value, slope)) in r.iter_mut().zip(values.iter().zip(slopes)) {
+    /// The mode in which z evolves from here, `time` s after the start of the step; `given` is space for
+    /// measurements and references.
+    fn mode_at(&self, time: f64, z: &[f64], given: &mut [f64]) -> Mode {
+        let Self { y, r, .. } = self;
+        let known = y[0].iter().zip(y[1]).chain(r[0].iter().zip(r[1]));
+        for (own, (value, slope)) in given.iter_mut().zip(known) {
             *own = value + slope * time;
         }
-        self.mode.limited(self.design, z, r)
+        self.mode.limited(self.design, z, given.split_at(y[0].len()).into())
     }
 }
 
@@ -85,15 +86,15 @@ fn system(design: &Design, mode: Mode) -> (DMatrix<f64>, DMatrix<f64>) {
 impl Observer {
     /// The observer of `design` with an empty cache.
     pub(crate) fn new(design: &Design) -> Self {
-        let references = design.references.len();
-        let inputs = design.measurements.len() + references + design.actuators.len();
+        let given = design.measurements.len() + design.references.len();
+        let inputs = given + design.actuators.len();
         let states = design.order();
         Self {
             cache: Vec::with_capacity(CACHE_SIZE),
             replaced: 0,
             input: vec![0.0; inputs],
             input_slope: vec![0.0; inputs],
-            reference: vec![0.0; references],
+            given: vec![0.0; given],
             before: vec![0.0; states],
             after: vec![0.0; states],
         }
@@ -127,7 +128,7 @@ impl Observer {
         conditions: Conditions<'_>,
         span: Span,
     ) -> Result<(), control::Error> {
-        let mode = conditions.mode_at(span.offset, &self.before, &mut self.reference);
+        let mode = conditions.mode_at(span.offset, &self.before, &mut self.given);
         if span.halvings > 0 {
             let stays = self.keeps_mode(mode, conditions, span.half(0))?
                 && self.keeps_mode(mode, conditions, span)?;
@@ -151,7 +152,7 @@ impl Observer {
     ) -> Result<bool, control::Error> {
         self.propagate(mode, conditions, span)?;
         let end = span.offset + span.size;
-        Ok(conditions.mode_at(end, &self.after, &mut self.reference) == mode)
+        Ok(conditions.mode_at(end, &self.after, &mut self.given) == mode)
     }
 
     /// Computes `after` from `before` over `span` in `mode`.

@@ -17,7 +17,10 @@
 //!
 //! with K_i x_i[k] + N_r r[k] in u[k], and f_hat in x_i[k+1] the one that u[k] uses: the terms of
 //! `equations.rs` for references. f_hat only while estimating, K_f f_hat only while compensating, u within its limits. A design
-//! without A_f has A_f = I. All signals are deviations from the operating point.
+//! without A_f has A_f = I. In a design with a direct term P_f, z has f_hat_i in place of f_hat, and
+//! f_hat[k] = f_hat_i + P_f (y[k] - C x_hat) with the estimates that u[k] uses. A sliding-mode law has
+//! f_hat[k|k] = rho L_f e[k] / (|L_f e[k]| + delta), element by element. All signals are deviations
+//! from the operating point.
 
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
@@ -110,7 +113,7 @@ impl Sampler {
         if self.estimator == Estimator::Current {
             values.set_estimate(&signals.z[..design.filtered_at(0)], point);
         }
-        let mode = mode.limited(design, &signals.z, &signals.r);
+        let mode = mode.limited(design, &signals.z, [&signals.y, &signals.r]);
         mode.set_limited(design, &mut signals.u);
         let equations = Equations::<f64>::new(design, mode);
         equations.set_free_commands(&mut signals);

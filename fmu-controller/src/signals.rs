@@ -41,6 +41,8 @@ pub(crate) struct Signals {
     pub(crate) r: Vec<f64>,
     /// The innovations.
     pub(crate) e: Vec<f64>,
+    /// The estimates of the faults in a design with a direct term; empty in others, whose z has them.
+    pub(crate) f_hat: Vec<f64>,
     /// The commands.
     pub(crate) u: Vec<f64>,
 }
@@ -78,7 +80,8 @@ impl Signals {
         let zeros = |count| vec![0.0; count];
         let (p, m, t) =
             (design.measurements.len(), design.actuators.len(), design.references.len());
-        Self { z: zeros(design.order()), y: zeros(p), r: zeros(t), e: zeros(p), u: zeros(m) }
+        let f_hat = zeros(design.p_f.as_ref().map_or(0, |p_f| p_f.rows));
+        Self { z: zeros(design.order()), y: zeros(p), r: zeros(t), e: zeros(p), f_hat, u: zeros(m) }
     }
 
     /// Sets z, y and r to the deviations of `values` from `point`, the inputs `offset` s after these were

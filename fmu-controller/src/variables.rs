@@ -16,6 +16,7 @@ pub(crate) fn list(controller: &AsoController) -> Vec<Variable<AsoController>> {
     let design = &controller.design;
     let mut all = inputs(design);
     all.extend(commands(design));
+    all.extend(faults(design));
     all.extend(estimates(design));
     all.extend(losses(controller));
     if design.sample_time.is_none() {
@@ -138,8 +139,10 @@ struct State {
 
 fn states(design: &Design) -> Vec<State> {
     let estimates = design.states.iter().map(Signal::label);
-    let estimates = estimates.chain(design.faults.iter().map(Fault::label));
     let estimates = estimates.map(|label| ("Estimate", label));
+    let kind = if design.p_f.is_some() { "Integral part of the estimate" } else { "Estimate" };
+    let faults = design.faults.iter().map(Fault::label);
+    let estimates = estimates.chain(faults.map(move |label| (kind, label)));
     let filtered = if design.filter.is_some() { &design.measurements[..] } else { &[] };
     let filtered = filtered.iter().map(|signal| ("Filtered value", signal.label()));
     let integrals = if design.k_i.is_some() { &design.references[..] } else { &[] };
@@ -155,6 +158,23 @@ fn states(design: &Design) -> Vec<State> {
                 _ => [unit.cloned(), per_second(unit)],
             };
             State { position, name, texts, units }
+        })
+        .collect()
+}
+
+/// The estimates of the faults in a design with a direct term, where they are no states.
+fn faults(design: &Design) -> Vec<Variable<AsoController>> {
+    let count = design.p_f.as_ref().map_or(0, |p_f| p_f.rows);
+    (0..count)
+        .map(|i| {
+            let Label { unit, meaning } = design.faults[i].label();
+            let (name, text) = (channel("f_hat", i, count), format!("Estimate of {meaning}"));
+            let variable = Variable::real(name, text, move |model: &mut AsoController| {
+                &mut model.deviations.f_hat[i]
+            });
+            output(design, with_unit(variable, unit), dependencies::of_fault(design, i))
+                .initially(dependencies::of_initial_fault(design, i))
+                .derivative(move |model| &mut model.with_slopes().f_slopes[i])
         })
         .collect()
 }

@@ -154,6 +154,7 @@ pub(crate) fn design_feedback(
             k_f,
             l_x: l.rows(0, n).into(),
             l_f: -l.rows(n, q),
+            p_f: None,
         },
         controller: controller.quality,
         observer,

@@ -18,7 +18,13 @@ use nalgebra::DMatrix;
 ///
 /// `A_p`, `B_p`, `C_p` are the matrices of the plant. `domain` is that of plant and gains. A current
 /// estimator, for sampled plants, corrects z by M times the new residual, forms u from the corrected
-/// z, then predicts; its state z is the prediction.
+/// z, then predicts; its state z is the prediction. With a direct term `P_f` (see [`Gains`])
+///
+/// ```text
+/// u = (K - K_f P_f [C_p, 0]) z + K_f P_f y,  K = [K_x, K_f]
+/// ```
+///
+/// with the corrected z, and the same u enters the model of the plant in A and B.
 ///
 /// # Errors
 ///
@@ -34,7 +40,24 @@ pub fn controller(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<
     m.rows_mut(n, q).copy_from(&gains.l_f);
     let mut k = gains.k_x.clone().resize_horizontally(n + q, 0.0);
     k.columns_mut(n, q).copy_from(&gains.k_f);
-    let m_c = &m * plant.augmented_output();
+    let seen = plant.augmented_output();
+    let m_c = &m * &seen;
+    if let Some(p_f) = &gains.p_f {
+        let direct = &gains.k_f * p_f;
+        k -= &direct * &seen;
+        let enters = (&plant.b * &direct).resize_vertically(n + q, 0.0);
+        let g = g - &enters * &seen;
+        return Ok(match gains.estimator {
+            Estimator::Prediction => {
+                StateSpace { a: g - m_c, b: m + enters, c: k, d: direct, domain }
+            }
+            Estimator::Current => {
+                let w = DMatrix::identity(n + q, n + q) - m_c;
+                let (b, d) = (&g * &m + enters, &k * m + direct);
+                StateSpace { a: g * &w, b, c: k * w, d, domain }
+            }
+        });
+    }
     Ok(match gains.estimator {
         Estimator::Prediction => {
             let d = DMatrix::zeros(k.nrows(), m.ncols());
@@ -45,6 +68,41 @@ pub fn controller(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<
             StateSpace { a: &g * &w, b: g * &m, c: &k * w, d: k * m, domain }
         }
     })
+}
+
+/// The estimates of the faults as outputs of [`controller`]: its A and B, and C and D of `f_hat`.
+///
+/// ```text
+/// f_hat = ([0, I] - P_f [C_p, 0]) z + P_f y
+/// ```
+///
+/// with the corrected z = W z + M y for a current estimator; `P_f` is zero without a direct term.
+///
+/// # Errors
+///
+/// Same as [`controller`].
+pub fn fault_estimates(
+    plant: &FaultyPlant,
+    gains: &Gains,
+    domain: Domain,
+) -> Result<StateSpace, Error> {
+    let own = controller(plant, gains, domain)?;
+    let (n, q) = plant.f_a.shape();
+    let mut c = DMatrix::zeros(q, n + q);
+    c.columns_mut(n, q).fill_with_identity();
+    let mut d = DMatrix::zeros(q, plant.c.nrows());
+    if let Some(p_f) = &gains.p_f {
+        c -= p_f * plant.augmented_output();
+        d.copy_from(p_f);
+    }
+    if gains.estimator == Estimator::Current {
+        let mut m = gains.l_x.clone().resize_vertically(n + q, 0.0);
+        m.rows_mut(n, q).copy_from(&gains.l_f);
+        let corrected = &c * m;
+        c -= &corrected * plant.augmented_output();
+        d += corrected;
+    }
+    Ok(StateSpace { c, d, ..own })
 }
 
 /// The dynamics of plant and controller together, of [x; z], where input i of the plant acts with

@@ -1,7 +1,7 @@
 //! Analyses the robustness of a design and judges it.
 
-use control::aso::{Estimator, Gains};
-use control::controller::controller;
+use control::aso::Gains;
+use control::controller::{controller, fault_estimates};
 use control::hold::zero_order_hold;
 use control::response::{frequency_grid, frequency_response, h_infinity};
 use control::robustness::{
@@ -56,7 +56,7 @@ pub(crate) fn robustness(
             longest_period(&physical.plant, &physical.controller)?,
         ),
     };
-    let (noise, noise_together) = noise(designed, &own, &physical.estimates(designed), limits)?;
+    let (noise, noise_together) = noise(designed, &own, &physical.estimates(designed)?, limits)?;
     let slopes = slopes(&designed.linear, &physical, &points)?;
     let (comparison, tolerance) = rayon::join(
         || comparison(designed, &physical, &points),
@@ -137,24 +137,12 @@ impl Physical {
     }
 
     /// The controller with the estimated faults as its output.
-    fn estimates(&self, designed: &ControllerDesign) -> StateSpace {
-        let (n, q) = designed.plant.f_a.shape();
-        let mut c = DMatrix::zeros(q, n + q);
-        c.columns_mut(n, q).fill_with_identity();
-        let mut d = DMatrix::zeros(q, designed.plant.c.nrows());
-        if designed.gains.estimator == Estimator::Current {
-            // f_hat after the correction by L_f (y - C x_hat).
-            c.columns_mut(0, n).copy_from(&-(&designed.gains.l_f * &designed.plant.c));
-            d.copy_from(&designed.gains.l_f);
-        }
-        let channels: Vec<_> =
-            designed.extended.channels.iter().map(|channel| channel.estimate).collect();
-        let own = StateSpace {
-            c: c.select_rows(&channels),
-            d: d.select_rows(&channels),
-            ..designed.controller.clone()
-        };
-        self.filtered(&own)
+    fn estimates(&self, designed: &ControllerDesign) -> Result<StateSpace, Error> {
+        let ControllerDesign { plant, gains, domain, extended, .. } = designed;
+        let own = fault_estimates(plant, gains, *domain)?;
+        let channels: Vec<_> = extended.channels.iter().map(|channel| channel.estimate).collect();
+        let (c, d) = (own.c.select_rows(&channels), own.d.select_rows(&channels));
+        Ok(self.filtered(&StateSpace { c, d, ..own }))
     }
 }
 

@@ -1,6 +1,6 @@
 //! The checks of a design file: counts, shapes, ranges, entries that belong together.
 
-use super::{Defaults, Design, DesignError, Fault};
+use super::{Defaults, Design, DesignError, Estimator, Fault, SlidingMode};
 use crate::names;
 
 /// Range of `least_command`: its square and the inverse of the square are finite.
@@ -41,7 +41,7 @@ impl Design {
             "K_x" => (m, n),
             "K_f" => (m, q),
             "L_x" => (n, p),
-            "L_f" => (q, p),
+            "L_f" | "P_f" => (q, p),
             "H" => (t, p),
             "K_i" | "N_r" => (m, t),
             "F_i" => (t, q),
@@ -99,7 +99,26 @@ impl Design {
             _ => {}
         }
         let of_faults = self.faults.iter().find_map(|fault| self.contradiction_of(fault));
-        of_faults.or_else(|| self.contradiction_of_references())
+        of_faults
+            .or_else(|| self.contradiction_of_references())
+            .or_else(|| self.contradiction_of_sliding_mode())
+    }
+
+    fn contradiction_of_sliding_mode(&self) -> Option<String> {
+        let SlidingMode { rho, delta } = self.sliding_mode.as_ref()?;
+        if self.estimator != Some(Estimator::Current) {
+            let text = "sliding_mode is stated, expected sample_time and estimator = \"current\"";
+            return Some(text.to_owned());
+        }
+        if self.p_f.is_some() {
+            return Some("sliding_mode and P_f exclude each other".to_owned());
+        }
+        let count = self.faults.len();
+        [("rho", rho), ("delta", delta)].into_iter().find_map(|(name, list)| {
+            let found = list.len();
+            let text = format!("{name} has {found} numbers, expected {count}, one for each fault");
+            (found != count).then_some(text)
+        })
     }
 
     fn contradiction_of_references(&self) -> Option<String> {
@@ -142,7 +161,19 @@ impl Design {
                 return Some((matrix.element(name, k), matrix.values[k], "a finite number"));
             }
         }
-        self.refused_filter()
+        self.refused_filter().or_else(|| self.refused_sliding_mode())
+    }
+
+    /// The first of rho and delta that is not a number above 0.
+    pub(crate) fn refused_sliding_mode(&self) -> Option<Refusal> {
+        let SlidingMode { rho, delta } = self.sliding_mode.as_ref()?;
+        let lists = [("rho", rho), ("delta", delta)].into_iter();
+        let mut all = lists.flat_map(|(name, list)| {
+            list.iter().enumerate().map(move |(k, value)| (name, k, list.len(), *value))
+        });
+        let (name, k, count, value) =
+            all.find(|(.., value)| !(*value > 0.0 && value.is_finite()))?;
+        Some((names::channel(name, k, count), value, "a finite number above 0"))
     }
 
     /// The first element of `filter` that breaks its rule.

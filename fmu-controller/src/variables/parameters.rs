@@ -4,7 +4,7 @@ use fmu::Variable;
 
 use super::{times_second, with_unit};
 use crate::controller::AsoController;
-use crate::design::{Design, Estimator, Fault, Label, Signal};
+use crate::design::{Design, Estimator, Fault, Label, Signal, SlidingMode};
 use crate::matrix::Matrix;
 use crate::names;
 use crate::names::channel;
@@ -23,6 +23,9 @@ fn described(name: &str) -> (&'static str, Accessor) {
         "K_f" => ("fault compensation gain K_f of (2)", |design| &mut design.k_f),
         "L_x" => ("observer gain L_x of (4)", |design| &mut design.l_x),
         "L_f" => ("fault observer gain L_f of (5)", |design| &mut design.l_f),
+        "P_f" => {
+            ("direct term P_f of the fault estimate", |design| design.p_f.get_or_insert_default())
+        }
         "H" => ("matrix H of the integral action", |design| design.h.get_or_insert_default()),
         "K_i" => ("gain K_i of the integral action", |design| design.k_i.get_or_insert_default()),
         "F_i" => ("sensor faults F_i in the integral action", |design| {
@@ -40,6 +43,7 @@ pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {
     all.extend(filter(design));
     all.extend(operating_point(design));
     all.extend(limits(design));
+    all.extend(sliding_mode(design));
     for (name, matrix) in design.matrices() {
         let (meaning, place) = described(name);
         all.extend((0..matrix.values.len()).map(|k| {
@@ -116,6 +120,27 @@ fn filter(design: &Design) -> Vec<Variable<AsoController>> {
             let unit = if design.sample_time.is_some() { "1" } else { "1/s" };
             variable.unit(unit).parameter()
         })
+        .collect()
+}
+
+/// The bounds of a sliding-mode law.
+fn sliding_mode(design: &Design) -> Vec<Variable<AsoController>> {
+    let Some(SlidingMode { rho, delta }) = &design.sliding_mode else {
+        return Vec::new();
+    };
+    let bounds = |name, text, list: &[f64], place: fn(&mut SlidingMode) -> &mut Vec<f64>| {
+        let count = list.len();
+        (0..count).map(move |k| {
+            let Label { unit, meaning } = design.faults[k].label();
+            let (name, text) = (channel(name, k, count), format!("{text}: {meaning}"));
+            let variable = Variable::real(name, text, move |model: &mut AsoController| {
+                &mut place(model.design.sliding_mode.get_or_insert_default())[k]
+            });
+            with_unit(variable, unit).parameter()
+        })
+    };
+    bounds("rho", "Largest estimate", rho, |own| &mut own.rho)
+        .chain(bounds("delta", "Half-width of the boundary layer", delta, |own| &mut own.delta))
         .collect()
 }
 

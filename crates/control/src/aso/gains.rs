@@ -16,6 +16,16 @@ pub enum Estimator {
 }
 
 /// The gains of the controller.
+///
+/// With a direct term `P_f` the observer's state is [`x_hat`; xi], with xi in place of `f_hat` in the
+/// equations of [`crate::aso`], and the estimate of the faults, which the feedback uses, is
+///
+/// ```text
+/// f_hat = xi + P_f (y - C x_hat)
+/// ```
+///
+/// where `x_hat` and xi are the corrected ones if the estimator is [`Estimator::Current`]. The direct
+/// term does not change the error dynamics, only what is read from them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gains {
     /// How the observer uses the newest measurement.
@@ -28,6 +38,8 @@ pub struct Gains {
     pub l_x: DMatrix<f64>,
     /// `L_f`, q x p.
     pub l_f: DMatrix<f64>,
+    /// `P_f`, q x p; none without a direct term.
+    pub p_f: Option<DMatrix<f64>>,
 }
 
 impl Estimator {
@@ -86,6 +98,12 @@ impl Gains {
         check::shape("K_x", &self.k_x, (m, n))?;
         check::shape("K_f", &self.k_f, (m, q))?;
         check::shape("L_x", &self.l_x, (n, p))?;
-        check::shape("L_f", &self.l_f, (q, p))
+        check::shape("L_f", &self.l_f, (q, p))?;
+        self.p_f.as_ref().map_or(Ok(()), |p_f| check::shape("P_f", p_f, (q, p)))
+    }
+
+    /// `P_f` C, q x n: how the direct term reads the error e = x - `x_hat`.
+    pub(crate) fn direct(&self, plant: &FaultyPlant) -> Option<DMatrix<f64>> {
+        self.p_f.as_ref().map(|p_f| p_f * &plant.c)
     }
 }

@@ -1,6 +1,6 @@
 //! Bounds of a sampled loop at all times, between the samples too.
 
-use super::fault_loop::loop_dynamics;
+use super::fault_loop::{loop_dynamics, outputs};
 use crate::aso::{Estimator, FaultyPlant, Gains};
 use crate::balance::{Balance, divide_rows, multiply_columns};
 use crate::faults::ExtendedPlant;
@@ -198,6 +198,10 @@ impl<'a> Lifted<'a> {
         let mut plant = rows.view_mut((0, 0), (own, n));
         plant += &command;
         rows.view_mut((0, n), (own, n)).copy_from(&-command);
+        if let Some(direct) = self.gains.direct(self.plant) {
+            let mut of_error = rows.view_mut((0, n), (own, n));
+            of_error += &self.gamma[i] * k_f * direct;
+        }
         rows.view_mut((0, 2 * n), (own, q)).copy_from(&(&self.gamma[i] * k_f));
         rows
     }
@@ -240,7 +244,7 @@ impl<'a> Lifted<'a> {
         for i in 0..reads {
             c.rows_mut(i * own, own).copy_from(&self.output(i));
         }
-        c.rows_mut(reads * own, order).fill_diagonal(1.0);
+        c.rows_mut(reads * own, order).copy_from(&outputs(self.plant, self.gains));
         add_impulses(a, &b, &c, (&mut sums, width))?;
         let mut found = sums.rows(reads * own, order).into_owned();
         for i in 0..reads {

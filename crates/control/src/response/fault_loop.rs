@@ -17,7 +17,8 @@ use nalgebra::DMatrix;
 /// sides are the values at the next sample. With a current estimator the matrix of the second line
 /// is `A_0` - L `C_0` `A_0`, f enters by (I - L `C_0`) [`F_a`; 0], and the estimates are the
 /// corrected ones. The commands are within the limits of the actuators. The fault f may be any
-/// function of time, jumps included.
+/// function of time, jumps included. With a direct term `P_f` (see [`Gains`]) the state is [x; e; xi], and
+/// `f_hat` = xi + `P_f` C e in the first and the last line.
 ///
 /// Source: (1) to (11) of the paper named in [`crate::aso`].
 ///
@@ -40,8 +41,7 @@ pub fn fault_system(
     b.view_mut((n, 0), (n + q, q)).copy_from(&seen);
     let mut d = DMatrix::zeros(2 * n + q, q);
     d.view_mut((2 * n, 0), (q, q)).copy_from(&-DMatrix::identity(q, q));
-    let c = DMatrix::identity(2 * n + q, 2 * n + q);
-    Ok(StateSpace { a: loop_dynamics(plant, gains), b, c, d, domain })
+    Ok(StateSpace { a: loop_dynamics(plant, gains), b, c: outputs(plant, gains), d, domain })
 }
 
 /// The closed loop as a system from [r; f] to [x; e; eps], with r = f' - `A_f` f the part of the
@@ -54,7 +54,8 @@ pub fn fault_system(
 /// ```
 ///
 /// In sampled time `r[k] = f[k+1] - A_f f[k]`. f acts only through the part that the compensation
-/// cannot cancel. For an f without jumps this is the loop of [`fault_system`] in other coordinates.
+/// cannot cancel. For an f without jumps this is the loop of [`fault_system`] in other coordinates. With a
+/// direct term the state eps is xi - f, and eps + `P_f` C e takes its place in the first and the last line.
 ///
 /// # Errors
 ///
@@ -70,8 +71,8 @@ pub fn fault_rate_system(
     let mut b = DMatrix::zeros(order, 2 * q);
     b.view_mut((2 * n, 0), (q, q)).copy_from(&-DMatrix::identity(q, q));
     b.view_mut((0, q), (n, q)).copy_from(&(&plant.f_a + &plant.b * &gains.k_f));
-    let (c, d) = (DMatrix::identity(order, order), DMatrix::zeros(order, 2 * q));
-    Ok(StateSpace { a: loop_dynamics(plant, gains), b, c, d, domain })
+    let d = DMatrix::zeros(order, 2 * q);
+    Ok(StateSpace { a: loop_dynamics(plant, gains), b, c: outputs(plant, gains), d, domain })
 }
 
 /// Computes upper bounds of the peak gains to [x; e; eps]: from faults, from their rates, and from
@@ -108,7 +109,18 @@ pub fn fault_gains(
     Ok([0, 1, 2].map(|part| found.columns(part * q, q).into_owned()))
 }
 
-/// The state matrix of both systems: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0, `A_0` - L `C_0`].
+/// [x; e; eps] of the state of both systems: the identity without a direct term.
+pub(super) fn outputs(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
+    let (n, q) = plant.f_a.shape();
+    let mut c = DMatrix::identity(2 * n + q, 2 * n + q);
+    if let Some(direct) = gains.direct(plant) {
+        c.view_mut((2 * n, n), (q, n)).copy_from(&direct);
+    }
+    c
+}
+
+/// The state matrix of both systems: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0, `A_0` - L `C_0`]; with a direct
+/// term -B `K_x` + B `K_f` `P_f` C in place of -B `K_x`.
 pub(super) fn loop_dynamics(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
     let (n, q) = plant.f_a.shape();
     let mut a = DMatrix::zeros(2 * n + q, 2 * n + q);
@@ -116,5 +128,9 @@ pub(super) fn loop_dynamics(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> 
     a.view_mut((0, n), (n, n)).copy_from(&-(&plant.b * &gains.k_x));
     a.view_mut((0, 2 * n), (n, q)).copy_from(&(&plant.b * &gains.k_f));
     a.view_mut((n, n), (n + q, n + q)).copy_from(&gains.error_dynamics(plant));
+    if let Some(direct) = gains.direct(plant) {
+        let mut of_error = a.view_mut((0, n), (n, n));
+        of_error += &plant.b * &gains.k_f * direct;
+    }
     a
 }

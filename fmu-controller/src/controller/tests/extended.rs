@@ -35,6 +35,10 @@ fn steps_of_any_size_follow_the_equations_of_every_design() {
                 step(&mut model, start, size, begun.as_slice(), slope.as_slice());
                 let u = oracle.command(&z, &y, true);
                 assert!(agree(&model.values.z, &z.all(), 2e-5), "{of:?} {size}");
+                if of.2.contains('d') {
+                    let fault = oracle.fault(&z, &y);
+                    assert!(agree(&model.deviations.f_hat, fault.as_slice(), 2e-5), "{of:?}");
+                }
                 assert!(agree(&model.values.u, u.as_slice(), 2e-5), "{of:?} {size}");
                 commands.insert(sides(&model));
             }
@@ -90,7 +94,8 @@ fn the_slopes_of_all_outputs_are_the_limits_of_their_differences() {
         step(&mut model, 1.0, 0.1, &zeros, &zeros);
         let (z, u) = (model.values.z.clone(), model.values.u.clone());
         let losses = model.with_slopes().losses.clone();
-        let slopes = (model.z_slopes.clone(), model.u_slopes.clone());
+        let faults = model.deviations.f_hat.clone();
+        let slopes = (model.z_slopes.clone(), model.u_slopes.clone(), model.f_slopes.clone());
         let h = 1e-7;
         step(&mut model, 1.1, h, &zeros, &zeros);
         let rate = |after: &[f64], before: &[f64]| -> Vec<f64> {
@@ -98,6 +103,7 @@ fn the_slopes_of_all_outputs_are_the_limits_of_their_differences() {
         };
         assert!(agree(&rate(&model.values.z, &z), &slopes.0, 1e-5), "{of:?}");
         assert!(agree(&rate(&model.values.u, &u), &slopes.1, 1e-5), "{of:?}");
+        assert!(agree(&rate(&model.deviations.f_hat, &faults), &slopes.2, 1e-5), "{of:?}");
         for (after, before) in model.losses.iter().zip(&losses) {
             let found = (after.estimate - before.estimate) / h;
             assert!((found - before.slope).abs() < 1e-5 * before.slope.abs().max(1.0), "{of:?}");

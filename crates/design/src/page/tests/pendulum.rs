@@ -58,6 +58,7 @@ impl Design {
                 k_f: matrix("K_f"),
                 l_x: matrix("L_x"),
                 l_f: matrix("L_f"),
+                p_f: None,
             },
         }
     }
