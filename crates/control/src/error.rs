@@ -98,6 +98,26 @@ pub enum Error {
         /// Columns of `F_a` that take part in one hidden combination, from 1.
         faults: Vec<usize>,
     },
+    /// The measurements do not show the rates of the faults directly.
+    #[error(
+        "the faults do not act on the derivatives of the measurements directly: rank C F_a is {rank}, \
+         expected {faults}"
+    )]
+    FaultsNotDirect {
+        /// Rank of C `F_a`.
+        rank: usize,
+        /// Columns of `F_a`.
+        faults: usize,
+    },
+    /// The invariant zeros of (A, `F_a`, C) are not all stable.
+    #[error(
+        "(A, F_a, C) has invariant zeros that are not stable: {}",
+        zeros.iter().map(|zero| shown(*zero)).collect::<Vec<_>>().join(", ")
+    )]
+    UnstableZeros {
+        /// Those that are not stable.
+        zeros: Vec<Complex<f64>>,
+    },
     /// The number of eigenvalues differs from the number of states.
     #[error("{found} eigenvalues are given, expected {expected}, one per state")]
     PoleCount {

@@ -7,6 +7,7 @@
 //! | assign the poles of a state feedback or an observer | [`placement`] |
 //! | linear-quadratic regulator, Kalman filter | [`riccati`] |
 //! | augmented state observer (ASO): estimate and compensate faults | [`aso`], [`faults`], [`sampled`] |
+//! | other laws that estimate faults: proportional-integral, fast adaptive, sliding mode, learning | [`estimation`] |
 //! | test which faults can be estimated | [`detectability`] |
 //! | controllability, observability, distance from losing them, zeros | [`rank`], [`distance`], [`zeros`] |
 //! | residual generators | [`residual`] |
@@ -36,6 +37,7 @@ pub mod distance;
 mod domain;
 pub mod eigen;
 mod error;
+pub mod estimation;
 pub mod exponential;
 pub mod faults;
 pub mod hold;

@@ -1,0 +1,116 @@
+//! Laws that estimate faults, beside the augmented state observer of [`crate::aso`].
+//!
+//! With e = y - C `x_hat` every law has a form that [`crate::aso::Gains`], the controller and all analyses
+//! of this crate know. For constant faults, without the feedback:
+//!
+//! | law | estimate of the fault | exists if |
+//! |---|---|---|
+//! | augmented, [`crate::aso`] | `f_hat`' = `L_f` e | (`A_0`, `C_0`) is detectable |
+//! | [`proportional_integral`] | `f_hat` = xi + `P_f` e, xi' = `L_f` e | the same |
+//! | [`fast_adaptive`] | `f_hat` = Gamma F (e + sigma integral of e) | rank C `F_a` = q, zeros of (A, `F_a`, C) stable |
+//! | [`sliding_mode`] | `f_hat` = rho F e / (\|F e\| + delta) | the same, rho above the fault |
+//! | [`learning`] | `f_hat`[k] = `K_1` `f_hat`[k-1] + `K_2` e[k] | the same |
+//!
+//! and `x_hat`' = A `x_hat` + B u + `F_a` `f_hat` + `L_x` e. The last three are designed in the coordinates of
+//! [`DirectForm`]. Sliding mode and learning are laws of sampled controllers.
+
+mod direct_form;
+mod fast_adaptive;
+mod learning;
+mod proportional_integral;
+mod sliding_mode;
+
+pub use direct_form::DirectForm;
+pub use fast_adaptive::{FastAdaptive, fast_adaptive};
+pub use learning::{Learning, learning};
+pub use proportional_integral::proportional_integral;
+pub use sliding_mode::{SlidingMode, sliding_mode};
+
+use crate::aso::{Estimator, FaultyPlant, Gains};
+use crate::eigen::eigenvalues;
+use crate::{Domain, Error, check};
+use nalgebra::DMatrix;
+
+/// The most decay of an error in one sample that [`mean_rate`] counts: 1.8 % are left.
+const FASTEST: f64 = 4.0;
+
+/// A law whose estimate has a model of its own.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct OwnModel {
+    /// The gains; of a nonlinear law those of its linearisation about a zero estimate.
+    pub gains: Gains,
+    /// `A_f` of the observer, q x q, which takes the place of the fault model.
+    pub a_f: DMatrix<f64>,
+}
+
+/// The rate in 1/s at which the errors of an observer decay: the geometric mean of |lambda| over the
+/// eigenvalues, in sampled time of |ln lambda| / T, at most 4 / T each.
+///
+/// `dynamics`: of the estimation error, stable.
+///
+/// # Errors
+///
+/// Same as [`eigenvalues`].
+pub fn mean_rate(dynamics: &DMatrix<f64>, domain: Domain) -> Result<f64, Error> {
+    let all = eigenvalues(dynamics)?;
+    let rate = |value: &nalgebra::Complex<f64>| match domain {
+        Domain::Continuous => value.norm(),
+        Domain::Sampled { period } => (value.norm().ln().max(-FASTEST) / period)
+            .hypot(value.arg() / period)
+            .min(FASTEST / period),
+    };
+    let sum: f64 = all.iter().map(|value| rate(value).ln()).sum();
+    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+    let count = all.len() as f64;
+    Ok((sum / count).exp())
+}
+
+/// The eigenvalue of an error that decays with `rate`: -rate, in sampled time e^(-rate T).
+pub(crate) fn eigenvalue(rate: f64, domain: Domain) -> f64 {
+    match domain {
+        Domain::Continuous => -rate,
+        Domain::Sampled { period } => (-rate * period).exp(),
+    }
+}
+
+/// The eigenvalue of a constant error: 0, in sampled time 1.
+pub(crate) fn constant(domain: Domain) -> f64 {
+    match domain {
+        Domain::Continuous => 0.0,
+        Domain::Sampled { .. } => 1.0,
+    }
+}
+
+/// (I - C `L_x`)^-1 of a current estimator, I of a prediction estimator: e before the correction from e
+/// after it.
+fn before_correction(plant: &FaultyPlant, gains: &Gains) -> Result<DMatrix<f64>, Error> {
+    let p = plant.c.nrows();
+    let identity = DMatrix::identity(p, p);
+    if gains.estimator == Estimator::Prediction {
+        return Ok(identity);
+    }
+    let inverse = (identity - &plant.c * &gains.l_x).try_inverse();
+    check::in_range("(I - C L_x)^-1", inverse.unwrap_or(DMatrix::from_element(1, 1, f64::NAN)))
+}
+
+/// Checks that the faults of `plant` are modelled as constant.
+fn require_constant_faults(plant: &FaultyPlant, domain: Domain) -> Result<(), Error> {
+    plant.check()?;
+    let q = plant.a_f.nrows();
+    let difference = (&plant.a_f - DMatrix::identity(q, q) * constant(domain)).amax();
+    if difference > 0.0 {
+        let rule = "zero: the law is about faults that are modelled as constant";
+        return Err(Error::OutOfRange { name: "A_f of f' = A_f f", value: difference, rule });
+    }
+    Ok(())
+}
+
+/// Checks a current estimator of a sampled plant.
+fn require_current(domain: Domain, estimator: Estimator) -> Result<(), Error> {
+    if domain == Domain::Continuous || estimator == Estimator::Prediction {
+        let rule = "a sampled controller with a current estimator";
+        return Err(Error::OutOfRange { name: "the domain", value: f64::NAN, rule });
+    }
+    Ok(())
+}

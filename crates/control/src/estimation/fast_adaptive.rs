@@ -1,0 +1,76 @@
+//! Fast adaptive fault estimation.
+
+use super::{DirectForm, before_correction, eigenvalue, require_constant_faults};
+use crate::aso::{Estimator, FaultyPlant, Gains};
+use crate::{Domain, Error, check};
+use nalgebra::{DMatrix, DVector};
+
+/// The two parameters of the law.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FastAdaptive {
+    /// sigma in 1/s.
+    pub sigma: f64,
+    /// The diagonal of Gamma in 1/s, one number for each fault: the rate at which its estimate follows.
+    pub gamma: Vec<f64>,
+}
+
+/// Designs fast adaptive fault estimation.
+///
+/// ```text
+/// x_hat' = A x_hat + B u + F_a f_hat + L_x e,   e = y - C x_hat
+/// f_hat' = Gamma F (e' + sigma e),  realised as  f_hat = xi + Gamma F e,  xi' = sigma Gamma F e
+/// ```
+///
+/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and `L_x` has A - `L_x` C = [-sigma I, \*; 0, ..], so that the error eps =
+/// `f_hat` - f obeys eps' = -Gamma eps + Gamma \* w - f': each estimate is the fault behind a first-order lag of rate
+/// gamma, disturbed only by w, the error of the states that no fault enters, which no fault excites. In
+/// sampled time (current estimator) e^(-sigma T) and e^(-gamma T) take the places of the eigenvalues.
+/// `gains`: for `K_x`, `K_f` and the estimator; `rate`: of the other errors, in 1/s, see
+/// [`DirectForm::observer_gain`], whose P proves the stability for every Gamma and sigma above zero in continuous time.
+///
+/// The result is in the form of [`Gains`], where `F_a` xi takes the place of `F_a` `f_hat`: its `L_x` has the
+/// `F_a` Gamma F in addition.
+///
+/// Source: K. Zhang, B. Jiang and V. Cocquempot, Adaptive observer-based fast fault estimation, Int. J. Control,
+/// Automation, and Systems 6 (2008): `f_hat`' = -Gamma F (`e_y`' + sigma `e_y`) with `e_y` = C `x_hat` - y, theorem 1 with
+/// E'P = F C. Their P and `L_x` solve linear matrix inequalities; here they follow from the form. The law for sampled
+/// controllers is our own.
+///
+/// # Errors
+///
+/// Same as [`Gains::check`] and [`DirectForm::observer_gain`]; [`Error::OutOfRange`] for a parameter that is not
+/// above zero, for faults that are not modelled as constant, or for a sampled prediction estimator.
+pub fn fast_adaptive(
+    (plant, form): (&FaultyPlant, &DirectForm),
+    gains: &Gains,
+    law: &FastAdaptive,
+    rate: f64,
+) -> Result<Gains, Error> {
+    let domain = form.domain();
+    require_constant_faults(plant, domain)?;
+    gains.check(plant)?;
+    let q = plant.f_a.ncols();
+    check::shape("gamma", &DMatrix::from_column_slice(law.gamma.len(), 1, &law.gamma), (q, 1))?;
+    check::positive("sigma", law.sigma)?;
+    law.gamma.iter().try_for_each(|&gamma| check::positive("gamma", gamma))?;
+    let pole = eigenvalue(law.sigma, domain);
+    let gamma = law.gamma.iter().map(|&gamma| form.distance(eigenvalue(gamma, domain)));
+    let gamma = DMatrix::from_diagonal(&DVector::from_iterator(q, gamma));
+    let direct = gamma * &form.m_1;
+    let l_x = form.observer_gain(pole, rate)? + &plant.f_a * &direct;
+    let l_f = &direct * form.distance(pole);
+    if domain == Domain::Continuous {
+        return Ok(Gains { l_x, l_f, p_f: Some(direct), ..gains.clone() });
+    }
+    if gains.estimator == Estimator::Prediction {
+        let rule = "a current estimator: f_hat uses the newest measurement";
+        return Err(Error::OutOfRange { name: "the estimator", value: f64::NAN, rule });
+    }
+    // L = A_aug M with A_aug = [A, F_a; 0, I]: M_f = L_f, A M_x = L_x - F_a L_f.
+    let moved = &l_x - &plant.f_a * &l_f;
+    let m_x = plant.a.clone().lu().solve(&moved).ok_or(Error::Overflow { what: "A^-1 L_x" })?;
+    let mut gains = Gains { l_x: m_x, l_f, p_f: None, ..gains.clone() };
+    let p_f = (direct - &gains.l_f) * before_correction(plant, &gains)?;
+    gains.p_f = Some(check::in_range("P_f", p_f)?);
+    Ok(gains)
+}

@@ -1,0 +1,64 @@
+//! The learning observer of a sampled controller.
+
+use super::{DirectForm, OwnModel, eigenvalue, require_constant_faults, require_current};
+use crate::aso::{FaultyPlant, Gains};
+use crate::{Error, check};
+use nalgebra::DMatrix;
+
+/// The parameters of the law.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Learning {
+    /// `K_1`: the part of the last estimate that is kept, above 0 and at most 1.
+    pub kept: f64,
+}
+
+/// Designs a learning observer whose learning interval is the sample time.
+///
+/// ```text
+/// f_hat[k] = v[k] = K_1 v[k-1] + K_2 e[k],  e[k] = y[k] - C x_hat[k|k-1]
+/// x_hat[k+1|k] = A x_hat[k|k-1] + B u[k] + F_a v[k] + L e[k]
+/// ```
+///
+/// `K_2` = g F with F = `M_1` of [`DirectForm`], and A - L C has the eigenvalue lambda for s = F e: s[k+1] = lambda s[k] + f[k]
+/// - v[k] + \* w. So (z - lambda) (z - `K_1`) + g z is the characteristic polynomial of s and v; lambda = p^2 / `K_1` and
+/// g = lambda + `K_1` - 2 p make it (z - p)^2, p = e^(-rate T): stable for every `K_1` above p^2. Of a constant fault the part
+/// (1 - lambda) (1 - `K_1`) / ((1 - lambda) (1 - `K_1`) + g) is left; none with `K_1` = 1, which is an integrator.
+/// The gains have M with A M = L as the gain of the correction.
+///
+/// Source: W. Chen and M. Saif, An iterative learning observer-based approach to fault detection and accommodation in
+/// nonlinear systems, Proc. 40th IEEE Conference on Decision and Control (2001), and Int. J. Adaptive Control and Signal
+/// Processing 20 (2006); Q. Jia, W. Chen, Y. Zhang and H. Li, Fault reconstruction and fault-tolerant control via
+/// learning observers in Takagi-Sugeno fuzzy descriptor systems with time delays, IEEE Transactions on Industrial
+/// Electronics 62 (2015): v(t) = `K_1` v(t - tau) + `K_2` (y - C `x_hat`). The gains by pole placement with tau = T are our own.
+///
+/// # Errors
+///
+/// Same as [`Gains::check`] and [`DirectForm::observer_gain`]; [`Error::OutOfRange`] for a `kept` outside of its range,
+/// a continuous plant or a prediction estimator; [`Error::NotSchur`] if `K_1` is at most p^2.
+pub fn learning(
+    (plant, form): (&FaultyPlant, &DirectForm),
+    gains: &Gains,
+    law: &Learning,
+    rate: f64,
+) -> Result<OwnModel, Error> {
+    let domain = form.domain();
+    require_constant_faults(plant, domain)?;
+    require_current(domain, gains.estimator)?;
+    gains.check(plant)?;
+    let kept = law.kept;
+    if !(kept > 0.0 && kept <= 1.0) {
+        let rule = "above 0 and at most 1";
+        return Err(Error::OutOfRange { name: "K_1", value: kept, rule });
+    }
+    let fast = eigenvalue(rate, domain);
+    let pole = fast * fast / kept;
+    if pole >= 1.0 {
+        return Err(Error::NotSchur { matrix: "lambda = p^2 / K_1", radius: pole });
+    }
+    let l_x = form.observer_gain(pole, rate)?;
+    let l_x = plant.a.clone().lu().solve(&l_x).ok_or(Error::Overflow { what: "A^-1 L_x" })?;
+    let l_f = &form.m_1 * (pole + kept - 2.0 * fast);
+    let (q, gains) = (plant.f_a.ncols(), Gains { l_x, l_f, p_f: None, ..gains.clone() });
+    check::finite("L_f", &gains.l_f)?;
+    Ok(OwnModel { gains, a_f: DMatrix::identity(q, q) * kept })
+}

@@ -1,0 +1,80 @@
+//! The sliding-mode observer of a sampled controller.
+
+use super::{DirectForm, OwnModel, constant, eigenvalue, require_constant_faults, require_current};
+use crate::aso::{FaultyPlant, Gains};
+use crate::{Error, check};
+use nalgebra::{DMatrix, DVector};
+
+/// The part of a constant fault, small against rho, that the boundary layer leaves.
+const LEFT: f64 = 0.01;
+
+/// The parameters of the law, one number for each fault, in its unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SlidingMode {
+    /// rho, above the largest fault.
+    pub rho: Vec<f64>,
+    /// delta, the half-width of the boundary layer; None for the width at which small errors decay with the
+    /// rate that [`sliding_mode`] is given.
+    pub delta: Option<Vec<f64>>,
+}
+
+/// Designs a sliding-mode observer with a boundary layer; returns it with its linearisation, and delta.
+///
+/// ```text
+/// f_hat[k] = nu[k],  nu_i = rho_i s_i / (|s_i| + delta_i),  s = F e[k],  e[k] = y[k] - C x_hat[k|k-1]
+/// x_hat[k+1|k] = A x_hat[k|k-1] + B u[k] + F_a nu[k] + L e[k]
+/// ```
+///
+/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and A - L C has the eigenvalue lambda for each s: s[k+1] = lambda s[k] +
+/// f[k] - nu[k] + \* w. In the boundary layer (small s) nu is about (rho / delta) s, and s decays with lambda - rho / delta.
+/// The default of delta makes this e^(-rate T); lambda = 1 - 0.01 (1 - e^(-rate T)) then leaves 1 % of a small constant
+/// fault, and rho / (rho - |f|) times as much of a larger one. `current`: the result has M with A M = L as the
+/// gain of the correction `x_hat`[k|k] = `x_hat`[k|k-1] + M e[k]; its `L_f` is (rho / delta) F; the observer itself uses F and the
+/// nonlinear function.
+///
+/// The estimate is bounded by rho whatever the measurements are. The error stays bounded if every |`f_i`| is
+/// below `rho_i`.
+///
+/// Source: C. Edwards, S. K. Spurgeon and R. J. Patton, Sliding mode observers for fault detection and isolation,
+/// Automatica 36 (2000): injection rho P e / (|P e| + delta) and reconstruction by its equivalent value. There the
+/// injection is a unit vector in continuous time; here it acts element by element, so that faults may have different units,
+/// and in sampled time.
+///
+/// # Errors
+///
+/// Same as [`Gains::check`] and [`DirectForm::observer_gain`]; [`Error::OutOfRange`] for a parameter that is
+/// not above zero, a continuous plant or a prediction estimator; [`Error::NotSchur`] for a delta so small that the
+/// samples oscillate about s = 0.
+pub fn sliding_mode(
+    (plant, form): (&FaultyPlant, &DirectForm),
+    gains: &Gains,
+    law: &SlidingMode,
+    rate: f64,
+) -> Result<(OwnModel, Vec<f64>), Error> {
+    let domain = form.domain();
+    require_constant_faults(plant, domain)?;
+    require_current(domain, gains.estimator)?;
+    gains.check(plant)?;
+    let q = plant.f_a.ncols();
+    for list in [Some(&law.rho), law.delta.as_ref()].into_iter().flatten() {
+        let name = "rho, or delta,";
+        check::shape(name, &DMatrix::from_column_slice(list.len(), 1, list), (q, 1))?;
+        list.iter().try_for_each(|&value| check::positive(name, value))?;
+    }
+    let fast = eigenvalue(rate, domain);
+    let pole = constant(domain) - LEFT * form.distance(fast);
+    let slope = pole - fast;
+    let delta = law.delta.clone();
+    let delta = delta.unwrap_or_else(|| law.rho.iter().map(|rho| rho / slope).collect());
+    let slopes = law.rho.iter().zip(&delta).map(|(rho, delta)| rho / delta);
+    let slopes = DVector::from_iterator(q, slopes);
+    if let Some(slope) = slopes.iter().find(|slope| (pole - **slope).abs() >= 1.0) {
+        let radius = (pole - slope).abs();
+        return Err(Error::NotSchur { matrix: "lambda - rho / delta", radius });
+    }
+    let l_x = form.observer_gain(pole, rate)?;
+    let l_x = plant.a.clone().lu().solve(&l_x).ok_or(Error::Overflow { what: "A^-1 L_x" })?;
+    let l_f = DMatrix::from_diagonal(&slopes) * &form.m_1;
+    let gains = Gains { l_x, l_f, p_f: None, ..gains.clone() };
+    Ok((OwnModel { gains, a_f: DMatrix::zeros(q, q) }, delta))
+}
