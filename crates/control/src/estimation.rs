@@ -6,7 +6,7 @@
 //! | law | estimate of the fault | exists if |
 //! |---|---|---|
 //! | augmented, [`crate::aso`] | `f_hat`' = `L_f` e | (`A_0`, `C_0`) is detectable |
-//! | [`proportional_integral`] | `f_hat` = xi + `P_f` e, xi' = `L_f` e | the same |
+//! | [`proportional_integral`] | `f_hat` = `f_hat_i` + `P_f` e, `f_hat_i`' = `L_f` e | the same |
 //! | [`fast_adaptive`] | `f_hat` = Gamma F (e + sigma integral of e) | rank C `F_a` = q, zeros of (A, `F_a`, C) stable |
 //! | [`sliding_mode`] | `f_hat` = rho F e / (\|F e\| + delta) | the same, rho above the fault |
 //! | [`learning`] | `f_hat`[k] = `K_1` `f_hat`[k-1] + `K_2` e[k] | the same |

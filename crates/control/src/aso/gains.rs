@@ -17,14 +17,14 @@ pub enum Estimator {
 
 /// The gains of the controller.
 ///
-/// With a direct term `P_f` the observer's state is [`x_hat`; xi], with xi in place of `f_hat` in the
+/// With a direct term `P_f` the observer's state is [`x_hat`; `f_hat_i`], with `f_hat_i` in place of `f_hat` in the
 /// equations of [`crate::aso`], and the estimate of the faults, which the feedback uses, is
 ///
 /// ```text
-/// f_hat = xi + P_f (y - C x_hat)
+/// f_hat = f_hat_i + P_f (y - C x_hat)
 /// ```
 ///
-/// where `x_hat` and xi are the corrected ones if the estimator is [`Estimator::Current`]. The direct
+/// where `x_hat` and `f_hat_i` are the corrected ones if the estimator is [`Estimator::Current`]. The direct
 /// term does not change the error dynamics, only what is read from them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gains {

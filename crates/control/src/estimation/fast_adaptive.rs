@@ -18,7 +18,7 @@ pub struct FastAdaptive {
 ///
 /// ```text
 /// x_hat' = A x_hat + B u + F_a f_hat + L_x e,   e = y - C x_hat
-/// f_hat' = Gamma F (e' + sigma e),  realised as  f_hat = xi + Gamma F e,  xi' = sigma Gamma F e
+/// f_hat' = Gamma F (e' + sigma e),  realised as  f_hat = f_hat_i + Gamma F e,  f_hat_i' = sigma Gamma F e
 /// ```
 ///
 /// F = `M_1` of [`DirectForm`], F C `F_a` = I, and `L_x` has A - `L_x` C = [-sigma I, \*; 0, ..], so that the error eps =
@@ -28,7 +28,7 @@ pub struct FastAdaptive {
 /// `gains`: for `K_x`, `K_f` and the estimator; `rate`: of the other errors, in 1/s, see
 /// [`DirectForm::observer_gain`], whose P proves the stability for every Gamma and sigma above zero in continuous time.
 ///
-/// The result is in the form of [`Gains`], where `F_a` xi takes the place of `F_a` `f_hat`: its `L_x` has the
+/// The result is in the form of [`Gains`], where `F_a` `f_hat_i` takes the place of `F_a` `f_hat`: its `L_x` has the
 /// `F_a` Gamma F in addition.
 ///
 /// Source: K. Zhang, B. Jiang and V. Cocquempot, Adaptive observer-based fast fault estimation, Int. J. Control,

@@ -9,11 +9,11 @@ use nalgebra::DMatrix;
 /// error dynamics.
 ///
 /// ```text
-/// f_hat = xi + P_f (y - C x_hat),  xi' = A_f xi + L_f (y - C x_hat),  P_f = part T L_f
+/// f_hat = f_hat_i + P_f (y - C x_hat),  f_hat_i' = A_f f_hat_i + L_f (y - C x_hat),  P_f = part T L_f
 /// ```
 ///
-/// The lag of xi behind a fault whose rate is constant (for a ramp model: whose second derivative is
-/// constant) is T times that rate; for constant faults `L_f` (y - C `x_hat`) = xi', so that `f_hat` = xi + part T xi'. With
+/// The lag of `f_hat_i` behind a fault whose rate is constant (for a ramp model: whose second derivative is
+/// constant) is T times that rate; for constant faults `L_f` (y - C `x_hat`) = `f_hat_i`', so that `f_hat` = `f_hat_i` + part T `f_hat_i`'. With
 /// `part` = 1 the lag is gone: for constant fault models a ramp leaves no lasting error. `part` = 0 is the augmented
 /// observer. `gains`: of that observer; its error dynamics must be stable. In sampled time
 /// with a current estimator `P_f` (y - C `x_hat`) reads the corrected estimates. It exists whenever the augmented

@@ -17,8 +17,8 @@ use nalgebra::DMatrix;
 /// sides are the values at the next sample. With a current estimator the matrix of the second line
 /// is `A_0` - L `C_0` `A_0`, f enters by (I - L `C_0`) [`F_a`; 0], and the estimates are the
 /// corrected ones. The commands are within the limits of the actuators. The fault f may be any
-/// function of time, jumps included. With a direct term `P_f` (see [`Gains`]) the state is [x; e; xi], and
-/// `f_hat` = xi + `P_f` C e in the first and the last line.
+/// function of time, jumps included. With a direct term `P_f` (see [`Gains`]) the state is [x; e; `f_hat_i`], and
+/// `f_hat` = `f_hat_i` + `P_f` C e in the first and the last line.
 ///
 /// Source: (1) to (11) of the paper named in [`crate::aso`].
 ///
@@ -55,7 +55,7 @@ pub fn fault_system(
 ///
 /// In sampled time `r[k] = f[k+1] - A_f f[k]`. f acts only through the part that the compensation
 /// cannot cancel. For an f without jumps this is the loop of [`fault_system`] in other coordinates. With a
-/// direct term the state eps is xi - f, and eps + `P_f` C e takes its place in the first and the last line.
+/// direct term the state eps is `f_hat_i` - f, and eps + `P_f` C e takes its place in the first and the last line.
 ///
 /// # Errors
 ///

@@ -95,9 +95,6 @@ fn initial_values_depend_on_what_is_listed_and_on_nothing_else() {
         for (i, name) in names::channels("f_hat", controller.deviations.f_hat.len()).enumerate() {
             list(name, dependencies::of_initial_fault(design, i));
         }
-        for (i, name) in names::channels("f_hat", controller.deviations.f_hat.len()).enumerate() {
-            list(name, dependencies::of_initial_fault(design, i));
-        }
         for loss in &controller.losses {
             let name = names::channel("E_hat", loss.fault, q);
             list(name, dependencies::of_initial_loss(design, loss));
@@ -181,9 +178,6 @@ fn at_a_point_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed
         for (k, state) in names::estimates(design).enumerate() {
             list(&state, &[(Constant, vec![state.clone()])]);
             list(&format!("der({state})"), &dependencies::of_slope(design, k));
-        }
-        for (i, name) in names::channels("f_hat", controller.deviations.f_hat.len()).enumerate() {
-            list(&name, &dependencies::of_fault(design, i));
         }
         for (i, name) in names::channels("f_hat", controller.deviations.f_hat.len()).enumerate() {
             list(&name, &dependencies::of_fault(design, i));

@@ -14,6 +14,8 @@ pub(super) struct Oracle {
     c: DMatrix<f64>,
     f_a: DMatrix<f64>,
     a_f: Option<DMatrix<f64>>,
+    p_f: Option<DMatrix<f64>>,
+    sliding_mode: Option<crate::design::SlidingMode>,
     k_x: DMatrix<f64>,
     k_f: DMatrix<f64>,
     l_x: DMatrix<f64>,
@@ -86,6 +88,8 @@ impl Oracle {
             c: design.c.dense(),
             f_a: design.f_a.dense(),
             a_f: design.a_f.as_ref().map(crate::matrix::Matrix::dense),
+            p_f: design.p_f.as_ref().map(crate::matrix::Matrix::dense),
+            sliding_mode: design.sliding_mode.clone(),
             k_x: design.k_x.dense(),
             k_f: design.k_f.dense(),
             l_x: design.l_x.dense(),
@@ -118,9 +122,17 @@ impl Oracle {
         (inputs.rows(0, p).into(), inputs.rows(p, t) - &self.r_op)
     }
 
+    /// f_hat while estimating.
+    pub(super) fn fault(&self, z: &Estimate, inputs: &Vector) -> Vector {
+        match &self.p_f {
+            Some(p_f) => &z.f + p_f * self.innovation(z, &self.inputs(inputs).0),
+            None => z.f.clone(),
+        }
+    }
+
     /// The command, limits ignored.
     fn free(&self, z: &Estimate, inputs: &Vector, on: bool) -> Vector {
-        let fault = &self.k_f * &z.f * f64::from(u8::from(on));
+        let fault = &self.k_f * self.fault(z, inputs) * f64::from(u8::from(on));
         let Tracking { k_i, n_r, .. } = &self.tracking;
         let reference = k_i * &z.x_i + n_r * self.inputs(inputs).1;
         &self.u_op + &self.k_x * (&z.x - &self.x_op) + fault + reference
@@ -134,7 +146,8 @@ impl Oracle {
         if h.nrows() == 0 {
             return [Vector::zeros(0), Vector::zeros(0)];
         }
-        [r - h * (y - &self.y_op) + f_i * &z.f, l_w * lost]
+        let f_hat = if on { self.fault(z, inputs) } else { z.f.clone() };
+        [r - h * (y - &self.y_op) + f_i * f_hat, l_w * lost]
     }
 
     pub(super) fn command(&self, z: &Estimate, inputs: &Vector, on: bool) -> Vector {
@@ -195,9 +208,15 @@ impl Oracle {
         let gain = |wanted: bool| if wanted { &e * 1.0 } else { &e * 0.0 };
         let (before, after) = (gain(current), gain(!current));
         let on_number = f64::from(u8::from(on));
+        let seen = &self.l_f * &before;
         let used = Estimate {
             x: &z.x + &self.l_x * &before,
-            f: &z.f + &self.l_f * before * on_number,
+            f: match &self.sliding_mode {
+                Some(own) if on => Vector::from_fn(seen.len(), |i, _| {
+                    own.rho[i] * seen[i] / (seen[i].abs() + own.delta[i])
+                }),
+                _ => &z.f + seen * on_number,
+            },
             ..z.clone()
         };
         let u = self.command(&used, inputs, on);

@@ -10,10 +10,11 @@ pub(super) type Sizes = [usize; 4];
 
 /// Sizes; an `l` for each actuator with limits; what else the design has: `a` a fault model A_f, `w`
 /// a filter, `o` an operating point, `e` losses of effectiveness, `i` references with integral action,
-/// `n` references with a feedforward, `c` or `p` samples, with a current or a prediction estimator.
+/// `n` references with a feedforward, `c` or `p` samples, with a current or a prediction estimator, `d` a
+/// direct term, `s` a sliding-mode law.
 pub(super) type Shape = (Sizes, &'static str, &'static str);
 
-pub(super) const LIMITED: [Shape; 8] = [
+pub(super) const LIMITED: [Shape; 11] = [
     ([1, 1, 1, 1], "l", ""),
     ([2, 2, 2, 2], "ll", ""),
     ([3, 2, 1, 1], "l-", ""),
@@ -22,8 +23,11 @@ pub(super) const LIMITED: [Shape; 8] = [
     ([3, 2, 2, 3], "-l", "awoe"),
     ([2, 2, 2, 2], "ll", "i"),
     ([3, 2, 2, 3], "-l", "awoein"),
+    ([2, 2, 2, 2], "ll", "d"),
+    ([3, 2, 2, 2], "-l", "dawoe"),
+    ([2, 2, 2, 1], "l-", "din"),
 ];
-pub(super) const FREE: [Shape; 12] = [
+pub(super) const FREE: [Shape; 16] = [
     ([1, 1, 1, 1], "-", ""),
     ([2, 2, 2, 2], "--", ""),
     ([3, 1, 1, 2], "-", ""),
@@ -36,8 +40,12 @@ pub(super) const FREE: [Shape; 12] = [
     ([2, 2, 2, 1], "--", "wi"),
     ([2, 2, 1, 1], "--", "n"),
     ([3, 1, 2, 1], "-", "oin"),
+    ([2, 1, 2, 1], "-", "d"),
+    ([3, 2, 2, 2], "--", "dao"),
+    ([2, 2, 2, 2], "--", "dwe"),
+    ([2, 1, 2, 2], "-", "dwi"),
 ];
-pub(super) const SAMPLED: [Shape; 11] = [
+pub(super) const SAMPLED: [Shape; 16] = [
     ([1, 1, 1, 1], "l", "c"),
     ([2, 2, 2, 2], "--", "c"),
     ([3, 2, 1, 2], "l-", "cao"),
@@ -49,6 +57,11 @@ pub(super) const SAMPLED: [Shape; 11] = [
     ([2, 2, 2, 1], "-l", "cawoein"),
     ([3, 2, 1, 2], "l-", "pi"),
     ([1, 1, 1, 1], "-", "cn"),
+    ([2, 1, 2, 2], "l", "cd"),
+    ([3, 2, 2, 2], "-l", "cdawoe"),
+    ([2, 2, 1, 1], "l-", "cs"),
+    ([3, 2, 2, 2], "-l", "csawoe"),
+    ([2, 1, 2, 1], "l", "cwid"),
 ];
 
 /// Numbers between -1 and 1, none of them zero, that follow no line.
@@ -90,15 +103,18 @@ pub(super) fn sized(of: Shape) -> AsoController {
     let ([n, m, p, q], _, features) = of;
     let t = references(of);
     let shapes = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p), (q, q)];
-    let shapes = shapes.into_iter().chain([(t, p), (m, t), (t, q), (t, m), (m, t)]);
-    let names =
-        ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f", "A_f", "H", "K_i", "F_i", "L_w", "N_r"];
+    let shapes = shapes.into_iter().chain([(t, p), (m, t), (t, q), (t, m), (m, t), (q, p)]);
+    let names = [
+        "A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f", "A_f", "H", "K_i", "F_i", "L_w", "N_r",
+        "P_f",
+    ];
     let has = |letters: &str| letters.chars().all(|letter| features.contains(letter));
     let stated = |name| match name {
         "A_f" => has("a"),
         "H" | "K_i" | "L_w" => has("i"),
         "F_i" => has("iw"),
         "N_r" => has("n"),
+        "P_f" => has("d"),
         _ => true,
     };
     let mut lines = vec!["description = \"of any size\"\nt_on = 0.5".to_owned()];
@@ -115,6 +131,10 @@ pub(super) fn sized(of: Shape) -> AsoController {
         if stated(name) {
             lines.push(format!("{name} = {}", matrix(shape, 5 * seed)));
         }
+    }
+    if features.contains('s') {
+        let numbers = |seed| (0..q).map(|k| 0.8 + 0.3 * number(seed + k)).collect::<Vec<_>>();
+        lines.push(format!("[sliding_mode]\nrho = {:?}\ndelta = {:?}", numbers(3), numbers(8)));
     }
     lines.push("[experiment]\nstop_time = 1.0\nstep_size = 0.1".to_owned());
     for (list, count) in
@@ -170,6 +190,9 @@ pub(super) fn unknowns(controller: &AsoController) -> Vec<Real> {
     };
     let mut all: Vec<_> = design.actuators.iter().enumerate().map(command).collect();
     all.extend(estimates(controller));
+    for (i, name) in names::channels("f_hat", controller.deviations.f_hat.len()).enumerate() {
+        all.push(real(name, move |own| &mut own.deviations.f_hat[i]));
+    }
     for (position, loss) in controller.losses.iter().enumerate() {
         let name = names::channel("E_hat", loss.fault, design.faults.len());
         all.push(real(name, move |own| &mut own.losses[position].estimate));
@@ -217,6 +240,7 @@ fn place<'a>(design: &'a mut Design, name: &str) -> &'a mut Matrix {
         "L_x" => return &mut design.l_x,
         "L_f" => return &mut design.l_f,
         "A_f" => &mut design.a_f,
+        "P_f" => &mut design.p_f,
         "H" => &mut design.h,
         "K_i" => &mut design.k_i,
         "F_i" => &mut design.f_i,
@@ -247,6 +271,14 @@ pub(super) fn initial_knowns(controller: &AsoController) -> Vec<Real> {
                 &mut own.design.actuators[j].limits.as_mut().unwrap()[side]
             }));
         }
+    }
+    for bound in 0..2 * design.sliding_mode.as_ref().map_or(0, |own| own.rho.len()) {
+        let (i, count) = (bound / 2, design.faults.len());
+        let name = names::channel(["rho", "delta"][bound % 2], i, count);
+        all.push(real(name, move |own| {
+            let own = own.design.sliding_mode.as_mut().unwrap();
+            &mut [&mut own.rho, &mut own.delta].into_iter().nth(bound % 2).unwrap()[i]
+        }));
     }
     for (name, matrix) in design.matrices() {
         all.extend((0..matrix.values.len()).map(|k| {
