@@ -71,6 +71,7 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
         k_f: sampled::compensation_gain(&extended, domain)?,
         l_x: observer.gain.rows(0, n).into(),
         l_f: -observer.gain.rows(n, plant.f_a.ncols()),
+        p_f: None,
     };
     let controller = controller(&plant, &gains, domain)?;
     let whole = closed_loop(&plant, &controller, &vec![1.0; plant.b.ncols()])?;
