@@ -10,9 +10,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context;
+use design::{Design, Language, Precision};
 use outputs::{Outputs, check_distinct, check_own};
 
 #[derive(clap::Args)]
+#[command(group(clap::ArgGroup::new("code").multiple(true)))]
 pub(crate) struct Options {
     /// The plant file: plant, faults and requirements on the controller
     /// (docs/reference/plant-file.md)
@@ -30,6 +32,15 @@ pub(crate) struct Options {
     /// The packed controller FMU from which it is made
     #[arg(long, value_name = "FMU", default_value = "dist/AsoController.fmu", requires = "fmu")]
     from: PathBuf,
+    /// Also write the controller of a sampled design as C99: NAME.h and NAME.c in this folder
+    #[arg(long, value_name = "FOLDER", group = "code")]
+    c_code: Option<PathBuf>,
+    /// Also write it as a Rust crate without the standard library
+    #[arg(long, value_name = "FOLDER", group = "code")]
+    no_std: Option<PathBuf>,
+    /// Single precision in the code, with a bound of the difference; the default is double precision
+    #[arg(long, requires = "code")]
+    float: bool,
     /// Also write the worst plant within the tolerances, as a plant file
     #[arg(long, value_name = "FILE")]
     worst_case: Option<PathBuf>,
@@ -60,6 +71,10 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         fmu_import::preload(library)?;
     }
     let mut made = design::design_within(&options.plant, options.certificate_time)?;
+    let code = code(options, &made)?;
+    for (option, path, _) in &code.files {
+        outputs.push((option, path));
+    }
     check_distinct(&inputs(options, made.model.as_deref()), &outputs)?;
     if !options.force {
         outputs.iter().try_for_each(|(_, path)| check_own(path, &made.identity))?;
@@ -72,6 +87,9 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     if let (Some(fmu), Some(path)) = (fmu, &options.fmu) {
         staged.stage(path, |path| fmu.write(path, &page))?;
     }
+    for (_, path, text) in &code.files {
+        staged.stage(path, |path| fs::write(path, text))?;
+    }
     if let Some(path) = &options.worst_case {
         let text = made.worst_case.as_ref();
         let text = text.context(
@@ -81,6 +99,9 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         staged.stage(path, |path| fs::write(path, text))?;
     }
     staged.commit()?;
+    for warning in &code.warnings {
+        eprintln!("warning: {warning}");
+    }
     if options.json {
         let mut output = std::io::stdout().lock();
         serde_json::to_writer_pretty(&mut output, &made.report)
@@ -93,6 +114,30 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         }
     }
     Ok(made.holds())
+}
+
+/// The source code of the controller: the option that asks for each file, its path, its content.
+#[derive(Default)]
+struct CodeFiles {
+    files: Vec<(&'static str, PathBuf, String)>,
+    warnings: Vec<String>,
+}
+
+fn code(options: &Options, made: &Design) -> anyhow::Result<CodeFiles> {
+    let precision = if options.float { Precision::Single } else { Precision::Double };
+    let mut all = CodeFiles::default();
+    for (option, folder, language) in
+        [("--c-code", &options.c_code, Language::C), ("--no-std", &options.no_std, Language::Rust)]
+    {
+        let Some(folder) = folder else { continue };
+        let code = made
+            .code(language, precision)
+            .with_context(|| format!("{option}: no code for {}", options.plant.display()))?;
+        let files = code.files.into_iter();
+        all.files.extend(files.map(|(path, text)| (option, folder.join(path), text)));
+        all.warnings = code.warnings;
+    }
+    Ok(all)
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -210,6 +211,35 @@ class Controller:
         start = os.fspath(base) if base is not None else os.fspath(fmus()["AsoController"])
         self._designed.fmu(start, os.fspath(path))
         return os.fspath(path)
+
+    def c_code(self, folder: PathLike, *, single: bool = False) -> list[str]:
+        """Write the controller of a sampled design as C99; return the paths: header and source.
+
+        Args:
+            folder: where to write; it is made if it is missing, and files of the same names are replaced.
+            single: ``float`` instead of ``double``, with a bound of the difference in the header.
+        """
+        return self._code(folder, False, single)
+
+    def rust_crate(self, folder: PathLike, *, single: bool = False) -> list[str]:
+        """Write the controller of a sampled design as a Rust crate without the standard library; return the paths.
+
+        The arguments are those of :meth:`c_code`.
+        """
+        return self._code(folder, True, single)
+
+    def _code(self, folder: PathLike, rust: bool, single: bool) -> list[str]:
+        files, notes = self._designed.code(rust, single)
+        paths = []
+        for name, text in files:
+            path = os.path.join(os.fspath(folder), name)
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            with open(path, "w", encoding="ascii", newline="\n") as file:
+                file.write(text)
+            paths.append(path)
+        for note in notes:
+            warnings.warn(note, stacklevel=3)
+        return paths
 
 
 def _escaped(text: str) -> str:

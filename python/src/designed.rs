@@ -38,6 +38,9 @@ pub(crate) fn design_plant(plant: &Bound<'_, PyAny>, path: PathBuf) -> PyResult<
     Ok(Designed { design: Mutex::new(design) })
 }
 
+/// Paths and contents of files, and warnings.
+type SourceFiles = (Vec<(PathBuf, String)>, Vec<String>);
+
 impl Designed {
     fn with<T>(&self, work: impl FnOnce(&mut design::Design) -> T) -> T {
         work(&mut self.design.lock().unwrap_or_else(PoisonError::into_inner))
@@ -67,6 +70,16 @@ impl Designed {
     /// The report as an HTML page.
     fn page(&self, py: Python<'_>) -> PyResult<String> {
         guarded(py, || self.with(|design| design.page()))
+    }
+
+    /// The controller as source code: paths and contents of the files, and warnings. `rust`: a crate instead of
+    /// C; `single`: single precision.
+    fn code(&self, py: Python<'_>, rust: bool, single: bool) -> PyResult<SourceFiles> {
+        let language = if rust { design::Language::Rust } else { design::Language::C };
+        let precision = if single { design::Precision::Single } else { design::Precision::Double };
+        let made = guarded(py, || self.with(|design| design.code(language, precision)))?;
+        let code = made.map_err(|error| error::design(&error).raise(py))?;
+        Ok((code.files, code.warnings))
     }
 
     /// Makes the controller FMU from the packed controller at `base`.

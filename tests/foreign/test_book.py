@@ -18,7 +18,7 @@ from conftest import ROOT
 
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"(?:^<!-- ([^\n]*) -->\n)?^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-LANGUAGES = {"sh", "text", "toml", "python", "rust", "lua", "xml"}
+LANGUAGES = {"sh", "text", "toml", "python", "rust", "lua", "xml", "c"}
 LEFT_OUT = shutil.ignore_patterns(".git", ".venv", "target", "results", "dist", "__pycache__", "fuzz")
 
 # Replaces `aso-ftc` and `cargo run --release --` on PATH. Commands that build libraries run in the

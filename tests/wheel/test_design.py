@@ -83,6 +83,17 @@ def test_the_controller_fmu_runs(made, tmp_path):
     assert np.array_equal(own["plant.x_p"], packed["plant.x_p"])
 
 
+def test_the_source_code_of_a_sampled_controller_is_written(tmp_path):
+    own, _ = matrices()
+    sampled = af.design({**own, "sample_time": 0.01})
+    header, source = sampled.controller.c_code(tmp_path / "c", single=True)
+    assert header.endswith(".h") and "float" in Path(source).read_text(encoding="ascii")
+    _, library = sampled.controller.rust_crate(tmp_path / "rust")
+    assert "#![no_std]" in Path(library).read_text(encoding="ascii")
+    with pytest.raises(af.DesignError, match="sample_time"):
+        af.design(own).controller.c_code(tmp_path / "none")
+
+
 def test_a_wrong_plant_is_a_design_error(tmp_path):
     own, _ = matrices()
     with pytest.raises(af.DesignError) as caught:

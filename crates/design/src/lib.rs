@@ -12,6 +12,7 @@ mod analysis;
 mod budget;
 mod certificate;
 mod checks;
+mod code;
 mod controller_fmu;
 mod design_file;
 mod designed;
@@ -43,6 +44,7 @@ use std::time::Duration;
 
 use files::{Source, Table};
 
+pub use code::{Code, Language, Precision};
 pub use controller_fmu::ControllerFmu;
 pub use error::Error;
 pub use report::Report;

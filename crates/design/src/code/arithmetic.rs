@@ -1,0 +1,100 @@
+//! Operations per sample and bytes of a controller.
+
+use super::Precision;
+use super::controller::Controller;
+use super::recursion::{Kind, Matrix, Operation, Recursion, Statement, Term, Vector, When};
+use super::tables::{Constants, locals, stored, tables};
+
+/// The most operations of one sample: while compensating, with every command at its upper limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Arithmetic {
+    pub(super) multiplications: usize,
+    /// Additions and subtractions.
+    pub(super) additions: usize,
+    pub(super) comparisons: usize,
+    pub(super) divisions: usize,
+}
+
+impl Arithmetic {
+    pub(super) fn of(controller: &Controller, recursion: &Recursion) -> Self {
+        let mut all = Self::default();
+        let statements = recursion.statements();
+        for statement in statements.filter(|own| own.when != When::NotCompensating) {
+            all.add_statement(controller, statement);
+        }
+        let [n, q, m, p] = [Kind::State, Kind::Fault, Kind::Actuator, Kind::Measurement]
+            .map(|kind| kind.count(controller));
+        let filtered = if controller.filter.is_some() { p } else { 0 };
+        // Finite or not: the measurements, the commands and estimates, the next estimates.
+        all.comparisons += 2 * (p + m + n + q + n + q + filtered);
+        if controller.is_limited() {
+            all.comparisons += 2 * m;
+        }
+        // E_hat = -(u scale) f_hat, scale = 1 / (u u + u_e^2).
+        let losses = controller.losses.len();
+        all.multiplications += 3 * losses;
+        all.additions += losses;
+        all.divisions += losses;
+        all
+    }
+
+    fn add_statement(&mut self, controller: &Controller, statement: &Statement) {
+        let rows = statement.target.kind().count(controller);
+        self.add_term(controller, statement.start, rows);
+        for operation in &statement.operations {
+            match *operation {
+                Operation::Add(term) | Operation::Subtract(term) => {
+                    self.additions += rows;
+                    self.add_term(controller, term, rows);
+                }
+                Operation::Accumulate(matrix, _) => self.add_products(controller, matrix, rows),
+            }
+        }
+    }
+
+    fn add_term(&mut self, controller: &Controller, term: Term, rows: usize) {
+        match term {
+            Term::Zero | Term::Element(_) => {}
+            Term::Product(matrix, _) => self.add_products(controller, matrix, rows),
+            Term::FilterStep => {
+                self.multiplications += rows;
+                self.additions += rows;
+            }
+        }
+    }
+
+    fn add_products(&mut self, controller: &Controller, matrix: Matrix, rows: usize) {
+        let count = rows * matrix.of(controller).ncols();
+        self.multiplications += count;
+        self.additions += count;
+    }
+}
+
+/// Bytes of a controller, program code aside.
+pub(super) struct Memory {
+    /// One instance.
+    pub(super) state: usize,
+    /// The vectors on the stack during a sample.
+    pub(super) stack: usize,
+    /// The constants.
+    pub(super) constants: usize,
+}
+
+impl Memory {
+    pub(super) fn of(controller: &Controller, recursion: &Recursion, precision: Precision) -> Self {
+        let size = precision.size();
+        let count = |vector: Vector| vector.kind().count(controller);
+        let stored: usize = stored(controller).into_iter().map(count).sum();
+        // The commands of the sample before.
+        let stored = stored + Kind::Actuator.count(controller);
+        let flags = usize::from(controller.filter.is_some());
+        let counter = if controller.first_compensated > 0 { 4 } else { 0 };
+        let stack: usize = locals(recursion).into_iter().map(count).sum();
+        let tables: usize = tables(controller, recursion).iter().map(Constants::count).sum();
+        Self {
+            state: (stored * size + counter + flags).next_multiple_of(size),
+            stack: stack * size,
+            constants: tables * size,
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! The sampled controller as its design file states it.
+
+use nalgebra::DMatrix;
+use serde::Deserialize;
+
+use super::Precision;
+use super::recursion::Matrix;
+use crate::Error;
+
+/// The controller of a sampled design: matrices, signals, switches. Shapes as in the design file.
+pub(super) struct Controller {
+    pub(super) description: String,
+    /// T in s.
+    pub(super) sample_time: f64,
+    pub(super) estimator: Estimator,
+    /// Start of the compensation in s, and the first sample at or after it.
+    pub(super) t_on: f64,
+    pub(super) first_compensated: u32,
+    /// Whether the fault is estimated while it is not compensated.
+    pub(super) monitor: bool,
+    /// The diagonal of W.
+    pub(super) filter: Option<Vec<f64>>,
+    pub(super) a: DMatrix<f64>,
+    pub(super) b: DMatrix<f64>,
+    pub(super) c: DMatrix<f64>,
+    pub(super) f_a: DMatrix<f64>,
+    /// The identity where faults are constant.
+    pub(super) a_f: DMatrix<f64>,
+    pub(super) constant_faults: bool,
+    pub(super) k_x: DMatrix<f64>,
+    pub(super) k_f: DMatrix<f64>,
+    pub(super) l_x: DMatrix<f64>,
+    pub(super) l_f: DMatrix<f64>,
+    pub(super) states: Vec<Signal>,
+    pub(super) actuators: Vec<Signal>,
+    pub(super) measurements: Vec<Signal>,
+    pub(super) faults: Vec<Signal>,
+    pub(super) losses: Vec<Loss>,
+}
+
+/// The measurements that the command is computed from.
+#[derive(Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Estimator {
+    Current,
+    Prediction,
+}
+
+/// A state, an actuator, a measurement or a fault.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Signal {
+    pub(super) name: String,
+    #[serde(default)]
+    pub(super) unit: Option<String>,
+    #[serde(default)]
+    pub(super) description: String,
+    /// The value at the operating point.
+    #[serde(default)]
+    pub(super) operating: f64,
+    #[serde(default)]
+    pub(super) limits: Option<[f64; 2]>,
+    #[serde(default)]
+    loss_of: Option<String>,
+    #[serde(default)]
+    least_command: Option<f64>,
+}
+
+/// A fault that is a loss of effectiveness, with its position and that of its actuator.
+pub(super) struct Loss {
+    pub(super) fault: usize,
+    pub(super) actuator: usize,
+    /// `u_e`.
+    pub(super) least_command: f64,
+}
+
+/// The entries of a design file that this module has code for.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    description: String,
+    t_on: f64,
+    #[serde(default)]
+    monitor: bool,
+    sample_time: Option<f64>,
+    estimator: Option<Estimator>,
+    #[serde(default)]
+    filter: Option<Vec<f64>>,
+    #[serde(rename = "experiment")]
+    _experiment: toml::Value,
+    states: Vec<Signal>,
+    actuators: Vec<Signal>,
+    measurements: Vec<Signal>,
+    faults: Vec<Signal>,
+    #[serde(rename = "A")]
+    a: Rows,
+    #[serde(rename = "B")]
+    b: Rows,
+    #[serde(rename = "C")]
+    c: Rows,
+    #[serde(rename = "F_a")]
+    f_a: Rows,
+    #[serde(rename = "A_f", default)]
+    a_f: Option<Rows>,
+    #[serde(rename = "K_x")]
+    k_x: Rows,
+    #[serde(rename = "K_f")]
+    k_f: Rows,
+    #[serde(rename = "L_x")]
+    l_x: Rows,
+    #[serde(rename = "L_f")]
+    l_f: Rows,
+}
+
+/// A matrix as the design file has it.
+#[derive(Deserialize)]
+struct Rows(Vec<Vec<f64>>);
+
+impl Rows {
+    fn dense(self) -> DMatrix<f64> {
+        let columns = self.0.first().map_or(0, Vec::len);
+        DMatrix::from_row_slice(self.0.len(), columns, &self.0.concat())
+    }
+}
+
+impl Controller {
+    /// Reads the design file `text`; the error names what has no code.
+    pub(super) fn of(text: &str) -> Result<Self, Error> {
+        let file: File = toml::from_str(text).map_err(|error| {
+            Error::Invalid(format!(
+                "there is no code for this design, only its FMU: {}",
+                error.message()
+            ))
+        })?;
+        let (Some(sample_time), Some(estimator)) = (file.sample_time, file.estimator) else {
+            return Err(Error::Invalid(
+                "there is code for sampled designs only, and this one is continuous; state \
+                 `sample_time` in the plant file"
+                    .to_owned(),
+            ));
+        };
+        let first_compensated = first_at(file.t_on, sample_time).ok_or_else(|| {
+            Error::Invalid(format!(
+                "t_on = {} s is more than 2^32 samples of {sample_time} s after the start; a counter of \
+                 the code has 32 bits",
+                file.t_on
+            ))
+        })?;
+        let faults = file.faults.len();
+        Ok(Self {
+            losses: losses(&file.faults, &file.actuators),
+            description: file.description,
+            sample_time,
+            estimator,
+            t_on: file.t_on,
+            first_compensated,
+            monitor: file.monitor,
+            filter: file.filter,
+            a: file.a.dense(),
+            b: file.b.dense(),
+            c: file.c.dense(),
+            f_a: file.f_a.dense(),
+            constant_faults: file.a_f.is_none(),
+            a_f: file.a_f.map_or_else(|| DMatrix::identity(faults, faults), Rows::dense),
+            k_x: file.k_x.dense(),
+            k_f: file.k_f.dense(),
+            l_x: file.l_x.dense(),
+            l_f: file.l_f.dense(),
+            states: file.states,
+            actuators: file.actuators,
+            measurements: file.measurements,
+            faults: file.faults,
+        })
+    }
+
+    /// The operating point of some signals.
+    pub(super) fn operating(signals: &[Signal]) -> Vec<f64> {
+        signals.iter().map(|signal| signal.operating).collect()
+    }
+
+    /// Whether any actuator has limits.
+    pub(super) fn is_limited(&self) -> bool {
+        self.actuators.iter().any(|actuator| actuator.limits.is_some())
+    }
+
+    /// Checks that `precision` can hold every constant.
+    pub(super) fn check_range(&self, precision: Precision) -> Result<(), Error> {
+        if precision == Precision::Double {
+            return Ok(());
+        }
+        for matrix in Matrix::ALL {
+            let largest = matrix.of(self).amax();
+            if largest > LARGEST_SINGLE {
+                return Err(too_large(matrix.name(), largest));
+            }
+        }
+        let signals = [&self.states, &self.actuators, &self.measurements];
+        for signal in signals.into_iter().flatten() {
+            let values = signal.limits.iter().flatten().chain([&signal.operating]);
+            let largest = values.fold(0.0, |largest: f64, value| largest.max(value.abs()));
+            if largest > LARGEST_SINGLE {
+                return Err(too_large(&signal.name, largest));
+            }
+        }
+        match self.losses.iter().find(|loss| !COMMANDS.contains(&loss.least_command)) {
+            None => Ok(()),
+            Some(loss) => Err(Error::Invalid(format!(
+                "least_command = {:?} of {}: `float` cannot hold its square; expected {:?} to {:?}",
+                loss.least_command,
+                self.faults[loss.fault].name,
+                COMMANDS.start(),
+                COMMANDS.end()
+            ))),
+        }
+    }
+}
+
+/// The largest constant in single precision: its product with a signal of its own size is finite.
+const LARGEST_SINGLE: f64 = 1e18;
+/// The `least_command` whose square is a normal number in single precision.
+const COMMANDS: std::ops::RangeInclusive<f64> = 1e-18..=1e18;
+
+fn too_large(name: &str, value: f64) -> Error {
+    Error::Invalid(format!(
+        "{name} has the number {value:?}; `float` code has constants up to {LARGEST_SINGLE:?} only"
+    ))
+}
+
+/// The number of the first sample at which the FMU compensates, from a start at time 0; `None` if it
+/// does not fit into 32 bits.
+fn first_at(t_on: f64, period: f64) -> Option<u32> {
+    let is_on = |sample: f64| {
+        let time = sample * period;
+        time >= t_on - 8.0 * f64::EPSILON * time
+    };
+    let mut sample = ((t_on / period).floor() - 2.0).max(0.0);
+    while !is_on(sample) && sample <= f64::from(u32::MAX) {
+        sample += 1.0;
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number")]
+    (sample <= f64::from(u32::MAX)).then_some(sample as u32)
+}
+
+fn losses(faults: &[Signal], actuators: &[Signal]) -> Vec<Loss> {
+    let loss = |(fault, own): (usize, &Signal)| {
+        let name = own.loss_of.as_ref()?;
+        let actuator = actuators.iter().position(|actuator| actuator.name == *name)?;
+        Some(Loss { fault, actuator, least_command: own.least_command? })
+    };
+    faults.iter().enumerate().filter_map(loss).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::first_at;
+
+    #[test]
+    fn the_first_compensated_sample_is_the_first_one_at_t_on() {
+        for (t_on, period, expected) in [
+            (0.0, 0.1, 0),
+            (-3.0, 0.1, 0),
+            (0.3, 0.1, 3), // 3 * 0.1 is above 0.3, 0.3 / 0.1 below 3
+            (0.31, 0.1, 4),
+            (5.0, 1e-3, 5000),
+            (0.7, 0.1, 7),
+        ] {
+            assert_eq!(first_at(t_on, period), Some(expected), "{t_on} {period}");
+        }
+        assert_eq!(first_at(1e9, 1e-3), None);
+    }
+}

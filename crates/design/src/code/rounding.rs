@@ -1,0 +1,400 @@
+//! A bound of what single precision changes.
+//!
+//! Every statement of the recursion computes its sum with an error of at most
+//!
+//! ```text
+//! kappa s,   s = the largest deviations of x_hat, f_hat, y and u from the operating point, and 1
+//! ```
+//!
+//! from the rounding of its constants, products and partial sums: r |a| |v| for a product a v, r times the
+//! magnitudes added so far for a sum, r = 2^-24 (N. J. Higham, Accuracy and Stability of Numerical
+//! Algorithms, 2002, equation (2.4) and section 3.1). The errors w of all statements enter the loop of
+//! plant and controller,
+//!
+//! ```text
+//! d[k+1] = A d[k] + B w[k],   [du; df_hat] = C d[k] + D w[k],   d = [dx; dx_hat; df_hat]
+//! ```
+//!
+//! so that G kappa s bounds the differences of the outputs, with the peak-to-peak gains G of that system.
+//! The bound holds in the loop of the design, while faults are compensated and no command is at a limit.
+//! It takes the worst case of every rounding; errors of both signs cancel in practice.
+
+use std::ops::AddAssign as _;
+
+use control::response::peak_gain;
+use control::{Domain, Error, StateSpace};
+use nalgebra::{DMatrix, DVector, RowDVector};
+
+use super::controller::Controller;
+use super::recursion::{Kind, Operation, Recursion, Statement, Term, Vector, When};
+use super::summary::{Fields, aligned, filled};
+
+/// The relative rounding error of single precision.
+const UNIT: f64 = 5.960_464_477_539_063e-8;
+/// For products of rounding errors, for the width of the peak gains, for the printed digits.
+const SECOND_ORDER: f64 = 1.001;
+/// The relative width of the peak gains.
+const WIDTH: f64 = 0.02;
+/// The largest order of the loop whose peak gains are computed.
+const LARGEST_ORDER: usize = 60;
+/// The part of a signal by which its rounding errors may change it before that is a warning.
+const COARSE: f64 = 0.01;
+
+/// The bound, or the reason why there is none.
+pub(super) struct RoundingBound {
+    /// Outputs (commands, then faults) x signals (states, faults, measurements, commands, 1).
+    bound: Result<DMatrix<f64>, String>,
+    /// 1 - |lambda| of the slowest eigenvalue of the loop.
+    slowest: f64,
+}
+
+impl RoundingBound {
+    pub(super) fn of(controller: &Controller, recursion: &Recursion) -> Self {
+        let mut analysis = Analysis::new(controller);
+        let statements = recursion.statements();
+        for statement in statements.filter(|own| own.when != When::NotCompensating) {
+            analysis.follow(statement);
+        }
+        let order = analysis.order();
+        if order > LARGEST_ORDER {
+            let reason =
+                format!("{order} states of plant and controller are too many to compute it");
+            return Self { bound: Err(reason), slowest: f64::NAN };
+        }
+        let system = analysis.system();
+        let domain = Domain::Sampled { period: controller.sample_time };
+        let slowest =
+            control::stability::instability(&system.a, domain).map_or(f64::NAN, |own| -own);
+        let gains = peak_gain(&system, WIDTH).map(|gain| gain.upper * analysis.kappa());
+        let bound =
+            gains.map(|bound| bound * SECOND_ORDER).map_err(|error: Error| error.to_string());
+        Self { bound, slowest }
+    }
+
+    /// What makes single precision too coarse for this design.
+    pub(super) fn warnings(&self, controller: &Controller) -> Vec<String> {
+        let bound = match &self.bound {
+            Ok(bound) => bound,
+            Err(reason) => {
+                return vec![format!("float: no bound of the rounding errors: {reason}")];
+            }
+        };
+        let [n, q, m, p] = [Kind::State, Kind::Fault, Kind::Actuator, Kind::Measurement]
+            .map(|kind| kind.count(controller));
+        let commands = (0..m).map(|j| (&controller.actuators[j].name, bound[(j, n + q + p + j)]));
+        let faults = (0..q).map(|i| (&controller.faults[i].name, bound[(m + i, n + i)]));
+        let coarse = commands.chain(faults).filter(|(_, part)| *part > COARSE);
+        coarse
+            .map(|(name, part)| {
+                format!(
+                    "float: rounding may change {name} by {:.2} % of itself: the slowest eigenvalue of \
+                     the loop is 1 - {:.1e}, and rounding errors add up over its time; use double, or a \
+                     longer sample time",
+                    100.0 * part,
+                    self.slowest
+                )
+            })
+            .collect()
+    }
+
+    /// The lines of the header.
+    pub(super) fn lines(&self, fields: &Fields) -> Vec<String> {
+        let bound = match &self.bound {
+            Ok(bound) => bound,
+            Err(reason) => return filled(&format!("No bound of the difference: {reason}.")),
+        };
+        let mut outputs: Vec<_> =
+            fields.actuators.iter().map(|field| format!("Commands.{field}")).collect();
+        outputs.extend(fields.faults.iter().map(|field| format!("Estimates.f_hat_{field}")));
+        let mut signals = named("x_hat_", &fields.states);
+        signals.extend(named("f_hat_", &fields.faults));
+        signals.extend(named("", &fields.measurements));
+        signals.extend(named("", &fields.actuators));
+        signals.push("1".to_owned());
+        let mut lines = filled(
+            "In the loop with the plant of the design, while compensating and with no command at a limit, \
+             an output differs by at most the sum over the signals of coefficient times largest \
+             deviation from the operating point (last row: a constant):",
+        );
+        for (output, row) in outputs.into_iter().zip(bound.row_iter()) {
+            lines.extend([String::new(), output]);
+            let rows = signals.iter().zip(row.iter());
+            let rows: Vec<_> =
+                rows.map(|(name, own)| [format!("  {name}"), format!("{own:.4e}")]).collect();
+            lines.extend(aligned(&rows));
+        }
+        lines
+    }
+}
+
+fn named(start: &str, fields: &[String]) -> Vec<String> {
+    fields.iter().map(|field| format!("{start}{field}")).collect()
+}
+
+/// The elements of a vector: what they are made of, and how exact they are.
+#[derive(Clone)]
+struct Elements {
+    /// Elements x (states of the loop, then errors w): the difference from exact arithmetic.
+    form: DMatrix<f64>,
+    /// Elements x signals: a bound of the absolute value.
+    magnitude: DMatrix<f64>,
+    /// Elements x signals: a bound of the errors that are not among w.
+    error: DMatrix<f64>,
+}
+
+impl Elements {
+    fn zero(rows: usize, (forms, signals): (usize, usize)) -> Self {
+        let none = DMatrix::zeros(rows, signals);
+        Self { form: DMatrix::zeros(rows, forms), magnitude: none.clone(), error: none }
+    }
+
+    /// Adds `sign` times other elements; a sum with zero has no error.
+    fn add(&mut self, other: &Self, sign: f64) {
+        self.form += &other.form * sign;
+        self.error += &other.error;
+        for (mut row, other) in self.magnitude.row_iter_mut().zip(other.magnitude.row_iter()) {
+            row += other;
+        }
+        for i in 0..self.error.nrows() {
+            if other.magnitude.row(i).iter().any(|part| *part > 0.0) {
+                let rounding = self.magnitude.row(i) * UNIT;
+                self.error.row_mut(i).add_assign(&rounding);
+            }
+        }
+    }
+
+    /// Adds row i of `matrix` times `vector` to element i, one product after the other.
+    fn accumulate(&mut self, matrix: &DMatrix<f64>, vector: &Self) {
+        self.form += matrix * &vector.form;
+        for (i, row) in matrix.row_iter().enumerate() {
+            for (j, &entry) in row.iter().enumerate().filter(|(_, entry)| **entry != 0.0) {
+                let factor = vector.magnitude.row(j);
+                let is_first = self.magnitude.row(i).amax() == 0.0;
+                self.magnitude.row_mut(i).add_assign(&(factor * entry.abs()));
+                let sum = if is_first { 0.0 } else { UNIT };
+                let rounding = factor * product_error(entry) + self.magnitude.row(i) * sum;
+                self.error.row_mut(i).add_assign(&rounding);
+            }
+        }
+    }
+}
+
+/// The error of a product with `entry`, relative to the other factor: of the constant and of the
+/// product.
+fn product_error(entry: f64) -> f64 {
+    let is_power_of_two = entry.to_bits().trailing_zeros() >= 52;
+    let product = if is_power_of_two { 0.0 } else { entry.abs() * UNIT };
+    product + constant_error(entry)
+}
+
+/// The error of a constant in single precision.
+#[expect(clippy::cast_possible_truncation, reason = "the error is what is computed")]
+fn constant_error(value: f64) -> f64 {
+    (value - f64::from(value as f32)).abs()
+}
+
+/// Follows the statements of a sample.
+struct Analysis<'a> {
+    controller: &'a Controller,
+    known: Vec<(Vector, Elements)>,
+    /// kappa: a row over the signals for each error.
+    errors: Vec<RowDVector<f64>>,
+}
+
+impl<'a> Analysis<'a> {
+    fn new(controller: &'a Controller) -> Self {
+        let mut own = Self { controller, known: Vec::new(), errors: Vec::new() };
+        let [n, p] = [Kind::State, Kind::Measurement].map(|kind| own.count(kind));
+        own.start(Vector::StoredXHat, |form| form.columns_mut(n, n).fill_with_identity());
+        let q = own.count(Kind::Fault);
+        own.start(Vector::StoredFHat, |form| form.columns_mut(2 * n, q).fill_with_identity());
+        match &controller.filter {
+            None => own.start(Vector::Measured, |form| {
+                form.columns_mut(0, n).copy_from(&controller.c);
+            }),
+            Some(filter) => {
+                // The last states of the design are the filtered measurements, which the controller
+                // computes: y_f[k+1] = y_f + w (C x - y_f).
+                let first = n - p;
+                own.start(Vector::StoredYF, |form| {
+                    form.columns_mut(first, p).fill_with_identity();
+                });
+                own.start(Vector::Measured, |form| {
+                    for (k, w) in filter.iter().enumerate() {
+                        let row = controller.a.view((first + k, 0), (1, first)) / *w;
+                        form.view_mut((k, 0), (1, first)).copy_from(&row);
+                    }
+                });
+            }
+        }
+        let mut measured = own.get(Vector::Measured);
+        measured.error = &measured.magnitude * UNIT;
+        own.learn(Vector::Measured, measured);
+        own
+    }
+
+    fn count(&self, kind: Kind) -> usize {
+        kind.count(self.controller)
+    }
+
+    /// States of the loop: plant, stored `x_hat`, stored `f_hat`.
+    fn order(&self) -> usize {
+        2 * self.count(Kind::State) + self.count(Kind::Fault)
+    }
+
+    /// The columns of forms, with room for the errors of 6 vectors of each kind, and the signals.
+    fn widths(&self) -> (usize, usize) {
+        let kinds = [Kind::State, Kind::Fault, Kind::Measurement, Kind::Actuator];
+        let signals: usize = kinds.map(|kind| self.count(kind)).iter().sum();
+        (self.order() + 6 * signals, signals + 1)
+    }
+
+    /// Sets the exact elements of a vector at the start of a sample.
+    fn start(&mut self, vector: Vector, fill: impl FnOnce(&mut DMatrix<f64>)) {
+        let mut elements = Elements::zero(self.count(vector.kind()), self.widths());
+        fill(&mut elements.form);
+        elements.magnitude = self.magnitude(vector);
+        self.known.push((vector, elements));
+    }
+
+    /// A vector as it is now; zero if no statement has computed it.
+    fn get(&self, vector: Vector) -> Elements {
+        let operating = match vector {
+            Vector::XOp => Some(&self.controller.states),
+            Vector::UOp => Some(&self.controller.actuators),
+            Vector::YOp => Some(&self.controller.measurements),
+            _ => None,
+        };
+        let zero = || Elements::zero(self.count(vector.kind()), self.widths());
+        if let Some(signals) = operating {
+            let mut constant = zero();
+            let last = constant.error.ncols() - 1;
+            for (i, signal) in signals.iter().enumerate() {
+                constant.magnitude[(i, last)] = signal.operating.abs();
+                constant.error[(i, last)] = constant_error(signal.operating);
+            }
+            return constant;
+        }
+        let found = self.known.iter().rev().find(|(other, _)| *other == vector);
+        found.map_or_else(zero, |(_, elements)| elements.clone())
+    }
+
+    /// A bound of the elements of a vector, from the largest deviations of the signals.
+    fn magnitude(&self, vector: Vector) -> DMatrix<f64> {
+        let [n, q, p, m] = [Kind::State, Kind::Fault, Kind::Measurement, Kind::Actuator]
+            .map(|kind| self.count(kind));
+        let rows = self.count(vector.kind());
+        let mut own = DMatrix::zeros(rows, self.widths().1);
+        let first = match vector.kind() {
+            Kind::State => 0,
+            Kind::Fault => n,
+            Kind::Measurement => n + q,
+            Kind::Actuator => n + q + p,
+        };
+        own.columns_mut(first, rows).fill_with_identity();
+        let operating = match vector {
+            Vector::StoredXHat | Vector::XValue | Vector::NextXHat => &self.controller.states,
+            Vector::StoredYF | Vector::Measured | Vector::NextYF => &self.controller.measurements,
+            Vector::Command => &self.controller.actuators,
+            Vector::E => {
+                own.columns_mut(0, n).copy_from(&self.controller.c.abs());
+                return own;
+            }
+            _ => return own,
+        };
+        for (i, signal) in operating.iter().enumerate() {
+            own[(i, n + q + p + m)] = signal.operating.abs();
+        }
+        own
+    }
+
+    /// Takes the elements that a statement computes; their errors become elements of w.
+    fn learn(&mut self, vector: Vector, mut elements: Elements) {
+        elements.magnitude = self.magnitude(vector);
+        for (i, error) in elements.error.row_iter().enumerate() {
+            if error.amax() > 0.0 {
+                elements.form[(i, self.order() + self.errors.len())] = 1.0;
+                self.errors.push(error.into_owned());
+            }
+        }
+        elements.error.fill(0.0);
+        self.known.push((vector, elements));
+    }
+
+    fn follow(&mut self, statement: &Statement) {
+        // No output and no later statement has x_hat as a value.
+        if statement.target == Vector::XValue {
+            return;
+        }
+        let rows = self.count(statement.target.kind());
+        let mut sum = self.term(statement.start, rows);
+        for operation in &statement.operations {
+            match *operation {
+                Operation::Add(term) => sum.add(&self.term(term, rows), 1.0),
+                Operation::Subtract(term) => sum.add(&self.term(term, rows), -1.0),
+                Operation::Accumulate(matrix, vector) => {
+                    sum.accumulate(matrix.of(self.controller), &self.get(vector));
+                }
+            }
+        }
+        self.learn(statement.target, sum);
+    }
+
+    fn term(&self, term: Term, rows: usize) -> Elements {
+        let mut own = Elements::zero(rows, self.widths());
+        match term {
+            Term::Zero => {}
+            Term::Element(vector) => own = self.get(vector),
+            Term::Product(matrix, vector) => {
+                own.accumulate(matrix.of(self.controller), &self.get(vector));
+            }
+            Term::FilterStep => {
+                let mut difference = self.get(Vector::Y);
+                difference.add(&self.get(Vector::YF), -1.0);
+                let filter = self.controller.filter.as_deref().unwrap_or_default();
+                let diagonal = DMatrix::from_diagonal(&DVector::from_column_slice(filter));
+                own.accumulate(&diagonal, &difference);
+                own.error += diagonal * difference.error;
+            }
+        }
+        own
+    }
+
+    /// The loop from the errors w to [u; `f_hat`].
+    fn system(&self) -> StateSpace {
+        let ((n, q, p, m), order) = (
+            (
+                self.count(Kind::State),
+                self.count(Kind::Fault),
+                self.count(Kind::Measurement),
+                self.count(Kind::Actuator),
+            ),
+            self.order(),
+        );
+        let inputs = self.errors.len();
+        let command = self.get(Vector::Command).form;
+        let mut next = DMatrix::zeros(order, self.widths().0);
+        next.view_mut((0, 0), (n, n)).copy_from(&self.controller.a);
+        next.rows_mut(0, n).add_assign(&(&self.controller.b * &command));
+        if self.controller.filter.is_some() {
+            next.rows_mut(n - p, p).copy_from(&self.get(Vector::NextYF).form);
+        }
+        next.rows_mut(n, n).copy_from(&self.get(Vector::NextXHat).form);
+        next.rows_mut(2 * n, q).copy_from(&self.get(Vector::NextFHat).form);
+        let mut outputs = DMatrix::zeros(m + q, self.widths().0);
+        outputs.rows_mut(0, m).copy_from(&command);
+        outputs.rows_mut(m, q).copy_from(&self.get(Vector::FValue).form);
+        StateSpace {
+            a: next.columns(0, order).into_owned(),
+            b: next.columns(order, inputs).into_owned(),
+            c: outputs.columns(0, order).into_owned(),
+            d: outputs.columns(order, inputs).into_owned(),
+            domain: Domain::Sampled { period: self.controller.sample_time },
+        }
+    }
+
+    /// kappa, errors x signals.
+    fn kappa(&self) -> DMatrix<f64> {
+        DMatrix::from_rows(&self.errors)
+    }
+}

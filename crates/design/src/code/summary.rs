@@ -1,0 +1,317 @@
+//! What the user of the code must know: the same sentences for C and Rust.
+
+use super::arithmetic::{Arithmetic, Memory};
+use super::controller::{Controller, Estimator, Signal};
+use super::names::fields;
+use super::recursion::Recursion;
+use super::rounding::RoundingBound;
+use super::{Precision, Request};
+
+/// The functions and flags of a language, as its users write them.
+pub(super) struct Vocabulary {
+    pub(super) init: String,
+    pub(super) init_at: String,
+    pub(super) step: String,
+    pub(super) held: String,
+    pub(super) at_limit: String,
+    pub(super) overflow: String,
+    pub(super) real: &'static str,
+    /// How the compiler keeps the order of operations.
+    pub(super) compiler: &'static str,
+}
+
+/// The identifiers of the signals.
+pub(super) struct Fields {
+    pub(super) states: Vec<String>,
+    pub(super) faults: Vec<String>,
+    pub(super) actuators: Vec<String>,
+    pub(super) measurements: Vec<String>,
+}
+
+impl Fields {
+    pub(super) fn of(controller: &Controller) -> Self {
+        let own = |signals: &[Signal]| fields(signals.iter().map(|signal| signal.name.as_str()));
+        Self {
+            states: own(&controller.states),
+            faults: own(&controller.faults),
+            actuators: own(&controller.actuators),
+            measurements: own(&controller.measurements),
+        }
+    }
+
+    /// The fields of the estimates, in order: states, faults, losses.
+    pub(super) fn estimates(&self, controller: &Controller) -> Vec<String> {
+        let states = self.states.iter().map(|field| format!("x_hat_{field}"));
+        let faults = self.faults.iter().map(|field| format!("f_hat_{field}"));
+        let losses = controller.losses.iter();
+        let losses = losses.map(|loss| format!("E_hat_{}", self.faults[loss.fault]));
+        states.chain(faults).chain(losses).collect()
+    }
+}
+
+/// Returns the lines that describe a controller, in ASCII.
+pub(super) fn summary(
+    request: &Request<'_>,
+    controller: &Controller,
+    (recursion, fields): (&Recursion, &Fields),
+    bound: Option<&RoundingBound>,
+    vocabulary: &Vocabulary,
+) -> Vec<String> {
+    let mut lines = vec![
+        format!("Sampled controller: {}", one_line(&controller.description)),
+        format!("Written by {}, version {}.", request.identity, env!("CARGO_PKG_VERSION")),
+        format!("Verdict of the design: {}.", request.verdict),
+    ];
+    section(&mut lines, "USE", &[usage(controller, vocabulary)]);
+    section(&mut lines, "TIMING", &timing(request, controller, vocabulary));
+    section(&mut lines, "COMPENSATION AND LIMITS", &modes(controller));
+    section(&mut lines, "SIGNALS", &[]);
+    lines.extend(signals(controller, fields));
+    section(&mut lines, "STATUS", &status(vocabulary));
+    section(&mut lines, "COST", &costs(request, controller, recursion));
+    section(&mut lines, "PRECISION", &precision(request, vocabulary));
+    if let Some(bound) = bound {
+        lines.extend(bound.lines(fields));
+    }
+    for line in &mut lines {
+        *line = ascii(line);
+    }
+    lines
+}
+
+/// The longest line of a paragraph.
+const WIDTH: usize = 92;
+
+/// Adds a title and paragraphs, broken into lines.
+fn section(lines: &mut Vec<String>, title: &str, paragraphs: &[String]) {
+    lines.extend([String::new(), title.to_owned()]);
+    for paragraph in paragraphs {
+        lines.extend(filled(paragraph));
+    }
+}
+
+/// Breaks a paragraph into lines.
+pub(super) fn filled(paragraph: &str) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in paragraph.split(' ') {
+        match lines.last_mut() {
+            Some(line) if line.len() + word.len() < WIDTH => line.extend([" ", word]),
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+fn usage(controller: &Controller, vocabulary: &Vocabulary) -> String {
+    let Vocabulary { init, init_at, step, .. } = vocabulary;
+    let filtered = match controller.filter {
+        Some(_) => ", the filtered measurements at the first measurements",
+        None => "",
+    };
+    format!(
+        "Call {init} once for each instance, then {step} once in every sample. The estimates of \
+         the states start at the operating point, those of the faults at 0{filtered}; {init_at} starts \
+         them elsewhere. A call uses no heap, no global variable and no library, and ends after a \
+         bounded number of operations. Instances are independent. Signals are values, as in the plant \
+         file, not deviations from the operating point."
+    )
+}
+
+fn timing(request: &Request<'_>, controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
+    let (period, step) = (controller.sample_time, &vocabulary.step);
+    let estimator = match controller.estimator {
+        Estimator::Current => format!(
+            "The estimator is current: the commands of {step} follow from the measurements of the same \
+             call. Apply them at once: the time from measuring to applying is a delay that the design \
+             does not know."
+        ),
+        Estimator::Prediction => format!(
+            "The estimator is a predictor: the commands of {step} follow from the measurements of earlier \
+             calls. Call it as soon as the sample starts, and apply its commands in the same sample; its \
+             measurements count for the next one."
+        ),
+    };
+    let mut all = vec![format!(
+        "Sample time: {period:?} s. Sample k is at k times the sample time. {estimator}"
+    )];
+    all.extend(request.delay_margin.map(|margin| {
+        format!("The loop is stable with a further delay of all commands below {margin:.3e} s.")
+    }));
+    all
+}
+
+fn modes(controller: &Controller) -> Vec<String> {
+    let Controller { t_on, first_compensated, .. } = controller;
+    let start = match first_compensated {
+        0 => "the first sample".to_owned(),
+        sample => format!("sample {sample} (t_on = {t_on:?} s)"),
+    };
+    let estimated = if controller.monitor {
+        "They are estimated in every sample (monitor)."
+    } else {
+        "They are estimated while they are compensated; otherwise their estimates keep their values."
+    };
+    let mut all = vec![format!(
+        "Faults are compensated from {start} on while `compensate` is true. {estimated}"
+    )];
+    if let Some(filter) = &controller.filter {
+        let list: Vec<_> = filter.iter().map(|gain| format!("{gain:?}")).collect();
+        all.push(format!(
+            "Measurements are filtered: y_f := y_f + filter (y - y_f), filter = {}.",
+            list.join(", ")
+        ));
+    }
+    if controller.is_limited() {
+        let text = "A command beyond a limit is set to it, and the observer uses the limited command, so \
+                    that no estimate winds up.";
+        all.push(text.to_owned());
+    }
+    all
+}
+
+/// The table of the signals and their fields.
+fn signals(controller: &Controller, fields: &Fields) -> Vec<String> {
+    let mut rows = vec![
+        ["field", "name in the plant file", "unit", "operating point", "description"]
+            .map(str::to_owned),
+    ];
+    let groups = [
+        ("Measurements", "", &controller.measurements, &fields.measurements),
+        ("Commands", "", &controller.actuators, &fields.actuators),
+        ("Estimates", "x_hat_", &controller.states, &fields.states),
+        ("Estimates", "f_hat_", &controller.faults, &fields.faults),
+    ];
+    for (owner, start, signals, fields) in groups {
+        for (signal, field) in signals.iter().zip(fields) {
+            let fault = start == "f_hat_";
+            rows.push([
+                format!("{owner}.{start}{field}"),
+                one_line(&signal.name),
+                signal.unit.clone().unwrap_or_default(),
+                if fault { String::new() } else { format!("{:?}", signal.operating) },
+                one_line(&signal.description),
+            ]);
+        }
+    }
+    for loss in &controller.losses {
+        let [fault, actuator] =
+            [&controller.faults[loss.fault], &controller.actuators[loss.actuator]];
+        rows.push([
+            format!("Estimates.E_hat_{}", fields.faults[loss.fault]),
+            format!("loss of {}, {}", one_line(&actuator.name), one_line(&fault.name)),
+            "1".to_owned(),
+            String::new(),
+            String::new(),
+        ]);
+    }
+    let mut lines = aligned(&rows);
+    for (actuator, field) in controller.actuators.iter().zip(&fields.actuators) {
+        lines.extend(
+            actuator
+                .limits
+                .map(|[low, high]| format!("Limits of Commands.{field}: {low:?} to {high:?}")),
+        );
+    }
+    for loss in &controller.losses {
+        let [fault, actuator] = [&fields.faults[loss.fault], &fields.actuators[loss.actuator]];
+        lines.push(format!(
+            "E_hat_{fault} = -u f_hat / (u^2 + u_e^2), u = Commands.{actuator}, u_e = {:?}",
+            loss.least_command
+        ));
+    }
+    lines
+}
+
+fn status(vocabulary: &Vocabulary) -> [String; 3] {
+    let Vocabulary { held, at_limit, overflow, real, .. } = vocabulary;
+    [
+        format!(
+            "{held}: a measurement was NaN or infinite; its last finite value was used, before the first \
+             one its value at the operating point."
+        ),
+        format!("{at_limit}: a command is at a limit."),
+        format!(
+            "{overflow}: a sum was beyond the range of {real}; commands and estimates keep their values. \
+             So every output is a finite number in every sample."
+        ),
+    ]
+}
+
+fn costs(request: &Request<'_>, controller: &Controller, recursion: &Recursion) -> [String; 2] {
+    let Arithmetic { multiplications, additions, comparisons, divisions } =
+        Arithmetic::of(controller, recursion);
+    let Memory { state, stack, constants } = Memory::of(controller, recursion, request.precision);
+    [
+        format!(
+            "Floating-point operations of a sample, at most: {multiplications} multiplications, \
+             {additions} additions, {comparisons} comparisons, {divisions} divisions."
+        ),
+        format!(
+            "Memory: {state} bytes for an instance, {stack} bytes of vectors on the stack, {constants} \
+             bytes of constants; the size of the program depends on the compiler."
+        ),
+    ]
+}
+
+fn precision(request: &Request<'_>, vocabulary: &Vocabulary) -> [String; 1] {
+    let compiler = vocabulary.compiler;
+    [match request.precision {
+        Precision::Double => format!(
+            "Double. The results have the bits of the controller FMU of the same design, if the compiler \
+             neither contracts nor reorders operations: {compiler}"
+        ),
+        Precision::Single => format!(
+            "Single. The compiler must not reorder operations: {compiler} The results differ from those \
+             of the FMU of the same design."
+        ),
+    }]
+}
+
+/// Columns of equal width.
+pub(super) fn aligned<const N: usize>(rows: &[[String; N]]) -> Vec<String> {
+    let width =
+        |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<_> = (0..N).map(width).collect();
+    let line = |row: &[String; N]| {
+        let cells = row.iter().zip(&widths).map(|(cell, width)| format!("{cell:width$}"));
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    rows.iter().map(line).collect()
+}
+
+/// The text without line breaks.
+fn one_line(text: &str) -> String {
+    text.replace(|sign: char| sign.is_control(), " ")
+}
+
+/// Replaces characters beyond ASCII, and what ends a comment.
+pub(super) fn ascii(text: &str) -> String {
+    let mut plain = String::new();
+    for sign in text.chars() {
+        match sign {
+            '\\' => plain.push('/'),
+            ' '..='~' => plain.push(sign),
+            _ => plain
+                .extend(sign.escape_unicode().map(|sign| if sign == '\\' { '&' } else { sign })),
+        }
+    }
+    for (mark, apart) in
+        [("*/", "* /"), ("/*", "/ *"), ("??", "? ?"), ("//", "/ /"), ("```", "` ` `")]
+    {
+        while plain.contains(mark) {
+            plain = plain.replace(mark, apart);
+        }
+    }
+    plain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ascii;
+
+    #[test]
+    fn no_text_ends_a_comment() {
+        assert_eq!(ascii("a */ b /* // ??/ \\"), "a * / b / * / / ? ?/ /");
+        assert_eq!(ascii("\u{b0}C"), "&u{b0}C");
+    }
+}

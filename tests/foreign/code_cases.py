@@ -1,0 +1,155 @@
+"""Sampled designs as source code: plant files, their designs, the compiled code, the loop with the plant."""
+
+import re
+import subprocess
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from conftest import ROOT
+
+HERE = Path(__file__).parent
+WARNINGS = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -Werror -ffp-contract=off".split()
+
+# Two masses with a spring; the motor's force has limits, its fault is a ramp.
+MASSES = """
+A = [[0, 1, 0, 0], [-40, -0.5, 40, 0.1], [0, 0, 0, 1], [30, 0.1, -30, -0.3]]
+B = [[0], [2.5], [0], [0]]
+C = [[1, 0, 0, 0], [0, 0, 1, 0]]
+states = ["x_1", "v_1", "x_2", "v_2"]
+actuators = [{ name = "'motor 1'", unit = "N", limits = [-0.05, 1.05], operating = 0.5 }]
+measurements = [{ name = "q[1]", unit = "m", operating = 0.2 }, { name = "Q_1", unit = "m" }]
+sample_time = 0.02
+estimator = "ESTIMATOR"
+t_on = 1.5
+monitor = MONITOR
+feedback.eigenvalues = [-3, -3.5, -4, -5]
+observer.eigenvalues = [-8, -9, -10, -11, -12, -13]
+[[faults]]
+name = "int"
+actuator = "'motor 1'"
+kind = "ramp"
+[experiment]
+stop_time = 20.0
+"""
+
+QUADRUPLE = (ROOT / "examples" / "plants" / "quadruple-tank.toml").read_text(encoding="utf-8")
+TANKS = {
+    name: (ROOT / "examples" / "three-tank" / f"{name}.toml").read_text(encoding="utf-8").replace("../..", str(ROOT))
+    for name in ("plant", "sensor-fault", "loss-of-effectiveness")
+}
+
+
+def masses(estimator, monitor):
+    """The two masses with this estimator."""
+    return MASSES.replace("ESTIMATOR", estimator).replace("MONITOR", monitor)
+
+
+@dataclass
+class Case:
+    """A plant file; the largest faults, the standard deviation of the measurements, numbers of samples."""
+
+    text: str
+    fault: float
+    noise: float
+    samples: int = 3000
+    prefix: str = field(default="", repr=False)
+
+
+CASES = {
+    "three-tank": Case(TANKS["plant"], 6e-5, 1e-3),
+    "sensor-fault": Case(TANKS["sensor-fault"], 6e-5, 1e-3),
+    "loss-of-effectiveness": Case(TANKS["loss-of-effectiveness"], 6e-5, 1e-3),
+    "ramp-current": Case(masses("current", "false"), 0.5, 1e-3),
+    "ramp-prediction": Case(masses("prediction", "true"), 0.5, 1e-3),
+    "constant-prediction": Case("sample_time = 1.0\nestimator = 'prediction'\n" + QUADRUPLE, 0.3, 1e-2),
+}
+
+
+class Built:
+    """The files of `aso-ftc design` for a plant file, in `folder`."""
+
+    def __init__(self, aso_ftc, text, folder, *options, name="plant"):
+        self.folder, self.single = folder, "--float" in options
+        plant = folder / f"{name}.toml"
+        plant.write_text(text, encoding="utf-8")
+        wanted = ("--out", folder / "design.toml", "--c-code", folder / "c", "--no-std", folder / "rust")
+        self.done = aso_ftc("design", plant, *wanted, "--certificate-time", "0", *options)
+        assert self.done.returncode in (0, 1), self.done.stderr
+        self.design = tomllib.loads((folder / "design.toml").read_text(encoding="utf-8"))
+        [header] = (folder / "c").glob("*.h")
+        self.name, self.header = header.stem, header.read_text(encoding="utf-8")
+
+    def compiled(self, *options, compiler="gcc"):
+        """The C code with `controller_loop.c`, as a program."""
+        program = self.folder / ("c" + "".join(options).replace("=", "").replace(",", ""))
+        source, header = (self.folder / "c" / f"{self.name}.{end}" for end in "ch")
+        unit = program.with_suffix(".o")
+        run(compiler, *WARNINGS, *options, "-c", source, "-o", unit)
+        macros = [f"-DNAME={self.name}", f"-DREAL={'float' if self.single else 'double'}"]
+        run(compiler, *options, "-include", header, *macros, HERE / "controller_loop.c", unit, "-o", program)
+        return program
+
+    def crate(self):
+        """The Rust crate with `controller_loop.rs`, as a program."""
+        library, program = self.folder / "libcontroller.rlib", self.folder / "rust-loop"
+        always = ["rustc", "--edition", "2021", "-O", "-D", "warnings"]
+        source = self.folder / "rust" / "src" / "lib.rs"
+        run(*always, "--crate-type", "rlib", "--crate-name", "controller", source, "-o", library)
+        switch = ["--cfg", "single"] if self.single else []
+        known = ["--check-cfg", "cfg(single)", *switch, "--extern", f"controller={library}"]
+        run(*always, *known, HERE / "controller_loop.rs", "-o", program)
+        return program
+
+    @property
+    def sizes(self):
+        """Numbers of states, actuators, measurements, faults."""
+        return [len(self.design[name]) for name in ("states", "actuators", "measurements", "faults")]
+
+
+def run(*command):
+    """Runs a command that must succeed."""
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def fed(program, samples):
+    """What a program answers to rows of measurements and the switch, and the bytes of its state."""
+    done = subprocess.run([program], input=np.ascontiguousarray(samples).tobytes(), capture_output=True)
+    assert done.returncode == 0, done.stderr.decode()
+    return np.frombuffer(done.stdout).reshape(len(samples), -1), int(done.stderr.split()[0])
+
+
+class Plant:
+    """The sampled plant of a design, with faults."""
+
+    def __init__(self, design):
+        matrix = lambda name: np.array(design[name], dtype=float)
+        self.a, self.b, self.f_a, self.c = (matrix(name) for name in ("A", "B", "F_a", "C"))
+        self.sensors = np.zeros((len(self.c), self.f_a.shape[1]))
+        if "filter" in design:
+            # The last states of the design are y_f[k+1] = y_f + w (C x + F_s f - y_f).
+            n, w = len(self.a) - len(self.c), np.array(design["filter"])[:, None]
+            self.c, self.sensors = self.a[n:, :n] / w, self.f_a[n:] / w
+            self.a, self.b, self.f_a = self.a[:n, :n], self.b[:n], self.f_a[:n]
+        self.x = np.zeros(len(self.a))
+        operating = lambda name: np.array([own.get("operating", 0.0) for own in design[name]])
+        self.u_op, self.y_op = operating("actuators"), operating("measurements")
+        self.x_op = operating("states")
+
+    def measured(self, fault):
+        """The measurements."""
+        return self.c @ self.x + self.sensors @ fault + self.y_op
+
+    def step(self, u, fault):
+        """The next sample."""
+        self.x = self.a @ self.x + self.b @ (u - self.u_op) + self.f_a @ fault
+
+
+def bound_of(header):
+    """The coefficients in a header of single precision: rows of outputs, columns of signals and 1."""
+    text = header.split("(last row: a constant):")[1].split("*/")[0].replace("*", "")
+    groups = re.split(r"\n *\n", text)[1:]
+    return np.array([[float(line.split()[1]) for line in group.strip().splitlines()[1:]] for group in groups])

@@ -1,0 +1,48 @@
+/* Feeds measurements from standard input to a controller that `aso-ftc design --c-code` has written, and writes
+ * commands, estimates and status to standard output. Each sample has the measurements and whether to compensate, all
+ * as doubles. Macros: NAME (of the controller), REAL (double or float); the header comes by -include. */
+#include <stdio.h>
+#include <string.h>
+
+#define JOINED(name, part) name##_##part
+#define JOIN(name, part) JOINED(name, part)
+#define COUNT(signals) (sizeof(signals) / sizeof(REAL))
+
+static JOIN(NAME, Measurements) measurements;
+static JOIN(NAME, Commands) commands;
+static JOIN(NAME, Estimates) estimates;
+
+static void put(const void *signals, size_t count)
+{
+    const unsigned char *bytes = signals;
+    for (size_t k = 0; k < count; k++)
+    {
+        REAL value;
+        memcpy(&value, bytes + k * sizeof(REAL), sizeof(REAL));
+        double wide = (double)value;
+        fwrite(&wide, sizeof(wide), 1, stdout);
+    }
+}
+
+int main(void)
+{
+    JOIN(NAME, State) state;
+    double values[COUNT(measurements) + 1];
+    JOIN(NAME, init)(&state);
+    fprintf(stderr, "%zu\n", sizeof(state));
+    while (fread(values, sizeof(values), 1, stdin) == 1)
+    {
+        REAL received[COUNT(measurements)];
+        for (size_t k = 0; k < COUNT(measurements); k++)
+        {
+            received[k] = (REAL)values[k];
+        }
+        memcpy(&measurements, received, sizeof(received));
+        uint32_t bits = JOIN(NAME, step)(&state, &measurements, values[COUNT(measurements)] > 0.5, &commands, &estimates);
+        put(&commands, COUNT(commands));
+        put(&estimates, COUNT(estimates));
+        double status = (double)bits;
+        fwrite(&status, sizeof(status), 1, stdout);
+    }
+    return 0;
+}

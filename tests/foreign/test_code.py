@@ -1,0 +1,240 @@
+"""The source code of sampled controllers: compiled, with the bits of the FMU in double, within its bound in float."""
+
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from fmpy import extract
+
+from c_abi import Fmu, Instance
+from code_cases import CASES, Built, Plant, bound_of, fed, masses, run
+from conftest import ROOT
+from design_file import vector
+from design_loop import packed_plant
+
+
+@pytest.fixture(scope="module")
+def designed(aso_ftc, packed, tmp_path_factory):
+    """The design of a case with its FMU, in double precision."""
+    made = {}
+
+    def of(name):
+        if name not in made:
+            packed_plant(aso_ftc, "ThreeTank")
+            folder = tmp_path_factory.mktemp(name)
+            own = Built(aso_ftc, CASES[name].text, folder, "--fmu", folder / "Own.fmu")
+            own.fmu = Fmu(extract(str(folder / "Own.fmu"), str(folder / "fmu")))
+            own.samples, own.expected = in_the_loop(own, CASES[name])
+            made[name] = own
+        return made[name]
+
+    return of
+
+
+def in_the_loop(own, case):
+    """Measurements and switch of each sample in the loop of the FMU with the plant, and the FMU's outputs."""
+    n, m, p, q = own.sizes
+    design, plant = own.design, Plant(own.design)
+    chance = np.random.default_rng(3)
+    names = vector("x_hat", n) + vector("f_hat", q)
+    names += [vector("E_hat", q)[k] for k, fault in enumerate(design["faults"]) if "loss_of" in fault]
+    outputs = [signal["name"] for signal in design["actuators"]] + names
+    inputs = [signal["name"] for signal in design["measurements"]]
+    period, fault = design["sample_time"], np.zeros(q)
+    samples, expected = [], []
+    with Instance(own.fmu) as instance:
+        for k in range(case.samples):
+            if k % 500 == 100:
+                fault = case.fault * chance.uniform(-1, 1, q)
+            y = plant.measured(fault) + case.noise * chance.normal(size=p) * (k > 50)
+            compensate = not 1700 < k < 1800
+            if k == 0:
+                instance.start(dict(zip(inputs, y)))
+            else:
+                instance.set({**dict(zip(inputs, y)), "compensate": compensate})
+                instance.step((k - 1) * period, period)
+            samples.append([*y, compensate])
+            expected.append(instance.get(*outputs))
+            plant.step(np.array(expected[-1][:m]), fault)
+    return np.array(samples, dtype=float), np.array(expected)
+
+
+def bits(values):
+    """Bit patterns, which tell -0.0 from 0.0."""
+    return np.ascontiguousarray(values).view(np.uint64)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_c_has_the_bits_of_the_fmu_at_each_optimisation(designed, name):
+    own = designed(name)
+    for options in (["-O0"], ["-O2"], ["-O3", "-march=native"], ["-O1", "-g", "-fsanitize=address,undefined"]):
+        found, size = fed(own.compiled(*options), own.samples)
+        assert (bits(found[:, :-1]) == bits(own.expected)).all(), options
+        assert f"Memory: {size} bytes for an instance" in own.header
+    limited = any("limits" in actuator for actuator in own.design["actuators"])
+    assert set(found[:, -1]) == ({0.0, 2.0} if limited else {0.0}), "the limits are reached and left"
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_crate_has_the_bits_of_the_fmu(designed, name):
+    own = designed(name)
+    found, size = fed(own.crate(), own.samples)
+    assert (bits(found[:, :-1]) == bits(own.expected)).all()
+    assert f"Memory: {size} bytes for an instance" in own.header
+
+
+@pytest.mark.skipif(not shutil.which("clang"), reason="clang is not installed")
+def test_clang_compiles_it_without_warnings_and_with_the_same_bits(designed):
+    own = designed("sensor-fault")
+    found, _ = fed(own.compiled("-O2", "-march=native", compiler="clang"), own.samples)
+    assert (bits(found[:, :-1]) == bits(own.expected)).all()
+
+
+def test_the_stated_arithmetic_is_that_of_the_equations(designed):
+    own = designed("sensor-fault")
+    n, m, p, q = own.sizes  # n with the filter's states
+    products = p * n + n * p + q * p + m * n + m * q + n * n + n * m + n * q + p
+    # Deviations, y + 0, e, values of x_hat, f_hat, u, sums of u and of x_hat[k+1], f_hat[k+1] + 0, the filter.
+    others = (p + p + n + p) + p + (n + q + m) + m + 3 * n + q + 3 * p
+    comparisons = 2 * (p + m + n + q + n + q + p) + 2 * m
+    wanted = f"{products} multiplications, {products - p + others} additions, {comparisons} comparisons, 0 divisions."
+    assert wanted in own.header.replace("\n *", "")
+
+
+def test_nan_and_infinite_measurements_are_replaced_by_the_last_finite_ones(designed):
+    own = designed("ramp-current")
+    samples = own.samples[:600].copy()
+    samples[0, 0], samples[200:210, 1], samples[300, 0] = np.nan, np.inf, -np.inf
+    held = samples.copy()
+    held[0, 0] = own.design["measurements"][0]["operating"]
+    held[200:210, 1], held[300, 0] = samples[199, 1], samples[299, 0]
+    for program in (own.compiled("-O2"), own.crate()):
+        found, wanted = fed(program, samples)[0], fed(program, held)[0]
+        assert (bits(found[:, :-1]) == bits(wanted[:, :-1])).all() and np.isfinite(found).all()
+        marked = found[:, -1].astype(int) & 1
+        assert (np.flatnonzero(marked) == [0, *range(200, 210), 300]).all()
+
+
+def test_after_an_overflow_commands_and_estimates_are_those_of_the_sample_before(designed):
+    own = designed("constant-prediction")
+    m, samples = own.sizes[1], own.samples[:100].copy()
+    samples[50, 0] = 1.7e308 * np.sign(own.design["L_x"][0][0])
+    samples[50, 1] = -1.7e308 * np.sign(own.design["L_x"][0][1] * own.design["L_x"][0][0])
+    usual = fed(own.compiled("-O2"), own.samples[:100])[0]
+    for program in (own.compiled("-O2"), own.crate()):
+        found = fed(program, samples)[0]
+        assert np.isfinite(found).all()
+        assert (found[:50] == usual[:50]).all() and found[50, -1] == 4 and not found[51:, -1].any()
+        assert (found[50, :m] == found[49, :m]).all()
+        assert (found[50, m:-1] == found[51, m:-1]).all(), "the estimate of the sample before"
+
+
+@pytest.mark.parametrize(
+    "text", [CASES["three-tank"].text, CASES["sensor-fault"].text, CASES["constant-prediction"].text, masses("current", "true")],
+    ids=["three-tank", "sensor-fault", "constant-prediction", "ramp"],
+)
+def test_float_stays_within_its_bound_of_double_in_the_loop(aso_ftc, tmp_path, text):
+    """The bound is for a loop without limits; it may be up to 200 times the largest difference that occurs."""
+    text = re.sub(r", limits = \[.*?\]|^limits = .*$|^t_on = .*$", "", text, flags=re.MULTILINE)
+    packed_plant(aso_ftc, "ThreeTank")
+    loops = []
+    for kind in ("double", "single"):
+        (folder := tmp_path / kind).mkdir()
+        own = Built(aso_ftc, text, folder, *(["--float"] if kind == "single" else []))
+        loops.append((own, *looped(own)))
+    (_, exact, _), (own, found, y) = loops
+    n, m, p, q = own.sizes
+    plant = Plant(own.design)
+    largest = lambda columns, at: abs(columns - at).max(axis=0)
+    commands, x_hat, f_hat = np.split(found[:, : m + n + q], [m, m + n], axis=1)
+    signals = [largest(x_hat, plant.x_op), largest(f_hat, 0), largest(y, plant.y_op), largest(commands, plant.u_op), [1]]
+    bound = bound_of(own.header) @ np.concatenate(signals)
+    difference = abs(found - exact).max(axis=0)
+    difference = np.concatenate([difference[:m], difference[m + n : m + n + q]])
+    assert (difference < bound).all(), difference / bound
+    faults = [k for k, fault in enumerate(own.design["faults"]) if not fault["name"].endswith("_rate")]
+    checked = [*range(m), *(m + k for k in faults)]
+    assert (difference[checked] > bound[checked] / 200).all(), bound / difference
+    assert "warning" not in own.done.stderr
+
+
+def looped(own):
+    """Outputs and measurements in the loop of the compiled code with the plant."""
+    source = own.folder / "c" / f"{own.name}.c"
+    run("gcc", "-std=c99", "-O2", "-shared", "-fPIC", source, "-o", own.folder / "own.so")
+    import ctypes
+
+    library, real = ctypes.CDLL(str(own.folder / "own.so")), ctypes.c_float if own.single else ctypes.c_double
+    n, m, p, q = own.sizes
+    losses = sum("loss_of" in fault for fault in own.design["faults"])
+    state = (ctypes.c_double * 1000)()
+    commands, estimates = (real * m)(), (real * (n + q + losses))()
+    getattr(library, f"{own.name}_init")(state)
+    step, plant = getattr(library, f"{own.name}_step"), Plant(own.design)
+    chance, rows, measured = np.random.default_rng(5), [], []
+    scale = 1e-5 if "Q_1" in own.header and "Q_2" in own.header else 0.3
+    for k in range(4000):
+        if k % 1000 == 100:
+            fault = scale * chance.uniform(-1, 1, q)
+            fault[[own_fault["name"].endswith("_rate") for own_fault in own.design["faults"]]] = 0
+        y = plant.measured(fault if k >= 100 else np.zeros(q)) + 1e-3 * chance.normal(size=p)
+        step(state, (real * p)(*y), ctypes.c_bool(True), commands, estimates)
+        rows.append([*commands, *estimates])
+        measured.append(y)
+        plant.step(np.array(commands), fault if k >= 100 else np.zeros(q))
+    return np.array(rows), np.array(measured)
+
+
+def test_float_is_refused_a_green_light_where_rounding_hides_the_changes(aso_ftc, tmp_path):
+    """At 10 us, the poles of a loop of 0.1 1/s are 1 - 1e-6, 17 rounding errors from 1."""
+    text = re.sub(r"sample_time = .*", "sample_time = 1e-5", CASES["constant-prediction"].text)
+    own = Built(aso_ftc, text, tmp_path, "--float")
+    assert re.search(r"warning: float: rounding may change \S+ by .* % of itself: the slowest eigenvalue", own.done.stderr)
+
+
+def test_names_become_different_identifiers_and_the_header_lists_them(aso_ftc, tmp_path):
+    own = Built(aso_ftc, masses("current", "true"), tmp_path, name="String")
+    assert own.name == "String_ctl"
+    rows = [line.split()[1:3] for line in own.header.splitlines() if line.startswith((" * Measurements.", " * Estimates.f"))]
+    assert rows == [
+        ["Measurements.q_1", "q[1]"],
+        ["Measurements.Q_1_2", "Q_1"],
+        ["Estimates.f_hat_int_2", "int"],
+        ["Estimates.f_hat_int_rate", "int_rate"],
+    ]
+    assert "Commands.motor_1" in own.header
+    own.compiled("-O2"), own.crate()
+
+
+def test_a_continuous_design_has_no_code_and_float_needs_code(aso_ftc, tmp_path):
+    plant = ROOT / "examples" / "plants" / "quadruple-tank.toml"
+    done = aso_ftc("design", plant, "--out", tmp_path / "d.toml", "--c-code", tmp_path / "c")
+    assert done.returncode == 2 and "state `sample_time` in the plant file" in done.stderr
+    assert not list(tmp_path.iterdir())
+    done = aso_ftc("design", plant, "--out", tmp_path / "d.toml", "--float")
+    assert done.returncode == 2 and "--float" in done.stderr and not list(tmp_path.iterdir())
+
+
+def test_code_of_others_is_overwritten_on_request_only(aso_ftc, tmp_path):
+    text = CASES["constant-prediction"].text
+    Built(aso_ftc, text, tmp_path)
+    Built(aso_ftc, text.replace("0.32", "0.33"), tmp_path)
+    (tmp_path / "c" / "plant.c").write_text("int main(void) { return 0; }\n", encoding="utf-8")
+    wanted = ("--out", tmp_path / "design.toml", "--c-code", tmp_path / "c")
+    done = aso_ftc("design", tmp_path / "plant.toml", *wanted, "--certificate-time", "0")
+    assert done.returncode == 2 and "--force" in done.stderr
+    assert aso_ftc("design", tmp_path / "plant.toml", *wanted, "--certificate-time", "0", "--force").returncode in (0, 1)
+
+
+@pytest.mark.skipif(not shutil.which("arm-none-eabi-gcc"), reason="no compiler for ARM Cortex-M: gcc-arm-none-eabi")
+@pytest.mark.parametrize("options", [[], ["--float"]], ids=["double", "float"])
+def test_it_compiles_for_a_cortex_m(aso_ftc, tmp_path, options):
+    own = Built(aso_ftc, CASES["constant-prediction"].text, tmp_path, *options)
+    target = "-mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -ffreestanding".split()
+    always = "-std=c99 -O2 -ffp-contract=off -Wall -Wextra -Wconversion -Werror".split()
+    run("arm-none-eabi-gcc", *always, *target, "-c", tmp_path / "c" / "plant.c", "-o", tmp_path / "m4.o")
+    undefined = subprocess.run(["arm-none-eabi-nm", "-u", tmp_path / "m4.o"], capture_output=True, text=True).stdout
+    needed = {line.split()[-1] for line in undefined.splitlines()}
+    assert not needed if options else all(name.startswith("__aeabi_d") for name in needed), needed
