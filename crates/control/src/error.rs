@@ -118,6 +118,17 @@ pub enum Error {
         /// Those that are not stable.
         zeros: Vec<Complex<f64>>,
     },
+    /// No residual responds to a fault that is decoupled from the disturbances and the other faults.
+    #[error(
+        "no residual responds to fault {fault} and is decoupled from the disturbances{}",
+        also_decoupled(decoupled)
+    )]
+    FaultNotIsolable {
+        /// The fault, from 1.
+        fault: usize,
+        /// The faults to be decoupled, from 1.
+        decoupled: Vec<usize>,
+    },
     /// The number of eigenvalues differs from the number of states.
     #[error("{found} eigenvalues are given, expected {expected}, one per state")]
     PoleCount {
@@ -242,6 +253,10 @@ pub enum Error {
 
 fn shown(value: Complex<f64>) -> String {
     if value.im == 0.0 { value.re.to_string() } else { value.to_string() }
+}
+
+fn also_decoupled(faults: &[usize]) -> String {
+    if faults.is_empty() { String::new() } else { format!(" and the faults {faults:?}") }
 }
 
 /// Formats an eigenvalue s of a fault model.

@@ -11,6 +11,7 @@
 //! | test which faults can be estimated | [`detectability`] |
 //! | controllability, observability, distance from losing them, zeros | [`rank`], [`distance`], [`zeros`] |
 //! | residual generators | [`residual`] |
+//! | residuals that isolate faults: decoupled from commands, disturbances, other faults | [`isolation`] |
 //! | norms, step and frequency responses, the effect of faults | [`response`] |
 //! | margins of a loop: sensitivity, disk, gain, phase, delay, hold time, parameter tolerances | [`robustness`] |
 //! | bound of the estimation error with a proof | [`theorem1`] |
@@ -41,6 +42,7 @@ pub mod estimation;
 pub mod exponential;
 pub mod faults;
 pub mod hold;
+pub mod isolation;
 #[cfg(feature = "lmi")]
 pub mod lmi;
 pub mod lyapunov;

@@ -12,12 +12,14 @@
 //!   gain for all of them.
 //! * [`certify_schedule`]: proves that a sampled loop that depends on a scheduling variable is
 //!   stable, with a P that depends on it, too.
+//! * [`constant_gain`]: the static gain whose worst error over a family of systems is least.
 //!
 //! Problems are solved by an interior point method (Clarabel) in coordinates in which the data are
 //! about one. Its result is never trusted: a certificate is returned only if the eigenvalues of its
 //! inequalities, in the units of the data, are positive by more than the rounding errors.
 
 mod affine;
+mod constant_gain;
 mod coordinates;
 pub(crate) mod definite;
 mod gain;
@@ -30,6 +32,7 @@ mod synthesis;
 mod vertices;
 
 pub use affine::Affine;
+pub use constant_gain::{ConstantGain, constant_gain};
 pub use gain::{GainBound, Norm, certify_gain};
 pub use problem::Problem;
 pub use region::{Disc, Region, RegionCertificate, certify_region};

@@ -11,9 +11,12 @@ mod exponential;
 mod family;
 mod faults;
 mod hold;
+mod isolation;
 #[cfg(feature = "lmi")]
 mod lmi;
 mod lyapunov;
+#[path = "../../examples/fault_detection/matrices.rs"]
+mod matrices;
 mod paper;
 mod placement;
 mod rank;

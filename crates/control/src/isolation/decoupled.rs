@@ -1,0 +1,237 @@
+//! The part of a plant that unknown inputs do not reach and that the measurements show.
+
+use super::DisturbedPlant;
+use crate::Error;
+use crate::balance::{multiply_columns, multiply_rows, unit_columns};
+use crate::blocks::stacked;
+use crate::svd::Svd;
+use nalgebra::{DMatrix, DVector};
+
+/// z' = A z + `B_u` u + K y + `B_f` f, `y_h` = H y - `D_u` u = C z + `D_f` f, for all values of the unknown
+/// inputs; (A, C) observable.
+pub(super) struct DecoupledPart {
+    /// A, observable with C.
+    pub(super) a: DMatrix<f64>,
+    pub(super) b_u: DMatrix<f64>,
+    pub(super) b_f: DMatrix<f64>,
+    /// K.
+    pub(super) k: DMatrix<f64>,
+    pub(super) c: DMatrix<f64>,
+    pub(super) d_u: DMatrix<f64>,
+    pub(super) d_f: DMatrix<f64>,
+    /// H.
+    pub(super) h: DMatrix<f64>,
+    /// For each fault the length of the columns of `B_f` and `D_f`, relative to those of the plant.
+    pub(super) effects: Vec<f64>,
+    /// The least certain rank decision.
+    pub(super) gap: Gap,
+    /// Numbers of states that y, y', ... determine in addition: the conjugate partition of the
+    /// observability indices.
+    pub(super) blocks: Vec<usize>,
+}
+
+/// Relative singular values on both sides of the tolerance, over all rank decisions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Gap {
+    /// The smallest that counted as nonzero.
+    pub(super) kept: f64,
+    /// The largest that counted as zero.
+    pub(super) dropped: f64,
+}
+
+impl Gap {
+    pub(super) fn none() -> Self {
+        Self { kept: f64::INFINITY, dropped: 0.0 }
+    }
+
+    /// The number of singular values above `tolerance`.
+    fn rank(&mut self, svd: &Svd, tolerance: f64) -> usize {
+        let rank = svd.rank_above(tolerance);
+        if rank > 0 {
+            self.kept = self.kept.min(svd.values[rank - 1]);
+        }
+        if rank < svd.values.len() {
+            self.dropped = self.dropped.max(svd.values[rank]);
+        }
+        rank
+    }
+}
+
+impl DecoupledPart {
+    /// Decouples the disturbances and the faults with `decoupled[fault]`; None if no combination of
+    /// measurements is left.
+    ///
+    /// `plant`: in balanced coordinates. Outputs are scaled to rows of C of length one, unknown inputs
+    /// to columns of length one, A to its norm; a singular value below `tolerance` counts as zero.
+    pub(super) fn new(
+        plant: &DisturbedPlant,
+        decoupled: &[bool],
+        tolerance: f64,
+    ) -> Result<Option<Self>, Error> {
+        let Scaled { a, e, c, d, outputs, size } = Scaled::new(plant, decoupled);
+        let mut gap = Gap::none();
+        let w = reached_unseen([&a, &e, &c, &d], tolerance, &mut gap)?;
+        let v = noted_complement(&w, tolerance, &mut gap)?;
+        let seen = beside(&(&c * &w), &d);
+        let h = noted_complement(&seen, tolerance, &mut gap)?.transpose();
+        if h.nrows() == 0 {
+            return Ok(None);
+        }
+        let k = injection(&seen, &v.tr_mul(&beside(&(&a * &w), &e)), tolerance)?;
+        let dynamics = (v.tr_mul(&a) - &k * &c) * &v;
+        let (basis, blocks) = observable_states(&dynamics, &(&h * &c * &v), tolerance, &mut gap)?;
+        let (z, k) = (basis.tr_mul(&v.transpose()), basis.tr_mul(&k));
+        let (dynamics, seen) = (basis.tr_mul(&dynamics) * &basis, &h * &c * &v * &basis);
+        // Given units of time and of the outputs.
+        let k = multiply_columns(&(k * size), &outputs);
+        let h = multiply_columns(&h, &outputs);
+        let b_f = &z * &plant.b_f - &k * &plant.d_f;
+        let d_f = &h * &plant.d_f;
+        let original = stacked(&(&plant.b_f / size), &multiply_rows(&plant.d_f, &outputs));
+        let effects = relative_lengths(&stacked(&(&b_f / size), &d_f), &original);
+        Ok(Some(Self {
+            a: dynamics * size,
+            b_u: &z * &plant.b_u - &k * &plant.d_u,
+            c: seen,
+            d_u: &h * &plant.d_u,
+            k,
+            h,
+            b_f,
+            d_f,
+            effects,
+            gap,
+            blocks,
+        }))
+    }
+}
+
+/// A plant with the outputs R y and time in units of 1 / (norm of A).
+struct Scaled {
+    a: DMatrix<f64>,
+    e: DMatrix<f64>,
+    c: DMatrix<f64>,
+    d: DMatrix<f64>,
+    /// Diagonal of R.
+    outputs: DVector<f64>,
+    /// The norm of A.
+    size: f64,
+}
+
+impl Scaled {
+    fn new(plant: &DisturbedPlant, decoupled: &[bool]) -> Self {
+        let (e, d) = plant.unknown_inputs(decoupled);
+        let (n, norm) = (plant.a.nrows(), plant.a.norm());
+        let size = if norm > 0.0 { norm } else { 1.0 };
+        let outputs = plant.c.row_iter().zip(d.row_iter()).map(|(state, direct)| {
+            let length = if state.norm() > 0.0 { state.norm() } else { direct.norm() };
+            if length > 0.0 { 1.0 / length } else { 1.0 }
+        });
+        let outputs = DVector::from_iterator(plant.c.nrows(), outputs);
+        let inputs = unit_columns(&stacked(&(e / size), &multiply_rows(&d, &outputs)));
+        Self {
+            a: &plant.a / size,
+            e: inputs.rows(0, n).into_owned(),
+            d: inputs.rows(n, d.nrows()).into_owned(),
+            c: multiply_rows(&plant.c, &outputs),
+            outputs,
+            size,
+        }
+    }
+}
+
+/// W: an orthonormal basis of the smallest subspace with [A W, E] ker [C W, D] in it.
+fn reached_unseen(
+    [a, e, c, d]: [&DMatrix<f64>; 4],
+    tolerance: f64,
+    gap: &mut Gap,
+) -> Result<DMatrix<f64>, Error> {
+    let mut w = DMatrix::zeros(a.nrows(), 0);
+    if e.ncols() == 0 {
+        return Ok(w);
+    }
+    loop {
+        let seen = Svd::new(&beside(&(c * &w), d))?;
+        let rank = gap.rank(&seen, tolerance);
+        let unseen = seen.right.columns(rank, seen.right.ncols() - rank).into_owned();
+        let image = beside(&(a * &w), e) * unseen;
+        let all = Svd::new(&beside(&w, &image).transpose())?;
+        let reached = gap.rank(&all, tolerance);
+        if reached <= w.ncols() {
+            return Ok(w);
+        }
+        w = all.right.columns(0, reached).into_owned();
+    }
+}
+
+/// An orthonormal basis of the vectors that are orthogonal to the columns of M.
+pub(super) fn complement(m: &DMatrix<f64>, tolerance: f64) -> Result<DMatrix<f64>, Error> {
+    noted_complement(m, tolerance, &mut Gap::none())
+}
+
+/// The same; the rank decision is noted in `gap`.
+fn noted_complement(
+    m: &DMatrix<f64>,
+    tolerance: f64,
+    gap: &mut Gap,
+) -> Result<DMatrix<f64>, Error> {
+    if m.ncols() == 0 {
+        return Ok(DMatrix::identity(m.nrows(), m.nrows()));
+    }
+    let svd = Svd::new(&m.transpose())?;
+    let rank = gap.rank(&svd, tolerance);
+    Ok(svd.right.columns(rank, m.nrows() - rank).into_owned())
+}
+
+/// An orthonormal basis of the states that C shows, and how many of them y, y', ... add, by the
+/// staircase algorithm without further scaling, which would enlarge rounding errors.
+pub(super) fn observable_states(
+    a: &DMatrix<f64>,
+    c: &DMatrix<f64>,
+    tolerance: f64,
+    gap: &mut Gap,
+) -> Result<(DMatrix<f64>, Vec<usize>), Error> {
+    let n = a.nrows();
+    let (mut shown, mut rest) = (DMatrix::zeros(n, 0), DMatrix::identity(n, n));
+    let (mut link, mut blocks) = (c.clone(), Vec::new());
+    while rest.ncols() > 0 {
+        let svd = Svd::new(&link)?;
+        let rank = gap.rank(&svd, tolerance);
+        if rank == 0 {
+            break;
+        }
+        blocks.push(rank);
+        let turned: DMatrix<f64> = rest * svd.right;
+        let new = turned.columns(0, rank).into_owned();
+        rest = turned.columns(rank, turned.ncols() - rank).into_owned();
+        link = new.tr_mul(a) * &rest;
+        shown = beside(&shown, &new);
+    }
+    Ok((shown, blocks))
+}
+
+/// The K of least norm with K `seen` = `moved`.
+fn injection(
+    seen: &DMatrix<f64>,
+    moved: &DMatrix<f64>,
+    tolerance: f64,
+) -> Result<DMatrix<f64>, Error> {
+    if seen.ncols() == 0 {
+        return Ok(DMatrix::zeros(moved.nrows(), seen.nrows()));
+    }
+    let svd = Svd::new(&seen.transpose())?;
+    let rank = svd.rank_above(tolerance);
+    Ok(svd.least_squares(&moved.transpose(), rank).transpose())
+}
+
+/// For each column the length of `part` over that of `whole`, 0 if both are zero.
+fn relative_lengths(part: &DMatrix<f64>, whole: &DMatrix<f64>) -> Vec<f64> {
+    let columns = part.column_iter().zip(whole.column_iter());
+    columns.map(|(part, whole)| part.norm() / whole.norm().max(f64::MIN_POSITIVE)).collect()
+}
+
+/// [left, right].
+pub(super) fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut both = left.clone().resize_horizontally(left.ncols() + right.ncols(), 0.0);
+    both.columns_mut(left.ncols(), right.ncols()).copy_from(right);
+    both
+}

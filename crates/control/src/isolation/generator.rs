@@ -1,0 +1,348 @@
+//! Synthesis of one residual with a prescribed pattern.
+
+use super::DisturbedPlant;
+use super::decoupled::DecoupledPart;
+use super::direction::{Direction, strongest_weakest};
+use super::family::{Family, unit_gain};
+use crate::residual::ResidualGenerator;
+use crate::{Domain, Error, StateSpace, check};
+use nalgebra::{Complex, DMatrix};
+
+/// A gain counts as zero below this times the accuracy of the family.
+const ACCURACIES: f64 = 10.0;
+/// Part of the mean variance that is added to W, so that it is positive definite.
+const REGULARISATION: f64 = 1e-12;
+
+/// Requirements of a residual.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Requirements {
+    /// Poles of the generator, real and stable: s < 0, or 0 < z < 1 in sampled time. A generator of
+    /// order k has the first k of them; the last one is repeated as often as necessary.
+    pub poles: Vec<f64>,
+    /// The frequency, in rad per unit of time, at which the residual must respond to each fault of
+    /// its pattern: 0 for constant faults.
+    pub frequency: f64,
+    /// Smallest gain of a fault that is accepted, relative to the largest that the fault can have
+    /// for the same effect of noise, in (0, 1).
+    pub quality: f64,
+    /// Relative singular values below this count as zero.
+    pub tolerance: f64,
+    /// Standard deviation of the noise of each measurement, above zero; None: 1 each.
+    pub noise: Option<Vec<f64>>,
+}
+
+impl Requirements {
+    /// Constant faults, all poles equal to `pole`, quality 1e-3, tolerance 1e-7, equal noise.
+    #[must_use]
+    pub fn with_pole(pole: f64) -> Self {
+        let poles = vec![pole];
+        Self { poles, frequency: 0.0, quality: 1e-3, tolerance: 1e-7, noise: None }
+    }
+
+    /// The first k poles.
+    pub(super) fn poles(&self, k: usize) -> Vec<f64> {
+        let last = self.poles[self.poles.len() - 1];
+        (0..k).map(|at| self.poles.get(at).copied().unwrap_or(last)).collect()
+    }
+
+    /// The modulus of the fastest pole, as a frequency.
+    pub(super) fn fastest(&self, domain: Domain) -> f64 {
+        let rate = |pole: &f64| match domain {
+            Domain::Continuous => -pole,
+            Domain::Sampled { period } => -pole.ln() / period,
+        };
+        self.poles.iter().map(rate).fold(0.0, f64::max)
+    }
+
+    pub(super) fn check(&self, measurements: usize, domain: Domain) -> Result<(), Error> {
+        let rule = match domain {
+            Domain::Continuous => "finite numbers below zero, at least one",
+            Domain::Sampled { .. } => "numbers above 1e-3 and below 1, at least one",
+        };
+        let bad = |pole: &f64| match domain {
+            Domain::Continuous => !(pole.is_finite() && *pole < 0.0),
+            Domain::Sampled { .. } => !(*pole > 1e-3 && *pole < 1.0),
+        };
+        let first_bad = self.poles.iter().copied().find(bad);
+        if let Some(value) = first_bad.or(self.poles.is_empty().then_some(f64::NAN)) {
+            return Err(Error::OutOfRange { name: "poles", value, rule });
+        }
+        check::positive("tolerance", self.tolerance)?;
+        check::positive("quality", self.quality)?;
+        let noise = self.noise.iter().flatten();
+        noise.clone().try_for_each(|&size| check::positive("noise", size))?;
+        match &self.noise {
+            Some(noise) if noise.len() != measurements => Err(Error::Shape {
+                matrix: "noise",
+                expected: (measurements, 1),
+                found: (noise.len(), 1),
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A residual with a prescribed pattern.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Residual {
+    /// The generator, with one residual. Its order is the least one for this pattern.
+    pub generator: ResidualGenerator,
+    /// The response of the residual to the faults f: the poles are those of the generator. The
+    /// columns of decoupled faults are zero up to rounding.
+    pub from_faults: StateSpace,
+    /// The gain of each fault at the required frequency: 1 if the pattern has one fault; otherwise
+    /// the largest has the modulus 1.
+    pub gains: Vec<Complex<f64>>,
+    /// The smallest gain of a fault of the pattern, each relative to the largest gain that it can
+    /// have for the same effect of noise.
+    pub quality: f64,
+    /// Number of modes of the plant that no command, disturbance or fault moves. Their initial
+    /// values count as zero: they may appear in the residual.
+    pub unreachable: usize,
+    /// The smallest relative singular value that counted as nonzero, and the largest that counted
+    /// as zero: the wider apart, the more certain the decoupling.
+    pub rank_gap: (f64, f64),
+    /// Largest residual of the equations (3), relative to their terms: the accuracy of the
+    /// decoupling.
+    pub equation_error: f64,
+}
+
+/// Computes a residual generator of least order that responds to the faults with `pattern[fault]`
+/// and is decoupled from commands, disturbances and all other faults.
+///
+/// `pattern`: one entry per fault, at least one true. Without faults of the pattern and noise the
+/// residual decays with the prescribed poles for all commands, disturbances and decoupled faults, from all
+/// initial states of the reachable part of the plant. Method, cost and sources: see
+/// [`crate::isolation`]; about 100 n^3 multiplications for each order that is tried. The order is
+/// the least one of a generator with one residual for which every fault of the pattern has a gain at
+/// the required frequency and the required quality.
+///
+/// # Example
+///
+/// x1' = -x1 + u + f1, x2' = -2 x2 + x1 + d, both measured: f1 is decoupled from d.
+///
+/// ```
+/// use control::Domain;
+/// use control::isolation::{DisturbedPlant, Requirements, residual_generator};
+/// use nalgebra::DMatrix;
+/// let plant = DisturbedPlant {
+///     a: DMatrix::from_row_slice(2, 2, &[-1.0, 0.0, 1.0, -2.0]),
+///     b_u: DMatrix::from_row_slice(2, 1, &[1.0, 0.0]),
+///     b_d: DMatrix::from_row_slice(2, 1, &[0.0, 1.0]),
+///     b_f: DMatrix::from_row_slice(2, 1, &[1.0, 0.0]),
+///     c: DMatrix::identity(2, 2),
+///     d_u: DMatrix::zeros(2, 1),
+///     d_d: DMatrix::zeros(2, 1),
+///     d_f: DMatrix::zeros(2, 1),
+///     domain: Domain::Continuous,
+/// };
+/// let residual = residual_generator(&plant, &[true], &Requirements::with_pole(-5.0))?;
+/// // r = (5 / (s + 5)) ((s + 1) y1 - u), of order 1; a constant fault has the gain 1.
+/// assert_eq!(residual.generator.a, DMatrix::from_element(1, 1, -5.0));
+/// assert!((residual.generator.d_y[(0, 0)] - 5.0).abs() < 1e-12);
+/// assert!((residual.gains[0] - 1.0).norm() < 1e-12);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// [`Error::FaultNotIsolable`] names a fault of the pattern that no such residual shows at the
+/// required frequency; [`Error::OutOfRange`] for `requirements`, and when no order reaches the
+/// quality; same as [`DisturbedPlant::check`]; [`Error::Shape`] if `pattern` has not one entry per
+/// fault; [`Error::NotConverged`], [`Error::Overflow`] when an inner computation fails.
+pub fn residual_generator(
+    plant: &DisturbedPlant,
+    pattern: &[bool],
+    requirements: &Requirements,
+) -> Result<Residual, Error> {
+    check_arguments(plant, pattern, requirements)?;
+    let (reachable, unreachable) = plant.reachable_part(requirements.tolerance)?;
+    let decoupled: Vec<bool> = pattern.iter().map(|responds| !responds).collect();
+    let part = DecoupledPart::new(&reachable, &decoupled, requirements.tolerance)?;
+    let part = part.ok_or_else(|| not_isolable(pattern, first_of(pattern)))?;
+    let (family, direction) = least_order(&part, pattern, requirements, plant.domain)?;
+    let factors = DMatrix::from_row_slice(1, direction.factors.len(), direction.factors.as_slice());
+    let mut residual = realised(&part, family.member(&factors), requirements.frequency);
+    residual.quality = direction.quality;
+    residual.unreachable = unreachable;
+    normalise(&mut residual, pattern);
+    Ok(residual)
+}
+
+fn check_arguments(
+    plant: &DisturbedPlant,
+    pattern: &[bool],
+    requirements: &Requirements,
+) -> Result<(), Error> {
+    plant.check()?;
+    requirements.check(plant.c.nrows(), plant.domain)?;
+    let faults = plant.b_f.ncols();
+    if pattern.len() != faults {
+        let (expected, found) = ((faults, 1), (pattern.len(), 1));
+        return Err(Error::Shape { matrix: "pattern", expected, found });
+    }
+    if !pattern.contains(&true) {
+        return Err(Error::Empty { matrix: "pattern", found: (0, 1) });
+    }
+    Ok(())
+}
+
+fn first_of(pattern: &[bool]) -> usize {
+    pattern.iter().position(|&responds| responds).unwrap_or(0)
+}
+
+fn not_isolable(pattern: &[bool], fault: usize) -> Error {
+    let decoupled = (1..=pattern.len()).filter(|&at| !pattern[at - 1]).collect();
+    Error::FaultNotIsolable { fault: fault + 1, decoupled }
+}
+
+/// The family of least order in which every fault of the pattern has a gain, and its best member.
+fn least_order(
+    part: &DecoupledPart,
+    pattern: &[bool],
+    requirements: &Requirements,
+    domain: Domain,
+) -> Result<(Family, Direction), Error> {
+    let faults: Vec<usize> = (0..pattern.len()).filter(|&fault| pattern[fault]).collect();
+    let blocks = &part.blocks;
+    let mut best: f64 = 0.0;
+    let mut missing = Some(faults[0]);
+    for k in 0..=blocks.len() {
+        let (before, here) = match k {
+            0 => (part.c.nrows(), blocks.first().copied().unwrap_or(0)),
+            _ => (blocks[k - 1], blocks.get(k).copied().unwrap_or(0)),
+        };
+        // No further annihilator begins at this order.
+        if before == here {
+            continue;
+        }
+        let family = Family::new(part, &requirements.poles(k), domain)?;
+        let gains = dominant_part(&family.fault_gains(part, requirements.frequency));
+        let zero = ACCURACIES * family.accuracy;
+        let scale = family.fault_scale(part, requirements.frequency);
+        let has_gain = |fault: usize| gains.column(fault).norm() > zero * scale[fault];
+        missing = faults.iter().copied().find(|&fault| !has_gain(fault));
+        if missing.is_some() {
+            continue;
+        }
+        let ones = vec![1.0; part.h.ncols()];
+        let sizes = requirements.noise.as_ref().unwrap_or(&ones);
+        let mut noise = family.noise(part, sizes, requirements.fastest(domain));
+        let mean = noise.trace().max(f64::MIN_POSITIVE);
+        noise += DMatrix::identity(noise.nrows(), noise.nrows()) * (REGULARISATION * mean);
+        let factor = noise.cholesky().ok_or(Error::NotPositiveDefinite { matrix: "W" })?;
+        let direction = strongest_weakest(&gains.select_columns(&faults), &factor);
+        if let Some(direction) = direction {
+            if direction.quality >= requirements.quality {
+                return Ok((family, direction));
+            }
+            best = best.max(direction.quality);
+        }
+    }
+    if let Some(fault) = missing {
+        return Err(not_isolable(pattern, fault));
+    }
+    let rule = "at most the quality that can be reached, which is the value given";
+    Err(Error::OutOfRange { name: "quality", value: best, rule })
+}
+
+/// For each column the real or the imaginary part, the larger of the two.
+fn dominant_part(gains: &DMatrix<Complex<f64>>) -> DMatrix<f64> {
+    let mut parts = gains.map(|gain| gain.re);
+    for (mut column, complex) in parts.column_iter_mut().zip(gains.column_iter()) {
+        let imaginary = complex.map(|gain| gain.im);
+        if imaginary.norm() > column.norm() {
+            column.copy_from(&imaginary);
+        }
+    }
+    parts
+}
+
+/// The generator of a family of one member.
+fn realised(part: &DecoupledPart, family: Family, frequency: f64) -> Residual {
+    let (k, domain) = (family.poles.len(), family.domain);
+    let all =
+        |rows: &[DMatrix<f64>], width: usize| DMatrix::from_fn(k, width, |i, j| rows[i][(0, j)]);
+    let (t, l) = (all(&family.t, part.a.nrows()), all(&family.l, part.c.nrows()));
+    let w = family.w;
+    let mut f = DMatrix::from_diagonal(&nalgebra::DVector::from_column_slice(&family.poles));
+    for at in 1..k {
+        f[(at, at - 1)] = unit_gain(family.poles[at], domain);
+    }
+    let c = DMatrix::from_fn(1, k, |_, j| f64::from(u8::from(j + 1 == k)));
+    let equations = [
+        (&t * &part.a - &f * &t - &l * &part.c, (&t * &part.a).norm() + (&l * &part.c).norm()),
+        (&c * &t + &w * &part.c, (&c * &t).norm() + (&w * &part.c).norm()),
+    ];
+    let relative = |(error, size): &(DMatrix<f64>, f64)| error.norm() / size.max(f64::MIN_POSITIVE);
+    let from_faults = StateSpace {
+        a: f.clone(),
+        b: &l * &part.d_f - &t * &part.b_f,
+        c: c.clone(),
+        d: &w * &part.d_f,
+        domain,
+    };
+    Residual {
+        gains: gains(&from_faults, frequency),
+        from_faults,
+        generator: ResidualGenerator {
+            b_u: &t * &part.b_u - &l * &part.d_u,
+            b_y: &l * &part.h + &t * &part.k,
+            d_u: -(&w * &part.d_u),
+            d_y: &w * &part.h,
+            a: f,
+            c,
+            domain,
+        },
+        quality: 0.0,
+        unreachable: 0,
+        rank_gap: (part.gap.kept, part.gap.dropped),
+        equation_error: equations.iter().map(relative).fold(0.0, f64::max),
+    }
+}
+
+/// The response of one residual to the faults at one frequency, through a chain of lags.
+pub(super) fn gains(from_faults: &StateSpace, frequency: f64) -> Vec<Complex<f64>> {
+    let StateSpace { a, b, c, d, domain } = from_faults;
+    let s = match domain {
+        Domain::Continuous => Complex::new(0.0, frequency),
+        Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
+    };
+    let gain = |fault: usize| {
+        let mut below = Complex::new(0.0, 0.0);
+        let mut sum = Complex::new(d[(0, fault)], 0.0);
+        for at in 0..a.nrows() {
+            let coupling = if at > 0 { a[(at, at - 1)] } else { 0.0 };
+            below = (below * coupling + b[(at, fault)]) / (s - a[(at, at)]);
+            sum += below * c[(0, at)];
+        }
+        sum
+    };
+    (0..b.ncols()).map(gain).collect()
+}
+
+/// Scales the residual such that the largest gain of a fault of the pattern is 1, with the sign of
+/// the first one positive.
+fn normalise(residual: &mut Residual, pattern: &[bool]) {
+    let of_pattern = |residual: &Residual| -> Vec<Complex<f64>> {
+        let both = residual.gains.iter().zip(pattern);
+        both.filter(|(_, responds)| **responds).map(|(gain, _)| *gain).collect()
+    };
+    let found = of_pattern(residual);
+    let largest = found.iter().map(|gain| gain.norm()).fold(0.0, f64::max);
+    let first = found[0];
+    let sign = if first.re.abs() >= first.im.abs() { first.re } else { first.im };
+    let scale = 1.0_f64.copysign(sign) / largest;
+    let Residual { generator, from_faults, gains, .. } = residual;
+    for m in [&mut generator.d_u, &mut generator.d_y, &mut from_faults.d] {
+        *m *= scale;
+    }
+    // The states are scaled, so that C stays a unit vector.
+    for m in [&mut generator.b_u, &mut generator.b_y, &mut from_faults.b] {
+        *m *= scale;
+    }
+    for gain in gains {
+        *gain *= scale;
+    }
+}

@@ -1,0 +1,136 @@
+//! Patterns that a plant admits, and the patterns of given residuals.
+
+use super::DisturbedPlant;
+use super::decoupled::{DecoupledPart, complement};
+use super::generator::{Requirements, Residual, gains};
+use crate::blocks::{block_2x2, stacked};
+use crate::{Domain, Error};
+use nalgebra::{Complex, DMatrix};
+use std::collections::{BTreeMap, VecDeque};
+
+/// More patterns than this are not enumerated.
+const PATTERNS: usize = 4096;
+
+/// A pattern that some residual generator has.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct AchievablePattern {
+    /// One entry per fault: whether the residual responds to it, at some frequency.
+    pub pattern: Vec<bool>,
+    /// Whether it responds to each of these faults at the required frequency, too: for frequency 0,
+    /// whether constant faults stay visible.
+    pub strong: bool,
+}
+
+/// All patterns of residuals that are decoupled from the commands and the disturbances.
+///
+/// `requirements`: its frequency decides which patterns are strong; its poles only must be stable.
+/// Starting with no fault decoupled, further faults are decoupled one by one; the faults to which
+/// the remaining innovation does not respond are decoupled with them. The patterns are those of all
+/// sets found, the ones with most faults first. Up to 2^q sets, each at the cost of the decoupling,
+/// about 20 n^3 multiplications.
+///
+/// Source: A. Varga, Solving fault diagnosis problems (2017), section 5.4; the recursion is the one
+/// of his genspec, on unobservability subspaces in place of rational null spaces.
+///
+/// # Errors
+///
+/// Same as [`DisturbedPlant::check`]; [`Error::OutOfRange`] for `requirements`, and for more than
+/// 4096 patterns; [`Error::NotConverged`], [`Error::Overflow`] when an inner computation fails.
+pub fn achievable_patterns(
+    plant: &DisturbedPlant,
+    requirements: &Requirements,
+) -> Result<Vec<AchievablePattern>, Error> {
+    plant.check()?;
+    requirements.check(plant.c.nrows(), plant.domain)?;
+    let (plant, _) = plant.reachable_part(requirements.tolerance)?;
+    let faults = plant.b_f.ncols();
+    let mut found: BTreeMap<Vec<bool>, bool> = BTreeMap::new();
+    let mut open = VecDeque::from([vec![false; faults]]);
+    let mut seen = vec![vec![false; faults]];
+    while let Some(decoupled) = open.pop_front() {
+        let Some(part) = DecoupledPart::new(&plant, &decoupled, requirements.tolerance)? else {
+            continue;
+        };
+        let visible = part.effects.iter().map(|effect| *effect > requirements.tolerance);
+        let pattern: Vec<bool> =
+            visible.zip(&decoupled).map(|(visible, off)| visible && !off).collect();
+        if !pattern.contains(&true) || found.contains_key(&pattern) {
+            continue;
+        }
+        for fault in (0..faults).filter(|&fault| pattern[fault]) {
+            let mut next: Vec<bool> = pattern.iter().map(|responds| !responds).collect();
+            next[fault] = true;
+            if !seen.contains(&next) {
+                seen.push(next.clone());
+                open.push_back(next);
+            }
+        }
+        let strong = is_strong(&part, &pattern, requirements, plant.domain)?;
+        found.insert(pattern, strong);
+        if found.len() > PATTERNS {
+            let rule = "at most 4096: decouple fewer faults";
+            #[expect(clippy::cast_precision_loss, reason = "about 4096")]
+            let value = found.len() as f64;
+            return Err(Error::OutOfRange { name: "the number of patterns", value, rule });
+        }
+    }
+    let mut patterns: Vec<AchievablePattern> =
+        found.into_iter().map(|(pattern, strong)| AchievablePattern { pattern, strong }).collect();
+    let count = |found: &AchievablePattern| found.pattern.iter().filter(|x| **x).count();
+    patterns.sort_by(|x, y| count(y).cmp(&count(x)).then_with(|| y.pattern.cmp(&x.pattern)));
+    Ok(patterns)
+}
+
+/// Whether some residual responds to each fault of the pattern at the required frequency: the column
+/// [`b_f`; `d_f`] is not in the span of [A - s I; C].
+fn is_strong(
+    part: &DecoupledPart,
+    pattern: &[bool],
+    requirements: &Requirements,
+    domain: Domain,
+) -> Result<bool, Error> {
+    let s = match domain {
+        Domain::Continuous => Complex::new(0.0, requirements.frequency),
+        Domain::Sampled { period } => Complex::from_polar(1.0, requirements.frequency * period),
+    };
+    let n = part.a.nrows();
+    let size = part.a.norm().max(f64::MIN_POSITIVE);
+    // Rows in units of A and of C.
+    let shifted = (&part.a - DMatrix::identity(n, n) * s.re) / size;
+    let outputs = part.c.norm().max(f64::MIN_POSITIVE);
+    let real = stacked(&shifted, &(&part.c / outputs));
+    let imaginary =
+        DMatrix::from_fn(real.nrows(), n, |i, j| if i == j { -s.im / size } else { 0.0 });
+    let pencil = block_2x2([&real, &-&imaginary], [&imaginary, &real]);
+    let null = complement(&pencil, requirements.tolerance)?;
+    let columns = stacked(&(&part.b_f / size), &(&part.d_f / outputs));
+    let twice = stacked(&columns, &DMatrix::zeros(columns.nrows(), columns.ncols()));
+    let seen = null.tr_mul(&twice);
+    let lengths = seen.column_iter().zip(columns.column_iter());
+    let mut each = pattern.iter().zip(lengths);
+    Ok(each.all(|(&responds, (seen, column))| {
+        !responds || seen.norm() > requirements.tolerance * column.norm()
+    }))
+}
+
+/// The structure matrix of several residuals: entry (i, j) is true if the gain of residual i for
+/// fault j at `frequency` is at least `threshold` times the largest gain of the residual.
+///
+/// # Errors
+///
+/// [`Error::OutOfRange`] for a threshold that is not above zero.
+pub fn structure(
+    residuals: &[Residual],
+    frequency: f64,
+    threshold: f64,
+) -> Result<Vec<Vec<bool>>, Error> {
+    crate::check::positive("threshold", threshold)?;
+    let row = |residual: &Residual| {
+        let sizes: Vec<f64> =
+            gains(&residual.from_faults, frequency).iter().map(|gain| gain.norm()).collect();
+        let largest = sizes.iter().copied().fold(0.0, f64::max);
+        sizes.iter().map(|size| *size > 0.0 && *size >= threshold * largest).collect()
+    };
+    Ok(residuals.iter().map(row).collect())
+}

@@ -1,0 +1,108 @@
+//! The plant with commands, disturbances and faults.
+
+use super::decoupled::{Gap, beside, observable_states};
+use crate::balance::{Balance, divide_rows, multiply_columns, unit_columns};
+use crate::{Domain, Error, check};
+use nalgebra::DMatrix;
+
+/// A plant with n states x, m commands u, disturbances d, q faults f and p measurements y.
+///
+/// ```text
+/// x' = A x + B_u u + B_d d + B_f f,   y = C x + D_u u + D_d d + D_f f
+/// ```
+///
+/// with `x[k+1]` for x' in sampled time. There may be no disturbances: `B_d` n x 0, `D_d` p x 0. An
+/// actuator fault has the column of its command, a sensor fault a column of `D_f` that is a column
+/// of the identity matrix.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DisturbedPlant {
+    /// A, n x n.
+    pub a: DMatrix<f64>,
+    /// `B_u`, n x m.
+    pub b_u: DMatrix<f64>,
+    /// `B_d`, n x (number of disturbances).
+    pub b_d: DMatrix<f64>,
+    /// `B_f`, n x q.
+    pub b_f: DMatrix<f64>,
+    /// C, p x n.
+    pub c: DMatrix<f64>,
+    /// `D_u`, p x m.
+    pub d_u: DMatrix<f64>,
+    /// `D_d`, p x (number of disturbances).
+    pub d_d: DMatrix<f64>,
+    /// `D_f`, p x q.
+    pub d_f: DMatrix<f64>,
+    /// Continuous or sampled time.
+    pub domain: Domain,
+}
+
+impl DisturbedPlant {
+    /// Checks shapes and finiteness of the eight matrices, and the period.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], naming the matrix;
+    /// [`Error::OutOfRange`] for the period.
+    pub fn check(&self) -> Result<(), Error> {
+        let (n, p) = (check::square("A", &self.a)?, self.c.nrows());
+        let (m, q, disturbances) = (self.b_u.ncols(), self.b_f.ncols(), self.b_d.ncols());
+        check::shape("B_u", &self.b_u, (n, m))?;
+        check::shape("B_f", &self.b_f, (n, q))?;
+        check::shape("C", &self.c, (p, n))?;
+        check::shape("D_u", &self.d_u, (p, m))?;
+        check::shape("D_f", &self.d_f, (p, q))?;
+        if disturbances > 0 || self.d_d.ncols() > 0 {
+            check::shape("B_d", &self.b_d, (n, disturbances))?;
+            check::shape("D_d", &self.d_d, (p, disturbances))?;
+        }
+        self.domain.check()
+    }
+
+    /// The columns of the disturbances and of the faults with `decoupled[fault]`.
+    pub(super) fn unknown_inputs(&self, decoupled: &[bool]) -> (DMatrix<f64>, DMatrix<f64>) {
+        let chosen: Vec<usize> = (0..decoupled.len()).filter(|&j| decoupled[j]).collect();
+        let beside = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
+            let mut both = left.clone().resize_horizontally(left.ncols() + chosen.len(), 0.0);
+            both.columns_mut(left.ncols(), chosen.len()).copy_from(&right.select_columns(&chosen));
+            both
+        };
+        (beside(&self.b_d, &self.b_f), beside(&self.d_d, &self.d_f))
+    }
+
+    /// The plant without the modes that no input moves, in balanced coordinates, and the number of these
+    /// modes.
+    ///
+    /// Such a mode depends on the initial state alone. [`super::residual_generator`] leaves it out, so
+    /// that its initial value counts as zero: the norm of a quaternion, for example. Method: A is
+    /// balanced; then the staircase form of (A, [`B_u`, `B_d`, `B_f`]) by orthogonal transformations,
+    /// where singular values below `tolerance` count as zero, relative to the norm of A and to
+    /// columns of length one.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`DisturbedPlant::check`]; [`Error::NotConverged`] when a singular value iteration does
+    /// not end.
+    pub fn reachable_part(&self, tolerance: f64) -> Result<(Self, usize), Error> {
+        self.check()?;
+        let n = self.a.nrows();
+        let Balance { matrix, scale } = Balance::new(&self.a);
+        let size = if matrix.norm() > 0.0 { matrix.norm() } else { 1.0 };
+        let [b_u, b_d, b_f] = [&self.b_u, &self.b_d, &self.b_f].map(|b| divide_rows(b, &scale));
+        let inputs = unit_columns(&beside(&beside(&b_u, &b_d), &b_f)).transpose();
+        let mut gap = Gap::none();
+        let dual = (&matrix / size).transpose();
+        let (basis, _) = observable_states(&dual, &inputs, tolerance, &mut gap)?;
+        // Without an unreachable mode the coordinates stay what they are, up to their scale.
+        let left = n - basis.ncols();
+        let basis = if left == 0 { DMatrix::identity(n, n) } else { basis };
+        let part = Self {
+            a: basis.tr_mul(&matrix) * &basis,
+            b_u: basis.tr_mul(&b_u),
+            b_d: basis.tr_mul(&b_d),
+            b_f: basis.tr_mul(&b_f),
+            c: multiply_columns(&self.c, &scale) * basis,
+            ..self.clone()
+        };
+        Ok((part, left))
+    }
+}

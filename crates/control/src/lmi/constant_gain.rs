@@ -1,0 +1,163 @@
+//! A constant gain for a family of systems.
+
+use super::{Affine, Problem};
+use crate::blocks::to_complex;
+use crate::response::{frequency_response, h_infinity};
+use crate::{Error, StateSpace, check};
+use nalgebra::{Complex, DMatrix};
+
+const ROUNDS: usize = 60;
+/// Smallest relative width of a norm that is computed.
+const NORM_WIDTH: f64 = 1e-6;
+
+/// A constant gain with the least worst error over a family of systems.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct ConstantGain {
+    /// The gain Q, s x r.
+    pub gain: DMatrix<f64>,
+    /// H-infinity norm of Q `G_i` - M for each system.
+    pub norms: Vec<f64>,
+    /// The largest of `norms`.
+    pub worst: f64,
+    /// No gain has a smaller worst error: the minimum over the frequencies that were considered, up
+    /// to the accuracy of the solver.
+    pub lower_bound: f64,
+}
+
+/// Computes the constant gain Q that minimises the worst H-infinity error over a family.
+///
+/// ```text
+/// min over Q of max over i of || Q G_i - M ||,   G_i = C_i (s I - A_i)^-1 B_i + D_i
+/// ```
+///
+/// `family`: stable systems `G_i` with r outputs and m inputs each; `target`: M, s x m; `fixed`:
+/// entries (row, column, value) of Q that are given, counted from 0; `width`: relative distance of
+/// the worst error from its lower bound at which the iteration ends, at least 1e-5.
+///
+/// With `G_i` from [u; d; f] to [y; u] and M = [0, 0, I], Q [y; u] is a static residual generator
+/// for all systems of the family: its error is the response to commands and disturbances together
+/// with the error of the fault estimate. With `D_i` alone in place of `G_i` at sensor faults, fixed
+/// entries of Q make the response to faults exact.
+///
+/// The problem is convex. Method: for a finite set of frequencies of each system the minimum is a
+/// semidefinite program, and a lower bound; the frequencies of the largest singular values of
+/// Q `G_i` - M join the set, until the largest exceeds the bound by less than `width` (an exchange
+/// method for semi-infinite programs: R. Hettich and K. O. Kortanek, SIAM Review 35 (1993)). Usually
+/// about 10 rounds.
+///
+/// # Errors
+///
+/// [`Error::Empty`] for a family without systems; [`Error::Shape`], [`Error::NotFinite`],
+/// [`Error::NotHurwitz`], [`Error::NotSchur`] for a bad system, target or entry;
+/// [`Error::OutOfRange`] for `width`; [`Error::NotConverged`] when the programs do not end.
+pub fn constant_gain(
+    family: &[StateSpace],
+    target: &DMatrix<f64>,
+    fixed: &[(usize, usize, f64)],
+    width: f64,
+) -> Result<ConstantGain, Error> {
+    let first = family.first().ok_or(Error::Empty { matrix: "the family", found: (0, 1) })?;
+    let (s, r, m) = (target.nrows(), first.c.nrows(), first.b.ncols());
+    check::shape("M", target, (s, m))?;
+    check::positive("width", width)?;
+    for system in family {
+        system.stable_eigenvalues()?;
+        check::shape("C", &system.c, (r, system.a.nrows()))?;
+        check::shape("B", &system.b, (system.a.nrows(), m))?;
+    }
+    if let Some(&(row, column, _)) = fixed.iter().find(|entry| entry.0 >= s || entry.1 >= r) {
+        let found = (row + 1, column + 1);
+        return Err(Error::Shape { matrix: "fixed", expected: (s, r), found });
+    }
+    let width = width.max(1e-5);
+    let mut points = Vec::new();
+    for system in family {
+        points.push(response(system, 0.0)?);
+        points.push(response(system, f64::INFINITY)?);
+    }
+    let mut best: Option<ConstantGain> = None;
+    for _ in 0..ROUNDS {
+        let what = "the program for a constant gain";
+        let (bound, gain) = minimum(&points, target, fixed, r)
+            .ok_or(Error::NotConverged { what, iterations: ROUNDS })?;
+        let mut norms = Vec::with_capacity(family.len());
+        for system in family {
+            let found = h_infinity(&error_system(system, &gain, target), NORM_WIDTH)?;
+            norms.push(found.upper);
+            if found.lower > bound * (1.0 + 0.5 * width) {
+                points.push(response(system, found.frequency)?);
+            }
+        }
+        let worst = norms.iter().copied().fold(0.0, f64::max);
+        let lower_bound = best.as_ref().map_or(bound, |best| best.lower_bound.max(bound));
+        match &mut best {
+            Some(best) if best.worst <= worst => best.lower_bound = lower_bound,
+            _ => best = Some(ConstantGain { gain, norms, worst, lower_bound }),
+        }
+        if let Some(found) = best.take_if(|best| best.worst <= lower_bound * (1.0 + width)) {
+            return Ok(found);
+        }
+    }
+    Err(Error::NotConverged { what: "the exchange of frequencies", iterations: ROUNDS })
+}
+
+/// Q G - M.
+fn error_system(system: &StateSpace, gain: &DMatrix<f64>, target: &DMatrix<f64>) -> StateSpace {
+    StateSpace { c: gain * &system.c, d: gain * &system.d - target, ..system.clone() }
+}
+
+/// G at one frequency.
+fn response(system: &StateSpace, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
+    if frequency.is_infinite() {
+        return Ok(match system.domain {
+            crate::Domain::Continuous => to_complex(&system.d),
+            crate::Domain::Sampled { period } => {
+                frequency_response(system, &[std::f64::consts::PI / period])?.remove(0).gain
+            }
+        });
+    }
+    Ok(frequency_response(system, &[frequency])?.remove(0).gain)
+}
+
+/// The smallest gamma, and its Q, with [gamma I, X; X*, gamma I] >= 0 for X = Q G - M at all points.
+fn minimum(
+    points: &[DMatrix<Complex<f64>>],
+    target: &DMatrix<f64>,
+    fixed: &[(usize, usize, f64)],
+    r: usize,
+) -> Option<(f64, DMatrix<f64>)> {
+    let (s, m) = target.shape();
+    // Entries of Q in units in which the rows of G have length one.
+    let length = |row: usize| points.iter().map(|g| g.row(row).norm()).fold(0.0, f64::max);
+    let units: Vec<f64> =
+        (0..r).map(|row| if length(row) > 0.0 { length(row) } else { 1.0 }).collect();
+    let mut problem = Problem::new();
+    let level = problem.scalar();
+    let mut gain = Affine::zeros(s, r);
+    for row in 0..s {
+        for column in 0..r {
+            let given = fixed.iter().find(|entry| (entry.0, entry.1) == (row, column));
+            let mut entry = DMatrix::zeros(s, r);
+            entry[(row, column)] = 1.0;
+            let value = match given {
+                Some(&(_, _, value)) => Affine::constant(&(entry * value)),
+                None => problem.scalar().times(&(entry / units[column])),
+            };
+            gain = &gain + &value;
+        }
+    }
+    problem.minimise(&level);
+    for g in points {
+        let real = &(&gain * &g.map(|entry| entry.re)) - &Affine::constant(target);
+        let imaginary = &gain * &g.map(|entry| entry.im);
+        let x = Affine::blocks(&[&[&real, &-&imaginary], &[&imaginary, &real]]);
+        let (above, below) = (
+            level.times(&DMatrix::identity(2 * s, 2 * s)),
+            level.times(&DMatrix::identity(2 * m, 2 * m)),
+        );
+        problem.constrain(&Affine::blocks(&[&[&above, &x], &[&x.transpose(), &below]]), 0.0);
+    }
+    let (bound, unknowns) = problem.minimum()?;
+    Some((bound, gain.evaluate(&unknowns)))
+}
