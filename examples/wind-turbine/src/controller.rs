@@ -1,0 +1,58 @@
+//! The reference controller of the benchmark: most power below rated power, constant power above.
+
+use std::f64::consts::PI;
+
+use crate::plant::{DENSITY, EFFICIENCY, GEAR, GENERATOR_EFFICIENCY, POWER_COEFFICIENT, RADIUS};
+
+/// Rated power, W.
+const RATED_POWER: f64 = 4.8e6;
+/// Rated speed of the generator, and by how much less ends the operation at constant power, rad/s.
+const RATED_SPEED: f64 = 162.0;
+const HYSTERESIS: f64 = 15.0;
+/// Gains of the pitch controller: degrees per rad/s, and per rad.
+const PROPORTIONAL: f64 = 4.0;
+const INTEGRAL: f64 = 1.0;
+/// Range of the commanded pitch angle, degrees.
+const PITCH: [f64; 2] = [-2.0, 90.0];
+
+/// What the controller keeps from one sample to the next.
+#[derive(Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
+pub(crate) struct Controller {
+    constant_power: bool,
+    /// The last deviation from the rated speed, rad/s.
+    excess: f64,
+    /// Commanded pitch angle, degrees.
+    pub(crate) beta_ref: f64,
+    /// Commanded torque, N.m.
+    pub(crate) tau_ref: f64,
+}
+
+/// The torque in N.m for most power, `K_opt omega_g^2`.
+pub(crate) fn optimal_torque(omega_g: f64) -> f64 {
+    let speed = omega_g / (8.0 * GEAR);
+    let swept = 0.5 * DENSITY * PI * RADIUS.powi(5);
+    swept * EFFICIENCY[0] * POWER_COEFFICIENT * speed * speed / (8.0 * GEAR)
+}
+
+impl Controller {
+    /// Takes a sample: measured speed in rad/s, measured power in W, sample time in s.
+    pub(crate) fn sample(&mut self, omega_g: f64, power: f64, period: f64) {
+        let excess = omega_g - RATED_SPEED;
+        let was_constant = self.constant_power;
+        self.constant_power = if was_constant {
+            excess >= -HYSTERESIS
+        } else {
+            power >= RATED_POWER || excess >= 0.0
+        };
+        if self.constant_power {
+            let last = if was_constant { self.excess } else { excess };
+            let change = PROPORTIONAL * (excess - last) + INTEGRAL * period * last;
+            self.beta_ref = (self.beta_ref + change).clamp(PITCH[0], PITCH[1]);
+            self.tau_ref = RATED_POWER / (GENERATOR_EFFICIENCY * omega_g.max(1.0));
+        } else {
+            self.beta_ref = 0.0;
+            self.tau_ref = optimal_torque(omega_g);
+        }
+        self.excess = excess;
+    }
+}
