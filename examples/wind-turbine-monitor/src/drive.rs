@@ -1,8 +1,6 @@
 //! The residuals of the speeds of rotor and generator and of the converter's torque.
 
-use std::f64::consts::SQRT_2;
-
-use crate::test::Cusum;
+use crate::test::{Cusum, Pair};
 use crate::{NOISE_GENERATOR, NOISE_ROTOR, NOISE_TORQUE, PERIOD};
 
 /// Ratio of the gear.
@@ -25,12 +23,8 @@ pub(crate) struct Speeds {
     speed: f64,
     /// Acceleration by the torque of the shaft, rad/s2.
     shaft: f64,
-    generator: [Cusum; 2],
-    rotor: [Cusum; 2],
-    /// Of the sensors of the generator and of the rotor.
-    differences: [Cusum; 2],
-    pub(crate) generator_fault: [bool; 2],
-    pub(crate) rotor_fault: [bool; 2],
+    pub(crate) generator: Pair,
+    pub(crate) rotor: Pair,
 }
 
 impl Speeds {
@@ -38,27 +32,12 @@ impl Speeds {
     /// the generator in N.m.
     pub(crate) fn sample(&mut self, rotor: [f64; 2], generator: [f64; 2], torque: f64) {
         let residuals = generator.map(|speed| speed - self.speed);
-        let mut differ = |pair: usize, [first, second]: [f64; 2], noise: f64| {
-            self.differences[pair].take((first - second) / (SQRT_2 * noise))
-        };
-        let generators_differ = differ(0, generator, NOISE_GENERATOR);
-        let rotors_differ = differ(1, rotor, NOISE_ROTOR);
-        for (k, residual) in residuals.into_iter().enumerate() {
-            let tripped = self.generator[k].take(residual / (FILTER * NOISE_GENERATOR));
-            self.generator_fault[k] = generators_differ && tripped;
-        }
-        let used = match self.generator_fault {
-            [true, false] => residuals[1],
-            [false, true] => residuals[0],
-            _ => 0.5 * (residuals[0] + residuals[1]),
-        };
+        self.generator.take(residuals, [NOISE_GENERATOR, FILTER * NOISE_GENERATOR]);
+        let used = self.generator.trusted(residuals);
         self.speed += GAINS[0] * used;
         self.shaft += GAINS[1] * used;
-        for (k, speed) in rotor.into_iter().enumerate() {
-            let residual = speed - self.speed / GEAR;
-            let tripped = self.rotor[k].take(residual / (1.05 * NOISE_ROTOR));
-            self.rotor_fault[k] = rotors_differ && tripped;
-        }
+        let residuals = rotor.map(|speed| speed - self.speed / GEAR);
+        self.rotor.take(residuals, [NOISE_ROTOR, 1.05 * NOISE_ROTOR]);
         self.speed += PERIOD * (self.shaft - torque / INERTIA);
     }
 

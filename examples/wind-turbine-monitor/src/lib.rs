@@ -87,11 +87,11 @@ impl WindTurbineMonitor {
         self.samples += 1;
         let before = self.faults;
         for (i, blade) in self.blades.iter().enumerate() {
-            [self.faults[i], self.faults[3 + i]] = blade.sensor_fault;
+            [self.faults[i], self.faults[3 + i]] = blade.sensors.faulty;
             self.faults[10 + i] = blade.actuator_fault;
         }
-        [self.faults[6], self.faults[7]] = self.speeds.rotor_fault;
-        [self.faults[8], self.faults[9]] = self.speeds.generator_fault;
+        [self.faults[6], self.faults[7]] = self.speeds.rotor.faulty;
+        [self.faults[8], self.faults[9]] = self.speeds.generator.faulty;
         self.faults[13] = self.converter.fault;
         let started =
             before.iter().zip(self.faults).filter(|(before, now)| !**before && *now).count();

@@ -1,6 +1,8 @@
 //! The residuals of one blade's pitch actuator and its two sensors.
 
-use crate::test::{Cusum, THRESHOLD};
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use crate::test::{Cusum, Pair};
 use crate::{NOISE_PITCH, PERIOD};
 
 /// `2 zeta omega_n` and `omega_n^2` of the intact actuator.
@@ -19,10 +21,8 @@ pub(crate) struct Blade {
     beta: f64,
     rate: f64,
     samples: f64,
-    sensors: [Cusum; 2],
-    difference: Cusum,
-    common: Cusum,
-    pub(crate) sensor_fault: [bool; 2],
+    pub(crate) sensors: Pair,
+    mean: Cusum,
     pub(crate) actuator_fault: bool,
 }
 
@@ -30,23 +30,11 @@ impl Blade {
     /// Takes the measurements `m` of the two sensors at a sample, and predicts the next sample.
     pub(crate) fn sample(&mut self, beta_ref: f64, m: [f64; 2]) {
         let residuals = m.map(|angle| angle - self.beta);
-        let scaled = |residual: f64, noise: f64| residual / (noise * NOISE_PITCH);
-        let differ = self.difference.take(scaled(m[0] - m[1], std::f64::consts::SQRT_2));
-        let before = self.sensor_fault;
-        let tripped = [0, 1].map(|k| self.sensors[k].take(scaled(residuals[k], 1.0)));
+        self.sensors.take(residuals, [NOISE_PITCH; 2]);
         let mean = 0.5 * (residuals[0] + residuals[1]);
-        let moved = self.common.take(scaled(mean, std::f64::consts::FRAC_1_SQRT_2));
-        // Sensors that differ name the faulty one: the one with the larger residual, which stays named.
-        let larger = usize::from(residuals[1].abs() > residuals[0].abs());
-        let named = before.iter().position(|fault| *fault).unwrap_or(larger);
-        self.sensor_fault = [0, 1].map(|k| k == named && differ && (tripped[k] || before[k]));
-        let agree = !self.difference.is_above(0.5 * THRESHOLD);
-        self.actuator_fault = moved && agree && tripped[0] && tripped[1];
-        let used = match self.sensor_fault {
-            [true, _] => residuals[1],
-            [_, true] => residuals[0],
-            _ => mean,
-        };
+        let moved = self.mean.take(mean / (FRAC_1_SQRT_2 * NOISE_PITCH));
+        self.actuator_fault = moved && self.sensors.agree_on_a_change();
+        let used = self.sensors.trusted(residuals);
         self.samples += 1.0;
         self.beta += GAINS[0].max(1.0 / self.samples) * used;
         self.rate += GAINS[1] * used;

@@ -1,9 +1,11 @@
-//! A two-sided CUSUM test of a residual.
+//! Two-sided CUSUM tests of residuals, and of two sensors of one quantity.
+
+use std::f64::consts::SQRT_2;
 
 /// Shift of the mean in standard deviations from which on the sums grow, and the threshold of the sums.
 ///
 /// The mean number of samples between two false alarms of one side is about
-/// (exp(2 k (h + 1.166)) - 1 - 2 k (h + 1.166)) / (2 k^2) (Siegmund 1985), 1.6e12 for these values.
+/// (exp(2 k (h + 1.166)) - 1 - 2 k (h + 1.166)) / (2 k^2) (Siegmund 1985), 1e12 for these values.
 pub(crate) const ALLOWANCE: f64 = 1.0;
 pub(crate) const THRESHOLD: f64 = 13.0;
 /// Upper limit of the sums, so that an alarm ends soon after its fault.
@@ -27,5 +29,52 @@ impl Cusum {
     /// Whether a sum is above `limit`.
     pub(crate) fn is_above(&self, limit: f64) -> bool {
         self.sums.iter().any(|sum| *sum > limit)
+    }
+}
+
+/// Two sensors of one quantity: the tests of their residuals and of their difference.
+#[derive(Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
+pub(crate) struct Pair {
+    sensors: [Cusum; 2],
+    difference: Cusum,
+    /// The faulty sensor.
+    pub(crate) faulty: [bool; 2],
+}
+
+impl Pair {
+    /// Takes the residuals of both sensors, whose noise and whose residuals have these standard deviations.
+    ///
+    /// Sensors that differ name the faulty one: the one with the larger residual. It stays named until the
+    /// sensors agree again.
+    pub(crate) fn take(&mut self, residuals: [f64; 2], [noise, deviation]: [f64; 2]) {
+        let before = self.faulty;
+        let parted = self.difference.take((residuals[0] - residuals[1]) / (SQRT_2 * noise));
+        let differ = parted || before != [false; 2] && !self.agree();
+        let mut tripped = [false; 2];
+        for k in 0..2 {
+            tripped[k] = self.sensors[k].take(residuals[k] / deviation);
+        }
+        let larger = usize::from(residuals[1].abs() > residuals[0].abs());
+        let named = before.iter().position(|faulty| *faulty).unwrap_or(larger);
+        self.faulty = [0, 1].map(|k| k == named && differ && (tripped[k] || before[k]));
+    }
+
+    /// Whether both residuals are large, and the sensors agree.
+    pub(crate) fn agree_on_a_change(&self) -> bool {
+        let both = self.sensors.iter().all(|sensor| sensor.is_above(THRESHOLD));
+        both && self.agree()
+    }
+
+    fn agree(&self) -> bool {
+        !self.difference.is_above(0.5 * THRESHOLD)
+    }
+
+    /// The residual of the sensor without a fault; the mean of both if none has one.
+    pub(crate) fn trusted(&self, residuals: [f64; 2]) -> f64 {
+        match self.faulty {
+            [true, _] => residuals[1],
+            [_, true] => residuals[0],
+            _ => 0.5 * (residuals[0] + residuals[1]),
+        }
     }
 }
