@@ -8,8 +8,11 @@ use crate::{NOISE_PITCH, PERIOD};
 /// `2 zeta omega_n` and `omega_n^2` of the intact actuator.
 const DAMPING: f64 = 2.0 * 0.6 * 11.11;
 const STIFFNESS: f64 = 11.11 * 11.11;
-/// Gains of the observer: angle per residual, at the start 1 / (number of samples), and rate per residual, 1/s.
-const GAINS: [f64; 2] = [0.02, 0.02];
+/// Gains of the observer: angle per residual, at the start 1 / (number of samples); and rate per residual, 1/s.
+/// They are small, so that the observer hardly follows a faulty sensor.
+const GAINS: [f64; 2] = [0.001, 0.001];
+/// Gain of the angle while the actuator is faulty, so that the alarm ends with the fault.
+const FOLLOWING: f64 = 0.05;
 
 /// The observer of a blade and the tests of its residuals.
 ///
@@ -36,7 +39,8 @@ impl Blade {
         self.actuator_fault = moved && self.sensors.agree_on_a_change();
         let used = self.sensors.trusted(residuals);
         self.samples += 1.0;
-        self.beta += GAINS[0].max(1.0 / self.samples) * used;
+        let gain = if self.actuator_fault { FOLLOWING } else { GAINS[0] };
+        self.beta += gain.max(1.0 / self.samples) * used;
         self.rate += GAINS[1] * used;
         self.predict(beta_ref - 0.5 * (m[0] + m[1]));
     }
