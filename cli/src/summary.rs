@@ -99,6 +99,7 @@ impl ControllerCertificate {
             l_x: matrix("L_x")?,
             l_f: matrix("L_f")?,
             p_f: None,
+            integral: None,
         };
         let pairs = |matrix: &DMatrix<f64>| -> anyhow::Result<Vec<[f64; 2]>> {
             Ok(eigenvalues(matrix)?.iter().map(|value| [value.re, value.im]).collect())

@@ -1,7 +1,7 @@
 //! The summary of a design on the terminal.
 
 use design::Report;
-use design::report::{Loop, Matrix};
+use design::report::{CommandPeak, Loop, Matrix, ReferenceStep};
 
 /// The most rows or columns of a gain that are printed; the design file has all.
 const LARGEST_SHOWN: usize = 16;
@@ -16,6 +16,9 @@ pub(crate) fn summarise(report: &Report) {
     }
     for own in [&report.feedback, &report.observer] {
         print_loop(own);
+    }
+    for step in &report.references {
+        print_reference(step);
     }
     if let Some(found) = &report.robustness {
         let peaks: Vec<_> = found
@@ -71,6 +74,34 @@ fn print_gain(matrix: &Matrix) {
             format!("{:>12}", number(if rounding { 0.0 } else { *entry }))
         });
         println!("  {}", entries.collect::<Vec<_>>().join(" "));
+    }
+}
+
+fn print_reference(step: &ReferenceStep) {
+    let unit = step.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+    let rise = step.rise_time.map_or("none".to_owned(), |time| format!("{} s", number(time)));
+    println!(
+        "step of {} by {}{unit}: rise time {rise}, overshoot {} %, settled after {} s, steady-state error {} %",
+        step.reference,
+        number(step.size),
+        number(100.0 * step.overshoot),
+        number(step.settling_time),
+        number(if step.steady_state_error.abs() < ROUNDING {
+            0.0
+        } else {
+            100.0 * step.steady_state_error
+        }),
+    );
+    let command = |own: &CommandPeak| {
+        let [low, high] = own.range.map(number);
+        let unit = own.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+        format!("{} from {low} to {high}{unit}", own.name)
+    };
+    let commands: Vec<_> = step.commands.iter().take(LARGEST_SHOWN).map(command).collect();
+    println!("    commands, as deviations: {}", commands.join(", "));
+    if step.largest_step.iter().any(|limit| limit.is_finite()) {
+        let [low, high] = step.largest_step.map(number);
+        println!("    within the limits: steps from {low} to {high}{unit}");
     }
 }
 

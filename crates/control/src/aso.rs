@@ -155,6 +155,7 @@ pub(crate) fn design_feedback(
             l_x: l.rows(0, n).into(),
             l_f: -l.rows(n, q),
             p_f: None,
+            integral: None,
         },
         controller: controller.quality,
         observer,

@@ -1,7 +1,8 @@
 //! The controller of [`crate::aso`] as one linear system, and the loop that it closes.
 
 use crate::aso::{Estimator, FaultyPlant, Gains};
-use crate::blocks::block_2x2;
+use crate::blocks::{block_2x2, stacked};
+use crate::tracking::integration;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
@@ -25,6 +26,8 @@ use nalgebra::DMatrix;
 /// ```
 ///
 /// with the corrected z, and the same u enters the model of the plant in A and B.
+/// y is what the observer receives: filtered measurements where there is a filter. Integral action is left
+/// out; [`complete_controller`] has both.
 ///
 /// # Errors
 ///
@@ -103,6 +106,82 @@ pub fn fault_estimates(
         d += corrected;
     }
     Ok(StateSpace { c, d, ..own })
+}
+
+/// A controller from the measurements, as the sensors give them, to the commands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CompleteController {
+    /// From y to u. The state is [`y_f`; `x_hat`; `f_hat`; `x_i`], the first part with a filter, the last one
+    /// with integral action.
+    pub commands: StateSpace,
+    /// From y to `f_hat`, the estimate that u uses; the same A and B.
+    pub estimates: StateSpace,
+}
+
+/// The controller of [`controller`] with the measurement filter W before it and the integral action of
+/// [`crate::tracking`] beside it, for references r = 0.
+///
+/// ```text
+/// y_f' = W (y - y_f)                              sampled: y_f[k+1] = y_f[k] + W (y[k] - y_f[k])
+/// z'   = A z + B y_f + [B_p; 0] K_i x_i,          u = C z + D y_f + K_i x_i
+/// x_i' = -H y + H F_s f_hat                       sampled: x_i[k+1] = x_i[k] + T (-H y[k] + H F_s f_hat)
+/// ```
+///
+/// with A, B, C, D of [`controller`]; `filter`: the diagonal of W, p entries; without it `y_f` = y. `x_i'`
+/// contains y itself, not `y_f`.
+///
+/// # Errors
+///
+/// Same as [`controller`]; [`Error::Shape`] when the filter does not fit.
+pub fn complete_controller(
+    plant: &FaultyPlant,
+    gains: &Gains,
+    filter: Option<&[f64]>,
+    domain: Domain,
+) -> Result<CompleteController, Error> {
+    let own = controller(plant, gains, domain)?;
+    let mut commands = filtered(&own, filter)?;
+    let mut estimates = filtered(&fault_estimates(plant, gains, domain)?, filter)?;
+    if let Some(integral) = &gains.integral {
+        let b = plant.b.clone().resize_vertically(own.a.nrows(), 0.0);
+        let first = commands.a.nrows() - own.a.nrows();
+        let into = b.insert_rows(0, first, 0.0) * &integral.gain;
+        let (step, kept) = integration(domain);
+        let (k, t) = (commands.a.nrows(), gains.integrals());
+        let identity = DMatrix::identity(t, t) * kept;
+        let below = &integral.faults * &estimates.c * step;
+        let a = block_2x2([&commands.a, &into], [&below, &identity]);
+        let integrand = (&integral.faults * &estimates.d - &integral.h) * step;
+        let b = stacked(&commands.b, &integrand);
+        commands.c = stacked(&commands.c.transpose(), &integral.gain.transpose()).transpose();
+        estimates.c = estimates.c.resize_horizontally(k + t, 0.0);
+        (commands.a, commands.b) = (a.clone(), b.clone());
+        (estimates.a, estimates.b) = (a, b);
+    }
+    Ok(CompleteController { commands, estimates })
+}
+
+/// Puts a measurement filter before a controller: its states are `y_f`, then the controller's.
+fn filtered(own: &StateSpace, filter: Option<&[f64]>) -> Result<StateSpace, Error> {
+    let Some(filter) = filter else {
+        return Ok(own.clone());
+    };
+    let (p, k, m) = (filter.len(), own.a.nrows(), own.c.nrows());
+    check::shape("W", &DMatrix::from_column_slice(p, 1, filter), (own.b.ncols(), 1))?;
+    let w = DMatrix::from_diagonal(&filter.to_vec().into());
+    let kept = match own.domain {
+        Domain::Continuous => -&w,
+        Domain::Sampled { .. } => DMatrix::identity(p, p) - &w,
+    };
+    let mut a = DMatrix::zeros(p + k, p + k);
+    a.view_mut((0, 0), (p, p)).copy_from(&kept);
+    a.view_mut((p, 0), (k, p)).copy_from(&own.b);
+    a.view_mut((p, p), (k, k)).copy_from(&own.a);
+    let mut c = DMatrix::zeros(m, p + k);
+    c.columns_mut(0, p).copy_from(&own.d);
+    c.columns_mut(p, k).copy_from(&own.c);
+    let (b, d) = (w.resize_vertically(p + k, 0.0), DMatrix::zeros(m, p));
+    Ok(StateSpace { a, b, c, d, domain: own.domain })
 }
 
 /// The dynamics of plant and controller together, of [x; z], where input i of the plant acts with

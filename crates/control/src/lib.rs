@@ -14,6 +14,7 @@
 //! | residuals that isolate faults: decoupled from commands, disturbances, other faults | [`isolation`] |
 //! | norms, step and frequency responses, the effect of faults | [`response`] |
 //! | margins of a loop: sensitivity, disk, gain, phase, delay, hold time, parameter tolerances | [`robustness`] |
+//! | references: feedforward, integral action, anti-windup | [`tracking`] |
 //! | bound of the estimation error with a proof | [`theorem1`] |
 //! | linear matrix inequalities (feature `lmi`) | `lmi` |
 //! | the controller as one system, the closed loop, its stability | [`controller`], [`stability`] |
@@ -58,6 +59,7 @@ pub mod stability;
 mod state_space;
 mod svd;
 pub mod theorem1;
+pub mod tracking;
 pub mod zeros;
 
 pub use domain::Domain;

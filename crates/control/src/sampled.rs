@@ -212,7 +212,7 @@ pub fn design(
     let seen = estimator.output_matrix(&a_0, &c_0);
     let (l, observer) = place_estimator(&a_0, &seen, observer_poles)?;
     let (l_x, l_f) = (l.rows(0, n).into(), -l.rows(n, q));
-    let gains = Gains { estimator, k_x: feedback.gain, k_f, l_x, l_f, p_f: None };
+    let gains = Gains { estimator, k_x: feedback.gain, k_f, l_x, l_f, p_f: None, integral: None };
     let domain = Domain::Sampled { period };
     let controller_system = controller(&plant, &gains, domain)?;
     let dynamics = closed_loop(&plant, &controller_system, &vec![1.0; m])?;

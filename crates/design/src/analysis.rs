@@ -179,7 +179,7 @@ impl<'a> Loops<'a> {
         // The plant's states do not influence the estimation errors.
         let mut rates = self.to_fault_errors(&self.of_rates);
         let all = self.designed.plant.a.nrows();
-        let order = rates.a.nrows() - all;
+        let order = all + self.designed.plant.f_a.ncols();
         rates.a = rates.a.view((all, all), (order, order)).into();
         rates.b = rates.b.rows(all, order).into();
         rates.c = rates.c.columns(all, order).into();

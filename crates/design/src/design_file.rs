@@ -10,6 +10,7 @@ use super::designed::{ControllerDesign, fault_names};
 use super::plant_file::PlantFile;
 use super::reporting::estimator;
 use super::signals::{EntryPoint, Signal};
+use super::tracking::TrackingAction;
 
 /// The content of the file except the matrices.
 #[derive(Serialize)]
@@ -28,6 +29,8 @@ pub(crate) struct DesignFile<'a> {
     pub(crate) actuators: Vec<Entry>,
     pub(crate) measurements: Vec<Entry>,
     pub(crate) faults: Vec<Entry>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) references: Vec<Entry>,
 }
 
 /// The default experiment of importers, times in s.
@@ -96,6 +99,7 @@ impl ControllerDesign {
             actuators: entries(&linear.actuators),
             measurements: entries(&linear.measurements),
             faults: self.fault_entries(),
+            references: self.tracking.as_ref().map_or(Vec::new(), |own| entries(&own.signals)),
         };
         let FaultyPlant { a, b, c, f_a, a_f } = &self.plant;
         let mut matrices = vec![("A", a), ("B", b), ("C", c), ("F_a", f_a)];
@@ -104,6 +108,15 @@ impl ControllerDesign {
         }
         let Gains { k_x, k_f, l_x, l_f, .. } = &self.gains;
         matrices.extend([("K_x", k_x), ("K_f", k_f), ("L_x", l_x), ("L_f", l_f)]);
+        if let Some(integral) = &self.gains.integral {
+            matrices.extend([("H", &integral.h), ("K_i", &integral.gain)]);
+            matrices.extend((integral.faults.amax() > 0.0).then_some(("F_i", &integral.faults)));
+        }
+        match self.tracking.as_ref().map(|own| &own.action) {
+            Some(TrackingAction::Feedforward(n_r)) => matrices.push(("N_r", n_r)),
+            Some(TrackingAction::Integral { windup: Some(l_w), .. }) => matrices.push(("L_w", l_w)),
+            _ => {}
+        }
         head.render(&matrices)
     }
 

@@ -7,15 +7,18 @@ use super::norm_gains::ObserverProblem;
 use super::plant_file::PlantFile;
 use super::plausibility::{check_faults, check_limits};
 use super::requirements::{Request, Requirement};
+use super::tracking::{
+    DesignLoop, Tracking, check_references, decay, feedback_pair, integral_action,
+};
 use control::aso::{Estimator, FaultyPlant, Gains};
-use control::controller::{closed_loop, controller};
+use control::controller::closed_loop;
 use control::detectability::{Detectability, detectability};
 use control::distance::{Distance, from_uncontrollable};
 use control::faults::ExtendedPlant;
 use control::rank::{Mode, Rank, controllability, uncontrollable_modes};
 use control::sampled;
 use control::stability::{instability, is_clearly_stable};
-use control::{Domain, Error, StateSpace};
+use control::{Domain, Error};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
@@ -42,8 +45,12 @@ pub(crate) struct ControllerDesign {
     pub(crate) detectability: Detectability,
     /// The part of the faults' effect on the states that the compensation cannot cancel, relative.
     pub(crate) cancellation_residual: f64,
-    /// The linear controller, from measurements to commands.
-    pub(crate) controller: StateSpace,
+    /// The set points of measurements, if there are any.
+    pub(crate) tracking: Option<Tracking>,
+    /// A and B of the feedback: those of the plant, with integral action followed by the integrals.
+    pub(crate) feedback_pair: (DMatrix<f64>, DMatrix<f64>),
+    /// The plant and the linear controller from its measurements to its commands.
+    pub(crate) whole: DesignLoop,
     /// Largest real part of the closed-loop eigenvalues, or largest modulus minus one; negative if
     /// stable.
     pub(crate) instability: f64,
@@ -61,20 +68,29 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
         .map_err(|error| file.error(&["A"], error.to_string()))?;
     let (controllability, distance) = check_controllable(file, &linear, &mut warnings)?;
     check_faults(file, &linear, &extended)?;
+    check_references(file, &linear)?;
     let detectability = check_detectable(file, &linear, &extended, &mut warnings)?;
     let (domain, plant) = in_domain(file, &extended)?;
-    let (feedback, observer) = compute_gains((file, &linear), &extended, (&plant, c), domain)?;
+    let references = file.references.as_ref();
+    let states = extended.states;
+    let own = (plant.a.view((0, 0), (states, states)).into_owned(), plant.b.rows(0, states).into());
+    let pair = feedback_pair(references, [&own.0, &own.1, c], domain)?;
+    let (feedback, observer) = compute_gains((file, &linear), &extended, (&plant, &pair), domain)?;
     let n = plant.a.nrows();
     let gains = Gains {
         estimator: estimator(file),
-        k_x: feedback.gain.clone().resize_horizontally(n, 0.0),
+        k_x: feedback.gain.columns(0, states).into_owned().resize_horizontally(n, 0.0),
         k_f: sampled::compensation_gain(&extended, domain)?,
         l_x: observer.gain.rows(0, n).into(),
         l_f: -observer.gain.rows(n, plant.f_a.ncols()),
         p_f: None,
+        integral: integral_action(references, (&linear, &extended), &feedback.gain),
     };
-    let controller = controller(&plant, &gains, domain)?;
-    let whole = closed_loop(&plant, &controller, &vec![1.0; plant.b.ncols()])?;
+    let filter = sampled::filter(&extended, domain);
+    let whole = DesignLoop::of((&linear, &plant), &gains, filter.as_deref(), domain)?;
+    let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
+    let controlled = &pair.0 + &pair.1 * &feedback.gain;
+    let tracking = Tracking::of(file, (&linear, (&own.0, &own.1)), (&gains, &controlled), domain)?;
     Ok(ControllerDesign {
         cancellation_residual: cancellation_residual(&extended)?,
         instability_before: if file.t_on > 0.0 && !file.monitor {
@@ -82,8 +98,8 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
         } else {
             None
         },
-        instability: instability(&whole, domain)?,
-        filter: sampled::filter(&extended, domain),
+        instability: instability(&dynamics, domain)?,
+        filter,
         linear,
         warnings,
         extended,
@@ -95,7 +111,9 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
         controllability,
         distance,
         detectability,
-        controller,
+        tracking,
+        feedback_pair: pair,
+        whole,
     })
 }
 
@@ -123,23 +141,25 @@ fn in_domain(
     Ok((domain, plant))
 }
 
-/// Computes the gains of feedback and observer; `c` is the output matrix without extensions.
+/// Computes the gains of feedback and observer; `a` and `b` are the pair of the feedback.
 fn compute_gains(
     (file, linear): (&PlantFile<'_>, &LinearPlant),
     extended: &ExtendedPlant,
-    (plant, c): (&FaultyPlant, &DMatrix<f64>),
+    (plant, (a, b)): (&FaultyPlant, &(DMatrix<f64>, DMatrix<f64>)),
     domain: Domain,
 ) -> Result<(GainResult, GainResult), PlaceError> {
     let n = extended.states;
+    let order = a.nrows();
     let problem = FeedbackProblem {
-        a: &plant.a.view((0, 0), (n, n)).into(),
-        b: &plant.b.rows(0, n).into(),
-        c,
-        f_a: &plant.f_a.rows(0, n).into(),
+        a,
+        b,
+        c: &linear.c.clone().resize_horizontally(order, 0.0),
+        f_a: &plant.f_a.rows(0, n).into_owned().resize_vertically(order, 0.0),
     };
     let feedback = feedback(&file.feedback.requirement, &problem, domain).map_err(|refusal| {
-        let name = |at: usize| linear.states[at].name.clone();
-        refused((file, domain), &file.feedback, refusal, (n, "states"), name)
+        let names = feedback_states(file, linear);
+        let meaning = if order > n { "states and integrals of references" } else { "states" };
+        refused((file, domain), &file.feedback, refusal, (order, meaning), |at| names[at].clone())
     })?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let filter = sampled::filter(extended, domain);
@@ -309,6 +329,14 @@ fn names<'a>(list: impl Iterator<Item = &'a str>) -> String {
     list.collect::<Vec<_>>().join(", ")
 }
 
+/// Returns the names of the states of the feedback: states, with integral action the integrals.
+pub(crate) fn feedback_states(file: &PlantFile<'_>, linear: &LinearPlant) -> Vec<String> {
+    let integrals = file.references.iter().filter(|references| references.integral);
+    let integrals = integrals.flat_map(|references| &references.signals);
+    let integrals = integrals.map(|signal| format!("integral of {}", signal.name));
+    linear.states.iter().map(|signal| signal.name.clone()).chain(integrals).collect()
+}
+
 /// Returns the names of the states of the observer: states, filters, faults.
 fn observer_states(linear: &LinearPlant, extended: &ExtendedPlant) -> Vec<String> {
     let plain = (0..extended.plant.a.nrows()).map(|at| state_name(linear, at).to_owned());
@@ -342,6 +370,9 @@ fn refused(
                 None => error.to_string(),
             }
         }
+        Refusal::Control(error @ Error::Shape { matrix: "Q", .. }) => {
+            format!("{error}, one row for each of the {meaning}")
+        }
         Refusal::Control(error) => error.to_string(),
     };
     match &request.other {
@@ -371,18 +402,14 @@ fn fixed(
 }
 
 impl ControllerDesign {
-    /// Returns A + B K_x, n x n: the dynamics under exact state feedback.
+    /// Returns A + B K_x, n x n, the dynamics under exact state feedback; with integral action the same of
+    /// the plant extended by the integrals, with [K_x, K_i].
     pub(crate) fn feedback_dynamics(&self) -> DMatrix<f64> {
-        let n = self.extended.states;
-        self.plant.a.view((0, 0), (n, n)) + self.plant.b.rows(0, n) * self.gains.k_x.columns(0, n)
+        &self.feedback_pair.0 + &self.feedback_pair.1 * &self.feedback.gain
     }
 
     /// Returns the decay rate of the slowest eigenvalue under exact state feedback, 1/s.
     pub(crate) fn slowest_rate(&self) -> Result<f64, Error> {
-        let rate = -instability(&self.feedback_dynamics(), self.domain)?;
-        Ok(match self.domain {
-            Domain::Continuous => rate,
-            Domain::Sampled { period } => -(-rate).ln_1p() / period,
-        })
+        decay(&self.feedback_dynamics(), self.domain)
     }
 }

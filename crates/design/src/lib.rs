@@ -27,6 +27,8 @@ mod page;
 mod parameters;
 mod plant_file;
 mod plausibility;
+mod reference_steps;
+mod references;
 pub mod report;
 mod reporting;
 mod requirements;
@@ -37,6 +39,7 @@ mod robustness_limits;
 mod signals;
 #[cfg(test)]
 mod tests;
+mod tracking;
 mod worst_case;
 
 use std::path::{Path, PathBuf};

@@ -9,6 +9,7 @@ mod number;
 mod plane;
 mod plant;
 mod pole_map;
+mod references;
 mod region;
 mod robustness;
 mod table;
@@ -98,6 +99,7 @@ fn sections(report: &Report) -> Vec<Section> {
         (true, "conditioning", "Condition and pole errors", loops::conditioning(report)),
         (report.robustness.is_some(), "robustness", "Robustness", robustness::robustness(report)),
         (!report.frequency.is_empty(), "frequency", "Singular values", curves::frequencies(report)),
+        (!report.references.is_empty(), "references", "References", references::references(report)),
         (!report.steps.is_empty(), "steps", "Sudden faults", curves::responses(report)),
         (!report.bounds.is_empty(), "bounds", "Bounds of the errors", certificate::bounds(report)),
         (true, "certificate", "Certificate", certificate::certificate(report)),

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::DMatrix;
 
 use super::plausibility::check_names;
+use super::references::References;
 use super::requirements::{ChannelSignals, Request, request};
 use super::robustness_limits::RobustnessLimits;
 use super::signals::{
@@ -28,6 +29,8 @@ pub(crate) struct PlantFile<'a> {
     pub(crate) actuators: Vec<Signal>,
     pub(crate) measurements: Vec<Signal>,
     pub(crate) faults: Vec<Fault>,
+    /// Set points of measurements.
+    pub(crate) references: Option<References>,
     pub(crate) sampling: Option<Sampling>,
     /// Rates of the measurement filter, 1/s, one per measurement.
     pub(crate) filter: Option<Vec<f64>>,
@@ -74,7 +77,7 @@ pub(crate) struct Sampling {
     pub(crate) current: bool,
 }
 
-const KEYS: [&str; 24] = [
+const KEYS: [&str; 25] = [
     "description",
     "t_on",
     "monitor",
@@ -98,10 +101,11 @@ const KEYS: [&str; 24] = [
     "observer",
     "experiment",
     "robustness",
+    "reference",
     "D",
 ];
 /// Entries that errors of later steps point at.
-const PLACES: [&str; 17] = [
+const PLACES: [&str; 18] = [
     "A",
     "B",
     "C",
@@ -119,6 +123,7 @@ const PLACES: [&str; 17] = [
     "filter",
     "feedback",
     "observer",
+    "reference",
 ];
 
 impl<'a> PlantFile<'a> {
@@ -131,6 +136,7 @@ impl<'a> PlantFile<'a> {
             None => stated(file)?,
         };
         let faults = all_faults(file, &actuators, &measurements)?;
+        let references = References::read(file, &measurements)?;
         let sampling = sampling(file)?;
         let sampled = sampling.is_some();
         let read = |key: &str, weights, meaning: &str| {
@@ -166,6 +172,7 @@ impl<'a> PlantFile<'a> {
             actuators,
             measurements,
             faults,
+            references,
             sampling,
         };
         found.check_columns(file)?;

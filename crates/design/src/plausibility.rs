@@ -23,7 +23,8 @@ const MATRICES: [&str; 8] = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f"];
 /// that no two faults have the same name.
 pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
     let own = OwnVariables::of(file);
-    for signal in file.actuators.iter().chain(&file.measurements) {
+    let references = file.references.as_ref().map_or(&[][..], |references| &references.signals);
+    for signal in file.actuators.iter().chain(&file.measurements).chain(references) {
         let name = &signal.name;
         if !is_structured_name(name) {
             let message = format!(
@@ -50,23 +51,36 @@ pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
             return Err(at_name(file, signal, message));
         }
     }
-    check_arrays(file)?;
+    for signal in references {
+        let mut others = file.actuators.iter().chain(&file.measurements);
+        if others.any(|other| other.name == signal.name) {
+            let message = format!(
+                "the reference `{}` would have the name of an actuator or a measurement in the controller \
+                 FMU; expected another `name`",
+                signal.name
+            );
+            return Err(at_name(file, signal, message));
+        }
+    }
+    check_arrays(file, references)?;
     check_fault_names(file)
 }
 
-/// Checks that the elements of each array are adjacent and in order. In the FMU, `compensate` is
-/// between measurements and actuators.
-fn check_arrays(file: &PlantFile<'_>) -> Result<(), PlaceError> {
+/// Checks that the elements of each array are adjacent and in order. In the FMU, references and
+/// `compensate` are between measurements and actuators.
+fn check_arrays(file: &PlantFile<'_>, references: &[Signal]) -> Result<(), PlaceError> {
     let names = |signals: &'_ [Signal]| signals.iter().map(|s| s.name.clone()).collect::<Vec<_>>();
     let mut all = names(&file.measurements);
+    all.extend(names(references));
     all.push("compensate".to_owned());
     all.extend(names(&file.actuators));
     let Some((at, text)) = misplaced_elements(all.iter().map(String::as_str)).into_iter().next()
     else {
         return Ok(());
     };
-    let inputs = file.measurements.len();
-    let signal = file.measurements.get(at).unwrap_or_else(|| &file.actuators[at - inputs - 1]);
+    let mut inputs = file.measurements.iter().chain(references);
+    let before = file.measurements.len() + references.len() + 1;
+    let signal = inputs.nth(at).unwrap_or_else(|| &file.actuators[at - before]);
     let message =
         format!("in the controller FMU the {text}; expected another order or other names");
     Err(at_name(file, signal, message))
@@ -95,7 +109,7 @@ fn check_fault_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
 fn at_name(file: &PlantFile<'_>, signal: &Signal, message: String) -> PlaceError {
     match &signal.places[0] {
         Some(place) => file.error_at(place, message),
-        None => file.error(&["actuators", "measurements"], message),
+        None => file.error(&["actuators", "measurements", "reference"], message),
     }
 }
 
@@ -130,6 +144,10 @@ impl OwnVariables {
         if ramps > 0 {
             own.matrices.push("A_f");
         }
+        let t = file.references.as_ref().map(|references| references.signals.len());
+        if file.references.is_some() {
+            own.matrices.extend(["H", "K_i", "F_i", "L_w", "N_r"]);
+        }
         let operating = |signal: &Signal| signal.operating.is_some_and(|value| value != 0.0);
         let stated = states.is_none() || file.signals().any(operating);
         let mut add = |present: bool, signals: &[(&'static str, Option<usize>)]| {
@@ -138,6 +156,7 @@ impl OwnVariables {
         add(file.faults.iter().any(lossy), &[("E_hat", q)]);
         add(file.filter.is_some(), &[("y_f", p), ("filter", p)]);
         add(stated, &[("x_op", states), ("u_op", m), ("y_op", p)]);
+        add(t.is_some(), &[("x_i", t), ("x_i_0", t), ("r_op", t)]);
         let limited = file.actuators.iter().any(|actuator| actuator.limits.is_some());
         add(limited, &[("u_min", m), ("u_max", m)]);
         own
@@ -147,7 +166,7 @@ impl OwnVariables {
     fn include(&self, name: &str) -> bool {
         let derivative = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
         if let Some(state) = derivative {
-            let states = ["x_hat", "f_hat", "y_f"];
+            let states = ["x_hat", "f_hat", "y_f", "x_i"];
             let signals = self.signals.iter().filter(|(own, _)| states.contains(own));
             return !self.scalars.contains(&"T_s") && Self::is_among(state, signals);
         }

@@ -39,6 +39,8 @@ pub struct Report {
     /// Responses to a change of each fault: as a step, and as a ramp if the bound of its rate is
     /// stated; with several faults, also to steps of all of them together.
     pub steps: Vec<StepResponse>,
+    /// Responses to a step of each reference; empty without references.
+    pub references: Vec<ReferenceStep>,
     /// Singular values over frequency.
     pub frequency: Vec<Frequency>,
     /// Stability under loss of effectiveness, one entry per such fault.
@@ -268,6 +270,52 @@ pub struct StepResponse {
     pub rate: Option<f64>,
     /// The responding signals: states, errors of estimates, commands.
     pub curves: Vec<Curve>,
+}
+
+/// The response of the loop to a step of a reference, from rest, without faults and limits.
+#[derive(Serialize, JsonSchema)]
+pub struct ReferenceStep {
+    /// The reference.
+    pub reference: String,
+    /// Its unit.
+    pub unit: Option<String>,
+    /// Size of the step, in this unit; 1 if the plant file states none.
+    pub size: f64,
+    /// Whether the plant file states the size.
+    pub stated: bool,
+    /// Time from 10 % to 90 % of the step, in s; none if 90 % are never reached.
+    pub rise_time: Option<f64>,
+    /// Largest value beyond the reference, as a part of the step; 0 if there is none.
+    pub overshoot: f64,
+    /// Settling time in s: what follows then stays within 2 % of the step.
+    pub settling_time: f64,
+    /// What is left of the step after a long time, as a part of it.
+    pub steady_state_error: f64,
+    /// The commands, as deviations from the operating point.
+    pub commands: Vec<CommandPeak>,
+    /// The largest movement of the other outputs that follow references, as deviations.
+    pub others: Vec<Number>,
+    /// The largest step, positive and negative, whose commands stay within the limits; null if no limit
+    /// restricts it.
+    #[schemars(with = "[Option<f64>; 2]")]
+    pub largest_step: [f64; 2],
+    /// The output that follows, the measurements and the commands over time.
+    pub curves: Vec<Curve>,
+}
+
+/// The extremes of a command after a step of a reference.
+#[derive(Serialize, JsonSchema)]
+pub struct CommandPeak {
+    /// The actuator.
+    pub name: String,
+    /// Its unit.
+    pub unit: Option<String>,
+    /// Smallest and largest command as deviations from the operating point.
+    pub range: [f64; 2],
+    /// The limits as deviations from the operating point; none if it has none.
+    pub limits: Option<[f64; 2]>,
+    /// The command after a long time.
+    pub final_value: f64,
 }
 
 /// The response of a signal.

@@ -17,9 +17,11 @@ use super::certificate::certificate;
 use super::checks::checks;
 use super::designed::{ControllerDesign, fault_names};
 use super::gains::GainResult;
+use super::page::rounded;
 use super::parameters::ParameterFamily;
 use super::plant_file::PlantFile;
 use super::plausibility::line;
+use super::reference_steps::{beyond_limits, reached, reference_steps};
 use super::report::{
     Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal, pairs, rows,
 };
@@ -27,6 +29,7 @@ use super::requirements::{self, Requirement};
 use super::responses::responses;
 use super::robustness::{robustness, verdict};
 use super::signals::{self, EntryPoint, Fault, FaultDynamics};
+use super::tracking::{DesignLoop, TrackingAction};
 
 /// Returns the report on `designed`.
 pub(crate) fn report(
@@ -38,13 +41,16 @@ pub(crate) fn report(
     let loops = Loops::of(designed)?;
     let ControllerDesign { plant, gains, linear, .. } = designed;
     let names = Names::of(designed);
-    let checks = checks(designed);
+    let references = reference_steps(designed)?;
+    let mut checks = checks(designed);
+    checks.extend(reached(&references));
     let robustness = robustness(designed, &file.robustness, family)?;
     let budget = Budget::start(certificate_time);
     let certificate = certificate(designed, loops.norms()?, &budget);
     let (bounds, left_out) = loops.bounds(&budget)?;
     let mut warnings: Vec<_> =
         designed.warnings.iter().map(|warning| line(file, warning)).collect();
+    warnings.extend(references.iter().filter_map(beyond_limits));
     if left_out > 0 {
         warnings
             .push(format!("the bounds of {left_out} states and errors were {}", budget.reason()));
@@ -59,7 +65,7 @@ pub(crate) fn report(
         robustness,
         gains: names.gains(designed),
         feedback: closed(
-            "A + B K_x",
+            if gains.integral.is_some() { "A_e + B_e [K_x, K_i]" } else { "A + B K_x" },
             &designed.feedback_dynamics(),
             &designed.feedback,
             &file.feedback.requirement,
@@ -80,6 +86,7 @@ pub(crate) fn report(
         certificate,
         bounds,
         steps: responses(designed)?,
+        references,
         frequency: loops.frequency()?,
         effectiveness: effectiveness(designed)?,
         assumptions: assumptions(designed, &linear.faults),
@@ -102,6 +109,7 @@ struct Names {
     actuators: Vec<String>,
     measurements: Vec<String>,
     faults: Vec<String>,
+    references: Vec<String>,
 }
 
 impl Names {
@@ -118,6 +126,7 @@ impl Names {
         Self {
             actuators: names(&linear.actuators),
             faults: fault_names(linear, &designed.extended),
+            references: designed.tracking.as_ref().map_or(Vec::new(), |own| names(&own.signals)),
             states,
             extended,
             measurements,
@@ -126,7 +135,7 @@ impl Names {
 
     /// Returns A, B, C, F_a of the plant, and the model in the observer if it differs.
     fn plant_matrices(&self, designed: &ControllerDesign) -> Vec<Matrix> {
-        let Self { states, extended, actuators, measurements, faults } = self;
+        let Self { states, extended, actuators, measurements, faults, .. } = self;
         let linear = &designed.linear;
         let f_a = designed.extended.plant.f_a.rows(0, states.len()).into_owned();
         let mut matrices = vec![
@@ -158,7 +167,7 @@ impl Names {
 
     fn gains(&self, designed: &ControllerDesign) -> Vec<Matrix> {
         let gains = &designed.gains;
-        let Self { extended, actuators, measurements, faults, .. } = self;
+        let Self { extended, actuators, measurements, faults, references, .. } = self;
         let mut all = vec![
             matrix("K_x", "state feedback", &gains.k_x, actuators, extended),
             matrix("K_f", "fault compensation", &gains.k_f, actuators, faults),
@@ -168,6 +177,24 @@ impl Names {
         if let Some(filter) = &designed.filter {
             let diagonal = DMatrix::from_diagonal(&filter.clone().into());
             all.push(matrix("W", "measurement filter", &diagonal, measurements, measurements));
+        }
+        let Some(tracking) = &designed.tracking else {
+            return all;
+        };
+        let h = matrix("H", "outputs of the references", &tracking.h, references, measurements);
+        all.push(h);
+        if let Some(integral) = &gains.integral {
+            let k_i = &integral.gain;
+            all.push(matrix("K_i", "integral action", k_i, actuators, references));
+        }
+        match &tracking.action {
+            TrackingAction::Feedforward(n_r) => {
+                all.push(matrix("N_r", "feedforward", n_r, actuators, references));
+            }
+            TrackingAction::Integral { windup: Some(l_w), .. } => {
+                all.push(matrix("L_w", "back-calculation", l_w, references, actuators));
+            }
+            TrackingAction::Integral { .. } => {}
         }
         all
     }
@@ -288,7 +315,7 @@ fn effectiveness(designed: &ControllerDesign) -> Result<Vec<Effectiveness>, Erro
     if inputs.is_empty() {
         return Ok(Vec::new());
     }
-    let ControllerDesign { plant, controller, .. } = designed;
+    let DesignLoop { plant, controller } = &designed.whole;
     let found = loss_tolerance(plant, controller, &inputs, 1.0)?;
     let one = |(input, loss): (&usize, &f64)| Effectiveness {
         actuator: designed.linear.actuators[*input].name.clone(),
@@ -306,6 +333,7 @@ fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
             .to_owned(),
         "Bounds and responses start from rest, with the compensation on.".to_owned(),
     ];
+    all.extend(tracking_assumption(designed));
     if faults.iter().any(|fault| fault.dynamics == FaultDynamics::Constant) {
         all.push(
             "The estimate of a fault modelled as constant lags behind it; the rate of the fault \
@@ -328,6 +356,23 @@ fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
         );
     }
     all
+}
+
+/// Says what the set points rely on.
+fn tracking_assumption(designed: &ControllerDesign) -> Option<String> {
+    Some(match &designed.tracking.as_ref()?.action {
+        TrackingAction::Feedforward(_) => {
+            "The references are reached without error only if A, B and C are those of the plant: there is \
+             no integral action."
+                .to_owned()
+        }
+        TrackingAction::Integral { windup_time, .. } => format!(
+            "A constant reference is reached without error for every plant for which the loop is stable. \
+             While a command is at a limit, the integrals follow it with a time constant of {} s; the \
+             responses are those within the limits.",
+            rounded(*windup_time)
+        ),
+    })
 }
 
 /// Returns the variables of the controller FMU.

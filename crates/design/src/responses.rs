@@ -13,9 +13,9 @@ use super::signals::Fault;
 
 /// Relative band of the settling time: a response has settled when it stays within this fraction of
 /// its largest distance.
-const SETTLED: f64 = 0.02;
+pub(crate) const SETTLED: f64 = 0.02;
 /// Points shown within a sample time, besides the samples.
-const BETWEEN: u32 = 4;
+pub(crate) const BETWEEN: u32 = 4;
 
 /// Returns the responses to a change of each fault, as a step and as a ramp at the bound of its rate,
 /// and to steps of all faults together.
@@ -78,11 +78,14 @@ impl<'a> ShownLoop<'a> {
         let mut system = fault_system(plant, gains, *domain)?;
         let (m, order) = (plant.b.ncols(), system.a.nrows());
         let (all, q) = plant.f_a.shape();
-        // u = K_x (x - e) + K_f f_hat.
+        // u = K_x (x - e) + K_f f_hat + K_i x_i.
         let mut commands = DMatrix::zeros(m, order);
         commands.columns_mut(0, all).copy_from(&gains.k_x);
         commands.columns_mut(all, all).copy_from(&-&gains.k_x);
         commands.columns_mut(2 * all, q).copy_from(&gains.k_f);
+        if let Some(integral) = &gains.integral {
+            commands.columns_mut(2 * all + q, gains.integrals()).copy_from(&integral.gain);
+        }
         add_outputs(&mut system, &commands, &DMatrix::zeros(m, q));
         if let Domain::Sampled { period } = *domain {
             let n = designed.extended.states;
@@ -196,7 +199,7 @@ impl<'a> ShownLoop<'a> {
 }
 
 /// Appends outputs to a system.
-fn add_outputs(system: &mut StateSpace, c: &DMatrix<f64>, d: &DMatrix<f64>) {
+pub(crate) fn add_outputs(system: &mut StateSpace, c: &DMatrix<f64>, d: &DMatrix<f64>) {
     let rows = system.c.nrows();
     for (matrix, below) in [(&mut system.c, c), (&mut system.d, d)] {
         let mut all = matrix.clone().resize_vertically(rows + below.nrows(), 0.0);

@@ -1,7 +1,7 @@
 //! Analyses the robustness of a design and judges it.
 
 use control::aso::Gains;
-use control::controller::{controller, fault_estimates};
+use control::controller::{CompleteController, complete_controller};
 use control::hold::zero_order_hold;
 use control::response::{frequency_grid, frequency_response, h_infinity};
 use control::robustness::{
@@ -9,6 +9,7 @@ use control::robustness::{
     disk_margin, longest_hold, longest_period, noise_gains, peak_derivatives,
     regulator_of_same_speed, sampled_delay_margin, scaled_peak, tolerance_test,
 };
+use control::tracking::IntegralAction;
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -39,7 +40,7 @@ pub(crate) fn robustness(
     if designed.instability >= 0.0 {
         return Ok(None);
     }
-    let physical = Physical::of(designed);
+    let physical = Physical::of(designed)?;
     let own = physical.closed(&physical.controller)?;
     let point = |(point, name): (Point, &str)| {
         let signals = match point {
@@ -56,7 +57,7 @@ pub(crate) fn robustness(
             longest_period(&physical.plant, &physical.controller)?,
         ),
     };
-    let (noise, noise_together) = noise(designed, &own, &physical.estimates(designed)?, limits)?;
+    let (noise, noise_together) = noise(designed, &own, &physical.estimates, limits)?;
     let slopes = slopes(&designed.linear, &physical, &points)?;
     let (comparison, tolerance) = rayon::join(
         || comparison(designed, &physical, &points),
@@ -79,15 +80,16 @@ pub(crate) fn robustness(
     }))
 }
 
-/// The plant without filters, and the controller with its filters.
+/// The plant without filters, and the controller with its filters and integrals.
 struct Physical {
     plant: StateSpace,
     controller: StateSpace,
-    filter: Option<Vec<f64>>,
+    /// The controller with the estimated faults as its output.
+    estimates: StateSpace,
 }
 
 impl Physical {
-    fn of(designed: &ControllerDesign) -> Self {
+    fn of(designed: &ControllerDesign) -> Result<Self, Error> {
         let linear = &designed.linear;
         let plant = StateSpace {
             a: linear.a.clone(),
@@ -96,35 +98,15 @@ impl Physical {
             d: DMatrix::zeros(linear.c.nrows(), linear.b.ncols()),
             domain: Domain::Continuous,
         };
-        let mut physical = Self {
-            plant,
-            controller: designed.controller.clone(),
-            filter: designed.filter.clone(),
+        let CompleteController { commands, estimates } = complete(designed, &designed.gains)?;
+        let channels: Vec<_> =
+            designed.extended.channels.iter().map(|channel| channel.estimate).collect();
+        let estimates = StateSpace {
+            c: estimates.c.select_rows(&channels),
+            d: estimates.d.select_rows(&channels),
+            ..estimates
         };
-        physical.controller = physical.filtered(&designed.controller);
-        physical
-    }
-
-    /// Puts the measurement filter before a controller: its states are y_f, then the controller's.
-    fn filtered(&self, own: &StateSpace) -> StateSpace {
-        let Some(filter) = &self.filter else {
-            return own.clone();
-        };
-        let (p, k, m) = (filter.len(), own.a.nrows(), own.c.nrows());
-        let w = DMatrix::from_diagonal(&filter.clone().into());
-        let kept = match own.domain {
-            Domain::Continuous => -&w,
-            Domain::Sampled { .. } => DMatrix::identity(p, p) - &w,
-        };
-        let mut a = DMatrix::zeros(p + k, p + k);
-        a.view_mut((0, 0), (p, p)).copy_from(&kept);
-        a.view_mut((p, 0), (k, p)).copy_from(&own.b);
-        a.view_mut((p, p), (k, k)).copy_from(&own.a);
-        let mut c = DMatrix::zeros(m, p + k);
-        c.columns_mut(0, p).copy_from(&own.d);
-        c.columns_mut(p, k).copy_from(&own.c);
-        let (b, d) = (w.resize_vertically(p + k, 0.0), DMatrix::zeros(m, p));
-        StateSpace { a, b, c, d, domain: own.domain }
+        Ok(Self { plant, controller: commands, estimates })
     }
 
     fn closed(&self, controller: &StateSpace) -> Result<Loop, Error> {
@@ -135,15 +117,12 @@ impl Physical {
         }
         Loop::new(plant, controller.clone())
     }
+}
 
-    /// The controller with the estimated faults as its output.
-    fn estimates(&self, designed: &ControllerDesign) -> Result<StateSpace, Error> {
-        let ControllerDesign { plant, gains, domain, extended, .. } = designed;
-        let own = fault_estimates(plant, gains, *domain)?;
-        let channels: Vec<_> = extended.channels.iter().map(|channel| channel.estimate).collect();
-        let (c, d) = (own.c.select_rows(&channels), own.d.select_rows(&channels));
-        Ok(self.filtered(&StateSpace { c, d, ..own }))
-    }
+/// The controller with `gains`, its filter and its integrals.
+fn complete(designed: &ControllerDesign, gains: &Gains) -> Result<CompleteController, Error> {
+    let filter = designed.filter.as_deref();
+    complete_controller(&designed.plant, gains, filter, designed.domain)
 }
 
 fn point(own: &Loop, at: Point, name: &str, signals: &[Signal]) -> Result<LoopPoint, Error> {
@@ -294,9 +273,8 @@ fn comparison(
 ) -> Result<Vec<Compared>, Error> {
     let ControllerDesign { plant, gains, domain, extended, .. } = designed;
     let n = extended.states;
-    let (a, b) = (plant.a.view((0, 0), (n, n)).into(), plant.b.rows(0, n).into());
-    let k = gains.k_x.columns(0, n).into_owned();
-    let feedback = regulator_of_same_speed(&a, &b, &k, *domain)?;
+    let ((a, b), k) = (&designed.feedback_pair, &designed.feedback.gain);
+    let feedback = regulator_of_same_speed(a, b, k, *domain)?;
     let a_0 = plant.augmented_dynamics();
     let seen = gains.estimator.output_matrix(&a_0, &plant.augmented_output());
     let l = gains.observer_gain();
@@ -305,8 +283,11 @@ fn comparison(
     let observer = observer.map(|gain| -gain.transpose());
     let mut found = vec![
         Compared {
-            name: "norm of K_x".to_owned(),
-            design: norm(&k),
+            name: match gains.integral {
+                None => "norm of K_x".to_owned(),
+                Some(_) => "norm of [K_x, K_i]".to_owned(),
+            },
+            design: norm(k),
             linear_quadratic: feedback.as_ref().map(norm),
         },
         Compared {
@@ -319,12 +300,16 @@ fn comparison(
         (Some(feedback), Some(observer)) => {
             let all = plant.a.nrows();
             let other = Gains {
-                k_x: feedback.resize_horizontally(all, 0.0),
+                k_x: feedback.columns(0, n).into_owned().resize_horizontally(all, 0.0),
+                integral: gains.integral.clone().map(|own| IntegralAction {
+                    gain: feedback.columns(n, own.gain.ncols()).into(),
+                    ..own
+                }),
                 l_x: observer.rows(0, all).into(),
                 l_f: -observer.rows(all, plant.f_a.ncols()),
                 ..gains.clone()
             };
-            Some(physical.closed(&physical.filtered(&controller(plant, &other, *domain)?))?)
+            Some(physical.closed(&complete(designed, &other)?.commands)?)
         }
         _ => None,
     };

@@ -131,7 +131,7 @@ fn signal(entry: &Entry<'_>, limited: bool) -> Result<Signal, PlaceError> {
     })
 }
 
-fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
+pub(crate) fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
     match entry.text()? {
         "" => Err(entry.error("expected a name, found an empty text")),
         name => match name.chars().find(|sign| sign.is_control() || !is_character(*sign)) {
@@ -158,7 +158,7 @@ pub(crate) fn description(table: &Table<'_>) -> Result<String, PlaceError> {
     }
 }
 
-fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
+pub(crate) fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
     let Some(entry) = table.get("unit") else {
         return Ok(None);
     };

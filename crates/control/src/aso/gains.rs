@@ -1,6 +1,7 @@
 //! The gains of the controller.
 
 use super::FaultyPlant;
+use crate::tracking::IntegralAction;
 use crate::{Error, check};
 use nalgebra::DMatrix;
 
@@ -40,6 +41,8 @@ pub struct Gains {
     pub l_f: DMatrix<f64>,
     /// `P_f`, q x p; none without a direct term.
     pub p_f: Option<DMatrix<f64>>,
+    /// The integral action for references; None without.
+    pub integral: Option<IntegralAction>,
 }
 
 impl Estimator {
@@ -99,7 +102,15 @@ impl Gains {
         check::shape("K_f", &self.k_f, (m, q))?;
         check::shape("L_x", &self.l_x, (n, p))?;
         check::shape("L_f", &self.l_f, (q, p))?;
-        self.p_f.as_ref().map_or(Ok(()), |p_f| check::shape("P_f", p_f, (q, p)))
+        self.p_f.as_ref().map_or(Ok(()), |p_f| check::shape("P_f", p_f, (q, p)))?;
+        let Some(IntegralAction { h, output, faults, gain }) = &self.integral else {
+            return Ok(());
+        };
+        let t = gain.ncols();
+        check::shape("K_i", gain, (m, t))?;
+        check::shape("H", h, (t, p))?;
+        check::shape("H C", output, (t, n))?;
+        check::shape("H F_s", faults, (t, q))
     }
 
     /// `P_f` C, q x n: how the direct term reads the error e = x - `x_hat`.

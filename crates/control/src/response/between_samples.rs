@@ -60,8 +60,9 @@ pub fn gains_between_samples(
     gains.check(plant)?;
     check::positive("parts", f64::from(parts))?;
     check::positive("width", width)?;
-    let a = loop_dynamics(plant, gains);
-    stability::require_stable("A", &a, Domain::Sampled { period })?;
+    let domain = Domain::Sampled { period };
+    let a = loop_dynamics(plant, gains, domain);
+    stability::require_stable("A", &a, domain)?;
     let lifted = Lifted::new(extended, plant, gains, (period, parts))?;
     let sums = |inputs: &Effects| lifted.sums(&a, inputs, width);
     Ok(GainsBetweenSamples {
@@ -77,6 +78,8 @@ struct Lifted<'a> {
     gains: &'a Gains,
     /// Number of states of the plant without filter.
     states: usize,
+    /// T in s.
+    period: f64,
     /// h in s.
     part: f64,
     /// e^(A i h), i from 0 to N.
@@ -119,7 +122,7 @@ impl<'a> Lifted<'a> {
             gamma.push(&step * &gamma[i] + &held);
             phi.push(&step * &phi[i]);
         }
-        Ok(Self { plant, gains, states: n, part, phi, gamma, entry })
+        Ok(Self { plant, gains, states: n, period, part, phi, gamma, entry })
     }
 
     fn parts(&self) -> usize {
@@ -187,11 +190,12 @@ impl<'a> Lifted<'a> {
         }
     }
 
-    /// The rows of [x; e; `f_hat` or eps] from which x at the start of part i follows.
+    /// The rows of [x; e; `f_hat` or eps; `x_i`] from which x at the start of part i follows.
     fn output(&self, i: usize) -> DMatrix<f64> {
         let (n, q) = self.plant.f_a.shape();
-        let Gains { k_x, k_f, .. } = self.gains;
-        let mut rows = DMatrix::zeros(self.states, 2 * n + q);
+        let Gains { k_x, k_f, integral, .. } = self.gains;
+        let t = self.gains.integrals();
+        let mut rows = DMatrix::zeros(self.states, 2 * n + q + t);
         let own = self.states;
         rows.view_mut((0, 0), (own, own)).copy_from(&self.phi[i]);
         let command = &self.gamma[i] * k_x;
@@ -203,6 +207,9 @@ impl<'a> Lifted<'a> {
             of_error += &self.gamma[i] * k_f * direct;
         }
         rows.view_mut((0, 2 * n), (own, q)).copy_from(&(&self.gamma[i] * k_f));
+        if let Some(integral) = integral {
+            rows.columns_mut(2 * n + q, t).copy_from(&(&self.gamma[i] * &integral.gain));
+        }
         rows
     }
 
@@ -215,26 +222,32 @@ impl<'a> Lifted<'a> {
         if self.gains.estimator == Estimator::Current {
             seen -= self.gains.observer_gain() * &self.plant.c * states_after;
         }
-        let mut column = DMatrix::zeros(2 * n + q, q);
+        let t = self.gains.integrals();
+        let mut column = DMatrix::zeros(2 * n + q + t, q);
         column.view_mut((0, 0), (n, q)).copy_from(states_after);
         column.view_mut((n, 0), (n + q, q)).copy_from(&seen);
+        if let Some(integral) = &self.gains.integral {
+            let sensed = &integral.faults * (self.period * inputs.present_error[j]);
+            column.rows_mut(2 * n + q, t).copy_from(&sensed);
+        }
         column
     }
 
     /// The sum of |h| over all parts and samples; of x the largest over the parts of an interval.
     fn sums(&self, a: &DMatrix<f64>, inputs: &Effects, width: f64) -> Result<DMatrix<f64>, Error> {
         let (n, q) = self.plant.f_a.shape();
-        let (own, order, count) = (self.states, 2 * n + q, inputs.states_after.len());
+        let (own, rows, count) = (self.states, 2 * n + q, inputs.states_after.len());
+        let order = a.nrows();
         let reads = inputs.outputs.len();
         // All columns at once, and all rows: x at the start of each part, then [x; e; eps].
         let mut b = DMatrix::zeros(order, count * q);
-        let mut c = DMatrix::zeros(reads * own + order, order);
-        let mut sums = DMatrix::zeros(reads * own + order, q);
+        let mut c = DMatrix::zeros(reads * own + rows, order);
+        let mut sums = DMatrix::zeros(reads * own + rows, q);
         for j in 0..count {
             b.columns_mut(j * q, q).copy_from(&self.input(inputs, j));
             for (i, effects) in inputs.outputs.iter().enumerate() {
-                let mut rows = sums.rows_mut(i * own, own);
-                rows += effects[j].abs();
+                let mut at_part = sums.rows_mut(i * own, own);
+                at_part += effects[j].abs();
             }
             let present = inputs.present_error[j].abs();
             for fault in 0..q {
@@ -244,12 +257,12 @@ impl<'a> Lifted<'a> {
         for i in 0..reads {
             c.rows_mut(i * own, own).copy_from(&self.output(i));
         }
-        c.rows_mut(reads * own, order).copy_from(&outputs(self.plant, self.gains));
+        c.rows_mut(reads * own, rows).copy_from(&outputs(self.plant, self.gains));
         add_impulses(a, &b, &c, (&mut sums, width))?;
-        let mut found = sums.rows(reads * own, order).into_owned();
+        let mut found = sums.rows(reads * own, rows).into_owned();
         for i in 0..reads {
-            let rows = found.rows(0, own).sup(&sums.rows(i * own, own));
-            found.rows_mut(0, own).copy_from(&rows);
+            let largest = found.rows(0, own).sup(&sums.rows(i * own, own));
+            found.rows_mut(0, own).copy_from(&largest);
         }
         Ok(found)
     }

@@ -2,6 +2,7 @@
 
 use super::peak_gain;
 use crate::aso::{Estimator, FaultyPlant, Gains};
+use crate::tracking::{IntegralAction, integration};
 use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
@@ -13,7 +14,9 @@ use nalgebra::DMatrix;
 /// z = [x; e; f_hat - f]
 /// ```
 ///
-/// e = x - `x_hat`, eps = `f_hat` - f; state [x; e; `f_hat`], 2 n + q; in sampled time the left
+/// e = x - `x_hat`, eps = `f_hat` - f; state [x; e; `f_hat`], 2 n + q; with integral action B `K_i` `x_i` is
+/// added to the first line, and the state has the t integrals of [`crate::tracking`], `x_i`' = -H C x + H
+/// `F_s` eps, at its end. In sampled time the left
 /// sides are the values at the next sample. With a current estimator the matrix of the second line
 /// is `A_0` - L `C_0` `A_0`, f enters by (I - L `C_0`) [`F_a`; 0], and the estimates are the
 /// corrected ones. The commands are within the limits of the actuators. The fault f may be any
@@ -32,16 +35,22 @@ pub fn fault_system(
 ) -> Result<StateSpace, Error> {
     gains.check(plant)?;
     let (n, q) = plant.f_a.shape();
-    let mut b = DMatrix::zeros(2 * n + q, q);
+    let order = 2 * n + q + gains.integrals();
+    let mut b = DMatrix::zeros(order, q);
     b.view_mut((0, 0), (n, q)).copy_from(&plant.f_a);
     let mut seen = plant.f_a.clone().resize_vertically(n + q, 0.0);
     if gains.estimator == Estimator::Current {
         seen -= gains.observer_gain() * &plant.c * &plant.f_a;
     }
     b.view_mut((n, 0), (n + q, q)).copy_from(&seen);
+    if let Some(integral) = &gains.integral {
+        b.rows_mut(2 * n + q, gains.integrals())
+            .copy_from(&(&integral.faults * -integration(domain).0));
+    }
     let mut d = DMatrix::zeros(2 * n + q, q);
     d.view_mut((2 * n, 0), (q, q)).copy_from(&-DMatrix::identity(q, q));
-    Ok(StateSpace { a: loop_dynamics(plant, gains), b, c: outputs(plant, gains), d, domain })
+    let c = outputs(plant, gains);
+    Ok(StateSpace { a: loop_dynamics(plant, gains, domain), b, c, d, domain })
 }
 
 /// The closed loop as a system from [r; f] to [x; e; eps], with r = f' - `A_f` f the part of the
@@ -67,12 +76,12 @@ pub fn fault_rate_system(
 ) -> Result<StateSpace, Error> {
     gains.check(plant)?;
     let (n, q) = plant.f_a.shape();
-    let order = 2 * n + q;
+    let order = 2 * n + q + gains.integrals();
     let mut b = DMatrix::zeros(order, 2 * q);
     b.view_mut((2 * n, 0), (q, q)).copy_from(&-DMatrix::identity(q, q));
     b.view_mut((0, q), (n, q)).copy_from(&(&plant.f_a + &plant.b * &gains.k_f));
-    let d = DMatrix::zeros(order, 2 * q);
-    Ok(StateSpace { a: loop_dynamics(plant, gains), b, c: outputs(plant, gains), d, domain })
+    let (c, d) = (outputs(plant, gains), DMatrix::zeros(2 * n + q, 2 * q));
+    Ok(StateSpace { a: loop_dynamics(plant, gains, domain), b, c, d, domain })
 }
 
 /// Computes upper bounds of the peak gains to [x; e; eps]: from faults, from their rates, and from
@@ -109,10 +118,10 @@ pub fn fault_gains(
     Ok([0, 1, 2].map(|part| found.columns(part * q, q).into_owned()))
 }
 
-/// [x; e; eps] of the state of both systems: the identity without a direct term.
+/// [x; e; eps] of the state of both systems: the identity without a direct term and integrals.
 pub(super) fn outputs(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
     let (n, q) = plant.f_a.shape();
-    let mut c = DMatrix::identity(2 * n + q, 2 * n + q);
+    let mut c = DMatrix::identity(2 * n + q, 2 * n + q + gains.integrals());
     if let Some(direct) = gains.direct(plant) {
         c.view_mut((2 * n, n), (q, n)).copy_from(&direct);
     }
@@ -120,17 +129,30 @@ pub(super) fn outputs(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
 }
 
 /// The state matrix of both systems: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0, `A_0` - L `C_0`]; with a direct
-/// term -B `K_x` + B `K_f` `P_f` C in place of -B `K_x`.
-pub(super) fn loop_dynamics(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
+/// term -B `K_x` + B `K_f` `P_f` C in place of -B `K_x`; with integral action the rows and columns of `x_i`
+/// follow.
+pub(super) fn loop_dynamics(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> DMatrix<f64> {
     let (n, q) = plant.f_a.shape();
-    let mut a = DMatrix::zeros(2 * n + q, 2 * n + q);
+    let (first, t) = (2 * n + q, gains.integrals());
+    let mut a = DMatrix::zeros(first + t, first + t);
     a.view_mut((0, 0), (n, n)).copy_from(&gains.controlled_dynamics(plant));
     a.view_mut((0, n), (n, n)).copy_from(&-(&plant.b * &gains.k_x));
     a.view_mut((0, 2 * n), (n, q)).copy_from(&(&plant.b * &gains.k_f));
     a.view_mut((n, n), (n + q, n + q)).copy_from(&gains.error_dynamics(plant));
-    if let Some(direct) = gains.direct(plant) {
+    let direct = gains.direct(plant);
+    if let Some(direct) = &direct {
         let mut of_error = a.view_mut((0, n), (n, n));
         of_error += &plant.b * &gains.k_f * direct;
+    }
+    if let Some(IntegralAction { output, faults, gain, .. }) = &gains.integral {
+        let (step, kept) = integration(domain);
+        a.view_mut((0, first), (n, t)).copy_from(&(&plant.b * gain));
+        a.view_mut((first, 0), (t, n)).copy_from(&(output * -step));
+        a.view_mut((first, 2 * n), (t, q)).copy_from(&(faults * step));
+        a.view_mut((first, first), (t, t)).fill_diagonal(kept);
+        if let Some(direct) = &direct {
+            a.view_mut((first, n), (t, n)).copy_from(&(faults * direct * step));
+        }
     }
     a
 }

@@ -226,6 +226,7 @@ fn the_loss_that_a_loop_survives_is_that_of_scipy() {
         l_x: reference("loss_l_x"),
         l_f: reference("loss_l_f"),
         p_f: None,
+        integral: None,
     };
     let controller = controller(&plant, &gains, Domain::Continuous).unwrap();
     let found = loss_tolerance(&plant, &controller, &[0, 1], 1.0).unwrap();
@@ -257,6 +258,7 @@ fn the_loss_that_a_sampled_loop_survives_is_that_of_scipy() {
         l_x: of("m_x"),
         l_f: of("m_f"),
         p_f: None,
+        integral: None,
     };
     let controller = controller(&plant, &gains, Domain::Sampled { period: 0.1 }).unwrap();
     let found = loss_tolerance(&plant, &controller, &[0, 1], 1.0).unwrap();

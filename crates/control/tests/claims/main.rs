@@ -29,6 +29,7 @@ mod riccati;
 mod robustness;
 mod sampled;
 mod theorem1;
+mod tracking;
 mod zeros;
 
 use nalgebra::DMatrix;

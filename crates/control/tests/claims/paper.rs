@@ -46,6 +46,7 @@ pub(crate) fn repaired_gains() -> Gains {
         l_x: matrix(4, 2, &l_x),
         l_f: matrix(1, 2, &[-3343.2, 894.1]),
         p_f: None,
+        integral: None,
     }
 }
 

@@ -50,6 +50,7 @@ fn a_plant_of_one_state_gives_the_region_found_by_hand() {
         l_x: one(6.0),
         l_f: one(-3.0),
         p_f: None,
+        integral: None,
     };
     let (a, k, b, beta) = (5.0, 2.0, 3.0, 4.0);
     let p_12 = -1.0 / (2.0 * k);

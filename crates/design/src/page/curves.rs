@@ -126,21 +126,7 @@ fn response(id: &str, response: &StepResponse) -> Markup {
             }
         }
     };
-    let rows: Vec<Vec<Cell>> = response
-        .curves
-        .iter()
-        .map(|curve| {
-            vec![
-                curve.name.as_str().into(),
-                (&curve.unit).into(),
-                curve.peak.into(),
-                curve.peak_time.into(),
-                curve.settling_time.into(),
-            ]
-        })
-        .collect();
     let caption = format!("Peaks and settling after a change of {}", response.fault);
-    let heads = ["signal", "unit", "largest magnitude", "at time (s)", "settled after (s)"];
     let mut entries = vec![(line_sample("mark"), "settled, within 2 %".to_owned())];
     let sized = |curve: &Curve| response.parts.len() == 1 && curve.unit == response.unit;
     if response.curves.iter().any(sized) {
@@ -150,17 +136,35 @@ fn response(id: &str, response: &StepResponse) -> Markup {
         h3 id=(id) { (title) }
         div.figures.small {
             @for (index, curve) in response.curves.iter().enumerate() {
-                (self::curve(&format!("{id}-{}", index + 1), curve, response))
+                @let after = format!("a change of {}", response.fault);
+                (self::curve(&format!("{id}-{}", index + 1), curve, &after, sized(curve).then_some(response.size)))
             }
         }
         (legend(&entries))
-        (table(&caption, &heads, &rows))
+        (peaks(&caption, &response.curves))
     }
 }
 
-fn curve(id: &str, curve: &Curve, response: &StepResponse) -> Markup {
+/// Shows peak and settling time of each curve in a table.
+pub(super) fn peaks(caption: &str, curves: &[Curve]) -> Markup {
+    let row = |curve: &Curve| {
+        vec![
+            curve.name.as_str().into(),
+            (&curve.unit).into(),
+            curve.peak.into(),
+            curve.peak_time.into(),
+            curve.settling_time.into(),
+        ]
+    };
+    let rows: Vec<Vec<Cell>> = curves.iter().map(row).collect();
+    let heads = ["signal", "unit", "largest magnitude", "at time (s)", "settled after (s)"];
+    table(caption, &heads, &rows)
+}
+
+/// Shows a curve; `after`: what changed; `size`: the size of that change in the unit of the curve.
+pub(super) fn curve(id: &str, curve: &Curve, after: &str, size: Option<f64>) -> Markup {
     let unit = curve.unit.as_deref().unwrap_or_default();
-    let title = format!("{} after a change of {}", curve.name, response.fault);
+    let title = format!("{} after {after}", curve.name);
     let description = format!(
         "Largest magnitude {} {unit} at {} s, settled after {} s.",
         rounded(curve.peak),
@@ -186,7 +190,7 @@ fn curve(id: &str, curve: &Curve, response: &StepResponse) -> Markup {
             }
             (chart.draw(&html! {
                 (chart.level(0.0, "zero"))
-                @if response.parts.len() == 1 && curve.unit == response.unit { (chart.level(response.size, "size")) }
+                @if let Some(size) = size { (chart.level(size, "size")) }
                 (chart.upright(curve.settling_time, "mark"))
                 (chart.curve(&curve.times, &curve.values, "line-1"))
             }))

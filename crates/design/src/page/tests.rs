@@ -153,12 +153,13 @@ fn only_sections_with_content_appear_in_reading_order() {
             "5. Condition and pole errors",
             "6. Robustness",
             "7. Singular values",
-            "8. Sudden faults",
-            "9. Bounds of the errors",
-            "10. Certificate",
-            "11. Assumptions",
-            "12. Loss of effectiveness",
-            "13. Interface of the FMU",
+            "8. References",
+            "9. Sudden faults",
+            "10. Bounds of the errors",
+            "11. Certificate",
+            "12. Assumptions",
+            "13. Loss of effectiveness",
+            "14. Interface of the FMU",
         ]
     );
     assert_eq!(

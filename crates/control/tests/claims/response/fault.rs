@@ -36,7 +36,11 @@ fn paper() -> (FaultyPlant, Gains, Case) {
     let get = |name| case.get(name).clone();
     let plant = FaultyPlant::with_constant_faults(get("A"), get("B"), get("C"), get("F_a"));
     let (k_x, k_f, l_x, l_f) = (get("K_x"), get("K_f"), get("L_x"), get("L_f"));
-    (plant, Gains { estimator: Estimator::Prediction, k_x, k_f, l_x, l_f, p_f: None }, case)
+    (
+        plant,
+        Gains { estimator: Estimator::Prediction, k_x, k_f, l_x, l_f, p_f: None, integral: None },
+        case,
+    )
 }
 
 #[test]
@@ -160,6 +164,7 @@ fn a_fast_sampled_loop_tends_to_the_continuous_one() {
         l_x: DMatrix::from_element(1, 1, l_x),
         l_f: DMatrix::from_element(1, 1, l_f),
         p_f: None,
+        integral: None,
     };
     let slow = reversal(&plant(0.5, 1.0), &gains(10.0, -20.0), CONTINUOUS, 0, 2.0, None, 0.05);
     let slow = slow.unwrap();

@@ -28,7 +28,10 @@ fn values(report: &Report) -> Vec<Value> {
         curve["frequencies"].take();
         curve["singular_values"].take();
     }
-    for response in all["steps"].as_array_mut().unwrap() {
+    let [steps, references] = ["steps", "references"].map(|key| all[key].take());
+    let responses = [steps, references].map(|list| list.as_array().unwrap().clone()).concat();
+    all["responses"] = responses.into();
+    for response in all["responses"].as_array_mut().unwrap() {
         for curve in response["curves"].as_array_mut().unwrap() {
             curve["times"].take();
             curve["values"].take();

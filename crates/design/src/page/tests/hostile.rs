@@ -3,8 +3,9 @@
 use std::f64::consts::PI;
 
 use crate::report::{
-    Bound, Certificate, Check, Curve, Effectiveness, FreeP, Frequency, Loop, Matrix, Norm, Plant,
-    Region, Report, Sampled, Signal, StepResponse, Theorem1, Ultimate, Variable,
+    Bound, Certificate, Check, CommandPeak, Curve, Effectiveness, FreeP, Frequency, Loop, Matrix,
+    Norm, Plant, ReferenceStep, Region, Report, Sampled, Signal, StepResponse, Theorem1, Ultimate,
+    Variable,
 };
 
 use crate::robust_report::{
@@ -294,6 +295,7 @@ pub(super) fn hostile() -> Report {
             })
             .collect(),
         frequency: vec![frequency(3), frequency(1)],
+        references: references(),
         effectiveness: vec![Effectiveness {
             actuator: QUOTES.to_owned(),
             largest_stable_loss: 0.625_125,
@@ -301,6 +303,30 @@ pub(super) fn hostile() -> Report {
         assumptions: vec![format!("linear {MARKUP}"), "bell \u{7} and nul \0".to_owned()],
         interface: interface(),
     }
+}
+
+/// A step of a reference whose names are markup.
+fn references() -> Vec<ReferenceStep> {
+    vec![ReferenceStep {
+        reference: MARKUP.to_owned(),
+        unit: Some(QUOTES.to_owned()),
+        size: -0.25,
+        stated: true,
+        rise_time: None,
+        overshoot: 0.125,
+        settling_time: 3.5,
+        steady_state_error: 1e-17,
+        commands: vec![CommandPeak {
+            name: QUOTES.to_owned(),
+            unit: None,
+            range: [-1.5, 0.75],
+            limits: Some([-1.0, 1.0]),
+            final_value: 0.5,
+        }],
+        others: vec![Number { name: MARKUP.to_owned(), unit: None, value: 0.0625 }],
+        largest_step: [f64::NEG_INFINITY, 2.5],
+        curves: (1..=2).map(curve).collect(),
+    }]
 }
 
 /// A scalar plant of which next to nothing is known.
@@ -347,6 +373,7 @@ pub(super) fn bare() -> Report {
         },
         bounds: Vec::new(),
         steps: Vec::new(),
+        references: Vec::new(),
         frequency: Vec::new(),
         effectiveness: Vec::new(),
         assumptions: Vec::new(),

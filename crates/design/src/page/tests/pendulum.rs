@@ -59,6 +59,7 @@ impl Design {
                 l_x: matrix("L_x"),
                 l_f: matrix("L_f"),
                 p_f: None,
+                integral: None,
             },
         }
     }
@@ -291,6 +292,7 @@ pub(super) fn pendulum() -> Report {
             bound("f_fric", "N", 2.31, 2.6e-3),
         ],
         steps: vec![design.step(60.0)],
+        references: Vec::new(),
         frequency: design.frequencies(),
         effectiveness: Vec::new(),
         assumptions: vec![

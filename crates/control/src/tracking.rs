@@ -1,0 +1,324 @@
+//! Set points: integral action and feedforward for references of the measurements.
+//!
+//! t references r are set points of H y, with y = C x the measurements of x' = A x + B u. Either the
+//! distance from them is integrated, and the integral fed back,
+//!
+//! ```text
+//! x_i' = r - H (y - F_s f_hat),   u = K_x x_hat + K_f f_hat + K_i x_i
+//! x_i[k+1] = x_i[k] + T (r[k] - H (y[k] - F_s f_hat))      sampled, f_hat the estimate that u[k] uses
+//! ```
+//!
+//! or the references act on the commands by a constant gain, u = `K_x` `x_hat` + `K_f` `f_hat` + `N_r` r.
+//! `F_s` f is the effect of sensor faults on y. The integral makes H y equal to a constant r for every
+//! plant for which the loop is stable; the feedforward only if A, B, C are right.
+//!
+//! K = [`K_x`, `K_i`] is the gain of the plant [x; `x_i`] of [`extended_pair`]. The estimation errors do not
+//! depend on r, `x_i` or K, so that the loop has the eigenvalues of the extended plant under K and those of
+//! the observer: x' contains `K_i` `x_i`, but the errors obey the equations of [`crate::aso`], and `x_i'`
+//! = r - H C x + H `F_s` eps.
+//!
+//! Source: E. J. Davison and H. W. Smith, Pole assignment in linear time-invariant multivariable systems
+//! with constant disturbances, Automatica 7 (1971); G. F. Franklin, J. D. Powell and M. Workman, Digital
+//! control of dynamic systems, 3rd edition (1998), sections 8.5 and 9.3 for the sampled form.
+
+use crate::aso::Gains;
+use crate::blocks::{block_2x2, stacked};
+use crate::svd::Svd;
+use crate::{Domain, Error, StateSpace, check};
+use nalgebra::DMatrix;
+
+/// Singular values below this, relative to the largest, count as zero; rows and columns have length one.
+const TOLERANCE: f64 = 1e-12;
+/// Sweeps that scale rows and columns to length one.
+const SWEEPS: usize = 4;
+
+/// Integral action of a controller.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IntegralAction {
+    /// H, t x p.
+    pub h: DMatrix<f64>,
+    /// H C, t x n, from the states of the observer's model to H y; zero for the states of a measurement
+    /// filter, before which y is taken.
+    pub output: DMatrix<f64>,
+    /// H `F_s`, t x q: the effect of the faults on H y.
+    pub faults: DMatrix<f64>,
+    /// `K_i`, m x t.
+    pub gain: DMatrix<f64>,
+}
+
+/// Rank of the plant at constant signals.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct TrackingRank {
+    /// Rank of [A, B; H C, 0].
+    pub rank: usize,
+    /// Number of its rows, n + t: a constant H y of any value is possible when `rank` equals it.
+    pub expected: usize,
+    /// Rank of H C.
+    pub outputs: usize,
+}
+
+impl TrackingRank {
+    /// Whether every constant reference can be reached.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        self.rank == self.expected
+    }
+}
+
+/// Rank of [A, B; H C, 0]: whether a plant can hold H y at every constant value.
+///
+/// `a`: n x n; `b`: n x m; `output`: H C, t x n, all in continuous time. The rank is n + t if and only if for
+/// each r there are x and u with A x + B u = 0 and H C x = r. This needs at least as many commands as
+/// references, independent references, and no invariant zero at s = 0. With (A, B) stabilisable it is the
+/// condition for the pair of [`extended_pair`] to be stabilisable: its modes at s = 0 are those of the
+/// integrals. For a sampled plant the condition is the same unless the sample time hides a mode, as [A
+/// (T) - I, B(T)] is an invertible matrix times [A, B].
+///
+/// Rows and columns are scaled to length one; singular values below 1e-12 of the largest count as zero.
+///
+/// Source: E. J. Davison and H. W. Smith (1971), theorem 1.
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::NotConverged`].
+pub fn tracking_rank(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    output: &DMatrix<f64>,
+) -> Result<TrackingRank, Error> {
+    let n = check::square("A", a)?;
+    check::shape("B", b, (n, b.ncols()))?;
+    check::shape("H C", output, (output.nrows(), n))?;
+    let (t, m) = (output.nrows(), b.ncols());
+    let whole = block_2x2([a, b], [output, &DMatrix::zeros(t, m)]);
+    let rank = |matrix: &DMatrix<f64>| Ok::<_, Error>(Svd::new(&scaled(matrix))?.rank(TOLERANCE));
+    let outputs = if output.amax() > 0.0 { rank(&output.transpose())? } else { 0 };
+    Ok(TrackingRank { rank: rank(&whole.transpose())?, expected: n + t, outputs })
+}
+
+/// Scales rows and columns to about length one.
+fn scaled(m: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut m = m.clone();
+    for _ in 0..SWEEPS {
+        let unit = |length: f64| if length > 0.0 { 1.0 / length } else { 1.0 };
+        m.row_iter_mut().for_each(|mut row| row *= unit(row.norm()));
+        m.column_iter_mut().for_each(|mut column| column *= unit(column.norm()));
+    }
+    m
+}
+
+/// The plant [x; `x_i`] without the references: the pair that K = [`K_x`, `K_i`] is designed for.
+///
+/// ```text
+/// A_e = [A, 0; -H C, 0],   B_e = [B; 0]                  continuous
+/// A_e = [A, 0; -T H C, I], B_e = [B; 0]                  sampled, A and B the sampled matrices
+/// ```
+///
+/// `a`: n x n; `b`: n x m; `output`: H C, t x n, in `domain`.
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix.
+pub fn extended_pair(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    output: &DMatrix<f64>,
+    domain: Domain,
+) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
+    let n = check::square("A", a)?;
+    check::shape("B", b, (n, b.ncols()))?;
+    check::shape("H C", output, (output.nrows(), n))?;
+    let t = output.nrows();
+    let (step, kept) = integration(domain);
+    let kept = DMatrix::identity(t, t) * kept;
+    Ok((
+        block_2x2([a, &DMatrix::zeros(n, t)], [&(output * -step), &kept]),
+        b.clone().resize_vertically(n + t, 0.0),
+    ))
+}
+
+/// The factors of the integrand and of the last value in the equation of an integral: 1 and 0, or T and 1.
+pub(crate) fn integration(domain: Domain) -> (f64, f64) {
+    match domain {
+        Domain::Continuous => (1.0, 0.0),
+        Domain::Sampled { period } => (period, 1.0),
+    }
+}
+
+/// The feedforward `N_r`, m x t, for which H y follows a constant r without error.
+///
+/// ```text
+/// N_r = G^+,   G = H C (s I - A - B K_x)^-1 B   at s = 0, or z = 1 in place of s
+/// ```
+///
+/// `a`, `b`, `output`: as in [`extended_pair`]; `k_x`: m x n, such that A + B `K_x` is stable. G^+ is the
+/// pseudoinverse: of several `N_r` (more commands than references) the one of least norm in the given
+/// units. It exists when [`tracking_rank`] is full. One step of iterative refinement follows.
+///
+/// # Errors
+///
+/// Same as [`extended_pair`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for an unstable A + B `K_x`;
+/// [`Error::ResidualTooLarge`] when G `N_r` differs from I by more than 1e-9.
+pub fn feedforward(
+    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    output: &DMatrix<f64>,
+    k_x: &DMatrix<f64>,
+    domain: Domain,
+) -> Result<DMatrix<f64>, Error> {
+    let n = check::square("A", a)?;
+    check::shape("B", b, (n, b.ncols()))?;
+    check::shape("H C", output, (output.nrows(), n))?;
+    check::shape("K_x", k_x, (b.ncols(), n))?;
+    let (t, m) = (output.nrows(), b.ncols());
+    let own = StateSpace {
+        a: a + b * k_x,
+        b: b.clone(),
+        c: output.clone(),
+        d: DMatrix::zeros(t, m),
+        domain,
+    };
+    crate::stability::require_stable("A + B K_x", &own.a, domain)?;
+    let constant = own.dc_matrix().lu();
+    let gain = |input: &DMatrix<f64>| {
+        let states = constant.solve(&(b * input));
+        states.map(|states| output * states).ok_or(Error::Overflow { what: "the gain at s = 0" })
+    };
+    let whole = gain(&DMatrix::identity(m, m))?;
+    let inverse = Svd::new(&whole.transpose())?;
+    let rank = inverse.rank(TOLERANCE);
+    // (G')^+ = (G^+)'.
+    let solve = |r: &DMatrix<f64>| {
+        let left = inverse.left.columns(0, rank);
+        left * inverse.whitening(rank).transpose() * r
+    };
+    let identity = DMatrix::identity(t, t);
+    let first = solve(&identity);
+    let found = &first + solve(&(&identity - gain(&first)?));
+    let residual = (gain(&found)? - identity).amax();
+    if residual.is_nan() || residual > 1e-9 {
+        let (equation, allowed) = ("G N_r = I", 1e-9);
+        return Err(Error::ResidualTooLarge { equation, residual, allowed });
+    }
+    Ok(found)
+}
+
+/// The gain `L_w`, t x m, of the back-calculation that keeps integrals from winding up.
+///
+/// ```text
+/// x_i' = r - H y + L_w (u - v),   L_w = rate K_i^+
+/// x_i[k+1] = x_i[k] + T (r - H y) + L_w (u - v),   L_w = (1 - e^(-rate T)) K_i^+
+/// ```
+///
+/// v is the command before the limits, u the one within them. `k_i`: `K_i`, m x t; `ranges`: for each
+/// command the width of its limits, None if it has none; `rate`: above zero, in 1/s. While the commands are
+/// at their limits, the part of `x_i` that acts on them follows the value for which v = u best fits, with the
+/// rate: -`L_w` S `K_i`, S with ones for the commands at a limit, has eigenvalues between -rate and 0. Only
+/// rows of `K_i` of commands with limits count, in units of their ranges; the columns of the others are zero.
+/// Without a command at a limit u = v, and the term is zero.
+///
+/// Source: K. J. Åström and L. Rundqwist, Integrator windup and how to avoid it, American Control Conference
+/// (1989); it is one of the schemes of M. V. Kothare, P. J. Campo, M. Morari and C. N. Nett, A unified
+/// framework for the study of anti-windup designs, Automatica 30 (1994). The observer needs none of it: it
+/// receives u.
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad `K_i`; [`Error::OutOfRange`] for a bad
+/// range or rate; [`Error::NotConverged`].
+pub fn windup_gain(
+    k_i: &DMatrix<f64>,
+    ranges: &[Option<f64>],
+    rate: f64,
+    domain: Domain,
+) -> Result<DMatrix<f64>, Error> {
+    check::shape("K_i", k_i, (ranges.len(), k_i.ncols()))?;
+    check::positive("the rate of the back-calculation", rate)?;
+    for range in ranges.iter().flatten() {
+        check::positive("the range of a command", *range)?;
+    }
+    let weights = DMatrix::from_fn(ranges.len(), 1, |j, _| ranges[j].map_or(0.0, f64::recip));
+    let scaled = DMatrix::from_fn(k_i.nrows(), k_i.ncols(), |i, j| weights[i] * k_i[(i, j)]);
+    if scaled.amax() <= 0.0 {
+        return Ok(DMatrix::zeros(k_i.ncols(), k_i.nrows()));
+    }
+    let factor = match domain {
+        Domain::Continuous => rate,
+        Domain::Sampled { period } => -(-rate * period).exp_m1(),
+    };
+    let svd = Svd::new(&scaled)?;
+    let inverse =
+        svd.least_squares(&DMatrix::identity(ranges.len(), ranges.len()), svd.rank(TOLERANCE));
+    Ok(DMatrix::from_fn(k_i.ncols(), k_i.nrows(), |i, j| factor * inverse[(i, j)] * weights[j]))
+}
+
+/// The loop from the references to [x; u], without faults and estimation errors.
+///
+/// ```text
+/// [x; x_i]' = (A_e + B_e [K_x, K_i]) [x; x_i] + [B N_r; I] r
+/// u = [K_x, K_i] [x; x_i] + N_r r
+/// ```
+///
+/// with the pair of [`extended_pair`]; in sampled time T I in place of I. `a`, `b`: n x n, n x m in
+/// `domain`; `k_x`: m x n. With integral action the state is [x; `x_i`], with a feedforward x.
+///
+/// # Errors
+///
+/// Same as [`extended_pair`]; [`Error::Shape`] for a gain that does not fit.
+pub fn reference_system(
+    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    k_x: &DMatrix<f64>,
+    action: &Action<'_>,
+    domain: Domain,
+) -> Result<StateSpace, Error> {
+    let n = check::square("A", a)?;
+    let m = b.ncols();
+    check::shape("B", b, (n, m))?;
+    check::shape("K_x", k_x, (m, n))?;
+    let (a_e, b_e, k, into, direct) = match action {
+        Action::Integral { output, gain } => {
+            let t = output.nrows();
+            check::shape("K_i", gain, (m, t))?;
+            let (a_e, b_e) = extended_pair(a, b, output, domain)?;
+            let k = stacked(&k_x.transpose(), &gain.transpose()).transpose();
+            let mut into = DMatrix::zeros(n + t, t);
+            into.rows_mut(n, t).fill_diagonal(integration(domain).0);
+            (a_e, b_e, k, into, DMatrix::zeros(m, t))
+        }
+        Action::Feedforward(gain) => {
+            check::shape("N_r", gain, (m, gain.ncols()))?;
+            (a.clone(), b.clone(), k_x.clone(), b * *gain, (*gain).clone())
+        }
+    };
+    let states = DMatrix::identity(n, a_e.nrows());
+    let t = direct.ncols();
+    Ok(StateSpace {
+        a: a_e + b_e * &k,
+        b: into,
+        c: stacked(&states, &k),
+        d: stacked(&DMatrix::zeros(n, t), &direct),
+        domain,
+    })
+}
+
+/// How references act.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Action<'a> {
+    /// By integrals.
+    Integral {
+        /// H C, t x n.
+        output: &'a DMatrix<f64>,
+        /// `K_i`, m x t.
+        gain: &'a DMatrix<f64>,
+    },
+    /// By the feedforward `N_r`, m x t.
+    Feedforward(&'a DMatrix<f64>),
+}
+
+impl Gains {
+    /// The number of integrals.
+    #[must_use]
+    pub fn integrals(&self) -> usize {
+        self.integral.as_ref().map_or(0, |integral| integral.gain.ncols())
+    }
+}

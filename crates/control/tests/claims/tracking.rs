@@ -1,0 +1,342 @@
+//! References: feedforward, integral action, anti-windup.
+
+use control::aso::{Estimator, FaultyPlant, Gains};
+use control::controller::complete_controller;
+use control::eigen::eigenvalues;
+use control::faults::{ExtendedPlant, Fault, FaultEntry, FaultKind};
+use control::placement::{place, place_discrete, real_poles};
+use control::response::{
+    fault_rate_system, fault_system, frequency_response, gains_between_samples, peak_gain,
+};
+use control::robustness::Loop;
+use control::tracking::{
+    Action, IntegralAction, extended_pair, feedforward, reference_system, tracking_rank,
+    windup_gain,
+};
+use control::{Domain, StateSpace, sampled};
+use nalgebra::{Complex, DMatrix, DVector};
+
+const PERIOD: f64 = 0.1;
+
+fn matrix(rows: usize, values: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_row_slice(rows, values.len() / rows, values)
+}
+
+fn one(value: f64) -> DMatrix<f64> {
+    DMatrix::from_element(1, 1, value)
+}
+
+/// Three states, two commands, three measurements.
+fn plant() -> [DMatrix<f64>; 3] {
+    [
+        matrix(3, &[-1.0, 0.6, 0.0, 0.4, -1.5, 0.7, 0.2, 0.5, -0.8]),
+        matrix(3, &[1.0, 0.0, 0.0, 0.5, 0.3, 1.0]),
+        matrix(3, &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.2, 1.0]),
+    ]
+}
+
+/// References for the first measurement and the difference of the others.
+fn h() -> DMatrix<f64> {
+    matrix(2, &[1.0, 0.0, 0.0, 0.0, 1.0, -1.0])
+}
+
+/// A design with a fault of the first command and, if `sensor`, one of the second measurement.
+struct Designed {
+    extended: ExtendedPlant,
+    plant: FaultyPlant,
+    gains: Gains,
+    filter: Option<Vec<f64>>,
+    domain: Domain,
+    feedback: Vec<Complex<f64>>,
+}
+
+fn designed(domain: Domain, estimator: Estimator, sensor: bool) -> Designed {
+    let [a, b, c] = plant();
+    let kind = FaultKind::Constant;
+    let actuator = FaultEntry::Actuator(b.column(0).into());
+    let mut faults = vec![Fault { entry: actuator, kind }];
+    let f_s = DVector::from_vec(vec![0.0, 1.0, 0.0]);
+    if sensor {
+        faults.push(Fault { entry: FaultEntry::Sensor(f_s.clone()), kind });
+    }
+    let extended = ExtendedPlant::new(&a, &b, &c, &faults, &[20.0, 21.0, 22.0])
+        .expect("the design of the test exists");
+    let output = h() * &c;
+    let all = extended.plant.a.nrows();
+    let order = all + faults.len();
+    let observer: Vec<_> =
+        [-4.0, -4.5, -5.0, -5.5, -6.0, -6.5, -7.0, -7.5].into_iter().take(order).collect();
+    let feedback = real_poles(&[-1.0, -1.2, -1.4, -1.6, -1.8]);
+    let (plant, poles, observer) = match domain {
+        Domain::Continuous => (extended.plant.clone(), feedback, real_poles(&observer)),
+        Domain::Sampled { period } => (
+            sampled::sample(&extended, period).expect("the design of the test exists"),
+            sampled::sampled_poles(&feedback, period).expect("the design of the test exists"),
+            sampled::sampled_poles(&real_poles(&observer), period)
+                .expect("the design of the test exists"),
+        ),
+    };
+    let n = extended.states;
+    let own = (plant.a.view((0, 0), (n, n)).into_owned(), plant.b.rows(0, n).into_owned());
+    let (a_e, b_e) =
+        extended_pair(&own.0, &own.1, &output, domain).expect("the design of the test exists");
+    let assign = if domain == Domain::Continuous { place } else { place_discrete };
+    let k = assign(&a_e, &b_e, &poles).expect("the design of the test exists").gain;
+    let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
+    let seen = estimator.output_matrix(&a_0, &c_0);
+    let l = -assign(&a_0.transpose(), &seen.transpose(), &observer)
+        .expect("the design of the test exists")
+        .gain
+        .transpose();
+    let mut sensed = DMatrix::zeros(2, faults.len());
+    if sensor {
+        sensed.set_column(1, &(h() * f_s));
+    }
+    let gains = Gains {
+        estimator,
+        k_x: k.columns(0, n).into_owned().resize_horizontally(all, 0.0),
+        k_f: sampled::compensation_gain(&extended, domain).expect("the design of the test exists"),
+        l_x: l.rows(0, all).into(),
+        l_f: -l.rows(all, faults.len()),
+        p_f: None,
+        integral: Some(IntegralAction {
+            h: h(),
+            output: output.resize_horizontally(all, 0.0),
+            faults: sensed,
+            gain: k.columns(n, 2).into(),
+        }),
+    };
+    let filter = sampled::filter(&extended, domain);
+    Designed { extended, plant, gains, filter, domain, feedback: poles }
+}
+
+fn all_designs() -> Vec<Designed> {
+    let sampled = Domain::Sampled { period: PERIOD };
+    let kinds = [
+        (Domain::Continuous, Estimator::Prediction),
+        (sampled, Estimator::Prediction),
+        (sampled, Estimator::Current),
+    ];
+    let both = kinds.into_iter().flat_map(|(domain, estimator)| {
+        [false, true].map(|sensor| designed(domain, estimator, sensor))
+    });
+    both.collect()
+}
+
+/// The plant without filter, from [u; f] to y.
+fn physical(own: &Designed) -> StateSpace {
+    let n = own.extended.states;
+    let (m, q) = (own.plant.b.ncols(), own.plant.f_a.ncols());
+    let mut b = DMatrix::zeros(n, m + q);
+    b.columns_mut(0, m).copy_from(&own.plant.b.rows(0, n));
+    b.columns_mut(m, q).copy_from(&own.plant.f_a.rows(0, n));
+    let c = plant()[2].clone();
+    let mut d = DMatrix::zeros(c.nrows(), m + q);
+    if q > 1 {
+        d[(1, m + 1)] = 1.0;
+    }
+    StateSpace { a: own.plant.a.view((0, 0), (n, n)).into(), b, c, d, domain: own.domain }
+}
+
+/// The gain for constant signals.
+fn at_constant_signals(own: &StateSpace) -> DMatrix<f64> {
+    let n = own.a.nrows();
+    let kept = match own.domain {
+        Domain::Continuous => 0.0,
+        Domain::Sampled { .. } => 1.0,
+    };
+    let states = (DMatrix::identity(n, n) * kept - &own.a)
+        .lu()
+        .solve(&own.b)
+        .expect("the design of the test exists");
+    &own.c * states + &own.d
+}
+
+/// The largest distance of a number from the nearest one of the other list.
+fn distance(found: &[Complex<f64>], wanted: &[Complex<f64>]) -> f64 {
+    assert_eq!(found.len(), wanted.len());
+    let nearest = |one: &Complex<f64>| {
+        wanted.iter().map(|other| (other - one).norm()).fold(f64::INFINITY, f64::min)
+    };
+    found.iter().map(nearest).fold(0.0, f64::max)
+}
+
+#[test]
+fn the_loop_has_the_eigenvalues_of_feedback_with_integrals_observer_and_filter() {
+    for own in all_designs() {
+        let complete =
+            complete_controller(&own.plant, &own.gains, own.filter.as_deref(), own.domain).unwrap();
+        let whole = physical(&own);
+        let m = own.plant.b.ncols();
+        let alone = StateSpace {
+            b: whole.b.columns(0, m).into(),
+            d: DMatrix::zeros(whole.c.nrows(), m),
+            ..whole
+        };
+        let found = Loop::new(alone, complete.commands).unwrap().dynamics();
+        let mut wanted = own.feedback.clone();
+        wanted.extend(eigenvalues(&own.gains.error_dynamics(&own.plant)).unwrap());
+        let filtered = own.filter.iter().flatten().map(|w| match own.domain {
+            Domain::Continuous => Complex::new(-w, 0.0),
+            Domain::Sampled { .. } => Complex::new(1.0 - w, 0.0),
+        });
+        wanted.extend(filtered);
+        // A current estimator with a filter predicts y_f from x: no eigenvalue is lost.
+        let found = eigenvalues(&found).unwrap();
+        let away = distance(&wanted, &found);
+        assert!(away < 2e-4, "{:?} {:?} {away}", own.domain, own.gains.estimator);
+    }
+}
+
+#[test]
+fn the_loop_of_faults_and_errors_is_that_of_plant_and_complete_controller() {
+    for own in all_designs() {
+        let Designed { plant, gains, domain, .. } = &own;
+        let complete = complete_controller(plant, gains, own.filter.as_deref(), *domain).unwrap();
+        let control = &complete.commands;
+        let whole = physical(&own);
+        let (n, m, q) = (own.extended.states, plant.b.ncols(), plant.f_a.ncols());
+        let (b, f) = (whole.b.columns(0, m).into_owned(), whole.b.columns(m, q).into_owned());
+        let seen = whole.d.columns(m, q).into_owned();
+        let k = control.a.nrows();
+        // From f to [x; f_hat - f] with u = C z + D y, y = C x + F_s f.
+        let mut a = DMatrix::zeros(n + k, n + k);
+        a.view_mut((0, 0), (n, n)).copy_from(&(&whole.a + &b * &control.d * &whole.c));
+        a.view_mut((0, n), (n, k)).copy_from(&(&b * &control.c));
+        a.view_mut((n, 0), (k, n)).copy_from(&(&control.b * &whole.c));
+        a.view_mut((n, n), (k, k)).copy_from(&control.a);
+        let mut into = DMatrix::zeros(n + k, q);
+        into.rows_mut(0, n).copy_from(&(&f + &b * &control.d * &seen));
+        into.rows_mut(n, k).copy_from(&(&control.b * &seen));
+        let mut c = DMatrix::zeros(n + q, n + k);
+        c.view_mut((0, 0), (n, n)).fill_with_identity();
+        c.view_mut((n, 0), (q, n)).copy_from(&(&complete.estimates.d * &whole.c));
+        c.view_mut((n, n), (q, k)).copy_from(&complete.estimates.c);
+        let mut d = DMatrix::zeros(n + q, q);
+        d.rows_mut(n, q).copy_from(&(&complete.estimates.d * &seen - DMatrix::identity(q, q)));
+        let expected = StateSpace { a, b: into, c, d, domain: *domain };
+        let all = plant.a.nrows();
+        let mut rows: Vec<_> = (0..n).collect();
+        rows.extend(2 * all..2 * all + q);
+        let mut found = fault_system(plant, gains, *domain).unwrap();
+        (found.c, found.d) = (found.c.select_rows(&rows), found.d.select_rows(&rows));
+        let grid = [0.03, 0.3, 1.0, 3.0, 10.0];
+        let responses =
+            [&found, &expected].map(|system| frequency_response(system, &grid).unwrap());
+        for (found, expected) in responses[0].iter().zip(&responses[1]) {
+            let error = (&found.gain - &expected.gain).norm();
+            assert!(error < 1e-9 * expected.gain.norm(), "{domain:?} {error}");
+        }
+        // f' acts on the same loop.
+        let rates = fault_rate_system(plant, gains, *domain).unwrap();
+        assert!((rates.a - found.a).amax() <= 0.0);
+    }
+}
+
+#[test]
+fn with_one_part_the_bounds_between_samples_are_those_of_the_samples() {
+    for own in all_designs().into_iter().filter(|own| own.domain != Domain::Continuous) {
+        let Designed { plant, gains, extended, domain, .. } = &own;
+        let found = gains_between_samples(extended, plant, gains, PERIOD, (1, 1e-4)).unwrap();
+        let at_samples =
+            peak_gain(&fault_system(plant, gains, *domain).unwrap(), 1e-4).unwrap().upper;
+        for (found, expected) in found.of_faults.iter().zip(at_samples.iter()) {
+            assert!((found - expected).abs() < 1e-3 * expected.max(1e-6), "{found} {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_constant_sensor_fault_and_a_constant_actuator_fault_leave_no_error_of_the_reference() {
+    for own in all_designs() {
+        let system = fault_system(&own.plant, &own.gains, own.domain).unwrap();
+        let n = own.extended.states;
+        let tracked = h() * &plant()[2] * at_constant_signals(&system).rows(0, n);
+        assert!(tracked.amax() < 1e-10, "{tracked}");
+    }
+}
+
+#[test]
+fn the_extended_plant_of_one_state_has_the_printed_matrices() {
+    let (a_e, b_e) = extended_pair(&one(-2.0), &one(3.0), &one(5.0), Domain::Continuous).unwrap();
+    assert_eq!(a_e, matrix(2, &[-2.0, 0.0, -5.0, 0.0]));
+    assert_eq!(b_e, matrix(2, &[3.0, 0.0]));
+    let domain = Domain::Sampled { period: 0.25 };
+    let (a_e, _) = extended_pair(&one(-2.0), &one(3.0), &one(5.0), domain).unwrap();
+    assert_eq!(a_e, matrix(2, &[-2.0, 0.0, -1.25, 1.0]));
+}
+
+#[test]
+fn the_feedforward_of_one_state_is_its_closed_form() {
+    // x' = a x + b u, u = k x + n r, y = c x: n = -(a + b k) / (b c).
+    let (a, b, c, k) = (0.5, 3.0, 2.0, -1.0);
+    let found = feedforward((&one(a), &one(b)), &one(c), &one(k), Domain::Continuous).unwrap();
+    assert!((found[(0, 0)] + (a + b * k) / (b * c)).abs() < 1e-15);
+    let domain = Domain::Sampled { period: 0.1 };
+    let found = feedforward((&one(a), &one(b)), &one(c), &one(0.1), domain).unwrap();
+    assert!((found[(0, 0)] - (1.0 - a - b * 0.1) / (b * c)).abs() < 1e-15);
+}
+
+#[test]
+fn references_are_reached_without_error_by_both_actions() {
+    let [a, b, c] = plant();
+    let output = h() * &c;
+    let k = -DMatrix::identity(2, 3) * 0.3;
+    let n_r = feedforward((&a, &b), &output, &k, Domain::Continuous).unwrap();
+    let (a_e, b_e) = extended_pair(&a, &b, &output, Domain::Continuous).unwrap();
+    let whole = place(&a_e, &b_e, &real_poles(&[-1.0, -1.2, -1.4, -1.6, -1.8])).unwrap().gain;
+    let (k_x, k_i) = (whole.columns(0, 3).into_owned(), whole.columns(3, 2).into_owned());
+    let integral = Action::Integral { output: &output, gain: &k_i };
+    for (k_x, action) in [(&k, Action::Feedforward(&n_r)), (&k_x, integral)] {
+        let own = reference_system((&a, &b), k_x, &action, Domain::Continuous).unwrap();
+        let found = at_constant_signals(&own);
+        let error = &output * found.rows(0, 3) - DMatrix::identity(2, 2);
+        assert!(error.amax() < 1e-13, "{error}");
+        // The commands hold the plant there: A x + B u = 0.
+        assert!((&a * found.rows(0, 3) + &b * found.rows(3, 2)).amax() < 1e-13);
+    }
+}
+
+#[test]
+fn constant_references_need_commands_independent_outputs_and_no_zero_at_the_origin() {
+    let [a, b, c] = plant();
+    let full = tracking_rank(&a, &b, &(h() * &c)).unwrap();
+    assert!(full.is_full() && full.rank == 5 && full.outputs == 2);
+    let many = tracking_rank(&a, &b.columns(0, 1).into(), &(h() * &c)).unwrap();
+    assert_eq!((many.rank, many.expected), (4, 5));
+    let twice = matrix(2, &[1.0, 2.0, 0.0, 2.0, 4.0, 0.0]);
+    assert_eq!(tracking_rank(&a, &b, &twice).unwrap().outputs, 1);
+    // s / (s^2 + 3 s + 2), with states in very different units.
+    let [a, b] = [matrix(2, &[0.0, 1e-6, -2e6, -3.0]), matrix(2, &[0.0, 1e6])];
+    let zero = tracking_rank(&a, &b, &matrix(1, &[0.0, 1e-6])).unwrap();
+    assert_eq!((zero.rank, zero.expected, zero.outputs), (2, 3, 1));
+    assert!(tracking_rank(&a, &b, &matrix(1, &[1.0, 0.0])).unwrap().is_full());
+}
+
+#[test]
+fn back_calculation_lets_the_integrals_follow_in_any_units_and_with_any_commands_at_a_limit() {
+    let k_i = matrix(3, &[1.0, 0.2, -0.4, 3.0, 0.7, 0.6]);
+    let ranges = [Some(2.0), Some(0.5), None];
+    let rate = 4.0;
+    let l_w = windup_gain(&k_i, &ranges, rate, Domain::Continuous).unwrap();
+    assert!(l_w.column(2).amax() <= 0.0);
+    for limited in 0..4_u32 {
+        let s = DMatrix::from_fn(3, 3, |i, j| {
+            f64::from(u8::from(i == j && i < 2 && limited & (1 << i) != 0))
+        });
+        let matrix = -(&l_w * s * &k_i);
+        for value in eigenvalues(&matrix).unwrap() {
+            assert!(value.im.abs() < 1e-12 && value.re < 1e-12 && value.re > -rate - 1e-12);
+        }
+        if limited == 3 {
+            assert!((matrix + DMatrix::identity(2, 2) * rate).amax() < 1e-12);
+        }
+    }
+    // Commands in thousandths: K_i and ranges grow, the effect of a command shrinks.
+    let scale = DMatrix::from_diagonal(&DVector::from_vec(vec![1e3, 1.0, 1.0]));
+    let scaled =
+        windup_gain(&(&scale * &k_i), &[Some(2e3), Some(0.5), None], rate, Domain::Continuous);
+    assert!((scaled.unwrap() * scale - &l_w).amax() < 1e-12);
+    let sampled = windup_gain(&k_i, &ranges, rate, Domain::Sampled { period: 0.1 }).unwrap();
+    assert!((sampled * rate - l_w * (1.0 - (-0.4_f64).exp())).amax() < 1e-12);
+}

@@ -1,0 +1,170 @@
+//! The table `[reference]` of a plant file: set points of measurements.
+
+use files::{Entry, Place, PlaceError, Table};
+use nalgebra::DMatrix;
+
+use super::signals::{Signal, description, name, unit};
+
+/// The references of a plant file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct References {
+    /// Signals of the controller FMU. Their operating points follow from those of the measurements.
+    pub(crate) signals: Vec<Signal>,
+    /// H, t x p: what each reference is the set point of.
+    pub(crate) h: DMatrix<f64>,
+    /// The size of the step that the report shows, in the unit of the reference.
+    pub(crate) steps: Vec<Option<f64>>,
+    /// Where each reference is stated.
+    pub(crate) places: Vec<Place>,
+    /// Whether the distance from the references is integrated; otherwise they act by a feedforward.
+    pub(crate) integral: bool,
+    /// Time constant, in s, with which the integrals follow a command at its limit.
+    pub(crate) windup_time: Option<f64>,
+}
+
+const KEYS: [&str; 3] = ["track", "integral", "windup_time"];
+const REFERENCE: [&str; 6] = ["measurement", "combination", "name", "unit", "description", "step"];
+
+impl References {
+    /// Reads the table, if there is one.
+    pub(crate) fn read(
+        file: &Table<'_>,
+        measurements: &[Signal],
+    ) -> Result<Option<Self>, PlaceError> {
+        let Some(entry) = file.get("reference") else {
+            return Ok(None);
+        };
+        let table = entry.table()?;
+        table.allow(&KEYS)?;
+        let track = table.require("track", "the measurements that follow references")?;
+        let members = if track.is_list() { track.list()? } else { vec![track.clone()] };
+        if members.is_empty() {
+            return Err(track.error("expected at least one measurement"));
+        }
+        let integral = table.get("integral").map_or(Ok(true), |entry| entry.flag())?;
+        let windup_time = table.get("windup_time");
+        if let Some(entry) = windup_time.as_ref().filter(|_| !integral) {
+            return Err(entry.error("only integral action winds up, and `integral` is false"));
+        }
+        let mut found = Self {
+            signals: Vec::new(),
+            h: DMatrix::zeros(members.len(), measurements.len()),
+            steps: Vec::new(),
+            places: Vec::new(),
+            integral,
+            windup_time: windup_time.map(|entry| entry.positive()).transpose()?,
+        };
+        for (at, member) in members.iter().enumerate() {
+            let (signal, weights, step) = reference(member, measurements)?;
+            if found.signals.iter().any(|other| other.name == signal.name) {
+                return Err(member.error(format!("the name `{}` is there twice", signal.name)));
+            }
+            found.h.row_mut(at).copy_from_slice(&weights);
+            found.signals.push(signal);
+            found.steps.push(step);
+            found.places.push(member.place.clone());
+        }
+        Ok(Some(found))
+    }
+
+    /// Returns the references with operating points and units from those of the measurements.
+    pub(crate) fn completed(&self, measurements: &[Signal]) -> Vec<Signal> {
+        let complete = |(at, signal): (usize, &Signal)| {
+            let weights = self.h.row(at);
+            let stated = measurements.iter().any(|one| one.operating.is_some());
+            let operating = weights.iter().zip(measurements);
+            let operating = operating.map(|(weight, one)| weight * one.operating.unwrap_or(0.0));
+            let mut units = weights.iter().zip(measurements).filter(|(weight, _)| **weight != 0.0);
+            let first = units.next().and_then(|(_, one)| one.unit.clone());
+            let same = units.all(|(_, one)| one.unit == first);
+            Signal {
+                operating: stated.then(|| operating.sum()),
+                unit: signal.unit.clone().or(first.filter(|_| same)),
+                ..signal.clone()
+            }
+        };
+        self.signals.iter().enumerate().map(complete).collect()
+    }
+}
+
+/// Reads a reference: the name of a measurement, or a table. Returns the signal, its row of H and the
+/// size of its step.
+fn reference(
+    entry: &Entry<'_>,
+    measurements: &[Signal],
+) -> Result<(Signal, Vec<f64>, Option<f64>), PlaceError> {
+    let mut weights = vec![0.0; measurements.len()];
+    if entry.is_text() {
+        let at = position(entry, entry.text()?, measurements)?;
+        weights[at] = 1.0;
+        return Ok((named_after(&measurements[at], entry), weights, None));
+    }
+    let table = entry.table()?;
+    table.allow(&REFERENCE)?;
+    let own_name = table.get("name");
+    let mut signal = match (table.get("measurement"), table.get("combination")) {
+        (Some(_), Some(second)) => {
+            return Err(second.error("expected `measurement` or `combination`, found both"));
+        }
+        (None, None) => {
+            let message = "expected `measurement`, a name, or `combination`, a table from names of \
+                           measurements to factors";
+            return Err(entry.error(message));
+        }
+        (Some(measurement), None) => {
+            let at = position(&measurement, measurement.text()?, measurements)?;
+            weights[at] = 1.0;
+            named_after(&measurements[at], entry)
+        }
+        (None, Some(combination)) => {
+            for (measurement, factor) in combination.table()?.entries() {
+                weights[position(&factor, measurement, measurements)?] = factor.number()?;
+            }
+            if weights.iter().all(|weight| *weight == 0.0) {
+                return Err(combination.error("expected a factor other than 0"));
+            }
+            table.require("name", "the name of the input of the controller FMU")?;
+            Signal::named(String::new())
+        }
+    };
+    if let Some(own) = own_name {
+        signal.name = name(&own)?;
+        signal.places[0] = Some(own.place);
+    }
+    signal.unit = unit(&table)?.or(signal.unit);
+    let text = description(&table)?;
+    if !text.is_empty() {
+        signal.description = text;
+    }
+    let step = match table.get("step") {
+        None => None,
+        Some(entry) => match entry.number()? {
+            0.0 => return Err(entry.error("expected a step other than 0")),
+            size => Some(size),
+        },
+    };
+    Ok((signal, weights, step))
+}
+
+/// The reference of a measurement: `r_h1` for `h1`, `'r_level 1'` for `'level 1'`.
+fn named_after(measurement: &Signal, entry: &Entry<'_>) -> Signal {
+    let name = match measurement.name.strip_prefix('\'') {
+        Some(rest) => format!("'r_{rest}"),
+        None => format!("r_{}", measurement.name),
+    };
+    Signal {
+        description: match measurement.description.as_str() {
+            "" => format!("set point of {}", measurement.name),
+            text => format!("set point of {text}"),
+        },
+        places: [Some(entry.place.clone()), None],
+        ..Signal::named(name)
+    }
+}
+
+fn position(entry: &Entry<'_>, name: &str, measurements: &[Signal]) -> Result<usize, PlaceError> {
+    measurements.iter().position(|signal| signal.name == name).ok_or_else(|| {
+        let names: Vec<_> = measurements.iter().map(|signal| signal.name.as_str()).collect();
+        entry.error(format!("no measurement is named {name:?}; there are {}", names.join(", ")))
+    })
+}
