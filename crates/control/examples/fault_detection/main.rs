@@ -50,9 +50,9 @@ fn flight_actuators(missed: &mut u32) -> Result<(), Box<dyn Error>> {
     println!("achievable patterns: {}, for constant faults: {strong}", patterns.len());
     for (residual, pattern) in residuals.iter().zip(&actuators::PATTERNS) {
         let (order, (kept, dropped)) = (residual.generator.a.nrows(), residual.rank_gap);
-        println!(
-            "pattern {pattern:?}: order {order}, ranks decided between {dropped:.0e} and {kept:.0e}"
-        );
+        let error = residual.decoupling_error;
+        println!("pattern {pattern:?}: order {order}, decoupled to {error:.0e}");
+        println!("  ranks decided between {dropped:.0e} and {kept:.0e}");
     }
     println!("other masses, H-infinity norms from commands, winds, faults less the design:");
     for index in 0..actuators::MODELS {

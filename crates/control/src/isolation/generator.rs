@@ -4,12 +4,19 @@ use super::DisturbedPlant;
 use super::decoupled::DecoupledPart;
 use super::direction::{Direction, strongest_weakest};
 use super::family::{Family, unit_gain};
+use super::verification::decoupling_error;
 use crate::residual::ResidualGenerator;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
 
 /// A gain counts as zero below this times the accuracy of the family.
 const ACCURACIES: f64 = 10.0;
+/// A decoupling error up to this is the rounding of the data; a larger one comes from a coupling that
+/// counted as zero, so that a smaller tolerance is tried, down to this one.
+const DECOUPLED: f64 = 1e-6;
+const SMALLEST_TOLERANCE: f64 = 1e-12;
+/// The largest decoupling error that is accepted.
+const ALLOWED: f64 = 1e-3;
 /// Part of the mean variance that is added to W, so that it is positive definite.
 const REGULARISATION: f64 = 1e-12;
 
@@ -25,7 +32,8 @@ pub struct Requirements {
     /// Smallest gain of a fault that is accepted, relative to the largest that the fault can have
     /// for the same effect of noise, in (0, 1).
     pub quality: f64,
-    /// Relative singular values below this count as zero.
+    /// Relative singular values below this count as zero. If the residual then is not decoupled up to
+    /// 1e-6 (see [`Residual::decoupling_error`]), smaller values are tried.
     pub tolerance: f64,
     /// Standard deviation of the noise of each measurement, above zero; None: 1 each.
     pub noise: Option<Vec<f64>>,
@@ -103,9 +111,9 @@ pub struct Residual {
     /// The smallest relative singular value that counted as nonzero, and the largest that counted
     /// as zero: the wider apart, the more certain the decoupling.
     pub rank_gap: (f64, f64),
-    /// Largest residual of the equations (3), relative to their terms: the accuracy of the
-    /// decoupling.
-    pub equation_error: f64,
+    /// The largest response to a command, a disturbance or a decoupled fault, relative to the terms
+    /// that cancel in it, evaluated for the given plant at several frequencies.
+    pub decoupling_error: f64,
 }
 
 /// Computes a residual generator of least order that responds to the faults with `pattern[fault]`
@@ -149,7 +157,8 @@ pub struct Residual {
 ///
 /// [`Error::FaultNotIsolable`] names a fault of the pattern that no such residual shows at the
 /// required frequency; [`Error::OutOfRange`] for `requirements`, and when no order reaches the
-/// quality; same as [`DisturbedPlant::check`]; [`Error::Shape`] if `pattern` has not one entry per
+/// quality; [`Error::ResidualTooLarge`] if the decoupling error of the result is above 1e-3 for all
+/// tolerances; same as [`DisturbedPlant::check`]; [`Error::Shape`] if `pattern` has not one entry per
 /// fault; [`Error::NotConverged`], [`Error::Overflow`] when an inner computation fails.
 pub fn residual_generator(
     plant: &DisturbedPlant,
@@ -157,9 +166,40 @@ pub fn residual_generator(
     requirements: &Requirements,
 ) -> Result<Residual, Error> {
     check_arguments(plant, pattern, requirements)?;
-    let (reachable, unreachable) = plant.reachable_part(requirements.tolerance)?;
+    // All modes, in balanced coordinates.
+    let (balanced, _) = plant.reachable_part(0.0)?;
+    let verified = |tolerance: f64| {
+        let mut found = with_tolerance(plant, pattern, requirements, tolerance)?;
+        let fastest = requirements.fastest(plant.domain);
+        found.decoupling_error = decoupling_error(&balanced, pattern, &found.generator, fastest);
+        Ok(found)
+    };
+    let mut best: Residual = verified(requirements.tolerance)?;
+    let mut tolerance = requirements.tolerance;
+    while best.decoupling_error > DECOUPLED && tolerance > SMALLEST_TOLERANCE {
+        tolerance *= 0.01;
+        match verified(tolerance) {
+            Ok(found) if found.decoupling_error < best.decoupling_error => best = found,
+            _ => {}
+        }
+    }
+    if best.decoupling_error <= ALLOWED {
+        return Ok(best);
+    }
+    let (equation, residual) = ("the decoupling", best.decoupling_error);
+    Err(Error::ResidualTooLarge { equation, residual, allowed: ALLOWED })
+}
+
+/// The generator that follows when relative singular values below `tolerance` count as zero.
+fn with_tolerance(
+    plant: &DisturbedPlant,
+    pattern: &[bool],
+    requirements: &Requirements,
+    tolerance: f64,
+) -> Result<Residual, Error> {
+    let (reachable, unreachable) = plant.reachable_part(tolerance)?;
     let decoupled: Vec<bool> = pattern.iter().map(|responds| !responds).collect();
-    let part = DecoupledPart::new(&reachable, &decoupled, requirements.tolerance)?;
+    let part = DecoupledPart::new(&reachable, &decoupled, tolerance)?;
     let part = part.ok_or_else(|| not_isolable(pattern, first_of(pattern)))?;
     let (family, direction) = least_order(&part, pattern, requirements, plant.domain)?;
     let factors = DMatrix::from_row_slice(1, direction.factors.len(), direction.factors.as_slice());
@@ -243,8 +283,8 @@ fn least_order(
     if let Some(fault) = missing {
         return Err(not_isolable(pattern, fault));
     }
-    let rule = "at most the quality that can be reached, which is the value given";
-    Err(Error::OutOfRange { name: "quality", value: best, rule })
+    let (name, rule) = ("the quality that can be reached", "at least the required one");
+    Err(Error::OutOfRange { name, value: best, rule })
 }
 
 /// For each column the real or the imaginary part, the larger of the two.
@@ -271,11 +311,6 @@ fn realised(part: &DecoupledPart, family: Family, frequency: f64) -> Residual {
         f[(at, at - 1)] = unit_gain(family.poles[at], domain);
     }
     let c = DMatrix::from_fn(1, k, |_, j| f64::from(u8::from(j + 1 == k)));
-    let equations = [
-        (&t * &part.a - &f * &t - &l * &part.c, (&t * &part.a).norm() + (&l * &part.c).norm()),
-        (&c * &t + &w * &part.c, (&c * &t).norm() + (&w * &part.c).norm()),
-    ];
-    let relative = |(error, size): &(DMatrix<f64>, f64)| error.norm() / size.max(f64::MIN_POSITIVE);
     let from_faults = StateSpace {
         a: f.clone(),
         b: &l * &part.d_f - &t * &part.b_f,
@@ -298,7 +333,7 @@ fn realised(part: &DecoupledPart, family: Family, frequency: f64) -> Residual {
         quality: 0.0,
         unreachable: 0,
         rank_gap: (part.gap.kept, part.gap.dropped),
-        equation_error: equations.iter().map(relative).fold(0.0, f64::max),
+        decoupling_error: 0.0,
     }
 }
 
