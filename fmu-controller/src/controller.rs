@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use fmu::description::DefaultExperiment;
-use fmu::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step, Variable};
+use fmu::{About, At, Event, Experiment, Failure, Log, Model, ModelExchange, Step, Variable};
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
@@ -58,6 +58,15 @@ pub(crate) struct AsoController {
     sampler: Option<Sampler>,
     /// Whether the clock of the samples ticks. The samples follow from time, and so does the clock.
     pub(crate) sample_clock: bool,
+    /// The design at the scheduling variable of the last sample; `None` without a schedule.
+    current: Option<Box<Design>>,
+    /// The scheduling variable as an input with its slope, and as it was used in the last sample.
+    pub(crate) schedule_input: f64,
+    pub(crate) schedule_slope: f64,
+    pub(crate) schedule_at: f64,
+    /// Whether a value outside of the schedule was reported.
+    outside_reported: bool,
+    log: Log,
     /// Derived from `design` in the first step, also after a state was read from bytes.
     #[serde(skip)]
     observer: Option<Observer>,
@@ -175,6 +184,43 @@ impl AsoController {
         }
     }
 
+    /// Sets matrices and operating point of a scheduled controller for a sample at `time`, `offset` s
+    /// after the measurements were given.
+    fn interpolate(&mut self, offset: f64, time: f64) {
+        let input = self.schedule_input + self.schedule_slope * offset;
+        let Self { design, current, values, operating_point, .. } = self;
+        let (Some(schedule), Some(current)) = (&design.schedule, current) else { return };
+        let value = schedule.value(design, values, input, offset);
+        self.schedule_at = schedule.interpolate(value, current);
+        current.take_parameters(design);
+        operating_point.read(current);
+        let [first, last] = schedule.range();
+        if !(value >= first && value <= last) && !self.outside_reported {
+            self.outside_reported = true;
+            self.log.warn(format!(
+                "{} = {value} at {time} s is outside of the schedule from {first} to {last}; the \
+                 controller uses {} (reported once)",
+                schedule.variable, self.schedule_at
+            ));
+        }
+    }
+
+    /// Sets the derivatives of matrices and operating point of a scheduled controller in the direction
+    /// of `direction`, at the first sample.
+    fn differentiate_schedule(&self, direction: &mut Self) {
+        let Self { design, current, values, schedule_input, .. } = direction;
+        let (Some(schedule), Some(current)) = (&self.design.schedule, current) else { return };
+        let value = schedule.value(&self.design, &self.values, self.schedule_input, 0.0);
+        let slope = schedule.value(&self.design, values, *schedule_input, 0.0);
+        direction.schedule_at = schedule.differentiate(value, slope, current);
+        current.take_parameters(design);
+    }
+
+    /// The design of the last sample.
+    fn design_in_force(&self) -> &Design {
+        self.current.as_deref().unwrap_or(&self.design)
+    }
+
     /// Takes the samples that are due until `end`, with the measurements given at `start`, in s.
     fn sample(&mut self, start: f64, end: f64) -> Result<(), Failure> {
         let Some(mut sampler) = self.sampler.take_if(|sampler| !sampler.has_too_many_samples(end))
@@ -185,7 +231,9 @@ impl AsoController {
         };
         while let Some(offset) = sampler.time_to_sample(start, end) {
             let mode = self.free_mode(self.is_compensating(sampler.next_instant()));
-            let Self { design, values, operating_point, deviations, .. } = self;
+            self.interpolate(offset, sampler.next_instant());
+            let Self { design, current, values, operating_point, deviations, .. } = self;
+            let design = current.as_deref().unwrap_or(design);
             self.mode =
                 sampler.sample((design, mode), (values, operating_point, deviations), offset);
         }
@@ -226,6 +274,7 @@ impl Model for AsoController {
         let (mut values, deviations) = (Values::zero(&design), Signals::zero(&design));
         let operating_point = OperatingPoint::of(&design);
         values.r.copy_from_slice(&operating_point.r);
+        let start = design.schedule.as_ref().map_or(0.0, |schedule| schedule.range()[0]);
         Ok(Self {
             x_hat_0: operating.collect(),
             f_hat_0: vec![0.0; design.faults.len()],
@@ -240,6 +289,12 @@ impl Model for AsoController {
             frozen: false,
             sampler: Sampler::new(&design),
             sample_clock: false,
+            schedule_input: start,
+            schedule_slope: 0.0,
+            schedule_at: start,
+            outside_reported: false,
+            log: Log::default(),
+            current: design.unscheduled().map(Box::new),
             observer: None,
             values,
             operating_point,
@@ -276,6 +331,7 @@ impl Model for AsoController {
         self.start();
         self.observer = None;
         self.frozen = false;
+        self.outside_reported = false;
         if let Some(sampler) = &mut self.sampler {
             sampler.start(time, &self.values.z);
             return self.sample(time, time);
@@ -318,11 +374,13 @@ impl Model for AsoController {
         if initial {
             direction.start();
         }
-        direction.operating_point.read(&direction.design);
-        let Self { design, values, operating_point, deviations, z_slopes, .. } = direction;
+        self.differentiate_schedule(direction);
+        let Self { design, current, values, operating_point, deviations, z_slopes, .. } = direction;
+        let design = current.as_deref().unwrap_or(design);
+        operating_point.read(design);
         deviations.set(values, operating_point, 0.0);
         self.mode.set_limited(design, &mut deviations.u);
-        let equations = Equations::<Dual64>::new([&self.design, design], self.mode);
+        let equations = Equations::<Dual64>::new([self.design_in_force(), design], self.mode);
         let mut signals = (&self.deviations, &mut *deviations);
         if let (Some(own), Some(sampler)) = (&self.sampler, &mut direction.sampler) {
             own.differentiate_first_sample(equations, sampler, &mut signals);
@@ -343,6 +401,10 @@ impl Model for AsoController {
             loss.estimate = lost.eps;
         }
         Ok(())
+    }
+
+    fn log(&mut self) -> Option<&mut Log> {
+        Some(&mut self.log)
     }
 
     fn model_exchange(&self) -> Option<ModelExchange> {

@@ -214,6 +214,18 @@ fn of_references(design: &Design) -> Vec<String> {
 pub(crate) fn of_initial_command(design: &Design, j: usize) -> Vec<String> {
     let mut names = of_initial_deviation(design, j);
     names.extend(operating_command(design, j));
+    by_schedule(design, names)
+}
+
+/// `names` of a controller without a schedule; with one, its variable replaces the matrices, which are
+/// no parameters then.
+fn by_schedule(design: &Design, mut names: Vec<String>) -> Vec<String> {
+    let Some(schedule) = &design.schedule else { return names };
+    let elements =
+        |(name, matrix): (&'static str, &Matrix)| whole(name, matrix).collect::<Vec<_>>();
+    let elements: Vec<_> = design.matrices().flat_map(elements).collect();
+    names.retain(|name| !elements.contains(name) && *name != schedule.variable);
+    names.push(schedule.variable.clone());
     names
 }
 
@@ -263,6 +275,7 @@ pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
             names.extend(row("L_f", &design.l_f, i - n));
             names.extend(sliding_mode(design).skip(i - n).step_by(q));
         }
+        return by_schedule(design, names);
     }
     names
 }

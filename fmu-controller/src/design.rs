@@ -8,6 +8,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::matrix::Matrix;
+use crate::schedule::Schedule;
 
 /// The content of a design file. Shapes: n states, m actuators, p measurements, q states of the
 /// fault model, t references.
@@ -91,6 +92,9 @@ pub(crate) struct Design {
     pub(crate) references: Vec<Signal>,
     /// The experiment that importers run by default.
     pub(crate) experiment: Defaults,
+    /// Matrices and operating points by a scheduling variable, in place of those above.
+    #[serde(default)]
+    pub(crate) schedule: Option<Schedule>,
 }
 
 /// The measurements that the command of a sampled controller is computed from.
@@ -256,9 +260,31 @@ impl Design {
         }
     }
 
-    /// Whether the file states an operating point.
+    /// The design of one value of the scheduling variable, with the numbers of the plant of the file;
+    /// None without a schedule.
+    pub(crate) fn unscheduled(&self) -> Option<Self> {
+        self.schedule.is_some().then(|| Self { schedule: None, ..self.clone() })
+    }
+
+    /// The matrices that depend on the scheduling variable, in the order of [`Design::matrices`].
+    pub(crate) fn scheduled_mut(&mut self) -> [&mut Matrix; 8] {
+        let Self { a, b, c, f_a, k_x, k_f, l_x, l_f, .. } = self;
+        [a, b, c, f_a, k_x, k_f, l_x, l_f]
+    }
+
+    /// Takes what the importer can change: the limits of the actuators and the filter.
+    pub(crate) fn take_parameters(&mut self, other: &Self) {
+        for (own, other) in self.actuators.iter_mut().zip(&other.actuators) {
+            own.limits = other.limits;
+        }
+        let filters = self.filter.iter_mut().flatten().zip(other.filter.iter().flatten());
+        filters.for_each(|(own, other)| *own = *other);
+    }
+
+    /// Whether the file states an operating point that does not depend on a scheduling variable.
     pub(crate) fn has_operating_point(&self) -> bool {
-        self.actuators.iter().any(|actuator| actuator.operating.is_some())
+        self.schedule.is_none()
+            && self.actuators.iter().any(|actuator| actuator.operating.is_some())
     }
 
     /// The position of the filtered measurement `k` in z.

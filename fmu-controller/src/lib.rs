@@ -13,6 +13,7 @@ mod names;
 mod number;
 mod observer;
 mod sampled;
+mod schedule;
 mod shared;
 mod signals;
 mod variables;

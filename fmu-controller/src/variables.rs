@@ -19,6 +19,7 @@ pub(crate) fn list(controller: &AsoController) -> Vec<Variable<AsoController>> {
     all.extend(faults(design));
     all.extend(estimates(design));
     all.extend(losses(controller));
+    all.extend(schedule_at(design));
     if design.sample_time.is_none() {
         all.extend(slopes(design));
     }
@@ -105,7 +106,35 @@ fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
         Variable::boolean("compensate", text, |model: &mut AsoController| &mut model.compensate)
             .input(),
     );
+    inputs.extend(schedule_input(design));
     inputs
+}
+
+/// The scheduling variable, if it is no measurement.
+fn schedule_input(design: &Design) -> Option<Variable<AsoController>> {
+    let schedule = design.schedule.as_ref().filter(|own| own.measurement(design).is_none())?;
+    let meaning = &schedule.description;
+    let meaning = if meaning.is_empty() { &schedule.variable } else { meaning };
+    let text = format!("Scheduling variable: {meaning}");
+    let variable = Variable::real(&schedule.variable, text, |model: &mut AsoController| {
+        &mut model.schedule_input
+    });
+    let variable = with_unit(variable, schedule.unit.as_ref()).input();
+    Some(variable.derivative(|model: &mut AsoController| &mut model.schedule_slope))
+}
+
+/// The value of the scheduling variable that the last sample used.
+fn schedule_at(design: &Design) -> Option<Variable<AsoController>> {
+    let schedule = design.schedule.as_ref()?;
+    let unit = match schedule.measurement(design) {
+        Some(k) => design.measurements[k].unit.as_ref(),
+        None => schedule.unit.as_ref(),
+    };
+    let text = format!("{} of the last sample, held within the schedule", schedule.variable);
+    let variable =
+        Variable::real("schedule_at", text, |model: &mut AsoController| &mut model.schedule_at);
+    let initial = vec![schedule.variable.clone()];
+    Some(output(design, with_unit(variable, unit), Vec::new()).initially(initial))
 }
 
 fn commands(design: &Design) -> Vec<Variable<AsoController>> {

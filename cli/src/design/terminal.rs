@@ -1,7 +1,9 @@
 //! The summary of a design on the terminal.
 
 use design::Report;
+use design::family_report::MemberReport;
 use design::report::{CommandPeak, Loop, Matrix, ReferenceStep};
+use design::schedule_report::ScheduleReport;
 
 /// The most rows or columns of a gain that are printed; the design file has all.
 const LARGEST_SHOWN: usize = 16;
@@ -44,6 +46,24 @@ pub(crate) fn summarise(report: &Report) {
             tolerance.cases,
         );
     }
+    if let Some(found) = &report.family {
+        let members: Vec<_> = found.members.iter().collect();
+        print_members("member", &members);
+        match &found.whole {
+            Ok(found) => println!(
+                "one P for the whole family: proven for a plant that moves between its members in any \
+                 way, margin {:.1e}",
+                found.margin
+            ),
+            Err(reason) => println!(
+                "a plant that moves between the members: not proven ({reason}); the above is for \
+                 constant members"
+            ),
+        }
+    }
+    if let Some(found) = &report.schedule {
+        print_schedule(found);
+    }
     for check in report.checks.iter().filter(|check| !check.holds) {
         println!("does not hold: {} ({})", check.condition, check.explanation);
     }
@@ -55,6 +75,56 @@ pub(crate) fn summarise(report: &Report) {
     for reason in report.verdict.reasons.iter().filter(checked) {
         println!("    {reason}");
     }
+}
+
+/// Prints peaks of S and tolerances with each plant.
+fn print_members(kind: &str, members: &[&MemberReport]) {
+    for member in members {
+        let Some(own) = &member.margins else {
+            println!("{kind} {}: not stable", member.name);
+            continue;
+        };
+        let peaks: Vec<_> = own
+            .points
+            .iter()
+            .map(|point| format!("{} at the {}", number(point.judged), point.point))
+            .collect();
+        let tolerance = own.tolerance.as_ref().map_or(String::new(), |found| {
+            format!(
+                "; {} % of {} random cases are stable",
+                number(100.0 * found.stable),
+                found.cases
+            )
+        });
+        println!("{kind} {}: peak of S {}{tolerance}", member.name, peaks.join(", "));
+    }
+}
+
+fn print_schedule(found: &ScheduleReport) {
+    print_members("point", &found.points.iter().map(|point| &point.closed).collect::<Vec<_>>());
+    match (&found.any_rate, &found.bounded_rate) {
+        (Ok(own), _) => println!(
+            "schedule: proven between the points for any rate of {}, margin {:.1e}",
+            found.variable, own.margin
+        ),
+        (_, Ok(own)) => println!(
+            "schedule: proven between the points while {} changes by at most {} per s, margin {:.1e}",
+            found.variable,
+            number(own.rate),
+            own.margin
+        ),
+        (Err(any), Err(bounded)) => println!(
+            "schedule: not proven while {} changes (any rate: {any}; bounded rate: {bounded})",
+            found.variable
+        ),
+    }
+    println!(
+        "schedule: the worst of {} constant values is {} = {}, stability figure {}",
+        found.checked,
+        found.variable,
+        number(found.worst_at),
+        number(found.worst_instability)
+    );
 }
 
 /// Prints a gain, or only its size and its norm if it would fill more than a screen.

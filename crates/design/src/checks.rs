@@ -8,7 +8,7 @@ use super::report::Check;
 /// Relative size of the remaining fault effect below which the compensation counts as complete.
 const CANCELLED: f64 = 1e-9;
 /// Relative distance from an equilibrium below which an operating point counts as an equilibrium.
-const AT_REST: f64 = 1e-6;
+pub(crate) const AT_REST: f64 = 1e-6;
 
 /// Returns all conditions, each with its numerical value.
 pub(crate) fn checks(designed: &ControllerDesign) -> Vec<Check> {

@@ -7,8 +7,10 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::designed::{ControllerDesign, fault_names};
+use super::linear_plant::LinearPlant;
 use super::plant_file::PlantFile;
 use super::reporting::estimator;
+use super::schedule::Scheduled;
 use super::signals::{EntryPoint, Signal};
 use super::tracking::TrackingAction;
 
@@ -56,6 +58,16 @@ pub(crate) struct Entry {
     pub(crate) loss_of: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) least_command: Option<f64>,
+}
+
+/// The scheduling variable.
+#[derive(Serialize)]
+struct ScheduleEntry<'a> {
+    variable: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unit: Option<&'a str>,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    description: &'a str,
 }
 
 impl ControllerDesign {
@@ -117,7 +129,45 @@ impl ControllerDesign {
             Some(TrackingAction::Integral { windup: Some(l_w), .. }) => matrices.push(("L_w", l_w)),
             _ => {}
         }
-        head.render(&matrices)
+        let mut text = head.render(&matrices)?;
+        if let Some(schedule) = &self.schedule {
+            text += &self.schedule_text(schedule)?;
+        }
+        Ok(text)
+    }
+
+    /// Returns the table `[schedule]`: the variable, and matrices and operating point at each of its
+    /// values.
+    fn schedule_text(&self, schedule: &Scheduled) -> Result<String, crate::Error> {
+        let Signal { name, unit, description, .. } = &schedule.variable;
+        let own = ScheduleEntry { variable: name, unit: unit.as_deref(), description };
+        let unwritable = |error: toml::ser::Error| crate::Error::Invalid(error.to_string());
+        let mut text = format!("\n[schedule]\n{}", toml::to_string(&own).map_err(unwritable)?);
+        for (at, design) in schedule.points(self) {
+            text.extend(["\n[[schedule.points]]\nat = ", &format!("{at:?}"), "\n"]);
+            let LinearPlant { states, actuators, measurements, .. } = &design.linear;
+            let filtered = if design.filter.is_some() { &measurements[..] } else { &[] };
+            let x_op: Vec<_> = states.iter().chain(filtered).collect();
+            for (name, signals) in [
+                ("x_op", x_op),
+                ("u_op", actuators.iter().collect()),
+                ("y_op", measurements.iter().collect()),
+            ] {
+                let values: Vec<_> = signals
+                    .iter()
+                    .map(|signal| format!("{:?}", signal.operating.unwrap_or(0.0) + 0.0))
+                    .collect();
+                text.extend([name, " = [", &values.join(", "), "]\n"]);
+            }
+            let FaultyPlant { a, b, c, f_a, .. } = &design.plant;
+            let Gains { k_x, k_f, l_x, l_f, .. } = &design.gains;
+            let gains = [("K_x", k_x), ("K_f", k_f), ("L_x", l_x), ("L_f", l_f)];
+            for (name, matrix) in [("A", a), ("B", b), ("C", c), ("F_a", f_a)].iter().chain(&gains)
+            {
+                write_matrix(&mut text, name, matrix);
+            }
+        }
+        Ok(text)
     }
 
     fn signals(&self) -> impl Iterator<Item = &Signal> {
@@ -193,16 +243,21 @@ impl DesignFile<'_> {
         let mut text = String::new();
         text += &toml::to_string(&scalars).map_err(unwritable)?;
         for (name, matrix) in matrices {
-            text.extend(["\n", name, " = [\n"]);
-            for row in matrix.row_iter() {
-                let entries: Vec<_> =
-                    row.iter().map(|entry| format!("{:?}", entry + 0.0)).collect();
-                text.extend(["    [", &entries.join(", "), "],\n"]);
-            }
-            text += "]\n";
+            text += "\n";
+            write_matrix(&mut text, name, matrix);
         }
         text += "\n";
         text += &toml::to_string(&tables).map_err(unwritable)?;
         Ok(text)
     }
+}
+
+/// Writes a matrix, one row per line.
+fn write_matrix(text: &mut String, name: &str, matrix: &DMatrix<f64>) {
+    text.extend([name, " = [\n"]);
+    for row in matrix.row_iter() {
+        let entries: Vec<_> = row.iter().map(|entry| format!("{:?}", entry + 0.0)).collect();
+        text.extend(["    [", &entries.join(", "), "],\n"]);
+    }
+    *text += "]\n";
 }

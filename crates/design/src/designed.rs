@@ -1,5 +1,6 @@
 //! Computes the gains for a plant file.
 
+use super::family::{self, Family, common_feedback};
 use super::fixed_mode::{described, described_in};
 use super::gains::{FeedbackProblem, GainResult, Refusal, feedback, observer};
 use super::linear_plant::LinearPlant;
@@ -7,6 +8,7 @@ use super::norm_gains::ObserverProblem;
 use super::plant_file::PlantFile;
 use super::plausibility::{check_faults, check_limits};
 use super::requirements::{Request, Requirement};
+use super::schedule::Scheduled;
 use super::tracking::{
     DesignLoop, Tracking, check_references, decay, feedback_pair, integral_action,
 };
@@ -56,6 +58,8 @@ pub(crate) struct ControllerDesign {
     pub(crate) instability: f64,
     /// The same for the observer error before `t_on`, if the faults are not estimated then.
     pub(crate) instability_before: Option<f64>,
+    pub(crate) family: Option<Family>,
+    pub(crate) schedule: Option<Scheduled>,
 }
 
 /// Designs the controller for `file`.
@@ -75,7 +79,17 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
     let states = extended.states;
     let own = (plant.a.view((0, 0), (states, states)).into_owned(), plant.b.rows(0, states).into());
     let pair = feedback_pair(references, [&own.0, &own.1, c], domain)?;
-    let (feedback, observer) = compute_gains((file, &linear), &extended, (&plant, &pair), domain)?;
+    let members = family::members(file, &linear, &mut warnings)?;
+    let common = match &file.feedback.requirement {
+        Requirement::Region(region) if !members.is_empty() => {
+            let found = common_feedback((&linear, &members), *region, domain);
+            Some(found.map_err(|refusal| feedback_refused((file, &linear), domain, refusal))?)
+        }
+        _ => None,
+    };
+    let (common, certificate) = common.unzip();
+    let problem = (&plant, &pair, common);
+    let (feedback, observer) = compute_gains((file, &linear), &extended, problem, domain)?;
     let n = plant.a.nrows();
     let gains = Gains {
         estimator: estimator(file),
@@ -91,7 +105,10 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
     let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
     let controlled = &pair.0 + &pair.1 * &feedback.gain;
     let tracking = Tracking::of(file, (&linear, (&own.0, &own.1)), (&gains, &controlled), domain)?;
+    let schedule = Scheduled::of(file, &linear)?;
     Ok(ControllerDesign {
+        family: (!members.is_empty()).then_some(Family { members, feedback: certificate }),
+        schedule,
         cancellation_residual: cancellation_residual(&extended)?,
         instability_before: if file.t_on > 0.0 && !file.monitor {
             Some(instability(&gains.state_error_dynamics(&plant), domain)?)
@@ -145,7 +162,7 @@ fn in_domain(
 fn compute_gains(
     (file, linear): (&PlantFile<'_>, &LinearPlant),
     extended: &ExtendedPlant,
-    (plant, (a, b)): (&FaultyPlant, &(DMatrix<f64>, DMatrix<f64>)),
+    (plant, (a, b), common): (&FaultyPlant, &(DMatrix<f64>, DMatrix<f64>), Option<GainResult>),
     domain: Domain,
 ) -> Result<(GainResult, GainResult), PlaceError> {
     let n = extended.states;
@@ -156,11 +173,11 @@ fn compute_gains(
         c: &linear.c.clone().resize_horizontally(order, 0.0),
         f_a: &plant.f_a.rows(0, n).into_owned().resize_vertically(order, 0.0),
     };
-    let feedback = feedback(&file.feedback.requirement, &problem, domain).map_err(|refusal| {
-        let names = feedback_states(file, linear);
-        let meaning = if order > n { "states and integrals of references" } else { "states" };
-        refused((file, domain), &file.feedback, refusal, (order, meaning), |at| names[at].clone())
-    })?;
+    let feedback = match common {
+        Some(common) => common,
+        None => feedback(&file.feedback.requirement, &problem, domain)
+            .map_err(|refusal| feedback_refused((file, linear), domain, refusal))?,
+    };
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let filter = sampled::filter(extended, domain);
     let problem = ObserverProblem {
@@ -178,6 +195,17 @@ fn compute_gains(
         refused((file, domain), &file.observer, refusal, order, |at| names[at].clone())
     })?;
     Ok((feedback, observer))
+}
+
+fn feedback_refused(
+    (file, linear): (&PlantFile<'_>, &LinearPlant),
+    domain: Domain,
+    refusal: Refusal,
+) -> PlaceError {
+    let names = feedback_states(file, linear);
+    let more = names.len() > linear.states.len();
+    let meaning = if more { "states and integrals of references" } else { "states" };
+    refused((file, domain), &file.feedback, refusal, (names.len(), meaning), |at| names[at].clone())
 }
 
 /// Returns the part of the faults' effect on the plant's states that the compensation leaves,

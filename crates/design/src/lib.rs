@@ -17,6 +17,8 @@ mod controller_fmu;
 mod design_file;
 mod designed;
 mod error;
+mod family;
+pub mod family_report;
 mod fixed_mode;
 mod gains;
 mod identity;
@@ -36,10 +38,13 @@ mod responses;
 pub mod robust_report;
 mod robustness;
 mod robustness_limits;
+mod schedule;
+pub mod schedule_report;
 mod signals;
 #[cfg(test)]
 mod tests;
 mod tracking;
+mod variants;
 mod worst_case;
 
 use std::path::{Path, PathBuf};

@@ -3,6 +3,7 @@
 mod certificate;
 mod chart;
 mod curves;
+mod family;
 mod loops;
 mod matrix;
 mod number;
@@ -98,6 +99,8 @@ fn sections(report: &Report) -> Vec<Section> {
         (true, "poles", "Eigenvalues", loops::poles(report)),
         (true, "conditioning", "Condition and pole errors", loops::conditioning(report)),
         (report.robustness.is_some(), "robustness", "Robustness", robustness::robustness(report)),
+        (report.family.is_some(), "family", "Family of plants", family::family(report)),
+        (report.schedule.is_some(), "schedule", "Schedule", family::schedule(report)),
         (!report.frequency.is_empty(), "frequency", "Singular values", curves::frequencies(report)),
         (!report.references.is_empty(), "references", "References", references::references(report)),
         (!report.steps.is_empty(), "steps", "Sudden faults", curves::responses(report)),

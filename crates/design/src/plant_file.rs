@@ -13,9 +13,11 @@ use super::robustness_limits::RobustnessLimits;
 use super::signals::{
     EntryPoint, Fault, Signal, all_actuator_faults, description, faults, signals,
 };
+use super::variants::{self, Schedule, Variant};
 use files::{Entry, Place, PlaceError, Source, Table};
 
 /// A plant file whose entries are valid and consistent.
+#[derive(Clone)]
 pub(crate) struct PlantFile<'a> {
     source: &'a Source,
     /// The places of entries, for errors of later steps.
@@ -39,9 +41,13 @@ pub(crate) struct PlantFile<'a> {
     pub(crate) stop_time: Option<f64>,
     pub(crate) step_size: Option<f64>,
     pub(crate) robustness: RobustnessLimits,
+    /// Plants that the same gains serve, besides the one of the file.
+    pub(crate) family: Vec<Variant>,
+    pub(crate) schedule: Option<Schedule>,
 }
 
 /// The source of the plant's matrices.
+#[derive(Clone)]
 pub(crate) enum Model {
     /// The file states the matrices.
     Matrices {
@@ -56,6 +62,7 @@ pub(crate) enum Model {
 }
 
 /// The FMU of a plant and its operating point.
+#[derive(Clone)]
 pub(crate) struct PlantFmu {
     pub(crate) path: PathBuf,
     /// Values of variables at the operating point.
@@ -77,7 +84,7 @@ pub(crate) struct Sampling {
     pub(crate) current: bool,
 }
 
-const KEYS: [&str; 25] = [
+const KEYS: [&str; 27] = [
     "description",
     "t_on",
     "monitor",
@@ -103,6 +110,8 @@ const KEYS: [&str; 25] = [
     "robustness",
     "reference",
     "D",
+    "family",
+    "schedule",
 ];
 /// Entries that errors of later steps point at.
 const PLACES: [&str; 18] = [
@@ -168,6 +177,8 @@ impl<'a> PlantFile<'a> {
             stop_time: time("stop_time")?,
             step_size: time("step_size")?,
             robustness: RobustnessLimits::read(file, measurements.len())?,
+            family: variants::family(file, &model)?,
+            schedule: variants::schedule(file, &model, &measurements)?,
             model,
             actuators,
             measurements,

@@ -9,6 +9,7 @@ use super::designed::FAULTS;
 use super::linear_plant::LinearPlant;
 use super::plant_file::{Model, PlantFile};
 use super::signals::{EntryPoint, Fault, FaultDynamics, Signal};
+use super::variants::Variable;
 use control::faults::ExtendedPlant;
 
 /// A column counts as a combination of others if they leave less than this of its length; rows and
@@ -24,7 +25,13 @@ const MATRICES: [&str; 8] = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f"];
 pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
     let own = OwnVariables::of(file);
     let references = file.references.as_ref().map_or(&[][..], |references| &references.signals);
-    for signal in file.actuators.iter().chain(&file.measurements).chain(references) {
+    for signal in file
+        .actuators
+        .iter()
+        .chain(&file.measurements)
+        .chain(references)
+        .chain(schedule_input(file))
+    {
         let name = &signal.name;
         if !is_structured_name(name) {
             let message = format!(
@@ -62,25 +69,52 @@ pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
             return Err(at_name(file, signal, message));
         }
     }
+    if let Some(input) = schedule_input(file)
+        && file.actuators.iter().any(|actuator| actuator.name == input.name)
+    {
+        let message = format!(
+            "the scheduling variable `{}` is an actuator; expected a measurement, or another name",
+            input.name
+        );
+        return Err(at_name(file, input, message));
+    }
     check_arrays(file, references)?;
     check_fault_names(file)
 }
 
-/// Checks that the elements of each array are adjacent and in order. In the FMU, references and
-/// `compensate` are between measurements and actuators.
+/// The input of the controller FMU that selects its gains, if it is no measurement.
+fn schedule_input<'a>(file: &'a PlantFile<'_>) -> Option<&'a Signal> {
+    match &file.schedule.as_ref()?.variable {
+        Variable::Input(signal) => Some(signal),
+        Variable::Measurement(_) => None,
+    }
+}
+
+/// Checks that the elements of each array are adjacent and in order. In the FMU, references,
+/// `compensate` and the input of a schedule are between measurements and actuators.
 fn check_arrays(file: &PlantFile<'_>, references: &[Signal]) -> Result<(), PlaceError> {
     let names = |signals: &'_ [Signal]| signals.iter().map(|s| s.name.clone()).collect::<Vec<_>>();
     let mut all = names(&file.measurements);
     all.extend(names(references));
     all.push("compensate".to_owned());
+    let scheduled = schedule_input(file);
+    all.extend(scheduled.map(|signal| signal.name.clone()));
     all.extend(names(&file.actuators));
     let Some((at, text)) = misplaced_elements(all.iter().map(String::as_str)).into_iter().next()
     else {
         return Ok(());
     };
-    let mut inputs = file.measurements.iter().chain(references);
-    let before = file.measurements.len() + references.len() + 1;
-    let signal = inputs.nth(at).unwrap_or_else(|| &file.actuators[at - before]);
+    let inputs = file
+        .measurements
+        .iter()
+        .chain(references)
+        .map(Some)
+        .chain([None])
+        .chain(scheduled.map(Some));
+    let mut signals = inputs.chain(file.actuators.iter().map(Some));
+    let Some(signal) = signals.nth(at).flatten() else {
+        return Err(file.error(&["actuators", "measurements"], text));
+    };
     let message =
         format!("in the controller FMU the {text}; expected another order or other names");
     Err(at_name(file, signal, message))
@@ -140,6 +174,9 @@ impl OwnVariables {
         };
         if file.sampling.is_some() {
             own.scalars.extend(["T_s", "sample_clock"]);
+        }
+        if file.schedule.is_some() {
+            own.scalars.push("schedule_at");
         }
         if ramps > 0 {
             own.matrices.push("A_f");

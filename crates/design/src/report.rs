@@ -5,7 +5,9 @@ use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::{Serialize, Serializer};
 
+use super::family_report::FamilyReport;
 use super::robust_report::{Number, Robustness, Verdict};
+use super::schedule_report::ScheduleReport;
 
 /// The data of a design report.
 #[derive(Serialize, JsonSchema)]
@@ -32,6 +34,10 @@ pub struct Report {
     pub sampling: Option<Sampled>,
     /// Margins, noise, tolerances; none if the loop is not stable.
     pub robustness: Option<Robustness>,
+    /// The members of the family of plants; none if the plant file states none.
+    pub family: Option<FamilyReport>,
+    /// The schedule of the gains; none if the plant file states none.
+    pub schedule: Option<ScheduleReport>,
     /// Theorem 1 and related certificates.
     pub certificate: Certificate,
     /// Bounds of the errors, one entry for each pair of a fault and an error.
@@ -379,7 +385,7 @@ pub struct Variable {
 #[derive(JsonSchema)]
 #[schemars(untagged)]
 #[expect(dead_code, reason = "describes the form only")]
-enum OrReason<T> {
+pub(crate) enum OrReason<T> {
     /// The value.
     Found(T),
     /// Why there is none.
@@ -415,7 +421,7 @@ fn close(schema: &mut serde_json::Value) {
 }
 
 /// Serializes a value, or `{ "reason": ... }` if there is none.
-fn or_reason<T: Serialize, S: Serializer>(
+pub(crate) fn or_reason<T: Serialize, S: Serializer>(
     found: &Result<T, String>,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {

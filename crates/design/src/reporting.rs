@@ -16,6 +16,7 @@ use super::budget::Budget;
 use super::certificate::certificate;
 use super::checks::checks;
 use super::designed::{ControllerDesign, fault_names};
+use super::family_report::{self, judge};
 use super::gains::GainResult;
 use super::page::rounded;
 use super::parameters::ParameterFamily;
@@ -28,6 +29,7 @@ use super::report::{
 use super::requirements::{self, Requirement};
 use super::responses::responses;
 use super::robustness::{robustness, verdict};
+use super::schedule_report::{self, judge_schedule};
 use super::signals::{self, EntryPoint, Fault, FaultDynamics};
 use super::tracking::{DesignLoop, TrackingAction};
 
@@ -48,6 +50,16 @@ pub(crate) fn report(
     let budget = Budget::start(certificate_time);
     let certificate = certificate(designed, loops.norms()?, &budget);
     let (bounds, left_out) = loops.bounds(&budget)?;
+    let family_report = family_report::family(designed, &file.robustness, &budget)?;
+    let schedule = schedule_report::schedule(designed, &file.robustness, &budget)?;
+    let mut verdict = verdict(&checks, robustness.as_ref(), &file.robustness);
+    if let Some(found) = &family_report {
+        let members: Vec<_> = found.members.iter().skip(1).collect();
+        judge(&mut verdict, "member", &members, &file.robustness);
+    }
+    if let Some(found) = &schedule {
+        judge_schedule(&mut verdict, designed, found, &file.robustness);
+    }
     let mut warnings: Vec<_> =
         designed.warnings.iter().map(|warning| line(file, warning)).collect();
     warnings.extend(references.iter().filter_map(beyond_limits));
@@ -59,7 +71,7 @@ pub(crate) fn report(
         description,
         plant_file: file.name(),
         plant: self::plant(designed, &names)?,
-        verdict: verdict(&checks, robustness.as_ref(), &file.robustness),
+        verdict,
         warnings,
         checks,
         robustness,
@@ -83,6 +95,8 @@ pub(crate) fn report(
                 estimator: estimator(designed.gains.estimator).to_owned(),
             }),
         },
+        family: family_report,
+        schedule,
         certificate,
         bounds,
         steps: responses(designed)?,
@@ -100,6 +114,11 @@ pub(crate) fn estimator(estimator: Estimator) -> &'static str {
         Estimator::Current => "current",
         Estimator::Prediction => "prediction",
     }
+}
+
+/// Returns the gains of a design.
+pub(crate) fn gains(designed: &ControllerDesign) -> Vec<Matrix> {
+    Names::of(designed).gains(designed)
 }
 
 /// Names of the rows and columns of the matrices.
@@ -346,6 +365,18 @@ fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
             "Commands are constant over a sample time of {period} s; in the responses a \
              fault changes at samples; states and commands are shown between them, too."
         ));
+    }
+    if designed.family.is_some() {
+        all.push(
+            "Responses, bounds and certificates of the estimation errors are those of the nominal              plant; the estimation error of another member also depends on its states."
+                .to_owned(),
+        );
+    }
+    if designed.schedule.is_some() {
+        all.push(
+            "Gains, responses and bounds are those of the plant of the file; between the points of the              schedule, plant and controller are interpolated linearly. A change of the operating point              acts like a disturbance."
+                .to_owned(),
+        );
     }
     if designed.linear.models.iter().any(|m| matches!(m.entry, FaultEntry::LossOfEffectiveness(_)))
     {

@@ -42,22 +42,8 @@ pub(crate) fn robustness(
     }
     let physical = Physical::of(designed)?;
     let own = physical.closed(&physical.controller)?;
-    let point = |(point, name): (Point, &str)| {
-        let signals = match point {
-            Point::Input => &designed.linear.actuators,
-            Point::Output => &designed.linear.measurements,
-        };
-        self::point(&own, point, name, signals)
-    };
-    let points = POINTS.into_iter().map(point).collect::<Result<Vec<_>, _>>()?;
-    let (delay, hold) = match designed.domain {
-        Domain::Continuous => (delay_margin(&own)?, longest_hold(&own)?),
-        Domain::Sampled { .. } => (
-            sampled_delay_margin(&physical.plant, &physical.controller)?,
-            longest_period(&physical.plant, &physical.controller)?,
-        ),
-    };
-    let (noise, noise_together) = noise(designed, &own, &physical.estimates, limits)?;
+    let Margins { points, delay, hold, noise, noise_together } =
+        margins(designed, &physical, &own, limits)?;
     let slopes = slopes(&designed.linear, &physical, &points)?;
     let (comparison, tolerance) = rayon::join(
         || comparison(designed, &physical, &points),
@@ -80,17 +66,57 @@ pub(crate) fn robustness(
     }))
 }
 
+/// The margins of a loop, and what the noise of the measurements does in it.
+pub(crate) struct Margins {
+    pub(crate) points: Vec<LoopPoint>,
+    /// Delay margin and longest hold, s.
+    pub(crate) delay: f64,
+    pub(crate) hold: f64,
+    pub(crate) noise: Matrix,
+    pub(crate) noise_together: Vec<Number>,
+}
+
+/// Returns the margins of `own`, the loop of the controller and `physical`, which is stable.
+pub(crate) fn margins(
+    designed: &ControllerDesign,
+    physical: &Physical,
+    own: &Loop,
+    limits: &RobustnessLimits,
+) -> Result<Margins, crate::Error> {
+    let point = |(point, name): (Point, &str)| {
+        let signals = match point {
+            Point::Input => &designed.linear.actuators,
+            Point::Output => &designed.linear.measurements,
+        };
+        self::point(own, point, name, signals)
+    };
+    let points = POINTS.into_iter().map(point).collect::<Result<Vec<_>, _>>()?;
+    let (delay, hold) = match designed.domain {
+        Domain::Continuous => (delay_margin(own)?, longest_hold(own)?),
+        Domain::Sampled { .. } => (
+            sampled_delay_margin(&physical.plant, &physical.controller)?,
+            longest_period(&physical.plant, &physical.controller)?,
+        ),
+    };
+    let (noise, noise_together) = noise(designed, own, &physical.estimates, limits)?;
+    Ok(Margins { points, delay, hold, noise, noise_together })
+}
+
 /// The plant without filters, and the controller with its filters and integrals.
-struct Physical {
-    plant: StateSpace,
-    controller: StateSpace,
+pub(crate) struct Physical {
+    pub(crate) plant: StateSpace,
+    pub(crate) controller: StateSpace,
     /// The controller with the estimated faults as its output.
     estimates: StateSpace,
 }
 
 impl Physical {
     fn of(designed: &ControllerDesign) -> Result<Self, Error> {
-        let linear = &designed.linear;
+        Self::with(designed, &designed.linear)
+    }
+
+    /// Another plant with the same controller.
+    pub(crate) fn with(designed: &ControllerDesign, linear: &LinearPlant) -> Result<Self, Error> {
         let plant = StateSpace {
             a: linear.a.clone(),
             b: linear.b.clone(),
@@ -109,7 +135,7 @@ impl Physical {
         Ok(Self { plant, controller: commands, estimates })
     }
 
-    fn closed(&self, controller: &StateSpace) -> Result<Loop, Error> {
+    pub(crate) fn closed(&self, controller: &StateSpace) -> Result<Loop, Error> {
         let mut plant = self.plant.clone();
         if let Domain::Sampled { period } = controller.domain {
             (plant.a, plant.b) = zero_order_hold(&plant.a, &plant.b, period)?;
@@ -330,7 +356,7 @@ fn norm(m: &DMatrix<f64>) -> f64 {
 }
 
 /// Returns what the loop does while the entries of the plant's matrices vary.
-fn by_entries(
+pub(crate) fn by_entries(
     designed: &ControllerDesign,
     physical: &Physical,
     limits: &RobustnessLimits,

@@ -46,7 +46,8 @@ pub(crate) fn plant_file(
 
 /// Replaces what refers to the plant's FMU; false if a fault cannot be stated without it.
 fn without_fmu(table: &mut Table, designed: &ControllerDesign) -> bool {
-    for key in ["plant", "operating_point", "preload", "linearisation_step"] {
+    // Members and points of a schedule are linearised from the FMU.
+    for key in ["plant", "operating_point", "preload", "linearisation_step", "family", "schedule"] {
         table.remove(key);
     }
     let linear = &designed.linear;

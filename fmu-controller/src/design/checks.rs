@@ -18,6 +18,7 @@ impl Design {
             return Err(DesignError::Entry { path: path.to_owned(), what });
         }
         self.check_shapes(path)?;
+        self.check_schedule(path)?;
         let refused = self.refused_number().or_else(|| self.refused_signal());
         match refused.or_else(|| self.refused_time()) {
             Some((what, value, rule)) => {
@@ -70,6 +71,68 @@ impl Design {
             }),
             _ => Ok(()),
         }
+    }
+
+    /// Checks the grid of a schedule, and the shapes and numbers at its points.
+    fn check_schedule(&self, path: &str) -> Result<(), DesignError> {
+        let Some(schedule) = &self.schedule else { return Ok(()) };
+        let refuse = |what: String| Err(DesignError::Entry { path: path.to_owned(), what });
+        if self.sample_time.is_none() {
+            return refuse("schedule is stated and sample_time is not".to_owned());
+        }
+        let others = [
+            (!self.references.is_empty(), "references"),
+            (self.p_f.is_some(), "P_f"),
+            (self.sliding_mode.is_some(), "sliding_mode"),
+        ];
+        if let Some((_, other)) = others.iter().find(|(stated, _)| *stated) {
+            return refuse(format!("schedule and {other} are stated, expected one of them"));
+        }
+        if schedule.points.len() < 2 {
+            return refuse("schedule: expected at least two points".to_owned());
+        }
+        let mut last = f64::NEG_INFINITY;
+        for (at, point) in schedule.points.iter().enumerate() {
+            let place = format!("point {} of the schedule", at + 1);
+            if !(point.at > last && point.at.is_finite()) {
+                return refuse(format!(
+                    "{place}: at = {}, expected a finite number above {last}",
+                    point.at
+                ));
+            }
+            last = point.at;
+            for ((name, own), (_, expected)) in point.matrices().into_iter().zip(self.matrices()) {
+                if (own.rows, own.columns) != (expected.rows, expected.columns) {
+                    return refuse(format!(
+                        "{place}: {name} is {} x {}, expected {} x {}",
+                        own.rows, own.columns, expected.rows, expected.columns
+                    ));
+                }
+                if let Some(k) = own.values.iter().position(|value| !value.is_finite()) {
+                    let name = own.element(name, k);
+                    return refuse(format!("{place}: {name} is not a finite number"));
+                }
+            }
+            let lists = [
+                ("x_op", &point.x_op, self.states.len()),
+                ("u_op", &point.u_op, self.actuators.len()),
+                ("y_op", &point.y_op, self.measurements.len()),
+            ];
+            for (name, values, expected) in lists {
+                if values.len() != expected || values.iter().any(|value| !value.is_finite()) {
+                    return refuse(format!("{place}: {name}: expected {expected} finite numbers"));
+                }
+            }
+            for (actuator, value) in self.actuators.iter().zip(&point.u_op) {
+                if actuator.limits.is_some_and(|[low, high]| *value < low || *value > high) {
+                    let name = &actuator.name;
+                    return refuse(format!(
+                        "{place}: u_op of {name} is {value}, outside of its limits"
+                    ));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Describes the first entry that is missing, not allowed, or without its counterpart.

@@ -44,6 +44,10 @@ pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {
     all.extend(operating_point(design));
     all.extend(limits(design));
     all.extend(sliding_mode(design));
+    if design.schedule.is_some() {
+        // The matrices depend on the scheduling variable.
+        return all;
+    }
     for (name, matrix) in design.matrices() {
         let (meaning, place) = described(name);
         all.extend((0..matrix.values.len()).map(|k| {

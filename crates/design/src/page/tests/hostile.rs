@@ -296,6 +296,8 @@ pub(super) fn hostile() -> Report {
             .collect(),
         frequency: vec![frequency(3), frequency(1)],
         references: references(),
+        family: None,
+        schedule: None,
         effectiveness: vec![Effectiveness {
             actuator: QUOTES.to_owned(),
             largest_stable_loss: 0.625_125,
@@ -375,6 +377,8 @@ pub(super) fn bare() -> Report {
         steps: Vec::new(),
         references: Vec::new(),
         frequency: Vec::new(),
+        family: None,
+        schedule: None,
         effectiveness: Vec::new(),
         assumptions: Vec::new(),
         interface: Vec::new(),

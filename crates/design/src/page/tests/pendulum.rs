@@ -294,6 +294,8 @@ pub(super) fn pendulum() -> Report {
         steps: vec![design.step(60.0)],
         references: Vec::new(),
         frequency: design.frequencies(),
+        family: None,
+        schedule: None,
         effectiveness: Vec::new(),
         assumptions: vec![
             "The plant is linear around its operating point.".to_owned(),

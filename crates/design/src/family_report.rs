@@ -1,0 +1,213 @@
+//! The part of a design report on the members of a family of plants.
+
+use control::lmi::{self, Outcome, RegionCertificate, certify_common};
+use control::stability::instability;
+use control::{Domain, Error};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::budget::Budget;
+use super::designed::ControllerDesign;
+use super::family::{NOMINAL, name};
+use super::linear_plant::LinearPlant;
+use super::report::{OrReason, or_reason, rows};
+use super::robust_report::{Level, LoopPoint, Number, ToleranceResult, Verdict};
+use super::robustness::{Margins, Physical, by_entries, margins};
+use super::robustness_limits::RobustnessLimits;
+
+/// A family of plants with one controller.
+#[derive(Serialize, JsonSchema)]
+pub struct FamilyReport {
+    /// The plant of the file, `nominal`, then the others.
+    pub members: Vec<MemberReport>,
+    /// One P for the state feedback loops `A_i + B_i K_x` of all members; none if the feedback was
+    /// designed for the nominal plant.
+    pub feedback: Option<CommonCertificate>,
+    /// One P for the loops of all members with the whole controller: the loop is stable while the
+    /// plant moves between the members, in any way and arbitrarily fast; in a sampled design from one
+    /// sample to the next. Or the reason why there is none; each constant member is judged by its
+    /// eigenvalues.
+    #[serde(serialize_with = "or_reason")]
+    #[schemars(with = "OrReason<CommonCertificate>")]
+    pub whole: Result<CommonCertificate, String>,
+}
+
+/// A Lyapunov matrix for several loops.
+#[derive(Serialize, JsonSchema)]
+pub struct CommonCertificate {
+    /// The matrix P, row by row. For the whole loop in the order: states of the plant, filtered
+    /// measurements, estimates of the states, estimates of the faults.
+    pub p: Vec<Vec<f64>>,
+    /// Margin of the inequalities of all members, relative; larger than the rounding errors.
+    pub margin: f64,
+}
+
+/// A plant with the controller.
+#[derive(Serialize, JsonSchema)]
+pub struct MemberReport {
+    /// Its name.
+    pub name: String,
+    /// Largest real part of the eigenvalues of plant and controller together, 1/s, or largest modulus
+    /// less 1; negative if stable.
+    pub instability: f64,
+    /// Margins, noise and tolerances; none if the loop is not stable.
+    pub margins: Option<MemberMargins>,
+}
+
+/// Margins of a plant with the controller.
+#[derive(Serialize, JsonSchema)]
+pub struct MemberMargins {
+    /// The loop opened at the commands and at the measurements.
+    pub points: Vec<LoopPoint>,
+    /// Largest delay, s, common to all commands.
+    #[schemars(with = "Option<f64>")]
+    pub delay_margin: f64,
+    /// The longest time, s, over which the signals may be held, or longest sample time.
+    #[schemars(with = "Option<f64>")]
+    pub longest_hold: f64,
+    /// Root-mean-square values of commands and estimated faults under the noise of all measurements.
+    pub noise_together: Vec<Number>,
+    /// Stability while the entries of this plant vary within the tolerances of the plant file; none
+    /// if parameters of an FMU vary, which is tested for the nominal plant.
+    pub tolerance: Option<ToleranceResult>,
+}
+
+/// Returns the report on the family of `designed`, if it has one.
+pub(crate) fn family(
+    designed: &ControllerDesign,
+    limits: &RobustnessLimits,
+    budget: &Budget,
+) -> Result<Option<FamilyReport>, crate::Error> {
+    let Some(own) = &designed.family else { return Ok(None) };
+    let nominal = (NOMINAL.to_owned(), &designed.linear);
+    let others = own.members.iter().map(|member| (member.name.clone(), &member.linear));
+    let all: Vec<_> = std::iter::once(nominal).chain(others).collect();
+    let one = |(name, linear): &(String, &LinearPlant)| {
+        let found = member(designed, linear, name.clone(), limits);
+        found.map_err(|error| error.within(format!("member `{name}` of the family")))
+    };
+    let members = all.par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
+    let closed = |(_, linear): &(String, &LinearPlant)| {
+        let physical = Physical::with(designed, linear)?;
+        Ok(physical.closed(&physical.controller)?.dynamics())
+    };
+    let loops = all.iter().map(closed).collect::<Result<Vec<_>, Error>>()?;
+    let named = |at: usize| name(&own.members, at).to_owned();
+    Ok(Some(FamilyReport {
+        members,
+        feedback: own.feedback.as_ref().map(CommonCertificate::of),
+        whole: common(&loops, designed.domain, budget, named)?,
+    }))
+}
+
+/// Returns margins, noise and tolerances of `linear` with the controller of `designed`.
+pub(crate) fn member(
+    designed: &ControllerDesign,
+    linear: &LinearPlant,
+    name: String,
+    limits: &RobustnessLimits,
+) -> Result<MemberReport, crate::Error> {
+    let physical = Physical::with(designed, linear)?;
+    let own = physical.closed(&physical.controller)?;
+    let instability = instability(&own.dynamics(), designed.domain)?;
+    if instability >= 0.0 {
+        return Ok(MemberReport { name, instability, margins: None });
+    }
+    let Margins { points, delay, hold, noise_together, .. } =
+        margins(designed, &physical, &own, limits)?;
+    let tolerance = limits.parameters.is_empty().then(|| by_entries(designed, &physical, limits));
+    let margins = MemberMargins {
+        points,
+        delay_margin: delay,
+        longest_hold: hold,
+        noise_together,
+        tolerance: tolerance.transpose()?,
+    };
+    Ok(MemberReport { name, instability, margins: Some(margins) })
+}
+
+/// One P for all loops, or the reason why there is none.
+pub(crate) fn common(
+    loops: &[DMatrix<f64>],
+    domain: Domain,
+    budget: &Budget,
+    name: impl Fn(usize) -> String,
+) -> Result<Result<CommonCertificate, String>, Error> {
+    if budget.is_over() {
+        return Ok(Err(format!("it was {}", budget.reason())));
+    }
+    Ok(match certify_common(loops, &lmi::Region::default(), domain)? {
+        Outcome::Optimal(found) => Ok(CommonCertificate::of(&found)),
+        Outcome::Infeasible { conflict } => {
+            let mut names: Vec<_> = conflict.into_iter().map(name).collect();
+            names.dedup();
+            Err(format!("no P serves these together: {}", names.join(", ")))
+        }
+        Outcome::Inconclusive(reason) => Err(reason.to_owned()),
+    })
+}
+
+impl CommonCertificate {
+    pub(crate) fn of(found: &RegionCertificate) -> Self {
+        Self { p: rows(&found.p), margin: found.margin }
+    }
+}
+
+/// Judges the worst of several plants with the controller; `kind` names them in the reasons.
+pub(crate) fn judge(
+    verdict: &mut Verdict,
+    kind: &str,
+    members: &[&MemberReport],
+    limits: &RobustnessLimits,
+) {
+    let unstable = members.iter().filter(|member| member.margins.is_none());
+    let unstable: Vec<_> = unstable.map(|member| member.name.as_str()).collect();
+    if !unstable.is_empty() {
+        let names = unstable.join(", ");
+        verdict.add(Level::Red, format!("the loop is not stable with the {kind} {names}"));
+    }
+    let stable = || members.iter().filter_map(|own| Some((&own.name, own.margins.as_ref()?)));
+    let peaks = stable().flat_map(|(name, own)| own.points.iter().map(move |point| (name, point)));
+    if let Some((name, point)) = peaks.max_by(|x, y| x.1.judged.total_cmp(&y.1.judged)) {
+        let peak = point.judged;
+        let reached = match peak {
+            peak if peak > limits.red => Some((limits.red, Level::Red)),
+            peak if peak > limits.amber => Some((limits.amber, Level::Amber)),
+            _ => None,
+        };
+        if let Some((limit, level)) = reached {
+            let text = format!(
+                "the peak of S at the {} with the {kind} {name} is {peak:.3}, above {limit} ({})",
+                point.point,
+                level.word()
+            );
+            verdict.add(level, text);
+        }
+    }
+    let tolerances = stable().filter_map(|(name, own)| Some((name, own.tolerance.as_ref()?)));
+    let worst = tolerances
+        .filter(|(_, found)| found.stable < 1.0 || found.worst_instability >= 0.0)
+        .min_by(|x, y| x.1.first_unstable.total_cmp(&y.1.first_unstable));
+    if let Some((name, found)) = worst {
+        let text = format!(
+            "parameters within their tolerances make the loop with the {kind} {name} unstable: {:.1} % \
+             of {} random cases, the worst case found from {:.3} of the tolerances on",
+            100.0 * (1.0 - found.stable),
+            found.cases,
+            found.first_unstable
+        );
+        verdict.add(Level::Red, text);
+    }
+}
+
+impl Verdict {
+    /// Adds a reason; the level is the worse one.
+    pub(crate) fn add(&mut self, level: Level, reason: String) {
+        if self.level != Level::Red && level != Level::Green {
+            self.level = level;
+        }
+        self.reasons.push(reason);
+    }
+}

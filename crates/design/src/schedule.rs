@@ -1,0 +1,292 @@
+//! The designs at the points of a schedule, and the loop between them.
+
+use control::aso::{FaultyPlant, Gains};
+use control::controller::complete_controller;
+use control::hold::zero_order_hold;
+use control::lmi::{Interval, bernstein};
+use control::robustness::Loop;
+use control::stability::instability;
+use control::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
+
+use super::designed::{self, ControllerDesign};
+use super::family::check_states;
+use super::linear_plant::LinearPlant;
+use super::plant_file::PlantFile;
+use super::signals::Signal;
+use super::variants::{Schedule, Variable};
+
+/// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p`.
+const DEGREE: u32 = 4;
+
+/// The designs of a scheduled controller.
+pub(crate) struct Scheduled {
+    /// The scheduling variable.
+    pub(crate) variable: Signal,
+    /// The position of the measurement that it is.
+    pub(crate) measurement: Option<usize>,
+    /// Largest rate of the variable, per s.
+    pub(crate) rate_bound: Option<f64>,
+    /// Values of the variable, ascending, each with its design: None for the plant of the file.
+    points: Vec<(f64, Option<ControllerDesign>)>,
+}
+
+/// The matrices at a value of the scheduling variable.
+struct Point {
+    /// The sampled plant without filters.
+    physical: StateSpace,
+    /// The model in the observer, and the gains.
+    model: FaultyPlant,
+    gains: Gains,
+}
+
+impl Scheduled {
+    /// Designs the controller at each point of the schedule of `file`.
+    pub(crate) fn of(
+        file: &PlantFile<'_>,
+        nominal: &LinearPlant,
+    ) -> Result<Option<Self>, crate::Error> {
+        let Some(schedule) = &file.schedule else { return Ok(None) };
+        let variable = schedule.variable(&file.measurements).clone();
+        let mut points = Vec::with_capacity(schedule.points.len());
+        for (at, point) in schedule.points.iter().enumerate() {
+            if at == schedule.nominal {
+                points.push((point.at, None));
+                continue;
+            }
+            let own = designed::design(&file.with(&point.plant)).map_err(|error| {
+                error.within(format!("schedule with {} = {}", variable.name, point.at))
+            })?;
+            check_states(file, &point.plant, (nominal, &own.linear))?;
+            if own.gains.p_f.is_some() {
+                let message = "a schedule is for the augmented observer, without a direct term P_f";
+                return Err(file.error_at(&point.plant.place, message).into());
+            }
+            points.push((point.at, Some(own)));
+        }
+        let found = Self {
+            measurement: match schedule.variable {
+                Variable::Measurement(at) => Some(at),
+                Variable::Input(_) => None,
+            },
+            rate_bound: schedule.rate_bound,
+            variable,
+            points,
+        };
+        found.check_operating(file, schedule, nominal)?;
+        Ok(Some(found))
+    }
+
+    /// Checks that a measurement that schedules has the value of its point at each operating point.
+    fn check_operating(
+        &self,
+        file: &PlantFile<'_>,
+        schedule: &Schedule,
+        nominal: &LinearPlant,
+    ) -> Result<(), crate::Error> {
+        let Some(at) = self.measurement else { return Ok(()) };
+        for ((value, own), point) in self.points.iter().zip(&schedule.points) {
+            let linear = own.as_ref().map_or(nominal, |own| &own.linear);
+            let operating = linear.measurements[at].operating.unwrap_or(0.0);
+            let first = schedule.points[0].at;
+            let range = schedule.points[schedule.points.len() - 1].at - first;
+            if (operating - value).abs() > 1e-6 * range {
+                let message = format!(
+                    "the measurement {} is {operating} at the operating point; expected {value}, the \
+                     value that selects this point",
+                    self.variable.name
+                );
+                return Err(file.error_at(&point.plant.place, message).into());
+            }
+        }
+        Ok(())
+    }
+
+    /// The values of the scheduling variable with their designs; `nominal` is the design of the file.
+    pub(crate) fn points<'a>(
+        &'a self,
+        nominal: &'a ControllerDesign,
+    ) -> impl Iterator<Item = (f64, &'a ControllerDesign)> {
+        self.points.iter().map(move |(at, own)| (*at, own.as_ref().unwrap_or(nominal)))
+    }
+
+    /// The points besides that of the plant of the file.
+    pub(crate) fn others(&self) -> impl Iterator<Item = (f64, &ControllerDesign)> {
+        self.points.iter().filter_map(|(at, own)| Some((*at, own.as_ref()?)))
+    }
+}
+
+impl Point {
+    fn of(own: &ControllerDesign) -> Result<Self, Error> {
+        let linear = &own.linear;
+        let (mut a, mut b) = (linear.a.clone(), linear.b.clone());
+        if let Domain::Sampled { period } = own.domain {
+            (a, b) = zero_order_hold(&a, &b, period)?;
+        }
+        let d = DMatrix::zeros(linear.c.nrows(), b.ncols());
+        let physical = StateSpace { a, b, c: linear.c.clone(), d, domain: own.domain };
+        Ok(Self { physical, model: own.plant.clone(), gains: own.gains.clone() })
+    }
+
+    /// The matrices at the part `t` of the way to `other`, as the controller FMU interpolates them.
+    fn between(&self, other: &Self, t: f64) -> Self {
+        let mix = |from: &DMatrix<f64>, to: &DMatrix<f64>| from * (1.0 - t) + to * t;
+        let (plant, next) = (&self.physical, &other.physical);
+        let (model, gains) = (&self.model, &self.gains);
+        Self {
+            physical: StateSpace {
+                a: mix(&plant.a, &next.a),
+                b: mix(&plant.b, &next.b),
+                c: mix(&plant.c, &next.c),
+                ..plant.clone()
+            },
+            model: FaultyPlant {
+                a: mix(&model.a, &other.model.a),
+                b: mix(&model.b, &other.model.b),
+                c: mix(&model.c, &other.model.c),
+                f_a: mix(&model.f_a, &other.model.f_a),
+                a_f: model.a_f.clone(),
+            },
+            gains: Gains {
+                k_x: mix(&gains.k_x, &other.gains.k_x),
+                k_f: mix(&gains.k_f, &other.gains.k_f),
+                l_x: mix(&gains.l_x, &other.gains.l_x),
+                l_f: mix(&gains.l_f, &other.gains.l_f),
+                ..gains.clone()
+            },
+        }
+    }
+
+    /// The dynamics of plant and controller together.
+    fn closed(self, filter: Option<&[f64]>) -> Result<DMatrix<f64>, Error> {
+        let domain = self.physical.domain;
+        let own = complete_controller(&self.model, &self.gains, filter, domain)?;
+        Ok(Loop::new(self.physical, own.commands)?.dynamics())
+    }
+}
+
+/// The loop at and between the points of a schedule.
+pub(crate) struct ScheduledLoop {
+    at: Vec<f64>,
+    points: Vec<Point>,
+    filter: Option<Vec<f64>>,
+}
+
+impl ScheduledLoop {
+    pub(crate) fn of(own: &Scheduled, nominal: &ControllerDesign) -> Result<Self, Error> {
+        let all: Vec<_> = own.points(nominal).collect();
+        Ok(Self {
+            at: all.iter().map(|(at, _)| *at).collect(),
+            points: all.iter().map(|(_, own)| Point::of(own)).collect::<Result<_, _>>()?,
+            filter: nominal.filter.clone(),
+        })
+    }
+
+    /// The intervals between the points. All plants and gains on them are interpolated linearly, so
+    /// that the loop is a polynomial of degree 4.
+    pub(crate) fn intervals(&self) -> Result<Vec<Interval>, Error> {
+        let interval = |k: usize| {
+            let at = |j: u32| self.dynamics(k, f64::from(j) / f64::from(DEGREE));
+            let values = (0..=DEGREE).map(at).collect::<Result<Vec<_>, _>>()?;
+            let length = self.at[k + 1] - self.at[k];
+            Ok(Interval { length, coefficients: bernstein(&values)? })
+        };
+        (0..self.points.len() - 1).map(interval).collect()
+    }
+
+    /// The instability of the loop at `count` values in each interval, its ends included: the worst,
+    /// with the value of the variable.
+    pub(crate) fn worst(&self, count: u32, domain: Domain) -> Result<(f64, f64), Error> {
+        let mut worst = (f64::NEG_INFINITY, self.at[0]);
+        for k in 0..self.points.len() - 1 {
+            for j in 0..=count {
+                let t = f64::from(j) / f64::from(count);
+                let found = instability(&self.dynamics(k, t)?, domain)?;
+                if found > worst.0 {
+                    worst = (found, self.at[k] * (1.0 - t) + self.at[k + 1] * t);
+                }
+            }
+        }
+        Ok(worst)
+    }
+
+    fn dynamics(&self, k: usize, t: f64) -> Result<DMatrix<f64>, Error> {
+        self.points[k].between(&self.points[k + 1], t).closed(self.filter.as_deref())
+    }
+}
+
+/// The instability of the loop at each point when a measurement schedules, whose own feedback through
+/// the interpolated operating points ("hidden coupling") the designs at the points do not have.
+///
+/// With slopes ' of the operating points in the variable theta = `y_j`, A to D the controller with its states z,
+///
+/// ```text
+/// z[k+1] = A z + B y + ((I - A) z_op' - B y_op') theta
+/// u      = C z + D y + (u_op' - C z_op' - D y_op') theta
+/// ```
+///
+/// Between two intervals the slopes jump; the worse side counts. Source: W. J. Rugh and J. S. Shamma,
+/// Research on gain scheduling, Automatica 36 (2000), section 3.
+pub(crate) fn coupled(
+    own: &Scheduled,
+    nominal: &ControllerDesign,
+) -> Result<Option<Vec<f64>>, Error> {
+    let Some(j) = own.measurement else { return Ok(None) };
+    let all: Vec<_> = own.points(nominal).collect();
+    let slopes: Vec<_> = all.windows(2).map(|pair| Slopes::between(pair[0], pair[1])).collect();
+    let one = |k: usize| {
+        let sides = [k.checked_sub(1), (k + 1 < all.len()).then_some(k)].into_iter().flatten();
+        let mut worst = f64::NEG_INFINITY;
+        for side in sides {
+            let design = all[k].1;
+            let point = Point::of(design)?;
+            let filter = design.filter.as_deref();
+            let own = complete_controller(&point.model, &point.gains, filter, design.domain)?;
+            let changed = slopes[side].act_on(&own.commands, filter.is_some(), j);
+            let whole = Loop::new(point.physical, changed)?;
+            worst = worst.max(instability(&whole.dynamics(), design.domain)?);
+        }
+        Ok(worst)
+    };
+    (0..all.len()).map(one).collect::<Result<_, _>>().map(Some)
+}
+
+/// Slopes of the operating points in the scheduling variable.
+struct Slopes {
+    x: Vec<f64>,
+    u: Vec<f64>,
+    y: Vec<f64>,
+}
+
+impl Slopes {
+    fn between(from: (f64, &ControllerDesign), to: (f64, &ControllerDesign)) -> Self {
+        let length = to.0 - from.0;
+        let slope = |of: fn(&LinearPlant) -> &[Signal]| {
+            let values = of(&from.1.linear).iter().zip(of(&to.1.linear));
+            let value = |signal: &Signal| signal.operating.unwrap_or(0.0);
+            values.map(|(from, to)| (value(to) - value(from)) / length).collect()
+        };
+        Self {
+            x: slope(|linear| &linear.states),
+            u: slope(|linear| &linear.actuators),
+            y: slope(|linear| &linear.measurements),
+        }
+    }
+
+    /// `own`, the controller with its filter, scheduled by its measurement `j`. Its states are the
+    /// filtered measurements, if there are any, x_hat, the filtered measurements of the model, f_hat.
+    fn act_on(&self, own: &StateSpace, is_filtered: bool, j: usize) -> StateSpace {
+        let filtered = if is_filtered { &self.y[..] } else { &[] };
+        let slopes = [filtered, &self.x, filtered].concat();
+        let z = DMatrix::from_column_slice(slopes.len(), 1, &slopes);
+        let z = z.resize_vertically(own.a.nrows(), 0.0);
+        let y = DMatrix::from_column_slice(self.y.len(), 1, &self.y);
+        let u = DMatrix::from_column_slice(self.u.len(), 1, &self.u);
+        let mut found = own.clone();
+        let to_z = &z - &own.a * &z - &own.b * &y;
+        let to_u = u - &own.c * &z - &own.d * &y;
+        found.b.set_column(j, &(own.b.column(j) + to_z.column(0)));
+        found.d.set_column(j, &(own.d.column(j) + to_u.column(0)));
+        found
+    }
+}

@@ -1,0 +1,265 @@
+//! Reads the plants besides the one of the file: the members of a family, and the points of a
+//! schedule.
+
+use files::{Entry, Place, PlaceError, Table};
+
+use super::matrix::MatrixEntry as _;
+use super::plant_file::{Model, PlantFile};
+use super::signals::{Signal, description, name, unit};
+
+/// Entries that replace those of the plant of the file.
+const MATRICES: [&str; 4] = ["A", "B", "C", "F_a"];
+/// The operating point of a plant that matrices describe.
+const OPERATING: [&str; 3] = ["x_op", "u_op", "y_op"];
+const POINT: &str = "operating_point";
+
+/// A plant besides the one of the file.
+#[derive(Clone)]
+pub(crate) struct Variant {
+    pub(crate) name: String,
+    pub(crate) place: Place,
+    model: Model,
+    /// `u_op` and `y_op`.
+    operating: [Option<Vec<f64>>; 2],
+}
+
+/// The schedule of a controller: its variable, and plants at some of its values.
+#[derive(Clone)]
+pub(crate) struct Schedule {
+    pub(crate) variable: Variable,
+    /// Largest rate of the variable, per s.
+    pub(crate) rate_bound: Option<f64>,
+    /// In ascending order; at least two.
+    pub(crate) points: Vec<SchedulePoint>,
+    /// The position of the point with the plant of the file.
+    pub(crate) nominal: usize,
+}
+
+/// The variable that selects the gains.
+#[derive(Clone)]
+pub(crate) enum Variable {
+    /// A measurement, from 0.
+    Measurement(usize),
+    /// An input of the controller.
+    Input(Signal),
+}
+
+/// A plant at a value of the scheduling variable.
+#[derive(Clone)]
+pub(crate) struct SchedulePoint {
+    pub(crate) at: f64,
+    pub(crate) plant: Variant,
+}
+
+impl Schedule {
+    /// The name of the variable.
+    pub(crate) fn variable<'a>(&'a self, measurements: &'a [Signal]) -> &'a Signal {
+        match &self.variable {
+            Variable::Measurement(at) => &measurements[*at],
+            Variable::Input(signal) => signal,
+        }
+    }
+}
+
+impl PlantFile<'_> {
+    /// The file with another plant, without family and schedule.
+    pub(crate) fn with(&self, variant: &Variant) -> Self {
+        let mut own = self.clone();
+        (own.family, own.schedule) = (Vec::new(), None);
+        own.model = variant.model.clone();
+        let [u_op, y_op] = &variant.operating;
+        for (signals, values) in [(&mut own.actuators, u_op), (&mut own.measurements, y_op)] {
+            for (at, signal) in signals.iter_mut().enumerate() {
+                match (values, &own.model) {
+                    (Some(values), _) => signal.operating = Some(values[at]),
+                    // The FMU states the values at its operating point.
+                    (None, Model::Fmu(_)) => signal.operating = None,
+                    (None, Model::Matrices { .. }) => {}
+                }
+            }
+        }
+        own
+    }
+}
+
+/// Reads `[[family]]`.
+pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, PlaceError> {
+    let Some(entry) = file.get("family") else { return Ok(Vec::new()) };
+    without_references(file, &entry)?;
+    if let Some(schedule) = file.get("schedule") {
+        return Err(
+            schedule.error("expected `family` (one gain) or `schedule` (gains by a variable)")
+        );
+    }
+    let mut found: Vec<Variant> = Vec::new();
+    for (at, member) in entry.list()?.iter().enumerate() {
+        let table = member.table()?;
+        let keys = allowed(model, &["name"], false);
+        table.allow(&keys)?;
+        let own = match table.get("name") {
+            Some(entry) => name(&entry)?,
+            None => format!("member {}", at + 1),
+        };
+        if own == "nominal" || found.iter().any(|other| other.name == own) {
+            let message =
+                format!("the name `{own}` is there twice; `nominal` is the plant of the file");
+            return Err(member.error(message));
+        }
+        let variant = variant(&table, own, member.place.clone(), model)?;
+        if !keys[1..].iter().any(|key| table.get(key).is_some()) {
+            let expected = keys[1..].join(", ");
+            return Err(member.error(format!("the plant of the file again: expected {expected}")));
+        }
+        found.push(variant);
+    }
+    if found.is_empty() {
+        return Err(entry.error("expected at least one plant"));
+    }
+    Ok(found)
+}
+
+fn without_references(file: &Table<'_>, entry: &Entry<'_>) -> Result<(), PlaceError> {
+    match file.get("reference") {
+        Some(_) => Err(entry.error(
+            "a controller for several plants follows no references: expected no `reference`",
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Reads `[schedule]`.
+pub(crate) fn schedule(
+    file: &Table<'_>,
+    model: &Model,
+    measurements: &[Signal],
+) -> Result<Option<Schedule>, PlaceError> {
+    let Some(entry) = file.get("schedule") else { return Ok(None) };
+    without_references(file, &entry)?;
+    if file.get("sample_time").is_none() {
+        return Err(entry.error(
+            "a continuous controller has no schedule: expected `sample_time`; a sampled one holds \
+             its gains from one sample to the next",
+        ));
+    }
+    let table = entry.table()?;
+    table.allow(&["variable", "unit", "description", "rate_bound", "points"])?;
+    let named =
+        table.require("variable", "a measurement, or the name of an input of the controller")?;
+    let own = name(&named)?;
+    let variable = match measurements.iter().position(|signal| signal.name == own) {
+        Some(at) => {
+            if let Some(entry) = ["unit", "description"].iter().find_map(|key| table.get(key)) {
+                return Err(entry.error(format!("the measurement `{own}` states it")));
+            }
+            Variable::Measurement(at)
+        }
+        None => Variable::Input(Signal {
+            unit: unit(&table)?,
+            description: description(&table)?,
+            places: [Some(named.place.clone()), None],
+            ..Signal::named(own)
+        }),
+    };
+    let listed = table.require("points", "the plants at two or more values of the variable")?;
+    let (points, nominal) = points(&listed, model)?;
+    Ok(Some(Schedule {
+        variable,
+        rate_bound: table.get("rate_bound").map(|entry| entry.positive()).transpose()?,
+        points,
+        nominal,
+    }))
+}
+
+fn points(listed: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usize), PlaceError> {
+    let mut found: Vec<SchedulePoint> = Vec::new();
+    let mut nominal = None;
+    for member in &listed.list()? {
+        let table = member.table()?;
+        let keys = allowed(model, &["at"], true);
+        table.allow(&keys)?;
+        let at = table.require("at", "the value of the scheduling variable")?;
+        let value = at.number()?;
+        if let Some(last) = found.last().filter(|last| last.at >= value) {
+            let message = format!("expected ascending values, found {value} after {}", last.at);
+            return Err(at.error(message));
+        }
+        let is_nominal = !keys[1..].iter().any(|key| table.get(key).is_some());
+        if is_nominal && nominal.replace(found.len()).is_some() {
+            let expected = keys[1..].join(", ");
+            let message = format!("a second point with the plant of the file: expected {expected}");
+            return Err(member.error(message));
+        }
+        let plant = variant(&table, value.to_string(), member.place.clone(), model)?;
+        found.push(SchedulePoint { at: value, plant });
+    }
+    if found.len() < 2 {
+        return Err(listed.error(format!("expected at least two points, found {}", found.len())));
+    }
+    let missing = "expected one point with nothing but `at`: that of the plant of the file";
+    let nominal = nominal.ok_or_else(|| listed.error(missing))?;
+    Ok((found, nominal))
+}
+
+/// `first`, then the entries that a variant of `model` may have.
+fn allowed(model: &Model, first: &[&'static str], operating: bool) -> Vec<&'static str> {
+    let mut keys = first.to_vec();
+    match model {
+        Model::Fmu(_) => keys.push(POINT),
+        Model::Matrices { f_a, .. } => {
+            keys.extend(&MATRICES[..if f_a.is_some() { 4 } else { 3 }]);
+            keys.extend(operating.then_some(OPERATING).iter().flatten());
+        }
+    }
+    keys
+}
+
+fn variant(
+    table: &Table<'_>,
+    name: String,
+    place: Place,
+    model: &Model,
+) -> Result<Variant, PlaceError> {
+    let mut model = model.clone();
+    let mut operating = [None, None];
+    match &mut model {
+        Model::Fmu(own) => {
+            let stated = table.get(POINT).map(|entry| entry.table()).transpose()?;
+            for (name, value) in stated.iter().flat_map(Table::entries) {
+                let value = value.number()?;
+                own.operating_point.retain(|(other, _)| other != name);
+                own.operating_point.push((name.to_owned(), value));
+            }
+        }
+        Model::Matrices { a, b, c, f_a, states } => {
+            let matrices = [
+                ("A", Some(&mut *a)),
+                ("B", Some(&mut *b)),
+                ("C", Some(&mut *c)),
+                ("F_a", f_a.as_mut()),
+            ];
+            for (key, matrix) in matrices {
+                if let (Some(entry), Some(matrix)) = (table.get(key), matrix) {
+                    *matrix = entry.shaped(matrix.shape(), "as that of the file")?;
+                }
+            }
+            let (m, p) = (b.ncols(), c.nrows());
+            if let Some(values) = numbers(table, "x_op", states.len())? {
+                for (state, value) in states.iter_mut().zip(values) {
+                    state.operating = Some(value);
+                }
+            }
+            operating = [numbers(table, "u_op", m)?, numbers(table, "y_op", p)?];
+        }
+    }
+    Ok(Variant { name, place, model, operating })
+}
+
+/// Reads a list of `count` numbers.
+fn numbers(table: &Table<'_>, key: &str, count: usize) -> Result<Option<Vec<f64>>, PlaceError> {
+    let Some(entry) = table.get(key) else { return Ok(None) };
+    let found = entry.numbers()?;
+    if found.len() == count {
+        return Ok(Some(found));
+    }
+    Err(entry.error(format!("expected {count} numbers, found {}", found.len())))
+}

@@ -1,0 +1,158 @@
+//! A controller whose matrices and operating point depend on a scheduling variable.
+//!
+//! At each sample of the controller, with theta held within the grid,
+//!
+//! ```text
+//! M(theta) = (1 - t) M_i + t M_{i+1},  t = (theta - theta_i) / (theta_{i+1} - theta_i)
+//! ```
+//!
+//! for each of A, B, C, F_a, K_x, K_f, L_x, L_f, x_op, u_op, y_op. The controller then takes the sample
+//! like one whose design states these numbers. The estimates are those of states, not of deviations,
+//! so that a change of the operating point does not change them.
+
+use serde::{Deserialize, Serialize};
+
+use crate::design::Design;
+use crate::matrix::Matrix;
+use crate::signals::Values;
+
+/// The table `[schedule]` of a design file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Schedule {
+    /// The name of a measurement, or of an input of its own.
+    pub(crate) variable: String,
+    #[serde(default)]
+    pub(crate) unit: Option<String>,
+    #[serde(default)]
+    pub(crate) description: String,
+    /// The grid, in ascending order.
+    pub(crate) points: Vec<Point>,
+}
+
+/// The matrices and the operating point at a value of the scheduling variable.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Point {
+    /// The value.
+    pub(crate) at: f64,
+    pub(crate) x_op: Vec<f64>,
+    pub(crate) u_op: Vec<f64>,
+    pub(crate) y_op: Vec<f64>,
+    #[serde(rename = "A")]
+    a: Matrix,
+    #[serde(rename = "B")]
+    b: Matrix,
+    #[serde(rename = "C")]
+    c: Matrix,
+    #[serde(rename = "F_a")]
+    f_a: Matrix,
+    #[serde(rename = "K_x")]
+    k_x: Matrix,
+    #[serde(rename = "K_f")]
+    k_f: Matrix,
+    #[serde(rename = "L_x")]
+    l_x: Matrix,
+    #[serde(rename = "L_f")]
+    l_f: Matrix,
+}
+
+impl Point {
+    /// The matrices, in the order of [`Design::matrices`].
+    pub(crate) fn matrices(&self) -> [(&'static str, &Matrix); 8] {
+        [
+            ("A", &self.a),
+            ("B", &self.b),
+            ("C", &self.c),
+            ("F_a", &self.f_a),
+            ("K_x", &self.k_x),
+            ("K_f", &self.k_f),
+            ("L_x", &self.l_x),
+            ("L_f", &self.l_f),
+        ]
+    }
+}
+
+/// The place of a value in the grid.
+#[derive(Clone, Copy)]
+struct Place {
+    /// The interval, from 0, and the part of it before the value.
+    interval: usize,
+    part: f64,
+    /// Whether the value is inside of the grid.
+    inside: bool,
+}
+
+impl Schedule {
+    /// The position of the measurement that schedules.
+    pub(crate) fn measurement(&self, design: &Design) -> Option<usize> {
+        design.measurements.iter().position(|signal| signal.name == self.variable)
+    }
+
+    /// The scheduling variable `offset` s after the measurements were given.
+    pub(crate) fn value(&self, design: &Design, values: &Values, input: f64, offset: f64) -> f64 {
+        match self.measurement(design) {
+            Some(k) => values.y[k] + values.y_slopes[k] * offset,
+            None => input,
+        }
+    }
+
+    /// The first and the last value of the grid.
+    pub(crate) fn range(&self) -> [f64; 2] {
+        [self.points[0].at, self.points[self.points.len() - 1].at]
+    }
+
+    fn place(&self, value: f64) -> Place {
+        let [first, last] = self.range();
+        let inside = value >= first && value <= last;
+        // NaN selects the first point.
+        let value = if value > first { value.min(last) } else { first };
+        let after = self.points.partition_point(|point| point.at <= value);
+        let interval = after.clamp(1, self.points.len() - 1) - 1;
+        let [from, to] = [0, 1].map(|end| self.points[interval + end].at);
+        Place { interval, part: (value - from) / (to - from), inside }
+    }
+
+    /// Writes the interpolated matrices and operating point into `design`; returns the value after it
+    /// was held within the grid.
+    pub(crate) fn interpolate(&self, value: f64, design: &mut Design) -> f64 {
+        let Place { interval, part, .. } = self.place(value);
+        let mix = |[from, to]: [f64; 2]| from * (1.0 - part) + to * part;
+        self.write(interval, mix, design);
+        mix([self.points[interval].at, self.points[interval + 1].at])
+    }
+
+    /// Writes the derivatives of the interpolated matrices and operating point into `direction`, for
+    /// the derivative `slope` of the scheduling variable; zero outside of the grid. At a point of the
+    /// grid they are those of the interval after it.
+    pub(crate) fn differentiate(&self, value: f64, slope: f64, direction: &mut Design) -> f64 {
+        let Place { interval, inside, .. } = self.place(value);
+        let [from, to] = [0, 1].map(|end| self.points[interval + end].at);
+        let slope = if inside { slope } else { 0.0 };
+        self.write(interval, |[low, high]| (high - low) / (to - from) * slope, direction);
+        slope
+    }
+
+    fn write(&self, interval: usize, mix: impl Fn([f64; 2]) -> f64, design: &mut Design) {
+        let [from, to] = [0, 1].map(|end| &self.points[interval + end]);
+        let places = design.scheduled_mut();
+        for ((place, (_, from)), (_, to)) in
+            places.into_iter().zip(from.matrices()).zip(to.matrices())
+        {
+            let ends = from.values.iter().zip(&to.values);
+            for (value, (from, to)) in place.values.iter_mut().zip(ends) {
+                *value = mix([*from, *to]);
+            }
+        }
+        let point = |values: [&[f64]; 2], k: usize| Some(mix(values.map(|values| values[k])));
+        for (k, state) in design.states.iter_mut().enumerate() {
+            state.operating = point([&from.x_op, &to.x_op], k);
+        }
+        for (k, actuator) in design.actuators.iter_mut().enumerate() {
+            actuator.operating = point([&from.u_op, &to.u_op], k);
+        }
+        for (k, signal) in design.measurements.iter_mut().enumerate() {
+            signal.operating = point([&from.y_op, &to.y_op], k);
+        }
+    }
+}
