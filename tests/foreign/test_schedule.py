@@ -90,6 +90,17 @@ def tank(aso_ftc, root, packed, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def measured(aso_ftc, root, packed, tmp_path_factory):
+    """The three tanks with the measured level as variable."""
+    folder = tmp_path_factory.mktemp("measured")
+    text = (root / "examples/three-tank/schedule.toml").read_text().replace("../../dist", str(root / "dist"))
+    own = 'variable = "level"\nunit = "m"\ndescription = "Set point of the level of tank 1"'
+    assert own in text
+    (folder / "tank.toml").write_text(text.replace(own, 'variable = "y_1"'))
+    return made(aso_ftc, folder / "tank.toml", folder)
+
+
+@pytest.fixture(scope="module")
 def drive(aso_ftc, packed, tmp_path_factory):
     """Report, design and FMU of the drive."""
     folder = tmp_path_factory.mktemp("drive")
@@ -122,8 +133,8 @@ def expected(design, count):
 
 
 @pytest.mark.parametrize("size", [1.0, 0.5, 3.0])
-def test_the_fmu_follows_the_interpolated_recursion(tank, size):
-    _, design, fmu = tank
+def test_the_fmu_follows_the_interpolated_recursion(measured, size):
+    _, design, fmu = measured
     count, per_step = 100, size / design.period
     rows = expected(design, count + 1)
     with started(fmu) as instance:
@@ -137,8 +148,8 @@ def test_the_fmu_follows_the_interpolated_recursion(tank, size):
     assert rows[-1][-1] > 0.5, "the run passes two points of the grid"
 
 
-def test_in_model_exchange_each_sample_is_interpolated(tank):
-    _, design, fmu = tank
+def test_in_model_exchange_each_sample_is_interpolated(measured):
+    _, design, fmu = measured
     rows = expected(design, 60)
     with started(fmu, MODEL_EXCHANGE) as instance:
         info = EventInfo()
@@ -151,8 +162,8 @@ def test_in_model_exchange_each_sample_is_interpolated(tank):
             instance.must("EnterEventMode")
 
 
-def test_a_restored_state_continues_with_the_same_bits(tank):
-    _, _, fmu = tank
+def test_a_restored_state_continues_with_the_same_bits(measured):
+    _, _, fmu = measured
     with started(fmu) as instance, Instance(fmu) as other:
         for k in range(20):
             instance.set(dict(zip(["y_1", "y_2", "y_3"], LEVELS + k * RISE)))
@@ -166,8 +177,8 @@ def test_a_restored_state_continues_with_the_same_bits(tank):
         assert runs[0] == runs[1]
 
 
-def test_a_value_outside_of_the_grid_is_held_with_one_warning(tank):
-    _, _, fmu = tank
+def test_a_value_outside_of_the_grid_is_held_with_one_warning(measured):
+    _, _, fmu = measured
     with started(fmu) as instance:
         instance.set({"y_1": 0.61})
         instance.call("DoStep", 0.0, 1.0, 1)
@@ -179,8 +190,8 @@ def test_a_value_outside_of_the_grid_is_held_with_one_warning(tank):
         assert instance.get("schedule_at") == [0.6]
 
 
-def test_the_derivatives_at_the_start_include_the_schedule(tank):
-    _, _, fmu = tank
+def test_the_derivatives_at_the_start_include_the_schedule(measured):
+    _, _, fmu = measured
     names, outputs = ["y_1", "y_2", "y_3"], ["Q_1", "Q_2", "f_hat[1]", "x_hat[2]", "schedule_at"]
 
     def values(levels):
@@ -198,8 +209,8 @@ def test_the_derivatives_at_the_start_include_the_schedule(tank):
         assert list(found.values()) == pytest.approx(slopes, rel=1e-5, abs=1e-6)
 
 
-def test_the_controller_has_no_matrices_as_parameters_but_the_value_of_its_schedule(tank):
-    _, _, fmu = tank
+def test_the_controller_has_no_matrices_as_parameters_but_the_value_of_its_schedule(measured):
+    _, _, fmu = measured
     parameters = fmu.names(causality="parameter")
     assert not any(name.startswith(tuple(f"{own}[" for own in [*MATRICES, *LISTS])) for name in parameters)
     assert fmu.variables["schedule_at"].causality == "output"
@@ -222,7 +233,9 @@ def test_an_input_may_schedule_and_fmpy_runs_it(drive):
     result = simulate_fmu(
         str(fmu.folder), input=signals, output=outputs, stop_time=end, output_interval=design.period,
     )
-    rows = design.run([0, 0, 0], angle[:, None], inertia)
+    # FMPy holds the inputs of the start of each step, at whose end the sample is.
+    held = [0, *range(count - 1)]
+    rows = design.run([0, 0, 0], angle[held, None], inertia[held])
     assert np.array([result[name] for name in outputs]).T == pytest.approx(rows, rel=1e-8, abs=1e-9)
 
 
@@ -270,11 +283,15 @@ def test_the_certificate_holds_between_the_points(name, request):
             assert np.linalg.eigvalsh(left * np.outer(scale, scale)).min() > 0
 
 
-def test_the_feedback_through_the_operating_points_is_part_of_the_report(tank):
-    report, design, fmu = tank
-    for point in report["schedule"]["points"]:
-        assert point["coupled_instability"] < 0
-        assert point["coupled_instability"] != point["closed"]["instability"]
+def test_a_measurement_that_moves_its_own_operating_point_leaves_no_equilibrium_stable(measured, tank):
+    for point in measured[0]["schedule"]["points"]:
+        # Every point of the grid is an equilibrium: an eigenvalue is 1.
+        assert point["coupled_instability"] == pytest.approx(0, abs=1e-6)
+        assert point["closed"]["instability"] < -0.01
+    reasons = measured[0]["verdict"]["reasons"]
+    assert any("the measurement moves the operating point" in reason for reason in reasons)
+    assert tank[0]["verdict"]["level"] != "red"
+    assert tank[2].names(causality="input") == ["y_1", "y_2", "y_3", "compensate", "level"]
 
 
 @pytest.mark.parametrize(

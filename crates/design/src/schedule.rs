@@ -14,7 +14,7 @@ use super::family::check_states;
 use super::linear_plant::LinearPlant;
 use super::plant_file::PlantFile;
 use super::signals::Signal;
-use super::variants::{Schedule, Variable};
+use super::variants::Variable;
 
 /// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p`.
 const DEGREE: u32 = 4;
@@ -64,7 +64,7 @@ impl Scheduled {
             }
             points.push((point.at, Some(own)));
         }
-        let found = Self {
+        Ok(Some(Self {
             measurement: match schedule.variable {
                 Variable::Measurement(at) => Some(at),
                 Variable::Input(_) => None,
@@ -72,34 +72,7 @@ impl Scheduled {
             rate_bound: schedule.rate_bound,
             variable,
             points,
-        };
-        found.check_operating(file, schedule, nominal)?;
-        Ok(Some(found))
-    }
-
-    /// Checks that a measurement that schedules has the value of its point at each operating point.
-    fn check_operating(
-        &self,
-        file: &PlantFile<'_>,
-        schedule: &Schedule,
-        nominal: &LinearPlant,
-    ) -> Result<(), crate::Error> {
-        let Some(at) = self.measurement else { return Ok(()) };
-        for ((value, own), point) in self.points.iter().zip(&schedule.points) {
-            let linear = own.as_ref().map_or(nominal, |own| &own.linear);
-            let operating = linear.measurements[at].operating.unwrap_or(0.0);
-            let first = schedule.points[0].at;
-            let range = schedule.points[schedule.points.len() - 1].at - first;
-            if (operating - value).abs() > 1e-6 * range {
-                let message = format!(
-                    "the measurement {} is {operating} at the operating point; expected {value}, the \
-                     value that selects this point",
-                    self.variable.name
-                );
-                return Err(file.error_at(&point.plant.place, message).into());
-            }
-        }
-        Ok(())
+        }))
     }
 
     /// The values of the scheduling variable with their designs; `nominal` is the design of the file.

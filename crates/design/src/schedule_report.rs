@@ -19,6 +19,8 @@ use super::schedule::{Scheduled, ScheduledLoop, coupled};
 /// Values of the scheduling variable in each interval, its ends included, at which eigenvalues are
 /// computed, less 1.
 const CHECKED: u32 = 20;
+/// An eigenvalue this near to the stability limit is one on it, with rounding errors.
+const NEUTRAL: f64 = 1e-7;
 
 /// A controller whose gains depend on a scheduling variable.
 #[derive(Serialize, JsonSchema)]
@@ -196,10 +198,10 @@ pub(crate) fn judge_schedule(
         );
     }
     for point in &found.points {
-        if point.coupled_instability.is_some_and(|value| value >= 0.0) {
+        if point.coupled_instability.is_some_and(|value| value >= -NEUTRAL) {
             let text = format!(
-                "the loop at {} = {} is not stable with the feedback through the interpolated \
-                 operating points",
+                "the loop at {} = {} is not stable, because the measurement moves the operating point; \
+                 schedule by an input, such as its set point",
                 found.variable, point.at
             );
             verdict.add(Level::Red, text);

@@ -156,7 +156,8 @@ impl Analysis<'_> {
     }
 }
 
-/// The members that contradict each other, each of them necessary; inconclusive if the program of
+/// The members that contradict each other, each of them necessary, the first ones if there is a choice;
+/// inconclusive if the program of
 /// all members is not infeasible.
 fn contradiction<T>(
     all: Vec<usize>,
@@ -168,7 +169,7 @@ fn contradiction<T>(
         Outcome::Inconclusive(_) => return Ok(Outcome::Inconclusive(UNDECIDED)),
     }
     let mut conflict = all.clone();
-    for candidate in all {
+    for candidate in all.into_iter().rev() {
         let rest: Vec<_> = conflict.iter().copied().filter(|at| *at != candidate).collect();
         if !rest.is_empty() && matches!(program(&rest).solve()?, Outcome::Infeasible { .. }) {
             conflict = rest;
