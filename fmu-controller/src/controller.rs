@@ -195,7 +195,8 @@ impl AsoController {
         current.take_parameters(design);
         operating_point.read(current);
         let [first, last] = schedule.range();
-        if !(value >= first && value <= last) && !self.outside_reported {
+        let inside = (first..=last).contains(&value);
+        if !inside && !self.outside_reported {
             self.outside_reported = true;
             self.log.warn(format!(
                 "{} = {value} at {time} s is outside of the schedule from {first} to {last}; the \
