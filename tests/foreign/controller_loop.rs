@@ -20,8 +20,8 @@ fn main() {
         let found = controller.step(&Measurements::from(received), compensate[0] > 0.5);
         let commands: [Real; ACTUATORS] = found.commands.into();
         let estimates: [Real; ESTIMATES] = found.estimates.into();
-        let Status { measurement_held, at_limit, overflow } = found.status;
-        let status = u8::from(measurement_held) + 2 * u8::from(at_limit) + 4 * u8::from(overflow);
+        let Status { held, at_limit, overflow } = found.status;
+        let status = u8::from(held) + 2 * u8::from(at_limit) + 4 * u8::from(overflow);
         let all = commands.iter().chain(&estimates).map(|value| f64::from(*value)).chain([f64::from(status)]);
         all.for_each(|value| output.extend(value.to_le_bytes()));
     }

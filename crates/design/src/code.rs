@@ -12,6 +12,7 @@ mod recursion;
 mod rounding;
 mod rust;
 mod summary;
+mod symbols;
 mod tables;
 
 use std::path::PathBuf;

@@ -1,8 +1,11 @@
 //! Operations per sample and bytes of a controller.
 
+use nalgebra::DMatrix;
+
 use super::Precision;
 use super::controller::Controller;
-use super::recursion::{Kind, Matrix, Operation, Recursion, Statement, Term, Vector, When};
+use super::recursion::{Operation, Recursion, Statement, Term, When};
+use super::symbols::{Kind, Matrix, Vector};
 use super::tables::{Constants, locals, stored, tables};
 
 /// The most operations of one sample: while compensating, with every command at its upper limit.
@@ -22,11 +25,10 @@ impl Arithmetic {
         for statement in statements.filter(|own| own.when != When::NotCompensating) {
             all.add_statement(controller, statement);
         }
-        let [n, q, m, p] = [Kind::State, Kind::Fault, Kind::Actuator, Kind::Measurement]
-            .map(|kind| kind.count(controller));
+        let [n, q, p, m, t, integrals] = Kind::ALL.map(|kind| kind.count(controller));
         let filtered = if controller.filter.is_some() { p } else { 0 };
-        // Finite or not: the measurements, the commands and estimates, the next estimates.
-        all.comparisons += 2 * (p + m + n + q + n + q + filtered);
+        // Finite or not: the inputs, the commands and estimates, the state for the next sample.
+        all.comparisons += 2 * (p + t + m + n + q + n + q + filtered + integrals);
         if controller.is_limited() {
             all.comparisons += 2 * m;
         }
@@ -48,6 +50,7 @@ impl Arithmetic {
                     self.add_term(controller, term, rows);
                 }
                 Operation::Accumulate(matrix, _) => self.add_products(controller, matrix, rows),
+                Operation::TimesPeriod => self.multiplications += rows,
             }
         }
     }
@@ -64,7 +67,7 @@ impl Arithmetic {
     }
 
     fn add_products(&mut self, controller: &Controller, matrix: Matrix, rows: usize) {
-        let count = rows * matrix.of(controller).ncols();
+        let count = rows * matrix.of(controller).map_or(0, DMatrix::ncols);
         self.multiplications += count;
         self.additions += count;
     }

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use super::arithmetic::Memory;
 use super::controller::Controller;
-use super::recursion::{Kind, Operation, Recursion, Statement, Term, Vector, When};
+use super::recursion::{Operation, Recursion, Statement, Term, When};
 use super::rounding::RoundingBound;
 use super::summary::{Fields, Vocabulary, summary};
-use super::tables::{Constants, locals, stored, tables};
+use super::symbols::{Kind, Vector};
+use super::tables::{Constants, kept, locals, shown, stored, tables};
 use super::{Precision, Request};
 
 /// The longest line of a table.
@@ -96,7 +97,8 @@ impl Source<'_> {
             String::new(),
             "/* Numbers of signals. */".to_owned(),
         ]);
-        for kind in [Kind::State, Kind::Fault, Kind::Actuator, Kind::Measurement] {
+        let kinds = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Integral);
+        for kind in kinds.filter(|kind| kind.count(controller) > 0) {
             lines.push(format!("#define {} {}U", self.count(kind), kind.count(controller)));
         }
         lines.extend([
@@ -120,6 +122,9 @@ impl Source<'_> {
             String::new(),
         ]);
         self.structure(&mut lines, "Measurements", &fields.measurements);
+        if !fields.references.is_empty() {
+            self.structure(&mut lines, "References", &fields.references);
+        }
         self.structure(&mut lines, "Commands", &fields.actuators);
         self.structure(&mut lines, "Estimates", &fields.estimates(controller));
         lines.push("/* One instance; its fields belong to the functions below. */".to_owned());
@@ -146,12 +151,7 @@ impl Source<'_> {
             format!("    const {real} f_hat_0[{q}]);"),
             String::new(),
             "/* Takes a sample; returns the bits of the status. */".to_owned(),
-            format!(
-                "uint32_t {name}_step({name}_State *state, const {name}_Measurements *measurements,"
-            ),
-            format!(
-                "    bool compensate, {name}_Commands *commands, {name}_Estimates *estimates);"
-            ),
+            format!("{};", self.signature()),
             String::new(),
             "#ifdef __cplusplus".to_owned(),
             "}".to_owned(),
@@ -160,6 +160,19 @@ impl Source<'_> {
             format!("#endif /* {capital}_H */"),
         ]);
         finished(&lines)
+    }
+
+    /// The head of the function that takes a sample.
+    fn signature(&self) -> String {
+        let name = &self.request.prefix;
+        let references = match self.fields.references.as_slice() {
+            [] => String::new(),
+            _ => format!("const {name}_References *references, "),
+        };
+        format!(
+            "uint32_t {name}_step({name}_State *state, const {name}_Measurements *measurements,\n    \
+             {references}bool compensate,\n    {name}_Commands *commands, {name}_Estimates *estimates)"
+        )
     }
 
     fn structure(&self, lines: &mut Vec<String>, what: &str, fields: &[String]) {
@@ -244,6 +257,19 @@ static bool is_finite({real} value)
     return (value >= -{most}) && (value <= {most});
 }}
 
+/* Keeps a value that is a number; returns the flag for one that is none. */
+static uint32_t take({real} *kept, {real} value, uint32_t flag)
+{{
+    uint32_t status = flag;
+
+    if (is_finite(value))
+    {{
+        *kept = value;
+        status = 0U;
+    }}
+    return status;
+}}
+
 /* Adds a row times a vector to a sum, one product after the other. */
 static {real} accumulate({real} start, const {real} row[], const {real} vector[], uint32_t count)
 {{
@@ -309,8 +335,12 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
             (Kind::Fault, "        state->f_hat[i] = f_hat_0[i];".to_owned()),
             (Kind::Measurement, format!("{filtered}        state->y[i] = y_op[i];")),
             (Kind::Actuator, "        state->u[i] = u_op[i];".to_owned()),
+            (Kind::Reference, "        state->r[i] = r_op[i];".to_owned()),
+            (Kind::Integral, format!("        state->x_i[i] = {};", self.literal(0.0))),
         ] {
-            self.loop_over(lines, 1, kind, &[&body]);
+            if kind.count(controller) > 0 {
+                self.loop_over(lines, 1, kind, &[&body]);
+            }
         }
         if controller.first_compensated > 0 {
             lines.push("    state->sample = 0U;".to_owned());
@@ -331,15 +361,8 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
     }
 
     fn step(&self, lines: &mut Vec<String>) {
-        let Self { request, controller, recursion, fields, real, capital } = self;
-        let name = &request.prefix;
-        lines.push(format!(
-            "
-uint32_t {name}_step({name}_State *state, const {name}_Measurements *measurements,
-    bool compensate, {name}_Commands *commands, {name}_Estimates *estimates)
-{{"
-        ));
-        lines.push(format!("    {real} received[{}];", self.count(Kind::Measurement)));
+        let Self { controller, recursion, real, capital, .. } = self;
+        lines.extend([String::new(), self.signature(), "{".to_owned()]);
         for vector in locals(recursion) {
             lines.push(format!("    {real} {}[{}];", vector.name(), self.count(vector.kind())));
         }
@@ -354,26 +377,8 @@ uint32_t {name}_step({name}_State *state, const {name}_Measurements *measurement
             "    bool finite = true;".to_owned(),
             format!("    const bool compensating = {compensating};"),
             String::new(),
-            "    /* The last finite measurements. */".to_owned(),
         ]);
-        for (k, field) in fields.measurements.iter().enumerate() {
-            lines.push(format!("    received[{k}] = measurements->{field};"));
-        }
-        self.loop_over(
-            lines,
-            1,
-            Kind::Measurement,
-            &[
-                "        if (is_finite(received[i]))",
-                "        {",
-                "            state->y[i] = received[i];",
-                "        }",
-                "        else",
-                "        {",
-                &format!("            status = {capital}_HELD;"),
-                "        }",
-            ],
-        );
+        self.inputs(lines);
         if controller.filter.is_some() {
             lines.extend(["    if (!state->started)".to_owned(), "    {".to_owned()]);
             self.loop_over(
@@ -394,20 +399,27 @@ uint32_t {name}_step({name}_State *state, const {name}_Measurements *measurement
             self.statement(lines, statement);
         }
         lines.extend([String::new(), "    /* Is the next estimate one? */".to_owned()]);
-        let kept = self.kept();
+        let kept = kept(controller);
         self.check(lines, &kept.iter().map(|(next, _)| *next).collect::<Vec<_>>());
         self.keep(lines, &kept);
         self.outputs(lines);
         lines.extend(["    return status;".to_owned(), "}".to_owned()]);
     }
 
-    /// What is computed for the next sample, with where it is stored.
-    fn kept(&self) -> Vec<(Vector, Vector)> {
-        let mut all =
-            vec![(Vector::NextXHat, Vector::StoredXHat), (Vector::NextFHat, Vector::StoredFHat)];
-        let filtered = (Vector::NextYF, Vector::StoredYF);
-        all.extend(self.controller.filter.is_some().then_some(filtered));
-        all
+    /// Takes the inputs that are numbers.
+    fn inputs(&self, lines: &mut Vec<String>) {
+        lines.push("    /* The last finite inputs. */".to_owned());
+        for (owner, fields, vector) in [
+            ("measurements", &self.fields.measurements, "y"),
+            ("references", &self.fields.references, "r"),
+        ] {
+            for (k, field) in fields.iter().enumerate() {
+                let (kept, capital) = (format!("state->{vector}[{k}]"), &self.capital);
+                lines.push(format!(
+                    "    status = status | take(&{kept}, {owner}->{field}, {capital}_HELD);"
+                ));
+            }
+        }
     }
 
     fn check(&self, lines: &mut Vec<String>, vectors: &[Vector]) {
@@ -454,8 +466,8 @@ uint32_t {name}_step({name}_State *state, const {name}_Measurements *measurement
         }
         self.loop_over(lines, 2, Kind::Actuator, &["            state->u[i] = command[i];"]);
         lines.extend(["    }".to_owned(), "    else".to_owned(), "    {".to_owned()]);
-        for (value, stored) in [(Vector::XValue, "x_hat"), (Vector::FValue, "f_hat")] {
-            let body = format!("            {}[i] = state->{stored}[i];", value.name());
+        for (value, stored) in shown(self.controller) {
+            let body = format!("            {}[i] = {};", value.name(), self.element(stored));
             self.loop_over(lines, 2, value.kind(), &[&body]);
         }
         let capital = &self.capital;
@@ -494,6 +506,9 @@ uint32_t {name}_step({name}_State *state, const {name}_Measurements *measurement
                 self.literal(loss.least_command * loss.least_command)
             ));
         }
+        for (i, field) in fields.integrals.iter().enumerate() {
+            lines.push(format!("    estimates->x_i_{field} = x_i_value[{i}];"));
+        }
     }
 
     fn statement(&self, lines: &mut Vec<String>, statement: &Statement) {
@@ -522,6 +537,7 @@ uint32_t {name}_step({name}_State *state, const {name}_Measurements *measurement
                     match *operation {
                         Operation::Add(term) => format!("sum + {}", self.term(term)),
                         Operation::Subtract(term) => format!("sum - {}", self.term(term)),
+                        Operation::TimesPeriod => format!("sum * {}_SAMPLE_TIME", self.capital),
                         Operation::Accumulate(matrix, vector) => format!(
                             "accumulate(sum, {}[i], {}, {})",
                             matrix.name(),

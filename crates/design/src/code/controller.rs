@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use serde::Deserialize;
 
 use super::Precision;
-use super::recursion::Matrix;
+use super::symbols::Matrix;
 use crate::Error;
 
 /// The controller of a sampled design: matrices, signals, switches. Shapes as in the design file.
@@ -31,10 +31,17 @@ pub(super) struct Controller {
     pub(super) k_f: DMatrix<f64>,
     pub(super) l_x: DMatrix<f64>,
     pub(super) l_f: DMatrix<f64>,
+    /// H, `K_i`, `F_i`, `L_w`, `N_r` of the references, where the design states them.
+    pub(super) h: Option<DMatrix<f64>>,
+    pub(super) k_i: Option<DMatrix<f64>>,
+    pub(super) f_i: Option<DMatrix<f64>>,
+    pub(super) l_w: Option<DMatrix<f64>>,
+    pub(super) n_r: Option<DMatrix<f64>>,
     pub(super) states: Vec<Signal>,
     pub(super) actuators: Vec<Signal>,
     pub(super) measurements: Vec<Signal>,
     pub(super) faults: Vec<Signal>,
+    pub(super) references: Vec<Signal>,
     pub(super) losses: Vec<Loss>,
 }
 
@@ -110,6 +117,18 @@ struct File {
     l_x: Rows,
     #[serde(rename = "L_f")]
     l_f: Rows,
+    #[serde(rename = "H", default)]
+    h: Option<Rows>,
+    #[serde(rename = "K_i", default)]
+    k_i: Option<Rows>,
+    #[serde(rename = "F_i", default)]
+    f_i: Option<Rows>,
+    #[serde(rename = "L_w", default)]
+    l_w: Option<Rows>,
+    #[serde(rename = "N_r", default)]
+    n_r: Option<Rows>,
+    #[serde(default)]
+    references: Vec<Signal>,
 }
 
 /// A matrix as the design file has it.
@@ -127,10 +146,10 @@ impl Controller {
     /// Reads the design file `text`; the error names what has no code.
     pub(super) fn of(text: &str) -> Result<Self, Error> {
         let file: File = toml::from_str(text).map_err(|error| {
-            Error::Invalid(format!(
-                "there is no code for this design, only its FMU: {}",
-                error.message()
-            ))
+            // `unknown field X, expected one of` all that there are.
+            let reason = error.message().split(", expected").next().unwrap_or_default();
+            let reason = reason.replace("unknown field", "there is no code for its entry");
+            Error::Invalid(format!("only the FMU has this controller: {reason}"))
         })?;
         let (Some(sample_time), Some(estimator)) = (file.sample_time, file.estimator) else {
             return Err(Error::Invalid(
@@ -166,6 +185,12 @@ impl Controller {
             k_f: file.k_f.dense(),
             l_x: file.l_x.dense(),
             l_f: file.l_f.dense(),
+            h: file.h.map(Rows::dense),
+            k_i: file.k_i.map(Rows::dense),
+            f_i: file.f_i.map(Rows::dense),
+            l_w: file.l_w.map(Rows::dense),
+            n_r: file.n_r.map(Rows::dense),
+            references: file.references,
             states: file.states,
             actuators: file.actuators,
             measurements: file.measurements,
@@ -189,12 +214,12 @@ impl Controller {
             return Ok(());
         }
         for matrix in Matrix::ALL {
-            let largest = matrix.of(self).amax();
+            let largest = matrix.of(self).map_or(0.0, DMatrix::amax);
             if largest > LARGEST_SINGLE {
                 return Err(too_large(matrix.name(), largest));
             }
         }
-        let signals = [&self.states, &self.actuators, &self.measurements];
+        let signals = [&self.states, &self.actuators, &self.measurements, &self.references];
         for signal in signals.into_iter().flatten() {
             let values = signal.limits.iter().flatten().chain([&signal.operating]);
             let largest = values.fold(0.0, |largest: f64, value| largest.max(value.abs()));

@@ -5,53 +5,8 @@
 //! included, so that double precision gives the bits of the FMU. `fmu-controller/src/sampled.rs` has the
 //! equations.
 
-use nalgebra::DMatrix;
-
 use super::controller::{Controller, Estimator};
-
-/// A vector of the recursion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Vector {
-    /// The estimate for this sample from the measurements before it, as values.
-    StoredXHat,
-    StoredFHat,
-    StoredYF,
-    /// The measurements as values; the last finite ones.
-    Measured,
-    /// The operating point.
-    XOp,
-    UOp,
-    YOp,
-    /// Deviations from the operating point.
-    Y,
-    E,
-    XHat,
-    FHat,
-    YF,
-    U,
-    /// The commands and estimates as values.
-    Command,
-    XValue,
-    FValue,
-    /// The estimate for the next sample, as values.
-    NextXHat,
-    NextFHat,
-    NextYF,
-}
-
-/// A matrix of the controller.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Matrix {
-    A,
-    B,
-    C,
-    FA,
-    AF,
-    KX,
-    KF,
-    LX,
-    LF,
-}
+use super::symbols::{Matrix, Vector};
 
 /// What a statement adds, for element i.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +28,8 @@ pub(super) enum Operation {
     Subtract(Term),
     /// Adds row i of a matrix times a vector, one product after the other.
     Accumulate(Matrix, Vector),
+    /// Multiplies by the sample time.
+    TimesPeriod,
 }
 
 /// When a statement is carried out.
@@ -103,7 +60,7 @@ impl Recursion {
     pub(super) fn of(controller: &Controller) -> Self {
         let mut before_limits = deviations(controller);
         before_limits.extend(estimates(controller));
-        before_limits.extend(commands());
+        before_limits.extend(commands(controller));
         Self { before_limits, after_limits: predictions(controller) }
     }
 
@@ -139,6 +96,11 @@ fn deviations(controller: &Controller) -> Vec<Statement> {
     if controller.filter.is_some() {
         let start = Element(Vector::StoredYF);
         all.push(statement("", Vector::YF, start, [Subtract(Element(Vector::YOp))]));
+    }
+    if !controller.references.is_empty() {
+        let start = Element(Vector::Referred);
+        let operations = [Subtract(Element(Vector::ROp)), Add(Zero)];
+        all.push(statement("", Vector::R, start, operations));
     }
     all
 }
@@ -180,22 +142,34 @@ fn estimates(controller: &Controller) -> Vec<Statement> {
 }
 
 /// The commands without limits.
-fn commands() -> [Statement; 3] {
+fn commands(controller: &Controller) -> Vec<Statement> {
     use Operation::Add;
     use Term::{Element, Product};
-    [
+    let add = |equation, matrix, vector| {
+        statement(equation, Vector::U, Element(Vector::U), [Add(Product(matrix, vector))])
+    };
+    let mut all = vec![
         statement("u = K_x x_hat", Vector::U, Product(Matrix::KX, Vector::XHat), []),
         Statement {
             when: When::Compensating,
-            ..statement(
-                "u = u + K_f f_hat",
-                Vector::U,
-                Element(Vector::U),
-                [Add(Product(Matrix::KF, Vector::FHat))],
-            )
+            ..add("u = u + K_f f_hat", Matrix::KF, Vector::FHat)
         },
-        statement("commands", Vector::Command, Element(Vector::U), [Add(Element(Vector::UOp))]),
-    ]
+    ];
+    if controller.k_i.is_some() {
+        all.push(add("u = u + K_i x_i", Matrix::KI, Vector::StoredXI));
+    }
+    if controller.n_r.is_some() {
+        all.push(add("u = u + N_r r", Matrix::NR, Vector::R));
+    }
+    let u_op = [Add(Element(Vector::UOp))];
+    all.push(statement("commands", Vector::Command, Element(Vector::U), u_op));
+    if controller.h.is_some() {
+        all.push(statement("", Vector::XIValue, Element(Vector::StoredXI), []));
+    }
+    if controller.l_w.is_some() {
+        all.push(statement("", Vector::V, Element(Vector::U), []));
+    }
+    all
 }
 
 /// The estimate for the next sample.
@@ -229,6 +203,36 @@ fn predictions(controller: &Controller) -> Vec<Statement> {
             [Add(Element(Vector::YF)), Add(Element(Vector::YOp))],
         ));
     }
+    all.extend(integrals(controller));
+    all
+}
+
+/// The integrals of the distances from the references. The FMU adds `L_w` (u - v) for the commands at a
+/// limit; for the others u - v is 0.
+fn integrals(controller: &Controller) -> Vec<Statement> {
+    use Operation::{Accumulate, Add, Subtract, TimesPeriod};
+    use Term::{Element, Product, Zero};
+    if controller.h.is_none() {
+        return Vec::new();
+    }
+    let mut all = Vec::new();
+    let mut operations = vec![Subtract(Product(Matrix::H, Vector::Y))];
+    operations.extend(controller.f_i.is_some().then_some(Add(Product(Matrix::FI, Vector::FHat))));
+    operations.push(TimesPeriod);
+    if controller.l_w.is_some() {
+        let without_limits = [Subtract(Element(Vector::V))];
+        all.push(statement("u - v", Vector::Excess, Element(Vector::U), without_limits));
+        operations.push(Accumulate(Matrix::LW, Vector::Excess));
+    }
+    operations.extend([Add(Element(Vector::StoredXI)), Add(Zero)]);
+    let equation = match (&controller.f_i, &controller.l_w) {
+        (None, None) => "x_i[k+1] = x_i + T (r - H y)",
+        (Some(_), None) => "x_i[k+1] = x_i + T (r - H y + F_i f_hat)",
+        (None, Some(_)) => "x_i[k+1] = x_i + T (r - H y) + L_w (u - v)",
+        (Some(_), Some(_)) => "x_i[k+1] = x_i + T (r - H y + F_i f_hat) + L_w (u - v)",
+    };
+    let next = statement(equation, Vector::NextXI, Element(Vector::R), []);
+    all.push(Statement { operations, ..next });
     all
 }
 
@@ -265,115 +269,4 @@ fn fault_predictions(controller: &Controller) -> Vec<Statement> {
 /// Faults are estimated while they are compensated; with `monitor`, always.
 fn while_estimating(controller: &Controller) -> When {
     if controller.monitor { When::Always } else { When::Compensating }
-}
-
-impl Matrix {
-    pub(super) const ALL: [Self; 9] =
-        [Self::A, Self::B, Self::C, Self::FA, Self::AF, Self::KX, Self::KF, Self::LX, Self::LF];
-
-    /// The matrix of a controller.
-    pub(super) fn of(self, controller: &Controller) -> &DMatrix<f64> {
-        match self {
-            Self::A => &controller.a,
-            Self::B => &controller.b,
-            Self::C => &controller.c,
-            Self::FA => &controller.f_a,
-            Self::AF => &controller.a_f,
-            Self::KX => &controller.k_x,
-            Self::KF => &controller.k_f,
-            Self::LX => &controller.l_x,
-            Self::LF => &controller.l_f,
-        }
-    }
-
-    /// The name in the design file.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::A => "A",
-            Self::B => "B",
-            Self::C => "C",
-            Self::FA => "F_a",
-            Self::AF => "A_f",
-            Self::KX => "K_x",
-            Self::KF => "K_f",
-            Self::LX => "L_x",
-            Self::LF => "L_f",
-        }
-    }
-}
-
-impl Vector {
-    /// The name without its owner.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::StoredXHat | Self::XHat => "x_hat",
-            Self::StoredFHat | Self::FHat => "f_hat",
-            Self::StoredYF | Self::YF => "y_f",
-            Self::Measured | Self::Y => "y",
-            Self::XOp => "x_op",
-            Self::UOp => "u_op",
-            Self::YOp => "y_op",
-            Self::E => "e",
-            Self::U => "u",
-            Self::Command => "command",
-            Self::XValue => "x_value",
-            Self::FValue => "f_value",
-            Self::NextXHat => "next_x_hat",
-            Self::NextFHat => "next_f_hat",
-            Self::NextYF => "next_y_f",
-        }
-    }
-
-    /// Whether it is part of the controller's state.
-    pub(super) fn is_stored(self) -> bool {
-        matches!(self, Self::StoredXHat | Self::StoredFHat | Self::StoredYF | Self::Measured)
-    }
-
-    /// The signals that its elements belong to.
-    pub(super) fn kind(self) -> Kind {
-        match self {
-            Self::StoredXHat | Self::XHat | Self::XOp | Self::XValue | Self::NextXHat => {
-                Kind::State
-            }
-            Self::StoredFHat | Self::FHat | Self::FValue | Self::NextFHat => Kind::Fault,
-            Self::UOp | Self::U | Self::Command => Kind::Actuator,
-            Self::StoredYF
-            | Self::Measured
-            | Self::YOp
-            | Self::Y
-            | Self::E
-            | Self::YF
-            | Self::NextYF => Kind::Measurement,
-        }
-    }
-}
-
-/// The signals of a controller.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    State,
-    Fault,
-    Actuator,
-    Measurement,
-}
-
-impl Kind {
-    pub(super) fn count(self, controller: &Controller) -> usize {
-        match self {
-            Self::State => controller.states.len(),
-            Self::Fault => controller.faults.len(),
-            Self::Actuator => controller.actuators.len(),
-            Self::Measurement => controller.measurements.len(),
-        }
-    }
-
-    /// The name of their number.
-    pub(super) fn plural(self) -> &'static str {
-        match self {
-            Self::State => "STATES",
-            Self::Fault => "FAULTS",
-            Self::Actuator => "ACTUATORS",
-            Self::Measurement => "MEASUREMENTS",
-        }
-    }
 }

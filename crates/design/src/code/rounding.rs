@@ -26,8 +26,9 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::controller::Controller;
-use super::recursion::{Kind, Operation, Recursion, Statement, Term, Vector, When};
+use super::recursion::{Operation, Recursion, Statement, Term, When};
 use super::summary::{Fields, aligned, filled};
+use super::symbols::{Kind, Matrix, Vector};
 
 /// The relative rounding error of single precision.
 const UNIT: f64 = 5.960_464_477_539_063e-8;
@@ -42,7 +43,7 @@ const COARSE: f64 = 0.01;
 
 /// The bound, or the reason why there is none.
 pub(super) struct RoundingBound {
-    /// Outputs (commands, then faults) x signals (states, faults, measurements, commands, 1).
+    /// Outputs (commands, then faults) x signals (as [`Kind::ALL`], then 1).
     bound: Result<DMatrix<f64>, String>,
     /// 1 - |lambda| of the slowest eigenvalue of the loop.
     slowest: f64,
@@ -79,10 +80,11 @@ impl RoundingBound {
                 return vec![format!("float: no bound of the rounding errors: {reason}")];
             }
         };
-        let [n, q, m, p] = [Kind::State, Kind::Fault, Kind::Actuator, Kind::Measurement]
-            .map(|kind| kind.count(controller));
-        let commands = (0..m).map(|j| (&controller.actuators[j].name, bound[(j, n + q + p + j)]));
-        let faults = (0..q).map(|i| (&controller.faults[i].name, bound[(m + i, n + i)]));
+        let first = |kind| first_signal(kind, controller);
+        let commands = controller.actuators.iter().enumerate();
+        let commands = commands.map(|(j, own)| (&own.name, bound[(j, first(Kind::Actuator) + j)]));
+        let (m, faults) = (controller.actuators.len(), controller.faults.iter().enumerate());
+        let faults = faults.map(|(i, own)| (&own.name, bound[(m + i, first(Kind::Fault) + i)]));
         let coarse = commands.chain(faults).filter(|(_, part)| *part > COARSE);
         coarse
             .map(|(name, part)| {
@@ -110,6 +112,8 @@ impl RoundingBound {
         signals.extend(named("f_hat_", &fields.faults));
         signals.extend(named("", &fields.measurements));
         signals.extend(named("", &fields.actuators));
+        signals.extend(named("", &fields.references));
+        signals.extend(named("x_i_", &fields.integrals));
         signals.push("1".to_owned());
         let mut lines = filled(
             "In the loop with the plant of the design, while compensating and with no command at a limit, \
@@ -125,6 +129,12 @@ impl RoundingBound {
         }
         lines
     }
+}
+
+/// The place of the signals of a kind among all signals.
+fn first_signal(kind: Kind, controller: &Controller) -> usize {
+    let before = Kind::ALL.into_iter().take_while(|other| *other != kind);
+    before.map(|other| other.count(controller)).sum()
 }
 
 fn named(start: &str, fields: &[String]) -> Vec<String> {
@@ -161,6 +171,13 @@ impl Elements {
                 self.error.row_mut(i).add_assign(&rounding);
             }
         }
+    }
+
+    /// Multiplies by a constant.
+    fn scale(&mut self, factor: f64) {
+        self.form *= factor;
+        self.error = &self.error * factor + &self.magnitude * product_error(factor);
+        self.magnitude *= factor;
     }
 
     /// Adds row i of `matrix` times `vector` to element i, one product after the other.
@@ -227,9 +244,16 @@ impl<'a> Analysis<'a> {
                 });
             }
         }
-        let mut measured = own.get(Vector::Measured);
-        measured.error = &measured.magnitude * UNIT;
-        own.learn(Vector::Measured, measured);
+        let integrals = own.count(Kind::Integral);
+        own.start(Vector::StoredXI, |form| {
+            form.columns_mut(2 * n + q, integrals).fill_with_identity();
+        });
+        own.start(Vector::Referred, |_| {});
+        for vector in [Vector::Measured, Vector::Referred] {
+            let mut rounded = own.get(vector);
+            rounded.error = &rounded.magnitude * UNIT;
+            own.learn(vector, rounded);
+        }
         own
     }
 
@@ -237,15 +261,14 @@ impl<'a> Analysis<'a> {
         kind.count(self.controller)
     }
 
-    /// States of the loop: plant, stored `x_hat`, stored `f_hat`.
+    /// States of the loop: plant, stored `x_hat`, stored `f_hat`, `x_i`.
     fn order(&self) -> usize {
-        2 * self.count(Kind::State) + self.count(Kind::Fault)
+        2 * self.count(Kind::State) + self.count(Kind::Fault) + self.count(Kind::Integral)
     }
 
     /// The columns of forms, with room for the errors of 6 vectors of each kind, and the signals.
     fn widths(&self) -> (usize, usize) {
-        let kinds = [Kind::State, Kind::Fault, Kind::Measurement, Kind::Actuator];
-        let signals: usize = kinds.map(|kind| self.count(kind)).iter().sum();
+        let signals: usize = Kind::ALL.map(|kind| self.count(kind)).iter().sum();
         (self.order() + 6 * signals, signals + 1)
     }
 
@@ -263,6 +286,7 @@ impl<'a> Analysis<'a> {
             Vector::XOp => Some(&self.controller.states),
             Vector::UOp => Some(&self.controller.actuators),
             Vector::YOp => Some(&self.controller.measurements),
+            Vector::ROp => Some(&self.controller.references),
             _ => None,
         };
         let zero = || Elements::zero(self.count(vector.kind()), self.widths());
@@ -281,29 +305,23 @@ impl<'a> Analysis<'a> {
 
     /// A bound of the elements of a vector, from the largest deviations of the signals.
     fn magnitude(&self, vector: Vector) -> DMatrix<f64> {
-        let [n, q, p, m] = [Kind::State, Kind::Fault, Kind::Measurement, Kind::Actuator]
-            .map(|kind| self.count(kind));
-        let rows = self.count(vector.kind());
-        let mut own = DMatrix::zeros(rows, self.widths().1);
-        let first = match vector.kind() {
-            Kind::State => 0,
-            Kind::Fault => n,
-            Kind::Measurement => n + q,
-            Kind::Actuator => n + q + p,
-        };
-        own.columns_mut(first, rows).fill_with_identity();
+        let (rows, signals) = (self.count(vector.kind()), self.widths().1);
+        let mut own = DMatrix::zeros(rows, signals);
+        own.columns_mut(first_signal(vector.kind(), self.controller), rows).fill_with_identity();
         let operating = match vector {
             Vector::StoredXHat | Vector::XValue | Vector::NextXHat => &self.controller.states,
             Vector::StoredYF | Vector::Measured | Vector::NextYF => &self.controller.measurements,
             Vector::Command => &self.controller.actuators,
+            Vector::Referred => &self.controller.references,
             Vector::E => {
-                own.columns_mut(0, n).copy_from(&self.controller.c.abs());
+                let c = self.controller.c.abs();
+                own.columns_mut(0, c.ncols()).copy_from(&c);
                 return own;
             }
             _ => return own,
         };
         for (i, signal) in operating.iter().enumerate() {
-            own[(i, n + q + p + m)] = signal.operating.abs();
+            own[(i, signals - 1)] = signal.operating.abs();
         }
         own
     }
@@ -322,9 +340,16 @@ impl<'a> Analysis<'a> {
     }
 
     fn follow(&mut self, statement: &Statement) {
-        // No output and no later statement has x_hat as a value.
-        if statement.target == Vector::XValue {
-            return;
+        match statement.target {
+            // No output of the loop and no later statement has these.
+            Vector::XValue | Vector::XIValue | Vector::V => return,
+            // Without limits it is exactly zero.
+            Vector::Excess => {
+                let zero = Elements::zero(self.count(Kind::Actuator), self.widths());
+                self.known.push((Vector::Excess, zero));
+                return;
+            }
+            _ => {}
         }
         let rows = self.count(statement.target.kind());
         let mut sum = self.term(statement.start, rows);
@@ -332,12 +357,17 @@ impl<'a> Analysis<'a> {
             match *operation {
                 Operation::Add(term) => sum.add(&self.term(term, rows), 1.0),
                 Operation::Subtract(term) => sum.add(&self.term(term, rows), -1.0),
-                Operation::Accumulate(matrix, vector) => {
-                    sum.accumulate(matrix.of(self.controller), &self.get(vector));
-                }
+                Operation::Accumulate(matrix, vector) => self.accumulate(&mut sum, matrix, vector),
+                Operation::TimesPeriod => sum.scale(self.controller.sample_time),
             }
         }
         self.learn(statement.target, sum);
+    }
+
+    fn accumulate(&self, sum: &mut Elements, matrix: Matrix, vector: Vector) {
+        if let Some(matrix) = matrix.of(self.controller) {
+            sum.accumulate(matrix, &self.get(vector));
+        }
     }
 
     fn term(&self, term: Term, rows: usize) -> Elements {
@@ -346,7 +376,7 @@ impl<'a> Analysis<'a> {
             Term::Zero => {}
             Term::Element(vector) => own = self.get(vector),
             Term::Product(matrix, vector) => {
-                own.accumulate(matrix.of(self.controller), &self.get(vector));
+                self.accumulate(&mut own, matrix, vector);
             }
             Term::FilterStep => {
                 let mut difference = self.get(Vector::Y);
@@ -362,15 +392,8 @@ impl<'a> Analysis<'a> {
 
     /// The loop from the errors w to [u; `f_hat`].
     fn system(&self) -> StateSpace {
-        let ((n, q, p, m), order) = (
-            (
-                self.count(Kind::State),
-                self.count(Kind::Fault),
-                self.count(Kind::Measurement),
-                self.count(Kind::Actuator),
-            ),
-            self.order(),
-        );
+        let ([n, q, p, m, _, integrals], order) =
+            (Kind::ALL.map(|kind| self.count(kind)), self.order());
         let inputs = self.errors.len();
         let command = self.get(Vector::Command).form;
         let mut next = DMatrix::zeros(order, self.widths().0);
@@ -381,6 +404,7 @@ impl<'a> Analysis<'a> {
         }
         next.rows_mut(n, n).copy_from(&self.get(Vector::NextXHat).form);
         next.rows_mut(2 * n, q).copy_from(&self.get(Vector::NextFHat).form);
+        next.rows_mut(2 * n + q, integrals).copy_from(&self.get(Vector::NextXI).form);
         let mut outputs = DMatrix::zeros(m + q, self.widths().0);
         outputs.rows_mut(0, m).copy_from(&command);
         outputs.rows_mut(m, q).copy_from(&self.get(Vector::FValue).form);

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use super::c::wrapped;
 use super::controller::Controller;
-use super::recursion::{Kind, Operation, Recursion, Statement, Term, Vector, When};
+use super::recursion::{Operation, Recursion, Statement, Term, When};
 use super::rounding::RoundingBound;
 use super::summary::{Fields, Vocabulary, ascii, summary};
-use super::tables::{Constants, locals, stored, tables};
+use super::symbols::{Kind, Vector};
+use super::tables::{Constants, kept, locals, shown, stored, tables};
 use super::{Precision, Request};
 
 /// What every function of this file renders from.
@@ -53,7 +54,7 @@ impl Source<'_> {
             init: "Controller::new()".to_owned(),
             init_at: "Controller::starting_at()".to_owned(),
             step: "Controller::step()".to_owned(),
-            held: "Status::measurement_held".to_owned(),
+            held: "Status::held".to_owned(),
             at_limit: "Status::at_limit".to_owned(),
             overflow: "Status::overflow".to_owned(),
             real: self.real,
@@ -89,7 +90,11 @@ impl Source<'_> {
             (Kind::Fault, "faults"),
             (Kind::Actuator, "actuators"),
             (Kind::Measurement, "measurements"),
+            (Kind::Reference, "references"),
         ] {
+            if kind.count(controller) == 0 {
+                continue;
+            }
             lines.push(format!("/// Number of {what}."));
             let count = kind.count(controller);
             lines.push(format!("pub const {}: usize = {count};", kind.plural()));
@@ -142,9 +147,13 @@ impl Source<'_> {
         let estimates = fields.estimates(controller);
         for (name, text, count, fields) in [
             ("Measurements", "The measurements of a sample.", "MEASUREMENTS", &fields.measurements),
+            ("References", "The references of a sample.", "REFERENCES", &fields.references),
             ("Commands", "The commands of a sample.", "ACTUATORS", &fields.actuators),
             ("Estimates", "The estimates of a sample.", "ESTIMATES", &estimates),
         ] {
+            if fields.is_empty() {
+                continue;
+            }
             lines.push(format!("\n/// {text}"));
             lines.push("#[derive(Clone, Copy, Debug, Default, PartialEq)]".to_owned());
             lines.push(format!("pub struct {name} {{"));
@@ -173,8 +182,8 @@ impl Source<'_> {
 /// What was unusual in a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status {
-    /// A measurement was NaN or infinite; its last finite value was used.
-    pub measurement_held: bool,
+    /// A measurement or reference was NaN or infinite; its last finite value was used.
+    pub held: bool,
     /// A command is at a limit.
     pub at_limit: bool,
     /// A sum was beyond the range of the numbers; commands and estimates keep their values.
@@ -239,19 +248,36 @@ impl Controller {{
         if controller.first_compensated > 0 {
             lines.push("            sample: 0,".to_owned());
         }
+        if !controller.references.is_empty() {
+            lines.push("            r: R_OP,".to_owned());
+        }
+        if controller.h.is_some() {
+            lines.push("            x_i: [0.0; REFERENCES],".to_owned());
+        }
         lines.push("            y: Y_OP,\n            u: U_OP,\n        }\n    }".to_owned());
     }
 
     fn step(&self, lines: &mut Vec<String>) {
         let Self { controller, recursion, real, .. } = self;
-        lines.push(
+        let (parameter, pair, taken) = match controller.references.as_slice() {
+            [] => ("", "", ""),
+            _ => (
+                " references: &References,",
+                "\n        let referred: [REAL; REFERENCES] = (*references).into();",
+                "\n        status.held |= take(&mut self.r, &referred);",
+            ),
+        };
+        let pair = pair.replace("REAL", real);
+        lines.push(format!(
             "
     /// Takes a sample.
     #[must_use]
-    pub fn step(&mut self, measurements: &Measurements, compensate: bool) -> Outputs {
-        let mut status = Status::default();"
-                .to_owned(),
-        );
+    pub fn step(&mut self, measurements: &Measurements,{parameter} compensate: bool) -> Outputs {{
+        let mut status = Status::default();
+        // The last finite inputs.
+        let measured: [{real}; MEASUREMENTS] = (*measurements).into();{pair}
+        status.held |= take(&mut self.y, &measured);{taken}"
+        ));
         let compensating = match controller.first_compensated {
             0 => "compensate",
             _ => "compensate && self.sample >= FIRST_COMPENSATED",
@@ -261,17 +287,6 @@ impl Controller {{
             let (name, count) = (vector.name(), vector.kind().plural());
             lines.push(format!("        let mut {name} = [0.0; {count}];"));
         }
-        lines.push(format!(
-            "        // The last finite measurements.
-        let received: [{real}; MEASUREMENTS] = (*measurements).into();
-        for (held, value) in self.y.iter_mut().zip(&received) {{
-            if value.is_finite() {{
-                *held = *value;
-            }} else {{
-                status.measurement_held = true;
-            }}
-        }}"
-        ));
         if controller.filter.is_some() {
             lines.push(
                 "        if !self.started {
@@ -304,23 +319,22 @@ impl Controller {{
         for statement in &recursion.after_limits {
             write_statement(lines, statement);
         }
-        let (filtered, keep) = match controller.filter {
-            Some(_) => (" && all_finite(&next_y_f)", "\n            self.y_f = next_y_f;"),
-            None => ("", ""),
-        };
-        lines.push(format!(
-            "        finite = finite && all_finite(&next_x_hat) && all_finite(&next_f_hat){filtered};
-        if finite {{
-            self.x_hat = next_x_hat;
-            self.f_hat = next_f_hat;{keep}
-            self.u = command;
-        }} else {{
-            x_value = self.x_hat;
-            f_value = self.f_hat;
-            status.at_limit = false;
-            status.overflow = true;
-        }}"
-        ));
+        let kept = kept(controller);
+        let checks = kept.iter().map(|(next, _)| format!(" && all_finite(&{})", next.name()));
+        lines.push(format!("        finite = finite{};", checks.collect::<String>()));
+        lines.push("        if finite {".to_owned());
+        lines.extend(
+            kept.iter()
+                .map(|(next, own)| format!("            {} = {};", owned(*own), next.name())),
+        );
+        lines.push("            self.u = command;\n        } else {".to_owned());
+        for (value, stored) in shown(controller) {
+            lines.push(format!("            {} = {};", value.name(), owned(stored)));
+        }
+        lines.push(
+            "            status.at_limit = false;\n            status.overflow = true;\n        }"
+                .to_owned(),
+        );
         if controller.first_compensated > 0 {
             lines.push(
                 "        self.sample = FIRST_COMPENSATED.min(self.sample.saturating_add(1));"
@@ -337,6 +351,10 @@ impl Controller {{
         lines.push("        let commands = Commands::from(self.u);".to_owned());
         lines.push(format!("        let [{}] = x_value;", states.join(", ")));
         lines.push(format!("        let [{}] = f_value;", faults.join(", ")));
+        let integrals: Vec<_> = (1..=fields.integrals.len()).map(|k| format!("i{k}")).collect();
+        if !integrals.is_empty() {
+            lines.push(format!("        let [{}] = x_i_value;", integrals.join(", ")));
+        }
         let losses = controller.losses.iter().map(|loss| {
             format!(
                 "lost_effectiveness(commands.{}, {}, {})",
@@ -345,7 +363,7 @@ impl Controller {{
                 self.literal(loss.least_command * loss.least_command)
             )
         });
-        let values = states.iter().chain(&faults).cloned().chain(losses);
+        let values = states.iter().chain(&faults).cloned().chain(losses).chain(integrals);
         lines.push("        let estimates = Estimates {".to_owned());
         for (field, value) in fields.estimates(controller).iter().zip(values) {
             lines.push(format!("            {field}: {value},"));
@@ -359,6 +377,19 @@ impl Controller {{
         let real = self.real;
         lines.push(format!(
             "
+/// Keeps the values that are numbers; returns whether there is another one.
+fn take(kept: &mut [{real}], values: &[{real}]) -> bool {{
+    let mut held = false;
+    for (kept, value) in kept.iter_mut().zip(values) {{
+        if value.is_finite() {{
+            *kept = *value;
+        }} else {{
+            held = true;
+        }}
+    }}
+    held
+}}
+
 fn all_finite(vector: &[{real}]) -> bool {{
     vector.iter().all(|value| value.is_finite())
 }}
@@ -398,6 +429,7 @@ fn write_statement(lines: &mut Vec<String>, statement: &Statement) {
         let sum = match *operation {
             Operation::Add(term) => format!("sum + {}", zipped.term(term)),
             Operation::Subtract(term) => format!("sum - {}", zipped.term(term)),
+            Operation::TimesPeriod => "sum * SAMPLE_TIME".to_owned(),
             Operation::Accumulate(matrix, vector) => {
                 let row = zipped.row(&matrix.name().to_ascii_uppercase());
                 format!("accumulate(sum, {row}, &{})", owned(vector))

@@ -26,6 +26,9 @@ pub(super) struct Fields {
     pub(super) faults: Vec<String>,
     pub(super) actuators: Vec<String>,
     pub(super) measurements: Vec<String>,
+    pub(super) references: Vec<String>,
+    /// The integrals, named like their references.
+    pub(super) integrals: Vec<String>,
 }
 
 impl Fields {
@@ -36,16 +39,22 @@ impl Fields {
             faults: own(&controller.faults),
             actuators: own(&controller.actuators),
             measurements: own(&controller.measurements),
+            integrals: match controller.h {
+                Some(_) => own(&controller.references),
+                None => Vec::new(),
+            },
+            references: own(&controller.references),
         }
     }
 
-    /// The fields of the estimates, in order: states, faults, losses.
+    /// The fields of the estimates, in order: states, faults, losses, integrals.
     pub(super) fn estimates(&self, controller: &Controller) -> Vec<String> {
         let states = self.states.iter().map(|field| format!("x_hat_{field}"));
         let faults = self.faults.iter().map(|field| format!("f_hat_{field}"));
         let losses = controller.losses.iter();
         let losses = losses.map(|loss| format!("E_hat_{}", self.faults[loss.fault]));
-        states.chain(faults).chain(losses).collect()
+        let integrals = self.integrals.iter().map(|field| format!("x_i_{field}"));
+        states.chain(faults).chain(losses).chain(integrals).collect()
     }
 }
 
@@ -166,6 +175,12 @@ fn modes(controller: &Controller) -> Vec<String> {
                     that no estimate winds up.";
         all.push(text.to_owned());
     }
+    if controller.h.is_some() {
+        let text = "The integrals x_i of the distances of the measurements from their references start at 0; \
+                    while a command is at a limit, they follow the limited command (L_w).";
+        let plain = "The integrals x_i of the distances of the measurements from their references start at 0.";
+        all.push(if controller.l_w.is_some() { text } else { plain }.to_owned());
+    }
     all
 }
 
@@ -177,6 +192,7 @@ fn signals(controller: &Controller, fields: &Fields) -> Vec<String> {
     ];
     let groups = [
         ("Measurements", "", &controller.measurements, &fields.measurements),
+        ("References", "", &controller.references, &fields.references),
         ("Commands", "", &controller.actuators, &fields.actuators),
         ("Estimates", "x_hat_", &controller.states, &fields.states),
         ("Estimates", "f_hat_", &controller.faults, &fields.faults),
@@ -204,6 +220,15 @@ fn signals(controller: &Controller, fields: &Fields) -> Vec<String> {
             String::new(),
         ]);
     }
+    for (field, reference) in fields.integrals.iter().zip(&controller.references) {
+        rows.push([
+            format!("Estimates.x_i_{field}"),
+            format!("integral for {}", one_line(&reference.name)),
+            String::new(),
+            "0.0".to_owned(),
+            String::new(),
+        ]);
+    }
     let mut lines = aligned(&rows);
     for (actuator, field) in controller.actuators.iter().zip(&fields.actuators) {
         lines.extend(
@@ -226,7 +251,7 @@ fn status(vocabulary: &Vocabulary) -> [String; 3] {
     let Vocabulary { held, at_limit, overflow, real, .. } = vocabulary;
     [
         format!(
-            "{held}: a measurement was NaN or infinite; its last finite value was used, before the first \
+            "{held}: a measurement or reference was NaN or infinite; its last finite value was used, before the first \
              one its value at the operating point."
         ),
         format!("{at_limit}: a command is at a limit."),

@@ -1,13 +1,35 @@
 //! The constants and the variables of a controller.
 
+use nalgebra::DMatrix;
+
 use super::controller::{Controller, Signal};
-use super::recursion::{Kind, Matrix, Operation, Recursion, Term, Vector};
+use super::recursion::{Operation, Recursion, Term};
+use super::symbols::{Kind, Matrix, Vector};
 
 /// The vectors that are kept from sample to sample.
 pub(super) fn stored(controller: &Controller) -> Vec<Vector> {
     let mut all = vec![Vector::StoredXHat, Vector::StoredFHat];
     all.extend(controller.filter.is_some().then_some(Vector::StoredYF));
     all.push(Vector::Measured);
+    all.extend((!controller.references.is_empty()).then_some(Vector::Referred));
+    all.extend(controller.h.is_some().then_some(Vector::StoredXI));
+    all
+}
+
+/// What is computed for the next sample, and where it is stored.
+pub(super) fn kept(controller: &Controller) -> Vec<(Vector, Vector)> {
+    let mut all =
+        vec![(Vector::NextXHat, Vector::StoredXHat), (Vector::NextFHat, Vector::StoredFHat)];
+    let filtered = (Vector::NextYF, Vector::StoredYF);
+    all.extend(controller.filter.is_some().then_some(filtered));
+    all.extend(controller.h.is_some().then_some((Vector::NextXI, Vector::StoredXI)));
+    all
+}
+
+/// The estimates as a user sees them, and the stored ones, which they are after an overflow.
+pub(super) fn shown(controller: &Controller) -> Vec<(Vector, Vector)> {
+    let mut all = vec![(Vector::XValue, Vector::StoredXHat), (Vector::FValue, Vector::StoredFHat)];
+    all.extend(controller.h.is_some().then_some((Vector::XIValue, Vector::StoredXI)));
     all
 }
 
@@ -52,19 +74,17 @@ pub(super) const LIMITS: [(&str, &str); 4] = [
 
 /// All constants of a controller.
 pub(super) fn tables(controller: &Controller, recursion: &Recursion) -> Vec<Constants> {
-    let mut all: Vec<_> = matrices(recursion)
-        .into_iter()
-        .map(|(matrix, vector, rows)| {
-            let values = matrix.of(controller).row_iter();
-            Constants {
-                name: matrix.name(),
-                meaning: "",
-                rows,
-                columns: Some(vector.kind()),
-                values: values.map(|row| row.iter().copied().collect()).collect(),
-            }
-        })
-        .collect();
+    let mut all = Vec::new();
+    for (matrix, vector, rows) in matrices(recursion) {
+        let values = matrix.of(controller).into_iter().flat_map(DMatrix::row_iter);
+        all.push(Constants {
+            name: matrix.name(),
+            meaning: "",
+            rows,
+            columns: Some(vector.kind()),
+            values: values.map(|row| row.iter().copied().collect()).collect(),
+        });
+    }
     all.extend(controller.filter.clone().map(|filter| {
         Constants::vector("filter", "gains of the measurement filter", Kind::Measurement, filter)
     }));
@@ -72,7 +92,11 @@ pub(super) fn tables(controller: &Controller, recursion: &Recursion) -> Vec<Cons
         ("x_op", "operating point", Kind::State, &controller.states),
         ("u_op", "", Kind::Actuator, &controller.actuators),
         ("y_op", "", Kind::Measurement, &controller.measurements),
+        ("r_op", "", Kind::Reference, &controller.references),
     ] {
+        if signals.is_empty() {
+            continue;
+        }
         all.push(Constants::vector(name, meaning, kind, Controller::operating(signals)));
     }
     if controller.is_limited() {
