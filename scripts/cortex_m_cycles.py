@@ -9,7 +9,7 @@ Needs arm-none-eabi-gcc and qemu-system-arm (Debian: gcc-arm-none-eabi, qemu-sys
 point, so that limits are reached. Each instruction counts with the cycles of the Technical Reference Manual of the
 Cortex-M4 (ARM DDI 0439, tables 3-1 and 7-1): loads and stores 2, of several registers one more than their number,
 divisions of integers 12, VDIV and VSQRT 14, VMLA 3, branches that are taken 3, the rest 1. Memory without wait states is
-assumed. A Cortex-M7 issues up to two instructions at once and needs fewer cycles than this.
+assumed. Of a Cortex-M7, which issues up to two instructions at once, only the instructions are counted.
 """
 
 import argparse
@@ -149,7 +149,8 @@ def main():
     assert len(samples) == SAMPLES, f"{len(samples)} samples in the trace"
     most = max(samples, key=lambda own: own[1])
     print(f"{source.stem}, {names['real']}, {options.cpu}: program and constants {size} bytes")
-    print(f"a sample: at most {most[0]} instructions, about {most[1]} cycles, {1e6 * most[1] / 168e6:.1f} us at 168 MHz")
+    estimate = f", about {most[1]} cycles, {1e6 * most[1] / 168e6:.1f} us at 168 MHz"
+    print(f"a sample: at most {most[0]} instructions{'' if options.cpu == 'cortex-m7' else estimate}")
     print("most frequent: " + ", ".join(f"{name} {count // SAMPLES}" for name, count in kinds.most_common(8)))
 
 

@@ -89,6 +89,7 @@ class Built:
         unit = program.with_suffix(".o")
         run(compiler, *WARNINGS, *options, "-c", source, "-o", unit)
         macros = [f"-DNAME={self.name}", f"-DREAL={'float' if self.single else 'double'}"]
+        macros += ["-DREFERENCES"] if self.design.get("references") else []
         run(compiler, *options, "-include", header, *macros, HERE / "controller_loop.c", unit, "-o", program)
         return program
 
@@ -98,8 +99,9 @@ class Built:
         always = ["rustc", "--edition", "2021", "-O", "-D", "warnings"]
         source = self.folder / "rust" / "src" / "lib.rs"
         run(*always, "--crate-type", "rlib", "--crate-name", "controller", source, "-o", library)
-        switch = ["--cfg", "single"] if self.single else []
-        known = ["--check-cfg", "cfg(single)", *switch, "--extern", f"controller={library}"]
+        switches = [("single", self.single), ("references", self.design.get("references"))]
+        known = ["--check-cfg", "cfg(single, references)"]
+        known += [word for name, is_set in switches if is_set for word in ("--cfg", name)] + ["--extern", f"controller={library}"]
         run(*always, *known, HERE / "controller_loop.rs", "-o", program)
         return program
 

@@ -1,6 +1,7 @@
 /* Feeds measurements from standard input to a controller that `aso-ftc design --c-code` has written, and writes
- * commands, estimates and status to standard output. Each sample has the measurements and whether to compensate, all
- * as doubles. Macros: NAME (of the controller), REAL (double or float); the header comes by -include. */
+ * commands, estimates and status to standard output. Each sample has the measurements, the references and whether to
+ * compensate, all as doubles. Macros: NAME (of the controller), REAL (double or float), REFERENCES if it has any; the
+ * header comes by -include. */
 #include <stdio.h>
 #include <string.h>
 
@@ -9,6 +10,14 @@
 #define COUNT(signals) (sizeof(signals) / sizeof(REAL))
 
 static JOIN(NAME, Measurements) measurements;
+#ifdef REFERENCES
+static JOIN(NAME, References) references;
+#define ALL (COUNT(measurements) + COUNT(references))
+#define SIGNALS &measurements, &references
+#else
+#define ALL COUNT(measurements)
+#define SIGNALS &measurements
+#endif
 static JOIN(NAME, Commands) commands;
 static JOIN(NAME, Estimates) estimates;
 
@@ -27,18 +36,21 @@ static void put(const void *signals, size_t count)
 int main(void)
 {
     JOIN(NAME, State) state;
-    double values[COUNT(measurements) + 1];
+    double values[ALL + 1];
     JOIN(NAME, init)(&state);
     fprintf(stderr, "%zu\n", sizeof(state));
     while (fread(values, sizeof(values), 1, stdin) == 1)
     {
-        REAL received[COUNT(measurements)];
-        for (size_t k = 0; k < COUNT(measurements); k++)
+        REAL received[ALL];
+        for (size_t k = 0; k < ALL; k++)
         {
             received[k] = (REAL)values[k];
         }
-        memcpy(&measurements, received, sizeof(received));
-        uint32_t bits = JOIN(NAME, step)(&state, &measurements, values[COUNT(measurements)] > 0.5, &commands, &estimates);
+        memcpy(&measurements, received, sizeof(measurements));
+#ifdef REFERENCES
+        memcpy(&references, received + COUNT(measurements), sizeof(references));
+#endif
+        uint32_t bits = JOIN(NAME, step)(&state, SIGNALS, values[ALL] > 0.5, &commands, &estimates);
         put(&commands, COUNT(commands));
         put(&estimates, COUNT(estimates));
         double status = (double)bits;

@@ -7,6 +7,9 @@ type Real = f32;
 #[cfg(not(single))]
 type Real = f64;
 
+#[cfg(not(references))]
+const REFERENCES: usize = 0;
+
 fn main() {
     let mut input = Vec::new();
     std::io::stdin().read_to_end(&mut input).unwrap();
@@ -14,10 +17,14 @@ fn main() {
     let mut controller = Controller::new();
     eprintln!("{}", size_of_val(&controller));
     let mut output = Vec::new();
-    for sample in values.chunks_exact(MEASUREMENTS + 1) {
-        let (received, compensate) = sample.split_at(MEASUREMENTS);
-        let received: [Real; MEASUREMENTS] = core::array::from_fn(|k| received[k] as Real);
-        let found = controller.step(&Measurements::from(received), compensate[0] > 0.5);
+    for sample in values.chunks_exact(MEASUREMENTS + REFERENCES + 1) {
+        let measured: [Real; MEASUREMENTS] = core::array::from_fn(|k| sample[k] as Real);
+        let referred: [Real; REFERENCES] = core::array::from_fn(|k| sample[MEASUREMENTS + k] as Real);
+        let compensate = sample[MEASUREMENTS + REFERENCES] > 0.5;
+        #[cfg(references)]
+        let found = controller.step(&measured.into(), &referred.into(), compensate);
+        #[cfg(not(references))]
+        let (found, _) = (controller.step(&measured.into(), compensate), referred);
         let commands: [Real; ACTUATORS] = found.commands.into();
         let estimates: [Real; ESTIMATES] = found.estimates.into();
         let Status { held, at_limit, overflow } = found.status;

@@ -277,7 +277,13 @@ fn losses(faults: &[Signal], actuators: &[Signal]) -> Vec<Loss> {
 
 #[cfg(test)]
 mod tests {
-    use super::first_at;
+    use super::{Controller, first_at};
+
+    #[test]
+    fn an_entry_without_code_is_named() {
+        let error = Controller::of("P_f = [[1.0]]\n").err().unwrap().to_string();
+        assert_eq!(error, "only the FMU has this controller: there is no code for its entry `P_f`");
+    }
 
     #[test]
     fn the_first_compensated_sample_is_the_first_one_at_t_on() {

@@ -499,7 +499,7 @@ impl Zipped {
 /// A vector as an expression.
 fn owned(vector: Vector) -> String {
     match vector {
-        Vector::XOp | Vector::UOp | Vector::YOp => vector.name().to_ascii_uppercase(),
+        Vector::XOp | Vector::UOp | Vector::YOp | Vector::ROp => vector.name().to_ascii_uppercase(),
         _ if vector.is_stored() => format!("self.{}", vector.name()),
         _ => vector.name().to_owned(),
     }

@@ -1,0 +1,229 @@
+//! The function that takes a sample.
+
+use super::Source;
+use crate::code::recursion::{Operation, Statement, Term, When};
+use crate::code::symbols::{Kind, Vector};
+use crate::code::tables::{kept, locals, shown};
+
+impl Source<'_> {
+    pub(super) fn step(&self, lines: &mut Vec<String>) {
+        let Self { controller, recursion, real, capital, .. } = self;
+        lines.extend([String::new(), self.signature(), "{".to_owned()]);
+        for vector in locals(recursion) {
+            lines.push(format!("    {real} {}[{}];", vector.name(), self.count(vector.kind())));
+        }
+        let compensating = match controller.first_compensated {
+            0 => "compensate".to_owned(),
+            _ => format!("compensate && (state->sample >= {capital}_FIRST_COMPENSATED)"),
+        };
+        lines.extend([
+            format!("    {real} sum;"),
+            "    uint32_t i;".to_owned(),
+            "    uint32_t status = 0U;".to_owned(),
+            "    bool finite = true;".to_owned(),
+            format!("    const bool compensating = {compensating};"),
+            String::new(),
+        ]);
+        self.inputs(lines);
+        if controller.filter.is_some() {
+            lines.extend(["    if (!state->started)".to_owned(), "    {".to_owned()]);
+            self.loop_over(
+                lines,
+                2,
+                Kind::Measurement,
+                &["            state->y_f[i] = state->y[i];"],
+            );
+            lines.extend(["        state->started = true;".to_owned(), "    }".to_owned()]);
+        }
+        for statement in &recursion.before_limits {
+            self.statement(lines, statement);
+        }
+        lines.extend([String::new(), "    /* Is every output a number? */".to_owned()]);
+        self.check(lines, &[Vector::Command, Vector::XValue, Vector::FValue]);
+        self.limits(lines);
+        for statement in &recursion.after_limits {
+            self.statement(lines, statement);
+        }
+        lines.extend([String::new(), "    /* Is the next estimate one? */".to_owned()]);
+        let kept = kept(controller);
+        self.check(lines, &kept.iter().map(|(next, _)| *next).collect::<Vec<_>>());
+        self.keep(lines, &kept);
+        self.outputs(lines);
+        lines.extend(["    return status;".to_owned(), "}".to_owned()]);
+    }
+
+    /// Takes the inputs that are numbers.
+    fn inputs(&self, lines: &mut Vec<String>) {
+        lines.push("    /* The last finite inputs. */".to_owned());
+        for (owner, fields, vector) in [
+            ("measurements", &self.fields.measurements, "y"),
+            ("references", &self.fields.references, "r"),
+        ] {
+            for (k, field) in fields.iter().enumerate() {
+                let (kept, capital) = (format!("state->{vector}[{k}]"), &self.capital);
+                lines.push(format!(
+                    "    status = status | take(&{kept}, {owner}->{field}, {capital}_HELD);"
+                ));
+            }
+        }
+    }
+
+    fn check(&self, lines: &mut Vec<String>, vectors: &[Vector]) {
+        for vector in vectors {
+            let body = format!("        finite = is_finite({}[i]) && finite;", vector.name());
+            self.loop_over(lines, 1, vector.kind(), &[&body]);
+        }
+    }
+
+    fn limits(&self, lines: &mut Vec<String>) {
+        if !self.controller.is_limited() {
+            return;
+        }
+        lines.extend([
+            String::new(),
+            "    /* The observer uses the limited commands. */".to_owned(),
+        ]);
+        let mut body = Vec::new();
+        for (start, sign, own, value) in
+            [("if", '<', "u_low", "u_min"), ("else if", '>', "u_high", "u_max")]
+        {
+            body.extend([
+                format!("        {start} (u[i] {sign} {own}[i])"),
+                "        {".to_owned(),
+                format!("            u[i] = {own}[i];"),
+                format!("            command[i] = {value}[i];"),
+                format!("            status = status | {}_AT_LIMIT;", self.capital),
+                "        }".to_owned(),
+            ]);
+        }
+        body.extend(
+            ["        else", "        {", "            /* not at a limit */", "        }"]
+                .map(str::to_owned),
+        );
+        let body: Vec<_> = body.iter().map(String::as_str).collect();
+        self.loop_over(lines, 1, Kind::Actuator, &body);
+    }
+
+    fn keep(&self, lines: &mut Vec<String>, kept: &[(Vector, Vector)]) {
+        lines.extend(["    if (finite)".to_owned(), "    {".to_owned()]);
+        for (next, stored) in kept {
+            let body = format!("            {} = {}[i];", element(*stored), next.name());
+            self.loop_over(lines, 2, next.kind(), &[&body]);
+        }
+        self.loop_over(lines, 2, Kind::Actuator, &["            state->u[i] = command[i];"]);
+        lines.extend(["    }".to_owned(), "    else".to_owned(), "    {".to_owned()]);
+        for (value, stored) in shown(self.controller) {
+            let body = format!("            {}[i] = {};", value.name(), element(stored));
+            self.loop_over(lines, 2, value.kind(), &[&body]);
+        }
+        let capital = &self.capital;
+        lines.extend([
+            format!("        status = (status & {capital}_HELD) | {capital}_OVERFLOW;"),
+            "    }".to_owned(),
+        ]);
+        if self.controller.first_compensated > 0 {
+            lines.extend([
+                format!("    if (state->sample < {capital}_FIRST_COMPENSATED)"),
+                "    {".to_owned(),
+                "        state->sample++;".to_owned(),
+                "    }".to_owned(),
+            ]);
+        }
+    }
+
+    fn outputs(&self, lines: &mut Vec<String>) {
+        let Self { controller, fields, .. } = self;
+        lines.push(String::new());
+        for (j, field) in fields.actuators.iter().enumerate() {
+            lines.push(format!("    commands->{field} = state->u[{j}];"));
+        }
+        for (i, field) in fields.states.iter().enumerate() {
+            lines.push(format!("    estimates->x_hat_{field} = x_value[{i}];"));
+        }
+        for (i, field) in fields.faults.iter().enumerate() {
+            lines.push(format!("    estimates->f_hat_{field} = f_value[{i}];"));
+        }
+        for loss in &controller.losses {
+            lines.push(format!(
+                "    estimates->E_hat_{} = lost_effectiveness(state->u[{}], f_value[{}],\n        {});",
+                fields.faults[loss.fault],
+                loss.actuator,
+                loss.fault,
+                self.literal(loss.least_command * loss.least_command)
+            ));
+        }
+        for (i, field) in fields.integrals.iter().enumerate() {
+            lines.push(format!("    estimates->x_i_{field} = x_i_value[{i}];"));
+        }
+    }
+
+    fn statement(&self, lines: &mut Vec<String>, statement: &Statement) {
+        let Statement { when, equation, target, start, operations } = statement;
+        if !equation.is_empty() {
+            lines.extend([String::new(), format!("    /* {equation} */")]);
+        }
+        let depth = usize::from(*when != When::Always);
+        match when {
+            When::Always => {}
+            When::Compensating => lines.push("    if (compensating)".to_owned()),
+            When::NotCompensating => lines.push("    if (!compensating)".to_owned()),
+        }
+        if depth > 0 {
+            lines.push("    {".to_owned());
+        }
+        let indent = "    ".repeat(depth + 2);
+        let mut body = Vec::new();
+        if operations.is_empty() {
+            body.push(format!("{indent}{}[i] = {};", target.name(), self.term(*start)));
+        } else {
+            body.push(format!("{indent}sum = {};", self.term(*start)));
+            for operation in operations {
+                body.push(format!(
+                    "{indent}sum = {};",
+                    match *operation {
+                        Operation::Add(term) => format!("sum + {}", self.term(term)),
+                        Operation::Subtract(term) => format!("sum - {}", self.term(term)),
+                        Operation::TimesPeriod => format!("sum * {}_SAMPLE_TIME", self.capital),
+                        Operation::Accumulate(matrix, vector) => format!(
+                            "accumulate(sum, {}[i], {}, {})",
+                            matrix.name(),
+                            variable(vector),
+                            self.count(vector.kind())
+                        ),
+                    }
+                ));
+            }
+            body.push(format!("{indent}{}[i] = sum;", target.name()));
+        }
+        let body: Vec<_> = body.iter().map(String::as_str).collect();
+        self.loop_over(lines, depth + 1, target.kind(), &body);
+        if depth > 0 {
+            lines.push("    }".to_owned());
+        }
+    }
+
+    fn term(&self, term: Term) -> String {
+        match term {
+            Term::Zero => self.literal(0.0),
+            Term::Element(vector) => element(vector),
+            Term::Product(matrix, vector) => format!(
+                "product({}[i], {}, {})",
+                matrix.name(),
+                variable(vector),
+                self.count(vector.kind())
+            ),
+            Term::FilterStep => "filter[i] * (y[i] - y_f[i])".to_owned(),
+        }
+    }
+}
+
+/// Element i of a vector.
+fn element(vector: Vector) -> String {
+    format!("{}[i]", variable(vector))
+}
+
+/// A vector as an expression.
+fn variable(vector: Vector) -> String {
+    let owner = if vector.is_stored() { "state->" } else { "" };
+    format!("{owner}{}", vector.name())
+}
