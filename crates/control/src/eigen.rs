@@ -1,5 +1,7 @@
 //! Eigenvalues of a real square matrix.
 
+mod francis;
+
 use crate::balance::Balance;
 use crate::{Error, check};
 use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, Schur};
@@ -12,10 +14,14 @@ const ITERATIONS_PER_ROW: usize = 100;
 /// rounding errors are relative to the norm of the matrix.
 const ZERO: [f64; 2] = [f64::EPSILON, 256.0 * f64::EPSILON];
 
+/// From this order on eigenvalues are computed without the Schur form.
+const LARGE: usize = 48;
+
 /// The eigenvalues of A, ordered by real part, then by imaginary part.
 ///
 /// `a`: n x n, finite. Method: diagonal balancing (Parlett and Reinsch 1969), then the QR algorithm
-/// with a bounded number of iterations; about 10 n^3 multiplications. The result is exact for a
+/// with a bounded number of iterations; about 25 n^3 operations, 10 n^3 from order 48 on, where no
+/// Schur form is computed. The result is exact for a
 /// matrix that differs from the balanced A by a few units of rounding of its norm. Complex
 /// eigenvalues are exact conjugates.
 ///
@@ -37,8 +43,14 @@ const ZERO: [f64; 2] = [f64::EPSILON, 256.0 * f64::EPSILON];
 pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     check::square("A", a)?;
     let balanced = Balance::new(a).matrix;
-    let (_, t) = schur(&balanced).or_else(|_| schur(&reflected(&balanced)))?.unpack();
-    let mut found = diagonal_blocks(&t);
+    let fast = || francis::eigenvalues(balanced.clone().hessenberg().unpack_h());
+    let mut found = match (a.nrows() >= LARGE).then(fast).flatten() {
+        Some(found) => found,
+        None => {
+            let form = schur(&balanced).or_else(|_| schur(&reflected(&balanced)))?;
+            diagonal_blocks(&form.unpack().1)
+        }
+    };
     found.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
     Ok(found)
 }

@@ -19,9 +19,11 @@
 //! | gains for comparison | [`regulator_of_same_speed`] |
 
 mod channel;
+mod crossing;
 mod delay;
 mod disk;
 mod entries;
+mod held;
 mod hold_time;
 mod noise;
 mod scaling;

@@ -69,7 +69,11 @@ pub fn frequency_response(
 pub fn frequency_grid(system: &StateSpace, per_decade: u32) -> Result<Vec<f64>, Error> {
     system.check()?;
     check::positive("per_decade", f64::from(per_decade))?;
-    let values = eigenvalues(&system.a)?;
+    Ok(grid(system, &eigenvalues(&system.a)?, per_decade))
+}
+
+/// [`frequency_grid`] of a system whose eigenvalues are known.
+pub(crate) fn grid(system: &StateSpace, values: &[Complex<f64>], per_decade: u32) -> Vec<f64> {
     let sizes = values.iter().map(|value| match system.domain {
         Domain::Continuous => value.norm(),
         Domain::Sampled { period } => value.ln().norm() / period,
@@ -90,7 +94,7 @@ pub fn frequency_grid(system: &StateSpace, per_decade: u32) -> Result<Vec<f64>, 
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "above zero")]
     let steps = count as u32;
     let point = |k: u32| from * (to / from).powf(f64::from(k) / count);
-    Ok((0..=steps).map(|k| point(k).min(to)).collect())
+    (0..=steps).map(|k| point(k).min(to)).collect()
 }
 
 /// A system in coordinates in which A is balanced and in Hessenberg form, so that each frequency needs
@@ -171,16 +175,17 @@ impl<'a> Transfer<'a> {
                 states[(k, input)] -= factor * above;
             }
         }
-        for mut column in states.column_iter_mut() {
-            for k in (0..n).rev() {
-                let mut sum = column[k];
-                for (entry, state) in rows.column(k).iter().zip(column.iter()).skip(k + 1) {
-                    sum -= entry * state;
-                }
-                column[k] = sum / rows[(k, k)];
+        // All inputs of a state are neighbours, so that their sums are formed at the same time.
+        let mut by_state = states.transpose();
+        for k in (0..n).rev() {
+            let (mut sums, known) = by_state.columns_range_pair_mut(k, k + 1..);
+            for (entry, state) in rows.column(k).iter().skip(k + 1).zip(known.column_iter()) {
+                sums.iter_mut().zip(state.iter()).for_each(|(sum, state)| *sum -= entry * state);
             }
+            let pivot = rows[(k, k)];
+            sums.iter_mut().for_each(|sum| *sum /= pivot);
         }
-        states
+        by_state.transpose()
     }
 
     /// The largest singular value.

@@ -1,14 +1,20 @@
 //! The H-infinity norm.
 
 use super::frequency::Transfer;
+use crate::balance::Balance;
 use crate::blocks::block_2x2;
 use crate::eigen::eigenvalues;
 use crate::svd::norm_2;
 use crate::{Domain, Error, StateSpace, check};
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 use std::f64::consts::SQRT_2;
 
 const ROUNDS: usize = 100;
+/// From this order of the Hamiltonian matrix on eigenvalues with a real part above `IMAGINARY` of their
+/// modulus and above `ROUNDING` of the norm count as not imaginary.
+const LARGE: usize = 96;
+const IMAGINARY: f64 = 1e-3;
+const ROUNDING: f64 = 1e-7;
 /// Logarithmic steps of the frequency about a local maximum; the smallest one relative to the root of
 /// the width, as the maximum is flat.
 const FIRST_STEP: f64 = 0.05;
@@ -39,7 +45,8 @@ pub struct HInfinity {
 ///
 /// so that gamma, a little above the largest value known, is the norm when the largest singular
 /// value stays below gamma at the imaginary parts of all eigenvalues and midway between them. It
-/// need not be decided which eigenvalues are imaginary. Otherwise the largest value found, raised to
+/// need not be decided which eigenvalues are imaginary; of a large matrix those that are clearly not
+/// are left out. Otherwise the largest value found, raised to
 /// the local maximum about it, replaces gamma. A sampled system is first transformed to a continuous one
 /// by z = (1 + s) / (1 - s). About 100 n^3 multiplications for the eigenvalues and 4 n^2 (1 + m) for
 /// each of the 4 n frequencies in a round; usually 1 or 2 rounds.
@@ -80,7 +87,8 @@ pub fn h_infinity(system: &StateSpace, width: f64) -> Result<HInfinity, Error> {
     let transfer = Transfer::new(system);
     let continuous = continuous_equivalent(system)?;
     let mut best = HInfinity::at_ends(&transfer, &continuous.d, system.domain)?;
-    let resonances = modes.iter().flat_map(|mode| match system.domain {
+    let modes = modes.iter().filter(|mode| mode.im >= 0.0);
+    let resonances = modes.flat_map(|mode| match system.domain {
         Domain::Continuous => vec![mode.im.abs(), mode.norm()],
         Domain::Sampled { period } => vec![mode.arg().abs() / period],
     });
@@ -183,7 +191,14 @@ fn crossings(system: &StateSpace, gamma: f64) -> Result<Vec<f64>, Error> {
         [&-(c.tr_mul(&weight) * &c), &-a.transpose()],
     );
     let hamiltonian = check::in_range("the Hamiltonian matrix", hamiltonian)?;
-    let mut found: Vec<f64> = eigenvalues(&hamiltonian)?.iter().map(|x| x.im.abs()).collect();
+    let rounding = if hamiltonian.nrows() < LARGE {
+        f64::INFINITY
+    } else {
+        ROUNDING * Balance::new(&hamiltonian).matrix.norm()
+    };
+    let possible = |x: &&Complex<f64>| x.re.abs() <= rounding.max(IMAGINARY * x.norm());
+    let all = eigenvalues(&hamiltonian)?;
+    let mut found: Vec<f64> = all.iter().filter(possible).map(|x| x.im.abs()).collect();
     found.push(0.0);
     found.sort_by(f64::total_cmp);
     found.dedup();

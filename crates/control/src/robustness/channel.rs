@@ -1,5 +1,6 @@
 //! Margins of one channel, the others closed.
 
+use super::crossing::narrowed;
 use super::disk::single;
 use super::sweep::Sweep;
 use super::{Loop, Point};
@@ -15,7 +16,6 @@ const TESTED_GAINS: u32 = 40;
 /// The same for loops with more than `LARGE` states.
 const TESTED_GAINS_IF_LARGE: u32 = 8;
 const LARGE: usize = 100;
-const BISECTIONS: usize = 60;
 /// A change of the sign of Im L is a crossing of the real axis, not a pole, if the angle to the axis
 /// is below this.
 const ON_AXIS: f64 = 1e-6;
@@ -86,10 +86,10 @@ struct Gains<'a> {
 }
 
 impl Gains<'_> {
-    fn is_stable(&self, gain: f64) -> Result<bool, Error> {
+    fn instability(&self, gain: f64) -> Result<f64, Error> {
         let StateSpace { a, b, c, domain, .. } = self.system;
         // c is the negative of what comes back.
-        Ok(instability(&(a - b * c * (gain - 1.0)), *domain)? < 0.0)
+        instability(&(a - b * c * (gain - 1.0)), *domain)
     }
 
     /// The limits on both sides of 1: the nearest of `candidates`, or one that the tests find.
@@ -103,21 +103,20 @@ impl Gains<'_> {
     /// The first unstable gain on the way from 1 to `end`, or `end`.
     fn confirmed(&self, end: f64) -> Result<f64, Error> {
         let far = end.clamp(1.0 / LARGEST_GAIN, LARGEST_GAIN);
-        let mut good = 1.0;
+        let mut good = (1.0, f64::NAN);
         let large = self.system.a.nrows() > LARGE;
         let count = if large { TESTED_GAINS_IF_LARGE } else { TESTED_GAINS };
         for step in 1..count {
             let gain = far.powf(f64::from(step) / f64::from(count));
-            if self.is_stable(gain)? {
-                good = gain;
+            let value = self.instability(gain)?;
+            if value < 0.0 {
+                good = (gain, value);
                 continue;
             }
-            let mut bad = gain;
-            for _ in 0..BISECTIONS {
-                let middle = (good * bad).sqrt();
-                *(if self.is_stable(middle)? { &mut good } else { &mut bad }) = middle;
-            }
-            return Ok(good);
+            return Ok(narrowed(good, (gain, value.max(f64::MIN_POSITIVE)), |gain| {
+                self.instability(gain)
+            })?
+            .0);
         }
         Ok(end)
     }

@@ -1,16 +1,16 @@
 //! The delay margin for a common delay in all channels.
 
+use super::crossing::narrowed;
+use super::held::hold_inputs;
 use super::sweep::Sweep;
 use super::{Loop, Point};
 use crate::blocks::block_2x2;
 use crate::eigen::schur;
-use crate::hold::zero_order_hold;
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
 
-const BISECTIONS: usize = 40;
 /// Number of whole samples up to which the delay of a sampled loop is refined.
 const REFINED_SAMPLES: f64 = 20.0;
 
@@ -64,14 +64,14 @@ fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Complex<f64>>, Error> {
 ///
 /// # Errors
 ///
-/// Same as [`Loop::new`], [`zero_order_hold`] and [`delay_margin`]; [`Error::OutOfRange`] when the
+/// Same as [`Loop::new`], [`crate::hold::zero_order_hold`] and [`delay_margin`]; [`Error::OutOfRange`] when the
 /// controller is continuous.
 pub fn sampled_delay_margin(plant: &StateSpace, controller: &StateSpace) -> Result<f64, Error> {
     let Domain::Sampled { period } = controller.domain else {
         let rule = "that of a sampled controller";
         return Err(Error::OutOfRange { name: "the domain", value: f64::NAN, rule });
     };
-    let (a, b) = zero_order_hold(&plant.a, &plant.b, period)?;
+    let (a, b) = hold_inputs(&plant.a, &plant.b, period)?;
     let sampled = StateSpace { a, b, domain: controller.domain, ..plant.clone() };
     let estimate = delay_margin(&Loop::new(sampled, controller.clone())?)?;
     let whole = (estimate / period).floor();
@@ -80,16 +80,14 @@ pub fn sampled_delay_margin(plant: &StateSpace, controller: &StateSpace) -> Resu
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most twenty")]
     let samples = whole as usize;
-    let stable = |part: f64| {
+    let value = |part: f64| {
         let dynamics = delayed(plant, controller, period, (samples, part))?;
-        Ok::<_, Error>(instability(&dynamics, controller.domain)? < 0.0)
+        instability(&dynamics, controller.domain)
     };
-    let (mut good, mut bad) = (0.0, 1.0);
-    for _ in 0..BISECTIONS {
-        let middle = 0.5 * (good + bad);
-        *(if stable(middle)? { &mut good } else { &mut bad }) = middle;
-    }
-    Ok(period * (whole + good))
+    // Rounding may hide that the loop is stable at the start and unstable at the end.
+    let start = (0.0, value(0.0)?.min(-f64::MIN_POSITIVE));
+    let end = (1.0, value(1.0)?.max(f64::MIN_POSITIVE));
+    Ok(period * (whole + narrowed(start, end, value)?.0))
 }
 
 /// The loop with commands delayed by `samples` samples and the part `part` of one: its states are
@@ -105,10 +103,10 @@ fn delayed(
     let mut a = DMatrix::identity(n, n);
     let (mut old, mut new) = (DMatrix::zeros(n, m), DMatrix::zeros(n, m));
     if part > 0.0 {
-        (a, old) = zero_order_hold(&plant.a, &plant.b, part * period)?;
+        (a, old) = hold_inputs(&plant.a, &plant.b, part * period)?;
     }
     if part < 1.0 {
-        let (rest, held) = zero_order_hold(&plant.a, &plant.b, (1.0 - part) * period)?;
+        let (rest, held) = hold_inputs(&plant.a, &plant.b, (1.0 - part) * period)?;
         (a, old, new) = (&rest * a, rest * old, held);
     }
     let own = controller;

@@ -6,7 +6,7 @@ use crate::riccati::{Weights, lqr};
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
-const BISECTIONS: usize = 40;
+const STEPS: usize = 60;
 /// Relative difference of the speeds at which the search ends.
 const CLOSE: f64 = 1e-3;
 /// Range of the weight of the states, as powers of ten.
@@ -22,7 +22,8 @@ const POWERS: [f64; 2] = [-12.0, 16.0];
 ///
 /// `a`: n x n; `b`: n x m; `gain`: K, m x n. The regulator weighs the states, in units that balance
 /// A, by q and the inputs, in units for which the columns of B in these coordinates have length one,
-/// by 1. The speed grows with q, which bisection finds. Returns None if no q is as slow or as fast.
+/// by 1. The speed grows with q, which is found by regula falsi between logarithms of q and speed,
+/// with a bisection in every third step. Returns None if no q is as slow or as fast.
 ///
 /// # Errors
 ///
@@ -48,19 +49,23 @@ pub fn regulator_of_same_speed(
         let weights = Weights { q: &q * 10_f64.powf(power), r: r.clone(), n: None };
         lqr(a, b, &weights, domain).ok().map(|found| found.gain)
     };
-    let [mut slow, mut fast] = POWERS;
-    for _ in 0..BISECTIONS {
-        let middle = 0.5 * (slow + fast);
-        let Some(found) = solve(middle) else {
+    // The ends, each with the logarithm of its speed relative to the required one, if it is known.
+    let [mut slow, mut fast] = POWERS.map(|power| (power, f64::NAN));
+    for step in 1..=STEPS {
+        let part = slow.1 / (slow.1 - fast.1);
+        let part = if part.is_finite() && step % 3 != 0 { part } else { 0.5 };
+        let power = slow.0 + part * (fast.0 - slow.0);
+        let Some(found) = solve(power) else {
             // Extreme weights have no verified solution.
-            *(if middle < 0.0 { &mut slow } else { &mut fast }) = middle;
+            *(if power < 0.0 { &mut slow } else { &mut fast }) = (power, f64::NAN);
             continue;
         };
         let reached = speed(&(a + b * &found), domain)?;
         if (reached - required).abs() <= CLOSE * required.abs() {
             return Ok(Some(found));
         }
-        *(if reached < required { &mut slow } else { &mut fast }) = middle;
+        let end = (power, (reached / required).ln());
+        *(if reached < required { &mut slow } else { &mut fast }) = end;
     }
     Ok(None)
 }

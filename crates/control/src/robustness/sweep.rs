@@ -1,12 +1,12 @@
 //! Frequencies at which margins are searched.
 
-use crate::response::{Transfer, frequency_grid};
+use super::crossing::narrowed;
+use crate::response::{Transfer, grid};
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
 
 const PER_DECADE: u32 = 60;
-const BISECTIONS: usize = 60;
 
 /// A frequency response on a grid that has the resonances of the system.
 pub(super) struct Sweep<'a> {
@@ -21,9 +21,10 @@ impl<'a> Sweep<'a> {
     /// From frequency zero to ten times the fastest eigenvalue or to the Nyquist frequency.
     pub(super) fn new(system: &'a StateSpace) -> Result<Self, Error> {
         let modes = system.stable_eigenvalues()?;
-        let mut frequencies = frequency_grid(system, PER_DECADE)?;
+        let mut frequencies = grid(system, &modes, PER_DECADE);
         frequencies.push(0.0);
-        frequencies.extend(modes.iter().flat_map(|mode| match system.domain {
+        let modes = modes.iter().filter(|mode| mode.im >= 0.0);
+        frequencies.extend(modes.flat_map(|mode| match system.domain {
             Domain::Continuous => [mode.im.abs(), mode.norm()],
             Domain::Sampled { period } => {
                 let frequency = mode.arg().abs() / period;
@@ -57,12 +58,9 @@ impl<'a> Sweep<'a> {
             if before.is_nan() || after.is_nan() || (before > 0.0) == (after > 0.0) {
                 continue;
             }
-            let (mut low, mut high) = (self.frequencies[at - 1], self.frequencies[at]);
-            for _ in 0..BISECTIONS {
-                let middle = 0.5 * (low + high);
-                let same = (of(&self.at(middle)?) > 0.0) == (before > 0.0);
-                *(if same { &mut low } else { &mut high }) = middle;
-            }
+            let ends = ((self.frequencies[at - 1], before), (self.frequencies[at], after));
+            let value = |frequency| Ok::<_, Error>(of(&self.at(frequency)?));
+            let (low, high) = narrowed(ends.0, ends.1, value)?;
             found.push(0.5 * (low + high));
         }
         Ok(found)

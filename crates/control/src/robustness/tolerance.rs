@@ -1,8 +1,9 @@
 //! Errors of the plant's parameters: random cases and a search for the worst one.
 
 use super::Loop;
+use super::crossing::narrowed;
+use super::held::hold_inputs;
 use super::worst_case::worst_case;
-use crate::hold::zero_order_hold;
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
@@ -13,7 +14,8 @@ const STRUCTURAL: f64 = 1e-9;
 const REACH: f64 = 16.0;
 const FACTOR: f64 = 1.1;
 const FIRST: f64 = 1e-6;
-const BISECTIONS: usize = 40;
+/// Below this multiple the tests are a factor of two apart.
+const SMALL: f64 = 0.05;
 
 /// The relative tolerances of the entries of A, B and C of a plant.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,7 +87,9 @@ pub trait PlantFamily {
 
     /// The rising multiples of the tolerances at which the worst direction is tested.
     fn multiples(&self) -> Vec<f64> {
-        let next = |multiple: &f64| Some(multiple * FACTOR).filter(|next| *next <= REACH);
+        let factor = |multiple: f64| if multiple < SMALL { 2.0 } else { FACTOR };
+        let next =
+            |multiple: &f64| Some(multiple * factor(*multiple)).filter(|next| *next <= REACH);
         std::iter::successors(Some(FIRST), next).collect()
     }
 }
@@ -102,7 +106,7 @@ pub trait PlantFamily {
 ///
 /// # Errors
 ///
-/// Those of the family; same as [`Loop::new`], [`zero_order_hold`] and [`instability`].
+/// Those of the family; same as [`Loop::new`], [`crate::hold::zero_order_hold`] and [`instability`].
 pub fn tolerance_test<F: PlantFamily>(
     family: &F,
     controller: &StateSpace,
@@ -224,7 +228,7 @@ impl<F: PlantFamily> Loops<'_, F> {
     /// The dynamics of the loop with a plant, which is discretised for a sampled controller.
     pub(super) fn dynamics(&self, mut plant: StateSpace) -> Result<DMatrix<f64>, Error> {
         if let Domain::Sampled { period } = self.controller.domain {
-            (plant.a, plant.b) = zero_order_hold(&plant.a, &plant.b, period)?;
+            (plant.a, plant.b) = hold_inputs(&plant.a, &plant.b, period)?;
             plant.domain = self.controller.domain;
         }
         Ok(Loop::new(plant, self.controller.clone())?.dynamics())
@@ -236,22 +240,19 @@ impl<F: PlantFamily> Loops<'_, F> {
     }
 
     fn first_unstable(&self, deviations: &[f64]) -> Result<Option<f64>, F::Error> {
-        let stable = |multiple: f64| {
+        let value = |multiple: f64| {
             let scaled: Vec<f64> = deviations.iter().map(|part| multiple * part).collect();
-            Ok::<_, F::Error>(self.instability(&scaled)? < 0.0)
+            self.instability(&scaled)
         };
-        let mut good = 0.0;
+        let mut good = (0.0, f64::NAN);
         for multiple in self.family.multiples() {
-            if stable(multiple)? {
-                good = multiple;
+            let found = value(multiple)?;
+            if found < 0.0 {
+                good = (multiple, found);
                 continue;
             }
-            let mut bad = multiple;
-            for _ in 0..BISECTIONS {
-                let middle = 0.5 * (good + bad);
-                *(if stable(middle)? { &mut good } else { &mut bad }) = middle;
-            }
-            return Ok(Some(good));
+            let bad = (multiple, found.max(f64::MIN_POSITIVE));
+            return Ok(Some(narrowed(good, bad, value)?.0));
         }
         Ok(None)
     }

@@ -12,6 +12,11 @@ type Vector = DVector<Complex<f64>>;
 const ROUNDS: usize = 12;
 /// Number of eigenvalues whose directions are tried from each start.
 const MODES: usize = 6;
+/// Each trial that fails moves this part of the parameters of the one before; of a controller with more than
+/// `LARGE` states a smaller one, as each trial costs its eigenvalues.
+const FEWER: usize = 2;
+const FEWER_IF_LARGE: usize = 8;
+const LARGE: usize = 50;
 /// Relative shift of the eigenvalue in the inverse iteration.
 const SHIFT: f64 = 1e-9;
 
@@ -37,6 +42,7 @@ fn ascend<F: PlantFamily>(
     loops: &Loops<'_, F>,
     (mut value, mut deviations): (f64, Vec<f64>),
 ) -> Result<(f64, Vec<f64>), F::Error> {
+    let large = loops.controller.a.nrows() > LARGE;
     for round in 0..ROUNDS {
         let count = if round == 0 { MODES } else { 1 };
         let mut improved = false;
@@ -56,7 +62,7 @@ fn ascend<F: PlantFamily>(
                     (value, deviations, improved) = (reached, candidate, true);
                     break;
                 }
-                moved /= 2;
+                moved /= if large { FEWER_IF_LARGE } else { FEWER };
             }
         }
         if !improved {

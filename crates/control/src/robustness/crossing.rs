@@ -1,0 +1,71 @@
+//! The place where a function changes its sign.
+
+/// Relative width of the interval at the end.
+const WIDTH: f64 = 1e-14;
+const STEPS: usize = 160;
+
+/// Narrows an interval in which a function changes its sign; returns its ends, in the order of the
+/// arguments.
+///
+/// `low`, `high`: the ends, each with the value there, of different signs; a value that is no number
+/// counts as negative. The function need not be continuous. Method: regula falsi in the variant
+/// of M. Dowell and P. Jarratt (BIT 11, 1971, Illinois); every third step bisects.
+pub(super) fn narrowed<E>(
+    (mut low, mut at_low): (f64, f64),
+    (mut high, mut at_high): (f64, f64),
+    of: impl Fn(f64) -> Result<f64, E>,
+) -> Result<(f64, f64), E> {
+    let positive = at_low > 0.0;
+    let mut before = None;
+    for step in 1..=STEPS {
+        let width = high - low;
+        let least = WIDTH * low.abs().max(high.abs());
+        if width.abs() <= least {
+            break;
+        }
+        let part = at_low / (at_low - at_high);
+        // A step away from both ends lets the interval close around the crossing.
+        let edge = (0.5 * least / width.abs()).min(0.5);
+        let inside = at_low.is_finite() && at_high.is_finite() && step % 3 != 0;
+        let middle = low + width * if inside { part.clamp(edge, 1.0 - edge) } else { 0.5 };
+        let value = of(middle)?;
+        let replaces_low = (value > 0.0) == positive;
+        if replaces_low {
+            (low, at_low) = (middle, value);
+            at_high *= if before == Some(true) { 0.5 } else { 1.0 };
+        } else {
+            (high, at_high) = (middle, value);
+            at_low *= if before == Some(false) { 0.5 } else { 1.0 };
+        }
+        before = Some(replaces_low);
+    }
+    Ok((low, high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    fn crossing(low: f64, high: f64, of: impl Fn(f64) -> f64) -> ((f64, f64), u32) {
+        let calls = Cell::new(0);
+        let counted = |x: f64| {
+            calls.set(calls.get() + 1);
+            Ok::<_, ()>(of(x))
+        };
+        (narrowed((low, of(low)), (high, of(high)), counted).unwrap(), calls.get())
+    }
+
+    #[test]
+    fn smooth_functions_need_few_steps_and_steps_are_found_by_bisection() {
+        let ((low, high), calls) = crossing(1.0, 1.25, |x| x.powi(3) - 1.5);
+        assert!(low.powi(3) <= 1.5 && 1.5 <= high.powi(3) && high - low < 2e-14, "{low} {high}");
+        assert!(calls <= 14, "{calls}");
+        let ((good, bad), _) = crossing(1.0, 2.0, |x| if x < 1.7 { -1.0 } else { f64::INFINITY });
+        assert!(good < 1.7 && 1.7 <= bad && bad - good < 4e-14, "{good} {bad}");
+        let ((good, bad), _) = crossing(2.0, 1.0, |x| if x < 1.7 { f64::NAN } else { 1e300 });
+        assert!(bad < 1.7 && 1.7 <= good && good - bad < 4e-14, "{good} {bad}");
+        let ((low, high), _) = crossing(0.0, 1.0, |x| (x - 0.3).powi(9));
+        assert!((low - 0.3).abs() < 1e-3 && (high - 0.3).abs() < 1e-3, "{low} {high}");
+    }
+}
