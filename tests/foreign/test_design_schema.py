@@ -15,6 +15,7 @@ EXAMPLES = [
     "examples/three-tank/plant.toml",
     "examples/three-tank/loss-of-effectiveness.toml",
     "examples/three-tank/sensor-fault.toml",
+    "examples/three-tank/reference.toml",
 ]
 # A lag: no margin has a limit but those of the disk. Then a region; then a loop that is not stable with its commands.
 SMALL = """A = [[-1.5]]
