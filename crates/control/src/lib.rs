@@ -12,6 +12,7 @@
 //! | controllability, observability, distance from losing them, zeros | [`rank`], [`distance`], [`zeros`] |
 //! | residual generators | [`residual`] |
 //! | residuals that isolate faults: decoupled from commands, disturbances, other faults | [`isolation`] |
+//! | white residuals, tests with a stated rate of false alarms, predicted delays | [`detection`] |
 //! | norms, step and frequency responses, the effect of faults | [`response`] |
 //! | margins of a loop: sensitivity, disk, gain, phase, delay, hold time, parameter tolerances | [`robustness`] |
 //! | references: feedforward, integral action, anti-windup | [`tracking`] |
@@ -35,6 +36,7 @@ mod blocks;
 mod check;
 pub mod controller;
 pub mod detectability;
+pub mod detection;
 pub mod distance;
 mod domain;
 pub mod eigen;

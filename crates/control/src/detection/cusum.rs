@@ -1,0 +1,336 @@
+//! Cumulative sums: a test of the mean of one white residual.
+
+use super::Delay;
+use super::chi_square::{normal_below, normal_density};
+use crate::{Error, check};
+use nalgebra::{DMatrix, DVector};
+
+/// Points of the quadrature for the density of a cumulative sum between 0 and the threshold.
+const NODES: usize = 48;
+/// Steps after which the density of a sum without a fault has settled.
+const SETTLING: usize = 400;
+const BISECTIONS: usize = 60;
+/// The largest threshold whose integral equation is solved for single samples.
+const LARGE: f64 = 40.0;
+/// The threshold of the test of several samples together in place of a larger one.
+const REDUCED: f64 = 20.0;
+/// The largest threshold that is tried.
+const LARGEST: f64 = 1e6;
+/// Mean excess of a sum of standard normal steps over a distant limit, twice: Siegmund (1985), (10.37).
+const EXCESS: f64 = 1.166;
+
+/// The two-sided test by cumulative sums of a residual g with variance 1 and, without faults, mean 0.
+///
+/// ```text
+/// S+[k] = max(0, S+[k-1] + g[k] - kappa)
+/// S-[k] = max(0, S-[k-1] - g[k] - kappa)      alarm: S+[k] > h or S-[k] > h
+/// ```
+///
+/// The best drift kappa for a fault that moves the mean by delta is delta / 2 (Lorden 1971, Moustakides
+/// 1986: the largest mean delay is the least possible for a given mean time between false alarms).
+///
+/// The run length of one sum solves an integral equation (Page 1954, (4)), which is solved here by the
+/// Gauss-Legendre quadrature of Goel and Wu (1971); both sums together have 1/L = 1/L+ + 1/L- (Kemp 1961).
+/// Brook and Evans (1972) have the tables that the tests compare with. Above a threshold of 40, N samples
+/// are taken together as one of mean N^(1/2) times as large, which changes the run length by less than 1 %:
+/// the threshold plus 1.166, the mean excess on both sides (Siegmund 1985, section 10.2), scales with
+/// N^(-1/2).
+///
+/// Source: E. S. Page, Biometrika 41 (1954); A. L. Goel and S. M. Wu, Technometrics 13 (1971); K. W. Kemp,
+/// J. Royal Stat. Soc. B 23 (1961); D. Brook and D. A. Evans, Biometrika 59 (1972); D. Siegmund, Sequential
+/// Analysis (1985).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cusum {
+    /// kappa, in standard deviations of the residual, above 0.
+    pub drift: f64,
+    /// h, in standard deviations of the residual, above 0.
+    pub threshold: f64,
+}
+
+impl Cusum {
+    /// The test with this drift whose mean number of samples between false alarms is `samples`.
+    ///
+    /// `drift`: above 0; `samples`: at least 2. Method: bisection of [`Cusum::between_false_alarms`], relative
+    /// accuracy of the threshold 1e-12.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use control::detection::Cusum;
+    /// // Montgomery, Introduction to Statistical Quality Control: k = 0.5, h = 5 has a run length of 465.
+    /// let test = Cusum::with_false_alarms(0.5, 465.0)?;
+    /// assert!((test.threshold - 5.0).abs() < 1e-3);
+    /// # Ok::<(), control::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] for a drift that is not above 0, or a number of samples below 2 or so large
+    /// that the threshold would be above 1e6.
+    pub fn with_false_alarms(drift: f64, samples: f64) -> Result<Self, Error> {
+        check::positive("the drift", drift)?;
+        if samples.is_nan() || samples < 2.0 {
+            let rule = "at least 2";
+            return Err(Error::OutOfRange {
+                name: "the number of samples between false alarms",
+                value: samples,
+                rule,
+            });
+        }
+        let of = |threshold: f64| Self { drift, threshold };
+        let (mut low, mut high) = (0.0, 1.0);
+        while of(high).between_false_alarms() < samples {
+            (low, high) = (high, 1.5 * high);
+            if high > LARGEST {
+                let rule = "less, as the threshold would be above 1e6";
+                let name = "the number of samples between false alarms";
+                return Err(Error::OutOfRange { name, value: samples, rule });
+            }
+        }
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            let short = of(middle).between_false_alarms() < samples;
+            *(if short { &mut low } else { &mut high }) = middle;
+        }
+        Ok(of(high))
+    }
+
+    /// The mean number of samples from zero sums to a false alarm of either sum.
+    #[must_use]
+    pub fn between_false_alarms(&self) -> f64 {
+        0.5 * self.run_length(0.0)
+    }
+
+    /// A lower bound of the mean number of samples between false alarms while a residual without faults
+    /// has any mean of at most `bias`: that of the constant mean `bias`.
+    #[must_use]
+    pub fn between_false_alarms_with_bias(&self, bias: f64) -> f64 {
+        let bias = bias.abs();
+        1.0 / (1.0 / self.run_length(bias) + 1.0 / self.run_length(-bias))
+    }
+
+    /// The mean number of samples until S+, from 0, is above the threshold when the residual has the
+    /// constant mean `mean`.
+    ///
+    /// ```text
+    /// L(s) = 1 + L(0) Phi(kappa - mean - s) + integral of L(y) phi(y - s + kappa - mean), y from 0 to h
+    /// ```
+    ///
+    /// Infinite where the equation cannot be solved in double precision (beyond about 1e15).
+    #[must_use]
+    pub fn run_length(&self, mean: f64) -> f64 {
+        let (group, test) = self.grouped();
+        real(group) * test.single_run_length(mean * real(group).sqrt())
+    }
+
+    fn single_run_length(&self, mean: f64) -> f64 {
+        let (nodes, weights) = self.quadrature();
+        let shift = self.drift - mean;
+        // The unknowns are L(0), then L at the nodes.
+        let from = |at: usize| if at == 0 { 0.0 } else { nodes[at - 1] };
+        let matrix = DMatrix::from_fn(nodes.len() + 1, nodes.len() + 1, |row, column| {
+            let stays = match column {
+                0 => normal_below(shift - from(row)),
+                _ => weights[column - 1] * normal_density(nodes[column - 1] - from(row) + shift),
+            };
+            f64::from(u8::from(row == column)) - stays
+        });
+        let ones = DVector::from_element(nodes.len() + 1, 1.0);
+        match matrix.lu().solve(&ones) {
+            Some(lengths) if lengths[0] >= 1.0 => lengths[0],
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// The distribution of the delay of a fault that moves the mean of the residual to `mean(k)` in its
+    /// k-th sample, k from 0 on; at most `most` samples are followed.
+    ///
+    /// The fault meets sums as they are after a long time without faults. Only the sum of the fault's
+    /// sign counts, the one of the larger mean.
+    #[must_use]
+    pub fn delay(&self, mean: impl Fn(usize) -> f64, most: usize) -> Delay {
+        let (group, test) = self.grouped();
+        let mut up = Sums::settled(&test);
+        let mut down = up.clone();
+        let mut missed = vec![1.0];
+        while missed.len() <= most {
+            let start = missed.len() - 1;
+            let sum: f64 = (start..start + group).map(&mean).sum();
+            let mean = sum / real(group).sqrt();
+            up.step(mean);
+            down.step(-mean);
+            let (before, left) = (missed[start], up.total().min(down.total()));
+            // Within a group the probability is interpolated.
+            missed.extend((1..=group).map(|k| before + (left - before) * real(k) / real(group)));
+            if left < 1e-6 {
+                break;
+            }
+        }
+        missed.truncate(most + 1);
+        Delay { missed }
+    }
+
+    /// The test with a smaller threshold for sums of several samples, divided by the root of their number.
+    fn grouped(&self) -> (usize, Self) {
+        if self.threshold <= LARGE {
+            return (1, *self);
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 1e10")]
+        let group = (self.threshold / REDUCED).powi(2).ceil() as usize;
+        let root = real(group).sqrt();
+        let threshold = (self.threshold + EXCESS) / root - EXCESS;
+        (group, Self { drift: self.drift * root, threshold })
+    }
+
+    /// Nodes and weights between 0 and the threshold.
+    fn quadrature(&self) -> (Vec<f64>, Vec<f64>) {
+        // A node for each 0.2 standard deviations keeps the accuracy for large thresholds.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 200")]
+        let count = NODES.max((5.0 * self.threshold.min(LARGE)) as usize);
+        let half = 0.5 * self.threshold;
+        let (nodes, weights) = gauss_legendre(count);
+        let nodes = nodes.iter().map(|node| half * (1.0 + node)).collect();
+        (nodes, weights.iter().map(|weight| half * weight).collect())
+    }
+}
+
+/// The distribution of one cumulative sum that has not been above its threshold: the probability of 0,
+/// and the density at the nodes.
+#[derive(Clone)]
+struct Sums {
+    drift: f64,
+    nodes: Vec<f64>,
+    weights: Vec<f64>,
+    zero: f64,
+    density: Vec<f64>,
+}
+
+impl Sums {
+    /// After many samples without a fault and without an alarm.
+    fn settled(test: &Cusum) -> Self {
+        let (nodes, weights) = test.quadrature();
+        let density = vec![0.0; nodes.len()];
+        let mut sums = Self { drift: test.drift, nodes, weights, zero: 1.0, density };
+        for _ in 0..SETTLING {
+            let before = sums.zero;
+            sums.step(0.0);
+            let total = sums.total();
+            sums.zero /= total;
+            sums.density.iter_mut().for_each(|value| *value /= total);
+            if (sums.zero - before).abs() < 1e-14 {
+                break;
+            }
+        }
+        sums
+    }
+
+    /// One sample with a residual of this mean; what passes the threshold is lost.
+    fn step(&mut self, mean: f64) {
+        let shift = self.drift - mean;
+        let masses: Vec<f64> =
+            self.density.iter().zip(&self.weights).map(|(value, weight)| value * weight).collect();
+        let after = |to: f64| {
+            let from = masses.iter().zip(&self.nodes);
+            self.zero * normal_density(to + shift)
+                + from.map(|(mass, node)| mass * normal_density(to - node + shift)).sum::<f64>()
+        };
+        let density = self.nodes.iter().map(|&to| after(to)).collect();
+        let from = masses.iter().zip(&self.nodes);
+        self.zero = self.zero * normal_below(shift)
+            + from.map(|(mass, node)| mass * normal_below(shift - node)).sum::<f64>();
+        self.density = density;
+    }
+
+    fn total(&self) -> f64 {
+        let inner = self.density.iter().zip(&self.weights).map(|(value, weight)| value * weight);
+        self.zero + inner.sum::<f64>()
+    }
+}
+
+/// Nodes and weights of the Gauss-Legendre quadrature on -1 to 1: roots of the Legendre polynomial by
+/// Newton's method.
+fn gauss_legendre(count: usize) -> (Vec<f64>, Vec<f64>) {
+    let legendre = |x: f64| {
+        let (mut before, mut value) = (1.0, x);
+        for k in 2..=count {
+            let next = (real(2 * k - 1) * x * value - real(k - 1) * before) / real(k);
+            (before, value) = (value, next);
+        }
+        (value, real(count) * (x * value - before) / (x * x - 1.0))
+    };
+    let root = |at: usize| {
+        let mut x = (std::f64::consts::PI * (real(at) + 0.75) / (real(count) + 0.5)).cos();
+        for _ in 0..100 {
+            let (value, slope) = legendre(x);
+            x -= value / slope;
+            if (value / slope).abs() < 1e-15 {
+                break;
+            }
+        }
+        (x, 2.0 / ((1.0 - x * x) * legendre(x).1.powi(2)))
+    };
+    (0..count).map(root).unzip()
+}
+
+#[expect(clippy::cast_precision_loss, reason = "numbers of samples are far below 2^52")]
+fn real(number: usize) -> f64 {
+    number as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_quadrature_integrates_polynomials_exactly() {
+        let (nodes, weights) = gauss_legendre(6);
+        let integral = |power: i32| -> f64 {
+            nodes.iter().zip(&weights).map(|(node, weight)| weight * node.powi(power)).sum()
+        };
+        assert!((integral(0) - 2.0).abs() < 1e-14);
+        assert!((integral(10) - 2.0 / 11.0).abs() < 1e-14);
+        assert!(integral(9).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_sum_with_a_negligible_threshold_is_a_test_of_single_samples() {
+        let test = Cusum { drift: 1.0, threshold: 1e-9 };
+        let single = 1.0 / normal_below(-1.0);
+        assert!((test.run_length(0.0) / single - 1.0).abs() < 1e-8);
+    }
+
+    #[test]
+    fn the_mean_delay_of_a_constant_shift_is_the_run_length_from_settled_sums() {
+        // From zero sums the delay is longer than from settled ones.
+        let test = Cusum { drift: 0.5, threshold: 4.0 };
+        let delay = test.delay(|_| 1.0, 1000).mean().unwrap();
+        let from_zero = test.run_length(1.0);
+        assert!(delay < from_zero && delay > 0.8 * from_zero, "{delay} {from_zero}");
+    }
+
+    #[test]
+    fn samples_taken_together_change_the_run_length_by_less_than_a_hundredth() {
+        let test = Cusum { drift: 0.1, threshold: 39.0 };
+        let group = 4.0_f64;
+        let threshold = (39.0 + EXCESS) / group.sqrt() - EXCESS;
+        let grouped = Cusum { drift: 0.1 * group.sqrt(), threshold };
+        for mean in [0.0, 0.1, 0.3] {
+            let (single, together) =
+                (test.run_length(mean), group * grouped.run_length(mean * group.sqrt()));
+            assert!((together / single - 1.0).abs() < 0.01, "{mean}: {single} {together}");
+        }
+        let slow = Cusum::with_false_alarms(0.005, 1e6).unwrap();
+        assert!(slow.threshold > 400.0);
+        let delay = slow.delay(|_| 0.01, 1_000_000).mean().unwrap();
+        let from_zero = slow.run_length(0.01);
+        assert!(delay < from_zero && delay > 0.6 * from_zero, "{delay} {from_zero}");
+    }
+
+    #[test]
+    fn numbers_without_a_threshold_are_refused() {
+        assert!(Cusum::with_false_alarms(0.0, 100.0).is_err());
+        assert!(Cusum::with_false_alarms(0.5, 1.0).is_err());
+        assert!(Cusum::with_false_alarms(0.5, f64::NAN).is_err());
+        assert!(Cusum::with_false_alarms(1e-12, 1e40).is_err());
+    }
+}

@@ -1,0 +1,324 @@
+//! The filter of the residuals: a Kalman filter behind an unknown-input observer.
+
+use crate::blocks::symmetric_part;
+use crate::residual::ResidualGenerator;
+use crate::riccati::kalman;
+use crate::svd::Svd;
+use crate::{Domain, Error, StateSpace, check};
+use nalgebra::{DMatrix, DVector};
+
+/// Singular values below this part of the largest count as zero; the columns have length one.
+const TOLERANCE: f64 = 1e-9;
+
+/// A plant with noise and unknown inputs d: x' = A x + B u + w + sum of e d, y = C x + v + sum of `e_s` d;
+/// `x[k+1]` for x' in sampled time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoisyPlant {
+    /// A, n x n.
+    pub a: DMatrix<f64>,
+    /// B, n x m.
+    pub b: DMatrix<f64>,
+    /// C, p x n.
+    pub c: DMatrix<f64>,
+    /// W, n x n: intensity of the process noise w; its covariance in sampled time.
+    pub w: DMatrix<f64>,
+    /// V, p x p, positive definite: intensity of the measurement noise v; its covariance in sampled time.
+    pub v: DMatrix<f64>,
+    /// Continuous or sampled time.
+    pub domain: Domain,
+}
+
+/// An input that nobody measures: a disturbance, or a fault.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UnknownInput {
+    /// e, n entries: how it acts on the states.
+    pub on_states: DVector<f64>,
+    /// `e_s`, p entries: how it adds to the measurements.
+    pub on_measurements: DVector<f64>,
+}
+
+/// A filter with white residuals r: without unknown inputs, or with those that it decouples, r has mean 0
+/// and the intensity (in sampled time the covariance) I.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct DetectionFilter {
+    /// The filter, from commands u and measurements y to r.
+    pub generator: ResidualGenerator,
+    /// K: the initial state of the filter is K x, x the initial state of the plant.
+    pub start: DMatrix<f64>,
+    /// T of the unknown-input observer, in the coordinates of the filter: its state estimates T x.
+    projection: DMatrix<f64>,
+    /// `B_y` - the part of it that does not multiply the innovation, and N of the innovation.
+    injection: DMatrix<f64>,
+    selection: DMatrix<f64>,
+}
+
+impl NoisyPlant {
+    fn check(&self) -> Result<(), Error> {
+        let (n, p) = (check::square("A", &self.a)?, self.c.nrows());
+        check::shape("B", &self.b, (n, self.b.ncols()))?;
+        check::shape("C", &self.c, (p, n))?;
+        check::shape("W", &self.w, (n, n))?;
+        check::shape("V", &self.v, (p, p))?;
+        self.domain.check()
+    }
+
+    fn check_input(&self, input: &UnknownInput) -> Result<(), Error> {
+        let column = |v: &DVector<f64>| DMatrix::from_column_slice(v.len(), 1, v.as_slice());
+        check::shape("a column e", &column(&input.on_states), (self.a.nrows(), 1))?;
+        check::shape("a column e_s", &column(&input.on_measurements), (self.c.nrows(), 1))
+    }
+
+    /// The plant with `input` as a further state, a random walk: d' = noise of this intensity (in sampled
+    /// time `d[k+1]` = d[k] + noise of this covariance).
+    ///
+    /// A filter of this plant estimates the input: a constant one leaves the residuals in steady state.
+    /// The larger the intensity, the sooner. Other inputs get a zero for the new state
+    /// ([`UnknownInput::extended`]).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`], [`Error::NotFinite`] for bad matrices; [`Error::OutOfRange`] for an intensity that
+    /// is not above 0.
+    pub fn with_random_walk(&self, input: &UnknownInput, intensity: f64) -> Result<Self, Error> {
+        self.check()?;
+        self.check_input(input)?;
+        check::positive("the intensity of a random walk", intensity)?;
+        let n = self.a.nrows();
+        let grown = |m: &DMatrix<f64>| m.clone().resize(n + 1, n + 1, 0.0);
+        let (mut a, mut w) = (grown(&self.a), grown(&self.w));
+        a.view_mut((0, n), (n, 1)).copy_from(&input.on_states);
+        a[(n, n)] = match self.domain {
+            Domain::Continuous => 0.0,
+            Domain::Sampled { .. } => 1.0,
+        };
+        w[(n, n)] = intensity;
+        let mut c = self.c.clone().resize_horizontally(n + 1, 0.0);
+        c.set_column(n, &input.on_measurements);
+        let b = self.b.clone().resize_vertically(n + 1, 0.0);
+        Ok(Self { a, b, c, w, v: self.v.clone(), domain: self.domain })
+    }
+}
+
+impl UnknownInput {
+    /// The same input of a plant with `states` states, whose further states it does not act on.
+    #[must_use]
+    pub fn extended(&self, states: usize) -> Self {
+        Self { on_states: self.on_states.clone().resize_vertically(states, 0.0), ..self.clone() }
+    }
+}
+
+/// Designs the filter whose residuals do not depend on the inputs `unknown`, or returns None if there is
+/// none by this method.
+///
+/// Measurements in which an input appears directly are left out: y becomes `N_s` y with `N_s` `E_s` = 0.
+/// The inputs that act on the states are removed by an unknown-input observer (Chen and Patton 1999,
+/// section 3.2). With C for `N_s` C,
+///
+/// ```text
+/// H = E (C E)^+,  T = I - H C,  s = T x                               rank C E = rank E
+/// s' = T A s + T B u + T A H y + (T w - T A H v)                      (T E = 0)
+/// N y = N C s + N v                                                   N C E = 0, N N' = I
+/// ```
+///
+/// is a plant without unknown inputs, whose process noise and measurement noise are correlated. A Kalman
+/// filter estimates s in an orthonormal basis of the range of T; the residual is its innovation,
+///
+/// ```text
+/// r = R (N y - N C s_hat),   R (N V N') R' = I,   in sampled time R (N V N' + N C P C' N') R' = I
+/// ```
+///
+/// which is white, and of all decoupled filters the one with the least covariance of the state error.
+///
+/// Existence: rank C E = rank E, at least one row N is left, and (T A, N C) is detectable: (A, E, C) has no
+/// unstable invariant zeros. None says that one of them does not hold.
+///
+/// Source: J. Chen and R. J. Patton, Robust Model-Based Fault Diagnosis for Dynamic Systems (1999), chapter
+/// 3; the correlation: B. D. O. Anderson and J. B. Moore, Optimal Filtering (1979), section 5.4; whiteness:
+/// T. Kailath, IEEE Trans. Autom. Control 13 (1968).
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for bad matrices;
+/// [`Error::NotPositiveDefinite`] for V, [`Error::Unweighted`] if a mode on the stability limit gets no
+/// process noise; the numerical errors of [`kalman`].
+pub fn detection_filter(
+    plant: &NoisyPlant,
+    unknown: &[UnknownInput],
+) -> Result<Option<DetectionFilter>, Error> {
+    plant.check()?;
+    unknown.iter().try_for_each(|input| plant.check_input(input))?;
+    let Some(observer) = UnknownInputObserver::new(plant, unknown)? else {
+        return Ok(None);
+    };
+    match observer.filter(plant) {
+        Err(Error::NotDetectable { .. }) if !unknown.is_empty() => Ok(None),
+        other => other.map(Some),
+    }
+}
+
+/// T, H and N, the columns scaled to length one.
+struct UnknownInputObserver {
+    /// Q, n x k: an orthonormal basis of the range of T.
+    basis: DMatrix<f64>,
+    /// Q' T, k x n.
+    projection: DMatrix<f64>,
+    /// H, n x p.
+    h: DMatrix<f64>,
+    /// N, rows x p.
+    selection: DMatrix<f64>,
+}
+
+impl UnknownInputObserver {
+    fn new(plant: &NoisyPlant, unknown: &[UnknownInput]) -> Result<Option<Self>, Error> {
+        let (n, p) = (plant.a.nrows(), plant.c.nrows());
+        let columns = |of: fn(&UnknownInput) -> &DVector<f64>, rows: usize| {
+            let found = unknown.iter().map(of).filter(|column| column.amax() > 0.0);
+            let units: Vec<_> = found.map(|column| column / column.norm()).collect();
+            let mut matrix = DMatrix::zeros(rows, units.len());
+            units.iter().enumerate().for_each(|(at, unit)| matrix.set_column(at, unit));
+            matrix
+        };
+        let of_sensors = left_null_space(&columns(|input| &input.on_measurements, p))?;
+        let Some(kept) = of_sensors else { return Ok(None) };
+        let e = columns(|input| &input.on_states, n);
+        let seen = &kept * &plant.c * &e;
+        if e.ncols() > 0 && rank(&scaled(&seen))? < rank(&e)? {
+            return Ok(None);
+        }
+        let Some(left) = left_null_space(&seen)? else { return Ok(None) };
+        let mut h = DMatrix::zeros(n, p);
+        if e.ncols() > 0 {
+            let inverse = Svd::new(&seen)?;
+            let of_measurements = DMatrix::identity(kept.nrows(), kept.nrows());
+            h = &e * inverse.least_squares(&of_measurements, inverse.rank(TOLERANCE)) * &kept;
+        }
+        let t = DMatrix::identity(n, n) - &h * &plant.c;
+        let range = Svd::new(&t)?;
+        let basis = range.left.columns(0, range.rank(TOLERANCE)).into_owned();
+        let projection = basis.transpose() * &t;
+        Ok(Some(Self { basis, projection, h, selection: left * kept }))
+    }
+
+    fn filter(&self, plant: &NoisyPlant) -> Result<DetectionFilter, Error> {
+        let Self { basis, projection, h, selection } = self;
+        let NoisyPlant { a, b, c, w, v, domain } = plant;
+        let dynamics = projection * a * basis;
+        let through = projection * a * h;
+        let output = selection * c * basis;
+        let process = symmetric_part(
+            &(projection * w * projection.transpose() + &through * v * through.transpose()),
+        );
+        let measured = symmetric_part(&(selection * v * selection.transpose()));
+        let cross = -(&through * v * selection.transpose());
+        let (gain, covariance) =
+            correlated_filter((&dynamics, &output), (&process, &measured, &cross), *domain)?;
+        let factor = symmetric_part(&covariance)
+            .cholesky()
+            .ok_or(Error::NotPositiveDefinite { matrix: "V" })?
+            .l();
+        let whitening = factor
+            .solve_lower_triangular(&DMatrix::identity(covariance.nrows(), covariance.nrows()))
+            .ok_or(Error::Overflow { what: "the inverse of V" })?;
+        let injection = &through + &gain * selection;
+        let rows = selection.nrows();
+        Ok(DetectionFilter {
+            generator: ResidualGenerator {
+                a: dynamics - &gain * &output,
+                b_u: projection * b,
+                b_y: injection.clone(),
+                c: -(&whitening * output),
+                d_u: DMatrix::zeros(rows, b.ncols()),
+                d_y: &whitening * selection,
+                domain: *domain,
+            },
+            start: projection.clone(),
+            projection: projection.clone(),
+            injection,
+            selection: whitening * selection,
+        })
+    }
+}
+
+impl DetectionFilter {
+    /// The system from an unknown input of the plant to r: for e = T x - `s_hat`,
+    ///
+    /// ```text
+    /// e' = A e + (T e_d - B_y e_s) d,  r = -C e + D_y e_s d
+    /// ```
+    ///
+    /// with A, `B_y`, C, `D_y` of the generator. The commands have no part in it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`] for columns of the wrong length.
+    pub fn effect(&self, input: &UnknownInput) -> Result<StateSpace, Error> {
+        let (n, p) = (self.projection.ncols(), self.selection.ncols());
+        for (name, column, rows) in [("e", &input.on_states, n), ("e_s", &input.on_measurements, p)]
+        {
+            if column.len() != rows {
+                let found = (column.len(), 1);
+                return Err(Error::Shape { matrix: name, expected: (rows, 1), found });
+            }
+        }
+        let generator = &self.generator;
+        let b = &self.projection * &input.on_states - &self.injection * &input.on_measurements;
+        let d = &self.selection * &input.on_measurements;
+        Ok(StateSpace {
+            a: generator.a.clone(),
+            b: DMatrix::from_column_slice(b.len(), 1, b.as_slice()),
+            c: -&generator.c,
+            d: DMatrix::from_column_slice(d.len(), 1, d.as_slice()),
+            domain: generator.domain,
+        })
+    }
+}
+
+/// Gain and innovation covariance (in continuous time: intensity V) of the Kalman filter for correlated
+/// noise: with S = E w v', A - S V^-1 C and W - S V^-1 S' have uncorrelated noise and a gain less by
+/// S V^-1.
+fn correlated_filter(
+    (a, c): (&DMatrix<f64>, &DMatrix<f64>),
+    (w, v, s): (&DMatrix<f64>, &DMatrix<f64>, &DMatrix<f64>),
+    domain: Domain,
+) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
+    let factor = v.clone().cholesky().ok_or(Error::NotPositiveDefinite { matrix: "V" })?;
+    let part = factor.solve(&s.transpose()).transpose();
+    let process = symmetric_part(&(w - &part * s.transpose()));
+    let filter = kalman(&(a - &part * c), c, &process, v, domain)?;
+    let innovation = match domain {
+        Domain::Continuous => v.clone(),
+        Domain::Sampled { .. } => v + c * filter.covariance * c.transpose(),
+    };
+    Ok((filter.gain + part, innovation))
+}
+
+/// The rows N with N M = 0 and N N' = I; None if there are none.
+fn left_null_space(m: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
+    let (rows, columns) = m.shape();
+    if columns == 0 || m.amax() <= 0.0 {
+        return Ok(Some(DMatrix::identity(rows, rows)));
+    }
+    let dual = Svd::new(&scaled(m).transpose())?;
+    let rank = dual.rank(TOLERANCE);
+    if rank == rows {
+        return Ok(None);
+    }
+    Ok(Some(dual.right.columns(rank, rows - rank).transpose()))
+}
+
+/// The matrix with columns of length one; columns of zeros stay.
+fn scaled(m: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut unit = m.clone();
+    for mut column in unit.column_iter_mut() {
+        let length = column.norm();
+        if length > 0.0 {
+            column /= length;
+        }
+    }
+    unit
+}
+
+fn rank(m: &DMatrix<f64>) -> Result<usize, Error> {
+    if m.amax() > 0.0 { Ok(Svd::new(m)?.rank(TOLERANCE)) } else { Ok(0) }
+}

@@ -1,0 +1,145 @@
+//! The chi-square test of the mean of residuals over a window.
+
+use super::Delay;
+use super::chi_square::{noncentral_quantile, noncentral_survival};
+use crate::Error;
+
+/// At most as many phases of a window are averaged for a delay.
+const PHASES: usize = 32;
+
+/// The chi-square test of the mean of white residuals r, m of them with covariance I, over windows of N
+/// samples, one after the other.
+///
+/// ```text
+/// s = N |mean of r over the window|^2,  alarm at the end of the window: s > h
+/// ```
+///
+/// Without faults s has the chi-square distribution with m degrees of freedom. It is the generalised
+/// likelihood ratio of a constant mean of any direction and size, doubled. Windows do not overlap, so that
+/// their results are independent and the mean number of samples between false alarms is N / P(s > h).
+///
+/// Source: A. S. Willsky, Automatica 12 (1976), section 4.1; M. Basseville and I. V. Nikiforov, Detection of
+/// Abrupt Changes (1993), section 4.2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WindowTest {
+    /// m, the number of residuals.
+    pub residuals: u32,
+    /// N, the number of samples of a window.
+    pub window: usize,
+    /// h.
+    pub threshold: f64,
+}
+
+impl WindowTest {
+    /// The test whose mean number of samples between false alarms is `samples`, while the mean of the
+    /// residuals without faults has at most the length `bias` (0 for a plant without model error).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] for an empty window, no residuals, a bias that is not finite, or a number of
+    /// samples that is not larger than the window.
+    pub fn with_false_alarms(
+        (residuals, window): (u32, usize),
+        samples: f64,
+        bias: f64,
+    ) -> Result<Self, Error> {
+        let length = real(window);
+        if residuals == 0 || window == 0 {
+            let (name, rule) = ("the number of residuals or of samples", "at least 1");
+            return Err(Error::OutOfRange { name, value: 0.0, rule });
+        }
+        if !(bias >= 0.0 && bias.is_finite()) {
+            let (name, rule) = ("the mean of the residuals", "a finite number from 0");
+            return Err(Error::OutOfRange { name, value: bias, rule });
+        }
+        let threshold = noncentral_quantile(residuals, length * bias * bias, length / samples);
+        if threshold.is_nan() {
+            let (name, rule) = ("the number of samples between false alarms", "more than a window");
+            return Err(Error::OutOfRange { name, value: samples, rule });
+        }
+        Ok(Self { residuals, window, threshold })
+    }
+
+    /// The mean number of samples between false alarms, residuals with mean zero.
+    #[must_use]
+    pub fn between_false_alarms(&self) -> f64 {
+        real(self.window) / self.alarm_probability(0.0)
+    }
+
+    /// The probability of an alarm in a window in which the mean of the residuals has this length.
+    #[must_use]
+    pub fn alarm_probability(&self, mean: f64) -> f64 {
+        noncentral_survival(self.residuals, real(self.window) * mean * mean, self.threshold)
+    }
+
+    /// The distribution of the delay of a fault that moves the mean of the residuals to `mean(k)`, m
+    /// entries, in its k-th sample; at most `most` samples are followed. The fault starts in any sample of
+    /// a window with the same probability.
+    #[must_use]
+    pub fn delay(&self, mean: impl Fn(usize) -> Vec<f64>, most: usize) -> Delay {
+        let dimension = self.residuals as usize;
+        // Sums of the means of the first k samples.
+        let mut sums = vec![vec![0.0; dimension]];
+        for k in 0..most {
+            let sum = sums[k].iter().zip(mean(k)).map(|(sum, value)| sum + value).collect();
+            sums.push(sum);
+        }
+        let phases = self.window.min(PHASES);
+        let mut missed = vec![0.0; most + 1];
+        for phase in 0..phases {
+            let inside = phase * self.window / phases;
+            let (mut left, mut start, mut end) = (1.0, 0, self.window - inside);
+            for (k, missed) in missed.iter_mut().enumerate() {
+                if k == end {
+                    let shift = sums[end].iter().zip(&sums[start]).map(|(end, start)| end - start);
+                    let squared: f64 = shift.map(|value| value * value).sum();
+                    let noncentrality = squared / real(self.window);
+                    left *=
+                        1.0 - noncentral_survival(self.residuals, noncentrality, self.threshold);
+                    (start, end) = (end, end + self.window);
+                }
+                *missed += left / real(phases);
+            }
+        }
+        let done = missed.iter().position(|missed| *missed < 1e-6).unwrap_or(most);
+        missed.truncate(done + 1);
+        Delay { missed }
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "numbers of samples are far below 2^52")]
+fn real(number: usize) -> f64 {
+    number as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_false_alarms_are_the_stated_ones() {
+        for (residuals, window) in [(1, 1), (2, 10), (5, 64)] {
+            let test = WindowTest::with_false_alarms((residuals, window), 1e5, 0.0).unwrap();
+            assert!((test.between_false_alarms() / 1e5 - 1.0).abs() < 1e-9);
+        }
+        assert!(WindowTest::with_false_alarms((1, 10), 10.0, 0.0).is_err());
+        assert!(WindowTest::with_false_alarms((0, 10), 1e5, 0.0).is_err());
+        assert!(WindowTest::with_false_alarms((1, 10), 1e5, f64::NAN).is_err());
+    }
+
+    #[test]
+    fn a_constant_mean_is_found_window_by_window() {
+        let test = WindowTest::with_false_alarms((2, 1), 1000.0, 0.0).unwrap();
+        let power = test.alarm_probability(3.0);
+        let delay = test.delay(|_| vec![3.0, 0.0], 4000).mean().unwrap();
+        assert!((delay - 1.0 / power).abs() < 1e-3, "{delay} {power}");
+    }
+
+    #[test]
+    fn a_mean_that_a_bias_explains_raises_the_threshold() {
+        let [exact, biased] =
+            [0.0, 1.0].map(|bias| WindowTest::with_false_alarms((2, 4), 1e4, bias).unwrap());
+        assert!(biased.threshold > exact.threshold);
+        assert!((4.0 / biased.alarm_probability(1.0) / 1e4 - 1.0).abs() < 1e-9);
+    }
+}
