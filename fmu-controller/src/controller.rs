@@ -8,6 +8,8 @@ use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::design::Design;
+use crate::design::detection::DetectionDesign;
+use crate::detection::{Detector, Stretch};
 use crate::equations::Equations;
 use crate::loss::Loss;
 use crate::mode::Mode;
@@ -56,6 +58,8 @@ pub(crate) struct AsoController {
     frozen: bool,
     /// `None` for a continuous controller.
     sampler: Option<Sampler>,
+    /// `None` without a detection of faults.
+    detector: Option<Detector>,
     /// Whether the clock of the samples ticks. The samples follow from time, and so does the clock.
     pub(crate) sample_clock: bool,
     /// The design at the scheduling variable of the last sample; `None` without a schedule.
@@ -93,31 +97,62 @@ impl AsoController {
         self.operating_point.read(&self.design);
     }
 
-    /// Advances the deviations of the estimate over the part of a step from `offset` to
-    /// `offset + size`.
-    fn advance(&mut self, compensating: bool, part: (f64, f64)) -> Result<(), Failure> {
+    /// Advances the deviations of the estimate over the part from `offset` to `offset + size` of a step
+    /// that starts at `start`.
+    fn advance(&mut self, compensating: bool, start: f64, part: (f64, f64)) -> Result<(), Failure> {
         let mode = self.free_mode(compensating);
-        let Self { design, values, deviations: Signals { z, y, r, .. }, observer, .. } = self;
+        let Self { design, values, deviations, observer, detector, .. } = self;
+        let Signals { z, y, r, .. } = deviations;
         let (y, r) = ([&y[..], &values.y_slopes], [&r[..], &values.r_slopes]);
         let conditions = Conditions { design, y, r, mode };
+        let follow = &mut |z: &[f64], mode, (offset, size)| {
+            let (Some(detector), Some(own)) = (&mut *detector, &design.detection) else {
+                return Ok(());
+            };
+            detector.follow((design, own), &Stretch { z, mode, y, r, start, offset, size })
+        };
         observer
             .get_or_insert_with(|| Observer::new(design))
-            .advance(z, conditions, part)
+            .advance(z, conditions, part, follow)
             .map_err(|error| Failure::Error(format!("the observer cannot be stepped: {error}")))
+    }
+
+    /// The detector of a design with a detection.
+    pub(crate) fn detector_mut(&mut self) -> &mut Detector {
+        self.detector.get_or_insert_default()
+    }
+
+    /// The detection of a design that has one.
+    pub(crate) fn detection_mut(&mut self) -> &mut DetectionDesign {
+        self.design.detection.get_or_insert_default()
+    }
+
+    /// Starts the detection at `time` from the initial estimate.
+    fn start_detection(&mut self, time: f64) {
+        let Self { design, values, operating_point, deviations, detector, .. } = self;
+        if let (Some(detector), Some(own)) = (detector, &design.detection) {
+            deviations.set(values, operating_point, 0.0);
+            detector.start(own, time, &deviations.z[..design.states.len()]);
+        }
     }
 
     /// Makes a step of a continuous controller.
     fn integrate(&mut self, step: &Step) -> Result<(), Failure> {
+        if let (Some(detector), Some(own)) = (&self.detector, &self.design.detection)
+            && detector.has_too_many_samples(own, step.end())
+        {
+            return Err(too_many_samples(step.start, step.end()));
+        }
         let resolution = clock_rounding(step.end());
         let until_on = self.design.t_on - step.start;
         let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;
         // z has its deviations from the step before, or from the start.
         self.deviations.set_inputs(&self.values, &self.operating_point, 0.0);
         if inside {
-            self.advance(false, (0.0, until_on))?;
-            self.advance(true, (until_on, step.size - until_on))?;
+            self.advance(false, step.start, (0.0, until_on))?;
+            self.advance(true, step.start, (until_on, step.size - until_on))?;
         } else {
-            self.advance(self.is_compensating(step.start), (0.0, step.size))?;
+            self.advance(self.is_compensating(step.start), step.start, (0.0, step.size))?;
         }
         self.values.set_estimate(&self.deviations.z, &self.operating_point);
         self.mode = self.free_mode(self.is_compensating(step.end()));
@@ -226,22 +261,29 @@ impl AsoController {
     fn sample(&mut self, start: f64, end: f64) -> Result<(), Failure> {
         let Some(mut sampler) = self.sampler.take_if(|sampler| !sampler.has_too_many_samples(end))
         else {
-            return Err(Failure::Error(format!(
-                "too many samples are due from {start} to {end} s"
-            )));
+            return Err(too_many_samples(start, end));
         };
         while let Some(offset) = sampler.time_to_sample(start, end) {
-            let mode = self.free_mode(self.is_compensating(sampler.next_instant()));
-            self.interpolate(offset, sampler.next_instant());
-            let Self { design, current, values, operating_point, deviations, .. } = self;
-            let design = current.as_deref().unwrap_or(design);
+            let instant = sampler.next_instant();
+            let mode = self.free_mode(self.is_compensating(instant));
+            self.interpolate(offset, instant);
+            let Self { design, current, values, operating_point, deviations, detector, .. } = self;
+            let whole = &**design;
+            let design = current.as_deref().unwrap_or(whole);
             self.mode =
                 sampler.sample((design, mode), (values, operating_point, deviations), offset);
+            if let (Some(detector), Some(own)) = (detector, &whole.detection) {
+                detector.sample(own, (&deviations.u, &deviations.y), instant);
+            }
         }
         self.sampler = Some(sampler);
         self.set_losses();
         Ok(())
     }
+}
+
+fn too_many_samples(start: f64, end: f64) -> Failure {
+    Failure::Error(format!("too many samples are due from {start} to {end} s"))
 }
 
 /// The rounding error in s to expect of an importer that adds up its steps to `time`.
@@ -289,6 +331,7 @@ impl Model for AsoController {
             mode: Mode::default(),
             frozen: false,
             sampler: Sampler::new(&design),
+            detector: Detector::new(&design),
             sample_clock: false,
             schedule_input: start,
             schedule_slope: 0.0,
@@ -319,7 +362,10 @@ impl Model for AsoController {
                 )));
             }
         }
-        match self.design.refused_filter().or_else(|| self.design.refused_sliding_mode()) {
+        let detection = self.design.detection.as_ref();
+        let refused = detection.and_then(|own| own.refused_number(&self.design));
+        let of_laws = self.design.refused_filter().or_else(|| self.design.refused_sliding_mode());
+        match of_laws.or(refused) {
             Some((name, value, rule)) => {
                 Err(Failure::Error(format!("{name} = {value}, expected {rule}")))
             }
@@ -330,6 +376,7 @@ impl Model for AsoController {
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
         let time = experiment.start_time;
         self.start();
+        self.start_detection(time);
         self.observer = None;
         self.frozen = false;
         self.outside_reported = false;
@@ -408,7 +455,12 @@ impl Model for AsoController {
         Some(&mut self.log)
     }
 
+    /// None for a continuous controller with a detection: the states of its filter are integrated with the
+    /// observer's.
     fn model_exchange(&self) -> Option<ModelExchange> {
+        if self.detector.is_some() && self.sampler.is_none() {
+            return None;
+        }
         let limited = self.design.actuators.iter().filter(|actuator| actuator.limits.is_some());
         let event_indicators = if self.sampler.is_some() { 0 } else { 2 * limited.count() };
         Some(ModelExchange { event_indicators })

@@ -2,6 +2,7 @@
 //! names and units of the signals.
 
 mod checks;
+pub(crate) mod detection;
 
 use std::path::Path;
 
@@ -9,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::matrix::Matrix;
 use crate::schedule::Schedule;
+use detection::DetectionDesign;
 
 /// The content of a design file. Shapes: n states, m actuators, p measurements, q states of the
 /// fault model, t references.
@@ -95,6 +97,9 @@ pub(crate) struct Design {
     /// Matrices and operating points by a scheduling variable, in place of those above.
     #[serde(default)]
     pub(crate) schedule: Option<Schedule>,
+    /// The detection of faults, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) detection: Option<DetectionDesign>,
 }
 
 /// The measurements that the command of a sampled controller is computed from.

@@ -5,6 +5,7 @@
 mod controller;
 mod dependencies;
 mod design;
+mod detection;
 mod equations;
 mod loss;
 mod matrix;

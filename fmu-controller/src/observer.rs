@@ -19,13 +19,48 @@ const HALVINGS: u32 = 20;
 /// The most propagators in the cache.
 const CACHE_SIZE: usize = 96;
 
-/// Steps the observer of one design.
-#[derive(Clone)]
-pub(crate) struct Observer {
-    /// Propagators with the mode and the step size that they were computed for.
+/// Propagators with the mode and the step size that they were computed for.
+#[derive(Clone, Default)]
+pub(crate) struct Propagators {
     cache: Vec<(Mode, f64, Arc<FirstOrderHold>)>,
     /// Position of the propagator that was replaced last.
     replaced: usize,
+}
+
+impl Propagators {
+    /// The propagator for a mode and a step size in s, computed from the matrices of `system` where it is
+    /// new.
+    ///
+    /// Sizes must be equal to the last bit: the content of the cache must not change results, so
+    /// that a restored instance, whose cache is empty, continues with the same bits.
+    pub(crate) fn of(
+        &mut self,
+        (mode, size): (Mode, f64),
+        system: impl FnOnce() -> (DMatrix<f64>, DMatrix<f64>),
+    ) -> Result<&FirstOrderHold, control::Error> {
+        let known = self.cache.iter().position(|(cached, own, _)| {
+            cached.has_the_matrices_of(mode) && own.to_bits() == size.to_bits()
+        });
+        if let Some(position) = known {
+            return Ok(&self.cache[position].2);
+        }
+        let (state, input) = system();
+        let hold = Arc::new(FirstOrderHold::new(&state, &input, size)?);
+        if self.cache.len() < CACHE_SIZE {
+            self.cache.reserve_exact(CACHE_SIZE - self.cache.len());
+            self.cache.push((mode, size, hold));
+            return Ok(&self.cache[self.cache.len() - 1].2);
+        }
+        self.replaced = (self.replaced + 1) % CACHE_SIZE;
+        self.cache[self.replaced] = (mode, size, hold);
+        Ok(&self.cache[self.replaced].2)
+    }
+}
+
+/// Steps the observer of one design.
+#[derive(Clone)]
+pub(crate) struct Observer {
+    propagators: Propagators,
     /// Space for [y; r; w] and its slope, for [y; r], and for z before and after a step.
     input: Vec<f64>,
     input_slope: Vec<f64>,
@@ -33,6 +68,10 @@ pub(crate) struct Observer {
     before: Vec<f64>,
     after: Vec<f64>,
 }
+
+/// Takes z at the start of a part of a step, the mode in it, and its offset and size in s.
+pub(crate) type Follow<'a> =
+    &'a mut dyn FnMut(&[f64], Mode, (f64, f64)) -> Result<(), control::Error>;
 
 /// What does not change during a step.
 #[derive(Clone, Copy)]
@@ -60,27 +99,37 @@ impl Conditions<'_> {
     }
 }
 
-/// M and N of `mode`: as the equations are linear, their columns are z' at unit vectors.
-fn system(design: &Design, mode: Mode) -> (DMatrix<f64>, DMatrix<f64>) {
+/// z' and u at the unit vectors of z, y, r and w in turn, w the commands of the channels at a limit.
+pub(crate) fn unit_responses(design: &Design, mode: Mode) -> Vec<[Vec<f64>; 2]> {
     let equations = Equations::<f64>::new(design, mode);
     let (n, p, m) = (design.order(), design.measurements.len(), design.actuators.len());
     let t = design.references.len();
-    let z_slopes = |set: &dyn Fn(&mut Signals)| {
+    let responses = |set: &dyn Fn(&mut Signals)| {
         let mut unit = Signals::zero(design);
         set(&mut unit);
         let mut slopes = vec![0.0; n];
         equations.evaluate(&mut &mut unit, &mut &mut slopes[..]);
-        slopes
+        [slopes, unit.u]
     };
-    let state = (0..n).flat_map(|j| z_slopes(&|unit| unit.z[j] = 1.0));
-    let measured = (0..p).flat_map(|k| z_slopes(&|unit| unit.y[k] = 1.0));
-    let referred = (0..t).flat_map(|k| z_slopes(&|unit| unit.r[k] = 1.0));
-    let held = (0..m).flat_map(|j| {
+    let state = (0..n).map(|j| responses(&|unit| unit.z[j] = 1.0));
+    let measured = (0..p).map(|k| responses(&|unit| unit.y[k] = 1.0));
+    let referred = (0..t).map(|k| responses(&|unit| unit.r[k] = 1.0));
+    let held = (0..m).map(|j| {
         let command = if mode.is_limited(j) { 1.0 } else { 0.0 };
-        z_slopes(&|unit| unit.u[j] = command)
+        responses(&|unit| unit.u[j] = command)
     });
-    let inputs = measured.chain(referred).chain(held);
-    (DMatrix::from_iterator(n, n, state), DMatrix::from_iterator(n, p + t + m, inputs))
+    state.chain(measured).chain(referred).chain(held).collect()
+}
+
+/// M and N of `mode`: as the equations are linear, their columns are z' at unit vectors.
+fn system(design: &Design, mode: Mode) -> (DMatrix<f64>, DMatrix<f64>) {
+    let n = design.order();
+    let responses = unit_responses(design, mode);
+    let matrix = |columns: &[[Vec<f64>; 2]]| {
+        let values = columns.iter().flat_map(|[slopes, _]| slopes.iter().copied());
+        DMatrix::from_iterator(n, columns.len(), values)
+    };
+    (matrix(&responses[..n]), matrix(&responses[n..]))
 }
 
 impl Observer {
@@ -90,8 +139,7 @@ impl Observer {
         let inputs = given + design.actuators.len();
         let states = design.order();
         Self {
-            cache: Vec::with_capacity(CACHE_SIZE),
-            replaced: 0,
+            propagators: Propagators::default(),
             input: vec![0.0; inputs],
             input_slope: vec![0.0; inputs],
             given: vec![0.0; given],
@@ -105,19 +153,24 @@ impl Observer {
     /// Where a channel reaches or leaves a limit on the way, the step is halved until that instant
     /// is known to 2^-20 of the step. A channel that leaves its mode and returns to it before the
     /// middle or the end of a part is not detected.
+    ///
+    /// `follow` gets each part of the step in which the mode stays: z at its start, the mode, offset and
+    /// size in s.
     pub(crate) fn advance(
         &mut self,
         z: &mut [f64],
         conditions: Conditions<'_>,
         (offset, size): (f64, f64),
+        follow: Follow<'_>,
     ) -> Result<(), control::Error> {
         let span = Span { offset, size, halvings: HALVINGS };
         self.before.copy_from_slice(z);
         if conditions.design.actuators.iter().any(|actuator| actuator.limits.is_some()) {
-            self.advance_part(conditions, span)?;
+            self.advance_part(conditions, span, follow)?;
             z.copy_from_slice(&self.before);
         } else {
             self.propagate(conditions.mode, conditions, span)?;
+            follow(&self.before, conditions.mode, (offset, size))?;
             z.copy_from_slice(&self.after);
         }
         Ok(())
@@ -127,18 +180,20 @@ impl Observer {
         &mut self,
         conditions: Conditions<'_>,
         span: Span,
+        follow: Follow<'_>,
     ) -> Result<(), control::Error> {
         let mode = conditions.mode_at(span.offset, &self.before, &mut self.given);
         if span.halvings > 0 {
             let stays = self.keeps_mode(mode, conditions, span.half(0))?
                 && self.keeps_mode(mode, conditions, span)?;
             if !stays {
-                self.advance_part(conditions, span.half(0))?;
-                return self.advance_part(conditions, span.half(1));
+                self.advance_part(conditions, span.half(0), follow)?;
+                return self.advance_part(conditions, span.half(1), follow);
             }
         } else {
             self.propagate(mode, conditions, span)?;
         }
+        follow(&self.before, mode, (span.offset, span.size))?;
         std::mem::swap(&mut self.before, &mut self.after);
         Ok(())
     }
@@ -171,37 +226,8 @@ impl Observer {
         for (j, held) in held.iter_mut().enumerate() {
             *held = mode.limit(design.actuators[j].range(), j).unwrap_or(0.0);
         }
-        let position = self.propagator(design, mode, span)?;
-        let (_, _, hold) = &self.cache[position];
+        let hold = self.propagators.of((mode, span.size), || system(design, mode))?;
         hold.step_into(&self.before, &self.input, &self.input_slope, &mut self.after)
-    }
-
-    /// The position in the cache of the propagator for `mode` and the size of `span`, which is
-    /// computed where it is new.
-    ///
-    /// Sizes must be equal to the last bit: the content of the cache must not change results, so
-    /// that a restored instance, whose cache is empty, continues with the same bits.
-    fn propagator(
-        &mut self,
-        design: &Design,
-        mode: Mode,
-        span: Span,
-    ) -> Result<usize, control::Error> {
-        let known = self.cache.iter().position(|(cached, size, _)| {
-            cached.has_the_matrices_of(mode) && size.to_bits() == span.size.to_bits()
-        });
-        if let Some(position) = known {
-            return Ok(position);
-        }
-        let (state, input) = system(design, mode);
-        let hold = Arc::new(FirstOrderHold::new(&state, &input, span.size)?);
-        if self.cache.len() < CACHE_SIZE {
-            self.cache.push((mode, span.size, hold));
-            return Ok(self.cache.len() - 1);
-        }
-        self.replaced = (self.replaced + 1) % CACHE_SIZE;
-        self.cache[self.replaced] = (mode, span.size, hold);
-        Ok(self.replaced)
     }
 }
 

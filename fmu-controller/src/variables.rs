@@ -1,5 +1,6 @@
 //! The variables of the controller, which follow from the dimensions and names of the design.
 
+mod detection;
 mod parameters;
 
 use fmu::Variable;
@@ -25,6 +26,7 @@ pub(crate) fn list(controller: &AsoController) -> Vec<Variable<AsoController>> {
     }
     all.extend(parameters::of(design));
     all.extend(sample_clock(design));
+    all.extend(detection::of(design));
     all
 }
 

@@ -165,6 +165,7 @@ impl Design {
         of_faults
             .or_else(|| self.contradiction_of_references())
             .or_else(|| self.contradiction_of_sliding_mode())
+            .or_else(|| self.detection.as_ref()?.contradiction(self))
     }
 
     fn contradiction_of_sliding_mode(&self) -> Option<String> {
@@ -224,7 +225,8 @@ impl Design {
                 return Some((matrix.element(name, k), matrix.values[k], "a finite number"));
             }
         }
-        self.refused_filter().or_else(|| self.refused_sliding_mode())
+        let of_laws = self.refused_filter().or_else(|| self.refused_sliding_mode());
+        of_laws.or_else(|| self.detection.as_ref()?.refused_number(self))
     }
 
     /// The first of rho and delta that is not a number above 0.

@@ -1,0 +1,156 @@
+//! The section `[detection]` of a design file: the filter of the residuals and the tests.
+
+use serde::{Deserialize, Serialize};
+
+use super::Design;
+use super::checks::Refusal;
+use crate::matrix::Matrix;
+
+/// The filter of the residuals r, of k states x_r, with the tests of r. In a sampled controller
+///
+/// ```text
+/// x_r[k+1] = A x_r[k] + B_u u[k] + B_y y[k],  r[k] = C x_r[k] + D_u u[k] + D_y y[k]
+/// ```
+///
+/// in a continuous one x_r' in place of x_r[k+1]; its residuals are averages of r over each interval of
+/// `sample_time`, times the root of `sample_time`. Without faults the residuals are white with
+/// variance 1.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DetectionDesign {
+    /// The interval in s between two tests of a continuous controller; a sampled one tests in each sample.
+    #[serde(default)]
+    pub(crate) sample_time: Option<f64>,
+    /// Time in s after the start of the run from which the residuals are tested.
+    pub(crate) from: f64,
+    /// A, k x k.
+    #[serde(rename = "A")]
+    pub(crate) a: Matrix,
+    /// B_u, k x m.
+    #[serde(rename = "B_u")]
+    pub(crate) b_u: Matrix,
+    /// B_y, k x p.
+    #[serde(rename = "B_y")]
+    pub(crate) b_y: Matrix,
+    /// C, rows x k.
+    #[serde(rename = "C")]
+    pub(crate) c: Matrix,
+    /// D_u, rows x m.
+    #[serde(rename = "D_u")]
+    pub(crate) d_u: Matrix,
+    /// D_y, rows x p.
+    #[serde(rename = "D_y")]
+    pub(crate) d_y: Matrix,
+    /// The initial x_r is this matrix times the initial estimate of the states; k x n.
+    pub(crate) start: Matrix,
+    /// The faults that `fault_isolated` counts, from 1.
+    pub(crate) faults: Vec<String>,
+    /// The tests, each of some rows of r in turn.
+    pub(crate) tests: Vec<TestDesign>,
+}
+
+/// A test: of one residual by cumulative sums (`drift`), or of the mean of several over a window.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TestDesign {
+    pub(crate) name: String,
+    /// How many rows of r it takes.
+    pub(crate) residuals: usize,
+    /// kappa of the cumulative sums.
+    #[serde(default)]
+    pub(crate) drift: Option<f64>,
+    /// The number of samples of a window.
+    #[serde(default)]
+    pub(crate) window: Option<u32>,
+    pub(crate) threshold: f64,
+    /// For each fault whether this test reacts to it.
+    pub(crate) reacts: Vec<bool>,
+}
+
+impl DetectionDesign {
+    /// The matrices with their names and the numbers of rows and columns that they must have.
+    fn shapes(&self, design: &Design) -> [(&'static str, &Matrix, (usize, usize)); 7] {
+        let (k, rows) = (self.a.rows, self.c.rows);
+        let (m, p) = (design.actuators.len(), design.measurements.len());
+        [
+            ("detection.A", &self.a, (k, k)),
+            ("detection.B_u", &self.b_u, (k, m)),
+            ("detection.B_y", &self.b_y, (k, p)),
+            ("detection.C", &self.c, (rows, k)),
+            ("detection.D_u", &self.d_u, (rows, m)),
+            ("detection.D_y", &self.d_y, (rows, p)),
+            ("detection.start", &self.start, (k, design.states.len())),
+        ]
+    }
+
+    /// Describes the first entry with a wrong shape, or without its counterpart.
+    pub(super) fn contradiction(&self, design: &Design) -> Option<String> {
+        for (name, matrix, (rows, columns)) in self.shapes(design) {
+            if (matrix.rows, matrix.columns) != (rows, columns) {
+                let (found_rows, found_columns) = (matrix.rows, matrix.columns);
+                return Some(format!(
+                    "{name} is {found_rows} x {found_columns}, expected {rows} x {columns}"
+                ));
+            }
+        }
+        let stated = self.sample_time.is_some();
+        if stated == design.sample_time.is_some() {
+            let (found, expected) =
+                if stated { ("is stated", "none") } else { ("is missing", "one") };
+            return Some(format!(
+                "detection.sample_time {found}; expected {expected}, as a continuous controller, and no \
+                 sampled one, has its own"
+            ));
+        }
+        let (rows, taken) = (self.c.rows, self.tests.iter().map(|test| test.residuals).sum());
+        if rows != taken {
+            return Some(format!("the tests take {taken} residuals, detection.C has {rows} rows"));
+        }
+        self.tests.iter().find_map(|test| self.contradiction_of(test))
+    }
+
+    fn contradiction_of(&self, test: &TestDesign) -> Option<String> {
+        let (name, found, expected) = (&test.name, test.reacts.len(), self.faults.len());
+        if found != expected {
+            return Some(format!(
+                "detection test {name}: reacts has {found} entries, expected {expected}, one for each fault"
+            ));
+        }
+        match (test.drift, test.window, test.residuals) {
+            (Some(_), None, 1) => None,
+            (None, Some(window), 1..) if window > 0 => None,
+            (Some(_), None, count) => Some(format!(
+                "detection test {name}: cumulative sums of {count} residuals, expected 1"
+            )),
+            _ => Some(format!(
+                "detection test {name}: expected drift, or window and residuals of at least 1"
+            )),
+        }
+    }
+
+    /// The first number that is out of its range.
+    pub(crate) fn refused_number(&self, design: &Design) -> Option<Refusal> {
+        for (name, matrix, _) in self.shapes(design) {
+            if let Some(k) = matrix.values.iter().position(|value| !value.is_finite()) {
+                return Some((matrix.element(name, k), matrix.values[k], "a finite number"));
+            }
+        }
+        let positive = |value: &f64| *value > 0.0 && value.is_finite();
+        for test in &self.tests {
+            for (what, value) in [("threshold", Some(test.threshold)), ("drift", test.drift)] {
+                if let Some(value) = value.filter(|value| !positive(value)) {
+                    return Some((
+                        format!("detection test {}: {what}", test.name),
+                        value,
+                        "above 0",
+                    ));
+                }
+            }
+        }
+        if let Some(value) = self.sample_time.filter(|value| !positive(value)) {
+            return Some(("detection.sample_time".to_owned(), value, "more than 0 s"));
+        }
+        (!(self.from >= 0.0 && self.from.is_finite()))
+            .then(|| ("detection.from".to_owned(), self.from, "a time in s from 0"))
+    }
+}

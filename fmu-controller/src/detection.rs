@@ -1,0 +1,267 @@
+//! Detection and isolation of faults: residuals, tests, the decision.
+//!
+//! The residuals follow the measurements and the commands that are really applied, whatever the observer
+//! does. A sampled controller computes and tests them in each sample. In a continuous one the filter is part
+//! of the piecewise linear system of the observer (`observer.rs`), stepped as exactly, and its residuals
+//! are averages over intervals of the detection's own sample time, which does not depend on the
+//! communication step:
+//!
+//! ```text
+//! [z; x_r; q]' = [M, 0, 0; B_u K, A, 0; D_u K, C, 0] [z; x_r; q] + [N; B_u S + B_y Y; D_u S + D_y Y] v
+//! r[k] = q(t_k) / T^(1/2),  q(t_k) is then set to 0
+//! ```
+//!
+//! v = [y; r; w], w the commands of the channels at a limit, u = K z + S v, y = Y v. The sample at the start of a run, which a
+//! sampled controller has, is not tested.
+
+mod decision;
+mod tests_of_residuals;
+
+use control::Error;
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use crate::design::Design;
+use crate::design::detection::DetectionDesign;
+use crate::matrix::Matrix;
+use crate::mode::Mode;
+use crate::observer::{self, Propagators};
+pub(crate) use decision::Decision;
+use tests_of_residuals::TestState;
+
+/// The part of the sample time by which a sample may be early: an importer adds up its steps with rounding.
+const TOLERANCE: f64 = 1e-6;
+/// Times between samples are rounded to this part of the sample time, so that equal ones are equal bits.
+const RESOLUTION: f64 = 1.0 / 1_073_741_824.0;
+/// The most samples in one step.
+const MOST_SAMPLES: f64 = 1e7;
+
+/// State and outputs of the detection.
+#[derive(Clone, Default, Serialize, Deserialize)]
+pub(crate) struct Detector {
+    /// [x_r; q], q in a continuous controller only.
+    state: Vec<f64>,
+    /// Start of the run in s, and the number of samples since.
+    start: f64,
+    samples: f64,
+    pub(crate) residuals: Vec<f64>,
+    pub(crate) statistics: Vec<f64>,
+    tests: Vec<TestState>,
+    pub(crate) decision: Decision,
+    /// The input `detection_reset`.
+    pub(crate) reset: bool,
+    #[serde(skip)]
+    work: Work,
+}
+
+/// Space of a step, and the propagators of a continuous controller; empty in a state read from bytes.
+#[derive(Clone, Default)]
+struct Work {
+    propagators: Propagators,
+    before: Vec<f64>,
+    after: Vec<f64>,
+    input: Vec<f64>,
+    input_slope: Vec<f64>,
+}
+
+/// A part of a step in which the mode stays; signals as deviations, times in s.
+#[derive(Clone, Copy)]
+pub(crate) struct Stretch<'a> {
+    /// z at the start of this part.
+    pub(crate) z: &'a [f64],
+    pub(crate) mode: Mode,
+    /// The measurements at the start of the step, and their slopes.
+    pub(crate) y: [&'a [f64]; 2],
+    /// The same of the references.
+    pub(crate) r: [&'a [f64]; 2],
+    /// Start of the step.
+    pub(crate) start: f64,
+    /// Start of this part after the start of the step.
+    pub(crate) offset: f64,
+    /// Length of this part.
+    pub(crate) size: f64,
+}
+
+impl Detector {
+    /// The detector of `design`, if it has one.
+    pub(crate) fn new(design: &Design) -> Option<Self> {
+        let own = design.detection.as_ref()?;
+        let integrals = if own.sample_time.is_some() { own.c.rows } else { 0 };
+        let tests = &own.tests;
+        Some(Self {
+            state: vec![0.0; own.a.rows + integrals],
+            start: 0.0,
+            samples: 0.0,
+            residuals: vec![0.0; own.c.rows],
+            statistics: vec![0.0; tests.len()],
+            tests: tests.iter().map(TestState::new).collect(),
+            decision: Decision::default(),
+            reset: false,
+            work: Work::default(),
+        })
+    }
+
+    /// Starts at `time` in s from the deviations `x_hat` of the states.
+    pub(crate) fn start(&mut self, own: &DetectionDesign, time: f64, x_hat: &[f64]) {
+        self.state.fill(0.0);
+        own.start.add_product::<true>(x_hat, &mut self.state);
+        (self.start, self.samples) = (time, 0.0);
+        self.residuals.fill(0.0);
+        self.work.propagators = Propagators::default();
+        self.clear();
+    }
+
+    /// Clears sums, windows and decision.
+    fn clear(&mut self) {
+        self.statistics.fill(0.0);
+        self.tests.iter_mut().for_each(TestState::clear);
+        self.decision = Decision::default();
+    }
+
+    /// One sample of a sampled controller at `time`, with the deviations of the commands applied from it on.
+    pub(crate) fn sample(&mut self, own: &DetectionDesign, (u, y): (&[f64], &[f64]), time: f64) {
+        let first = self.samples < 1.0;
+        if !first {
+            self.residuals.fill(0.0);
+            own.c.add_product::<true>(&self.state, &mut self.residuals);
+            own.d_u.add_product::<true>(u, &mut self.residuals);
+            own.d_y.add_product::<true>(y, &mut self.residuals);
+        }
+        let next = &mut self.work.after;
+        next.clear();
+        next.resize(self.state.len(), 0.0);
+        own.a.add_product::<true>(&self.state, next);
+        own.b_u.add_product::<true>(u, next);
+        own.b_y.add_product::<true>(y, next);
+        self.state.copy_from_slice(next);
+        self.samples += 1.0;
+        if !first {
+            self.decide(own, time);
+        }
+    }
+
+    /// Follows a part of a step of a continuous controller, with the samples in it.
+    pub(crate) fn follow(
+        &mut self,
+        (design, own): (&Design, &DetectionDesign),
+        stretch: &Stretch<'_>,
+    ) -> Result<(), Error> {
+        let Some(period) = own.sample_time else { return Ok(()) };
+        let start = stretch.start + stretch.offset;
+        let (mut at, end) = (0.0, stretch.size);
+        self.work.before.clear();
+        self.work.before.extend(stretch.z.iter().chain(&self.state));
+        loop {
+            let instant = self.start + (self.samples + 1.0) * period;
+            let rounded = ((instant - start) / (RESOLUTION * period)).round();
+            let due = rounded * RESOLUTION * period;
+            let sampled = due <= end + TOLERANCE * period;
+            // A sample at the end, up to rounding, leaves the size of the part as it is.
+            let to = if due < end - TOLERANCE * period { due } else { end };
+            if to > at {
+                self.propagate((design, own), stretch, (at, to - at))?;
+                at = to;
+            }
+            if !sampled {
+                break;
+            }
+            self.samples += 1.0;
+            let integrals = &mut self.work.before[stretch.z.len() + own.a.rows..];
+            let root = period.sqrt();
+            for (residual, integral) in self.residuals.iter_mut().zip(integrals) {
+                (*residual, *integral) = (*integral / root, 0.0);
+            }
+            self.decide(own, instant);
+        }
+        self.state.copy_from_slice(&self.work.before[stretch.z.len()..]);
+        Ok(())
+    }
+
+    /// Advances [z; x_r; q] by `size` s, from `at` s after the start of the part.
+    fn propagate(
+        &mut self,
+        (design, own): (&Design, &DetectionDesign),
+        stretch: &Stretch<'_>,
+        (at, size): (f64, f64),
+    ) -> Result<(), Error> {
+        let Work { propagators, before, after, input, input_slope } = &mut self.work;
+        input.clear();
+        input_slope.clear();
+        let offset = stretch.offset + at;
+        for [values, slopes] in [stretch.y, stretch.r] {
+            input.extend(values.iter().zip(slopes).map(|(value, slope)| value + slope * offset));
+            input_slope.extend_from_slice(slopes);
+        }
+        for (j, actuator) in design.actuators.iter().enumerate() {
+            input.push(stretch.mode.limit(actuator.range(), j).unwrap_or(0.0));
+            input_slope.push(0.0);
+        }
+        let hold = propagators.of((stretch.mode, size), || system((design, own), stretch.mode))?;
+        after.clear();
+        after.resize(before.len(), 0.0);
+        hold.step_into(before, input, input_slope, after)?;
+        std::mem::swap(before, after);
+        Ok(())
+    }
+
+    /// Tests the residuals at `time`.
+    fn decide(&mut self, own: &DetectionDesign, time: f64) {
+        if self.reset {
+            self.clear();
+        }
+        // With the rounding of a clock that an importer adds up.
+        if time < self.start + own.from - 8.0 * f64::EPSILON * time.abs() {
+            return;
+        }
+        let mut first = 0;
+        for (at, (test, state)) in own.tests.iter().zip(&mut self.tests).enumerate() {
+            let residuals = &self.residuals[first..first + test.residuals];
+            first += test.residuals;
+            let onset = state.take(test, residuals, time);
+            self.statistics[at] = state.statistic;
+            if let Some(onset) = onset {
+                self.decision.alarm(time, onset);
+            }
+        }
+        self.decision.isolate(own, |at| self.tests[at].has_alarmed);
+    }
+
+    /// Whether more samples are due until `end` than one step may take.
+    pub(crate) fn has_too_many_samples(&self, own: &DetectionDesign, end: f64) -> bool {
+        own.sample_time
+            .is_some_and(|period| (end - self.start) / period - self.samples > MOST_SAMPLES)
+    }
+}
+
+/// Matrices of [z; x_r; q]' over [z; x_r; q] and [y; r; w] in `mode`.
+fn system((design, own): (&Design, &DetectionDesign), mode: Mode) -> (DMatrix<f64>, DMatrix<f64>) {
+    let responses = observer::unit_responses(design, mode);
+    let (order, p) = (design.order(), design.measurements.len());
+    let (k, rows) = (own.a.rows, own.c.rows);
+    let whole = order + k + rows;
+    let (mut state, mut input) =
+        (DMatrix::zeros(whole, whole), DMatrix::zeros(whole, responses.len() - order));
+    let dense =
+        |matrix: &Matrix| DMatrix::from_row_slice(matrix.rows, matrix.columns, &matrix.values);
+    let [b_u, b_y, d_u, d_y] = [&own.b_u, &own.b_y, &own.d_u, &own.d_y].map(dense);
+    for (at, [slopes, u]) in responses.into_iter().enumerate() {
+        let u = DVector::from_vec(u);
+        let mut column = DVector::zeros(whole);
+        column.rows_mut(0, order).copy_from_slice(&slopes);
+        column.rows_mut(order, k).copy_from(&(&b_u * &u));
+        column.rows_mut(order + k, rows).copy_from(&(&d_u * &u));
+        if (order..order + p).contains(&at) {
+            let mut part = column.rows_mut(order, k);
+            part += b_y.column(at - order);
+            let mut part = column.rows_mut(order + k, rows);
+            part += d_y.column(at - order);
+        }
+        match at.checked_sub(order) {
+            None => state.set_column(at, &column),
+            Some(at) => input.set_column(at, &column),
+        }
+    }
+    state.view_mut((order, order), (k, k)).copy_from(&dense(&own.a));
+    state.view_mut((order + k, order), (rows, k)).copy_from(&dense(&own.c));
+    (state, input)
+}

@@ -1,0 +1,51 @@
+//! The decision: whether there is a fault, since when, and which one.
+
+use serde::{Deserialize, Serialize};
+
+use crate::design::detection::DetectionDesign;
+
+/// The value of the times before an alarm.
+const NEVER: f64 = -1.0;
+
+/// The decision, which stays until it is reset.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Decision {
+    pub(crate) detected: bool,
+    /// Position of the fault from 1; 0 without an alarm, -1 if the alarms fit no fault or several.
+    pub(crate) isolated: i32,
+    /// Time of the first alarm in s.
+    pub(crate) time: f64,
+    /// The estimated time in s at which the fault started.
+    pub(crate) onset: f64,
+}
+
+impl Default for Decision {
+    fn default() -> Self {
+        Self { detected: false, isolated: 0, time: NEVER, onset: NEVER }
+    }
+}
+
+impl Decision {
+    /// Takes the alarm of a test at `time`.
+    pub(super) fn alarm(&mut self, time: f64, onset: f64) {
+        if !self.detected {
+            *self = Self { detected: true, time, onset, ..*self };
+        }
+    }
+
+    /// Finds the one fault to which exactly the tests react that have given an alarm.
+    pub(super) fn isolate(&mut self, own: &DetectionDesign, has_alarmed: impl Fn(usize) -> bool) {
+        if !self.detected {
+            return;
+        }
+        let fits = |fault: &usize| {
+            let mut tests = own.tests.iter().enumerate();
+            tests.all(|(at, test)| test.reacts[*fault] == has_alarmed(at))
+        };
+        let mut fitting = (0..own.faults.len()).filter(fits);
+        self.isolated = match (fitting.next(), fitting.next()) {
+            (Some(fault), None) => i32::try_from(fault + 1).unwrap_or(-1),
+            _ => -1,
+        };
+    }
+}
