@@ -4,7 +4,7 @@
 //! | task | item |
 //! |---|---|
 //! | white residuals, insensitive to unknown inputs and to other faults | [`detection_filter`] |
-//! | what a fault does to a residual | [`DetectionFilter::effect`], [`mean_after_step`] |
+//! | what a fault does to a residual | [`DetectionFilter::effect`], [`mean_after_step`], [`mean_of_constant`] |
 //! | test of one residual by cumulative sums | [`Cusum`] |
 //! | test of the mean of several residuals over a window | [`WindowTest`] |
 //! | distribution chi-square, central and noncentral | [`chi_square`] |
@@ -23,6 +23,6 @@ mod window;
 
 pub use cusum::Cusum;
 pub use delay::Delay;
-pub use effect::mean_after_step;
+pub use effect::{mean_after_step, mean_of_constant};
 pub use filter::{DetectionFilter, NoisyPlant, UnknownInput, detection_filter};
 pub use window::WindowTest;

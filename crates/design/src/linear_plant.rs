@@ -1,10 +1,13 @@
 //! The plant as a linear system with faults, from the matrices of the plant file or from its FMU.
 
+use control::detection::UnknownInput;
 use control::faults::{Fault as Model, FaultEntry, FaultKind};
 use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
 
+use super::detection_request::{Disturbance, DisturbanceEntry};
+use files::PlaceError;
 use super::plant_file::{self, PlantFile};
 use super::signals::{EntryPoint, Fault, FaultDynamics, Signal};
 
@@ -23,6 +26,8 @@ pub(crate) struct LinearPlant {
     pub(crate) faults: Vec<Fault>,
     /// The fault models, in the same order.
     pub(crate) models: Vec<Model>,
+    /// The disturbances of the file.
+    pub(crate) disturbances: Vec<UnknownInput>,
     /// The source of the matrices, in a sentence.
     pub(crate) origin: String,
     /// For an FMU: the relative distance of the operating point from an equilibrium.
@@ -50,6 +55,7 @@ impl LinearPlant {
                     measurements: file.measurements.clone(),
                     faults: file.faults.clone(),
                     models: file.faults.iter().map(model).collect(),
+                    disturbances: disturbances(file, (b, c.nrows()), None)?,
                     origin: "The plant file states the matrices.".to_owned(),
                     residual: None,
                 })
@@ -103,7 +109,9 @@ fn linearised(
     };
     refuse_feedthrough(file, &found.matrices.d, &found.matrices.c)?;
     let (faults, models) = faults(file, &found)?;
+    let of = (&found.matrices.b, found.matrices.c.nrows());
     Ok(LinearPlant {
+        disturbances: disturbances(file, of, Some(&found.matrices))?,
         states: found.states.iter().map(known).collect(),
         actuators: merged(&file.actuators, &found.inputs),
         measurements: merged(&file.measurements, &found.outputs),
@@ -137,13 +145,55 @@ pub(crate) fn request(file: &PlantFile<'_>, own: &plant_file::PlantFmu) -> Linea
     let at = own.operating_point.iter();
     Linearise {
         inputs: names(&file.actuators),
-        faults: inputs.collect(),
+        faults: inputs.chain(disturbance_inputs(file)).collect(),
         outputs: names(&file.measurements),
         states: own.states.clone(),
         at: at.map(|(name, value)| (name.clone(), value.to_string())).collect(),
         step: own.step,
         ..Linearise::default()
     }
+}
+
+/// The inputs of the FMU that are disturbances.
+fn disturbance_inputs<'a>(file: &'a PlantFile<'_>) -> impl Iterator<Item = String> + 'a {
+    file.disturbances.iter().filter_map(|disturbance| match &disturbance.entry_point {
+        DisturbanceEntry::Input(name) => Some(name.clone()),
+        _ => None,
+    })
+}
+
+/// Returns how the disturbances of the file act on a plant with the input matrix `b` and `p`
+/// measurements; those of an FMU are the last columns of `found`.
+fn disturbances(
+    file: &PlantFile<'_>,
+    (b, p): (&DMatrix<f64>, usize),
+    found: Option<&linearise::Matrices>,
+) -> Result<Vec<UnknownInput>, PlaceError> {
+    let columns = found.map_or(0, |found| found.f.ncols());
+    let mut next = columns - disturbance_inputs(file).count().min(columns)..;
+    let n = b.nrows();
+    let one = |own: &Disturbance| {
+        let (mut on_states, mut on_measurements) = (DVector::zeros(n), DVector::zeros(p));
+        match (&own.entry_point, found) {
+            (DisturbanceEntry::Column(e), _) => on_states.copy_from(e),
+            (DisturbanceEntry::Actuator(at), _) => on_states = column(b, *at),
+            (DisturbanceEntry::Sensor(at), _) => on_measurements[*at] = 1.0,
+            (DisturbanceEntry::Input(_), None) => {}
+            (DisturbanceEntry::Input(_), Some(found)) => {
+                let at = next.next().unwrap_or_default();
+                (on_states, on_measurements) = (column(&found.f, at), column(&found.g, at));
+            }
+        }
+        if on_states.amax() <= 0.0 && on_measurements.amax() <= 0.0 {
+            let message = format!(
+                "disturbance `{}` acts neither on a state nor on a measurement at the operating point",
+                own.name
+            );
+            return Err(file.error_at(&own.place, message));
+        }
+        Ok(UnknownInput { on_states, on_measurements })
+    };
+    file.disturbances.iter().map(one).collect()
 }
 
 /// Linearises the FMU of the file; returns its name and the result.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
 
+use super::detection_request::{DetectionRequest, Disturbance, disturbances};
 use super::plausibility::check_names;
 use super::references::References;
 use super::requirements::{ChannelSignals, Request, request};
@@ -44,6 +45,8 @@ pub(crate) struct PlantFile<'a> {
     /// Plants that the same gains serve, besides the one of the file.
     pub(crate) family: Vec<Variant>,
     pub(crate) schedule: Option<Schedule>,
+    pub(crate) disturbances: Vec<Disturbance>,
+    pub(crate) detection: Option<DetectionRequest>,
 }
 
 /// The source of the plant's matrices.
@@ -84,7 +87,7 @@ pub(crate) struct Sampling {
     pub(crate) current: bool,
 }
 
-const KEYS: [&str; 27] = [
+const KEYS: [&str; 29] = [
     "description",
     "t_on",
     "monitor",
@@ -109,6 +112,8 @@ const KEYS: [&str; 27] = [
     "experiment",
     "robustness",
     "reference",
+    "disturbances",
+    "detection",
     "D",
     "family",
     "schedule",
@@ -179,6 +184,8 @@ impl<'a> PlantFile<'a> {
             robustness: RobustnessLimits::read(file, measurements.len())?,
             family: variants::family(file, &model)?,
             schedule: variants::schedule(file, &model, &measurements)?,
+            disturbances: disturbances(file, &actuators, &measurements)?,
+            detection: DetectionRequest::read(file, measurements.len(), &faults)?,
             model,
             actuators,
             measurements,

@@ -20,6 +20,17 @@ const NEGLIGIBLE: f64 = 1e-6;
 /// The parameters of the controller FMU that are matrices.
 const MATRICES: [&str; 8] = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f"];
 
+/// The scalars that a detection adds to the controller FMU.
+const DETECTION: [&str; 7] = [
+    "detection_reset",
+    "fault_detected",
+    "fault_isolated",
+    "t_detected",
+    "t_onset",
+    "detect_from",
+    "detection_sample_time",
+];
+
 /// Checks the names of actuators and measurements, which are variables of the controller FMU, and
 /// that no two faults have the same name.
 pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
@@ -185,11 +196,15 @@ impl OwnVariables {
         if file.references.is_some() {
             own.matrices.extend(["H", "K_i", "F_i", "L_w", "N_r"]);
         }
+        if file.detection.is_some() {
+            own.scalars.extend(DETECTION);
+        }
         let operating = |signal: &Signal| signal.operating.is_some_and(|value| value != 0.0);
         let stated = states.is_none() || file.signals().any(operating);
         let mut add = |present: bool, signals: &[(&'static str, Option<usize>)]| {
             own.signals.extend_from_slice(if present { signals } else { &[] });
         };
+        add(file.detection.is_some(), &[("residual", None), ("statistic", None), ("threshold", None)]);
         add(file.faults.iter().any(lossy), &[("E_hat", q)]);
         add(file.filter.is_some(), &[("y_f", p), ("filter", p)]);
         add(stated, &[("x_op", states), ("u_op", m), ("y_op", p)]);

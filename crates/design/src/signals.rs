@@ -131,6 +131,7 @@ fn signal(entry: &Entry<'_>, limited: bool) -> Result<Signal, PlaceError> {
     })
 }
 
+/// Reads a name of one line.
 pub(crate) fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
     match entry.text()? {
         "" => Err(entry.error("expected a name, found an empty text")),
@@ -279,7 +280,7 @@ fn entry_point(
 }
 
 /// Returns the index of the signal that the entry names.
-fn position(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<usize, PlaceError> {
+pub(crate) fn position(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<usize, PlaceError> {
     let text = entry.text()?;
     signals.iter().position(|signal| signal.name == text).ok_or_else(|| {
         let names: Vec<_> = signals.iter().map(|signal| signal.name.as_str()).collect();

@@ -145,21 +145,20 @@ impl Cusum {
     /// The distribution of the delay of a fault that moves the mean of the residual to `mean(k)` in its
     /// k-th sample, k from 0 on; at most `most` samples are followed.
     ///
-    /// The fault meets sums as they are after a long time without faults. Only the sum of the fault's
-    /// sign counts, the one of the larger mean.
+    /// The fault meets sums as they are after a long time without faults. Only the sum counts whose sign is
+    /// that of the means, all added.
     #[must_use]
     pub fn delay(&self, mean: impl Fn(usize) -> f64, most: usize) -> Delay {
         let (group, test) = self.grouped();
-        let mut up = Sums::settled(&test);
-        let mut down = up.clone();
+        let mut sums = Sums::settled(&test);
+        let total: f64 = (0..most).map(&mean).sum();
+        let sign = if total < 0.0 { -1.0 } else { 1.0 };
         let mut missed = vec![1.0];
         while missed.len() <= most {
             let start = missed.len() - 1;
             let sum: f64 = (start..start + group).map(&mean).sum();
-            let mean = sum / real(group).sqrt();
-            up.step(mean);
-            down.step(-mean);
-            let (before, left) = (missed[start], up.total().min(down.total()));
+            sums.step(sign * sum / real(group).sqrt());
+            let (before, left) = (missed[start], sums.total());
             // Within a group the probability is interpolated.
             missed.extend((1..=group).map(|k| before + (left - before) * real(k) / real(group)));
             if left < 1e-6 {

@@ -38,6 +38,23 @@ pub fn mean_after_step(
     Ok(found)
 }
 
+/// The limit of [`mean_after_step`] after many samples: the residuals' mean under a constant input.
+///
+/// # Errors
+///
+/// Same as [`mean_after_step`]; [`Error::NotHurwitz`] or [`Error::NotSchur`] if there is no limit.
+pub fn mean_of_constant(effect: &StateSpace, period: f64) -> Result<DVector<f64>, Error> {
+    effect.stable_eigenvalues()?;
+    check::positive("the period", period)?;
+    let x = effect.dc_matrix().lu().solve(&effect.b).ok_or(Error::Overflow { what: "the mean" })?;
+    let mean = &effect.c * x + &effect.d;
+    let root = match effect.domain {
+        Domain::Sampled { .. } => 1.0,
+        Domain::Continuous => period.sqrt(),
+    };
+    Ok(mean.column(0) * root)
+}
+
 /// The sampled system from an input, constant over each interval, to the averages of the output over the
 /// intervals, times the root of the period.
 pub(crate) fn averaged(system: &StateSpace, period: f64) -> Result<StateSpace, Error> {

@@ -130,7 +130,7 @@ impl UnknownInput {
 ///
 /// which is white, and of all decoupled filters the one with the least covariance of the state error.
 ///
-/// Existence: rank C E = rank E, at least one row N is left, and (T A, N C) is detectable: (A, E, C) has no
+/// Existence: rank C E = rank E < n, at least one row N is left, and (T A, N C) is detectable: (A, E, C) has no
 /// unstable invariant zeros. None says that one of them does not hold.
 ///
 /// Source: J. Chen and R. J. Patton, Robust Model-Based Fault Diagnosis for Dynamic Systems (1999), chapter
@@ -196,6 +196,9 @@ impl UnknownInputObserver {
         let t = DMatrix::identity(n, n) - &h * &plant.c;
         let range = Svd::new(&t)?;
         let basis = range.left.columns(0, range.rank(TOLERANCE)).into_owned();
+        if basis.ncols() == 0 {
+            return Ok(None);
+        }
         let projection = basis.transpose() * &t;
         Ok(Some(Self { basis, projection, h, selection: left * kept }))
     }

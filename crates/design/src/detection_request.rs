@@ -1,0 +1,287 @@
+//! Reads the table `[detection]` and the list `[[disturbances]]` of a plant file.
+
+use files::{Entry, Place, PlaceError, Table};
+use nalgebra::DVector;
+
+use super::signals::{Fault, Signal, name, position};
+
+/// What the detection of faults shall do.
+#[derive(Clone, Debug)]
+pub(crate) struct DetectionRequest {
+    pub(crate) place: Place,
+    pub(crate) method: Method,
+    /// Mean time between false alarms, s.
+    pub(crate) false_alarm_interval: f64,
+    /// Whether each test shall react to one fault only, as far as possible.
+    pub(crate) isolation: bool,
+    /// Noise of each measurement: the root of its spectral density, or its standard deviation in a
+    /// sampled design.
+    pub(crate) noise: Vec<f64>,
+    /// Process noise of each state, in the same sense; None if the file states none.
+    pub(crate) process_noise: Option<ProcessNoise>,
+    /// The size of each fault that shall be detected.
+    pub(crate) sizes: Vec<f64>,
+    /// Time between two tests of a continuous controller, s.
+    pub(crate) sample_time: Option<f64>,
+    /// Time in s within which the least detectable fault is detected.
+    pub(crate) delay: Option<f64>,
+    /// Time in s from the start of a run to the first test.
+    pub(crate) from: Option<f64>,
+}
+
+/// The statistic of the tests.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Method {
+    Cusum,
+    /// Chi-square of the mean over a window of this many s, if stated.
+    ChiSquare { window: Option<f64> },
+}
+
+/// The process noise of the states.
+#[derive(Clone, Debug)]
+pub(crate) struct ProcessNoise {
+    /// One number for all states, or one for each.
+    pub(crate) values: Vec<f64>,
+    pub(crate) place: Place,
+}
+
+/// An unknown input that is no fault.
+#[derive(Clone, Debug)]
+pub(crate) struct Disturbance {
+    pub(crate) name: String,
+    pub(crate) entry_point: DisturbanceEntry,
+    /// Largest absolute value.
+    pub(crate) bound: Option<f64>,
+    pub(crate) place: Place,
+}
+
+/// Where a disturbance enters the plant.
+#[derive(Clone, Debug)]
+pub(crate) enum DisturbanceEntry {
+    /// The column E of x' = A x + E d.
+    Column(DVector<f64>),
+    /// It adds to this command.
+    Actuator(usize),
+    /// It adds to this measurement.
+    Sensor(usize),
+    /// An input of the plant's FMU.
+    Input(String),
+}
+
+const KEYS: [&str; 11] = [
+    "method",
+    "false_alarm_interval",
+    "false_alarms_per_hour",
+    "window",
+    "isolation",
+    "noise",
+    "process_noise",
+    "sizes",
+    "sample_time",
+    "delay",
+    "from",
+];
+const DISTURBANCE: [&str; 6] = ["name", "E", "actuator", "sensor", "input", "bound"];
+
+impl DetectionRequest {
+    /// Reads the table, if the file has one.
+    pub(crate) fn read(
+        file: &Table<'_>,
+        measurements: usize,
+        faults: &[Fault],
+    ) -> Result<Option<Self>, PlaceError> {
+        let Some(entry) = file.get("detection") else {
+            return Ok(None);
+        };
+        let table = entry.table()?;
+        table.allow(&KEYS)?;
+        let positive = |key: &str| table.get(key).map(|entry| entry.positive()).transpose();
+        let sample_time = positive("sample_time")?;
+        if let (Some(entry), true) = (table.get("sample_time"), file.get("sample_time").is_some()) {
+            return Err(entry.error("a sampled controller tests in each of its samples"));
+        }
+        Ok(Some(Self {
+            method: method(&table)?,
+            false_alarm_interval: false_alarms(&table)?,
+            isolation: table.get("isolation").map_or(Ok(false), |entry| entry.flag())?,
+            noise: noise(file, &table, measurements)?,
+            process_noise: table
+                .get("process_noise")
+                .map(|entry| {
+                    let values = not_negative(&entry)?;
+                    Ok(ProcessNoise { values, place: entry.place })
+                })
+                .transpose()?,
+            sizes: sizes(&table, faults)?,
+            sample_time,
+            delay: positive("delay")?,
+            from: table
+                .get("from")
+                .map(|entry| match entry.number()? {
+                    number if number >= 0.0 => Ok(number),
+                    number => Err(entry.error(format!("expected a time from 0, found {number}"))),
+                })
+                .transpose()?,
+            place: entry.place,
+        }))
+    }
+}
+
+fn method(table: &Table<'_>) -> Result<Method, PlaceError> {
+    let meaning = "the test: \"cusum\" or \"chi-square\"";
+    let entry = table.require("method", meaning)?;
+    let window = table.get("window");
+    match (entry.text()?, window) {
+        ("cusum", None) => Ok(Method::Cusum),
+        ("cusum", Some(window)) => Err(window.error("it belongs to the method \"chi-square\"")),
+        ("chi-square", window) => {
+            let window = window.map(|entry| entry.positive()).transpose()?;
+            Ok(Method::ChiSquare { window })
+        }
+        (other, _) => {
+            Err(entry.error(format!("expected \"cusum\" or \"chi-square\", found {other:?}")))
+        }
+    }
+}
+
+/// Reads the mean time between false alarms in s, or their number per hour.
+fn false_alarms(table: &Table<'_>) -> Result<f64, PlaceError> {
+    match (table.get("false_alarm_interval"), table.get("false_alarms_per_hour")) {
+        (Some(entry), None) => entry.positive(),
+        (None, Some(entry)) => Ok(3600.0 / entry.positive()?),
+        (Some(_), Some(entry)) => {
+            Err(entry.error("expected it or `false_alarm_interval`, found both"))
+        }
+        (None, None) => {
+            let meaning = "the mean time between false alarms in s; or `false_alarms_per_hour`";
+            table.require("false_alarm_interval", meaning)?.positive()
+        }
+    }
+}
+
+/// Reads the noise of the measurements here, or of `[robustness]`.
+fn noise(
+    file: &Table<'_>,
+    table: &Table<'_>,
+    measurements: usize,
+) -> Result<Vec<f64>, PlaceError> {
+    let robustness = file.get("robustness").map(|entry| entry.table()).transpose()?;
+    let inherited = robustness.and_then(|table| table.get("noise"));
+    let Some(entry) = table.get("noise").or(inherited) else {
+        let meaning = "the noise of the measurements (or `noise` in [robustness]): in continuous time \
+                       the root of the spectral density, in a sampled design the standard deviation";
+        return Err(table.require("noise", meaning).err().unwrap_or_else(|| table.error(meaning)));
+    };
+    let found = not_negative(&entry)?;
+    if found.iter().any(|noise| *noise <= 0.0) {
+        return Err(entry.error("thresholds follow from the noise: expected numbers above 0"));
+    }
+    match found.len() {
+        1 => Ok(vec![found[0]; measurements]),
+        count if count == measurements => Ok(found),
+        count => {
+            let message =
+                format!("expected {measurements} numbers, one per measurement, found {count}");
+            Err(entry.error(message))
+        }
+    }
+}
+
+/// Reads one number or a list of numbers, none below 0.
+fn not_negative(entry: &Entry<'_>) -> Result<Vec<f64>, PlaceError> {
+    let numbers = if entry.is_list() { entry.numbers()? } else { vec![entry.number()?] };
+    match numbers.iter().find(|number| **number < 0.0) {
+        Some(number) => Err(entry.error(format!("expected no less than 0, found {number}"))),
+        None if numbers.is_empty() => Err(entry.error("expected at least one number")),
+        None => Ok(numbers),
+    }
+}
+
+/// Reads the size of each fault: of `sizes`, its `step`, or its `bound`.
+fn sizes(table: &Table<'_>, faults: &[Fault]) -> Result<Vec<f64>, PlaceError> {
+    let stated = table.get("sizes").map(|entry| entry.table()).transpose()?;
+    if let Some(stated) = &stated {
+        let names: Vec<_> = faults.iter().map(|fault| fault.name.as_str()).collect();
+        stated.allow(&names)?;
+    }
+    let size = |fault: &Fault| {
+        let own = stated.as_ref().and_then(|table| table.get(&fault.name));
+        match own.map(|entry| entry.positive()).transpose()?.or(fault.step).or(fault.bound) {
+            Some(size) => Ok(size),
+            None => Err(table.error(format!(
+                "the size of fault `{0}` that shall be detected is missing: expected sizes.{0} here, or \
+                 `step` or `bound` of the fault",
+                fault.name
+            ))),
+        }
+    };
+    faults.iter().map(size).collect()
+}
+
+/// Reads the list `[[disturbances]]`.
+pub(crate) fn disturbances(
+    file: &Table<'_>,
+    actuators: &[Signal],
+    measurements: &[Signal],
+) -> Result<Vec<Disturbance>, PlaceError> {
+    let Some(entry) = file.get("disturbances") else {
+        return Ok(Vec::new());
+    };
+    if file.get("detection").is_none() {
+        return Err(entry.error("the detection decouples them; expected [detection], too"));
+    }
+    let mut found: Vec<Disturbance> = Vec::new();
+    for member in entry.list()? {
+        let own = disturbance(file, &member, actuators, measurements)?;
+        if found.iter().any(|other| other.name == own.name) {
+            return Err(member.error(format!("the name `{}` is there twice", own.name)));
+        }
+        found.push(own);
+    }
+    Ok(found)
+}
+
+fn disturbance(
+    file: &Table<'_>,
+    entry: &Entry<'_>,
+    actuators: &[Signal],
+    measurements: &[Signal],
+) -> Result<Disturbance, PlaceError> {
+    let table = entry.table()?;
+    table.allow(&DISTURBANCE)?;
+    let keys = ["E", "actuator", "sensor", "input"];
+    let stated: Vec<_> = keys.iter().filter_map(|key| Some((*key, table.get(key)?))).collect();
+    let [(key, own)] = stated.as_slice() else {
+        return Err(entry.error("expected one of E, actuator, sensor, input"));
+    };
+    let is_fmu = file.get("plant").is_some();
+    let entry_point = match *key {
+        "E" if is_fmu => {
+            return Err(own.error("the plant is an FMU: expected `input`, one of its inputs"));
+        }
+        "input" if !is_fmu => {
+            return Err(own.error("the plant is no FMU: expected `E`, a number for each state"));
+        }
+        "E" => {
+            let states = file.get("A").map_or(Ok(0), |entry| entry.list().map(|rows| rows.len()))?;
+            let column = own.numbers()?;
+            if column.len() != states {
+                let message = format!("expected {states} numbers, one per state, found {}", column.len());
+                return Err(own.error(message));
+            }
+            if column.iter().all(|number| *number == 0.0) {
+                return Err(own.error("expected a number other than 0"));
+            }
+            DisturbanceEntry::Column(column.into())
+        }
+        "actuator" => DisturbanceEntry::Actuator(position(own, actuators, "actuator")?),
+        "sensor" => DisturbanceEntry::Sensor(position(own, measurements, "measurement")?),
+        _ => DisturbanceEntry::Input(name(own)?),
+    };
+    Ok(Disturbance {
+        name: name(&table.require("name", "the name of the disturbance")?)?,
+        entry_point,
+        bound: table.get("bound").map(|entry| entry.positive()).transpose()?,
+        place: entry.place.clone(),
+    })
+}
