@@ -1,6 +1,7 @@
 //! The summary of a design on the terminal.
 
 use design::Report;
+use design::detection_report::Detection;
 use design::family_report::MemberReport;
 use design::report::{CommandPeak, Loop, Matrix, ReferenceStep};
 use design::schedule_report::ScheduleReport;
@@ -64,6 +65,9 @@ pub(crate) fn summarise(report: &Report) {
     if let Some(found) = &report.schedule {
         print_schedule(found);
     }
+    if let Some(found) = &report.detection {
+        print_detection(found);
+    }
     for check in report.checks.iter().filter(|check| !check.holds) {
         println!("does not hold: {} ({})", check.condition, check.explanation);
     }
@@ -125,6 +129,40 @@ fn print_schedule(found: &ScheduleReport) {
         number(found.worst_at),
         number(found.worst_instability)
     );
+}
+
+/// Prints thresholds and predictions of the detection.
+fn print_detection(found: &Detection) {
+    println!(
+        "detection ({}) every {} s: a false alarm every {} s on average",
+        found.method,
+        number(found.sample_time),
+        number(found.false_alarm_interval)
+    );
+    for fault in &found.faults {
+        let seconds = |time: Option<f64>| {
+            time.map_or_else(|| "never for sure".to_owned(), |time| format!("{} s", number(time)))
+        };
+        let least = fault.least.map_or_else(|| "none".to_owned(), number);
+        println!(
+            "    {} of {}: mean delay {}, 90 % within {}; least detectable within {} s: {least}",
+            fault.fault,
+            number(fault.size),
+            seconds(fault.delay),
+            seconds(fault.delay_90),
+            number(fault.within),
+        );
+    }
+    for (test, reacts) in found.tests.iter().zip(&found.reacts) {
+        let faults = found.faults.iter().zip(reacts).filter(|(_, reacts)| **reacts);
+        let names: Vec<_> = faults.map(|(fault, _)| fault.fault.as_str()).collect();
+        println!(
+            "    test {}: threshold {}, reacts to {}",
+            test.name,
+            number(test.threshold),
+            names.join(", ")
+        );
+    }
 }
 
 /// Prints a gain, or only its size and its norm if it would fill more than a screen.

@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::designed::{ControllerDesign, fault_names};
+use super::detection::Section;
 use super::linear_plant::LinearPlant;
 use super::plant_file::PlantFile;
 use super::reporting::estimator;
@@ -33,6 +34,8 @@ pub(crate) struct DesignFile<'a> {
     pub(crate) faults: Vec<Entry>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) references: Vec<Entry>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) detection: Option<&'a Section>,
 }
 
 /// The default experiment of importers, times in s.
@@ -76,6 +79,7 @@ impl ControllerDesign {
         &self,
         file: &PlantFile<'_>,
         description: &str,
+        detection: Option<&Section>,
     ) -> Result<String, crate::Error> {
         let linear = &self.linear;
         let at_origin = self.signals().all(|signal| signal.operating.unwrap_or(0.0) == 0.0);
@@ -112,6 +116,7 @@ impl ControllerDesign {
             measurements: entries(&linear.measurements),
             faults: self.fault_entries(),
             references: self.tracking.as_ref().map_or(Vec::new(), |own| entries(&own.signals)),
+            detection,
         };
         let FaultyPlant { a, b, c, f_a, a_f } = &self.plant;
         let mut matrices = vec![("A", a), ("B", b), ("C", c), ("F_a", f_a)];
@@ -217,7 +222,7 @@ fn per_second(unit: &str) -> Option<String> {
 }
 
 /// Rounds to the nearest 1, 2 or 5 times a power of ten, on the logarithmic scale.
-fn round(x: f64) -> f64 {
+pub(crate) fn round(x: f64) -> f64 {
     let exponent = x.log10().floor();
     let part = x.log10() - exponent;
     let distance = |factor: &f64| (factor.log10() - part).abs();

@@ -34,7 +34,9 @@ pub(crate) struct DetectionRequest {
 pub(crate) enum Method {
     Cusum,
     /// Chi-square of the mean over a window of this many s, if stated.
-    ChiSquare { window: Option<f64> },
+    ChiSquare {
+        window: Option<f64>,
+    },
 }
 
 /// The process noise of the states.
@@ -112,7 +114,7 @@ impl DetectionRequest {
                     Ok(ProcessNoise { values, place: entry.place })
                 })
                 .transpose()?,
-            sizes: sizes(&table, faults)?,
+            sizes: sizes(&entry, faults)?,
             sample_time,
             delay: positive("delay")?,
             from: table
@@ -160,17 +162,14 @@ fn false_alarms(table: &Table<'_>) -> Result<f64, PlaceError> {
 }
 
 /// Reads the noise of the measurements here, or of `[robustness]`.
-fn noise(
-    file: &Table<'_>,
-    table: &Table<'_>,
-    measurements: usize,
-) -> Result<Vec<f64>, PlaceError> {
+fn noise(file: &Table<'_>, table: &Table<'_>, measurements: usize) -> Result<Vec<f64>, PlaceError> {
     let robustness = file.get("robustness").map(|entry| entry.table()).transpose()?;
     let inherited = robustness.and_then(|table| table.get("noise"));
-    let Some(entry) = table.get("noise").or(inherited) else {
-        let meaning = "the noise of the measurements (or `noise` in [robustness]): in continuous time \
-                       the root of the spectral density, in a sampled design the standard deviation";
-        return Err(table.require("noise", meaning).err().unwrap_or_else(|| table.error(meaning)));
+    let meaning = "the noise of the measurements (or `noise` in [robustness]): in continuous time the root \
+                   of the spectral density, in a sampled design the standard deviation";
+    let entry = match table.get("noise").or(inherited) {
+        Some(entry) => entry,
+        None => table.require("noise", meaning)?,
     };
     let found = not_negative(&entry)?;
     if found.iter().any(|noise| *noise <= 0.0) {
@@ -198,7 +197,8 @@ fn not_negative(entry: &Entry<'_>) -> Result<Vec<f64>, PlaceError> {
 }
 
 /// Reads the size of each fault: of `sizes`, its `step`, or its `bound`.
-fn sizes(table: &Table<'_>, faults: &[Fault]) -> Result<Vec<f64>, PlaceError> {
+fn sizes(entry: &Entry<'_>, faults: &[Fault]) -> Result<Vec<f64>, PlaceError> {
+    let table = entry.table()?;
     let stated = table.get("sizes").map(|entry| entry.table()).transpose()?;
     if let Some(stated) = &stated {
         let names: Vec<_> = faults.iter().map(|fault| fault.name.as_str()).collect();
@@ -208,7 +208,7 @@ fn sizes(table: &Table<'_>, faults: &[Fault]) -> Result<Vec<f64>, PlaceError> {
         let own = stated.as_ref().and_then(|table| table.get(&fault.name));
         match own.map(|entry| entry.positive()).transpose()?.or(fault.step).or(fault.bound) {
             Some(size) => Ok(size),
-            None => Err(table.error(format!(
+            None => Err(entry.error(format!(
                 "the size of fault `{0}` that shall be detected is missing: expected sizes.{0} here, or \
                  `step` or `bound` of the fault",
                 fault.name
@@ -263,10 +263,12 @@ fn disturbance(
             return Err(own.error("the plant is no FMU: expected `E`, a number for each state"));
         }
         "E" => {
-            let states = file.get("A").map_or(Ok(0), |entry| entry.list().map(|rows| rows.len()))?;
+            let states =
+                file.get("A").map_or(Ok(0), |entry| entry.list().map(|rows| rows.len()))?;
             let column = own.numbers()?;
             if column.len() != states {
-                let message = format!("expected {states} numbers, one per state, found {}", column.len());
+                let message =
+                    format!("expected {states} numbers, one per state, found {}", column.len());
                 return Err(own.error(message));
             }
             if column.iter().all(|number| *number == 0.0) {

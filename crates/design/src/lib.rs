@@ -124,12 +124,18 @@ fn design_source(source: &Source, certificate_time: Duration) -> Result<Design, 
     let family = ParameterFamily::of(&file)?;
     let designed = designed::design(&file)?;
     let description = description(&file, &designed);
-    let text = designed.file(&file, &description)?;
+    let detection = detection::detection(&file, &designed)?;
+    let section = detection.as_ref().map(|detection| &detection.section);
+    let text = designed.file(&file, &description, section)?;
     let report =
         reporting::report((&file, family.as_ref()), &designed, description, certificate_time);
-    let report = report.map_err(|error| {
+    let mut report = report.map_err(|error| {
         error.within(format!("the design for {} cannot be examined", file.name()))
     })?;
+    if let Some(detection) = detection {
+        report.warnings.extend(detection.warnings);
+        report.detection = Some(detection.report);
+    }
     let identity = identity::identity(&report);
     let worst_case = worst_case::plant_file(&file, &designed, &report)?;
     let text = format!("{}\n{text}", identity::heading(&identity, &report.verdict));

@@ -7,9 +7,9 @@ use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
 
 use super::detection_request::{Disturbance, DisturbanceEntry};
-use files::PlaceError;
 use super::plant_file::{self, PlantFile};
 use super::signals::{EntryPoint, Fault, FaultDynamics, Signal};
+use files::PlaceError;
 
 /// Relative size in its row below which an entry of D or G counts as zero.
 const NOTHING: f64 = 1e-9;

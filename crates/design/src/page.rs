@@ -3,6 +3,7 @@
 mod certificate;
 mod chart;
 mod curves;
+mod detection;
 mod family;
 mod loops;
 mod matrix;
@@ -101,6 +102,12 @@ fn sections(report: &Report) -> Vec<Section> {
         (report.robustness.is_some(), "robustness", "Robustness", robustness::robustness(report)),
         (report.family.is_some(), "family", "Family of plants", family::family(report)),
         (report.schedule.is_some(), "schedule", "Schedule", family::schedule(report)),
+        (
+            report.detection.is_some(),
+            "detection",
+            "Detection of faults",
+            report.detection.as_ref().map_or_else(Markup::default, detection::detection),
+        ),
         (!report.frequency.is_empty(), "frequency", "Singular values", curves::frequencies(report)),
         (!report.references.is_empty(), "references", "References", references::references(report)),
         (!report.steps.is_empty(), "steps", "Sudden faults", curves::responses(report)),

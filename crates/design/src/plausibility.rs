@@ -204,7 +204,10 @@ impl OwnVariables {
         let mut add = |present: bool, signals: &[(&'static str, Option<usize>)]| {
             own.signals.extend_from_slice(if present { signals } else { &[] });
         };
-        add(file.detection.is_some(), &[("residual", None), ("statistic", None), ("threshold", None)]);
+        add(
+            file.detection.is_some(),
+            &[("residual", None), ("statistic", None), ("threshold", None)],
+        );
         add(file.faults.iter().any(lossy), &[("E_hat", q)]);
         add(file.filter.is_some(), &[("y_f", p), ("filter", p)]);
         add(stated, &[("x_op", states), ("u_op", m), ("y_op", p)]);

@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::{Serialize, Serializer};
 
+use super::detection_report::Detection;
 use super::family_report::FamilyReport;
 use super::robust_report::{Number, Robustness, Verdict};
 use super::schedule_report::ScheduleReport;
@@ -38,6 +39,8 @@ pub struct Report {
     pub family: Option<FamilyReport>,
     /// The schedule of the gains; none if the plant file states none.
     pub schedule: Option<ScheduleReport>,
+    /// The detection of faults, if the plant file asks for it.
+    pub detection: Option<Detection>,
     /// Theorem 1 and related certificates.
     pub certificate: Certificate,
     /// Bounds of the errors, one entry for each pair of a fault and an error.

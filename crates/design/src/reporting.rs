@@ -97,6 +97,7 @@ pub(crate) fn report(
         },
         family: family_report,
         schedule,
+        detection: None,
         certificate,
         bounds,
         steps: responses(designed)?,

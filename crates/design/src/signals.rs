@@ -280,7 +280,11 @@ fn entry_point(
 }
 
 /// Returns the index of the signal that the entry names.
-pub(crate) fn position(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<usize, PlaceError> {
+pub(crate) fn position(
+    entry: &Entry<'_>,
+    signals: &[Signal],
+    what: &str,
+) -> Result<usize, PlaceError> {
     let text = entry.text()?;
     signals.iter().position(|signal| signal.name == text).ok_or_else(|| {
         let names: Vec<_> = signals.iter().map(|signal| signal.name.as_str()).collect();

@@ -6,6 +6,7 @@ use super::*;
 
 mod dependencies;
 mod derivatives;
+mod detection;
 mod exchange;
 mod extended;
 mod oracle;

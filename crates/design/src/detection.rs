@@ -1,0 +1,296 @@
+//! The detection of a design: filters of the residuals, tests, predictions, the section of the design
+//! file.
+
+mod decoupling;
+mod file;
+mod prediction;
+mod problem;
+
+use control::detection::{Cusum, WindowTest};
+use nalgebra::DMatrix;
+
+use super::designed::ControllerDesign;
+use super::detection_report::{DecoupledInput, DetectedFault, Detection as Report, Test};
+use super::detection_request::{DetectionRequest, Method};
+use super::plant_file::PlantFile;
+use super::report::{Matrix, rows};
+use decoupling::Decoupling;
+pub(crate) use file::Section;
+use prediction::{Prediction, TestKind};
+use problem::Problem;
+
+/// A fault does not act on a residual whose mean it moves by less than this part of that of the fault
+/// that the test is for.
+const INSENSITIVE: f64 = 1e-6;
+/// The largest drift: with it a fault of four standard deviations is mostly found in its first sample.
+const LARGEST_DRIFT: f64 = 2.0;
+
+/// The detection with what the report says about it.
+pub(crate) struct Detection {
+    pub(crate) section: Section,
+    pub(crate) report: Report,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// A filter with the tests of its residuals.
+struct Part {
+    decoupling: Decoupling,
+    tests: Vec<PlannedTest>,
+}
+
+/// A test of combinations of the residuals of a filter.
+struct PlannedTest {
+    name: String,
+    /// The combinations: rows x residuals of the filter.
+    rows: DMatrix<f64>,
+    kind: TestKind,
+    /// Whether it reacts to each fault.
+    reacts: Vec<bool>,
+}
+
+/// Designs the detection that the plant file asks for, if it does.
+pub(crate) fn detection(
+    file: &PlantFile<'_>,
+    designed: &ControllerDesign,
+) -> Result<Option<Detection>, crate::Error> {
+    let Some(request) = &file.detection else {
+        return Ok(None);
+    };
+    let problem = Problem::new(file, request, designed)?;
+    let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
+    let parts = parts(file, request, &problem)?;
+    let mut warnings = Vec::new();
+    let report = report(request, &problem, &parts, &mut warnings).map_err(refuse)?;
+    let section = Section::new(&problem, &parts, report.from, designed);
+    Ok(Some(Detection { section, report, warnings }))
+}
+
+/// Plans the filters and their tests.
+fn parts(
+    file: &PlantFile<'_>,
+    request: &DetectionRequest,
+    problem: &Problem,
+) -> Result<Vec<Part>, crate::Error> {
+    let q = problem.faults.len();
+    let base = problem.base(file)?;
+    let shifts = problem.shifts(file, &base)?;
+    let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
+    if request.isolation {
+        let part = |fault: usize| {
+            let others: Vec<usize> = (1..q).map(|k| (fault + k) % q).collect();
+            let decoupling = problem.isolating(&base, fault, &others, shifts[fault])?;
+            let test = plan(request, problem, &decoupling, (&[fault], q))?;
+            let reacts = reacting(problem, &decoupling, &test, fault)?;
+            Ok(Part { decoupling, tests: vec![PlannedTest { reacts, ..test }] })
+        };
+        return Ok((0..q).map(part).collect::<Result<_, _>>().map_err(refuse)?);
+    }
+    let groups: Vec<Vec<usize>> = match request.method {
+        Method::Cusum => (0..q).map(|fault| vec![fault]).collect(),
+        Method::ChiSquare { .. } => vec![(0..q).collect()],
+    };
+    let count = groups.len();
+    let tests = groups.iter().map(|group| plan(request, problem, &base, (group, count)));
+    let tests = tests.collect::<Result<_, _>>().map_err(refuse)?;
+    Ok(vec![Part { decoupling: base, tests }])
+}
+
+/// Plans the test for some faults, one of `count` tests.
+fn plan(
+    request: &DetectionRequest,
+    problem: &Problem,
+    decoupling: &Decoupling,
+    (faults, count): (&[usize], usize),
+) -> Result<PlannedTest, control::Error> {
+    #[expect(clippy::cast_precision_loss, reason = "a number of faults")]
+    let samples = request.false_alarm_interval * count as f64 / problem.period;
+    let name = match faults {
+        [fault] => problem.names[problem.fault_at(*fault)].clone(),
+        _ => "all".to_owned(),
+    };
+    let reacts = vec![true; problem.faults.len()];
+    let rows = decoupling.filter.generator.c.nrows();
+    match request.method {
+        Method::Cusum => {
+            let mean = problem.steady_mean(decoupling, problem.fault_at(faults[0]))?;
+            let drift = (0.5 * mean.norm()).min(LARGEST_DRIFT);
+            let test = Cusum::with_false_alarms(drift, samples)?;
+            let direction = mean.normalize().transpose();
+            let rows = DMatrix::from_row_slice(1, direction.len(), direction.as_slice());
+            Ok(PlannedTest { name, rows, kind: TestKind::Cusum(test), reacts })
+        }
+        Method::ChiSquare { window } => {
+            let means = faults
+                .iter()
+                .map(|&fault| problem.means(decoupling, problem.fault_at(fault)))
+                .collect::<Result<Vec<_>, _>>()?;
+            let count = u32::try_from(rows).unwrap_or(u32::MAX);
+            let test = match window {
+                Some(window) => {
+                    let samples_of_window = prediction::whole(window / problem.period).max(1);
+                    WindowTest::with_false_alarms((count, samples_of_window), samples, 0.0)?
+                }
+                None => prediction::best_window(count, samples, &means)?,
+            };
+            let rows = DMatrix::identity(rows, rows);
+            Ok(PlannedTest { name, rows, kind: TestKind::Window(test), reacts })
+        }
+    }
+}
+
+/// Whether the test for `own` reacts to each fault.
+fn reacting(
+    problem: &Problem,
+    decoupling: &Decoupling,
+    test: &PlannedTest,
+    own: usize,
+) -> Result<Vec<bool>, control::Error> {
+    let peak = |fault: usize| {
+        let means = problem.means(decoupling, problem.fault_at(fault))?;
+        Ok(largest(&(&test.rows * means)))
+    };
+    let least = INSENSITIVE * peak(own)?;
+    (0..problem.faults.len())
+        .map(|fault| {
+            Ok(!decoupling.has(problem.fault_at(fault)) && (fault == own || peak(fault)? > least))
+        })
+        .collect()
+}
+
+/// The largest length of a column.
+fn largest(means: &DMatrix<f64>) -> f64 {
+    means.column_iter().map(|column| column.norm()).fold(0.0, f64::max)
+}
+
+/// All tests with the filters that they belong to.
+fn tests(parts: &[Part]) -> impl Iterator<Item = (&Decoupling, &PlannedTest)> {
+    parts.iter().flat_map(|part| part.tests.iter().map(|test| (&part.decoupling, test)))
+}
+
+fn report(
+    request: &DetectionRequest,
+    problem: &Problem,
+    parts: &[Part],
+    warnings: &mut Vec<String>,
+) -> Result<Report, control::Error> {
+    let q = problem.faults.len();
+    let period = problem.period;
+    let decoupled = |decoupling: &Decoupling, test: &PlannedTest| {
+        let one = |&(input, exact): &(usize, bool)| {
+            let means = problem.means(decoupling, input)?;
+            Ok(DecoupledInput {
+                name: problem.names[input].clone(),
+                exact,
+                size: problem.sizes[input],
+                largest_mean: largest(&(&test.rows * means)),
+            })
+        };
+        decoupling.inputs().iter().map(one).collect::<Result<Vec<_>, control::Error>>()
+    };
+    let mut reported = Vec::new();
+    let mut structure = DMatrix::zeros(tests(parts).count(), q);
+    for (at, (decoupling, test)) in tests(parts).enumerate() {
+        for fault in 0..q {
+            let means = problem.means(decoupling, problem.fault_at(fault))?;
+            structure[(at, fault)] = largest(&(&test.rows * means));
+        }
+        reported.push(Test {
+            name: test.name.clone(),
+            residuals: test.rows.nrows(),
+            drift: test.kind.drift(),
+            window: test.kind.window(),
+            threshold: test.kind.threshold(),
+            false_alarm_interval: test.kind.between_false_alarms() * period,
+            decoupled: decoupled(decoupling, test)?,
+        });
+    }
+    let within = request.delay.unwrap_or(10.0 / problem.rate);
+    let mut faults = Vec::new();
+    for fault in 0..q {
+        let input = problem.fault_at(fault);
+        let name = &problem.names[input];
+        let mut all = tests(parts);
+        let own = all.find(|(_, test)| test.name == *name || test.name == "all");
+        let Some((decoupling, test)) = own else { continue };
+        let means = &test.rows * problem.means(decoupling, input)?;
+        let prediction = Prediction { kind: &test.kind, means: &means, period };
+        let delay = prediction.delay(1.0);
+        faults.push(DetectedFault {
+            fault: name.clone(),
+            unit: problem.units[fault].clone(),
+            size: problem.sizes[input].unwrap_or(1.0),
+            test: test.name.clone(),
+            mean: (&test.rows * problem.steady_mean(decoupling, input)?).norm(),
+            delay: delay.mean().map(|samples| ((samples - 0.5) * period).max(0.0)),
+            #[expect(clippy::cast_precision_loss, reason = "numbers of samples")]
+            delay_90: delay.quantile(0.9).map(|samples| samples as f64 * period),
+            within,
+            least: prediction
+                .least(within)
+                .map(|factor| factor * problem.sizes[input].unwrap_or(1.0)),
+        });
+    }
+    let reacts: Vec<Vec<bool>> = tests(parts).map(|(_, test)| test.reacts.clone()).collect();
+    let confused = if request.isolation { confused(&reacts, problem) } else { Vec::new() };
+    for group in &confused {
+        warnings.push(format!(
+            "the residuals cannot tell the faults {} apart; `fault_isolated` is -1 for them",
+            group.join(", ")
+        ));
+    }
+    for test in &reported {
+        for input in test.decoupled.iter().filter(|input| !input.exact) {
+            warnings.push(format!(
+                "{} acts on the residual of the test {} while it changes: its step of {} moves the mean by \
+                 up to {:.3} standard deviations; a constant one does not",
+                input.name,
+                test.name,
+                input.size.unwrap_or(1.0),
+                input.largest_mean
+            ));
+        }
+    }
+    let rate: f64 = reported.iter().map(|test| 1.0 / test.false_alarm_interval).sum();
+    Ok(Report {
+        method: match request.method {
+            Method::Cusum => "cusum",
+            Method::ChiSquare { .. } => "chi-square",
+        }
+        .to_owned(),
+        sample_time: period,
+        from: match request.from {
+            Some(from) => from,
+            None => 7.0 / problem.slowest_decay(parts.iter().map(|part| &part.decoupling))?,
+        },
+        false_alarm_interval: 1.0 / rate,
+        noise: request.noise.clone(),
+        process_noise: problem.origin_of_process_noise.clone(),
+        structure: Matrix {
+            name: "structure".to_owned(),
+            meaning: "largest mean of the residuals, in standard deviations".to_owned(),
+            rows: reported.iter().map(|test| test.name.clone()).collect(),
+            columns: (0..q).map(|fault| problem.names[problem.fault_at(fault)].clone()).collect(),
+            values: rows(&structure),
+        },
+        tests: reported,
+        faults,
+        reacts,
+        confused,
+    })
+}
+
+/// Groups of faults to which the same tests react.
+fn confused(reacts: &[Vec<bool>], problem: &Problem) -> Vec<Vec<String>> {
+    let signature = |fault: usize| reacts.iter().map(|test| test[fault]).collect::<Vec<_>>();
+    let q = problem.faults.len();
+    let mut groups = Vec::new();
+    for fault in 0..q {
+        let same: Vec<usize> =
+            (0..q).filter(|&other| signature(other) == signature(fault)).collect();
+        if same.len() > 1 && same[0] == fault {
+            let name = |&fault: &usize| problem.names[problem.fault_at(fault)].clone();
+            groups.push(same.iter().map(name).collect());
+        }
+    }
+    groups
+}

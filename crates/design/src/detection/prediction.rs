@@ -1,0 +1,131 @@
+//! Predicted delays, and the least fault that is detected in time.
+
+use control::Error;
+use control::detection::{Cusum, Delay, WindowTest};
+use nalgebra::DMatrix;
+
+/// The most samples that a delay is followed, beyond those in which the mean settles.
+const MOST_SAMPLES: usize = 20_000;
+/// The probability with which the least fault is detected in time.
+const POWER: f64 = 0.95;
+/// The largest factor of the size of a fault that is tried, and the number of bisections.
+const LARGEST: f64 = 1e3;
+const BISECTIONS: usize = 18;
+/// The longest window that is chosen.
+const LONGEST: usize = 4096;
+
+/// A test of residuals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum TestKind {
+    Cusum(Cusum),
+    Window(WindowTest),
+}
+
+impl TestKind {
+    pub(super) fn drift(&self) -> Option<f64> {
+        match self {
+            Self::Cusum(test) => Some(test.drift),
+            Self::Window(_) => None,
+        }
+    }
+
+    pub(super) fn window(&self) -> Option<u32> {
+        match self {
+            Self::Cusum(_) => None,
+            Self::Window(test) => Some(u32::try_from(test.window).unwrap_or(u32::MAX)),
+        }
+    }
+
+    pub(super) fn threshold(&self) -> f64 {
+        match self {
+            Self::Cusum(test) => test.threshold,
+            Self::Window(test) => test.threshold,
+        }
+    }
+
+    pub(super) fn between_false_alarms(&self) -> f64 {
+        match self {
+            Self::Cusum(test) => test.between_false_alarms(),
+            Self::Window(test) => test.between_false_alarms(),
+        }
+    }
+
+    /// The delay of a step that moves the means to these columns, the last of which lasts, times `factor`.
+    fn delay(&self, means: &DMatrix<f64>, factor: f64, most: usize) -> Delay {
+        let last = means.ncols() - 1;
+        match self {
+            Self::Cusum(test) => test.delay(|k| means[(0, k.min(last))] * factor, most),
+            Self::Window(test) => {
+                let mean =
+                    |k: usize| means.column(k.min(last)).iter().map(|mean| mean * factor).collect();
+                test.delay(mean, most)
+            }
+        }
+    }
+}
+
+/// A test and the means of its residuals after a step of a fault.
+pub(super) struct Prediction<'a> {
+    pub(super) kind: &'a TestKind,
+    /// Residuals x samples.
+    pub(super) means: &'a DMatrix<f64>,
+    /// Time between samples, s.
+    pub(super) period: f64,
+}
+
+impl Prediction<'_> {
+    /// The delay of a step of `factor` times the size.
+    pub(super) fn delay(&self, factor: f64) -> Delay {
+        self.kind.delay(self.means, factor, self.means.ncols() + MOST_SAMPLES)
+    }
+
+    /// The least factor of the size that is detected within `time` s with probability 0.95.
+    pub(super) fn least(&self, time: f64) -> Option<f64> {
+        let most = whole(time / self.period).min(2 * MOST_SAMPLES);
+        let found =
+            |factor: f64| self.kind.delay(self.means, factor, most).detected_within(most) >= POWER;
+        if !found(LARGEST) {
+            return None;
+        }
+        let (mut low, mut high) = (1.0 / LARGEST, LARGEST);
+        for _ in 0..BISECTIONS {
+            let middle = f64::sqrt(low * high);
+            *(if found(middle) { &mut high } else { &mut low }) = middle;
+        }
+        Some(high)
+    }
+}
+
+/// The test with the window, a power of two of samples, with the least sum of mean delays of some faults.
+pub(super) fn best_window(
+    residuals: u32,
+    samples: f64,
+    means: &[DMatrix<f64>],
+) -> Result<WindowTest, Error> {
+    let mut best: Option<(f64, WindowTest)> = None;
+    let mut window = 1;
+    #[expect(clippy::cast_precision_loss, reason = "at most 4096")]
+    while window <= LONGEST && (window as f64) < 0.25 * samples {
+        let test = WindowTest::with_false_alarms((residuals, window), samples, 0.0)?;
+        let kind = TestKind::Window(test);
+        let delay = |means: &DMatrix<f64>| {
+            let most = means.ncols() + 40 * window;
+            kind.delay(means, 1.0, most).mean().unwrap_or(f64::INFINITY)
+        };
+        let sum: f64 = means.iter().map(delay).sum();
+        if best.is_none_or(|(least, _)| sum < least) {
+            best = Some((sum, test));
+        }
+        window *= 2;
+    }
+    match best {
+        Some((_, test)) => Ok(test),
+        None => WindowTest::with_false_alarms((residuals, 1), samples, 0.0),
+    }
+}
+
+/// A positive number rounded to a whole one, at most 2^31.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+pub(super) fn whole(number: f64) -> usize {
+    number.round().clamp(0.0, 2_147_483_648.0) as usize
+}

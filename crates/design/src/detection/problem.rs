@@ -1,0 +1,324 @@
+//! The plant with noise and unknown inputs that the residuals are designed for.
+
+use control::detection::{
+    NoisyPlant, UnknownInput, detection_filter, mean_after_step, mean_of_constant,
+};
+use control::eigen::eigenvalues;
+use control::faults::{Fault, FaultEntry};
+use control::hold::zero_order_hold;
+use control::{Domain, Error, StateSpace};
+use nalgebra::{DMatrix, DVector};
+
+use super::decoupling::Decoupling;
+use super::prediction::whole;
+use crate::design_file::round;
+use crate::designed::ControllerDesign;
+use crate::detection_request::DetectionRequest;
+use crate::plant_file::PlantFile;
+
+/// Time constants of the slowest mode after which a mean has settled.
+const SETTLED: f64 = 15.0;
+/// The most samples of a response that are computed.
+const MOST_SAMPLES: usize = 20_000;
+/// The process noise that is chosen makes the filter no faster than this part of what it can.
+const NEARLY: f64 = 0.99;
+/// A constant fault leaves no trace if its steady mean is below this part of the largest one.
+const NO_TRACE: f64 = 1e-6;
+
+/// The plant of the residuals, in the time domain of the controller.
+pub(super) struct Problem {
+    pub(super) plant: NoisyPlant,
+    /// The disturbances, then the faults.
+    pub(super) inputs: Vec<UnknownInput>,
+    pub(super) names: Vec<String>,
+    /// The sizes of the inputs; None for a disturbance without a bound.
+    pub(super) sizes: Vec<Option<f64>>,
+    disturbances: usize,
+    /// The faults, as positions from 0.
+    pub(super) faults: std::ops::Range<usize>,
+    pub(super) units: Vec<Option<String>>,
+    /// Time between two tests, s.
+    pub(super) period: f64,
+    /// The decay rate of the slowest eigenvalue under state feedback, 1/s.
+    pub(super) rate: f64,
+    pub(super) origin_of_process_noise: String,
+}
+
+impl Problem {
+    pub(super) fn new(
+        file: &PlantFile<'_>,
+        request: &DetectionRequest,
+        designed: &ControllerDesign,
+    ) -> Result<Self, crate::Error> {
+        let linear = &designed.linear;
+        let refuse = |error: Error| file.error_at(&request.place, error.to_string());
+        let n = linear.a.nrows();
+        let mut inputs = linear.disturbances.clone();
+        let of_faults =
+            linear.models.iter().map(|model| unknown_input(model, &linear.b, &linear.c));
+        inputs.extend(of_faults);
+        let (mut a, mut b) = (linear.a.clone(), linear.b.clone());
+        if let Domain::Sampled { period } = designed.domain {
+            let columns: Vec<DVector<f64>> = b
+                .column_iter()
+                .map(|c| c.into_owned())
+                .chain(inputs.iter().map(|input| input.on_states.clone()))
+                .collect();
+            let (phi, gamma) =
+                zero_order_hold(&a, &DMatrix::from_columns(&columns), period).map_err(refuse)?;
+            let m = b.ncols();
+            (a, b) = (phi, gamma.columns(0, m).into_owned());
+            for (input, column) in inputs.iter_mut().zip(gamma.column_iter().skip(m)) {
+                input.on_states = column.into_owned();
+            }
+        }
+        let rate = designed.slowest_rate().map_err(refuse)?;
+        let period = match designed.domain {
+            Domain::Sampled { period } => period,
+            Domain::Continuous => request.sample_time.unwrap_or_else(|| round(0.1 / rate)),
+        };
+        let noise = DVector::from_column_slice(&request.noise);
+        let disturbances = linear.disturbances.len();
+        let bounds = file.disturbances.iter().map(|disturbance| disturbance.bound);
+        let names = file.disturbances.iter().map(|disturbance| disturbance.name.clone());
+        let mut problem = Self {
+            plant: NoisyPlant {
+                a,
+                b,
+                c: linear.c.clone(),
+                w: DMatrix::zeros(n, n),
+                v: DMatrix::from_diagonal(&noise.component_mul(&noise)),
+                domain: designed.domain,
+            },
+            inputs,
+            names: names.chain(linear.faults.iter().map(|fault| fault.name.clone())).collect(),
+            sizes: bounds.chain(request.sizes.iter().copied().map(Some)).collect(),
+            disturbances,
+            faults: 0..linear.faults.len(),
+            units: linear.faults.iter().map(|fault| fault.unit.clone()).collect(),
+            period,
+            rate,
+            origin_of_process_noise: String::new(),
+        };
+        problem.set_process_noise(file, request)?;
+        Ok(problem)
+    }
+
+    /// The position of a fault among the inputs.
+    pub(super) fn fault_at(&self, fault: usize) -> usize {
+        self.disturbances + fault
+    }
+
+    /// Takes the stated process noise, or chooses the least one with which the filter without unknown
+    /// inputs forgets as fast as the loop.
+    fn set_process_noise(
+        &mut self,
+        file: &PlantFile<'_>,
+        request: &DetectionRequest,
+    ) -> Result<(), crate::Error> {
+        let n = self.plant.a.nrows();
+        if let Some(stated) = &request.process_noise {
+            let values = match stated.values.len() {
+                1 => vec![stated.values[0]; n],
+                count if count == n => stated.values.clone(),
+                count => {
+                    let message = format!("expected {n} numbers, one per state, found {count}");
+                    return Err(file.error_at(&stated.place, message).into());
+                }
+            };
+            let noise = DVector::from_vec(values);
+            self.plant.w = DMatrix::from_diagonal(&noise.component_mul(&noise));
+            self.origin_of_process_noise = "The plant file states it.".to_owned();
+            return Ok(());
+        }
+        let unit = self.unit_process_noise();
+        let decay = |factor: f64| {
+            let plant = NoisyPlant { w: &unit * factor, ..self.plant.clone() };
+            let filter = detection_filter(&plant, &[]).ok().flatten()?;
+            self.decay(&filter.generator.a).ok()
+        };
+        let enough = match decay(4f64.powi(12)) {
+            Some(fastest) => self.rate.min(NEARLY * fastest) * NEARLY,
+            None => self.rate,
+        };
+        let factors = std::iter::once(0.0).chain((-16..=12).map(|power| 4f64.powi(power)));
+        let found =
+            factors.into_iter().find(|factor| decay(*factor).is_some_and(|own| own >= enough));
+        let Some(factor) = found else {
+            let message = "no process noise was found with which a filter exists: expected `process_noise`, \
+                           one number for each state";
+            return Err(file.error_at(&request.place, message).into());
+        };
+        self.plant.w = unit * factor;
+        self.origin_of_process_noise = if factor > 0.0 {
+            format!(
+                "The plant file states none. Faults that vary as noise, with {factor} times the variance of \
+                 their sizes within one time constant of the loop, make the filter as fast as the loop; \
+                 with less noise in the plant there are fewer false alarms."
+            )
+        } else {
+            "None: the filter is fast enough without.".to_owned()
+        };
+        Ok(())
+    }
+
+    /// Process noise by which each fault that acts on the states varies by its size within a time
+    /// constant of the loop.
+    fn unit_process_noise(&self) -> DMatrix<f64> {
+        let n = self.plant.a.nrows();
+        let mut w = DMatrix::zeros(n, n);
+        for fault in self.faults.clone() {
+            let at = self.fault_at(fault);
+            let column = &self.inputs[at].on_states * self.sizes[at].unwrap_or(1.0);
+            w += &column * column.transpose();
+        }
+        if w.amax() <= 0.0 {
+            w = &self.plant.b * self.plant.b.transpose();
+        }
+        match self.plant.domain {
+            Domain::Continuous => w / self.rate,
+            Domain::Sampled { period } => w / (self.rate * period),
+        }
+    }
+
+    /// The filter for all faults: the disturbances are decoupled.
+    pub(super) fn base(&self, file: &PlantFile<'_>) -> Result<Decoupling, crate::Error> {
+        let refuse = |error: Error| {
+            let place = file.detection.as_ref().map_or(0..0, |request| request.place.clone());
+            file.error_at(&place, error.to_string())
+        };
+        let mut found = Decoupling::without(self).map_err(refuse)?;
+        for (input, own) in file.disturbances.iter().enumerate() {
+            if let Some(next) = found.with(self, input, true).map_err(refuse)? {
+                found = next;
+                continue;
+            }
+            if own.bound.is_none() {
+                let message = format!(
+                    "the measurements do not show disturbance `{}` at once, so that it cannot be removed \
+                     exactly (rank C E = rank E, stable zeros): expected `bound`, its largest value, for an \
+                     approximation",
+                    own.name
+                );
+                return Err(file.error_at(&own.place, message).into());
+            }
+            found = found.with(self, input, false).map_err(refuse)?.ok_or_else(|| {
+                let message = format!(
+                    "the measurements cannot tell disturbance `{}` from a motion of the states, or no \
+                     residual is left without it; expected more measurements, or fewer disturbances",
+                    own.name
+                );
+                file.error_at(&own.place, message)
+            })?;
+        }
+        Ok(found)
+    }
+
+    /// The steady mean of the residuals of `base` after each fault of its size; an error names a fault
+    /// without one.
+    pub(super) fn shifts(
+        &self,
+        file: &PlantFile<'_>,
+        base: &Decoupling,
+    ) -> Result<Vec<f64>, crate::Error> {
+        let place = |fault: usize| &file.faults[fault].place;
+        let shift = |fault: usize| {
+            let refuse = |error: Error| file.error_at(place(fault), error.to_string());
+            let at = self.fault_at(fault);
+            let steady = self.steady_mean(base, at).map_err(refuse)?.norm();
+            let means = self.means(base, at).map_err(refuse)?;
+            if steady <= NO_TRACE * super::largest(&means) || steady <= 0.0 {
+                let name = &self.names[at];
+                let message = format!(
+                    "a constant fault `{name}` leaves no trace in the residuals: the measurements cannot \
+                     tell it from the disturbances or from a motion of the states"
+                );
+                return Err(file.error_at(place(fault), message).into());
+            }
+            Ok(steady)
+        };
+        self.faults.clone().map(shift).collect()
+    }
+
+    /// The filter for `fault`: of the other faults as many as possible are decoupled, in this order.
+    pub(super) fn isolating(
+        &self,
+        base: &Decoupling,
+        fault: usize,
+        others: &[usize],
+        shift: f64,
+    ) -> Result<Decoupling, Error> {
+        let mut found = base.clone();
+        for &other in others {
+            for exact in [true, false] {
+                let next = found.with(self, self.fault_at(other), exact)?;
+                let Some(next) = next else { continue };
+                if self.steady_mean(&next, self.fault_at(fault))?.norm() > NO_TRACE * shift {
+                    found = next;
+                    break;
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    fn effect(&self, decoupling: &Decoupling, input: usize) -> Result<StateSpace, Error> {
+        let own = self.inputs[input].extended(decoupling.states);
+        decoupling.filter.effect(&own)
+    }
+
+    /// The mean of the residuals long after a step of an input by its size.
+    pub(super) fn steady_mean(
+        &self,
+        decoupling: &Decoupling,
+        input: usize,
+    ) -> Result<DVector<f64>, Error> {
+        let size = self.sizes[input].unwrap_or(1.0);
+        Ok(mean_of_constant(&self.effect(decoupling, input)?, self.period)? * size)
+    }
+
+    /// The means of the residuals in the samples after a step of an input by its size, until they are
+    /// settled.
+    pub(super) fn means(
+        &self,
+        decoupling: &Decoupling,
+        input: usize,
+    ) -> Result<DMatrix<f64>, Error> {
+        let size = self.sizes[input].unwrap_or(1.0);
+        let decay = self.decay(&decoupling.filter.generator.a)?;
+        let samples = whole(SETTLED / (decay * self.period)).clamp(2, MOST_SAMPLES);
+        Ok(mean_after_step(&self.effect(decoupling, input)?, self.period, samples)? * size)
+    }
+
+    /// The decay rate in 1/s of the slowest eigenvalue of a filter.
+    fn decay(&self, a: &DMatrix<f64>) -> Result<f64, Error> {
+        let excess = eigenvalues(a)?.into_iter().map(|value| match self.plant.domain {
+            Domain::Continuous => value.re,
+            Domain::Sampled { period } => value.norm().max(f64::MIN_POSITIVE).ln() / period,
+        });
+        Ok(-excess.fold(f64::NEG_INFINITY, f64::max))
+    }
+
+    /// The decay rate in 1/s of the slowest of some filters.
+    pub(super) fn slowest_decay<'a>(
+        &self,
+        filters: impl Iterator<Item = &'a Decoupling>,
+    ) -> Result<f64, Error> {
+        filters
+            .map(|decoupling| self.decay(&decoupling.filter.generator.a))
+            .try_fold(f64::INFINITY, |least, own| Ok(least.min(own?)))
+    }
+}
+
+/// How a fault acts on the plant.
+fn unknown_input(model: &Fault, b: &DMatrix<f64>, c: &DMatrix<f64>) -> UnknownInput {
+    let (n, p) = (b.nrows(), c.nrows());
+    let (mut on_states, mut on_measurements) = (DVector::zeros(n), DVector::zeros(p));
+    match &model.entry {
+        FaultEntry::Actuator(column) => on_states.copy_from(column),
+        FaultEntry::Sensor(column) => on_measurements.copy_from(column),
+        FaultEntry::LossOfEffectiveness(at) => on_states.copy_from(&b.column(*at)),
+        _ => {}
+    }
+    UnknownInput { on_states, on_measurements }
+}
