@@ -3,6 +3,7 @@
 
 mod decoupling;
 mod file;
+mod model_error;
 mod prediction;
 mod problem;
 
@@ -12,16 +13,20 @@ use nalgebra::DMatrix;
 use super::designed::ControllerDesign;
 use super::detection_report::{DecoupledInput, DetectedFault, Detection as Report, Test};
 use super::detection_request::{DetectionRequest, Method};
+use super::parameters::ParameterFamily;
 use super::plant_file::PlantFile;
 use super::report::{Matrix, rows};
 use decoupling::Decoupling;
 pub(crate) use file::Section;
+use model_error::ModelErrors;
 use prediction::{Prediction, TestKind};
 use problem::Problem;
 
 /// A fault does not act on a residual whose mean it moves by less than this part of that of the fault
 /// that the test is for.
 const INSENSITIVE: f64 = 1e-6;
+/// Time constants of the slowest filter after which its initial error is a thousandth.
+const SETTLING: f64 = 7.0;
 /// The largest drift: with it a fault of four standard deviations is mostly found in its first sample.
 const LARGEST_DRIFT: f64 = 2.0;
 
@@ -44,6 +49,8 @@ struct PlannedTest {
     /// The combinations: rows x residuals of the filter.
     rows: DMatrix<f64>,
     kind: TestKind,
+    /// The largest mean of the residuals that errors of the model give them.
+    bias: f64,
     /// Whether it reacts to each fault.
     reacts: Vec<bool>,
 }
@@ -52,13 +59,18 @@ struct PlannedTest {
 pub(crate) fn detection(
     file: &PlantFile<'_>,
     designed: &ControllerDesign,
+    family: Option<&ParameterFamily<'_>>,
 ) -> Result<Option<Detection>, crate::Error> {
     let Some(request) = &file.detection else {
         return Ok(None);
     };
     let problem = Problem::new(file, request, designed)?;
     let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
-    let parts = parts(file, request, &problem)?;
+    let errors = request
+        .model_error
+        .as_ref()
+        .map(|own| ModelErrors::new(file, own, (&designed.linear, designed), family));
+    let parts = parts(file, request, &problem, errors.transpose()?.as_ref())?;
     let mut warnings = Vec::new();
     let report = report(request, &problem, &parts, &mut warnings).map_err(refuse)?;
     let section = Section::new(&problem, &parts, report.from, designed);
@@ -70,38 +82,51 @@ fn parts(
     file: &PlantFile<'_>,
     request: &DetectionRequest,
     problem: &Problem,
+    errors: Option<&ModelErrors<'_>>,
 ) -> Result<Vec<Part>, crate::Error> {
     let q = problem.faults.len();
     let base = problem.base(file)?;
     let shifts = problem.shifts(file, &base)?;
     let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
+    let plan = |decoupling: &Decoupling, faults: &[usize], count: usize| {
+        plan(file, request, (problem, errors), decoupling, (faults, count))
+    };
     if request.isolation {
         let part = |fault: usize| {
             let others: Vec<usize> = (1..q).map(|k| (fault + k) % q).collect();
-            let decoupling = problem.isolating(&base, fault, &others, shifts[fault])?;
-            let test = plan(request, problem, &decoupling, (&[fault], q))?;
-            let reacts = reacting(problem, &decoupling, &test, fault)?;
+            let decoupling = problem.isolating(&base, fault, &others, shifts[fault]);
+            let decoupling = decoupling.map_err(refuse)?;
+            let test = plan(&decoupling, &[fault], q)?;
+            let reacts = reacting(problem, &decoupling, &test, fault).map_err(refuse)?;
             Ok(Part { decoupling, tests: vec![PlannedTest { reacts, ..test }] })
         };
-        return Ok((0..q).map(part).collect::<Result<_, _>>().map_err(refuse)?);
+        return (0..q).map(part).collect();
     }
     let groups: Vec<Vec<usize>> = match request.method {
         Method::Cusum => (0..q).map(|fault| vec![fault]).collect(),
         Method::ChiSquare { .. } => vec![(0..q).collect()],
     };
     let count = groups.len();
-    let tests = groups.iter().map(|group| plan(request, problem, &base, (group, count)));
-    let tests = tests.collect::<Result<_, _>>().map_err(refuse)?;
+    let tests = groups.iter().map(|group| plan(&base, group, count));
+    let tests = tests.collect::<Result<_, crate::Error>>()?;
     Ok(vec![Part { decoupling: base, tests }])
 }
 
 /// Plans the test for some faults, one of `count` tests.
 fn plan(
+    file: &PlantFile<'_>,
     request: &DetectionRequest,
-    problem: &Problem,
+    (problem, errors): (&Problem, Option<&ModelErrors<'_>>),
     decoupling: &Decoupling,
     (faults, count): (&[usize], usize),
-) -> Result<PlannedTest, control::Error> {
+) -> Result<PlannedTest, crate::Error> {
+    let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
+    let bias = |rows: &DMatrix<f64>| match errors {
+        Some(errors) => errors.largest_mean(problem, (decoupling, rows)).map_err(|error| {
+            error.within("the residuals of a wrong model are not bounded".to_owned())
+        }),
+        None => Ok(0.0),
+    };
     #[expect(clippy::cast_precision_loss, reason = "a number of faults")]
     let samples = request.false_alarm_interval * count as f64 / problem.period;
     let name = match faults {
@@ -112,28 +137,35 @@ fn plan(
     let rows = decoupling.filter.generator.c.nrows();
     match request.method {
         Method::Cusum => {
-            let mean = problem.steady_mean(decoupling, problem.fault_at(faults[0]))?;
+            let mean = problem.steady_mean(decoupling, problem.fault_at(faults[0]));
+            let mean = mean.map_err(refuse)?;
             let drift = (0.5 * mean.norm()).min(LARGEST_DRIFT);
-            let test = Cusum::with_false_alarms(drift, samples)?;
+            let mut test = Cusum::with_false_alarms(drift, samples).map_err(refuse)?;
             let direction = mean.normalize().transpose();
             let rows = DMatrix::from_row_slice(1, direction.len(), direction.as_slice());
-            Ok(PlannedTest { name, rows, kind: TestKind::Cusum(test), reacts })
+            let bias = bias(&rows)?;
+            // A mean of up to the bias adds to no sum, so that there are no more false alarms.
+            test.drift += bias;
+            Ok(PlannedTest { name, rows, kind: TestKind::Cusum(test), bias, reacts })
         }
         Method::ChiSquare { window } => {
             let means = faults
                 .iter()
                 .map(|&fault| problem.means(decoupling, problem.fault_at(fault)))
-                .collect::<Result<Vec<_>, _>>()?;
+                .collect::<Result<Vec<_>, _>>()
+                .map_err(refuse)?;
             let count = u32::try_from(rows).unwrap_or(u32::MAX);
+            let rows = DMatrix::identity(rows, rows);
+            let bias = bias(&rows)?;
             let test = match window {
                 Some(window) => {
                     let samples_of_window = prediction::whole(window / problem.period).max(1);
-                    WindowTest::with_false_alarms((count, samples_of_window), samples, 0.0)?
+                    WindowTest::with_false_alarms((count, samples_of_window), samples, bias)
                 }
-                None => prediction::best_window(count, samples, &means)?,
+                None => prediction::best_window(count, (samples, bias), &means),
             };
-            let rows = DMatrix::identity(rows, rows);
-            Ok(PlannedTest { name, rows, kind: TestKind::Window(test), reacts })
+            let kind = TestKind::Window(test.map_err(refuse)?);
+            Ok(PlannedTest { name, rows, kind, bias, reacts })
         }
     }
 }
@@ -174,82 +206,20 @@ fn report(
     warnings: &mut Vec<String>,
 ) -> Result<Report, control::Error> {
     let q = problem.faults.len();
-    let period = problem.period;
-    let decoupled = |decoupling: &Decoupling, test: &PlannedTest| {
-        let one = |&(input, exact): &(usize, bool)| {
-            let means = problem.means(decoupling, input)?;
-            Ok(DecoupledInput {
-                name: problem.names[input].clone(),
-                exact,
-                size: problem.sizes[input],
-                largest_mean: largest(&(&test.rows * means)),
-            })
-        };
-        decoupling.inputs().iter().map(one).collect::<Result<Vec<_>, control::Error>>()
-    };
-    let mut reported = Vec::new();
     let mut structure = DMatrix::zeros(tests(parts).count(), q);
     for (at, (decoupling, test)) in tests(parts).enumerate() {
         for fault in 0..q {
             let means = problem.means(decoupling, problem.fault_at(fault))?;
             structure[(at, fault)] = largest(&(&test.rows * means));
         }
-        reported.push(Test {
-            name: test.name.clone(),
-            residuals: test.rows.nrows(),
-            drift: test.kind.drift(),
-            window: test.kind.window(),
-            threshold: test.kind.threshold(),
-            false_alarm_interval: test.kind.between_false_alarms() * period,
-            decoupled: decoupled(decoupling, test)?,
-        });
     }
+    let reported = tests(parts).map(|(decoupling, test)| test_report(problem, decoupling, test));
+    let reported = reported.collect::<Result<Vec<_>, _>>()?;
     let within = request.delay.unwrap_or(10.0 / problem.rate);
-    let mut faults = Vec::new();
-    for fault in 0..q {
-        let input = problem.fault_at(fault);
-        let name = &problem.names[input];
-        let mut all = tests(parts);
-        let own = all.find(|(_, test)| test.name == *name || test.name == "all");
-        let Some((decoupling, test)) = own else { continue };
-        let means = &test.rows * problem.means(decoupling, input)?;
-        let prediction = Prediction { kind: &test.kind, means: &means, period };
-        let delay = prediction.delay(1.0);
-        faults.push(DetectedFault {
-            fault: name.clone(),
-            unit: problem.units[fault].clone(),
-            size: problem.sizes[input].unwrap_or(1.0),
-            test: test.name.clone(),
-            mean: (&test.rows * problem.steady_mean(decoupling, input)?).norm(),
-            delay: delay.mean().map(|samples| ((samples - 0.5) * period).max(0.0)),
-            #[expect(clippy::cast_precision_loss, reason = "numbers of samples")]
-            delay_90: delay.quantile(0.9).map(|samples| samples as f64 * period),
-            within,
-            least: prediction
-                .least(within)
-                .map(|factor| factor * problem.sizes[input].unwrap_or(1.0)),
-        });
-    }
+    let faults = (0..q).filter_map(|fault| fault_report(problem, parts, fault, within).transpose());
     let reacts: Vec<Vec<bool>> = tests(parts).map(|(_, test)| test.reacts.clone()).collect();
     let confused = if request.isolation { confused(&reacts, problem) } else { Vec::new() };
-    for group in &confused {
-        warnings.push(format!(
-            "the residuals cannot tell the faults {} apart; `fault_isolated` is -1 for them",
-            group.join(", ")
-        ));
-    }
-    for test in &reported {
-        for input in test.decoupled.iter().filter(|input| !input.exact) {
-            warnings.push(format!(
-                "{} acts on the residual of the test {} while it changes: its step of {} moves the mean by \
-                 up to {:.3} standard deviations; a constant one does not",
-                input.name,
-                test.name,
-                input.size.unwrap_or(1.0),
-                input.largest_mean
-            ));
-        }
-    }
+    warn(&reported, &confused, warnings);
     let rate: f64 = reported.iter().map(|test| 1.0 / test.false_alarm_interval).sum();
     Ok(Report {
         method: match request.method {
@@ -257,10 +227,10 @@ fn report(
             Method::ChiSquare { .. } => "chi-square",
         }
         .to_owned(),
-        sample_time: period,
+        sample_time: problem.period,
         from: match request.from {
             Some(from) => from,
-            None => 7.0 / problem.slowest_decay(parts.iter().map(|part| &part.decoupling))?,
+            None => SETTLING / problem.slowest_decay(parts.iter().map(|part| &part.decoupling))?,
         },
         false_alarm_interval: 1.0 / rate,
         noise: request.noise.clone(),
@@ -273,10 +243,95 @@ fn report(
             values: rows(&structure),
         },
         tests: reported,
-        faults,
+        faults: faults.collect::<Result<_, _>>()?,
         reacts,
         confused,
     })
+}
+
+fn test_report(
+    problem: &Problem,
+    decoupling: &Decoupling,
+    test: &PlannedTest,
+) -> Result<Test, control::Error> {
+    let decoupled = |&(input, exact): &(usize, bool)| {
+        let means = problem.means(decoupling, input)?;
+        Ok(DecoupledInput {
+            name: problem.names[input].clone(),
+            exact,
+            size: problem.sizes[input],
+            largest_mean: largest(&(&test.rows * means)),
+        })
+    };
+    Ok(Test {
+        name: test.name.clone(),
+        residuals: test.rows.nrows(),
+        drift: test.kind.drift(),
+        window: test.kind.window(),
+        model_error: test.bias,
+        threshold: test.kind.threshold(),
+        false_alarm_interval: test.kind.between_false_alarms(test.bias) * problem.period,
+        decoupled: decoupling
+            .inputs()
+            .iter()
+            .map(decoupled)
+            .collect::<Result<_, control::Error>>()?,
+    })
+}
+
+/// Predicts the detection of a fault by the test that is for it.
+fn fault_report(
+    problem: &Problem,
+    parts: &[Part],
+    fault: usize,
+    within: f64,
+) -> Result<Option<DetectedFault>, control::Error> {
+    let (input, period) = (problem.fault_at(fault), problem.period);
+    let name = &problem.names[input];
+    // One test for each fault, or one for all.
+    let own = if tests(parts).count() == 1 { 0 } else { fault };
+    let Some((decoupling, test)) = tests(parts).nth(own) else {
+        return Ok(None);
+    };
+    let means = &test.rows * problem.means(decoupling, input)?;
+    let prediction = Prediction { kind: &test.kind, means: &means, period };
+    let delay = prediction.delay(1.0);
+    let size = problem.sizes[input].unwrap_or(1.0);
+    Ok(Some(DetectedFault {
+        fault: name.clone(),
+        unit: problem.units[fault].clone(),
+        size,
+        test: test.name.clone(),
+        mean: (&test.rows * problem.steady_mean(decoupling, input)?).norm(),
+        // A fault starts between two samples: half a sample before the first one with it, on average.
+        delay: delay.mean().map(|samples| (samples - 0.5) * period),
+        #[expect(clippy::cast_precision_loss, reason = "numbers of samples")]
+        delay_90: delay.quantile(0.9).map(|samples| samples as f64 * period),
+        within,
+        least: prediction.least(within).map(|factor| factor * size),
+    }))
+}
+
+/// Names what the tests cannot do.
+fn warn(tests: &[Test], confused: &[Vec<String>], warnings: &mut Vec<String>) {
+    for group in confused {
+        warnings.push(format!(
+            "the residuals cannot tell the faults {} apart; `fault_isolated` is -1 for them",
+            group.join(", ")
+        ));
+    }
+    for test in tests {
+        for input in test.decoupled.iter().filter(|input| !input.exact) {
+            warnings.push(format!(
+                "{} acts on the residual of the test {} while it changes: its step of {} moves the mean by \
+                 up to {:.3} standard deviations; a constant one does not",
+                input.name,
+                test.name,
+                input.size.unwrap_or(1.0),
+                input.largest_mean
+            ));
+        }
+    }
 }
 
 /// Groups of faults to which the same tests react.

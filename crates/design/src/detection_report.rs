@@ -46,6 +46,9 @@ pub struct Test {
     pub drift: Option<f64>,
     /// Number of samples of a window.
     pub window: Option<u32>,
+    /// The largest mean of the residuals, in standard deviations, that errors of the model give them without a
+    /// fault; 0 if they are not considered. Drift or threshold allow for it.
+    pub model_error: f64,
     /// Threshold of the statistic.
     pub threshold: f64,
     /// Predicted mean time between its false alarms, in s.

@@ -23,6 +23,8 @@ pub(crate) struct DetectionRequest {
     pub(crate) sizes: Vec<f64>,
     /// Time between two tests of a continuous controller, s.
     pub(crate) sample_time: Option<f64>,
+    /// Whether the tests allow for errors of the model.
+    pub(crate) model_error: Option<ModelError>,
     /// Time in s within which the least detectable fault is detected.
     pub(crate) delay: Option<f64>,
     /// Time in s from the start of a run to the first test.
@@ -37,6 +39,16 @@ pub(crate) enum Method {
     ChiSquare {
         window: Option<f64>,
     },
+}
+
+/// The errors of the model that give no alarm: those of the tolerances of `[robustness]`.
+#[derive(Clone, Debug)]
+pub(crate) struct ModelError {
+    /// Factor of the largest residual, at least 1.
+    pub(crate) margin: f64,
+    /// The largest deviation of each command from its operating point, if stated.
+    pub(crate) commands: Vec<Option<f64>>,
+    pub(crate) place: Place,
 }
 
 /// The process noise of the states.
@@ -70,7 +82,7 @@ pub(crate) enum DisturbanceEntry {
     Input(String),
 }
 
-const KEYS: [&str; 11] = [
+const KEYS: [&str; 13] = [
     "method",
     "false_alarm_interval",
     "false_alarms_per_hour",
@@ -79,6 +91,8 @@ const KEYS: [&str; 11] = [
     "noise",
     "process_noise",
     "sizes",
+    "model_error",
+    "commands",
     "sample_time",
     "delay",
     "from",
@@ -89,7 +103,7 @@ impl DetectionRequest {
     /// Reads the table, if the file has one.
     pub(crate) fn read(
         file: &Table<'_>,
-        measurements: usize,
+        (actuators, measurements): (&[Signal], usize),
         faults: &[Fault],
     ) -> Result<Option<Self>, PlaceError> {
         let Some(entry) = file.get("detection") else {
@@ -115,6 +129,7 @@ impl DetectionRequest {
                 })
                 .transpose()?,
             sizes: sizes(&entry, faults)?,
+            model_error: model_error(&table, actuators)?,
             sample_time,
             delay: positive("delay")?,
             from: table
@@ -216,6 +231,31 @@ fn sizes(entry: &Entry<'_>, faults: &[Fault]) -> Result<Vec<f64>, PlaceError> {
         }
     };
     faults.iter().map(size).collect()
+}
+
+/// Reads the margin for errors of the model, and the bounds of the commands.
+fn model_error(table: &Table<'_>, actuators: &[Signal]) -> Result<Option<ModelError>, PlaceError> {
+    let stated = table.get("commands");
+    let Some(entry) = table.get("model_error") else {
+        return match stated {
+            Some(entry) => Err(entry.error("it belongs to `model_error`")),
+            None => Ok(None),
+        };
+    };
+    let margin = match entry.number()? {
+        margin if margin >= 1.0 => margin,
+        margin => return Err(entry.error(format!("expected a factor from 1, found {margin}"))),
+    };
+    let stated = stated.map(|entry| entry.table()).transpose()?;
+    if let Some(stated) = &stated {
+        stated.allow(&actuators.iter().map(|own| own.name.as_str()).collect::<Vec<_>>())?;
+    }
+    let bound = |actuator: &Signal| {
+        let own = stated.as_ref().and_then(|table| table.get(&actuator.name));
+        own.map(|entry| entry.positive()).transpose()
+    };
+    let commands = actuators.iter().map(bound).collect::<Result<_, _>>()?;
+    Ok(Some(ModelError { margin, commands, place: entry.place }))
 }
 
 /// Reads the list `[[disturbances]]`.

@@ -124,7 +124,7 @@ fn design_source(source: &Source, certificate_time: Duration) -> Result<Design, 
     let family = ParameterFamily::of(&file)?;
     let designed = designed::design(&file)?;
     let description = description(&file, &designed);
-    let detection = detection::detection(&file, &designed)?;
+    let detection = detection::detection(&file, &designed, family.as_ref())?;
     let section = detection.as_ref().map(|detection| &detection.section);
     let text = designed.file(&file, &description, section)?;
     let report =

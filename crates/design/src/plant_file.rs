@@ -185,7 +185,7 @@ impl<'a> PlantFile<'a> {
             family: variants::family(file, &model)?,
             schedule: variants::schedule(file, &model, &measurements)?,
             disturbances: disturbances(file, &actuators, &measurements)?,
-            detection: DetectionRequest::read(file, measurements.len(), &faults)?,
+            detection: DetectionRequest::read(file, (&actuators, measurements.len()), &faults)?,
             model,
             actuators,
             measurements,

@@ -102,7 +102,8 @@ impl DetectionDesign {
                  sampled one, has its own"
             ));
         }
-        let (rows, taken) = (self.c.rows, self.tests.iter().map(|test| test.residuals).sum());
+        let rows = self.c.rows;
+        let taken: usize = self.tests.iter().map(|test| test.residuals).sum();
         if rows != taken {
             return Some(format!("the tests take {taken} residuals, detection.C has {rows} rows"));
         }

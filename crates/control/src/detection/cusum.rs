@@ -292,6 +292,20 @@ mod tests {
     }
 
     #[test]
+    fn the_run_lengths_are_the_published_ones() {
+        // D. C. Montgomery, Introduction to Statistical Quality Control, table of run lengths for k = 0.5.
+        for (threshold, lengths) in
+            [(4.0, [168.0, 26.6, 8.38, 3.34, 2.19]), (5.0, [465.0, 38.0, 10.4, 4.01, 2.57])]
+        {
+            let test = Cusum { drift: 0.5, threshold };
+            for (shift, expected) in [0.0, 0.5, 1.0, 2.0, 3.0].into_iter().zip(lengths) {
+                let found = test.between_false_alarms_with_bias(shift);
+                assert!((found / expected - 1.0).abs() < 3e-3, "{shift}: {found} {expected}");
+            }
+        }
+    }
+
+    #[test]
     fn a_sum_with_a_negligible_threshold_is_a_test_of_single_samples() {
         let test = Cusum { drift: 1.0, threshold: 1e-9 };
         let single = 1.0 / normal_below(-1.0);

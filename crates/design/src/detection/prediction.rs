@@ -43,10 +43,13 @@ impl TestKind {
         }
     }
 
-    pub(super) fn between_false_alarms(&self) -> f64 {
+    /// Samples between false alarms while a mean without faults has at most the length `bias`: the least
+    /// number, or a lower bound of it.
+    pub(super) fn between_false_alarms(&self, bias: f64) -> f64 {
         match self {
-            Self::Cusum(test) => test.between_false_alarms(),
-            Self::Window(test) => test.between_false_alarms(),
+            Self::Cusum(test) => test.between_false_alarms_with_bias(bias),
+            #[expect(clippy::cast_precision_loss, reason = "a number of samples")]
+            Self::Window(test) => test.window as f64 / test.alarm_probability(bias),
         }
     }
 
@@ -99,14 +102,14 @@ impl Prediction<'_> {
 /// The test with the window, a power of two of samples, with the least sum of mean delays of some faults.
 pub(super) fn best_window(
     residuals: u32,
-    samples: f64,
+    (samples, bias): (f64, f64),
     means: &[DMatrix<f64>],
 ) -> Result<WindowTest, Error> {
     let mut best: Option<(f64, WindowTest)> = None;
     let mut window = 1;
     #[expect(clippy::cast_precision_loss, reason = "at most 4096")]
     while window <= LONGEST && (window as f64) < 0.25 * samples {
-        let test = WindowTest::with_false_alarms((residuals, window), samples, 0.0)?;
+        let test = WindowTest::with_false_alarms((residuals, window), samples, bias)?;
         let kind = TestKind::Window(test);
         let delay = |means: &DMatrix<f64>| {
             let most = means.ncols() + 40 * window;
@@ -120,7 +123,7 @@ pub(super) fn best_window(
     }
     match best {
         Some((_, test)) => Ok(test),
-        None => WindowTest::with_false_alarms((residuals, 1), samples, 0.0),
+        None => WindowTest::with_false_alarms((residuals, 1), samples, bias),
     }
 }
 
