@@ -34,7 +34,7 @@ impl Decision {
     }
 
     /// Finds the one fault to which exactly the tests react that have given an alarm.
-    pub(super) fn isolate(&mut self, own: &DetectionDesign, has_alarmed: impl Fn(usize) -> bool) {
+    pub(crate) fn isolate(&mut self, own: &DetectionDesign, has_alarmed: impl Fn(usize) -> bool) {
         if !self.detected {
             return;
         }

@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use crate::detection_report::{DecoupledInput, DetectedFault, Detection, Test};
 use crate::report::{
     Bound, Certificate, Check, CommandPeak, Curve, Effectiveness, FreeP, Frequency, Loop, Matrix,
     Norm, Plant, ReferenceStep, Region, Report, Sampled, Signal, StepResponse, Theorem1, Ultimate,
@@ -247,6 +248,46 @@ fn robustness(numbers: &mut Numbers) -> Robustness {
     }
 }
 
+fn detection(numbers: &mut Numbers) -> Detection {
+    Detection {
+        method: MARKUP.to_owned(),
+        sample_time: PERIOD,
+        from: 0.0,
+        false_alarm_interval: 3600.0,
+        noise: vec![0.125],
+        process_noise: format!("{MARKUP} {QUOTES}"),
+        tests: vec![Test {
+            name: MARKUP.to_owned(),
+            residuals: 1,
+            drift: Some(0.5),
+            window: None,
+            model_error: 0.25,
+            threshold: 5.5,
+            false_alarm_interval: 3600.0,
+            decoupled: vec![DecoupledInput {
+                name: QUOTES.to_owned(),
+                exact: false,
+                size: None,
+                largest_mean: 0.125,
+            }],
+        }],
+        faults: vec![DetectedFault {
+            fault: MARKUP.to_owned(),
+            unit: Some(QUOTES.to_owned()),
+            size: 0.5,
+            test: MARKUP.to_owned(),
+            mean: 1.5,
+            delay: None,
+            delay_90: Some(2.5),
+            within: 3.5,
+            least: None,
+        }],
+        structure: numbers.matrix("structure", 1, 1),
+        reacts: vec![vec![true]],
+        confused: vec![vec![MARKUP.to_owned(), QUOTES.to_owned()]],
+    }
+}
+
 /// A sampled design with everything in it.
 pub(super) fn hostile() -> Report {
     let mut numbers = Numbers(7);
@@ -273,6 +314,7 @@ pub(super) fn hostile() -> Report {
         feedback: sampled_loop("Φ + Γ K_x", &rates, Some(region())),
         observer: sampled_loop("Φ_0 - L C_0", &rates[2..], None),
         sampling: Some(Sampled { sample_time: PERIOD, estimator: "current".to_owned() }),
+        detection: Some(detection(&mut numbers)),
         certificate: certificate(&mut numbers),
         bounds: (1..=3)
             .map(|k| Bound {
@@ -359,6 +401,7 @@ pub(super) fn bare() -> Report {
         feedback: system(-1.5),
         observer: system(-20.25),
         sampling: None,
+        detection: None,
         certificate: Certificate {
             printed: Ok(Theorem1 {
                 alpha: 1.0,

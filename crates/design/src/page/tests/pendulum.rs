@@ -283,6 +283,7 @@ pub(super) fn pendulum() -> Report {
             [8.31e6, 21.7, 4.4e-10],
         ),
         sampling: None,
+        detection: None,
         certificate: design.certificate(),
         bounds: vec![
             bound("x_p", "m", 3.1e-6, 1.2e-9),
