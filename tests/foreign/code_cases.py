@@ -38,7 +38,7 @@ stop_time = 20.0
 QUADRUPLE = (ROOT / "examples" / "plants" / "quadruple-tank.toml").read_text(encoding="utf-8")
 TANKS = {
     name: (ROOT / "examples" / "three-tank" / f"{name}.toml").read_text(encoding="utf-8").replace("../..", str(ROOT))
-    for name in ("plant", "sensor-fault", "loss-of-effectiveness")
+    for name in ("plant", "sensor-fault", "loss-of-effectiveness", "reference")
 }
 
 
@@ -62,6 +62,7 @@ CASES = {
     "three-tank": Case(TANKS["plant"], 6e-5, 1e-3),
     "sensor-fault": Case(TANKS["sensor-fault"], 6e-5, 1e-3),
     "loss-of-effectiveness": Case(TANKS["loss-of-effectiveness"], 6e-5, 1e-3),
+    "reference": Case(TANKS["reference"], 6e-5, 1e-3),
     "ramp-current": Case(masses("current", "false"), 0.5, 1e-3),
     "ramp-prediction": Case(masses("prediction", "true"), 0.5, 1e-3),
     "constant-prediction": Case("sample_time = 1.0\nestimator = 'prediction'\n" + QUADRUPLE, 0.3, 1e-2),

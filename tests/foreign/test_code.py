@@ -40,8 +40,11 @@ def in_the_loop(own, case):
     chance = np.random.default_rng(3)
     names = vector("x_hat", n) + vector("f_hat", q)
     names += [vector("E_hat", q)[k] for k, fault in enumerate(design["faults"]) if "loss_of" in fault]
+    references = design.get("references", [])
+    names += vector("x_i", len(references)) if "H" in design else []
     outputs = [signal["name"] for signal in design["actuators"]] + names
-    inputs = [signal["name"] for signal in design["measurements"]]
+    inputs = [signal["name"] for signal in [*design["measurements"], *references]]
+    operating = np.array([signal.get("operating", 0.0) for signal in references])
     period, fault = design["sample_time"], np.zeros(q)
     samples, expected = [], []
     with Instance(own.fmu) as instance:
@@ -49,6 +52,7 @@ def in_the_loop(own, case):
             if k % 500 == 100:
                 fault = case.fault * chance.uniform(-1, 1, q)
             y = plant.measured(fault) + case.noise * chance.normal(size=p) * (k > 50)
+            y = np.append(y, operating * (1 + 0.1 * (k // 700 % 2)))
             compensate = not 1700 < k < 1800
             if k == 0:
                 instance.start(dict(zip(inputs, y)))
