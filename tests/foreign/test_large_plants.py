@@ -1,0 +1,147 @@
+"""A lightly damped chain of 25 masses, 50 states: the numbers of `aso-ftc design --json` by scipy."""
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
+from scipy.optimize import linear_sum_assignment, minimize_scalar
+
+from design_oracle import Matrices, closed_loop
+
+MASSES, COMMANDS, MEASUREMENTS = 25, 3, 6
+STATES = 2 * MASSES
+
+
+def chain():
+    """A, B, C: unit masses and springs, damped by 1 %; forces and measured positions are spread out."""
+    stiffness = 2 * np.eye(MASSES) - np.eye(MASSES, k=1) - np.eye(MASSES, k=-1)
+    a = np.block(
+        [[np.zeros((MASSES, MASSES)), np.eye(MASSES)], [-stiffness, -0.01 * stiffness]]
+    )
+    b, c = np.zeros((STATES, COMMANDS)), np.zeros((MEASUREMENTS, STATES))
+    for at in range(COMMANDS):
+        b[MASSES + at * MASSES // COMMANDS + 3, at] = 1
+    for at in range(MEASUREMENTS):
+        c[at, at * MASSES // MEASUREMENTS + 2] = 1
+    return a, b, c
+
+
+@pytest.fixture(scope="module")
+def designed(aso_ftc, tmp_path_factory):
+    """The report and the matrices of the design file."""
+    folder = tmp_path_factory.mktemp("chain")
+    a, b, c = chain()
+    text = "".join(f"{name} = {matrix.tolist()}\n" for name, matrix in zip("ABC", (a, b, c)))
+    text += f"feedback.Q = {[1.0] * STATES}\nfeedback.R = {[1.0] * COMMANDS}\n"
+    text += f"observer.W = {[1.0] * (STATES + 1)}\nobserver.V = {[0.01] * MEASUREMENTS}\n"
+    text += '[[faults]]\nname = "f"\nactuator = "u1"\nbound = 1.0\nrate_bound = 1.0\n'
+    (folder / "chain.toml").write_text(text + "[robustness]\ncases = 50\n", encoding="utf-8")
+    options = ("--certificate-time", "0", "--out", folder / "design.toml", "--json")
+    done = aso_ftc("design", folder / "chain.toml", *options)
+    assert done.returncode in (0, 1), done.stderr
+    assert done.stderr == ""
+    design = tomllib.loads((folder / "design.toml").read_text(encoding="utf-8"))
+    return json.loads(done.stdout), Matrices(design)
+
+
+def loop_at_the_measurements(own):
+    """A, B, C of -T at the measurements, with the states of plant and controller."""
+    a, _, _, _ = closed_loop(own)
+    n, q = own.n, own.q
+    b = np.vstack([np.zeros((n, MEASUREMENTS)), own.L_x, own.L_f])
+    return a, b, np.hstack([own.C, np.zeros((MEASUREMENTS, n + q))])
+
+
+def h_infinity(a, b, c, d, start):
+    """The largest singular value near `start`, refined; and the test that none is larger, by its Hamiltonian matrix."""
+
+    def largest(w):
+        return np.linalg.norm(c @ np.linalg.solve(1j * w * np.eye(len(a)) - a, b) + d, 2)
+
+    inner = minimize_scalar(lambda w: -largest(w), bounds=(0.9 * start, 1.1 * start), method="bounded")
+    gamma = 1.001 * -inner.fun
+    r = np.linalg.inv(gamma**2 * np.eye(d.shape[1]) - d.T @ d)
+    moved = a + b @ r @ d.T @ c
+    hamiltonian = np.block(
+        [[moved, b @ r @ b.T], [-c.T @ (np.eye(len(d)) + d @ r @ d.T) @ c, -moved.T]]
+    )
+    return -inner.fun, np.abs(np.linalg.eigvals(hamiltonian).real).min()
+
+
+def test_the_gains_are_those_of_scipys_riccati_equations(designed):
+    _, own = designed
+    a, b, c = chain()
+    p = solve_continuous_are(a, b, np.eye(STATES), np.eye(COMMANDS))
+    assert np.abs(own.K_x + b.T @ p).max() < 1e-9 * np.abs(p).max()
+    a_0, c_0, gain = own.augmented
+    p = solve_continuous_are(a_0.T, c_0.T, np.eye(len(a_0)), 0.01 * np.eye(MEASUREMENTS))
+    assert np.abs(gain - p @ c_0.T / 0.01).max() < 1e-8 * np.abs(gain).max()
+
+
+def test_the_eigenvalues_are_those_of_numpy(designed):
+    report, own = designed
+    for name, dynamics in (("feedback", own.fed_back), ("observer", own.error_dynamics)):
+        stated = np.array([complex(*pair) for pair in report[name]["eigenvalues"]])
+        distances = np.abs(stated[:, None] - np.linalg.eigvals(dynamics)[None, :])
+        pairs = linear_sum_assignment(distances)
+        assert distances[pairs].max() < 1e-5, name
+
+
+def test_the_peaks_are_h_infinity_norms_and_noise_h2_norms(designed):
+    report, own = designed
+    a, b, c = loop_at_the_measurements(own)
+    (point,) = (own for own in report["robustness"]["points"] if own["point"] == "output")
+    for name, system in (("s", (a, b, c, np.eye(MEASUREMENTS))), ("t", (a, b, c, 0 * np.eye(MEASUREMENTS)))):
+        peak, distance = h_infinity(*system, point[f"{name}_frequency"])
+        assert point[f"{name}_peak"] == pytest.approx(peak, rel=2e-4)
+        assert distance > 1e-7, "a singular value is larger"
+    covariance = solve_continuous_lyapunov(a, -b @ b.T)
+    commands = np.hstack([np.zeros((COMMANDS, STATES)), own.K_x, own.K_f])
+    together = [number["value"] for number in report["robustness"]["noise_together"]]
+    expected = np.sqrt(np.diag(commands @ covariance @ commands.T))
+    assert together[:COMMANDS] == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_worst_case_and_the_longest_hold_are_on_the_limit(designed):
+    report, own = designed
+    robustness = report["robustness"]
+    worst = robustness["tolerance"]
+    values = {matrix["name"]: np.array(matrix["values"]) for matrix in worst["worst"]}
+    n, q = own.n, own.q
+    command, correction = np.hstack([own.K_x, own.K_f]), np.vstack([own.L_x, own.L_f])
+    a_0 = np.block([[own.A, 0 * own.F_a], [np.zeros((q, n + q))]])
+    b_0 = np.vstack([own.B, np.zeros((q, COMMANDS))])
+    f_0 = np.vstack([own.F_a, np.zeros((q, q))])
+    c_0 = np.hstack([own.C, np.zeros((MEASUREMENTS, q))])
+    controller = a_0 + b_0 @ command - correction @ c_0
+    controller[:, n:] += f_0
+
+    def dynamics(part):
+        a, b, c = (
+            nominal + part * (values[name] - nominal)
+            for name, nominal in (("A", own.A), ("B", own.B), ("C", own.C))
+        )
+        return np.block([[a, b @ command], [correction @ c, controller]])
+
+    def instability(part):
+        return np.linalg.eigvals(dynamics(part)).real.max()
+
+    assert instability(1) == pytest.approx(worst["worst_instability"], abs=1e-7)
+    if worst["first_unstable"] is not None:
+        assert instability(0.999 * worst["first_unstable"]) < 0
+        assert instability(1.001 * worst["first_unstable"]) > 0
+    hold = robustness["longest_hold"]
+
+    def radius(h):
+        from scipy.linalg import expm
+
+        def held(a, b):
+            whole = expm(h * np.block([[a, b], [np.zeros((b.shape[1], len(a) + b.shape[1]))]]))
+            return whole[: len(a), : len(a)], whole[: len(a), len(a) :]
+
+        (a, b), (k, gain) = held(own.A, own.B), held(controller, correction)
+        return np.abs(np.linalg.eigvals(np.block([[a, b @ command], [gain @ own.C, k]]))).max()
+
+    assert radius(0.999 * hold) < 1 < radius(1.001 * hold)
