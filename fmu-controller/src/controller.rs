@@ -14,6 +14,7 @@ use crate::equations::Equations;
 use crate::loss::Loss;
 use crate::mode::Mode;
 use crate::observer::{Conditions, Observer};
+use crate::reconfiguration::Reconfigurator;
 use crate::sampled::Sampler;
 use crate::shared::Shared;
 use crate::signals::{OperatingPoint, Signals, Values};
@@ -51,6 +52,8 @@ pub(crate) struct AsoController {
     pub(crate) compensate: bool,
     /// E_hat with its derivative.
     pub(crate) losses: Vec<Loss>,
+    /// Which actuators are gone.
+    pub(crate) reconfigurator: Reconfigurator,
     /// The mode of u and z'. Whether it compensates is decided at the start, at the end of each step
     /// and at events; in a sampled controller at each sample.
     mode: Mode,
@@ -84,7 +87,27 @@ impl AsoController {
 
     /// The mode with no channel at a limit.
     fn free_mode(&self, compensating: bool) -> Mode {
-        Mode::free(compensating, compensating || self.design.monitor)
+        let mode = Mode::free(compensating, compensating || self.design.monitor);
+        mode.without(self.reconfigurator.gone)
+    }
+
+    /// Decides at `time` which actuators are gone; the estimates of the faults of those that are gone or
+    /// back since the last decision restart at 0. Returns whether there are such estimates.
+    fn reconfigure(&mut self, time: f64, mut sampler: Option<&mut Sampler>) -> bool {
+        let Self { design, values, deviations, reconfigurator, losses, .. } = self;
+        let changed = reconfigurator.decide(design, losses, time);
+        let affected = design.reconfigurations.iter();
+        let affected = affected.filter(|own| changed & (1 << own.actuator) != 0);
+        let mut restarted = false;
+        for fault in affected.flat_map(|own| &own.restarted) {
+            let position = design.states.len() + fault;
+            (values.z[position], deviations.z[position]) = (0.0, 0.0);
+            if let Some(sampler) = &mut sampler {
+                sampler.set_prediction(position, 0.0);
+            }
+            restarted = true;
+        }
+        restarted
     }
 
     /// Sets the estimate to its initial value.
@@ -146,6 +169,7 @@ impl AsoController {
         let resolution = clock_rounding(step.end());
         let until_on = self.design.t_on - step.start;
         let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;
+        self.reconfigure(step.start, None);
         // z has its deviations from the step before, or from the start.
         self.deviations.set_inputs(&self.values, &self.operating_point, 0.0);
         if inside {
@@ -264,6 +288,9 @@ impl AsoController {
             return Err(too_many_samples(start, end));
         };
         while let Some(offset) = sampler.time_to_sample(start, end) {
+            if !sampler.is_at_start() {
+                self.reconfigure(sampler.next_instant(), Some(&mut sampler));
+            }
             let instant = sampler.next_instant();
             let mode = self.free_mode(self.is_compensating(instant));
             self.interpolate(offset, instant);
@@ -275,9 +302,9 @@ impl AsoController {
             if let (Some(detector), Some(own)) = (detector, &whole.detection) {
                 detector.sample(own, (&deviations.u, &deviations.y), instant);
             }
+            self.set_losses();
         }
         self.sampler = Some(sampler);
-        self.set_losses();
         Ok(())
     }
 }
@@ -328,6 +355,7 @@ impl Model for AsoController {
             has_slopes: false,
             compensate: true,
             losses: Loss::all(&design),
+            reconfigurator: Reconfigurator::new(&design),
             mode: Mode::default(),
             frozen: false,
             sampler: Sampler::new(&design),
@@ -380,6 +408,7 @@ impl Model for AsoController {
         self.observer = None;
         self.frozen = false;
         self.outside_reported = false;
+        self.reconfigurator.start();
         if let Some(sampler) = &mut self.sampler {
             sampler.start(time, &self.values.z);
             return self.sample(time, time);
@@ -422,6 +451,7 @@ impl Model for AsoController {
         if initial {
             direction.start();
         }
+        direction.design.clear_reconfigurations();
         self.differentiate_schedule(direction);
         let Self { design, current, values, operating_point, deviations, z_slopes, .. } = direction;
         let design = current.as_deref().unwrap_or(design);
@@ -462,21 +492,33 @@ impl Model for AsoController {
             return None;
         }
         let limited = self.design.actuators.iter().filter(|actuator| actuator.limits.is_some());
-        let event_indicators = if self.sampler.is_some() { 0 } else { 2 * limited.count() };
+        let decisive = self.design.reconfigurations.iter().filter(|own| own.loss.is_some());
+        let event_indicators =
+            if self.sampler.is_some() { 0 } else { 2 * limited.count() + decisive.count() };
         Some(ModelExchange { event_indicators })
     }
 
     fn event_indicators(&self, _time: f64, indicators: &mut [f64]) {
         let equations = Equations::<f64>::new(&self.design, self.mode);
-        let mut pairs = indicators.chunks_exact_mut(2);
+        let decisive = self.reconfigurator.distances(&self.design, &self.losses);
+        let limited = self.design.actuators.iter().filter(|actuator| actuator.limits.is_some());
+        let (limits, decisions) = indicators.split_at_mut(2 * limited.count());
+        for (indicator, (distance, above)) in decisions.iter_mut().zip(decisive) {
+            *indicator = distance + if above { -HYSTERESIS } else { HYSTERESIS };
+        }
+        let mut pairs = limits.chunks_exact_mut(2);
         for (j, actuator) in self.design.actuators.iter().enumerate() {
             let Some([low, high]) = actuator.range() else { continue };
             let Signals { z, y, r, .. } = &self.deviations;
-            let command = equations.free_command(j, equations.estimate(z), [y, r]);
+            let command = equations.free_command(j, equations.estimate(z), [y, r])
+                + self.mode.stuck_part(&self.design, j);
             let distances = [command - low, high - command];
             for (side, indicator) in pairs.next().into_iter().flatten().enumerate() {
                 let beyond = if self.mode.is_at(side, j) { -HYSTERESIS } else { HYSTERESIS };
-                *indicator = distances[side] / (high - low) + beyond;
+                *indicator = match self.mode.is_gone(j) {
+                    true => 1.0,
+                    false => distances[side] / (high - low) + beyond,
+                };
             }
         }
     }
@@ -488,12 +530,19 @@ impl Model for AsoController {
             return Ok(Event { next_event_time, ..Event::default() });
         }
         self.frozen = true;
+        let values_of_continuous_states_changed = self.reconfigure(time, None);
         self.deviations.set(&self.values, &self.operating_point, 0.0);
         self.mode = self.free_mode(self.is_compensating(time));
         let Signals { z, y, r, .. } = &self.deviations;
         self.mode = self.mode.limited(&self.design, z, [y, r]);
         let waiting = self.compensate && !self.mode.compensating;
-        Ok(Event { next_event_time: waiting.then_some(self.design.t_on), ..Event::default() })
+        let decision = self.reconfigurator.next_decision(&self.design);
+        let next_event_time = waiting.then_some(self.design.t_on).into_iter().chain(decision);
+        Ok(Event {
+            next_event_time: next_event_time.reduce(f64::min),
+            values_of_continuous_states_changed,
+            ..Event::default()
+        })
     }
 }
 

@@ -46,8 +46,12 @@ fn observed(design: &Design) -> Vec<String> {
 }
 
 /// The kinds of dependency of a command on x_hat and on f_hat.
-fn kinds_of_feedback(limited: bool) -> [DependencyKind; 2] {
-    if limited { [Dependent, Dependent] } else { [Fixed, Discrete] }
+fn kinds_of_feedback(design: &Design, limited: bool) -> [DependencyKind; 2] {
+    match (limited, design.reconfigurations.is_empty()) {
+        (true, _) => [Dependent, Dependent],
+        (false, true) => [Fixed, Discrete],
+        (false, false) => [Discrete, Discrete],
+    }
 }
 
 /// x_hat, f_hat, x_i and r, from which commands are computed; with a direct term also what the innovation
@@ -79,7 +83,7 @@ fn has_limits(design: &Design) -> bool {
 
 /// The dependencies of command `j`.
 pub(crate) fn of_command(design: &Design, j: usize) -> Vec<Group> {
-    of_feedback(design, kinds_of_feedback(design.actuators[j].limits.is_some()))
+    of_feedback(design, kinds_of_feedback(design, design.actuators[j].limits.is_some()))
 }
 
 /// The dependencies of each loss of effectiveness.
@@ -94,7 +98,7 @@ pub(crate) fn of_slope(design: &Design, i: usize) -> Vec<Group> {
         // A direct term has the measurements among those of the feedback.
         let measured = design.p_f.is_none().then(|| (Fixed, observed(design)));
         let mut groups: Vec<_> = measured.into_iter().collect();
-        groups.extend(of_feedback(design, kinds_of_feedback(has_limits(design))));
+        groups.extend(of_feedback(design, kinds_of_feedback(design, has_limits(design))));
         groups
     } else if i < n + q {
         let mut groups = vec![(Discrete, observed(design)), (Discrete, x_hat(design))];

@@ -92,6 +92,9 @@ pub(crate) struct Design {
     /// The t references; the inputs have the same names.
     #[serde(default)]
     pub(crate) references: Vec<Signal>,
+    /// What the controller does without an actuator, one entry for each actuator that may be gone.
+    #[serde(default)]
+    pub(crate) reconfigurations: Vec<Reconfiguration>,
     /// The experiment that importers run by default.
     pub(crate) experiment: Defaults,
     /// Matrices and operating points by a scheduling variable, in place of those above.
@@ -100,6 +103,39 @@ pub(crate) struct Design {
     /// The detection of faults, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) detection: Option<DetectionDesign>,
+}
+
+/// What the controller does without an actuator; see `reconfiguration.rs`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Reconfiguration {
+    /// The actuator that is gone.
+    pub(crate) gone: String,
+    /// Its position; set when the file is read.
+    #[serde(default)]
+    pub(crate) actuator: usize,
+    /// The command at which it is stuck.
+    pub(crate) stuck_at: f64,
+    /// K_x, m x n.
+    #[serde(rename = "K_x")]
+    pub(crate) k_x: Matrix,
+    /// K_f, m x q.
+    #[serde(rename = "K_f")]
+    pub(crate) k_f: Matrix,
+    /// K_s, m numbers.
+    #[serde(rename = "K_s")]
+    pub(crate) k_s: Vec<f64>,
+    /// The states of the fault model that restart at 0 when the actuator is gone or back.
+    #[serde(default)]
+    pub(crate) restart: Vec<String>,
+    /// Their positions; set when the file is read.
+    #[serde(default)]
+    pub(crate) restarted: Vec<usize>,
+    /// The actuator counts as gone if its estimated loss of effectiveness is above `loss` for `time` s.
+    #[serde(default)]
+    pub(crate) loss: Option<f64>,
+    #[serde(default)]
+    pub(crate) time: Option<f64>,
 }
 
 /// The measurements that the command of a sampled controller is computed from.
@@ -249,6 +285,7 @@ impl Design {
         };
         design.complete_the_operating_point();
         design.check(&path)?;
+        design.locate_reconfigurations();
         Ok(design)
     }
 
@@ -262,6 +299,33 @@ impl Design {
             for value in values {
                 *value = value.or(Some(0.0));
             }
+        }
+    }
+
+    /// Sets the positions that reconfigurations state by names.
+    fn locate_reconfigurations(&mut self) {
+        let at = |name: &String, mut names: std::slice::Iter<'_, Fault>| {
+            names.position(|own| own.name == *name)
+        };
+        for own in &mut self.reconfigurations {
+            let actuator = self.actuators.iter().position(|actuator| actuator.name == own.gone);
+            own.actuator = actuator.unwrap_or_default();
+            own.restarted =
+                own.restart.iter().filter_map(|name| at(name, self.faults.iter())).collect();
+        }
+    }
+
+    /// The reconfiguration without actuator `j`, if there is one.
+    pub(crate) fn without(&self, j: usize) -> Option<&Reconfiguration> {
+        self.reconfigurations.iter().find(|own| own.actuator == j)
+    }
+
+    /// Sets the matrices of the reconfigurations, which are no variables, to zero: a direction in the
+    /// space of the variables.
+    pub(crate) fn clear_reconfigurations(&mut self) {
+        for own in &mut self.reconfigurations {
+            let matrices = own.k_x.values.iter_mut().chain(&mut own.k_f.values);
+            matrices.chain(&mut own.k_s).for_each(|value| *value = 0.0);
         }
     }
 

@@ -192,8 +192,8 @@ impl Detector {
             input.extend(values.iter().zip(slopes).map(|(value, slope)| value + slope * offset));
             input_slope.extend_from_slice(slopes);
         }
-        for (j, actuator) in design.actuators.iter().enumerate() {
-            input.push(stretch.mode.limit(actuator.range(), j).unwrap_or(0.0));
+        for j in 0..design.actuators.len() {
+            input.push(stretch.mode.held_deviation(design, j).unwrap_or(0.0));
             input_slope.push(0.0);
         }
         let hold = propagators.of((stretch.mode, size), || system((design, own), stretch.mode))?;

@@ -149,8 +149,8 @@ impl<'a, D: Number> Equations<'a, D> {
         }
         for j in 0..D::values(D::read(signals)).u.len() {
             if !self.mode.is_limited(j) {
-                let Knowns { z, y, r, .. } = self.knowns(signals);
-                let u = self.free_command(j, z, [y, r]);
+                let Knowns { z, y, r, u, .. } = self.knowns(signals);
+                let u = self.free_command(j, z, [y, r]) + self.stuck_part(j, u);
                 D::write(signals, |signals| &mut signals.u[j], u);
             }
         }
@@ -178,9 +178,12 @@ impl<'a, D: Number> Equations<'a, D> {
         z: Estimate<'_, D>,
         [y, r]: [D::In<'_, [f64]>; 2],
     ) -> D {
-        let mut command = self.product(|design| design.k_x.row(j), z.x_hat);
+        let own = |design: &'a Design| self.mode.reconfiguration(design);
+        let k_x = |design| own(design).map_or(&design.k_x, |own| &own.k_x).row(j);
+        let mut command = self.product(k_x, z.x_hat);
         if self.mode.compensating {
-            command += self.product_with_faults(|design| design.k_f.row(j), z, y);
+            let k_f = |design| own(design).map_or(&design.k_f, |own| &own.k_f).row(j);
+            command += self.product_with_faults(k_f, z, y);
         }
         let Design { k_i, n_r, .. } = D::values(self.design);
         if k_i.is_some() {
@@ -217,6 +220,17 @@ impl<'a, D: Number> Equations<'a, D> {
         }
         let gains = D::list(D::part(self.design, row)).enumerate();
         gains.map(|(i, gain)| gain * self.fault(i, z, y)).sum()
+    }
+
+    /// The part of command `j` that an actuator causes that is stuck: an element of K_s times its command.
+    fn stuck_part(self, j: usize, u: D::In<'_, [f64]>) -> D {
+        let stuck = self.mode.reconfiguration(D::values(self.design)).map(|own| own.actuator);
+        stuck.map_or(-D::zero(), |stuck| {
+            let k_s = |design: &'a Design| {
+                self.mode.reconfiguration(design).map_or(&[][..], |own| &own.k_s)
+            };
+            D::at(D::part(self.design, k_s), j) * D::at(u, stuck)
+        })
     }
 
     /// Computes z' = [A x_hat + B u + F_a f_hat + L_x e; A_f f_hat + L_f e; W (y - y_f); x_i'], the second

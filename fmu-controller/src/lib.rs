@@ -13,6 +13,7 @@ mod mode;
 mod names;
 mod number;
 mod observer;
+mod reconfiguration;
 mod sampled;
 mod schedule;
 mod shared;

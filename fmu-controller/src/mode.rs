@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::Design;
+use crate::design::{Design, Reconfiguration};
 use crate::equations::Equations;
 
 /// The switches of the equations: while the mode stays, all equations are linear.
@@ -16,22 +16,49 @@ pub(crate) struct Mode {
     lower: u64,
     /// Bit j: channel j is at its upper limit.
     upper: u64,
+    /// Bit j: the actuator of channel j is gone.
+    gone: u64,
 }
 
 impl Mode {
     /// The mode with no channel at a limit.
     pub(crate) fn free(compensating: bool, estimating: bool) -> Self {
-        Self { compensating, estimating, lower: 0, upper: 0 }
+        Self { compensating, estimating, lower: 0, upper: 0, gone: 0 }
+    }
+
+    /// The same mode without the actuators whose bits are set in `gone`.
+    pub(crate) fn without(self, gone: u64) -> Self {
+        Self { gone, ..self }
+    }
+
+    /// Whether the actuator of channel `j` is gone.
+    pub(crate) fn is_gone(self, j: usize) -> bool {
+        self.gone & (1 << j) != 0
+    }
+
+    /// The reconfiguration in force: that of the first actuator that is gone.
+    pub(crate) fn reconfiguration(self, design: &Design) -> Option<&Reconfiguration> {
+        if self.gone == 0 { None } else { design.without(self.gone.trailing_zeros() as usize) }
+    }
+
+    /// The part of the free command of channel `j` that the stuck actuator causes, in deviations.
+    pub(crate) fn stuck_part(self, design: &Design, j: usize) -> f64 {
+        self.reconfiguration(design).map_or(0.0, |own| {
+            own.k_s[j] * self.held_deviation(design, own.actuator).unwrap_or_default()
+        })
     }
 
     /// The same mode, with the channels at a limit whose free command at `z` and the inputs y and r
     /// (deviations) is beyond that limit.
     pub(crate) fn limited(self, design: &Design, z: &[f64], inputs: [&[f64]; 2]) -> Self {
-        let mut mode = Self::free(self.compensating, self.estimating);
+        let mut mode = Self::free(self.compensating, self.estimating).without(self.gone);
         let equations = Equations::<f64>::new(design, mode);
         for (j, actuator) in design.actuators.iter().enumerate() {
-            if let Some([low, high]) = actuator.range() {
-                let command = equations.free_command(j, equations.estimate(z), inputs);
+            if let Some([low, high]) = actuator.range().filter(|_| !self.is_gone(j)) {
+                let mut command = equations.free_command(j, equations.estimate(z), inputs);
+                if self.gone != 0 {
+                    command += self.stuck_part(design, j);
+                }
                 mode.lower |= u64::from(command < low) << j;
                 mode.upper |= u64::from(command > high) << j;
             }
@@ -44,28 +71,36 @@ impl Mode {
         [self.lower, self.upper][side] & (1 << j) != 0
     }
 
-    /// Whether channel `j` is at a limit.
+    /// Whether channel `j` is at a limit or stuck, so that its command does not follow from z.
     pub(crate) fn is_limited(self, j: usize) -> bool {
-        self.is_at(0, j) || self.is_at(1, j)
+        self.is_at(0, j) || self.is_at(1, j) || self.is_gone(j)
     }
 
     /// Whether the equations of both modes have the same matrices.
     pub(crate) fn has_the_matrices_of(self, other: Self) -> bool {
-        (self.compensating, self.estimating, self.lower | self.upper)
-            == (other.compensating, other.estimating, other.lower | other.upper)
+        (self.compensating, self.estimating, self.lower | self.upper, self.gone)
+            == (other.compensating, other.estimating, other.lower | other.upper, other.gone)
     }
 
-    /// The element of `limits` that channel `j` is at; `None` for a free channel.
-    pub(crate) fn limit(self, limits: Option<[f64; 2]>, j: usize) -> Option<f64> {
-        let [low, high] = limits.filter(|_| self.is_limited(j))?;
+    /// The command of channel `j` if it is at a limit or stuck; `None` for a free channel.
+    pub(crate) fn held(self, design: &Design, j: usize) -> Option<f64> {
+        if self.is_gone(j) {
+            return design.without(j).map(|own| own.stuck_at);
+        }
+        let [low, high] = design.actuators[j].limits.filter(|_| self.is_limited(j))?;
         Some(if self.is_at(0, j) { low } else { high })
     }
 
-    /// Sets the deviations `u` of the channels at a limit to that limit.
+    /// The same as a deviation from the operating point.
+    pub(crate) fn held_deviation(self, design: &Design, j: usize) -> Option<f64> {
+        Some(self.held(design, j)? - design.actuators[j].operating.unwrap_or(0.0))
+    }
+
+    /// Sets the deviations `u` of the channels that are at a limit or stuck.
     pub(crate) fn set_limited(self, design: &Design, u: &mut [f64]) {
-        for (j, (u, actuator)) in u.iter_mut().zip(&design.actuators).enumerate() {
+        for (j, u) in u.iter_mut().enumerate() {
             if self.is_limited(j) {
-                *u = self.limit(actuator.range(), j).unwrap_or(*u);
+                *u = self.held_deviation(design, j).unwrap_or(*u);
             }
         }
     }

@@ -224,7 +224,7 @@ impl Observer {
             self.input_slope[k] = *slope;
         }
         for (j, held) in held.iter_mut().enumerate() {
-            *held = mode.limit(design.actuators[j].range(), j).unwrap_or(0.0);
+            *held = mode.held_deviation(design, j).unwrap_or(0.0);
         }
         let hold = self.propagators.of((mode, span.size), || system(design, mode))?;
         hold.step_into(&self.before, &self.input, &self.input_slope, &mut self.after)

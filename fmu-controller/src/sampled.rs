@@ -73,6 +73,16 @@ impl Sampler {
         self.prediction.copy_from_slice(z);
     }
 
+    /// Whether no sample was taken since the start.
+    pub(crate) fn is_at_start(&self) -> bool {
+        self.next <= 0.0
+    }
+
+    /// Sets an element of the prediction for the next sample.
+    pub(crate) fn set_prediction(&mut self, position: usize, value: f64) {
+        self.prediction[position] = value;
+    }
+
     /// The instant of the next sample in s.
     pub(crate) fn next_instant(&self) -> f64 {
         self.start + self.next * self.period

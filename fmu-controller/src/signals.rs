@@ -127,7 +127,7 @@ impl Values {
     ) {
         let free = u.iter().zip(&point.u).map(|(own, point)| own + point);
         for (j, (value, free)) in self.u.iter_mut().zip(free).enumerate() {
-            *value = mode.limit(design.actuators[j].limits, j).unwrap_or(free);
+            *value = mode.held(design, j).unwrap_or(free);
         }
     }
 }

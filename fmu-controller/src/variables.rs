@@ -21,6 +21,7 @@ pub(crate) fn list(controller: &AsoController) -> Vec<Variable<AsoController>> {
     all.extend(estimates(design));
     all.extend(losses(controller));
     all.extend(schedule_at(design));
+    all.extend(reconfiguration(design));
     if design.sample_time.is_none() {
         all.extend(slopes(design));
     }
@@ -108,6 +109,16 @@ fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
         Variable::boolean("compensate", text, |model: &mut AsoController| &mut model.compensate)
             .input(),
     );
+    inputs.extend(design.reconfigurations.iter().map(|own| {
+        let j = own.actuator;
+        let text = format!("Whether this actuator is gone: {}", own.gone);
+        Variable::boolean(
+            channel("actuator_gone", j, design.actuators.len()),
+            text,
+            move |model: &mut AsoController| &mut model.reconfigurator.reported[j],
+        )
+        .input()
+    }));
     inputs.extend(schedule_input(design));
     inputs
 }
@@ -137,6 +148,15 @@ fn schedule_at(design: &Design) -> Option<Variable<AsoController>> {
         Variable::real("schedule_at", text, |model: &mut AsoController| &mut model.schedule_at);
     let initial = vec![schedule.variable.clone()];
     Some(output(design, with_unit(variable, unit), Vec::new()).initially(initial))
+}
+
+/// The actuator that the controller does without.
+fn reconfiguration(design: &Design) -> Option<Variable<AsoController>> {
+    let text = "Number of the actuator that the controller does without; 0 if there is none";
+    let variable = Variable::integer("reconfiguration", text, |model: &mut AsoController| {
+        &mut model.reconfigurator.output
+    });
+    (!design.reconfigurations.is_empty()).then(|| variable.output(&[]))
 }
 
 fn commands(design: &Design) -> Vec<Variable<AsoController>> {

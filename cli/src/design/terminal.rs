@@ -3,7 +3,9 @@
 use design::Report;
 use design::detection_report::Detection;
 use design::family_report::MemberReport;
+use design::loss_report::LossLoop;
 use design::report::{CommandPeak, Loop, Matrix, ReferenceStep};
+use design::robust_report::Number;
 use design::schedule_report::ScheduleReport;
 
 /// The most rows or columns of a gain that are printed; the design file has all.
@@ -67,6 +69,15 @@ pub(crate) fn summarise(report: &Report) {
     }
     if let Some(found) = &report.detection {
         print_detection(found);
+    }
+    if let Some(losses) = &report.losses {
+        losses.loops.iter().for_each(print_losses);
+    }
+    for own in report.reconfiguration.iter().flat_map(|found| &found.without) {
+        match &own.outcome {
+            Ok(found) => println!("without {}: {}", own.actuator, found.method),
+            Err(reason) => println!("without {}: no controller: {reason}", own.actuator),
+        }
     }
     for check in report.checks.iter().filter(|check| !check.holds) {
         println!("does not hold: {} ({})", check.condition, check.explanation);
@@ -163,6 +174,25 @@ fn print_detection(found: &Detection) {
             names.join(", ")
         );
     }
+}
+
+/// Prints what is proven about the losses of effectiveness of one loop.
+fn print_losses(own: &LossLoop) {
+    let described = |losses: &[Number]| {
+        let one = |loss: &Number| format!("{} {}", loss.name, number(loss.value));
+        losses.iter().map(one).collect::<Vec<_>>().join(", ")
+    };
+    let proven = match &own.proof {
+        Ok(_) => "the stated losses are proven".to_owned(),
+        Err(reason) => format!("the stated losses are not proven: {reason}"),
+    };
+    println!("losses of effectiveness, {}: {proven}", own.name);
+    if let Some(certified) = own.certified.first() {
+        println!("    proven, also if they vary, up to {}", described(&certified.losses));
+    }
+    let limit = &own.constant[0];
+    let stable = if limit.stable { "stable up to" } else { "unstable beyond" };
+    println!("    constant losses: {stable} {}", described(&limit.losses));
 }
 
 /// Prints a gain, or only its size and its norm if it would fill more than a screen.

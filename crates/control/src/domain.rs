@@ -26,6 +26,15 @@ impl Domain {
         }
     }
 
+    /// The decay rate in 1/s of a mode with this [`Domain::excess`]: -Re s, or -ln |z| / period.
+    #[must_use]
+    pub fn decay_rate(self, excess: f64) -> f64 {
+        match self {
+            Self::Continuous => -excess,
+            Self::Sampled { period } => -excess.ln_1p() / period,
+        }
+    }
+
     /// Checks that the period of sampled time is a finite number above zero.
     pub(crate) fn check(self) -> Result<(), Error> {
         match self {

@@ -16,8 +16,12 @@
 //! ```
 
 mod loss;
+mod lossy_loop;
 
 pub use loss::{LossTolerance, estimated_loss, loss_tolerance};
+#[cfg(feature = "lmi")]
+pub use lossy_loop::CertifiedLoss;
+pub use lossy_loop::{ConstantLimit, LossyLoop};
 
 use crate::aso::{AsoDesign, FaultyPlant, design_feedback};
 use crate::blocks::{block_2x2, stacked};

@@ -8,6 +8,7 @@
 //! | linear-quadratic regulator, Kalman filter | [`riccati`] |
 //! | augmented state observer (ASO): estimate and compensate faults | [`aso`], [`faults`], [`sampled`] |
 //! | other laws that estimate faults: proportional-integral, fast adaptive, sliding mode, learning | [`estimation`] |
+//! | commands without an actuator: control allocation, equilibrium | [`allocation`] |
 //! | test which faults can be estimated | [`detectability`] |
 //! | controllability, observability, distance from losing them, zeros | [`rank`], [`distance`], [`zeros`] |
 //! | residual generators | [`residual`] |
@@ -30,6 +31,7 @@
 //! arguments and unsolvable problems are an [`Error`], never a panic.
 #![forbid(unsafe_code)]
 
+pub mod allocation;
 pub mod aso;
 mod balance;
 mod blocks;

@@ -4,6 +4,7 @@
 //! * [`Problem`] and [`Affine`]: semidefinite programs.
 //! * [`certify_region`]: proves that the eigenvalues of a matrix are in a [`Region`], with a
 //!   certificate P.
+//! * [`common_reachable_set`]: bounds of the states of a family of systems.
 //! * [`certify_gain`]: bounds the H-infinity or the generalised H2 norm of a system, with a
 //!   certificate P.
 //! * [`observer_gain`], [`state_feedback`]: compute a gain that places the eigenvalues in a region
@@ -25,6 +26,7 @@ pub(crate) mod definite;
 mod gain;
 mod observer;
 mod problem;
+mod reachable;
 mod region;
 mod schedule;
 mod solver;
@@ -35,9 +37,11 @@ pub use affine::Affine;
 pub use constant_gain::{ConstantGain, constant_gain};
 pub use gain::{GainBound, Norm, certify_gain};
 pub use problem::Problem;
+pub use reachable::{ReachableSet, common_reachable_set};
 pub use region::{Disc, Region, RegionCertificate, certify_region};
 pub use schedule::{Interval, ScheduleCertificate, bernstein, certify_schedule, largest_change};
 pub use synthesis::{Performance, Synthesis, observer_gain, state_feedback};
+pub(crate) use vertices::find_common;
 pub use vertices::{CommonFeedback, Vertex, certify_common, common_feedback, largest_scaling};
 
 use nalgebra::{DMatrix, DVector};

@@ -10,6 +10,8 @@ use super::designed::{ControllerDesign, fault_names};
 use super::detection::Section;
 use super::linear_plant::LinearPlant;
 use super::plant_file::PlantFile;
+use super::reconfiguration::Reconfiguration;
+use super::report::rows;
 use super::reporting::estimator;
 use super::schedule::Scheduled;
 use super::signals::{EntryPoint, Signal};
@@ -36,6 +38,27 @@ pub(crate) struct DesignFile<'a> {
     pub(crate) references: Vec<Entry>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) detection: Option<&'a Section>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) reconfigurations: Vec<ReconfigurationEntry>,
+}
+
+/// The controller without an actuator.
+#[derive(Serialize)]
+pub(crate) struct ReconfigurationEntry {
+    pub(crate) gone: String,
+    pub(crate) stuck_at: f64,
+    #[serde(rename = "K_x")]
+    pub(crate) k_x: Vec<Vec<f64>>,
+    #[serde(rename = "K_f")]
+    pub(crate) k_f: Vec<Vec<f64>>,
+    #[serde(rename = "K_s")]
+    pub(crate) k_s: Vec<f64>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) restart: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) loss: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) time: Option<f64>,
 }
 
 /// The default experiment of importers, times in s.
@@ -79,7 +102,7 @@ impl ControllerDesign {
         &self,
         file: &PlantFile<'_>,
         description: &str,
-        detection: Option<&Section>,
+        (detection, reconfigurations): (Option<&Section>, &[Reconfiguration]),
     ) -> Result<String, crate::Error> {
         let linear = &self.linear;
         let at_origin = self.signals().all(|signal| signal.operating.unwrap_or(0.0) == 0.0);
@@ -117,6 +140,7 @@ impl ControllerDesign {
             faults: self.fault_entries(),
             references: self.tracking.as_ref().map_or(Vec::new(), |own| entries(&own.signals)),
             detection,
+            reconfigurations: reconfigurations.iter().map(|own| self.reconfigured(own)).collect(),
         };
         let FaultyPlant { a, b, c, f_a, a_f } = &self.plant;
         let mut matrices = vec![("A", a), ("B", b), ("C", c), ("F_a", f_a)];
@@ -173,6 +197,20 @@ impl ControllerDesign {
             }
         }
         Ok(text)
+    }
+
+    fn reconfigured(&self, own: &Reconfiguration) -> ReconfigurationEntry {
+        let names = fault_names(&self.linear, &self.extended);
+        ReconfigurationEntry {
+            gone: self.linear.actuators[own.actuator].name.clone(),
+            stuck_at: own.stuck_at,
+            k_x: rows(&own.k_x),
+            k_f: rows(&own.k_f),
+            k_s: own.k_s.iter().map(|entry| entry + 0.0).collect(),
+            restart: own.restart.iter().map(|fault| names[*fault].clone()).collect(),
+            loss: own.decision.map(|(loss, _)| loss),
+            time: own.decision.map(|(_, time)| time),
+        }
     }
 
     fn signals(&self) -> impl Iterator<Item = &Signal> {

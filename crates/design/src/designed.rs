@@ -56,6 +56,8 @@ pub(crate) struct ControllerDesign {
     /// Largest real part of the closed-loop eigenvalues, or largest modulus minus one; negative if
     /// stable.
     pub(crate) instability: f64,
+    /// Whether the faults are estimated while they are not compensated.
+    pub(crate) monitor: bool,
     /// The same for the observer error before `t_on`, if the faults are not estimated then.
     pub(crate) instability_before: Option<f64>,
     pub(crate) family: Option<Family>,
@@ -116,6 +118,7 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
             None
         },
         instability: instability(&dynamics, domain)?,
+        monitor: file.monitor,
         filter,
         linear,
         warnings,

@@ -26,12 +26,17 @@ mod fixed_mode;
 mod gains;
 mod identity;
 mod linear_plant;
+pub mod loss_report;
+mod losses;
 mod matrix;
 mod norm_gains;
 mod page;
 mod parameters;
 mod plant_file;
 mod plausibility;
+mod reconfiguration;
+mod reconfiguration_limits;
+pub mod reconfiguration_report;
 mod reference_steps;
 mod references;
 pub mod report;
@@ -126,9 +131,14 @@ fn design_source(source: &Source, certificate_time: Duration) -> Result<Design, 
     let description = description(&file, &designed);
     let detection = detection::detection(&file, &designed, family.as_ref())?;
     let section = detection.as_ref().map(|detection| &detection.section);
-    let text = designed.file(&file, &description, section)?;
-    let report =
-        reporting::report((&file, family.as_ref()), &designed, description, certificate_time);
+    let (reconfigurations, without) = reconfiguration::reconfigurations(&file, &designed)?;
+    let text = designed.file(&file, &description, (section, &reconfigurations))?;
+    let report = reporting::report(
+        (&file, family.as_ref()),
+        (&designed, without),
+        description,
+        certificate_time,
+    );
     let mut report = report.map_err(|error| {
         error.within(format!("the design for {} cannot be examined", file.name()))
     })?;

@@ -6,11 +6,13 @@ mod curves;
 mod detection;
 mod family;
 mod loops;
+mod losses;
 mod matrix;
 mod number;
 mod plane;
 mod plant;
 mod pole_map;
+mod reconfiguration;
 mod references;
 mod region;
 mod robustness;
@@ -118,7 +120,13 @@ fn sections(report: &Report) -> Vec<Section> {
             !report.effectiveness.is_empty(),
             "effectiveness",
             "Loss of effectiveness",
-            plant::effectiveness(report),
+            losses::losses(report),
+        ),
+        (
+            report.reconfiguration.is_some(),
+            "reconfiguration",
+            "Without an actuator",
+            reconfiguration::reconfiguration(report),
         ),
         (
             !report.interface.is_empty(),

@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 
 use super::detection_request::{DetectionRequest, Disturbance, disturbances};
 use super::plausibility::check_names;
+use super::reconfiguration_limits::ReconfigurationRequest;
 use super::references::References;
 use super::requirements::{ChannelSignals, Request, request};
 use super::robustness_limits::RobustnessLimits;
@@ -47,6 +48,8 @@ pub(crate) struct PlantFile<'a> {
     pub(crate) schedule: Option<Schedule>,
     pub(crate) disturbances: Vec<Disturbance>,
     pub(crate) detection: Option<DetectionRequest>,
+    /// What the controller must be able to do without an actuator.
+    pub(crate) reconfiguration: Option<ReconfigurationRequest>,
 }
 
 /// The source of the plant's matrices.
@@ -87,7 +90,7 @@ pub(crate) struct Sampling {
     pub(crate) current: bool,
 }
 
-const KEYS: [&str; 29] = [
+const KEYS: [&str; 30] = [
     "description",
     "t_on",
     "monitor",
@@ -114,6 +117,7 @@ const KEYS: [&str; 29] = [
     "reference",
     "disturbances",
     "detection",
+    "reconfiguration",
     "D",
     "family",
     "schedule",
@@ -186,6 +190,12 @@ impl<'a> PlantFile<'a> {
             schedule: variants::schedule(file, &model, &measurements)?,
             disturbances: disturbances(file, &actuators, &measurements)?,
             detection: DetectionRequest::read(file, (&actuators, measurements.len()), &faults)?,
+            reconfiguration: ReconfigurationRequest::read(
+                file,
+                &actuators,
+                &measurements,
+                &faults,
+            )?,
             model,
             actuators,
             measurements,

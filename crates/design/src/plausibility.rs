@@ -214,6 +214,9 @@ impl OwnVariables {
         add(t.is_some(), &[("x_i", t), ("x_i_0", t), ("r_op", t)]);
         let limited = file.actuators.iter().any(|actuator| actuator.limits.is_some());
         add(limited, &[("u_min", m), ("u_max", m)]);
+        let reconfigured = file.reconfiguration.is_some();
+        add(reconfigured, &[("actuator_gone", m), ("u_stuck", m)]);
+        own.scalars.extend(reconfigured.then_some("reconfiguration"));
         own
     }
 

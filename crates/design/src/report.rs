@@ -7,6 +7,8 @@ use serde::{Serialize, Serializer};
 
 use super::detection_report::Detection;
 use super::family_report::FamilyReport;
+use super::loss_report::LossReport;
+use super::reconfiguration_report::ReconfigurationReport;
 use super::robust_report::{Number, Robustness, Verdict};
 use super::schedule_report::ScheduleReport;
 
@@ -54,6 +56,11 @@ pub struct Report {
     pub frequency: Vec<Frequency>,
     /// Stability under loss of effectiveness, one entry per such fault.
     pub effectiveness: Vec<Effectiveness>,
+    /// What is proven about losses of effectiveness up to stated fractions; none if `up_to` is not
+    /// stated.
+    pub losses: Option<LossReport>,
+    /// The controllers without each actuator that may be gone; none if `reconfiguration` is not stated.
+    pub reconfiguration: Option<ReconfigurationReport>,
     /// The assumptions of the report, in sentences.
     pub assumptions: Vec<String>,
     /// The variables of the controller FMU; empty without `--fmu`.

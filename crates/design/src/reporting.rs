@@ -18,10 +18,13 @@ use super::checks::checks;
 use super::designed::{ControllerDesign, fault_names};
 use super::family_report::{self, judge};
 use super::gains::GainResult;
+use super::loss_report::LossReport;
+use super::losses::losses;
 use super::page::rounded;
 use super::parameters::ParameterFamily;
 use super::plant_file::PlantFile;
 use super::plausibility::line;
+use super::reconfiguration_report::ReconfigurationReport;
 use super::reference_steps::{beyond_limits, reached, reference_steps};
 use super::report::{
     Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal, pairs, rows,
@@ -36,7 +39,7 @@ use super::tracking::{DesignLoop, TrackingAction};
 /// Returns the report on `designed`.
 pub(crate) fn report(
     (file, family): (&PlantFile<'_>, Option<&ParameterFamily<'_>>),
-    designed: &ControllerDesign,
+    (designed, reconfiguration): (&ControllerDesign, Option<ReconfigurationReport>),
     description: String,
     certificate_time: Duration,
 ) -> Result<Report, crate::Error> {
@@ -50,9 +53,13 @@ pub(crate) fn report(
     let budget = Budget::start(certificate_time);
     let certificate = certificate(designed, loops.norms()?, &budget);
     let (bounds, left_out) = loops.bounds(&budget)?;
+    let losses = losses(designed, &budget)?;
+    let of_losses = losses.iter().flat_map(LossReport::reasons);
+    let further = of_losses.chain(reconfiguration.iter().flat_map(ReconfigurationReport::reasons));
+    let further: Vec<_> = further.collect();
     let family_report = family_report::family(designed, &file.robustness, &budget)?;
     let schedule = schedule_report::schedule(designed, &file.robustness, &budget)?;
-    let mut verdict = verdict(&checks, robustness.as_ref(), &file.robustness);
+    let mut verdict = verdict(&checks, robustness.as_ref(), &file.robustness, further);
     if let Some(found) = &family_report {
         let members: Vec<_> = found.members.iter().skip(1).collect();
         judge(&mut verdict, "member", &members, &file.robustness);
@@ -104,6 +111,8 @@ pub(crate) fn report(
         references,
         frequency: loops.frequency()?,
         effectiveness: effectiveness(designed)?,
+        losses,
+        reconfiguration,
         assumptions: assumptions(designed, &linear.faults),
         interface: Vec::new(),
     })

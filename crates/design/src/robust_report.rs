@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::report::{Frequency, Matrix};
 
 /// How a design is judged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
     /// All checks hold and all limits are met.

@@ -440,6 +440,7 @@ pub(crate) fn verdict(
     checks: &[Check],
     robustness: Option<&Robustness>,
     limits: &RobustnessLimits,
+    further: Vec<(Level, String)>,
 ) -> Verdict {
     let mut level = Level::Green;
     let mut reasons = Vec::new();
@@ -469,6 +470,10 @@ pub(crate) fn verdict(
             level = Level::Red;
             reasons.push(instability(found, limits.tolerance));
         }
+    }
+    for (reached, reason) in further {
+        level = level.max(reached);
+        reasons.push(reason);
     }
     let RobustnessLimits { amber, red, tolerance, .. } = *limits;
     Verdict { level, reasons, limits: Limits { amber, red, tolerance } }

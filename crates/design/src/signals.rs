@@ -3,6 +3,7 @@
 use fmu_description::unit::Unit;
 use fmu_description::xml::is_character;
 
+use super::losses::MOST_LOSSES;
 use files::{Entry, Place, PlaceError, Table};
 
 /// A state, an actuator or a measurement.
@@ -76,12 +77,14 @@ pub(crate) struct Fault {
     pub(crate) rate_bound: Option<f64>,
     /// Largest step change.
     pub(crate) step: Option<f64>,
+    /// The largest fraction of a loss of effectiveness for which the loop must be stable.
+    pub(crate) up_to: Option<f64>,
     pub(crate) place: Place,
 }
 
 const SIGNAL: [&str; 4] = ["name", "unit", "description", "operating"];
 const ACTUATOR: [&str; 5] = ["name", "unit", "description", "operating", "limits"];
-const FAULT: [&str; 12] = [
+const FAULT: [&str; 13] = [
     "name",
     "unit",
     "description",
@@ -90,6 +93,7 @@ const FAULT: [&str; 12] = [
     "sensor",
     "loss_of",
     "least_command",
+    "up_to",
     "input",
     "bound",
     "rate_bound",
@@ -200,6 +204,11 @@ pub(crate) fn faults(
             return Err(member.error(format!("the name `{}` is there twice", fault.name)));
         }
         found.push(fault);
+        if found.iter().filter(|fault| fault.up_to.is_some()).count() > MOST_LOSSES {
+            return Err(member.error(format!(
+                "losses are proven for all combinations: expected `up_to` for at most {MOST_LOSSES} faults"
+            )));
+        }
     }
     Ok(found)
 }
@@ -231,6 +240,7 @@ fn fault(
         bound: number("bound")?,
         rate_bound: number("rate_bound")?,
         step: number("step")?,
+        up_to: up_to(&table)?,
         place: entry.place.clone(),
     })
 }
@@ -279,6 +289,23 @@ fn entry_point(
     }
 }
 
+/// Reads the largest fraction of a loss of effectiveness.
+fn up_to(table: &Table<'_>) -> Result<Option<f64>, PlaceError> {
+    let Some(entry) = table.get("up_to") else {
+        return Ok(None);
+    };
+    if table.get("loss_of").is_none() {
+        return Err(entry.error("this belongs to a fault with `loss_of`"));
+    }
+    match entry.positive()? {
+        fraction if fraction <= 1.0 => Ok(Some(fraction)),
+        other => Err(entry.error(format!(
+            "expected a fraction above 0 and at most 1, the largest part of its effect that the \
+             actuator may lose, found {other}"
+        ))),
+    }
+}
+
 /// Returns the index of the signal that the entry names.
 pub(crate) fn position(
     entry: &Entry<'_>,
@@ -316,6 +343,7 @@ impl Fault {
             bound: None,
             rate_bound: None,
             step: None,
+            up_to: None,
             place: place.clone(),
         }
     }

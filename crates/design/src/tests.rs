@@ -430,7 +430,7 @@ fn judged(text: &str) -> (Level, String) {
     read(text, |file| {
         let designed = design(file).unwrap();
         let found = robustness(&designed, &file.robustness, None).unwrap();
-        let verdict = verdict(&checks(&designed), found.as_ref(), &file.robustness);
+        let verdict = verdict(&checks(&designed), found.as_ref(), &file.robustness, Vec::new());
         (verdict.level, verdict.reasons.join("; "))
     })
     .unwrap()
@@ -471,7 +471,7 @@ fn the_worst_plant_is_a_plant_file() {
         let designed = design(file).unwrap();
         let time = super::CERTIFICATE_TIME;
         let report =
-            super::reporting::report((file, None), &designed, String::new(), time).unwrap();
+            super::reporting::report((file, None), (&designed, None), String::new(), time).unwrap();
         let a = report.robustness.as_ref().unwrap().tolerance.worst[0].values.clone();
         (super::worst_case::plant_file(file, &designed, &report).unwrap().unwrap(), a)
     })
@@ -490,7 +490,8 @@ fn without_time_for_certificates_the_report_says_what_is_left_out() {
         let [none, all] = [Duration::ZERO, super::CERTIFICATE_TIME].map(|time| {
             let report = |file: &PlantFile<'_>| {
                 let designed = design(file).unwrap();
-                super::reporting::report((file, None), &designed, String::new(), time).unwrap()
+                super::reporting::report((file, None), (&designed, None), String::new(), time)
+                    .unwrap()
             };
             read(&text, report).unwrap()
         });

@@ -1,6 +1,7 @@
 //! The checks of a design file: counts, shapes, ranges, entries that belong together.
 
 use super::{Defaults, Design, DesignError, Estimator, Fault, SlidingMode};
+use crate::matrix::Matrix;
 use crate::names;
 
 /// Range of `least_command`: its square and the inverse of the square are finite.
@@ -166,6 +167,7 @@ impl Design {
             .or_else(|| self.contradiction_of_references())
             .or_else(|| self.contradiction_of_sliding_mode())
             .or_else(|| self.detection.as_ref()?.contradiction(self))
+            .or_else(|| self.contradiction_of_reconfigurations())
     }
 
     fn contradiction_of_sliding_mode(&self) -> Option<String> {
@@ -182,6 +184,46 @@ impl Design {
             let found = list.len();
             let text = format!("{name} has {found} numbers, expected {count}, one for each fault");
             (found != count).then_some(text)
+        })
+    }
+
+    fn contradiction_of_reconfigurations(&self) -> Option<String> {
+        let others = !self.references.is_empty()
+            || self.p_f.is_some()
+            || self.sliding_mode.is_some()
+            || self.schedule.is_some();
+        if !self.reconfigurations.is_empty() && others {
+            return Some(
+                "reconfigurations exclude references, P_f, sliding_mode and schedule".to_owned(),
+            );
+        }
+        let (n, m, q) = (self.states.len(), self.actuators.len(), self.faults.len());
+        self.reconfigurations.iter().enumerate().find_map(|(at, own)| {
+            let gone = &own.gone;
+            let begin = format!("reconfiguration without {gone}: ");
+            let shape = |found: &Matrix| (found.rows, found.columns);
+            let decided = own.loss.zip(own.time);
+            let lost = self.faults.iter().any(|fault| fault.loss_of.as_ref() == Some(gone));
+            let numbers = own.k_x.values.iter().chain(&own.k_f.values).chain(&own.k_s);
+            let text = if !self.actuators.iter().any(|actuator| actuator.name == *gone) {
+                "there is no actuator of this name"
+            } else if self.reconfigurations[..at].iter().any(|other| other.gone == *gone) {
+                "it is there twice"
+            } else if shape(&own.k_x) != (m, n) || shape(&own.k_f) != (m, q) || own.k_s.len() != m {
+                "expected K_x of actuators x states, K_f of actuators x faults, K_s with one number \
+                 for each actuator"
+            } else if numbers.chain([&own.stuck_at]).any(|value| !value.is_finite()) {
+                "a number is not finite"
+            } else if own.restart.iter().any(|name| !self.faults.iter().any(|f| f.name == *name)) {
+                "`restart` names a fault that does not exist"
+            } else if own.loss.is_some() != own.time.is_some() || decided.is_some() && !lost {
+                "loss and time belong together, and to a fault with loss_of"
+            } else if decided.is_some_and(|(loss, time)| !(loss > 0.0 && time >= 0.0 && time < 1e9)) {
+                "expected a loss above 0 and a time of at least 0 s"
+            } else {
+                return None;
+            };
+            Some(begin + text)
         })
     }
 

@@ -4,7 +4,7 @@ use fmu::Variable;
 
 use super::{times_second, with_unit};
 use crate::controller::AsoController;
-use crate::design::{Design, Estimator, Fault, Label, Signal, SlidingMode};
+use crate::design::{Design, Estimator, Fault, Label, Reconfiguration, Signal, SlidingMode};
 use crate::matrix::Matrix;
 use crate::names;
 use crate::names::channel;
@@ -44,6 +44,7 @@ pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {
     all.extend(operating_point(design));
     all.extend(limits(design));
     all.extend(sliding_mode(design));
+    all.extend(stuck(design));
     if design.schedule.is_some() {
         // The matrices depend on the scheduling variable.
         return all;
@@ -185,6 +186,19 @@ fn operating(
         place(&mut model.design).get_or_insert_default()
     });
     with_unit(variable, unit).parameter()
+}
+
+/// The commands at which actuators are stuck when they are gone.
+fn stuck(design: &Design) -> Vec<Variable<AsoController>> {
+    let one = |(at, own): (usize, &Reconfiguration)| {
+        let name = channel("u_stuck", own.actuator, design.actuators.len());
+        let text = format!("Command at which the actuator is stuck when it is gone: {}", own.gone);
+        let variable = Variable::real(name, text, move |model: &mut AsoController| {
+            &mut model.design.reconfigurations[at].stuck_at
+        });
+        with_unit(variable, design.actuators[own.actuator].unit.as_ref()).tunable()
+    };
+    design.reconfigurations.iter().enumerate().map(one).collect()
 }
 
 fn limits(design: &Design) -> Vec<Variable<AsoController>> {

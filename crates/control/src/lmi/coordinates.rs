@@ -122,6 +122,12 @@ impl Coordinates {
         (&p + p.transpose()) * 0.5
     }
 
+    /// Q = T^-1 Q~ T'^-1.
+    pub(super) fn shape(&self, q: &DMatrix<f64>) -> DMatrix<f64> {
+        let q = &self.from * q * self.from.transpose();
+        (&q + q.transpose()) * 0.5
+    }
+
     /// L = T^-1 L~ unit for the error dynamics A - L C.
     pub(super) fn gain(&self, l: &DMatrix<f64>) -> DMatrix<f64> {
         &self.from * l * self.unit

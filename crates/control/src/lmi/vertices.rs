@@ -105,6 +105,34 @@ pub fn certify_common(
     Analysis { vertices, region, domain }.certificate(coordinates)
 }
 
+/// The certificate of [`certify_common`] if one is found at once, in the coordinates of the mean of the
+/// vertices or of the first one; without its search for the contradiction.
+///
+/// # Errors
+///
+/// Same as [`certify_common`], whose checks of the arguments it leaves out.
+pub(crate) fn find_common(
+    vertices: &[DMatrix<f64>],
+    region: &Region,
+    domain: Domain,
+) -> Result<Option<RegionCertificate>, Error> {
+    for a in vertices {
+        if !region.violated(&eigenvalues(a)?, domain).is_empty() {
+            return Ok(None);
+        }
+    }
+    let count = f64::from(u32::try_from(vertices.len()).unwrap_or(u32::MAX));
+    let mean = vertices[1..].iter().fold(vertices[0].clone(), |sum, a| sum + a) / count;
+    for a in [&mean, &vertices[0]] {
+        let Some(coordinates) = Coordinates::of_dynamics(a)? else { continue };
+        let found = certify_in(&coordinates, vertices, region, domain)?;
+        if let Outcome::Optimal(certificate) = found {
+            return Ok(Some(certificate));
+        }
+    }
+    Ok(None)
+}
+
 fn order(first: Option<&DMatrix<f64>>) -> Result<usize, Error> {
     match first {
         Some(a) => check::square("A", a),

@@ -1,6 +1,7 @@
 //! Claims of the crate, compared with published numbers, other software and the equations
 //! themselves.
 
+mod allocation;
 mod aso;
 mod data;
 mod detectability;
@@ -14,6 +15,8 @@ mod hold;
 mod isolation;
 #[cfg(feature = "lmi")]
 mod lmi;
+#[cfg(feature = "lmi")]
+mod losses;
 mod lyapunov;
 #[path = "../../examples/fault_detection/matrices.rs"]
 mod matrices;

@@ -159,7 +159,8 @@ fn only_sections_with_content_appear_in_reading_order() {
             "11. Certificate",
             "12. Assumptions",
             "13. Loss of effectiveness",
-            "14. Interface of the FMU",
+            "14. Without an actuator",
+            "15. Interface of the FMU",
         ]
     );
     assert_eq!(

@@ -113,3 +113,30 @@ fn the_communication_step_of_a_sampled_design_is_its_sample_time_unless_stated()
     assert_eq!(step_size(&text), Some(0.01));
     assert_eq!(step_size(&text.replace("step_size = 0.01", "")), Some(0.02));
 }
+
+#[test]
+fn a_reconfiguration_that_does_not_fit_is_refused_by_its_actuator() {
+    let wrong = [
+        ("gone = \"v\"", "without v: there is no actuator of this name"),
+        ("K_s = [0.0]", "without u: expected K_x of actuators x states"),
+        ("K_s = [inf]", "without u: a number is not finite"),
+        ("restart = [\"g\"]", "without u: `restart` names a fault that does not exist"),
+        ("loss = 0.9", "without u: loss and time belong together"),
+        ("loss = 0.9\ntime = 1.0", "and to a fault with loss_of"),
+    ];
+    for (entry, expected) in wrong {
+        let mut entries = vec!["gone = \"u\"", "K_s = [0.0]", "K_x = [[0.0, 0.0]]"];
+        let key = entry.split(' ').next().unwrap();
+        entries.retain(|own| !own.starts_with(key));
+        entries.push(entry);
+        if expected.contains("expected K_x") {
+            entries.retain(|own| !own.starts_with("K_x"));
+            entries.push("K_x = [[0.0]]");
+        }
+        let fault = "[[faults]]\nname = \"f\"";
+        let text = entries.join("\n");
+        let to = format!("[[reconfigurations]]\nstuck_at = 0.0\nK_f = [[0.0]]\n{text}\n\n{fault}");
+        let message = message("", fault, &to);
+        assert!(message.contains(expected), "{message:?} has no {expected:?}");
+    }
+}

@@ -3,6 +3,8 @@
 use std::f64::consts::PI;
 
 use crate::detection_report::{DecoupledInput, DetectedFault, Detection, Test};
+use crate::loss_report::{CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport};
+use crate::reconfiguration_report::{ReconfigurationReport, Reconfigured, WithoutActuator};
 use crate::report::{
     Bound, Certificate, Check, CommandPeak, Curve, Effectiveness, FreeP, Frequency, Loop, Matrix,
     Norm, Plant, ReferenceStep, Region, Report, Sampled, Signal, StepResponse, Theorem1, Ultimate,
@@ -130,6 +132,55 @@ fn region() -> Region {
         disc_radius: Some(398.5),
         sector: Some(45.5),
     }
+}
+
+fn reconfiguration() -> ReconfigurationReport {
+    let number = || Number { name: MARKUP.to_owned(), unit: Some(QUOTES.to_owned()), value: -0.0 };
+    let found = Reconfigured {
+        method: MARKUP.to_owned(),
+        residual: 0.25,
+        eigenvalues: vec![[-1.0, 2.0], [-1.0, -2.0]],
+        gain_norm: f64::NAN,
+        intact_gain_norm: 1e300,
+        k_x: vec![vec![1.0]],
+        k_f: vec![vec![1.0]],
+        k_s: vec![1.0],
+        commands: vec![number()],
+        beyond_limits: vec![MARKUP.to_owned()],
+        measurements: vec![number()],
+        kept: false,
+    };
+    let without = |outcome| WithoutActuator {
+        actuator: QUOTES.to_owned(),
+        unit: None,
+        stuck_at: 0.0,
+        outcome,
+    };
+    ReconfigurationReport {
+        by_estimate: Some([0.9, 1.0]),
+        without: vec![without(Ok(found)), without(Err(MARKUP.to_owned()))],
+    }
+}
+
+fn losses() -> LossReport {
+    let numbers = || vec![Number { name: MARKUP.to_owned(), unit: None, value: 0.25 }];
+    let constant = || ConstantLoss { losses: numbers(), stable: false, factor: 1.5 };
+    let own = |proof| LossLoop {
+        name: format!("passive {QUOTES}"),
+        meaning: MARKUP.to_owned(),
+        constant: vec![constant()],
+        proof,
+        certified: vec![CertifiedLoss { losses: numbers(), factor: f64::NAN }],
+    };
+    let peak = LossPeak {
+        disturbance: MARKUP.to_owned(),
+        size: f64::INFINITY,
+        state: QUOTES.to_owned(),
+        unit: Some(MARKUP.to_owned()),
+        largest: -0.0,
+    };
+    let proof = LossProof { margin: 1e-300, p: vec![vec![1.0]], decay: None, peaks: vec![peak] };
+    LossReport { stated: numbers(), loops: vec![own(Ok(proof)), own(Err(MARKUP.to_owned()))] }
 }
 
 fn interface() -> Vec<Variable> {
@@ -344,6 +395,8 @@ pub(super) fn hostile() -> Report {
             actuator: QUOTES.to_owned(),
             largest_stable_loss: 0.625_125,
         }],
+        losses: Some(losses()),
+        reconfiguration: Some(reconfiguration()),
         assumptions: vec![format!("linear {MARKUP}"), "bell \u{7} and nul \0".to_owned()],
         interface: interface(),
     }
@@ -423,6 +476,8 @@ pub(super) fn bare() -> Report {
         family: None,
         schedule: None,
         effectiveness: Vec::new(),
+        losses: None,
+        reconfiguration: None,
         assumptions: Vec::new(),
         interface: Vec::new(),
     }

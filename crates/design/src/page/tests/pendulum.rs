@@ -298,6 +298,8 @@ pub(super) fn pendulum() -> Report {
         family: None,
         schedule: None,
         effectiveness: Vec::new(),
+        losses: None,
+        reconfiguration: None,
         assumptions: vec![
             "The plant is linear around its operating point.".to_owned(),
             "Faults are constant; what they change by per second is a disturbance.".to_owned(),

@@ -1,0 +1,149 @@
+//! Control allocation: the commands that take over when an actuator is gone.
+
+use crate::svd::{Svd, norm_2};
+use crate::{Error, check};
+use nalgebra::{DMatrix, DVector};
+
+/// Singular values below this part of the largest count as zero.
+const TOLERANCE: f64 = 1e-12;
+
+/// The distribution of the effect of all inputs over the remaining ones.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Allocation {
+    /// M of u = M `u_d`, m x m; the rows of inputs that are gone are zero.
+    pub matrix: DMatrix<f64>,
+    /// Norm of B M - B relative to the norm of B: the part of the effect that the remaining inputs cannot
+    /// produce.
+    pub residual: f64,
+}
+
+/// Computes the commands of the remaining inputs that have the effect of the commands `u_d` of all inputs,
+/// as far as possible, with the least effort.
+///
+/// ```text
+/// u = M u_d minimises the norm of B u - B u_d; of all such u the one with the least sum of (u_j / a_j)^2
+/// M = D (B_r D)^+ B,  D = diag(a), B_r = B with zero columns for the inputs that are gone
+/// ```
+///
+/// `b`: n x m; `gone`: the inputs that are gone, from zero; `authority`: a, m numbers above zero, for
+/// example the distance from each command to its nearest limit. The effect is exact, and with it the loop
+/// that a feedback `u_d` = K x closes, if the columns of B are in the range of `B_r`: the remaining inputs are
+/// as many as the rank of B at least. Singular values below 1e-12 of the largest count as zero.
+///
+/// Source: W. C. Durham, Constrained control allocation, J. Guidance, Control and Dynamics 16 (1993); M. Bodson, Evaluation of
+/// optimization methods for control allocation, J. Guidance, Control and Dynamics 25 (2002), the weighted pseudo-inverse.
+///
+/// # Example
+///
+/// Two of three forces that act on a mass take over what the third one did, the stronger one more:
+///
+/// ```
+/// use control::allocation::allocate;
+/// use nalgebra::DMatrix;
+/// let b = DMatrix::from_row_slice(2, 3, &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
+/// let found = allocate(&b, &[0], &[1.0, 1.0, 2.0])?;
+/// assert!(found.residual < 1e-15);
+/// assert!((found.matrix[(1, 0)] - 0.2).abs() < 1e-15 && (found.matrix[(2, 0)] - 0.8).abs() < 1e-15);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad `b` or `authority`;
+/// [`Error::OutOfRange`] for an `authority` that is not above zero; [`Error::NotConverged`].
+pub fn allocate(b: &DMatrix<f64>, gone: &[usize], authority: &[f64]) -> Result<Allocation, Error> {
+    check::finite("B", b)?;
+    let scaled = remaining(b, gone, authority)?;
+    let found = Svd::new(&scaled)?;
+    let rank = found.rank(TOLERANCE);
+    let mut matrix = found.least_squares(b, rank);
+    matrix += found.least_squares(&(b - &scaled * &matrix), rank);
+    let left = norm_2(&(&scaled * &matrix - b))?;
+    let size = norm_2(b)?;
+    Ok(Allocation {
+        matrix: DMatrix::from_fn(b.ncols(), b.ncols(), |i, j| authority[i] * matrix[(i, j)]),
+        residual: if size > 0.0 { left / size } else { 0.0 },
+    })
+}
+
+/// `B_r` D.
+fn remaining(b: &DMatrix<f64>, gone: &[usize], authority: &[f64]) -> Result<DMatrix<f64>, Error> {
+    let given = DMatrix::from_column_slice(authority.len(), 1, authority);
+    check::shape("authority", &given, (b.ncols(), 1))?;
+    for own in authority {
+        check::positive("authority", *own)?;
+    }
+    let factor = |j: usize| if gone.contains(&j) { 0.0 } else { authority[j] };
+    Ok(DMatrix::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * factor(j)))
+}
+
+/// An equilibrium of a plant under a constant disturbance.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Equilibrium {
+    /// The states, n.
+    pub x: DVector<f64>,
+    /// The commands, m; zero for inputs that are gone.
+    pub u: DVector<f64>,
+    /// Norm of C x: what is left of the outputs that should be zero.
+    pub left: f64,
+}
+
+/// Computes the equilibrium under a constant disturbance in which given outputs are as near to zero as
+/// the remaining inputs allow.
+///
+/// ```text
+/// A x + B_r u + w = 0;  of all such (x, u) those with the least norm of C x, and of these the one with the
+/// least norm of x and u, u_j in units of a_j
+/// ```
+///
+/// `a`: n x n; `b`: n x m; `outputs`: C, r x n, rows in units in which they compare; `disturbance`: w, n
+/// entries, for example a column of B times the command at which an actuator is stuck; `gone`,
+/// `authority`: as in [`allocate`]. An equilibrium exists if [A, `B_r`] has rank n, which holds for a
+/// stabilisable (A, `B_r`). C x = 0 is reached for every w with as many independent remaining inputs as
+/// outputs, without an invariant zero at 0.
+///
+/// Source: E. J. Davison, The feedforward control of linear multivariable time-invariant systems,
+/// Automatica 9 (1973), for the existence.
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::OutOfRange`] for a bad
+/// `authority`; [`Error::NotControllable`] if no equilibrium exists; [`Error::NotConverged`].
+pub fn equilibrium(
+    (a, b, outputs): (&DMatrix<f64>, &DMatrix<f64>, &DMatrix<f64>),
+    disturbance: &DVector<f64>,
+    gone: &[usize],
+    authority: &[f64],
+) -> Result<Equilibrium, Error> {
+    let (n, m) = (check::square("A", a)?, b.ncols());
+    check::shape("B", b, (n, m))?;
+    check::shape("outputs", outputs, (outputs.nrows(), n))?;
+    let w = DMatrix::from_column_slice(disturbance.len(), 1, disturbance.as_slice());
+    check::shape("disturbance", &w, (n, 1))?;
+    let mut all = a.clone().resize_horizontally(n + m, 0.0);
+    all.columns_mut(n, m).copy_from(&remaining(b, gone, authority)?);
+    let found = Svd::new(&all)?;
+    let rank = found.rank(TOLERANCE);
+    if rank < n {
+        return Err(Error::NotControllable { rank, n });
+    }
+    let mut one = found.least_squares(&-&w, rank);
+    one -= found.least_squares(&(&all * &one + &w), rank);
+    let free = found.right.columns(rank, n + m - rank);
+    let seen = outputs * free.rows(0, n);
+    if !seen.is_empty() {
+        let seen = Svd::new(&seen)?;
+        let correction = seen.least_squares(&-(outputs * one.rows(0, n)), seen.rank(TOLERANCE));
+        one += free * correction;
+    }
+    let x: DVector<f64> = one.column(0).rows(0, n).into();
+    Ok(Equilibrium {
+        left: (outputs * &x).norm(),
+        u: DVector::from_fn(m, |j, _| {
+            if gone.contains(&j) { 0.0 } else { authority[j] * one[(n + j, 0)] }
+        }),
+        x,
+    })
+}

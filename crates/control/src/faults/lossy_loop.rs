@@ -1,0 +1,205 @@
+//! A loop whose actuators lose effectiveness: for which losses it is stable, and what is proven about
+//! losses that vary.
+
+#[cfg(feature = "lmi")]
+mod certified;
+
+#[cfg(feature = "lmi")]
+pub use certified::CertifiedLoss;
+
+use crate::aso::FaultyPlant;
+use crate::controller::closed_loop;
+use crate::stability::instability;
+use crate::{Domain, Error, StateSpace, check};
+use nalgebra::DMatrix;
+
+/// Largest number of inputs with a loss: a box has a corner for every combination.
+const MOST_INPUTS: usize = 6;
+/// Number of points between no loss and the largest loss at which stability is tested.
+const POINTS: u32 = 50;
+const BISECTIONS: usize = 40;
+/// Largest number of directions from no loss that are tested.
+const DIRECTIONS: usize = 70;
+
+/// The loop of a plant and a controller as a function of the losses E of its actuators.
+///
+/// ```text
+/// x' = A x + B (I - E) u + F_a f,  [x; z]' = A(E) [x; z]
+/// A(E) = A(0) - sum over j of E_j D_j,  0 <= E_j <= largest_j
+/// ```
+///
+/// z are the states of the controller. A(E) is affine in E, so that a box of losses is the convex hull of
+/// its corners.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct LossyLoop {
+    /// A(0).
+    pub intact: DMatrix<f64>,
+    /// `D_j`, one for each input.
+    pub effects: Vec<DMatrix<f64>>,
+    /// Continuous or sampled time. In sampled time a loss changes at samples only.
+    pub domain: Domain,
+}
+
+/// How large constant losses may become.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct ConstantLimit {
+    /// The factor of the box, from no loss, up to which the loop is stable; `most` if it is stable in the
+    /// whole range.
+    pub factor: f64,
+    /// The losses at which the loop becomes unstable; those of the least stable corner if it does not.
+    pub loss: Vec<f64>,
+}
+
+impl LossyLoop {
+    /// The loop of `plant` and `controller`, of which the inputs `inputs` may lose effect.
+    ///
+    /// `plant`: in the time domain of `controller`; `inputs`: from zero, at least one, at most six.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`closed_loop`]; [`Error::OutOfRange`] for an input that does not exist or a bad number of
+    /// inputs.
+    pub fn new(
+        plant: &FaultyPlant,
+        controller: &StateSpace,
+        inputs: &[usize],
+    ) -> Result<Self, Error> {
+        let m = plant.b.ncols();
+        if inputs.is_empty() || inputs.len() > MOST_INPUTS {
+            let (name, rule) = ("the number of inputs with a loss", "from one to six");
+            return Err(Error::OutOfRange { name, value: as_number(inputs.len()), rule });
+        }
+        if let Some(&input) = inputs.iter().find(|&&input| input >= m) {
+            let (name, rule) = ("the input of a loss", "the index of an input, from zero");
+            return Err(Error::OutOfRange { name, value: as_number(input), rule });
+        }
+        let intact = closed_loop(plant, controller, &vec![1.0; m])?;
+        let effect = |&input: &usize| {
+            let mut effectiveness = vec![1.0; m];
+            effectiveness[input] = 0.0;
+            Ok(&intact - closed_loop(plant, controller, &effectiveness)?)
+        };
+        let effects = inputs.iter().map(effect).collect::<Result<_, Error>>()?;
+        Ok(Self { effects, intact, domain: controller.domain })
+    }
+
+    /// A(E); `loss`: one number for each input.
+    #[must_use]
+    pub fn at(&self, loss: &[f64]) -> DMatrix<f64> {
+        let parts = self.effects.iter().zip(loss);
+        parts.fold(self.intact.clone(), |sum, (effect, loss)| sum - effect * *loss)
+    }
+
+    /// A(E) at the corners of the box from 0 to `largest`; an input whose largest loss is 0 adds no corner.
+    #[must_use]
+    pub fn corners(&self, largest: &[f64]) -> Vec<DMatrix<f64>> {
+        corners(largest).iter().map(|loss| self.at(loss)).collect()
+    }
+
+    /// Computes the factor t up to which the loop is stable for every constant loss in the box from 0 to t
+    /// times `largest`, by eigenvalues.
+    ///
+    /// `largest`: one number for each input, above zero for at least one; `most`: the largest t. On rays
+    /// from no loss to points on the far faces of the box, its corners among them, 50 losses each are
+    /// tested, and the first loss of stability is located by bisection. For one input that is the limit
+    /// itself, unless an unstable interval lies between two points; for several it is an upper bound of
+    /// the limit, and what is beyond it is unstable.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`instability`]; [`Error::OutOfRange`] for a bad `largest` or `most`.
+    pub fn constant_limit(&self, largest: &[f64], most: f64) -> Result<ConstantLimit, Error> {
+        self.check(largest)?;
+        check::positive("the largest factor", most)?;
+        let mut limit = ConstantLimit { factor: most, loss: Vec::new() };
+        let mut least_stable = f64::NEG_INFINITY;
+        for direction in directions(largest) {
+            let factor = self.along(&direction, limit.factor)?;
+            let loss: Vec<f64> = direction.iter().map(|part| part * factor).collect();
+            if factor < limit.factor {
+                limit = ConstantLimit { factor, loss };
+            } else if limit.factor >= most {
+                let found = instability(&self.at(&loss), self.domain)?;
+                if found > least_stable {
+                    (least_stable, limit.loss) = (found, loss);
+                }
+            }
+        }
+        Ok(limit)
+    }
+
+    /// The largest t, at most `end`, such that the loop is stable from zero to t times `direction`.
+    fn along(&self, direction: &[f64], end: f64) -> Result<f64, Error> {
+        let stable = |t: f64| {
+            let loss: Vec<f64> = direction.iter().map(|part| part * t).collect();
+            Ok::<_, Error>(instability(&self.at(&loss), self.domain)? < 0.0)
+        };
+        if !stable(0.0)? {
+            return Ok(0.0);
+        }
+        let mut good = 0.0;
+        for point in 1..=POINTS {
+            let t = end * f64::from(point) / f64::from(POINTS);
+            if stable(t)? {
+                good = t;
+                continue;
+            }
+            let mut bad = t;
+            for _ in 0..BISECTIONS {
+                let middle = 0.5 * (good + bad);
+                *(if stable(middle)? { &mut good } else { &mut bad }) = middle;
+            }
+            break;
+        }
+        Ok(good)
+    }
+
+    fn check(&self, largest: &[f64]) -> Result<(), Error> {
+        let given = DMatrix::from_column_slice(largest.len(), 1, largest);
+        check::shape("the largest losses", &given, (self.effects.len(), 1))?;
+        let rule = "from zero to one, above zero for at least one input";
+        let bad = largest.iter().copied().find(|loss| !(0.0..=1.0).contains(loss));
+        match bad.or_else(|| largest.iter().all(|loss| *loss <= 0.0).then_some(0.0)) {
+            Some(value) => Err(Error::OutOfRange { name: "the largest loss", value, rule }),
+            None => Ok(()),
+        }
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a count far below 2^52")]
+fn as_number(count: usize) -> f64 {
+    count as f64
+}
+
+/// The corners of the box from 0 to `largest`.
+fn corners(largest: &[f64]) -> Vec<Vec<f64>> {
+    grid(largest, 2)
+}
+
+/// All combinations of `points` values from 0 to the largest of each input.
+fn grid(largest: &[f64], points: usize) -> Vec<Vec<f64>> {
+    largest.iter().fold(vec![Vec::new()], |all, largest| {
+        let values = if *largest > 0.0 { points } else { 1 };
+        let extended = |begun: &Vec<f64>| {
+            (0..values).map(|at| largest * as_number(at) / as_number(points - 1)).map({
+                let begun = begun.clone();
+                move |value| begun.iter().copied().chain([value]).collect::<Vec<_>>()
+            })
+        };
+        all.iter().flat_map(extended).collect()
+    })
+}
+
+/// Points on the faces of the box away from 0, of a grid with at most 11 points for each input.
+fn directions(largest: &[f64]) -> Vec<Vec<f64>> {
+    let lossy = largest.iter().filter(|loss| **loss > 0.0).count();
+    let power = |base: usize| base.pow(u32::try_from(lossy).unwrap_or(u32::MAX));
+    let fits = |points: &usize| power(*points) - power(points - 1) <= DIRECTIONS;
+    let points = (2..=11).rev().find(fits).unwrap_or(2);
+    let on_a_face = |loss: &Vec<f64>| {
+        loss.iter().zip(largest).any(|(loss, largest)| *largest > 0.0 && loss >= largest)
+    };
+    grid(largest, points).into_iter().filter(on_a_face).collect()
+}

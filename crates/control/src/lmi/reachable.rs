@@ -1,0 +1,196 @@
+//! An ellipsoid that contains the reachable states of a family of systems.
+
+use super::coordinates::Coordinates;
+use super::definite::{AccurateProduct, margin};
+use super::region::MARGIN;
+use super::{Affine, Outcome, Problem};
+use crate::balance::power_of_two;
+use crate::lyapunov::{CONTINUOUS, DISCRETE};
+use crate::stability::instability;
+use crate::{Domain, Error, check};
+use nalgebra::{DMatrix, DVector};
+
+/// Factors of Q that are tried in turn until its inequalities hold by more than rounding errors.
+const ENLARGEMENTS: [f64; 5] = [1.0, 1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
+/// The part of the trace in the objective of [`common_reachable_set`].
+const REGULARISATION: f64 = 1e-6;
+const NOT_PROVEN: &str = "no common ellipsoid could be proven in double precision";
+
+/// An ellipsoid that contains all states that a family of systems reaches from rest.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct ReachableSet {
+    /// Q, n x n: x' `Q^-1` x <= 1 at all times.
+    pub shape: DMatrix<f64>,
+    /// Smallest eigenvalue of Q and of the inequalities, each scaled to a diagonal of about one;
+    /// larger than the rounding errors.
+    pub margin: f64,
+}
+
+impl ReachableSet {
+    /// The largest absolute value of `output` x in the ellipsoid: the root of c Q c'.
+    ///
+    /// `output`: c, n entries.
+    #[must_use]
+    pub fn peak(&self, output: &DVector<f64>) -> f64 {
+        output.dot(&(&self.shape * output)).max(0.0).sqrt()
+    }
+}
+
+/// Computes an ellipsoid that contains all states that a family of systems reaches from rest under a
+/// disturbance of at most one, small in the direction of given outputs.
+///
+/// ```text
+/// x' = A(t) x + b w(t), |w| <= 1, A(t) in the hull of A_1, A_2, ...;  Q > 0
+/// A_i Q + Q A_i' + lambda Q + b b' / lambda < 0                               continuous
+/// [Q - b b' / r, A_i Q; Q A_i', (1 - r) Q] > 0,  r = 1 - exp(-lambda period)  sampled
+/// V = x' Q^-1 x:  V' <= -lambda (V - w^2), so that V <= 1 at all times
+/// ```
+///
+/// `matrices`: the vertices `A_i`, n x n; `disturbance`: b, n entries; `outputs`: C, r x n; `rate`: lambda in
+/// 1/s, above zero and below twice a decay rate that [`super::certify_common`] proves, otherwise no Q exists.
+/// Of all Q the one with the smallest sum of c Q c' over the rows c of C is computed, each relative to the
+/// same number for the mean matrix. The Q that is returned is verified in the units of the data.
+///
+/// Source: Boyd et al. (1994), section 6.1.3; J. Abedor, K. Nagpal, K. Poolla, A linear matrix inequality
+/// approach to peak-to-peak gain minimization, Int. J. Robust Nonlinear Control 6 (1996).
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for bad or missing `matrices`; [`Error::Shape`] for a bad `disturbance` or bad `outputs`;
+/// [`Error::OutOfRange`] for a bad `rate`.
+pub fn common_reachable_set(
+    matrices: &[DMatrix<f64>],
+    (disturbance, outputs): (&DVector<f64>, &DMatrix<f64>),
+    rate: f64,
+    domain: Domain,
+) -> Result<Outcome<ReachableSet>, Error> {
+    let mean = mean(matrices)?;
+    let n = mean.nrows();
+    let b = DMatrix::from_column_slice(disturbance.len(), 1, disturbance.as_slice());
+    check::shape("disturbance", &b, (n, 1))?;
+    check::shape("outputs", outputs, (outputs.nrows(), n))?;
+    check::positive("rate", rate)?;
+    domain.check()?;
+    let Some(mut coordinates) = Coordinates::of_dynamics(&mean)? else {
+        return Ok(Outcome::Inconclusive(NOT_PROVEN));
+    };
+    if domain != Domain::Continuous {
+        coordinates.unit = 1.0;
+    }
+    let scaled_b = coordinates.input(&b);
+    let size = if scaled_b.amax() > 0.0 { power_of_two(scaled_b.norm()) } else { 1.0 };
+    let inequality = Reachability { b: scaled_b / size, rate: rate / coordinates.unit, domain };
+    let Some(of_mean) = inequality.smallest(&coordinates.dynamics(&mean))? else {
+        return Ok(Outcome::Infeasible { conflict: vec!["rate"] });
+    };
+    let mut problem = Problem::new();
+    let q = problem.symmetric(n);
+    problem.constrain(&q, MARGIN);
+    for a in matrices {
+        problem.constrain(&inequality.matrix(&q, &coordinates.dynamics(a)), MARGIN);
+    }
+    problem.minimise(&objective(&q, &coordinates.output(outputs), &of_mean));
+    let Outcome::Optimal(solution) = problem.solve()? else {
+        return Ok(Outcome::Inconclusive(NOT_PROVEN));
+    };
+    let shape = coordinates.shape(&solution.value(&q)) * (size * size);
+    let inequality = Reachability { b, rate, domain };
+    for enlargement in ENLARGEMENTS {
+        let shape = &shape * enlargement;
+        let mut smallest = margin(&shape)?;
+        for a in matrices {
+            smallest = smallest.min(margin(&inequality.value(&shape, a))?);
+        }
+        if smallest > 0.0 {
+            return Ok(Outcome::Optimal(ReachableSet { shape, margin: smallest }));
+        }
+    }
+    Ok(Outcome::Inconclusive(NOT_PROVEN))
+}
+
+/// The inequality of [`common_reachable_set`] for one vertex, as a matrix that must be positive definite.
+struct Reachability {
+    b: DMatrix<f64>,
+    rate: f64,
+    domain: Domain,
+}
+
+impl Reachability {
+    /// The smallest Q for one matrix, where the inequality is an equation; None if there is none.
+    fn smallest(&self, a: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
+        let spread = &self.b * self.b.transpose();
+        let (equation, moved, part) = match self.domain {
+            Domain::Continuous => {
+                let shift = DMatrix::from_diagonal_element(a.nrows(), a.nrows(), 0.5 * self.rate);
+                (&CONTINUOUS, a + shift, self.rate)
+            }
+            Domain::Sampled { .. } => (&DISCRETE, a / (1.0 - self.part()).sqrt(), self.part()),
+        };
+        if instability(&moved, self.domain)? >= 0.0 {
+            return Ok(None);
+        }
+        equation.solve(&moved.transpose(), &(spread / part)).map(Some)
+    }
+
+    /// 1 - exp(-lambda period); lambda in continuous time.
+    fn part(&self) -> f64 {
+        match self.domain {
+            Domain::Continuous => self.rate,
+            Domain::Sampled { period } => -(-self.rate * period).exp_m1(),
+        }
+    }
+
+    fn matrix(&self, q: &Affine, a: &DMatrix<f64>) -> Affine {
+        let moved = a * q;
+        let part = self.part();
+        let spread = Affine::constant(&(&self.b * self.b.transpose() / part));
+        match self.domain {
+            Domain::Continuous => -&(&(&moved.plus_transpose() + &(q * part)) + &spread),
+            Domain::Sampled { .. } => {
+                let (first, kept) = (q - &spread, q * (1.0 - part));
+                Affine::blocks(&[&[&first, &moved], &[&moved.transpose(), &kept]])
+            }
+        }
+    }
+
+    /// The matrix for a given Q; in continuous time with the product in twice the precision.
+    fn value(&self, q: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
+        if self.domain != Domain::Continuous {
+            return self.matrix(&Affine::constant(q), a).constant;
+        }
+        let constant = &self.b * self.b.transpose() / self.rate + q * self.rate;
+        -AccurateProduct::new(a, q).plus_transpose(&constant)
+    }
+}
+
+/// The sum of c Q c' over the rows c of `outputs`, each relative to its value for `of_mean`, and a little of
+/// the trace of Q, which bounds the other directions.
+fn objective(q: &Affine, outputs: &DMatrix<f64>, of_mean: &DMatrix<f64>) -> Affine {
+    let n = of_mean.nrows();
+    let mut weight = DMatrix::from_diagonal_element(n, n, REGULARISATION / of_mean.trace());
+    for row in outputs.row_iter() {
+        let size = (row * of_mean * row.transpose())[(0, 0)];
+        if size > 0.0 {
+            weight += row.tr_mul(&row) / size;
+        }
+    }
+    (0..n).fold(Affine::zeros(1, 1), |sum, i| {
+        let unit = DMatrix::from_fn(n, 1, |k, _| if k == i { 1.0 } else { 0.0 });
+        &sum + &(&weight.row(i).into_owned().resize_vertically(1, 0.0) * &(q * &unit))
+    })
+}
+
+/// The mean of square matrices of equal size.
+fn mean(matrices: &[DMatrix<f64>]) -> Result<DMatrix<f64>, Error> {
+    let Some(first) = matrices.first() else {
+        return Err(Error::Empty { matrix: "the list of vertices", found: (0, 0) });
+    };
+    let n = check::square("A", first)?;
+    let mut sum = DMatrix::zeros(n, n);
+    for a in matrices {
+        check::shape("A", a, (n, n))?;
+        sum += a;
+    }
+    Ok(sum / f64::from(u32::try_from(matrices.len()).unwrap_or(u32::MAX)))
+}

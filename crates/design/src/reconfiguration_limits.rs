@@ -1,0 +1,135 @@
+//! The table `[reconfiguration]` of a plant file: what happens when an actuator is gone.
+
+use super::signals::{EntryPoint, Fault, Signal};
+use files::{Entry, Place, PlaceError, Table};
+
+/// What the controller must be able to do without an actuator.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ReconfigurationRequest {
+    /// The actuators that may be gone, from 0, one at a time.
+    pub(crate) actuators: Vec<usize>,
+    /// The command at which each of them is then stuck, in its unit.
+    pub(crate) stuck_at: Vec<f64>,
+    /// The measurements to keep at the operating point, from 0.
+    pub(crate) keep: Vec<usize>,
+    /// An actuator counts as gone if its estimated loss is above the first number for the second, in s.
+    pub(crate) decision: Option<(f64, f64)>,
+    pub(crate) place: Place,
+}
+
+const KEYS: [&str; 5] = ["actuators", "stuck_at", "keep", "loss", "time"];
+
+impl ReconfigurationRequest {
+    /// Reads the table, if there is one.
+    pub(crate) fn read(
+        file: &Table<'_>,
+        actuators: &[Signal],
+        measurements: &[Signal],
+        faults: &[Fault],
+    ) -> Result<Option<Self>, PlaceError> {
+        let Some(entry) = file.get("reconfiguration") else {
+            return Ok(None);
+        };
+        for other in ["reference", "schedule"] {
+            if file.get(other).is_some() {
+                return Err(entry.error(format!("it is not possible together with `{other}`")));
+            }
+        }
+        if actuators.len() < 2 {
+            return Err(entry.error("without its only actuator a plant is not controlled"));
+        }
+        let table = entry.table()?;
+        table.allow(&KEYS)?;
+        let meaning = "the names of the actuators that may be gone, or \"all\"";
+        let own = positions(&table.require("actuators", meaning)?, actuators, "actuator")?;
+        let keep = match table.get("keep") {
+            Some(entry) => positions(&entry, measurements, "measurement")?,
+            None => (0..measurements.len()).collect(),
+        };
+        Ok(Some(Self {
+            stuck_at: stuck(&table, actuators, &own)?,
+            decision: decision(&table, &own, faults)?,
+            actuators: own,
+            keep,
+            place: entry.place,
+        }))
+    }
+}
+
+/// Reads names of signals, or the text "all".
+fn positions(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<Vec<usize>, PlaceError> {
+    if entry.is_text() {
+        return match entry.text()? {
+            "all" => Ok((0..signals.len()).collect()),
+            other => {
+                Err(entry.error(format!("expected a list of names or \"all\", found {other:?}")))
+            }
+        };
+    }
+    let mut found = Vec::new();
+    for member in entry.list()? {
+        let name = member.text()?;
+        let at = signals.iter().position(|signal| signal.name == name).ok_or_else(|| {
+            let names: Vec<_> = signals.iter().map(|signal| signal.name.as_str()).collect();
+            member.error(format!("no {what} is named {name:?}; there are {}", names.join(", ")))
+        })?;
+        if found.contains(&at) {
+            return Err(member.error(format!("the {what} `{name}` is there twice")));
+        }
+        found.push(at);
+    }
+    if found.is_empty() {
+        return Err(entry.error("expected at least one name, or \"all\""));
+    }
+    Ok(found)
+}
+
+/// Reads `stuck_at`, a table from actuators to commands; 0 if missing.
+fn stuck(table: &Table<'_>, actuators: &[Signal], own: &[usize]) -> Result<Vec<f64>, PlaceError> {
+    let mut found = vec![0.0; own.len()];
+    let Some(entry) = table.get("stuck_at") else {
+        return Ok(found);
+    };
+    for (name, value) in entry.table()?.entries() {
+        let Some(at) = own.iter().position(|at| actuators[*at].name == name) else {
+            let names: Vec<_> = own.iter().map(|at| actuators[*at].name.as_str()).collect();
+            let known = names.join(", ");
+            return Err(
+                value.error(format!("expected one of `actuators`: {known}, found `{name}`"))
+            );
+        };
+        found[at] = value.number()?;
+    }
+    Ok(found)
+}
+
+/// Reads `loss` and `time`, which belong together and to actuators whose loss is estimated.
+fn decision(
+    table: &Table<'_>,
+    own: &[usize],
+    faults: &[Fault],
+) -> Result<Option<(f64, f64)>, PlaceError> {
+    let (loss, time) = match (table.get("loss"), table.get("time")) {
+        (None, None) => return Ok(None),
+        (Some(loss), Some(time)) => (loss, time),
+        (Some(entry), None) => {
+            return Err(entry.error("expected `time` beside it: how long, in s, the loss is above"));
+        }
+        (None, Some(entry)) => {
+            return Err(entry.error("expected `loss` beside it: the fraction that is exceeded"));
+        }
+    };
+    let fraction = loss.positive()?;
+    if fraction >= 1.0 {
+        let message = format!("expected a fraction above 0 and below 1, found {fraction}");
+        return Err(loss.error(message));
+    }
+    let estimated = |fault: &Fault| match fault.entry_point {
+        EntryPoint::Loss { actuator, .. } => own.contains(&actuator),
+        _ => false,
+    };
+    if !faults.iter().any(estimated) {
+        return Err(loss.error("expected a fault with `loss_of` one of `actuators`, found none"));
+    }
+    Ok(Some((fraction, time.positive()?)))
+}

@@ -1,0 +1,102 @@
+//! Reconfiguration: the controller without an actuator that is gone.
+//!
+//! An actuator is gone if the input `actuator_gone` says so, or if its estimated loss of effectiveness
+//! stays above a stated fraction for a stated time; the latter is final until the next initialization.
+//! Its command is then the one at which it is stuck, `u_stuck`, also in the observer, and the others are
+//!
+//! ```text
+//! u = K_x x_hat + K_f f_hat + K_s (u_stuck - u_op)
+//! ```
+//!
+//! with the matrices of the design for that actuator. The estimates of its faults restart at 0; they are
+//! then the distance of its real effect from the assumed one. With several actuators gone, the matrices
+//! are those of the first one, and all of them are stuck.
+//!
+//! The decision is made at the start of each communication step, at each event, and at each sample; at
+//! initialization no actuator is gone.
+
+use serde::{Deserialize, Serialize};
+
+use crate::design::Design;
+use crate::loss::Loss;
+
+/// Which actuators are gone.
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct Reconfigurator {
+    /// The inputs, one for each actuator.
+    pub(crate) reported: Vec<bool>,
+    /// For each reconfiguration of the design: since when its loss is above the stated fraction, in s.
+    above_since: Vec<Option<f64>>,
+    /// Bit j: the estimate says that actuator j is gone.
+    decided: u64,
+    /// Bit j: actuator j is gone.
+    pub(crate) gone: u64,
+    /// The output: from 1, the position of the first actuator that is gone; 0 if there is none.
+    pub(crate) output: i32,
+}
+
+impl Reconfigurator {
+    /// No actuator of `design` is gone.
+    pub(crate) fn new(design: &Design) -> Self {
+        Self {
+            reported: vec![false; design.actuators.len()],
+            above_since: vec![None; design.reconfigurations.len()],
+            decided: 0,
+            gone: 0,
+            output: 0,
+        }
+    }
+
+    /// Forgets all decisions; the inputs stay.
+    pub(crate) fn start(&mut self) {
+        self.above_since.fill(None);
+        (self.decided, self.gone, self.output) = (0, 0, 0);
+    }
+
+    /// Decides at `time`, in s; bit j of the result: actuator j is gone or back since the last decision.
+    pub(crate) fn decide(&mut self, design: &Design, losses: &[Loss], time: f64) -> u64 {
+        let before = self.gone;
+        self.gone = 0;
+        for (own, since) in design.reconfigurations.iter().zip(&mut self.above_since) {
+            if let (Some(most), Some(least_time)) = (own.loss, own.time) {
+                let loss = losses.iter().find(|loss| loss.actuator == own.actuator);
+                let above = loss.is_some_and(|loss| loss.estimate > most);
+                *since = since.or(Some(time)).filter(|_| above);
+                // The importer adds up its steps with rounding.
+                let enough = since.is_some_and(|since| time - since >= least_time * (1.0 - 1e-9));
+                self.decided |= u64::from(enough) << own.actuator;
+            }
+            let gone = self.reported[own.actuator] || self.decided & (1 << own.actuator) != 0;
+            self.gone |= u64::from(gone) << own.actuator;
+        }
+        self.output = match self.gone {
+            0 => 0,
+            gone => i32::try_from(gone.trailing_zeros() + 1).unwrap_or_default(),
+        };
+        before ^ self.gone
+    }
+
+    /// The time of the next decision by an estimate that is above its fraction now, in s.
+    pub(crate) fn next_decision(&self, design: &Design) -> Option<f64> {
+        let ends =
+            design.reconfigurations.iter().zip(&self.above_since).filter_map(|(own, since)| {
+                let pending = self.decided & (1 << own.actuator) == 0;
+                Some((*since)? + own.time.filter(|_| pending)?)
+            });
+        ends.reduce(f64::min)
+    }
+
+    /// The estimated losses less the fractions above which they decide, negative beyond them.
+    pub(crate) fn distances<'a>(
+        &'a self,
+        design: &'a Design,
+        losses: &'a [Loss],
+    ) -> impl Iterator<Item = (f64, bool)> + 'a {
+        let all = design.reconfigurations.iter().zip(&self.above_since);
+        all.filter_map(move |(own, since)| {
+            let loss = losses.iter().find(|loss| loss.actuator == own.actuator);
+            let most = own.loss?;
+            Some((most - loss.map_or(0.0, |loss| loss.estimate), since.is_some()))
+        })
+    }
+}

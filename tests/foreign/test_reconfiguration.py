@@ -1,0 +1,256 @@
+"""An actuator is gone: the gains of the report, and runs of the controller FMU beside scipy."""
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
+from scipy.linalg import expm
+from scipy.optimize import minimize
+
+from conftest import ROOT
+
+PLANT = ROOT / "examples/plants/underwater-vehicle.toml"
+
+
+@pytest.fixture(scope="module")
+def vehicle(aso_ftc, tmp_path_factory):
+    """Design file, report and FMU of the vehicle; without losses to prove, which take time."""
+    folder = tmp_path_factory.mktemp("vehicle")
+    text = PLANT.read_text(encoding="utf-8").replace("up_to = 0.6\n", "") + "[robustness]\ncases = 0\n"
+    (folder / "plant.toml").write_text(text, encoding="utf-8")
+    out = ("--out", folder / "design.toml", "--fmu", folder / "Vehicle.fmu", "--json", "--certificate-time", "0")
+    done = aso_ftc("design", folder / "plant.toml", *out)
+    assert done.returncode == 0, done.stderr
+    return tomllib.loads((folder / "design.toml").read_text()), json.loads(done.stdout), folder / "Vehicle.fmu"
+
+
+def matrix(design, name):
+    return np.array(design[name])
+
+
+def test_three_thrusters_have_the_effect_of_four_with_the_least_effort(vehicle):
+    design, report, _ = vehicle
+    b, k_x = matrix(design, "B"), matrix(design, "K_x")
+    assert [own["gone"] for own in design["reconfigurations"]] == ["T1", "T2", "T3", "T4"]
+    for at, own in enumerate(design["reconfigurations"]):
+        gains = matrix(own, "K_x")
+        assert abs(gains[at]).max() == 0 and abs(b @ gains - b @ k_x).max() < 1e-12
+        # For a state, no other command of the three has the same effect with less effort.
+        x = np.array([0.4, -0.2, 0.1, 0.05, 0.03, -0.02])
+        rest = np.delete(b, at, axis=1)
+        solved = minimize(
+            lambda u: u @ u,
+            np.zeros(3),
+            constraints={"type": "eq", "fun": lambda u: (rest @ u - b @ k_x @ x)[3:]},
+            options={"ftol": 1e-15},
+        )
+        assert abs(np.delete(gains @ x, at) - solved.x).max() < 1e-6
+        # At rest the three do what the fourth did.
+        found = report["reconfiguration"]["without"][at]["outcome"]
+        commands = np.array([command["value"] for command in found["commands"]])
+        assert commands[at] == 0 and abs(b @ (commands - 3)).max() < 1e-12 and found["kept"]
+    assert ("loss" in design["reconfigurations"][0]) and ("loss" not in design["reconfigurations"][2])
+
+
+class Loop:
+    """The controller FMU and the plant by scipy, coupled every `step` s; commands are held in between."""
+
+    def __init__(self, vehicle, folder, step=0.005):
+        self.design, _, fmu = vehicle
+        self.step = step
+        description = read_model_description(str(fmu))
+        self.references = {variable.name: variable.valueReference for variable in description.modelVariables}
+        self.fmu = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=extract(str(fmu), unzipdir=str(folder)),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName="controller",
+        )
+        self.fmu.instantiate()
+        self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+        a, b = matrix(self.design, "A"), matrix(self.design, "B")
+        whole = expm(np.block([[a, b], [np.zeros((4, 10))]]) * step)
+        self.phi, self.gamma = whole[:6, :6], whole[:6, 6:]
+        self.x, self.time = np.zeros(6), 0.0
+
+    def get(self, *names):
+        return np.array(self.fmu.getReal([self.references[name] for name in names]))
+
+    def number(self):
+        return self.fmu.getInteger([self.references["reconfiguration"]])[0]
+
+    def gone(self, j, value=True):
+        self.fmu.setBoolean([self.references[f"actuator_gone[{j}]"]], [value])
+
+    def run(self, end, effect):
+        """Runs to `end`; `effect` turns the commands into what the thrusters do. Returns the largest |x|."""
+        largest = np.zeros(6)
+        while self.time < end - 1e-9:
+            u = effect(self.get("T1", "T2", "T3", "T4"))
+            self.x = self.phi @ self.x + self.gamma @ (u - 3.0)
+            self.fmu.setReal([self.references[name] for name in ("x", "y", "psi")], list(self.x[:3]))
+            self.fmu.doStep(self.time, self.step)
+            self.time += self.step
+            largest = np.maximum(largest, abs(self.x))
+        return largest
+
+    def close(self):
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+
+@pytest.fixture
+def loop(vehicle, tmp_path):
+    found = Loop(vehicle, tmp_path)
+    yield found
+    found.close()
+
+
+def without(at, stuck=0.0):
+    """The thrusters of which number `at` is stuck."""
+
+    def effect(u):
+        u = u.copy()
+        u[at] = stuck
+        return u
+
+    return effect
+
+
+@pytest.mark.parametrize("at", range(4))
+def test_without_a_thruster_the_vehicle_returns_to_its_position(loop, at):
+    loop.run(1.0, lambda u: u)
+    loop.gone(at + 1)
+    loop.run(15.0, without(at))
+    assert loop.number() == at + 1
+    assert abs(loop.x).max() < 2e-4
+    commands = loop.get("T1", "T2", "T3", "T4")
+    own = loop.design["reconfigurations"][at]
+    expected = 3 + matrix(own, "K_s") * -3.0
+    expected[at] = 0.0
+    assert abs(commands - expected).max() < 0.02
+
+
+def test_the_run_is_that_of_the_reconfigured_equations(vehicle, loop):
+    """From another state, observer and plant by scipy with the matrices of the design file."""
+    design = loop.design
+    own = design["reconfigurations"][2]
+    a, b, c, f_a = (matrix(design, name) for name in ("A", "B", "C", "F_a"))
+    gain = np.vstack([matrix(design, "L_x"), matrix(design, "L_f")])
+    loop.gone(3)
+    loop.x[:] = [0.05, -0.03, 0.02, 0.0, 0.0, 0.0]
+    x, z, step = loop.x.copy(), np.zeros(8), loop.step
+    u_3 = -3.0
+    # z' = M z + N [y; u_3] with the feedback of the design file; y is held over a step.
+    feedback = np.hstack([matrix(own, "K_x"), matrix(own, "K_f")])
+    feedback[2] = 0.0
+    constant = matrix(own, "K_s") * u_3
+    constant[2] = u_3
+    m = np.block([[a, f_a], [np.zeros((2, 8))]]) + np.vstack([b @ feedback, np.zeros((2, 8))])
+    m -= gain @ np.hstack([c, np.zeros((3, 2))])
+    n = np.hstack([gain, np.concatenate([b @ constant, np.zeros(2)])[:, None]])
+    whole = expm(np.block([[m, n], [np.zeros((4, 12))]]) * step)
+    u = np.array([3.0, 3.0, 3.0, 3.0])
+    for k in range(400):
+        loop.run((k + 1) * step, without(2))
+        u[2] = 0.0
+        x = loop.phi @ x + loop.gamma @ (u - 3.0)
+        z = whole[:8, :8] @ z + whole[:8, 8:] @ np.concatenate([c @ x, [1.0]])
+        u = 3.0 + feedback @ z + constant
+        assert abs(loop.x - x).max() < 1e-9, k
+        assert abs(loop.get("T1", "T2", "T3", "T4") - (u - [0, 0, 0, 0])).max() < 1e-7, k
+
+
+def test_the_estimated_loss_decides_that_a_thruster_is_gone(loop):
+    """Thruster 1 loses all of its effect; nobody tells the controller. Thruster 2 only half of it: no decision."""
+    loop.run(1.0, lambda u: u)
+    loop.run(4.0, lambda u: u * [1, 0.5, 1, 1])
+    assert loop.number() == 0 and loop.get("E_hat[2]")[0] == pytest.approx(0.5, abs=0.05)
+    loop.run(30.0, lambda u: u * [0, 1, 1, 1])
+    assert loop.number() == 1 and loop.get("T1")[0] == 0
+    assert abs(loop.x).max() < 1e-3
+    # The thruster does nothing, as assumed.
+    assert abs(loop.get("f_hat[1]")[0]) < 0.05
+
+
+def test_a_thruster_that_is_stuck_elsewhere_is_compensated_by_the_estimate(loop):
+    """Assumed are 0 N, real are 6 N: the estimate is the difference, and the others answer it."""
+    loop.gone(1)
+    loop.run(20.0, without(0, 6.0))
+    assert loop.get("f_hat[1]")[0] == pytest.approx(6.0, abs=0.05)
+    assert abs(loop.x).max() < 1e-3
+    # Back again: the intact gains, and an estimate from 0 on.
+    loop.gone(1, False)
+    loop.run(35.0, lambda u: u)
+    assert loop.number() == 0 and abs(loop.x).max() < 1e-3
+
+
+SMALL = """
+A = [[-1, 1, 0], [1, -2, 0.5], [0, 0.3, 0.4]]
+B = [[1, 0], [0, 1], [0, 1]]
+C = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+actuators = [{ name = "u1", limits = [-1, 1] }, { name = "u2", limits = [-1, 1] }]
+actuator_faults = "all"
+feedback.eigenvalues = [-2, -3, -4]
+observer.eigenvalues = [-6, -7, -8, -9, -10]
+robustness.cases = 0
+[reconfiguration]
+actuators = "all"
+keep = ["y3"]
+stuck_at = { u1 = 0.3 }
+"""
+
+
+def designed(aso_ftc, folder, text):
+    (folder / "plant.toml").write_text(text, encoding="utf-8")
+    return aso_ftc("design", folder / "plant.toml", "--out", folder / "design.toml", "--json")
+
+
+def test_without_exact_allocation_the_feedback_is_designed_again_and_keeps_what_must_be_kept(aso_ftc, tmp_path):
+    done = designed(aso_ftc, tmp_path, SMALL)
+    report, design = json.loads(done.stdout), tomllib.loads((tmp_path / "design.toml").read_text())
+    a, b = matrix(design, "A"), matrix(design, "B")
+    for at, own in enumerate(design["reconfigurations"]):
+        found = report["reconfiguration"]["without"][at]["outcome"]
+        k_x, k_s = matrix(own, "K_x"), matrix(own, "K_s")
+        assert found["residual"] > 1e-3 and "Designed again" in found["method"]
+        rest = b.copy()
+        rest[:, at] = 0
+        eigenvalues = np.sort(np.linalg.eigvals(a + rest @ k_x).real)
+        assert eigenvalues == pytest.approx([-4, -3, -2], abs=1e-6)
+        # At rest under the stuck command the third state is zero.
+        x = np.linalg.solve(a + rest @ k_x, -(b[:, at] + rest @ k_s))
+        assert abs(x[2]) < 1e-10 and found["kept"]
+
+
+def test_an_actuator_that_the_plant_needs_is_amber_with_the_mode_that_nothing_moves(aso_ftc, tmp_path):
+    text = SMALL.replace("[0, 1], [0, 1]]", "[0, 0], [0, 1]]").replace("[1, -2, 0.5], [0, 0.3, 0.4]", "[1, -2, 0], [0, 0, 0.4]")
+    report = json.loads(designed(aso_ftc, tmp_path, text).stdout)
+    one, two = report["reconfiguration"]["without"]
+    assert "cannot be stabilised" in two["outcome"]["reason"] and "x3" in two["outcome"]["reason"]
+    assert any(reason.startswith("without u2 there is no controller") for reason in report["verdict"]["reasons"])
+    assert [own["gone"] for own in tomllib.loads((tmp_path / "design.toml").read_text()).get("reconfigurations", [])] in (
+        [],
+        ["u1"],
+    )
+
+
+@pytest.mark.parametrize(
+    "old, new, message",
+    [
+        ('actuators = "all"\nkeep', 'actuators = ["u7"]\nkeep', 'no actuator is named "u7"; there are u1, u2'),
+        ('keep = ["y3"]', 'keep = ["u1"]', 'no measurement is named "u1"'),
+        ("stuck_at = { u1", "stuck_at = { y1", "expected one of `actuators`: u1, u2, found `y1`"),
+        ("keep =", "loss = 0.9\nkeep =", "expected `time` beside it"),
+        ("keep =", "loss = 0.9\ntime = 1\nkeep =", "expected a fault with `loss_of` one of `actuators`"),
+    ],
+)
+def test_a_bad_entry_is_refused_at_its_line(aso_ftc, tmp_path, old, new, message):
+    assert old in SMALL
+    done = designed(aso_ftc, tmp_path, SMALL.replace(old, new))
+    assert done.returncode == 2 and message in done.stderr and "plant.toml:1" in done.stderr
