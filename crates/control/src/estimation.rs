@@ -9,7 +9,7 @@
 //! | [`proportional_integral`] | `f_hat` = `f_hat_i` + `P_f` e, `f_hat_i`' = `L_f` e | the same |
 //! | [`fast_adaptive`] | `f_hat` = Gamma F (e + sigma integral of e) | rank C `F_a` = q, zeros of (A, `F_a`, C) stable |
 //! | [`sliding_mode`] | `f_hat` = rho F e / (\|F e\| + delta) | the same, rho above the fault |
-//! | [`learning`] | `f_hat`[k] = `K_1` `f_hat`[k-1] + `K_2` e[k] | the same |
+//! | [`learning`] | `f_hat` = `K_1` (`f_hat` a sample before) + `K_2` e | the same |
 //!
 //! and `x_hat`' = A `x_hat` + B u + `F_a` `f_hat` + `L_x` e. The last three are designed in the coordinates of
 //! [`DirectForm`]. Sliding mode and learning are laws of sampled controllers.

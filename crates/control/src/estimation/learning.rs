@@ -17,17 +17,18 @@ pub struct Learning {
 /// ```text
 /// f_hat[k] = v[k] = K_1 v[k-1] + K_2 e[k],  e[k] = y[k] - C x_hat[k|k-1]
 /// x_hat[k+1|k] = A x_hat[k|k-1] + B u[k] + F_a v[k] + L e[k]
+/// s[k+1] = lambda s[k] + f[k] - v[k] + * w,  s = F e
 /// ```
 ///
-/// `K_2` = g F with F = `M_1` of [`DirectForm`], and A - L C has the eigenvalue lambda for s = F e: s[k+1] = lambda s[k] + f[k]
-/// - v[k] + \* w. So (z - lambda) (z - `K_1`) + g z is the characteristic polynomial of s and v; lambda = p^2 / `K_1` and
+/// `K_2` = g F with F = `M_1` of [`DirectForm`], and L gives s the eigenvalue lambda; * w is what the error of the other
+/// states adds. So (z - lambda) (z - `K_1`) + g z is the characteristic polynomial of s and v; lambda = p^2 / `K_1` and
 /// g = lambda + `K_1` - 2 p make it (z - p)^2, p = e^(-rate T): stable for every `K_1` above p^2. Of a constant fault the part
 /// (1 - lambda) (1 - `K_1`) / ((1 - lambda) (1 - `K_1`) + g) is left; none with `K_1` = 1, which is an integrator.
 /// The gains have M with A M = L as the gain of the correction.
 ///
 /// Source: W. Chen and M. Saif, An iterative learning observer-based approach to fault detection and accommodation in
-/// nonlinear systems, Proc. 40th IEEE Conference on Decision and Control (2001), and Int. J. Adaptive Control and Signal
-/// Processing 20 (2006); Q. Jia, W. Chen, Y. Zhang and H. Li, Fault reconstruction and fault-tolerant control via
+/// nonlinear systems, Proc. 40th IEEE Conference on Decision and Control (2001), and An iterative learning observer for fault
+/// detection and accommodation in nonlinear time-delay systems, Int. J. Robust and Nonlinear Control 16 (2006); Q. Jia, W. Chen, Y. Zhang and H. Li, Fault reconstruction and fault-tolerant control via
 /// learning observers in Takagi-Sugeno fuzzy descriptor systems with time delays, IEEE Transactions on Industrial
 /// Electronics 62 (2015): v(t) = `K_1` v(t - tau) + `K_2` (y - C `x_hat`). The gains by pole placement with tau = T are our own.
 ///

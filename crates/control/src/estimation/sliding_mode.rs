@@ -23,13 +23,14 @@ pub struct SlidingMode {
 /// ```text
 /// f_hat[k] = nu[k],  nu_i = rho_i s_i / (|s_i| + delta_i),  s = F e[k],  e[k] = y[k] - C x_hat[k|k-1]
 /// x_hat[k+1|k] = A x_hat[k|k-1] + B u[k] + F_a nu[k] + L e[k]
+/// s[k+1] = lambda s[k] + f[k] - nu[k] + * w
 /// ```
 ///
-/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and A - L C has the eigenvalue lambda for each s: s[k+1] = lambda s[k] +
-/// f[k] - nu[k] + \* w. In the boundary layer (small s) nu is about (rho / delta) s, and s decays with lambda - rho / delta.
+/// F = `M_1` of [`DirectForm`], F C `F_a` = I, and L gives each s the eigenvalue lambda; * w is what the error of the other
+/// states adds. In the boundary layer (small s) nu is about (rho / delta) s, and s decays with lambda - rho / delta.
 /// The default of delta makes this e^(-rate T); lambda = 1 - 0.01 (1 - e^(-rate T)) then leaves 1 % of a small constant
-/// fault, and rho / (rho - |f|) times as much of a larger one. `current`: the result has M with A M = L as the
-/// gain of the correction `x_hat`[k|k] = `x_hat`[k|k-1] + M e[k]; its `L_f` is (rho / delta) F; the observer itself uses F and the
+/// fault, and rho / (rho - |f|) times as much of a larger one. The result has M with A M = L as the
+/// gain of the correction of `x_hat`; its `L_f` is (rho / delta) F; the observer itself uses F and the
 /// nonlinear function.
 ///
 /// The estimate is bounded by rho whatever the measurements are. The error stays bounded if every |`f_i`| is
