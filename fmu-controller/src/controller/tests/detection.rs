@@ -101,7 +101,6 @@ fn the_residuals_of_a_continuous_controller_do_not_depend_on_the_communication_s
         [("", [f64::NEG_INFINITY, f64::INFINITY]), ("limits = [-1.5, 0.3]", [-1.5, 0.3])]
     {
         let wanted = reference(range);
-        assert!(wanted.alarm.is_some_and(|[time, _]| time > 0.25));
         for sizes in [&[1.0][..], &[0.25], &[0.01], &[0.05], &[0.03, 0.011, 0.17]] {
             let mut found = run(ready(with_design(&continuous(limits)).unwrap()), sizes, 1.0);
             let detector = found.detector_mut();
@@ -109,10 +108,10 @@ fn the_residuals_of_a_continuous_controller_do_not_depend_on_the_communication_s
             assert!((residual - last).abs() < 1e-5, "{limits} {sizes:?}: {residual} {last}");
             assert!((detector.statistics[0] - wanted.statistic).abs() < 1e-4);
             let decision = &detector.decision;
-            let [time, onset] = wanted.alarm.unwrap();
+            assert_eq!(decision.detected, wanted.alarm.is_some());
+            let [time, onset] = wanted.alarm.unwrap_or([-1.0; 2]);
             assert!((decision.time - time).abs() < 1e-9, "{sizes:?} {decision:?} {wanted:?}");
             assert!((decision.onset - onset).abs() < 1e-9, "{sizes:?} {decision:?} {wanted:?}");
-            assert_eq!((decision.detected, decision.isolated), (true, 1));
         }
     }
 }
