@@ -101,7 +101,7 @@ pub(crate) struct Design {
     #[serde(default)]
     pub(crate) schedule: Option<Schedule>,
     /// The detection of faults, if there is one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     pub(crate) detection: Option<DetectionDesign>,
 }
 
