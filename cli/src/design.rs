@@ -54,6 +54,10 @@ pub(crate) struct Options {
     /// left out; 0 leaves all out
     #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = seconds)]
     certificate_time: Duration,
+    /// Compare all laws that estimate faults on this plant: write one page, NAME-comparison.html or
+    /// --report, and no design
+    #[arg(long, conflicts_with_all = ["out", "fmu", "worst_case", "c_code", "no_std"])]
+    compare: bool,
     /// Print the numbers of the report as JSON
     #[arg(long)]
     json: bool,
@@ -62,6 +66,9 @@ pub(crate) struct Options {
 /// Designs the controller and writes the requested files, all or none; returns whether all checks
 /// hold and the verdict is not red.
 pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
+    if options.compare {
+        return compare(options).map(|()| true);
+    }
     let (out, report) = names(options);
     let mut outputs: Vec<(&str, &Path)> = vec![("--out", &out), ("--report", &report)];
     outputs.extend(options.fmu.as_deref().map(|path| ("--fmu", path)));
@@ -138,6 +145,36 @@ fn code(options: &Options, made: &Design) -> anyhow::Result<CodeFiles> {
         all.warnings = code.warnings;
     }
     Ok(all)
+}
+
+/// Compares the estimation laws; writes one page.
+fn compare(options: &Options) -> anyhow::Result<()> {
+    let stem = options.plant.file_stem().unwrap_or_default().to_string_lossy();
+    let page = || PathBuf::from(format!("{stem}-comparison.html"));
+    let path = options.report.clone().unwrap_or_else(page);
+    let outputs = [("--report", path.as_path())];
+    check_distinct(&inputs(options, None), &outputs)?;
+    for library in &options.preload {
+        fmu_import::preload(library)?;
+    }
+    let found = design::compare(&options.plant)?;
+    check_distinct(&inputs(options, found.model.as_deref()), &outputs)?;
+    if !options.force {
+        check_own(&path, &found.identity)?;
+    }
+    let text = found.page();
+    let mut staged = Outputs::default();
+    staged.stage(&path, |path| fs::write(path, &text))?;
+    staged.commit()?;
+    if options.json {
+        let mut output = std::io::stdout().lock();
+        serde_json::to_writer_pretty(&mut output, &found).context("cannot print the comparison")?;
+        writeln!(output)?;
+    } else {
+        terminal::compare(&found);
+        println!("{}", path.display());
+    }
+    Ok(())
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {

@@ -1,12 +1,12 @@
 //! The summary of a design on the terminal.
 
-use design::Report;
 use design::detection_report::Detection;
 use design::family_report::MemberReport;
 use design::loss_report::LossLoop;
 use design::report::{CommandPeak, Loop, Matrix, ReferenceStep};
 use design::robust_report::Number;
 use design::schedule_report::ScheduleReport;
+use design::{Comparison, Report};
 
 /// The most rows or columns of a gain that are printed; the design file has all.
 const LARGEST_SHOWN: usize = 16;
@@ -25,6 +25,7 @@ pub(crate) fn summarise(report: &Report) {
     for step in &report.references {
         print_reference(step);
     }
+    println!("estimation law: {}", report.estimation.law);
     if let Some(found) = &report.robustness {
         let peaks: Vec<_> = found
             .points
@@ -193,6 +194,55 @@ fn print_losses(own: &LossLoop) {
     let limit = &own.constant[0];
     let stable = if limit.stable { "stable up to" } else { "unstable beyond" };
     println!("    constant losses: {stable} {}", described(&limit.losses));
+}
+
+/// Prints a row for each law and fault, and why the other laws do not exist.
+pub(crate) fn compare(found: &Comparison) {
+    let heads = [
+        "law",
+        "fault",
+        "constant",
+        "settling/s",
+        "ramp/s",
+        "sine",
+        "noise",
+        "noise peak",
+        "disk u",
+        "disk y",
+        "verdict",
+    ];
+    let mut rows = vec![heads.map(str::to_owned).to_vec()];
+    for law in &found.laws {
+        let Some(result) = &law.result else { continue };
+        let disk = |at: usize| result.disk_margin.map_or("-".to_owned(), |own| number(own[at]));
+        for one in &result.estimation.errors {
+            let stated = |value: Option<f64>| value.map_or("-".to_owned(), number);
+            rows.push(vec![
+                law.law.clone(),
+                one.fault.clone(),
+                number(one.constant),
+                number(one.step_settling),
+                one.ramp.map_or("grows".to_owned(), number),
+                number(one.sine),
+                stated(one.noise),
+                stated(one.noise_peak),
+                disk(0),
+                disk(1),
+                result.verdict.level.word().to_owned(),
+            ]);
+        }
+    }
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max();
+    let widths: Vec<_> = (0..heads.len()).map(|column| width(column).unwrap_or(0)).collect();
+    for row in &rows {
+        let cells = row.iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}"));
+        println!("{}", cells.collect::<Vec<_>>().join("  ").trim_end());
+    }
+    for law in &found.laws {
+        if let Some(reason) = &law.reason {
+            println!("{} does not exist: {reason}", law.law);
+        }
+    }
 }
 
 /// Prints a gain, or only its size and its norm if it would fill more than a screen.

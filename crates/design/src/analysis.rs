@@ -48,6 +48,21 @@ impl Outputs {
     }
 }
 
+/// The H-infinity norm, and how it was computed. Where the level sets do not converge, as with a zero of the
+/// whole system at z = 1, it is the largest value on a grid of frequencies.
+pub(crate) fn largest_gain(system: &StateSpace) -> Result<(f64, &'static str), Error> {
+    match h_infinity(system, WIDTH) {
+        Ok(found) => Ok((found.upper, "largest singular value over all frequencies (level sets)")),
+        Err(Error::NotConverged { .. }) => {
+            let grid = frequency_grid(system, POINTS_PER_DECADE)?;
+            let points = frequency_response(system, &grid)?;
+            let largest = points.iter().map(|point| point.singular_values[0]).fold(0.0, f64::max);
+            Ok((largest, "largest singular value on a grid of frequencies"))
+        }
+        Err(error) => Err(error),
+    }
+}
+
 /// The transfer functions from the faults, and from their rates, to [x; e; eps].
 pub(crate) struct Loops<'a> {
     designed: &'a ControllerDesign,
@@ -113,9 +128,12 @@ impl<'a> Loops<'a> {
         for (column, fault) in self.faults() {
             for (at, gains) in gains.iter().enumerate() {
                 let Some([jumping, gliding, uncancelled]) = gains else { continue };
-                let (of_fault, of_rate) = (jumping[column], gliding[column]);
+                let of_fault = jumping[column];
+                // A constant fault that leaves a lasting error has no bound by its rate.
+                let leaks = self.designed.law.leaks();
+                let of_rate = if leaks { f64::INFINITY } else { gliding[column] };
                 let left = uncancelled[column];
-                let constant = self.designed.extended.plant.a_f.row(column).amax() <= 0.0;
+                let constant = !leaks && self.designed.extended.plant.a_f.row(column).amax() <= 0.0;
                 let by_rate = match (fault.rate_bound, fault.bound) {
                     (Some(rate), Some(bound)) if constant => Some(of_rate * rate + left * bound),
                     _ => None,
@@ -167,15 +185,22 @@ impl<'a> Loops<'a> {
                 singular_values: (0..count).map(values).collect(),
             })
         };
-        Ok(vec![
+        let mut curves = vec![
             curve("faults to their estimates", &estimates)?,
             curve("faults to the errors of their estimates", &errors)?,
-            curve("rates of the faults to the errors of their estimates", &rates)?,
-        ])
+        ];
+        if !self.designed.law.leaks() {
+            curves.push(curve("rates of the faults to the errors of their estimates", &rates)?);
+        }
+        Ok(curves)
     }
 
-    /// Returns the norms from the rates of the faults to their estimation errors.
+    /// Returns the norms from the rates of the faults to their estimation errors; none if a constant
+    /// fault leaves a lasting error.
     pub(crate) fn norms(&self) -> Result<Vec<Norm>, Error> {
+        if self.designed.law.leaks() {
+            return Ok(Vec::new());
+        }
         // The plant's states do not influence the estimation errors.
         let mut rates = self.to_fault_errors(&self.of_rates);
         let all = self.designed.plant.a.nrows();
@@ -190,10 +215,10 @@ impl<'a> Loops<'a> {
             value,
             method: method.to_owned(),
         };
-        let largest = h_infinity(&rates, WIDTH)?.upper;
+        let (largest, method) = largest_gain(&rates)?;
         let energies = energy(&rates)?;
         Ok(vec![
-            norm("H-infinity", largest, "largest singular value over all frequencies (level sets)"),
+            norm("H-infinity", largest, method),
             norm("generalised H2", energies.peak, "peak for a rate of unit energy (Lyapunov)"),
             norm("H2", energies.h2, "covariance under white noise (Lyapunov)"),
         ])

@@ -6,6 +6,7 @@ use control::theorem1::{self, certify, largest_decay, smallest_radius, ultimate_
 
 use super::budget::Budget;
 use super::designed::ControllerDesign;
+use super::estimation::Law;
 use super::report::{Certificate, FreeP, Norm, Theorem1, Ultimate, rows};
 
 /// The design parameter alpha of (12); it cancels in delta.
@@ -46,6 +47,9 @@ fn fault_bound(designed: &ControllerDesign) -> Result<f64, String> {
 
 /// Checks that the theorem applies: a continuous observer of constant faults.
 fn applies(designed: &ControllerDesign) -> Result<(), String> {
+    if designed.law.law != Law::Augmented {
+        return Err("the theorem is about the augmented observer".to_owned());
+    }
     if designed.domain != Domain::Continuous {
         return Err("the theorem is about a controller in continuous time".to_owned());
     }

@@ -29,6 +29,8 @@ pub(crate) struct DesignFile<'a> {
     pub(crate) estimator: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) filter: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) sliding_mode: Option<SlidingMode>,
     pub(crate) experiment: Experiment,
     pub(crate) states: Vec<Entry>,
     pub(crate) actuators: Vec<Entry>,
@@ -66,6 +68,13 @@ pub(crate) struct ReconfigurationEntry {
 pub(crate) struct Experiment {
     pub(crate) stop_time: f64,
     pub(crate) step_size: f64,
+}
+
+/// The bounds of a sliding-mode law.
+#[derive(Serialize)]
+pub(crate) struct SlidingMode {
+    pub(crate) rho: Vec<f64>,
+    pub(crate) delta: Vec<f64>,
 }
 
 /// A signal.
@@ -133,6 +142,11 @@ impl ControllerDesign {
             sample_time: sampled,
             estimator: sampled.map(|_| estimator(self.gains.estimator)),
             filter: self.filter.clone(),
+            sliding_mode: self
+                .law
+                .injection
+                .as_ref()
+                .map(|own| SlidingMode { rho: own.rho.clone(), delta: own.delta.clone() }),
             experiment: self.experiment(file)?,
             states,
             actuators: entries(&linear.actuators),
@@ -144,11 +158,13 @@ impl ControllerDesign {
         };
         let FaultyPlant { a, b, c, f_a, a_f } = &self.plant;
         let mut matrices = vec![("A", a), ("B", b), ("C", c), ("F_a", f_a)];
-        if self.extended.plant.a_f.amax() > 0.0 {
+        if self.law.a_f.is_some() || self.extended.plant.a_f.amax() > 0.0 {
             matrices.push(("A_f", a_f));
         }
-        let Gains { k_x, k_f, l_x, l_f, .. } = &self.gains;
+        let Gains { k_x, k_f, l_x, l_f, p_f, .. } = &self.gains;
+        let l_f = self.law.injection.as_ref().map_or(l_f, |own| &own.f);
         matrices.extend([("K_x", k_x), ("K_f", k_f), ("L_x", l_x), ("L_f", l_f)]);
+        matrices.extend(p_f.as_ref().map(|p_f| ("P_f", p_f)));
         if let Some(integral) = &self.gains.integral {
             matrices.extend([("H", &integral.h), ("K_i", &integral.gain)]);
             matrices.extend((integral.faults.amax() > 0.0).then_some(("F_i", &integral.faults)));

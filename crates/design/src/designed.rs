@@ -1,8 +1,10 @@
 //! Computes the gains for a plant file.
 
+use super::estimation::Law;
 use super::family::{self, Family, common_feedback};
 use super::fixed_mode::{described, described_in};
 use super::gains::{FeedbackProblem, GainResult, Refusal, feedback, observer};
+use super::law::{DesignedLaw, LawProblem};
 use super::linear_plant::LinearPlant;
 use super::norm_gains::ObserverProblem;
 use super::plant_file::PlantFile;
@@ -40,6 +42,10 @@ pub(crate) struct ControllerDesign {
     /// The measurement filter in the controller.
     pub(crate) filter: Option<Vec<f64>>,
     pub(crate) gains: Gains,
+    /// The law that estimates the faults.
+    pub(crate) law: DesignedLaw,
+    /// The error dynamics of the augmented observer that meets the requirement.
+    pub(crate) required_error_dynamics: DMatrix<f64>,
     pub(crate) feedback: GainResult,
     pub(crate) observer: GainResult,
     pub(crate) controllability: Rank,
@@ -66,6 +72,11 @@ pub(crate) struct ControllerDesign {
 
 /// Designs the controller for `file`.
 pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Error> {
+    design_by(file, &file.estimation.law)
+}
+
+/// Designs the controller for `file` with another law for the estimates of the faults.
+pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDesign, crate::Error> {
     let linear = LinearPlant::of(file)?;
     let mut warnings = check_limits(file, &linear)?;
     let filter = file.filter.as_deref().unwrap_or_default();
@@ -76,7 +87,7 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
     check_faults(file, &linear, &extended)?;
     check_references(file, &linear)?;
     let detectability = check_detectable(file, &linear, &extended, &mut warnings)?;
-    let (domain, plant) = in_domain(file, &extended)?;
+    let (domain, mut plant) = in_domain(file, &extended)?;
     let references = file.references.as_ref();
     let states = extended.states;
     let own = (plant.a.view((0, 0), (states, states)).into_owned(), plant.b.rows(0, states).into());
@@ -102,6 +113,13 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
         p_f: None,
         integral: integral_action(references, (&linear, &extended), &feedback.gain),
     };
+    let problem =
+        LawProblem { linear: &linear, extended: &extended, plant: &plant, gains: &gains, domain };
+    let law = problem.design(law).map_err(|reason| not_existing(file, law, &reason, &problem))?;
+    let observer = if law.keeps_error_dynamics() { observer } else { by_law(&law) };
+    let required_error_dynamics = gains.error_dynamics(&plant);
+    let (gains, own_model) = (law.gains.clone(), law.a_f.clone());
+    plant.a_f = own_model.unwrap_or(plant.a_f);
     let filter = sampled::filter(&extended, domain);
     let whole = DesignLoop::of((&linear, &plant), &gains, filter.as_deref(), domain)?;
     let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
@@ -126,6 +144,8 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
         domain,
         plant,
         gains,
+        law,
+        required_error_dynamics,
         feedback,
         observer,
         controllability,
@@ -135,6 +155,31 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
         feedback_pair: pair,
         whole,
     })
+}
+
+/// An error at the law of the file, with the laws that exist.
+fn not_existing(
+    file: &PlantFile<'_>,
+    law: &Law,
+    reason: &str,
+    problem: &LawProblem<'_>,
+) -> PlaceError {
+    let message = format!(
+        "the law {} does not exist for this plant: {reason}; possible are {}",
+        law.name(),
+        problem.existing().join(", ")
+    );
+    file.error_at(&file.estimation.place, message)
+}
+
+/// The observer of a law with error dynamics of its own.
+fn by_law(law: &DesignedLaw) -> GainResult {
+    GainResult {
+        gain: law.gains.observer_gain(),
+        method: format!("By the law {}, as fast as the requirement on average.", law.law.name()),
+        required: Vec::new(),
+        quality: None,
+    }
 }
 
 fn estimator(file: &PlantFile<'_>) -> Estimator {

@@ -2,8 +2,10 @@
 
 mod certificate;
 mod chart;
+mod comparison;
 mod curves;
 mod detection;
+mod estimation;
 mod family;
 mod loops;
 mod losses;
@@ -19,6 +21,7 @@ mod robustness;
 mod table;
 mod verdict;
 
+pub(crate) use comparison::comparison;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 pub(crate) use number::rounded;
 
@@ -101,6 +104,12 @@ fn sections(report: &Report) -> Vec<Section> {
         (!report.gains.is_empty(), "gains", "Gains", plant::gains(report)),
         (true, "poles", "Eigenvalues", loops::poles(report)),
         (true, "conditioning", "Condition and pole errors", loops::conditioning(report)),
+        (
+            !report.estimation.errors.is_empty(),
+            "estimation",
+            "Estimation of the faults",
+            estimation::estimation(report),
+        ),
         (report.robustness.is_some(), "robustness", "Robustness", robustness::robustness(report)),
         (report.family.is_some(), "family", "Family of plants", family::family(report)),
         (report.schedule.is_some(), "schedule", "Schedule", family::schedule(report)),

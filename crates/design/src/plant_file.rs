@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::DMatrix;
 
 use super::detection_request::{DetectionRequest, Disturbance, disturbances};
+use super::estimation::EstimationRequest;
 use super::plausibility::check_names;
 use super::reconfiguration_limits::ReconfigurationRequest;
 use super::references::References;
@@ -40,6 +41,7 @@ pub(crate) struct PlantFile<'a> {
     pub(crate) filter: Option<Vec<f64>>,
     pub(crate) feedback: Request,
     pub(crate) observer: Request,
+    pub(crate) estimation: EstimationRequest,
     pub(crate) stop_time: Option<f64>,
     pub(crate) step_size: Option<f64>,
     pub(crate) robustness: RobustnessLimits,
@@ -90,7 +92,7 @@ pub(crate) struct Sampling {
     pub(crate) current: bool,
 }
 
-const KEYS: [&str; 30] = [
+const KEYS: [&str; 31] = [
     "description",
     "t_on",
     "monitor",
@@ -112,6 +114,7 @@ const KEYS: [&str; 30] = [
     "filter",
     "feedback",
     "observer",
+    "estimation",
     "experiment",
     "robustness",
     "reference",
@@ -183,6 +186,7 @@ impl<'a> PlantFile<'a> {
             filter: filter(file, &measurements, &faults)?,
             feedback: read("feedback", ["Q", "R"], "the requirement on A + B K_x")?,
             observer: read("observer", ["W", "V"], "the requirement on A_0 - L C_0")?,
+            estimation: EstimationRequest::read(file, faults.len())?,
             stop_time: time("stop_time")?,
             step_size: time("step_size")?,
             robustness: RobustnessLimits::read(file, measurements.len())?,

@@ -6,6 +6,7 @@ use fmu_description::{array_element, is_structured_name, misplaced_elements};
 use nalgebra::{DMatrix, DVector};
 
 use super::designed::FAULTS;
+use super::estimation::Law;
 use super::linear_plant::LinearPlant;
 use super::plant_file::{Model, PlantFile};
 use super::signals::{EntryPoint, Fault, FaultDynamics, Signal};
@@ -212,6 +213,18 @@ impl OwnVariables {
         add(file.filter.is_some(), &[("y_f", p), ("filter", p)]);
         add(stated, &[("x_op", states), ("u_op", m), ("y_op", p)]);
         add(t.is_some(), &[("x_i", t), ("x_i_0", t), ("r_op", t)]);
+        match &file.estimation.law {
+            Law::Augmented => {}
+            Law::ProportionalIntegral { .. } | Law::FastAdaptive { .. } => {
+                add(true, &[("f_hat_i", q)]);
+                own.matrices.push("P_f");
+            }
+            Law::SlidingMode { .. } => {
+                add(true, &[("rho", q), ("delta", q)]);
+                own.matrices.push("A_f");
+            }
+            Law::Learning { .. } => own.matrices.push("A_f"),
+        }
         let limited = file.actuators.iter().any(|actuator| actuator.limits.is_some());
         add(limited, &[("u_min", m), ("u_max", m)]);
         let reconfigured = file.reconfiguration.is_some();
@@ -224,7 +237,7 @@ impl OwnVariables {
     fn include(&self, name: &str) -> bool {
         let derivative = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
         if let Some(state) = derivative {
-            let states = ["x_hat", "f_hat", "y_f", "x_i"];
+            let states = ["x_hat", "f_hat", "f_hat_i", "y_f", "x_i"];
             let signals = self.signals.iter().filter(|(own, _)| states.contains(own));
             return !self.scalars.contains(&"T_s") && Self::is_among(state, signals);
         }

@@ -33,6 +33,8 @@ pub struct Report {
     pub feedback: Loop,
     /// The loop of the observer.
     pub observer: Loop,
+    /// The law that estimates the faults.
+    pub estimation: Estimation,
     /// The sampling of the controller; none in continuous time.
     pub sampling: Option<Sampled>,
     /// Margins, noise, tolerances; none if the loop is not stable.
@@ -113,11 +115,12 @@ pub struct Matrix {
     /// Names of the columns.
     pub columns: Vec<String>,
     /// The values, row by row.
+    #[schemars(with = "Vec<Vec<Option<f64>>>")]
     pub values: Vec<Vec<f64>>,
 }
 
 /// A condition that was checked.
-#[derive(Serialize, JsonSchema)]
+#[derive(Clone, Serialize, JsonSchema)]
 pub struct Check {
     /// The condition, in a sentence.
     pub condition: String,
@@ -161,6 +164,54 @@ pub struct Region {
     pub disc_radius: Option<f64>,
     /// Half angle of the sector about the negative real axis, in degrees.
     pub sector: Option<f64>,
+}
+
+/// The law that estimates the faults. The numbers of a sliding-mode law are those of its linearisation
+/// within the boundary layer.
+#[derive(Default, Serialize, JsonSchema)]
+pub struct Estimation {
+    /// Its name in the plant file.
+    pub law: String,
+    /// Its authors.
+    pub sources: String,
+    /// Its equations.
+    pub equations: Vec<String>,
+    /// Its parameters.
+    pub parameters: Vec<Number>,
+    /// The conditions for its existence.
+    pub conditions: Vec<Check>,
+    /// The errors of the estimates, one entry for each fault.
+    pub errors: Vec<EstimationErrors>,
+}
+
+/// The error f_hat - f of the estimate of a fault, relative to the fault, and its noise.
+#[derive(Serialize, JsonSchema)]
+pub struct EstimationErrors {
+    /// The fault.
+    pub fault: String,
+    /// Its unit.
+    pub unit: Option<String>,
+    /// Lasting error of a constant fault of 1.
+    pub constant: f64,
+    /// Time in s after a sudden fault of 1 from which the error stays within 2 % of its largest value
+    /// of the lasting one.
+    pub step_settling: f64,
+    /// Largest error after a sudden fault of 1.
+    pub step_peak: f64,
+    /// Lasting error of a fault that grows by 1 per s, in s; none if it grows without end.
+    pub ramp: Option<f64>,
+    /// Amplitude of the error for a sinusoidal fault of amplitude 1 and the frequency `sine_frequency`.
+    pub sine: f64,
+    /// The frequency, rad/s: a tenth of the mean rate of the augmented observer.
+    pub sine_frequency: f64,
+    /// Largest error for any fault of at most 1 (peak-to-peak gain); in a sampled design at the samples.
+    pub peak_gain: f64,
+    /// Root-mean-square value of the estimate under the measurement noise, in the unit of the fault;
+    /// without limit if a direct term passes white noise. None if the loop is not stable.
+    pub noise: Option<f64>,
+    /// Largest amplitude of the estimate for sinusoidal errors of the measurements whose norm is that of
+    /// the noise. None if the loop is not stable.
+    pub noise_peak: Option<f64>,
 }
 
 /// The sampling of a design.
@@ -265,7 +316,9 @@ pub struct Bound {
     pub unit: Option<String>,
     /// Peak-to-peak (L1) gain from the fault.
     pub gain_of_fault: f64,
-    /// Peak-to-peak (L1) gain from the rate of the fault.
+    /// Peak-to-peak (L1) gain from the rate of the fault; without limit if a constant fault leaves a
+    /// lasting error.
+    #[schemars(with = "Option<f64>")]
     pub gain_of_rate: f64,
     /// The smallest product of a gain and its bound, if the file states bounds.
     pub largest: Option<f64>,

@@ -16,6 +16,7 @@ use super::budget::Budget;
 use super::certificate::certificate;
 use super::checks::checks;
 use super::designed::{ControllerDesign, fault_names};
+use super::estimation_report::estimation;
 use super::family_report::{self, judge};
 use super::gains::GainResult;
 use super::loss_report::LossReport;
@@ -50,6 +51,7 @@ pub(crate) fn report(
     let mut checks = checks(designed);
     checks.extend(reached(&references));
     let robustness = robustness(designed, &file.robustness, family)?;
+    let estimation = estimation(designed, robustness.as_ref(), &file.robustness)?;
     let budget = Budget::start(certificate_time);
     let certificate = certificate(designed, loops.norms()?, &budget);
     let (bounds, left_out) = loops.bounds(&budget)?;
@@ -87,14 +89,15 @@ pub(crate) fn report(
             if gains.integral.is_some() { "A_e + B_e [K_x, K_i]" } else { "A + B K_x" },
             &designed.feedback_dynamics(),
             &designed.feedback,
-            &file.feedback.requirement,
+            Some(&file.feedback.requirement),
         )?,
         observer: closed(
             "A_0 - L C_0",
             &gains.error_dynamics(plant),
             &designed.observer,
-            &file.observer.requirement,
+            Some(&file.observer.requirement).filter(|_| designed.law.keeps_error_dynamics()),
         )?,
+        estimation,
         sampling: match designed.domain {
             Domain::Continuous => None,
             Domain::Sampled { period } => Some(Sampled {
@@ -203,6 +206,13 @@ impl Names {
             matrix("L_x", "correction of the states", &gains.l_x, extended, measurements),
             matrix("L_f", "correction of the faults", &gains.l_f, faults, measurements),
         ];
+        if let Some(p_f) = &gains.p_f {
+            all.push(matrix("P_f", "direct term of the faults", p_f, faults, measurements));
+        }
+        if let Some(injection) = &designed.law.injection {
+            let meaning = "argument of the sliding-mode injection; L_f is its linearisation";
+            all.push(matrix("F", meaning, &injection.f, faults, measurements));
+        }
         if let Some(filter) = &designed.filter {
             let diagonal = DMatrix::from_diagonal(&filter.clone().into());
             all.push(matrix("W", "measurement filter", &diagonal, measurements, measurements));
@@ -301,11 +311,11 @@ fn closed(
     name: &str,
     dynamics: &DMatrix<f64>,
     found: &GainResult,
-    requirement: &Requirement,
+    requirement: Option<&Requirement>,
 ) -> Result<Loop, Error> {
     let quality = found.quality;
     let region = match requirement {
-        Requirement::Region(region) | Requirement::HInfinity { region, .. } => Some(*region),
+        Some(Requirement::Region(region) | Requirement::HInfinity { region, .. }) => Some(*region),
         _ => None,
     };
     let number = |number: fn(&Quality) -> f64| quality.as_ref().map(number);
@@ -367,6 +377,14 @@ fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
         all.push(
             "The estimate of a fault modelled as constant lags behind it; the rate of the fault \
              causes the errors."
+                .to_owned(),
+        );
+    }
+    if designed.law.injection.is_some() {
+        all.push(
+            "The sliding-mode law is nonlinear: eigenvalues, margins, noise, bounds and responses are \
+             those of its linearisation within the boundary layer, for faults and noise small against \
+             rho; larger faults leave rho / (rho - |f|) times the lasting error."
                 .to_owned(),
         );
     }

@@ -78,11 +78,15 @@ impl<'a> ShownLoop<'a> {
         let mut system = fault_system(plant, gains, *domain)?;
         let (m, order) = (plant.b.ncols(), system.a.nrows());
         let (all, q) = plant.f_a.shape();
-        // u = K_x (x - e) + K_f f_hat + K_i x_i.
+        // u = K_x (x - e) + K_f f_hat + K_i x_i, with a direct term f_hat = f_hat_i + P_f C e.
         let mut commands = DMatrix::zeros(m, order);
         commands.columns_mut(0, all).copy_from(&gains.k_x);
         commands.columns_mut(all, all).copy_from(&-&gains.k_x);
         commands.columns_mut(2 * all, q).copy_from(&gains.k_f);
+        if let Some(p_f) = &gains.p_f {
+            let mut of_error = commands.columns_mut(all, all);
+            of_error += &gains.k_f * p_f * &plant.c;
+        }
         if let Some(integral) = &gains.integral {
             commands.columns_mut(2 * all + q, gains.integrals()).copy_from(&integral.gain);
         }

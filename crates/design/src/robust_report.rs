@@ -158,13 +158,14 @@ pub struct Channel {
 }
 
 /// A named number.
-#[derive(Serialize, JsonSchema)]
+#[derive(Clone, Serialize, JsonSchema)]
 pub struct Number {
     /// Its name.
     pub name: String,
     /// Its unit, if known.
     pub unit: Option<String>,
     /// Its value.
+    #[schemars(with = "Option<f64>")]
     pub value: f64,
 }
 

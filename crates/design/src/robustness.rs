@@ -14,6 +14,7 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use super::analysis::largest_gain;
 use super::designed::ControllerDesign;
 use super::linear_plant::LinearPlant;
 use super::page::rounded;
@@ -259,7 +260,7 @@ fn noise(
     limits: &RobustnessLimits,
 ) -> Result<(Matrix, Vec<Number>), Error> {
     let of = |output: &StateSpace| {
-        let mut gains = noise_gains(&own.from_noise(output)?)?;
+        let mut gains = noise_or_infinite(own.from_noise(output)?)?;
         for (mut column, noise) in gains.column_iter_mut().zip(&limits.noise) {
             column *= *noise;
         }
@@ -291,6 +292,38 @@ fn noise(
     Ok((matrix, together))
 }
 
+/// [`noise_gains`], infinite where a direct term passes white noise of continuous time.
+fn noise_or_infinite(mut system: StateSpace) -> Result<DMatrix<f64>, Error> {
+    let direct = system.d.clone();
+    if system.domain != Domain::Continuous {
+        return noise_gains(&system);
+    }
+    system.d.fill(0.0);
+    let passed = |gain: f64, direct: f64| if direct == 0.0 { gain } else { f64::INFINITY };
+    Ok(noise_gains(&system)?.zip_map(&direct, passed))
+}
+
+/// Returns for each fault the largest amplification of a sinusoidal error of the measurements to its
+/// estimate, all measurements together, in the units of `noise`.
+pub(crate) fn noise_peaks(designed: &ControllerDesign, noise: &[f64]) -> Result<Vec<f64>, Error> {
+    let physical = Physical::of(designed)?;
+    let own = physical.closed(&physical.controller)?;
+    let mut system = own.from_noise(&physical.estimates)?;
+    for (k, noise) in noise.iter().enumerate() {
+        system.b.column_mut(k).scale_mut(*noise);
+        system.d.column_mut(k).scale_mut(*noise);
+    }
+    let peak = |row: usize| {
+        let one = StateSpace {
+            c: system.c.rows(row, 1).into(),
+            d: system.d.rows(row, 1).into(),
+            ..system.clone()
+        };
+        Ok(largest_gain(&one)?.0)
+    };
+    (0..system.c.nrows()).map(peak).collect()
+}
+
 /// Returns the gains, and the peaks of S, beside those of the linear-quadratic design.
 fn comparison(
     designed: &ControllerDesign,
@@ -305,7 +338,11 @@ fn comparison(
     let seen = gains.estimator.output_matrix(&a_0, &plant.augmented_output());
     let l = gains.observer_gain();
     let dual = (-&l).transpose();
-    let observer = regulator_of_same_speed(&a_0.transpose(), &seen.transpose(), &dual, *domain)?;
+    // A law with its own model of the fault has no Kalman filter of the same kind.
+    let observer = match designed.law.a_f {
+        None => regulator_of_same_speed(&a_0.transpose(), &seen.transpose(), &dual, *domain)?,
+        Some(_) => None,
+    };
     let observer = observer.map(|gain| -gain.transpose());
     let mut found = vec![
         Compared {
@@ -333,6 +370,7 @@ fn comparison(
                 }),
                 l_x: observer.rows(0, all).into(),
                 l_f: -observer.rows(all, plant.f_a.ncols()),
+                p_f: None,
                 ..gains.clone()
             };
             Some(physical.closed(&complete(designed, &other)?.commands)?)

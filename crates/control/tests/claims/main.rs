@@ -7,6 +7,7 @@ mod data;
 mod detectability;
 mod distance;
 mod eigen;
+mod estimation;
 mod exponential;
 #[cfg(feature = "lmi")]
 mod family;

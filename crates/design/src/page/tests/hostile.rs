@@ -6,9 +6,9 @@ use crate::detection_report::{DecoupledInput, DetectedFault, Detection, Test};
 use crate::loss_report::{CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport};
 use crate::reconfiguration_report::{ReconfigurationReport, Reconfigured, WithoutActuator};
 use crate::report::{
-    Bound, Certificate, Check, CommandPeak, Curve, Effectiveness, FreeP, Frequency, Loop, Matrix,
-    Norm, Plant, ReferenceStep, Region, Report, Sampled, Signal, StepResponse, Theorem1, Ultimate,
-    Variable,
+    Bound, Certificate, Check, CommandPeak, Curve, Effectiveness, Estimation, EstimationErrors,
+    FreeP, Frequency, Loop, Matrix, Norm, Plant, ReferenceStep, Region, Report, Sampled, Signal,
+    StepResponse, Theorem1, Ultimate, Variable,
 };
 
 use crate::robust_report::{
@@ -364,6 +364,26 @@ pub(super) fn hostile() -> Report {
         gains: vec![numbers.matrix("L_x", 10, 8), numbers.matrix("L_f", 3, 8)],
         feedback: sampled_loop("Φ + Γ K_x", &rates, Some(region())),
         observer: sampled_loop("Φ_0 - L C_0", &rates[2..], None),
+        estimation: Estimation {
+            law: QUOTES.to_owned(),
+            sources: MARKUP.to_owned(),
+            equations: vec![format!("f' = L {MARKUP}")],
+            parameters: vec![Number { name: QUOTES.to_owned(), unit: None, value: 0.5 }],
+            conditions: vec![check("rank", true, Some(2.0))],
+            errors: vec![EstimationErrors {
+                fault: MARKUP.to_owned(),
+                unit: Some(QUOTES.to_owned()),
+                constant: 0.0,
+                step_settling: 0.25,
+                step_peak: 1.0,
+                ramp: None,
+                sine: 0.125,
+                sine_frequency: 3.5,
+                peak_gain: 2.0,
+                noise: Some(f64::INFINITY),
+                noise_peak: None,
+            }],
+        },
         sampling: Some(Sampled { sample_time: PERIOD, estimator: "current".to_owned() }),
         detection: Some(detection(&mut numbers)),
         certificate: certificate(&mut numbers),
@@ -453,6 +473,7 @@ pub(super) fn bare() -> Report {
         gains: Vec::new(),
         feedback: system(-1.5),
         observer: system(-20.25),
+        estimation: Estimation::default(),
         sampling: None,
         detection: None,
         certificate: Certificate {

@@ -5,8 +5,8 @@ use control::exponential::exponential;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::report::{
-    Bound, Certificate, Check, Curve, Frequency, Loop, Matrix, Norm, Plant, Report, Signal,
-    StepResponse, pairs, rows,
+    Bound, Certificate, Check, Curve, Estimation, Frequency, Loop, Matrix, Norm, Plant, Report,
+    Signal, StepResponse, pairs, rows,
 };
 
 use crate::robust_report::{Level, Limits, Verdict};
@@ -282,6 +282,7 @@ pub(super) fn pendulum() -> Report {
             &design.gains.error_dynamics(&design.plant),
             [8.31e6, 21.7, 4.4e-10],
         ),
+        estimation: Estimation::default(),
         sampling: None,
         detection: None,
         certificate: design.certificate(),

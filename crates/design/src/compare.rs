@@ -1,0 +1,115 @@
+//! Compares the laws that estimate faults on one plant file.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use files::{Source, Table};
+use serde::Serialize;
+
+use super::designed::{ControllerDesign, design_by};
+use super::error::Error;
+use super::estimation::Law;
+use super::identity::identity;
+use super::law::LawProblem;
+use super::parameters::ParameterFamily;
+use super::plant_file::PlantFile;
+use super::report::Estimation;
+use super::robust_report::Verdict;
+use super::{page, reporting};
+
+/// The laws on one plant, all for the same requirement.
+#[derive(Serialize)]
+pub struct Comparison {
+    /// Name of the plant file.
+    pub plant_file: String,
+    /// The laws, those that do not exist with the reason.
+    pub laws: Vec<LawResult>,
+    /// The text that every file about this plant contains.
+    #[serde(skip)]
+    pub identity: String,
+    /// The FMU of the plant, if the plant file names one.
+    #[serde(skip)]
+    pub model: Option<PathBuf>,
+}
+
+/// A law on the plant.
+#[derive(Serialize)]
+pub struct LawResult {
+    /// Its name in the plant file.
+    pub law: String,
+    /// Its authors.
+    pub sources: String,
+    /// Why it does not exist, in a sentence.
+    pub reason: Option<String>,
+    /// What it does on this plant; none if it does not exist.
+    pub result: Option<LawFigures>,
+}
+
+/// What a law does on the plant.
+#[derive(Serialize)]
+pub struct LawFigures {
+    /// Equations, parameters, conditions, errors of the estimates.
+    pub estimation: Estimation,
+    /// Disk margin alpha, all channels together, at the commands and at the measurements; none if the
+    /// loop is not stable.
+    pub disk_margin: Option<[f64; 2]>,
+    /// The verdict on the design with this law.
+    pub verdict: Verdict,
+}
+
+/// Designs the controller of the plant file at `path` with each law.
+///
+/// The law that the file names has the parameters of the file, the others have default parameters.
+/// Certificates and bounds are left out.
+///
+/// # Errors
+///
+/// Same as [`crate::design()`] for the augmented observer.
+pub fn compare(path: &Path) -> Result<Comparison, Error> {
+    let source = Source::read(path).map_err(Error::file("read", path))?;
+    let parsed = source.parse()?;
+    let file = PlantFile::read(&source, &Table::whole(&source, &parsed))?;
+    let family = ParameterFamily::of(&file)?;
+    let base = design_by(&file, &Law::Augmented)?;
+    let ControllerDesign { linear, extended, plant, gains, domain, .. } = &base;
+    let problem = LawProblem { linear, extended, plant, gains, domain: *domain };
+    let (mut laws, mut own_identity) = (Vec::new(), String::new());
+    for law in Law::ALL {
+        let stated = file.estimation.law.name() == law.name();
+        let law = if stated { file.estimation.law.clone() } else { law };
+        let mut found = LawResult {
+            law: law.name().to_owned(),
+            sources: law.sources().to_owned(),
+            reason: None,
+            result: None,
+        };
+        match problem.design(&law) {
+            Err(reason) => found.reason = Some(reason),
+            Ok(_) => {
+                let designed = design_by(&file, &law)?;
+                let whole = (&file, family.as_ref());
+                let report = reporting::report(whole, &designed, String::new(), Duration::ZERO)?;
+                own_identity = identity(&report);
+                found.result = Some(LawFigures {
+                    disk_margin: report.robustness.as_ref().and_then(|found| {
+                        let points = found.points.iter().map(|point| point.together.alpha);
+                        points.collect::<Vec<_>>().try_into().ok()
+                    }),
+                    estimation: report.estimation,
+                    verdict: report.verdict,
+                });
+            }
+        }
+        laws.push(found);
+    }
+    let model = file.fmu().map(Path::to_owned);
+    Ok(Comparison { plant_file: file.name(), laws, identity: own_identity, model })
+}
+
+impl Comparison {
+    /// The comparison as an HTML page that needs no other file.
+    #[must_use]
+    pub fn page(&self) -> String {
+        page::comparison(self)
+    }
+}

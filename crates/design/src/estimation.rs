@@ -1,0 +1,176 @@
+//! The table `[estimation]` of a plant file: the law that estimates the faults.
+
+use files::{Entry, Place, PlaceError, Table};
+
+/// A law with the parameters that the file states; the others follow from plant and observer.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Law {
+    Augmented,
+    ProportionalIntegral { proportional: Option<f64> },
+    FastAdaptive { sigma: Option<f64>, gamma: Option<Vec<f64>> },
+    SlidingMode { rho: Option<Vec<f64>>, delta: Option<Vec<f64>> },
+    Learning { kept: Option<f64> },
+}
+
+/// The requested law and its place in the file.
+#[derive(Clone, Debug)]
+pub(crate) struct EstimationRequest {
+    pub(crate) law: Law,
+    pub(crate) place: Place,
+}
+
+impl Law {
+    /// All laws, without stated parameters.
+    pub(crate) const ALL: [Self; 5] = [
+        Self::Augmented,
+        Self::ProportionalIntegral { proportional: None },
+        Self::FastAdaptive { sigma: None, gamma: None },
+        Self::SlidingMode { rho: None, delta: None },
+        Self::Learning { kept: None },
+    ];
+
+    /// The name in the plant file.
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Augmented => "augmented",
+            Self::ProportionalIntegral { .. } => "proportional-integral",
+            Self::FastAdaptive { .. } => "fast-adaptive",
+            Self::SlidingMode { .. } => "sliding-mode",
+            Self::Learning { .. } => "learning",
+        }
+    }
+
+    /// The parameters in the plant file.
+    fn keys(&self) -> &'static [&'static str] {
+        match self {
+            Self::Augmented => &[],
+            Self::ProportionalIntegral { .. } => &["proportional"],
+            Self::FastAdaptive { .. } => &["sigma", "gamma"],
+            Self::SlidingMode { .. } => &["rho", "delta"],
+            Self::Learning { .. } => &["K_1"],
+        }
+    }
+
+    /// The authors of the law.
+    pub(crate) fn sources(&self) -> &'static str {
+        match self {
+            Self::Augmented => "Patton and Klinkhieo (2009), (4), (5)",
+            Self::ProportionalIntegral { .. } => {
+                "Wojciechowski (1978); Söffker, Yu and Müller (1995); Busawon and Kabore (2001)"
+            }
+            Self::FastAdaptive { .. } => "Zhang, Jiang and Cocquempot (2008), theorem 1",
+            Self::SlidingMode { .. } => "Edwards, Spurgeon and Patton (2000)",
+            Self::Learning { .. } => "Chen and Saif (2001, 2006); Jia, Chen, Zhang and Li (2015)",
+        }
+    }
+
+    /// The equations of the law, for a sampled controller or one in continuous time.
+    pub(crate) fn equations(&self, sampled: bool) -> &'static [&'static str] {
+        match (self, sampled) {
+            (Self::Augmented, false) => &["f_hat' = A_f f_hat + L_f (y - C x_hat)"],
+            (Self::Augmented, true) => &["f_hat[k+1] = A_f (f_hat[k] + L_f (y[k] - C x_hat[k]))"],
+            (Self::ProportionalIntegral { .. }, false) => &[
+                "f_hat = f_hat_i + P_f (y - C x_hat)",
+                "f_hat_i' = A_f f_hat_i + L_f (y - C x_hat)",
+                "x_hat' = A x_hat + B u + F_a f_hat_i + L_x (y - C x_hat)",
+            ],
+            (Self::FastAdaptive { .. }, false) => &[
+                "f_hat = f_hat_i + P_f (y - C x_hat), P_f = Gamma F",
+                "f_hat_i' = L_f (y - C x_hat), L_f = sigma Gamma F",
+                "x_hat' = A x_hat + B u + F_a f_hat_i + L_x (y - C x_hat)",
+            ],
+            (Self::ProportionalIntegral { .. } | Self::FastAdaptive { .. }, true) => &[
+                "f_hat[k] = f_hat_i[k|k] + P_f (y[k] - C x_hat[k|k])",
+                "f_hat_i[k|k] = f_hat_i[k|k-1] + L_f (y[k] - C x_hat[k|k-1])",
+                "x_hat[k+1|k] = A x_hat[k|k] + B u[k] + F_a f_hat_i[k|k]",
+            ],
+            (Self::SlidingMode { .. }, _) => &[
+                "f_hat[k] = rho s / (|s| + delta), s = F (y[k] - C x_hat[k|k-1]), for each fault",
+                "x_hat[k+1|k] = A x_hat[k|k] + B u[k] + F_a f_hat[k]",
+            ],
+            (Self::Learning { .. }, _) => &[
+                "f_hat[k] = K_1 f_hat[k-1] + K_2 (y[k] - C x_hat[k|k-1])",
+                "x_hat[k+1|k] = A x_hat[k|k] + B u[k] + F_a f_hat[k]",
+            ],
+        }
+    }
+}
+
+impl EstimationRequest {
+    /// Reads the table; without it the law is the augmented observer. `faults`: their number.
+    pub(crate) fn read(file: &Table<'_>, faults: usize) -> Result<Self, PlaceError> {
+        let Some(entry) = file.get("estimation") else {
+            return Ok(Self { law: Law::Augmented, place: file.place.clone() });
+        };
+        let table = entry.table()?;
+        let names = Law::ALL.map(|law| law.name());
+        let stated = table.require("law", &format!("one of {}", names.join(", ")))?;
+        let found = stated.text()?;
+        let Some(law) = Law::ALL.into_iter().find(|law| law.name() == found) else {
+            let message = format!("expected one of {}, found {found:?}", names.join(", "));
+            return Err(stated.error(message));
+        };
+        for key in ["family", "schedule"] {
+            if law != Law::Augmented && file.get(key).is_some() {
+                let message = format!(
+                    "with `{key}` the law is the augmented observer: expected \"augmented\""
+                );
+                return Err(stated.error(message));
+            }
+        }
+        let known: Vec<_> = ["law"].iter().chain(law.keys()).copied().collect();
+        for (key, parameter) in table.entries() {
+            let owner = Law::ALL.into_iter().find(|law| law.keys().contains(&key));
+            if let Some(owner) = owner.filter(|_| !known.contains(&key)) {
+                let message =
+                    format!("it belongs to the law {}, not to {}", owner.name(), law.name());
+                return Err(parameter.error(message));
+            }
+        }
+        table.allow(&known)?;
+        let number = |key: &str| table.get(key).map(|entry| entry.positive()).transpose();
+        let numbers = |key: &str| table.get(key).map(|entry| each(&entry, faults)).transpose();
+        let law = match law {
+            Law::Augmented => law,
+            Law::ProportionalIntegral { .. } => Law::ProportionalIntegral {
+                proportional: table.get("proportional").map(|entry| part(&entry)).transpose()?,
+            },
+            Law::FastAdaptive { .. } => {
+                Law::FastAdaptive { sigma: number("sigma")?, gamma: numbers("gamma")? }
+            }
+            Law::SlidingMode { .. } => {
+                Law::SlidingMode { rho: numbers("rho")?, delta: numbers("delta")? }
+            }
+            Law::Learning { .. } => {
+                let kept = number("K_1")?;
+                if let Some((kept, entry)) = kept.zip(table.get("K_1")).filter(|own| own.0 > 1.0) {
+                    return Err(entry.error(format!("expected at most 1, found {kept}")));
+                }
+                Law::Learning { kept }
+            }
+        };
+        Ok(Self { law, place: stated.place })
+    }
+}
+
+/// Reads a number of at least 0.
+fn part(entry: &Entry<'_>) -> Result<f64, PlaceError> {
+    match entry.number()? {
+        number if number >= 0.0 => Ok(number),
+        number => Err(entry.error(format!("expected no less than 0, found {number}"))),
+    }
+}
+
+/// Reads one number above 0 for all faults, or one for each.
+fn each(entry: &Entry<'_>, faults: usize) -> Result<Vec<f64>, PlaceError> {
+    if !entry.is_list() {
+        return Ok(vec![entry.positive()?; faults]);
+    }
+    let members = entry.list()?;
+    if members.len() != faults {
+        let found = members.len();
+        let message = format!("expected {faults} numbers, one for each fault, found {found}");
+        return Err(entry.error(message));
+    }
+    members.iter().map(Entry::positive).collect()
+}

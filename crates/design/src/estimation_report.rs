@@ -1,0 +1,129 @@
+//! The part of the report on the law that estimates the faults.
+
+use control::estimation::mean_rate;
+use control::response::{
+    fault_gains, fault_rate_system, fault_system, frequency_response, step_response,
+};
+use control::{Domain, Error, StateSpace};
+
+use super::designed::ControllerDesign;
+use super::report::{Estimation, EstimationErrors};
+use super::robust_report::Robustness;
+use super::robustness::noise_peaks;
+use super::robustness_limits::RobustnessLimits;
+
+/// Relative width of the brackets of the peak gains.
+const WIDTH: f64 = 1e-3;
+/// Relative band of the settling time.
+const SETTLED: f64 = 0.02;
+/// The frequency of the sinusoidal fault relative to the mean rate of the observer.
+const SLOW: f64 = 0.1;
+
+/// Returns law, conditions and errors of the estimates; the noise only for a stable loop.
+pub(crate) fn estimation(
+    designed: &ControllerDesign,
+    robustness: Option<&Robustness>,
+    limits: &RobustnessLimits,
+) -> Result<Estimation, Error> {
+    let law = &designed.law;
+    let peaks = robustness.map(|_| noise_peaks(designed, &limits.noise)).transpose()?;
+    let noise = robustness.map(|found| {
+        let commands = designed.linear.actuators.len();
+        found.noise_together[commands..].iter().map(|number| number.value).collect::<Vec<_>>()
+    });
+    let own = Errors::of(designed)?;
+    let mut errors = Vec::new();
+    for (at, fault) in designed.linear.faults.iter().enumerate() {
+        errors.push(EstimationErrors {
+            noise: noise.as_ref().map(|list| list[at]),
+            noise_peak: peaks.as_ref().map(|list| list[at]),
+            fault: fault.name.clone(),
+            unit: fault.unit.clone(),
+            ..own.of_fault(at)?
+        });
+    }
+    let sampled = designed.domain != Domain::Continuous;
+    Ok(Estimation {
+        law: law.law.name().to_owned(),
+        sources: law.law.sources().to_owned(),
+        equations: law.law.equations(sampled).iter().map(|&line| line.to_owned()).collect(),
+        parameters: law.parameters.clone(),
+        conditions: law.conditions.clone(),
+        errors,
+    })
+}
+
+/// The error dynamics, from the faults to the errors of their estimates.
+struct Errors<'a> {
+    designed: &'a ControllerDesign,
+    of_faults: StateSpace,
+    /// From f', per second.
+    of_rates: StateSpace,
+    frequency: f64,
+}
+
+impl<'a> Errors<'a> {
+    fn of(designed: &'a ControllerDesign) -> Result<Self, Error> {
+        let ControllerDesign { plant, gains, domain, .. } = designed;
+        let mut of_rates = fault_rate_system(plant, gains, *domain)?;
+        if let Domain::Sampled { period } = domain {
+            of_rates.b.scale_mut(*period);
+        }
+        Ok(Self {
+            of_faults: Self::error_dynamics(designed, fault_system(plant, gains, *domain)?),
+            of_rates: Self::error_dynamics(designed, of_rates),
+            frequency: SLOW * mean_rate(&designed.required_error_dynamics, *domain)?,
+            designed,
+        })
+    }
+
+    /// The part of the loop without the plant's states and integrals, which do not influence the errors.
+    fn error_dynamics(designed: &ControllerDesign, system: StateSpace) -> StateSpace {
+        let all = designed.plant.a.nrows();
+        let order = all + designed.plant.f_a.ncols();
+        StateSpace {
+            a: system.a.view((all, all), (order, order)).into(),
+            b: system.b.rows(all, order).into(),
+            c: system.c.columns(all, order).into(),
+            ..system
+        }
+    }
+
+    fn of_fault(&self, at: usize) -> Result<EstimationErrors, Error> {
+        let ControllerDesign { plant, gains, domain, extended, law, .. } = self.designed;
+        let channel = extended.channels[at];
+        let row = 2 * plant.a.nrows() + channel.estimate;
+        let step = step_response(&self.of_faults, channel.estimate)?;
+        let transient = step.transient(row, SETTLED);
+        // A ramp of f is a constant f' of its estimate, which a ramp model follows without lag.
+        let ramp = match (law.leaks(), channel.rate) {
+            (true, _) => None,
+            (false, Some(_)) => Some(0.0),
+            (false, None) => {
+                let response = step_response(&self.of_rates, channel.estimate)?;
+                Some(response.final_value[row].abs())
+            }
+        };
+        let one = StateSpace {
+            b: self.of_faults.b.columns(channel.estimate, 1).into(),
+            c: self.of_faults.c.rows(row, 1).into(),
+            d: self.of_faults.d.view((row, channel.estimate), (1, 1)).into(),
+            ..self.of_faults.clone()
+        };
+        let point = frequency_response(&one, &[self.frequency])?;
+        let [peak, ..] = fault_gains(plant, gains, *domain, (&[row], WIDTH))?;
+        Ok(EstimationErrors {
+            fault: String::new(),
+            unit: None,
+            constant: step.final_value[row].abs(),
+            step_settling: transient.settling_time,
+            step_peak: transient.peak.abs(),
+            ramp,
+            sine: point[0].singular_values[0],
+            sine_frequency: self.frequency,
+            peak_gain: peak[(0, channel.estimate)],
+            noise: None,
+            noise_peak: None,
+        })
+    }
+}
