@@ -116,7 +116,7 @@ fn the_matrix_p_of_the_form_makes_the_error_strictly_positive_real() {
     let inverse = to.clone().try_inverse().unwrap();
     let a_l = &plant.a - &l_x * &plant.c;
     let inside = to * &a_l * inverse;
-    close(inside.view((0, 0), (3, 1)).as_slice(), &[-4.0, 0.0, 0.0], 1e-12);
+    close(inside.view((0, 0), (3, 1)).clone_owned().as_slice(), &[-4.0, 0.0, 0.0], 1e-12);
     let rest: DMatrix<f64> = inside.view((1, 1), (2, 2)).into();
     let p_w = lyapunov(&rest, &DMatrix::identity(2, 2)).unwrap().p;
     let mut scale = 1.0;
