@@ -44,12 +44,11 @@ pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     check::square("A", a)?;
     let balanced = Balance::new(a).matrix;
     let fast = || francis::eigenvalues(balanced.clone().hessenberg().unpack_h());
-    let mut found = match (a.nrows() >= LARGE).then(fast).flatten() {
-        Some(found) => found,
-        None => {
-            let form = schur(&balanced).or_else(|_| schur(&reflected(&balanced)))?;
-            diagonal_blocks(&form.unpack().1)
-        }
+    let mut found = if let Some(found) = (a.nrows() >= LARGE).then(fast).flatten() {
+        found
+    } else {
+        let form = schur(&balanced).or_else(|_| schur(&reflected(&balanced)))?;
+        diagonal_blocks(&form.unpack().1)
     };
     found.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
     Ok(found)

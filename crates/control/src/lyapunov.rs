@@ -179,9 +179,10 @@ impl Equation {
             let p = Doubling::new(&matrix, self.domain)?.solve(&scaled_q, self.remainder)?;
             (self.residual(&matrix, &p, &scaled_q) <= RESIDUAL_OF_DOUBLING).then_some(p)
         };
-        let p = match (matrix.nrows() >= LARGE).then(fast).flatten() {
-            Some(p) => p,
-            None => self.by_schur_form(&matrix, &scaled_q)?,
+        let p = if let Some(p) = (matrix.nrows() >= LARGE).then(fast).flatten() {
+            p
+        } else {
+            self.by_schur_form(&matrix, &scaled_q)?
         };
         let restore = |i: usize, j: usize| p[(i, j)] / scale[i] / scale[j];
         check::in_range("P", DMatrix::from_fn(p.nrows(), p.ncols(), restore))
