@@ -26,7 +26,8 @@ pub(super) fn narrowed<E>(
         let part = at_low / (at_low - at_high);
         // A step away from both ends lets the interval close around the crossing.
         let edge = (0.5 * least / width.abs()).min(0.5);
-        let inside = at_low.is_finite() && at_high.is_finite() && step % 3 != 0;
+        let finite = [at_low, at_high, part].iter().all(|value| value.is_finite());
+        let inside = finite && step % 3 != 0;
         let middle = low + width * if inside { part.clamp(edge, 1.0 - edge) } else { 0.5 };
         let value = of(middle)?;
         let replaces_low = (value > 0.0) == positive;
@@ -65,6 +66,10 @@ mod tests {
         assert!(good < 1.7 && 1.7 <= bad && bad - good < 4e-14, "{good} {bad}");
         let ((good, bad), _) = crossing(2.0, 1.0, |x| if x < 1.7 { f64::NAN } else { 1e300 });
         assert!(bad < 1.7 && 1.7 <= good && good - bad < 4e-14, "{good} {bad}");
+        // Both ends reach the value zero.
+        let ((low, high), _) =
+            crossing(0.0, 1.0, |x| if x < 0.3 { 0.0 } else { f64::MIN_POSITIVE });
+        assert!(low < 0.3 && 0.3 <= high && high - low < 2e-14, "{low} {high}");
         let ((low, high), _) = crossing(0.0, 1.0, |x| (x - 0.3).powi(9));
         assert!((low - 0.3).abs() < 1e-3 && (high - 0.3).abs() < 1e-3, "{low} {high}");
     }

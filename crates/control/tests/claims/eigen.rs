@@ -78,3 +78,45 @@ fn repeated_pairs_are_found() {
         }
     }
 }
+
+/// Ten equal eigenvalues, coupled by 1e-9, beside lightly damped pairs, in a dense basis of order 60:
+/// what an observer with ten measurements brings. The Schur form does not converge on some of these.
+#[test]
+fn a_large_matrix_with_a_cluster_has_the_eigenvalues_of_its_blocks() {
+    let n = 60;
+    let mut blocks = DMatrix::zeros(n, n);
+    for k in 0..10 {
+        blocks[(k, k)] = -9.745;
+        if k > 0 {
+            blocks[(k - 1, k)] = 1e-9;
+        }
+    }
+    let imaginary = |pair: usize| 0.3 + 0.11 * f64::from(u32::try_from(pair).unwrap());
+    for pair in 0..25 {
+        let at = 10 + 2 * pair;
+        (blocks[(at, at)], blocks[(at + 1, at + 1)]) = (-0.02, -0.02);
+        (blocks[(at, at + 1)], blocks[(at + 1, at)]) = (imaginary(pair), -imaginary(pair));
+    }
+    for row in 0..n {
+        for column in row + 2..n {
+            let k = f64::from(u32::try_from(n * row + column).unwrap());
+            blocks[(row, column)] += if row < 10 { 0.0 } else { 0.1 * (7.1 * k).sin() };
+        }
+    }
+    let reflection = |power: f64| {
+        let v = nalgebra::DVector::from_fn(n, |i, _| {
+            f64::from(u32::try_from(i + 1).unwrap()).powf(power)
+        });
+        DMatrix::identity(n, n) - &v * v.transpose() * (2.0 / v.norm_squared())
+    };
+    let q = reflection(-0.3) * reflection(0.4) * reflection(-1.0);
+    let found = eigenvalues(&(&q * &blocks * q.transpose())).unwrap();
+    let near = |value: Complex<f64>, width: f64| {
+        found.iter().filter(|found| (*found - value).norm() < width).count()
+    };
+    assert_eq!(near(Complex::from(-9.745), 1e-6), 10, "{found:?}");
+    for pair in 0..25 {
+        let value = Complex::new(-0.02, imaginary(pair));
+        assert_eq!((near(value, 1e-9), near(value.conj(), 1e-9)), (1, 1), "{value} {found:?}");
+    }
+}
