@@ -1,6 +1,7 @@
 //! `aso-ftc design`: designs a controller from a plant file; writes its report and its FMU.
 
 mod outputs;
+mod progress;
 mod terminal;
 
 use std::ffi::OsString;
@@ -12,6 +13,7 @@ use std::time::Duration;
 use anyhow::Context;
 use design::{Design, Language, Precision};
 use outputs::{Outputs, check_distinct, check_own};
+use progress::Bar;
 
 #[derive(clap::Args)]
 #[command(group(clap::ArgGroup::new("code").multiple(true)))]
@@ -77,7 +79,10 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     for library in &options.preload {
         fmu_import::preload(library)?;
     }
-    let mut made = design::design_within(&options.plant, options.certificate_time)?;
+    let mut made = {
+        let bar = Bar::new();
+        design::design_within(&options.plant, options.certificate_time, &|step| bar.show(step))?
+    };
     let code = code(options, &made)?;
     for (option, path, _) in &code.files {
         outputs.push((option, path));

@@ -6,6 +6,7 @@ use control::response::{
 };
 use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, RowDVector};
+use rayon::prelude::*;
 
 use super::budget::Budget;
 use super::designed::ControllerDesign;
@@ -17,7 +18,7 @@ const WIDTH: f64 = 1e-3;
 /// The parts of a sampling interval in which a fault may change and at which the states are read.
 const PARTS: u32 = 16;
 const POINTS_PER_DECADE: u32 = 20;
-/// Number of outputs between two looks at the clock.
+/// Number of outputs for each thread between two looks at the clock.
 const OUTPUTS_AT_ONCE: usize = 16;
 
 /// The outputs of the loop: states, state estimation errors, fault estimation errors.
@@ -110,11 +111,16 @@ impl<'a> Loops<'a> {
         }
         let mut rest = positions.len();
         while rest > 0 && !budget.is_over() {
-            let first = rest.saturating_sub(OUTPUTS_AT_ONCE);
-            let all = fault_gains(plant, gains, *domain, (&positions[first..rest], WIDTH))?;
-            for (row, place) in found[first..rest].iter_mut().enumerate() {
-                *place = Some(all.each_ref().map(|gains| gains.row(row).into_owned()));
-            }
+            let first = rest.saturating_sub(OUTPUTS_AT_ONCE * rayon::current_num_threads());
+            let at_once = found[first..rest].par_chunks_mut(OUTPUTS_AT_ONCE);
+            let rows = positions[first..rest].par_chunks(OUTPUTS_AT_ONCE);
+            at_once.zip(rows).try_for_each(|(places, rows)| {
+                let all = fault_gains(plant, gains, *domain, (rows, WIDTH))?;
+                for (row, place) in places.iter_mut().enumerate() {
+                    *place = Some(all.each_ref().map(|gains| gains.row(row).into_owned()));
+                }
+                Ok::<_, Error>(())
+            })?;
             rest = first;
         }
         Ok(found)

@@ -13,6 +13,7 @@ use super::identity::identity;
 use super::law::LawProblem;
 use super::parameters::ParameterFamily;
 use super::plant_file::PlantFile;
+use super::progress::Steps;
 use super::report::Estimation;
 use super::robust_report::Verdict;
 use super::{page, reporting};
@@ -89,7 +90,8 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
                 let designed = design_by(&file, &law)?;
                 let whole = (&file, family.as_ref());
                 let designed = (&designed, None);
-                let report = reporting::report(whole, designed, String::new(), Duration::ZERO)?;
+                let quietly = (Duration::ZERO, &Steps::new(&|_| {}));
+                let report = reporting::report(whole, designed, String::new(), quietly)?;
                 own_identity = identity(&report);
                 found.result = Some(LawFigures {
                     disk_margin: report.robustness.as_ref().and_then(|found| {

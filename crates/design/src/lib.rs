@@ -38,6 +38,7 @@ mod page;
 mod parameters;
 mod plant_file;
 mod plausibility;
+mod progress;
 mod reconfiguration;
 mod reconfiguration_limits;
 pub mod reconfiguration_report;
@@ -68,6 +69,7 @@ pub use code::{Code, Language, Precision};
 pub use compare::{Comparison, LawFigures, LawResult, compare};
 pub use controller_fmu::ControllerFmu;
 pub use error::Error;
+pub use progress::{Observer, Progress};
 pub use report::Report;
 pub use robust_report::Level;
 
@@ -75,6 +77,7 @@ use controller_fmu::Content;
 use designed::ControllerDesign;
 use parameters::ParameterFamily;
 use plant_file::PlantFile;
+use progress::{Step, Steps};
 
 /// The time that certificates and bounds may take unless something else is asked for.
 pub const CERTIFICATE_TIME: Duration = Duration::from_secs(30);
@@ -104,18 +107,22 @@ pub struct Design {
 /// [`Error`]: an entry of the file is wrong, with its line; the plant cannot be controlled, its faults
 /// cannot be told apart, or no gain meets the requirements.
 pub fn design(path: &Path) -> Result<Design, Error> {
-    design_within(path, CERTIFICATE_TIME)
+    design_within(path, CERTIFICATE_TIME, &|_| {})
 }
 
 /// [`design()`] in which certificates and bounds may take `certificate_time`; the rest of them is left
-/// out, and the report says so. Zero leaves all of them out.
+/// out, and the report says so. Zero leaves all of them out. `observer` is called when a step begins.
 ///
 /// # Errors
 ///
 /// Same as [`design()`].
-pub fn design_within(path: &Path, certificate_time: Duration) -> Result<Design, Error> {
+pub fn design_within(
+    path: &Path,
+    certificate_time: Duration,
+    observer: &Observer<'_>,
+) -> Result<Design, Error> {
     let source = Source::read(path).map_err(Error::file("read", path))?;
-    design_source(&source, certificate_time)
+    design_source(&source, certificate_time, &Steps::new(observer))
 }
 
 /// Designs the controller that `text`, the content of a plant file, asks for. `path` appears in errors;
@@ -125,14 +132,18 @@ pub fn design_within(path: &Path, certificate_time: Duration) -> Result<Design, 
 ///
 /// Same as [`design()`].
 pub fn design_text(path: &Path, text: String) -> Result<Design, Error> {
-    design_source(&Source::new(path, text), CERTIFICATE_TIME)
+    design_source(&Source::new(path, text), CERTIFICATE_TIME, &Steps::new(&|_| {}))
 }
 
-fn design_source(source: &Source, certificate_time: Duration) -> Result<Design, Error> {
+fn design_source(
+    source: &Source,
+    certificate_time: Duration,
+    steps: &Steps<'_>,
+) -> Result<Design, Error> {
     let parsed = source.parse()?;
     let file = PlantFile::read(source, &Table::whole(source, &parsed))?;
     let family = ParameterFamily::of(&file)?;
-    let designed = designed::design(&file)?;
+    let designed = steps.run(Step::Gains, || designed::design(&file))?;
     let description = description(&file, &designed);
     let detection = detection::detection(&file, &designed, family.as_ref())?;
     let section = detection.as_ref().map(|detection| &detection.section);
@@ -142,7 +153,7 @@ fn design_source(source: &Source, certificate_time: Duration) -> Result<Design, 
         (&file, family.as_ref()),
         (&designed, without),
         description,
-        certificate_time,
+        (certificate_time, steps),
     );
     let mut report = report.map_err(|error| {
         error.within(format!("the design for {} cannot be examined", file.name()))

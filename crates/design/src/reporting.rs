@@ -25,6 +25,7 @@ use super::page::rounded;
 use super::parameters::ParameterFamily;
 use super::plant_file::PlantFile;
 use super::plausibility::line;
+use super::progress::{Step, Steps};
 use super::reconfiguration_report::ReconfigurationReport;
 use super::reference_steps::{beyond_limits, reached, reference_steps};
 use super::report::{
@@ -42,7 +43,7 @@ pub(crate) fn report(
     (file, family): (&PlantFile<'_>, Option<&ParameterFamily<'_>>),
     (designed, reconfiguration): (&ControllerDesign, Option<ReconfigurationReport>),
     description: String,
-    certificate_time: Duration,
+    (certificate_time, steps): (Duration, &Steps<'_>),
 ) -> Result<Report, crate::Error> {
     let loops = Loops::of(designed)?;
     let ControllerDesign { plant, gains, linear, .. } = designed;
@@ -50,11 +51,12 @@ pub(crate) fn report(
     let references = reference_steps(designed)?;
     let mut checks = checks(designed);
     checks.extend(reached(&references));
-    let robustness = robustness(designed, &file.robustness, family)?;
+    let robustness = robustness(designed, &file.robustness, family, steps)?;
     let estimation = estimation(designed, robustness.as_ref(), &file.robustness)?;
     let budget = Budget::start(certificate_time);
-    let certificate = certificate(designed, loops.norms()?, &budget);
-    let (bounds, left_out) = loops.bounds(&budget)?;
+    let norms = loops.norms()?;
+    let certificate = steps.run(Step::Certificates, || certificate(designed, norms, &budget));
+    let (bounds, left_out) = steps.run(Step::Bounds, || loops.bounds(&budget))?;
     let losses = losses(designed, &budget)?;
     let of_losses = losses.iter().flat_map(LossReport::reasons);
     let further = of_losses.chain(reconfiguration.iter().flat_map(ReconfigurationReport::reasons));
@@ -110,7 +112,7 @@ pub(crate) fn report(
         detection: None,
         certificate,
         bounds,
-        steps: responses(designed)?,
+        steps: steps.run(Step::Responses, || responses(designed))?,
         references,
         frequency: loops.frequency()?,
         effectiveness: effectiveness(designed)?,

@@ -4,6 +4,7 @@ use control::hold::zero_order_hold;
 use control::response::{TimeResponse, fault_system, ramp_response, step_response};
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::analysis::Outputs;
 use super::designed::ControllerDesign;
@@ -22,35 +23,43 @@ pub(crate) const BETWEEN: u32 = 4;
 pub(crate) fn responses(designed: &ControllerDesign) -> Result<Vec<StepResponse>, Error> {
     let own = ShownLoop::of(designed)?;
     let faults = &designed.linear.faults;
-    let mut all = Vec::new();
-    for (fault, channel) in faults.iter().zip(&designed.extended.channels) {
+    let changes = faults.iter().zip(&designed.extended.channels).flat_map(|(fault, channel)| {
+        let rates = std::iter::once(None).chain(fault.rate_bound.map(Some));
+        rates.map(move |rate| (fault, channel.estimate, rate))
+    });
+    let changes: Vec<_> = changes.collect();
+    let one = |&(fault, input, rate): &(&Fault, usize, Option<f64>)| {
         let size = size(fault);
-        for rate in std::iter::once(None).chain(fault.rate_bound.map(Some)) {
-            let trace = match rate {
-                None => step_response(&own.system, channel.estimate)?,
-                Some(rate) => ramp_response(&own.system, channel.estimate, size / rate)?,
-            };
-            all.push(StepResponse {
-                fault: fault.name.clone(),
-                unit: fault.unit.clone(),
-                size,
-                rate,
-                parts: vec![part(fault)],
-                curves: own.curves(&trace, size),
-            });
-        }
-    }
-    if faults.len() > 1 {
+        let trace = match rate {
+            None => step_response(&own.system, input)?,
+            Some(rate) => ramp_response(&own.system, input, size / rate)?,
+        };
+        Ok(StepResponse {
+            fault: fault.name.clone(),
+            unit: fault.unit.clone(),
+            size,
+            rate,
+            parts: vec![part(fault)],
+            curves: own.curves(&trace, size),
+        })
+    };
+    let together = || {
         let names: Vec<_> = faults.iter().map(|fault| fault.name.as_str()).collect();
-        all.push(StepResponse {
+        Ok::<_, Error>(StepResponse {
             fault: names.join(" and "),
             unit: None,
             size: 1.0,
             rate: None,
             parts: faults.iter().map(part).collect(),
             curves: own.curves(&step_response(&own.together(), 0)?, 1.0),
-        });
-    }
+        })
+    };
+    let (all, last) = rayon::join(
+        || changes.par_iter().map(one).collect::<Result<Vec<_>, Error>>(),
+        || (faults.len() > 1).then(together).transpose(),
+    );
+    let mut all = all?;
+    all.extend(last?);
     Ok(all)
 }
 

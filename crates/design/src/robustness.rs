@@ -19,6 +19,7 @@ use super::designed::ControllerDesign;
 use super::linear_plant::LinearPlant;
 use super::page::rounded;
 use super::parameters::ParameterFamily;
+use super::progress::{Step, Steps};
 use super::report::{Check, Frequency, Matrix, rows};
 use super::robust_report::{
     Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Parameter, PeakSensitivity,
@@ -37,6 +38,7 @@ pub(crate) fn robustness(
     designed: &ControllerDesign,
     limits: &RobustnessLimits,
     family: Option<&ParameterFamily<'_>>,
+    steps: &Steps<'_>,
 ) -> Result<Option<Robustness>, crate::Error> {
     if designed.instability >= 0.0 {
         return Ok(None);
@@ -44,13 +46,15 @@ pub(crate) fn robustness(
     let physical = Physical::of(designed)?;
     let own = physical.closed(&physical.controller)?;
     let Margins { points, delay, hold, noise, noise_together } =
-        margins(designed, &physical, &own, limits)?;
+        steps.run(Step::Margins, || margins(designed, &physical, &own, limits))?;
     let slopes = slopes(&designed.linear, &physical, &points)?;
     let (comparison, tolerance) = rayon::join(
-        || comparison(designed, &physical, &points),
-        || match family {
-            None => by_entries(designed, &physical, limits),
-            Some(family) => by_parameters(designed, &physical, (limits, family), &slopes),
+        || steps.run(Step::Comparison, || comparison(designed, &physical, &points)),
+        || {
+            steps.run(Step::Tolerances, || match family {
+                None => by_entries(designed, &physical, limits),
+                Some(family) => by_parameters(designed, &physical, (limits, family), &slopes),
+            })
         },
     );
     Ok(Some(Robustness {
@@ -91,14 +95,17 @@ pub(crate) fn margins(
         };
         self::point(own, point, name, signals)
     };
-    let points = POINTS.into_iter().map(point).collect::<Result<Vec<_>, _>>()?;
-    let (delay, hold) = match designed.domain {
-        Domain::Continuous => (delay_margin(own)?, longest_hold(own)?),
-        Domain::Sampled { .. } => (
-            sampled_delay_margin(&physical.plant, &physical.controller)?,
-            longest_period(&physical.plant, &physical.controller)?,
-        ),
-    };
+    let Physical { plant, controller, .. } = physical;
+    let (points, [delay, hold]) = rayon::join(
+        || POINTS.into_par_iter().map(point).collect::<Result<Vec<_>, Error>>(),
+        || match designed.domain {
+            Domain::Continuous => [delay_margin(own), longest_hold(own)],
+            Domain::Sampled { .. } => {
+                [sampled_delay_margin(plant, controller), longest_period(plant, controller)]
+            }
+        },
+    );
+    let (points, delay, hold) = (points?, delay?, hold?);
     let (noise, noise_together) = noise(designed, own, &physical.estimates, limits)?;
     Ok(Margins { points, delay, hold, noise, noise_together })
 }

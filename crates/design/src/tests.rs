@@ -429,7 +429,7 @@ fn a_fault_of_a_mode_that_no_measurement_shows_is_refused() {
 fn judged(text: &str) -> (Level, String) {
     read(text, |file| {
         let designed = design(file).unwrap();
-        let found = robustness(&designed, &file.robustness, None).unwrap();
+        let found = robustness(&designed, &file.robustness, None, &unobserved()).unwrap();
         let verdict = verdict(&checks(&designed), found.as_ref(), &file.robustness, Vec::new());
         (verdict.level, verdict.reasons.join("; "))
     })
@@ -470,8 +470,13 @@ fn the_worst_plant_is_a_plant_file() {
     let (worst, a) = read(&text, |file| {
         let designed = design(file).unwrap();
         let time = super::CERTIFICATE_TIME;
-        let report =
-            super::reporting::report((file, None), (&designed, None), String::new(), time).unwrap();
+        let report = super::reporting::report(
+            (file, None),
+            (&designed, None),
+            String::new(),
+            (time, &unobserved()),
+        )
+        .unwrap();
         let a = report.robustness.as_ref().unwrap().tolerance.worst[0].values.clone();
         (super::worst_case::plant_file(file, &designed, &report).unwrap().unwrap(), a)
     })
@@ -490,8 +495,13 @@ fn without_time_for_certificates_the_report_says_what_is_left_out() {
         let [none, all] = [Duration::ZERO, super::CERTIFICATE_TIME].map(|time| {
             let report = |file: &PlantFile<'_>| {
                 let designed = design(file).unwrap();
-                super::reporting::report((file, None), (&designed, None), String::new(), time)
-                    .unwrap()
+                super::reporting::report(
+                    (file, None),
+                    (&designed, None),
+                    String::new(),
+                    (time, &unobserved()),
+                )
+                .unwrap()
             };
             read(&text, report).unwrap()
         });
@@ -571,4 +581,25 @@ fn fifty_states_get_a_linear_quadratic_design_without_linear_matrix_inequalities
     let expected =
         "linear matrix inequalities are solved for up to 30 states of the observer, found 51";
     assert_eq!(refused, expected);
+}
+
+fn unobserved() -> super::progress::Steps<'static> {
+    super::progress::Steps::new(&|_| {})
+}
+
+#[test]
+fn each_step_of_a_design_is_reported_once_with_the_part_that_is_done() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let seen = std::sync::Mutex::new(Vec::new());
+    let observe = |step| seen.lock().unwrap().push(step);
+    let plant = root.join("fmu-controller/pendulum.toml");
+    super::design_within(&plant, super::CERTIFICATE_TIME, &observe).unwrap();
+    let seen = seen.into_inner().unwrap();
+    let mut names: Vec<_> = seen.iter().map(|step| step.step).collect();
+    assert_eq!((names.len(), names[0]), (7, "gains"), "{names:?}");
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), 7);
+    assert!(seen.iter().all(|step| (0.0..1.0).contains(&step.done)), "{seen:?}");
+    assert!(seen[6].done > 0.5);
 }
