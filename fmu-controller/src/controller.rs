@@ -515,9 +515,10 @@ impl Model for AsoController {
             let distances = [command - low, high - command];
             for (side, indicator) in pairs.next().into_iter().flatten().enumerate() {
                 let beyond = if self.mode.is_at(side, j) { -HYSTERESIS } else { HYSTERESIS };
-                *indicator = match self.mode.is_gone(j) {
-                    true => 1.0,
-                    false => distances[side] / (high - low) + beyond,
+                *indicator = if self.mode.is_gone(j) {
+                    1.0
+                } else {
+                    distances[side] / (high - low) + beyond
                 };
             }
         }

@@ -62,7 +62,7 @@ pub(crate) fn losses(
         .into_iter()
         .map(|own| {
             let lossy = LossyLoop::new(&own.closed.plant, &own.closed.controller, &inputs)?;
-            Examination { designed, stated: &stated, lossy, budget }.report(own)
+            Examination { designed, stated: &stated, lossy, budget }.report(&own)
         })
         .collect::<Result<_, Error>>()?;
     Ok(Some(LossReport { stated: numbers(&stated, |loss| loss.up_to), loops }))
@@ -190,7 +190,7 @@ struct Examination<'a> {
 }
 
 impl Examination<'_> {
-    fn report(&self, own: Variant) -> Result<LossLoop, Error> {
+    fn report(&self, own: &Variant) -> Result<LossLoop, Error> {
         let constant: Vec<_> =
             self.boxes().iter().map(|own| self.constant(own)).collect::<Result<_, Error>>()?;
         let proof = match self.obstacle(&constant[0]) {

@@ -31,7 +31,7 @@ pub struct WithoutActuator {
     pub outcome: Result<Reconfigured, String>,
 }
 
-/// A controller without one actuator: u = K_x x_hat + K_f f_hat + K_s (stuck_at - operating point).
+/// A controller without one actuator: u = K_x x_hat + K_f f_hat + K_s (stuck command - operating point).
 #[derive(Serialize, JsonSchema)]
 pub struct Reconfigured {
     /// How the feedback was found, in a sentence.

@@ -218,7 +218,7 @@ impl Design {
                 "`restart` names a fault that does not exist"
             } else if own.loss.is_some() != own.time.is_some() || decided.is_some() && !lost {
                 "loss and time belong together, and to a fault with loss_of"
-            } else if decided.is_some_and(|(loss, time)| !(loss > 0.0 && time >= 0.0 && time < 1e9)) {
+            } else if decided.is_some_and(|(loss, time)| !(loss > 0.0 && (0.0..1e9).contains(&time))) {
                 "expected a loss above 0 and a time of at least 0 s"
             } else {
                 return None;
