@@ -165,7 +165,7 @@ def alarms(own, reset, fault, runs, samples, generator):
     root_w, root_v = np.sqrt(np.diag(w)), np.sqrt(np.diag(v))
     sums = [np.zeros((runs, 2 if "drift" in test else test["residuals"])) for test in own.tests]
     first = np.full(runs, samples)
-    for k in range(-300, samples):
+    for k in range(-200, samples):
         y = x @ c.T + root_v * generator.standard_normal((runs, 3))
         r = x_r @ own.c.T + y @ own.d_y.T
         x_r = x_r @ own.a.T + y @ own.b_y.T
@@ -197,7 +197,7 @@ def test_false_alarms_and_delays_of_simulated_runs_are_the_predicted_ones(tmp_pa
     report, file = designed(tmp_path, text(method, True, "isolation = true\n"))
     own = Filter(file["detection"])
     generator = np.random.default_rng(1)
-    runs, samples = 2000, 500
+    runs, samples = 1000, 400
     found = np.mean(alarms(own, 0, np.zeros(2), runs, samples, generator) < samples)
     predicted = 1.0 - np.exp(-samples * T / report["false_alarm_interval"])
     low, high = scipy.stats.binom.interval(0.999, runs, predicted)
@@ -205,7 +205,7 @@ def test_false_alarms_and_delays_of_simulated_runs_are_the_predicted_ones(tmp_pa
     for fault, entry in enumerate(report["faults"]):
         column = np.zeros(2)
         column[fault] = entry["size"]
-        delays = alarms(own, 0, column, runs, 2000, generator)
+        delays = alarms(own, 0, column, runs, 400, generator)
         # The first sample with the fault is at its start: half a sample less than on average.
         mean = (delays.mean() + 0.5) * T
         error = delays.std() * T / np.sqrt(runs)
@@ -254,7 +254,7 @@ def test_a_disturbance_that_the_measurements_show_late_is_a_random_walk_with_its
 @pytest.mark.parametrize(("change", "place"), [
     (('method = "cusum"', 'method = "t-test"'), 'expected "cusum" or "chi-square", found "t-test"'),
     (("false_alarm_interval = 200.0", ""), "`detection.false_alarm_interval` is missing"),
-    (("false_alarm_interval = 200.0", "false_alarm_interval = 0.1"), "at least 2"),
+    (("false_alarm_interval = 200.0", "false_alarm_interval = 0.05"), "at least 2"),
     (("noise = [0.02, 0.03, 0.04]", ""), "`detection.noise` is missing"),
     (("noise = [0.02, 0.03, 0.04]", "noise = [0.02, 0.03]"), "expected 3 numbers, one per measurement, found 2"),
     (("noise = [0.02, 0.03, 0.04]", "noise = 0"), "expected numbers above 0"),

@@ -112,12 +112,15 @@ pub(super) fn best_window(
         let test = WindowTest::with_false_alarms((residuals, window), samples, bias)?;
         let kind = TestKind::Window(test);
         let delay = |means: &DMatrix<f64>| {
-            let most = means.ncols() + 40 * window;
+            let most = means.ncols().min(40 * window) + 40 * window;
             kind.delay(means, 1.0, most).mean().unwrap_or(f64::INFINITY)
         };
         let sum: f64 = means.iter().map(delay).sum();
-        if best.is_none_or(|(least, _)| sum < least) {
-            best = Some((sum, test));
+        match best {
+            // Beyond the best window the delays grow with its length.
+            Some((least, _)) if sum > 2.0 * least => break,
+            Some((least, _)) if sum >= least => {}
+            _ => best = Some((sum, test)),
         }
         window *= 2;
     }
