@@ -3,6 +3,8 @@
 /// Terms of a series below this part of their sum end it.
 const NEGLIGIBLE: f64 = 1e-17;
 const MOST_TERMS: u32 = 1_000_000;
+/// A variable is never so many standard deviations below its mean, in double precision.
+const FAR: f64 = 40.0;
 
 /// The probability that a chi-square variable with `degrees` degrees of freedom is above `x`.
 ///
@@ -44,6 +46,11 @@ pub fn noncentral_survival(degrees: u32, noncentrality: f64, x: f64) -> f64 {
         return survival(degrees, x);
     }
     if x <= 0.0 {
+        return 1.0;
+    }
+    let mean = f64::from(degrees) + noncentrality;
+    let deviation = (2.0 * (mean + noncentrality)).sqrt();
+    if x < mean - FAR * deviation {
         return 1.0;
     }
     let rate = 0.5 * noncentrality;
@@ -146,12 +153,17 @@ mod tests {
 
     #[test]
     fn a_shifted_normal_variable_is_noncentral_with_one_degree() {
-        for (mean, x) in [(0.3, 1.0), (2.0, 9.0), (40.0, 1500.0)] {
+        for (mean, x) in [(0.3, 1.0), (2.0, 9.0), (40.0, 1500.0), (200.0, 39_000.0)] {
             let root = f64::sqrt(x);
             let expected = normal_below(mean - root) + normal_below(-mean - root);
             let found = noncentral_survival(1, mean * mean, x);
             assert!((found / expected - 1.0).abs() < 1e-11, "{mean} {x}: {found} {expected}");
         }
+    }
+
+    #[test]
+    fn a_variable_is_above_what_is_far_below_its_mean() {
+        assert!((noncentral_survival(3, 1e9, 20.0) - 1.0).abs() < 1e-15);
     }
 
     #[test]

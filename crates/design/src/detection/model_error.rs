@@ -28,7 +28,7 @@ pub(super) struct ModelErrors<'a> {
 }
 
 enum Plants<'a> {
-    Entries(StateSpace, Tolerances),
+    Entries(Box<(StateSpace, Tolerances)>),
     Parameters(&'a ParameterFamily<'a>),
 }
 
@@ -62,7 +62,8 @@ impl<'a> ModelErrors<'a> {
         };
         let tolerances = Tolerances::of_values(&plant, file.robustness.tolerance);
         Ok(Self {
-            plants: family.map_or(Plants::Entries(plant, tolerances), Plants::Parameters),
+            plants: family
+                .map_or_else(|| Plants::Entries(Box::new((plant, tolerances))), Plants::Parameters),
             domain: designed.domain,
             bounds: linear.actuators.iter().enumerate().map(bound).collect::<Result<_, _>>()?,
             margin: request.margin,
@@ -78,7 +79,8 @@ impl<'a> ModelErrors<'a> {
     ) -> Result<f64, crate::Error> {
         let mean = |plant: StateSpace| self.mean_of(problem, (decoupling, rows), plant);
         let found = match &self.plants {
-            Plants::Entries(plant, tolerances) => {
+            Plants::Entries(nominal) => {
+                let (plant, tolerances) = &**nominal;
                 let family = EntryFamily::new(plant, tolerances)?;
                 search(family.count(), |deviations| mean(family.plant(deviations)?))
             }

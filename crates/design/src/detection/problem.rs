@@ -61,7 +61,7 @@ impl Problem {
         if let Domain::Sampled { period } = designed.domain {
             let columns: Vec<DVector<f64>> = b
                 .column_iter()
-                .map(|c| c.into_owned())
+                .map(DVector::from)
                 .chain(inputs.iter().map(|input| input.on_states.clone()))
                 .collect();
             let (phi, gamma) =
@@ -128,7 +128,7 @@ impl Problem {
             };
             let noise = DVector::from_vec(values);
             self.plant.w = DMatrix::from_diagonal(&noise.component_mul(&noise));
-            self.origin_of_process_noise = "The plant file states it.".to_owned();
+            "The plant file states it.".clone_into(&mut self.origin_of_process_noise);
             return Ok(());
         }
         let unit = self.unit_process_noise();

@@ -32,9 +32,9 @@ pub(super) fn detection(found: &Detection) -> Markup {
 
 fn tests(tests: &[Test]) -> Markup {
     let decoupled = |inputs: &[DecoupledInput]| {
-        let one = |input: &DecoupledInput| match input.exact {
-            true => input.name.clone(),
-            false => format!("{} (approximately)", input.name),
+        let one = |input: &DecoupledInput| {
+            let how = if input.exact { "" } else { " (approximately)" };
+            format!("{}{how}", input.name)
         };
         inputs.iter().map(one).collect::<Vec<_>>().join(", ")
     };
