@@ -17,6 +17,7 @@ use progress::Bar;
 
 #[derive(clap::Args)]
 #[command(group(clap::ArgGroup::new("code").multiple(true)))]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct Options {
     /// The plant file: plant, faults and requirements on the controller
     /// (docs/reference/plant-file.md)

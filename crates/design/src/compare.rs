@@ -81,27 +81,24 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
         let mut found = LawResult {
             law: law.name().to_owned(),
             sources: law.sources().to_owned(),
-            reason: None,
+            reason: problem.design(&law).err(),
             result: None,
         };
-        match problem.design(&law) {
-            Err(reason) => found.reason = Some(reason),
-            Ok(_) => {
-                let designed = design_by(&file, &law)?;
-                let whole = (&file, family.as_ref());
-                let designed = (&designed, None);
-                let quietly = (Duration::ZERO, &Steps::new(&|_| {}));
-                let report = reporting::report(whole, designed, String::new(), quietly)?;
-                own_identity = identity(&report);
-                found.result = Some(LawFigures {
-                    disk_margin: report.robustness.as_ref().and_then(|found| {
-                        let points = found.points.iter().map(|point| point.together.alpha);
-                        points.collect::<Vec<_>>().try_into().ok()
-                    }),
-                    estimation: report.estimation,
-                    verdict: report.verdict,
-                });
-            }
+        if found.reason.is_none() {
+            let designed = design_by(&file, &law)?;
+            let whole = (&file, family.as_ref());
+            let designed = (&designed, None);
+            let quietly = (Duration::ZERO, &Steps::new(&|_| {}));
+            let report = reporting::report(whole, designed, String::new(), quietly)?;
+            own_identity = identity(&report);
+            found.result = Some(LawFigures {
+                disk_margin: report.robustness.as_ref().and_then(|found| {
+                    let points = found.points.iter().map(|point| point.together.alpha);
+                    points.collect::<Vec<_>>().try_into().ok()
+                }),
+                estimation: report.estimation,
+                verdict: report.verdict,
+            });
         }
         laws.push(found);
     }

@@ -32,19 +32,20 @@ fn plant() -> FaultyPlant {
 
 fn augmented(plant: &FaultyPlant) -> Gains {
     let (feedback, observer) = (real_poles(&[-1.0, -2.0, -3.0]), [-6.0, -7.0, -8.0, -9.0]);
-    design(plant, &feedback, &real_poles(&observer), None).unwrap().gains
+    design(plant, &feedback, &real_poles(&observer), None).expect("a design").gains
 }
 
 /// The plant every 0.1 s, and gains whose feedback and estimator the laws take over.
 fn sampled() -> (FaultyPlant, Gains, Domain) {
     let plant = plant();
-    let found = sample(&ExtendedPlant::without_filter(plant.clone()), T).unwrap();
+    let found = sample(&ExtendedPlant::without_filter(plant.clone()), T).expect("a sampled plant");
     let gains = Gains { estimator: Estimator::Current, ..augmented(&plant) };
     (found, gains, Domain::Sampled { period: T })
 }
 
 fn sorted_real(m: &DMatrix<f64>) -> Vec<f64> {
-    let mut all: Vec<_> = eigenvalues(m).unwrap().iter().map(|value| value.re).collect();
+    let mut all: Vec<_> =
+        eigenvalues(m).expect("eigenvalues").iter().map(|value| value.re).collect();
     all.sort_by(f64::total_cmp);
     all
 }
