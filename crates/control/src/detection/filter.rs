@@ -70,7 +70,7 @@ impl NoisyPlant {
     }
 
     /// The plant with `input` as a further state, a random walk: d' = noise of this intensity (in sampled
-    /// time `d[k+1]` = d[k] + noise of this covariance).
+    /// time `d[k+1] = d[k]` + noise of this covariance).
     ///
     /// A filter of this plant estimates the input: a constant one leaves the residuals in steady state.
     /// The larger the intensity, the sooner. Other inputs get a zero for the new state

@@ -90,7 +90,7 @@ pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
 /// for D = change P_i', change P_{i+1}', -change P_i', -change P_{i-1}'
 /// ```
 ///
-/// `P_i`' is the slope of P in interval i. P(theta[k+1]) - P(theta[k]) is in the convex hull of the
+/// `P_i`' is the slope of P in interval i. `P(theta[k+1]) - P(theta[k])` is in the convex hull of the
 /// four D, as `change` is at most the length of the shortest interval. The matrices are polynomials
 /// of t in each interval; all their Bernstein coefficients are positive definite, so the proof holds
 /// between the grid points, too. It is sufficient, not necessary.
