@@ -91,7 +91,7 @@ fn its_zeros_are_the_invariant_zeros() {
     for (p, q) in [(1, 1), (2, 2), (2, 1), (3, 2)] {
         let a = integers(4, 4, |i, j| (3 * i + 5 * j * j + i * j) % 7 - 3)
             - DMatrix::identity(4, 4) * 9.0;
-        let f_a = integers(4, q, |i, j| (2 * i + 3 * j + 1) % 5 - 1);
+        let f_a = integers(4, q, |i, j| (2 * i + 3 * j + 2) % 5 - 1);
         let c = integers(p, 4, |i, j| (4 * i + j + i * j + 2) % 5 - 1);
         let plant =
             FaultyPlant::with_constant_faults(a.clone(), f_a.clone(), c.clone(), f_a.clone());
@@ -215,7 +215,8 @@ fn the_boundary_layer_leaves_one_part_in_a_hundred_of_a_small_fault() {
     let step = step_response(&fault_system(&plant, &found, domain).unwrap(), 0).unwrap();
     assert!((step.final_value[6] + 0.01).abs() < 1e-4, "{}", step.final_value[6]);
     let eigenvalues = sorted_real(&found.error_dynamics(&plant));
-    assert!(eigenvalues.iter().any(|value| (value - fast).abs() < 1e-9), "{eigenvalues:?}");
+    // It is a double eigenvalue here, known to the root of the precision.
+    assert!(eigenvalues.iter().any(|value| (value - fast).abs() < 1e-7), "{eigenvalues:?}");
     let law = SlidingMode { delta: Some(vec![delta[0] / 10.0]), ..law };
     plant.a_f = DMatrix::identity(1, 1);
     let refused = sliding_mode((&plant, &form), &gains, &law, 5.0);
