@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 
 from conftest import ROOT
 
-PLANT = ROOT / "examples/plants/underwater-vehicle.toml"
+PLANT = ROOT / "examples/plants/actuators/underwater-vehicle.toml"
 
 
 @pytest.fixture(scope="module")

@@ -43,12 +43,12 @@ const LARGE: usize = 48;
 pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     check::square("A", a)?;
     let balanced = Balance::new(a).matrix;
-    let fast = || francis::eigenvalues(balanced.clone().hessenberg().unpack_h());
-    let mut found = if let Some(found) = (a.nrows() >= LARGE).then(fast).flatten() {
-        found
-    } else {
-        let form = schur(&balanced).or_else(|_| schur(&reflected(&balanced)))?;
-        diagonal_blocks(&form.unpack().1)
+    let alone = || francis::eigenvalues(balanced.clone().hessenberg().unpack_h());
+    let of_the_form = || schur(&balanced).map(|form| diagonal_blocks(&form.unpack().1));
+    let reflected = || schur(&reflected(&balanced)).map(|form| diagonal_blocks(&form.unpack().1));
+    let mut found = match (a.nrows() >= LARGE).then(alone).flatten() {
+        Some(found) => found,
+        None => of_the_form().or_else(|error| alone().ok_or(error)).or_else(|_| reflected())?,
     };
     found.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
     Ok(found)
