@@ -1,13 +1,9 @@
 //! Loss of effectiveness: its estimate, and the loss up to which the loop is stable.
 
+use super::lossy_loop::{LossyLoop, as_number, grid};
 use crate::aso::FaultyPlant;
-use crate::controller::closed_loop;
-use crate::stability::instability;
-use crate::{Error, StateSpace, check};
+use crate::{Error, StateSpace};
 
-/// Number of points on a line, between no loss and the largest loss, at which stability is tested.
-const POINTS: u32 = 50;
-const BISECTIONS: usize = 40;
 /// Largest number of points of the grid over several inputs.
 const GRID: usize = 1000;
 const GRID_PER_INPUT: usize = 11;
@@ -27,7 +23,7 @@ const GRID_PER_INPUT: usize = 11;
 ///
 /// [`Error::OutOfRange`] when `excitation` is not above zero.
 pub fn estimated_loss(u: f64, f_hat: f64, excitation: f64) -> Result<f64, Error> {
-    check::positive("u_e", excitation)?;
+    crate::check::positive("u_e", excitation)?;
     let size = u.hypot(excitation);
     Ok(-(u / size) * (f_hat / size))
 }
@@ -42,7 +38,7 @@ pub struct LossTolerance {
     pub single: Vec<f64>,
     /// The point of the grid over all combinations where the loop is least stable.
     pub worst: Vec<f64>,
-    /// [`instability`] there; negative when the loop is stable at every point of the grid.
+    /// [`instability`](crate::stability::instability) there; negative when the loop is stable at every point of the grid.
     pub worst_instability: f64,
 }
 
@@ -59,7 +55,8 @@ pub struct LossTolerance {
 ///
 /// # Errors
 ///
-/// Same as [`closed_loop`] and [`instability`]; [`Error::OutOfRange`] for a bad
+/// Same as [`closed_loop`](crate::controller::closed_loop) and
+/// [`instability`](crate::stability::instability); [`Error::OutOfRange`] for a bad
 /// `largest`, an input that does not exist, or more than nine inputs.
 pub fn loss_tolerance(
     plant: &FaultyPlant,
@@ -67,102 +64,43 @@ pub fn loss_tolerance(
     inputs: &[usize],
     largest: f64,
 ) -> Result<LossTolerance, Error> {
-    let losses = Losses { plant, controller, inputs };
-    losses.check(largest)?;
+    check(inputs.len(), largest)?;
+    let lossy = LossyLoop::of_any_number(plant, controller, inputs)?;
     let alone = |at: usize| {
         let mut direction = vec![0.0; inputs.len()];
         direction[at] = 1.0;
-        losses.along(&direction, largest)
+        lossy.along(&direction, largest)
     };
-    let (worst, worst_instability) = losses.worst(largest)?;
+    let mut worst = (vec![0.0; inputs.len()], f64::NEG_INFINITY);
+    for loss in grid(&vec![largest; inputs.len()], points(inputs.len())) {
+        let value = lossy.instability(&loss)?;
+        if value > worst.1 {
+            worst = (loss, value);
+        }
+    }
     Ok(LossTolerance {
-        common: losses.along(&vec![1.0; inputs.len()], largest)?,
+        common: lossy.along(&vec![1.0; inputs.len()], largest)?,
         single: (0..inputs.len()).map(alone).collect::<Result<_, _>>()?,
-        worst,
-        worst_instability,
+        worst: worst.0,
+        worst_instability: worst.1,
     })
 }
 
-struct Losses<'a> {
-    plant: &'a FaultyPlant,
-    controller: &'a StateSpace,
-    inputs: &'a [usize],
+fn check(inputs: usize, largest: f64) -> Result<(), Error> {
+    if !(largest > 0.0 && largest <= 1.0) {
+        let rule = "above zero and at most one";
+        return Err(Error::OutOfRange { name: "the largest loss", value: largest, rule });
+    }
+    if inputs == 0 || 1 << inputs.min(20) > GRID {
+        let (name, rule) = ("the number of inputs with a loss", "from one to nine");
+        return Err(Error::OutOfRange { name, value: as_number(inputs), rule });
+    }
+    Ok(())
 }
 
-impl Losses<'_> {
-    fn check(&self, largest: f64) -> Result<(), Error> {
-        if !(largest > 0.0 && largest <= 1.0) {
-            let rule = "above zero and at most one";
-            return Err(Error::OutOfRange { name: "the largest loss", value: largest, rule });
-        }
-        #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-        let as_number = |count: usize| count as f64;
-        if let Some(&input) = self.inputs.iter().find(|&&input| input >= self.plant.b.ncols()) {
-            let (name, rule) = ("the input of a loss", "the index of an input, from zero");
-            return Err(Error::OutOfRange { name, value: as_number(input), rule });
-        }
-        if self.inputs.is_empty() || 1 << self.inputs.len().min(20) > GRID {
-            let (name, rule) = ("the number of inputs with a loss", "from one to nine");
-            return Err(Error::OutOfRange { name, value: as_number(self.inputs.len()), rule });
-        }
-        Ok(())
-    }
-
-    fn instability(&self, loss: &[f64]) -> Result<f64, Error> {
-        let mut effectiveness = vec![1.0; self.plant.b.ncols()];
-        for (&input, loss) in self.inputs.iter().zip(loss) {
-            effectiveness[input] = 1.0 - loss;
-        }
-        let dynamics = closed_loop(self.plant, self.controller, &effectiveness)?;
-        instability(&dynamics, self.controller.domain)
-    }
-
-    /// The largest t, at most `end`, such that the loop is stable from zero to t times `direction`.
-    fn along(&self, direction: &[f64], end: f64) -> Result<f64, Error> {
-        let stable = |t: f64| {
-            let loss: Vec<f64> = direction.iter().map(|part| part * t).collect();
-            Ok::<_, Error>(self.instability(&loss)? < 0.0)
-        };
-        if !stable(0.0)? {
-            return Ok(0.0);
-        }
-        let mut good = 0.0;
-        for point in 1..=POINTS {
-            let t = end * f64::from(point) / f64::from(POINTS);
-            if stable(t)? {
-                good = t;
-                continue;
-            }
-            let mut bad = t;
-            for _ in 0..BISECTIONS {
-                let middle = 0.5 * (good + bad);
-                *(if stable(middle)? { &mut good } else { &mut bad }) = middle;
-            }
-            break;
-        }
-        Ok(good)
-    }
-
-    fn worst(&self, largest: f64) -> Result<(Vec<f64>, f64), Error> {
-        let count = self.inputs.len();
-        let fits = |points: &usize| points.checked_pow(u32::try_from(count).unwrap_or(u32::MAX));
-        let finest = (2..=GRID_PER_INPUT).rev().find(|at| fits(at).is_some_and(|all| all <= GRID));
-        let points = finest.unwrap_or(2);
-        let mut worst = (vec![0.0; count], f64::NEG_INFINITY);
-        let mut corner = vec![0; count];
-        loop {
-            #[expect(clippy::cast_precision_loss, reason = "at most eleven")]
-            let part = |at: &usize| largest * *at as f64 / (points - 1) as f64;
-            let loss: Vec<f64> = corner.iter().map(part).collect();
-            let value = self.instability(&loss)?;
-            if value > worst.1 {
-                worst = (loss, value);
-            }
-            let Some(next) = corner.iter().position(|&at| at + 1 < points) else {
-                return Ok(worst);
-            };
-            corner[next] += 1;
-            corner[..next].fill(0);
-        }
-    }
+/// The largest number of points for each input, at most eleven, whose grid is small enough.
+fn points(inputs: usize) -> usize {
+    let inputs = u32::try_from(inputs).unwrap_or(u32::MAX);
+    let fits = |points: &usize| points.checked_pow(inputs).is_some_and(|all| all <= GRID);
+    (2..=GRID_PER_INPUT).rev().find(fits).unwrap_or(2)
 }

@@ -66,11 +66,20 @@ impl LossyLoop {
         controller: &StateSpace,
         inputs: &[usize],
     ) -> Result<Self, Error> {
-        let m = plant.b.ncols();
         if inputs.is_empty() || inputs.len() > MOST_INPUTS {
             let (name, rule) = ("the number of inputs with a loss", "from one to six");
             return Err(Error::OutOfRange { name, value: as_number(inputs.len()), rule });
         }
+        Self::of_any_number(plant, controller, inputs)
+    }
+
+    /// Same as [`Self::new`], for any number of inputs.
+    pub(super) fn of_any_number(
+        plant: &FaultyPlant,
+        controller: &StateSpace,
+        inputs: &[usize],
+    ) -> Result<Self, Error> {
+        let m = plant.b.ncols();
         if let Some(&input) = inputs.iter().find(|&&input| input >= m) {
             let (name, rule) = ("the input of a loss", "the index of an input, from zero");
             return Err(Error::OutOfRange { name, value: as_number(input), rule });
@@ -121,7 +130,7 @@ impl LossyLoop {
             if factor < limit.factor {
                 limit = ConstantLimit { factor, loss };
             } else if limit.factor >= most {
-                let found = instability(&self.at(&loss), self.domain)?;
+                let found = self.instability(&loss)?;
                 if found > least_stable {
                     (least_stable, limit.loss) = (found, loss);
                 }
@@ -131,10 +140,10 @@ impl LossyLoop {
     }
 
     /// The largest t, at most `end`, such that the loop is stable from zero to t times `direction`.
-    fn along(&self, direction: &[f64], end: f64) -> Result<f64, Error> {
+    pub(super) fn along(&self, direction: &[f64], end: f64) -> Result<f64, Error> {
         let stable = |t: f64| {
             let loss: Vec<f64> = direction.iter().map(|part| part * t).collect();
-            Ok::<_, Error>(instability(&self.at(&loss), self.domain)? < 0.0)
+            Ok::<_, Error>(self.instability(&loss)? < 0.0)
         };
         if !stable(0.0)? {
             return Ok(0.0);
@@ -156,6 +165,11 @@ impl LossyLoop {
         Ok(good)
     }
 
+    /// [`instability`] of A(E).
+    pub(super) fn instability(&self, loss: &[f64]) -> Result<f64, Error> {
+        instability(&self.at(loss), self.domain)
+    }
+
     fn check(&self, largest: &[f64]) -> Result<(), Error> {
         let given = DMatrix::from_column_slice(largest.len(), 1, largest);
         check::shape("the largest losses", &given, (self.effects.len(), 1))?;
@@ -169,7 +183,7 @@ impl LossyLoop {
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a count far below 2^52")]
-fn as_number(count: usize) -> f64 {
+pub(super) fn as_number(count: usize) -> f64 {
     count as f64
 }
 
@@ -179,7 +193,7 @@ fn corners(largest: &[f64]) -> Vec<Vec<f64>> {
 }
 
 /// All combinations of `points` values from 0 to the largest of each input.
-fn grid(largest: &[f64], points: usize) -> Vec<Vec<f64>> {
+pub(super) fn grid(largest: &[f64], points: usize) -> Vec<Vec<f64>> {
     largest.iter().fold(vec![Vec::new()], |all, largest| {
         let values = if *largest > 0.0 { points } else { 1 };
         let extended = |begun: &Vec<f64>| {
