@@ -40,6 +40,13 @@ def test_a_grid_has_every_combination_once():
         assert found[2] == pytest.approx(wanted[2], rel=1e-14)
 
 
+def test_whole_levels_between_whole_ends_stay_whole():
+    own = {"from": 1, "to": 7, "steps": 4, "set": "algorithm.jobs"}
+    for change, expected in (({}, [1, 3, 5, 7]), ({"to": 7.0}, [1.0, 3.0, 5.0, 7.0]), ({"steps": 5}, [1.0, 2.5, 4.0, 5.5, 7.0])):
+        levels = columns(paper(parameters={"n": own | change}))["n"]
+        assert levels == expected and {type(level) for level in levels[1:-1]} == {type(expected[1])}
+
+
 @pytest.mark.parametrize(
     "name, entries", [("norm", {"loc": 25.0, "scale": 2.0}), ("gamma", {"a": 3.0}), ("expon", {})]
 )

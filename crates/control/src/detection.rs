@@ -7,6 +7,7 @@
 //! | what a fault does to a residual | [`DetectionFilter::effect`], [`mean_after_step`], [`mean_of_constant`] |
 //! | test of one residual by cumulative sums | [`Cusum`] |
 //! | test of the mean of several residuals over a window | [`WindowTest`] |
+//! | what errors of the model do to residuals | [`UncertainPlant::largest_mean`] |
 //! | distribution chi-square, central and noncentral | [`chi_square`] |
 //!
 //! The filter is a Kalman filter of the plant without faults, so that its residuals are white: the false
@@ -19,10 +20,12 @@ mod cusum;
 mod delay;
 mod effect;
 mod filter;
+mod model_error;
 mod window;
 
 pub use cusum::Cusum;
 pub use delay::Delay;
 pub use effect::{mean_after_step, mean_of_constant};
 pub use filter::{DetectionFilter, NoisyPlant, UnknownInput, detection_filter};
+pub use model_error::UncertainPlant;
 pub use window::WindowTest;

@@ -64,6 +64,7 @@ pub(crate) fn detection(
     let Some(request) = &file.detection else {
         return Ok(None);
     };
+    check_plants(file, request)?;
     let problem = Problem::new(file, request, designed)?;
     let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
     let errors = request
@@ -75,6 +76,22 @@ pub(crate) fn detection(
     let report = report(request, &problem, &parts, &mut warnings).map_err(refuse)?;
     let section = Section::new(&problem, &parts, report.from, designed);
     Ok(Some(Detection { section, report, warnings }))
+}
+
+/// Refuses several plants that the tests cannot allow for.
+fn check_plants(file: &PlantFile<'_>, request: &DetectionRequest) -> Result<(), crate::Error> {
+    let message = if file.schedule.is_some() {
+        "the residuals are those of one plant: expected no [schedule] with [detection]"
+    } else if file.family.is_empty() || (request.model_error.is_some() && file.fmu().is_none()) {
+        return Ok(());
+    } else if file.fmu().is_some() {
+        "the residuals are those of one operating point: expected no [[family]] of an FMU with [detection]; \
+         tolerances of its `parameters` in [robustness], with `model_error`, allow for other plants"
+    } else {
+        "the other plants of [[family]] would give false alarms: expected `model_error`, so that the tests \
+         allow for them"
+    };
+    Err(file.error_at(&request.place, message).into())
 }
 
 /// Plans the filters and their tests.
@@ -122,9 +139,7 @@ fn plan(
 ) -> Result<PlannedTest, crate::Error> {
     let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
     let bias = |rows: &DMatrix<f64>| match errors {
-        Some(errors) => errors.largest_mean(problem, (decoupling, rows)).map_err(|error| {
-            error.within("the residuals of a wrong model are not bounded".to_owned())
-        }),
+        Some(errors) => errors.largest_mean(problem, (decoupling, rows)),
         None => Ok(0.0),
     };
     #[expect(clippy::cast_precision_loss, reason = "a number of faults")]
@@ -219,7 +234,9 @@ fn report(
     let faults = (0..q).filter_map(|fault| fault_report(problem, parts, fault, within).transpose());
     let reacts: Vec<Vec<bool>> = tests(parts).map(|(_, test)| test.reacts.clone()).collect();
     let confused = if request.isolation { confused(&reacts, problem) } else { Vec::new() };
+    let faults = faults.collect::<Result<Vec<_>, _>>()?;
     warn(&reported, &confused, warnings);
+    hidden(&reported, &faults, warnings);
     let rate: f64 = reported.iter().map(|test| 1.0 / test.false_alarm_interval).sum();
     Ok(Report {
         method: match request.method {
@@ -243,7 +260,7 @@ fn report(
             values: rows(&structure),
         },
         tests: reported,
-        faults: faults.collect::<Result<_, _>>()?,
+        faults,
         reacts,
         confused,
     })
@@ -329,6 +346,21 @@ fn warn(tests: &[Test], confused: &[Vec<String>], warnings: &mut Vec<String>) {
                 test.name,
                 input.size.unwrap_or(1.0),
                 input.largest_mean
+            ));
+        }
+    }
+}
+
+/// Names the faults of their size that errors of the model hide.
+fn hidden(tests: &[Test], faults: &[DetectedFault], warnings: &mut Vec<String>) {
+    for fault in faults.iter().filter(|fault| fault.delay.is_none()) {
+        let own = tests.iter().find(|test| test.name == fault.test && test.model_error > 0.0);
+        if let Some(test) = own {
+            warnings.push(format!(
+                "{} of {} moves the mean of its residuals by {:.3} standard deviations, errors of the model by \
+                 up to {:.3}: it may stay undetected; smaller tolerances in [robustness] or smaller `commands` \
+                 help",
+                fault.fault, fault.size, fault.mean, test.model_error
             ));
         }
     }

@@ -8,7 +8,7 @@ use files::{Entry, PlaceError};
 use fmu_description::{Causality, Kind};
 use fmu_import::Fmu;
 use linearise::{Linearise, linearise};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::linear_plant;
 use super::plant_file::{PlantFile, PlantFmu};
@@ -111,6 +111,38 @@ impl<'a> ParameterFamily<'a> {
         Ok([(high.a - low.a) * 0.5, (high.b - low.b) * 0.5, (high.c - low.c) * 0.5])
     }
 
+    /// Linearises the FMU at the operating point of the plant file, with other parameters; returns also the
+    /// rates of its states there, and its measurements.
+    pub(crate) fn at_operating_point(
+        &self,
+        deviations: &[f64],
+    ) -> Result<(StateSpace, DVector<f64>, DVector<f64>), crate::Error> {
+        let mut request = self.request.clone();
+        let mut values = Vec::with_capacity(deviations.len());
+        for (parameter, deviation) in self.parameters.iter().zip(deviations) {
+            let value = parameter.value(*deviation).to_string();
+            values.push(format!("{} = {value}", parameter.name));
+            request.at.retain(|(name, _)| *name != parameter.name);
+            request.at.push((parameter.name.clone(), value));
+        }
+        let found = linearise(&self.fmu, &request).map_err(|error| {
+            let (path, values) = (self.own.path.display(), values.join(", "));
+            let message = format!("{path} with {values}: {error}");
+            crate::Error::from(self.file.error(&["robustness"], message))
+        })?;
+        let measured = found.outputs.iter().map(|signal| signal.value);
+        let measured = DVector::from_iterator(found.outputs.len(), measured);
+        let matrices = found.matrices;
+        let plant = StateSpace {
+            a: matrices.a,
+            b: matrices.b,
+            c: matrices.c,
+            d: matrices.d,
+            domain: Domain::Continuous,
+        };
+        Ok((plant, DVector::from_vec(found.rates), measured))
+    }
+
     /// The parameters for the report; `deviations`: those of the worst plant; `peaks`: derivatives of
     /// the peaks of S at the commands and at the measurements with respect to the entries.
     pub(crate) fn report(&self, deviations: &[f64], peaks: &[[DMatrix<f64>; 3]]) -> Vec<Parameter> {
@@ -204,27 +236,7 @@ impl PlantFamily for ParameterFamily<'_> {
 
     /// Linearises the FMU at the operating point of the plant file, with other parameters.
     fn plant(&self, deviations: &[f64]) -> Result<StateSpace, crate::Error> {
-        let mut request = self.request.clone();
-        let mut values = Vec::with_capacity(deviations.len());
-        for (parameter, deviation) in self.parameters.iter().zip(deviations) {
-            let value = parameter.value(*deviation).to_string();
-            values.push(format!("{} = {value}", parameter.name));
-            request.at.retain(|(name, _)| *name != parameter.name);
-            request.at.push((parameter.name.clone(), value));
-        }
-        let found = linearise(&self.fmu, &request).map_err(|error| {
-            let (path, values) = (self.own.path.display(), values.join(", "));
-            let message = format!("{path} with {values}: {error}");
-            crate::Error::from(self.file.error(&["robustness"], message))
-        })?;
-        let matrices = found.matrices;
-        Ok(StateSpace {
-            a: matrices.a,
-            b: matrices.b,
-            c: matrices.c,
-            d: matrices.d,
-            domain: Domain::Continuous,
-        })
+        Ok(self.at_operating_point(deviations)?.0)
     }
 
     fn slopes(&self, entries: &[DMatrix<f64>; 3]) -> Vec<f64> {

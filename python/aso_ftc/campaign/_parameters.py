@@ -169,7 +169,13 @@ def _range(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
     _unknown(place, own, [*_RANGES, "set", "unit"])
     if "to" not in own:
         raise _fail(place, "from without to")
-    return _between(place, own, _number(place, "from", own["from"]), _number(place, "to", own["to"]))
+    levels, quantile = _between(place, own, _number(place, "from", own["from"]), _number(place, "to", own["to"]))
+    ends = (own["from"], own["to"])
+    if levels is not None and all(isinstance(end, int) for end in ends) and "logarithmic" not in own:
+        # Whole levels stay whole: variables of type Integer take no 1.0.
+        size, rest = divmod(ends[1] - ends[0], own["steps"] - 1)
+        levels = tuple(range(ends[0], ends[1] + 1, size)) if rest == 0 else levels
+    return levels, quantile
 
 
 def _relative(place: str, own: dict[str, Any], value: Any) -> tuple[Any, Any]:

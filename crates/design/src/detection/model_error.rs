@@ -1,10 +1,9 @@
 //! The residuals that errors of the model cause without a fault.
 
-use control::hold::zero_order_hold;
-use control::response::peak_gain;
-use control::robustness::{EntryFamily, PlantFamily, Tolerances};
+use control::detection::UncertainPlant;
+use control::robustness::{PlantFamily, Tolerances};
 use control::{Domain, StateSpace};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::decoupling::Decoupling;
 use super::problem::Problem;
@@ -13,33 +12,36 @@ use crate::detection_request::ModelError;
 use crate::linear_plant::LinearPlant;
 use crate::parameters::ParameterFamily;
 use crate::plant_file::PlantFile;
+use crate::signals::Signal;
 
-/// Relative width of the bracket of a peak gain.
-const WIDTH: f64 = 1e-2;
+/// With so many parameters or fewer, all corners of their limits are tried.
+const ALL_CORNERS: usize = 6;
+/// With more, each parameter in turn goes to its worse limit, so many times at most.
+const ROUNDS: usize = 10;
 
 /// The plants within the tolerances of `[robustness]`, and the bounds of the commands.
 pub(super) struct ModelErrors<'a> {
-    plants: Plants<'a>,
+    file: &'a PlantFile<'a>,
+    request: &'a ModelError,
+    /// The plant, and the members of its family, whose entries are wrong by their tolerances.
+    plants: Vec<UncertainPlant>,
+    /// The FMU whose parameters are wrong; then the entries are exact.
+    parameters: Option<&'a ParameterFamily<'a>>,
+    /// The values of the measurements at the operating point.
+    measured: DVector<f64>,
     domain: Domain,
     /// The largest deviation of each command from its operating point.
-    bounds: Vec<f64>,
-    /// Factor of the largest residual that is found.
-    margin: f64,
-}
-
-enum Plants<'a> {
-    Entries(Box<(StateSpace, Tolerances)>),
-    Parameters(&'a ParameterFamily<'a>),
+    bounds: DVector<f64>,
 }
 
 impl<'a> ModelErrors<'a> {
     pub(super) fn new(
-        file: &PlantFile<'_>,
-        request: &ModelError,
+        file: &'a PlantFile<'a>,
+        request: &'a ModelError,
         (linear, designed): (&LinearPlant, &ControllerDesign),
-        family: Option<&'a ParameterFamily<'a>>,
+        parameters: Option<&'a ParameterFamily<'a>>,
     ) -> Result<Self, crate::Error> {
-        let bound = |(at, actuator): (usize, &crate::signals::Signal)| {
+        let bound = |(at, actuator): (usize, &Signal)| {
             let operating = actuator.operating.unwrap_or(0.0);
             let of_limits =
                 actuator.limits.map(|[low, high]| (operating - low).max(high - operating));
@@ -53,91 +55,142 @@ impl<'a> ModelErrors<'a> {
                 file.error_at(&request.place, message)
             })
         };
-        let plant = StateSpace {
-            a: linear.a.clone(),
-            b: linear.b.clone(),
-            c: linear.c.clone(),
-            d: DMatrix::zeros(linear.c.nrows(), linear.b.ncols()),
-            domain: Domain::Continuous,
-        };
-        let tolerances = Tolerances::of_values(&plant, file.robustness.tolerance);
+        let bounds = linear.actuators.iter().enumerate().map(bound);
+        let members = designed.family.iter().flat_map(|family| &family.members);
+        let plants = std::iter::once(linear).chain(members.map(|member| &member.linear));
         Ok(Self {
-            plants: family
-                .map_or_else(|| Plants::Entries(Box::new((plant, tolerances))), Plants::Parameters),
+            file,
+            request,
+            plants: plants.map(|plant| uncertain(plant, file.robustness.tolerance)).collect(),
+            parameters,
+            measured: DVector::from_iterator(
+                linear.measurements.len(),
+                linear.measurements.iter().map(|signal| signal.operating.unwrap_or(0.0)),
+            ),
             domain: designed.domain,
-            bounds: linear.actuators.iter().enumerate().map(bound).collect::<Result<_, _>>()?,
-            margin: request.margin,
+            bounds: DVector::from_vec(bounds.collect::<Result<_, _>>()?),
         })
     }
 
-    /// The largest mean of a combination of residuals that was found, in standard deviations, times the
-    /// margin. From the nominal plant, each parameter in turn goes to the limit that makes it worse, twice.
+    /// The largest mean of combinations of residuals, as a length in standard deviations, times the factor
+    /// of the plant file: a bound for all plants whose entries are within their tolerances; for parameters
+    /// of an FMU the largest bound of the plants that were tried.
     pub(super) fn largest_mean(
         &self,
         problem: &Problem,
-        (decoupling, rows): (&Decoupling, &DMatrix<f64>),
+        of: (&Decoupling, &DMatrix<f64>),
     ) -> Result<f64, crate::Error> {
-        let mean = |plant: StateSpace| self.mean_of(problem, (decoupling, rows), plant);
-        let found = match &self.plants {
-            Plants::Entries(nominal) => {
-                let (plant, tolerances) = &**nominal;
-                let family = EntryFamily::new(plant, tolerances)?;
-                search(family.count(), |deviations| mean(family.plant(deviations)?))
-            }
-            Plants::Parameters(family) => {
-                search(family.count(), |deviations| mean(family.plant(deviations)?))
-            }
+        let scale = match self.domain {
+            Domain::Sampled { .. } => 1.0,
+            Domain::Continuous => problem.period.sqrt(),
         };
-        Ok(found? * self.margin)
+        let found: Result<f64, crate::Error> = match self.parameters {
+            None => {
+                let bound = |plant| self.bound_of(plant, &self.bounds, of);
+                self.plants.iter().try_fold(0.0, |most: f64, plant| Ok(most.max(bound(plant)?)))
+            }
+            Some(family) => worst(family.count(), |deviations| {
+                let (plant, bounds) = self.with_parameters(family, deviations)?;
+                self.bound_of(&plant, &bounds, of)
+            }),
+        };
+        Ok(found? * scale * self.request.margin)
     }
 
-    /// The largest mean of the residuals of a plant for all commands within their bounds.
-    fn mean_of(
+    /// The FMU with other parameters. At the operating point of the plant file it is not at rest: what
+    /// accelerates it there, and what it then measures, is a further input that is always 1.
+    fn with_parameters(
         &self,
-        problem: &Problem,
+        family: &ParameterFamily<'_>,
+        deviations: &[f64],
+    ) -> Result<(UncertainPlant, DVector<f64>), crate::Error> {
+        let (mut plant, rates, measured) = family.at_operating_point(deviations)?;
+        let m = plant.b.ncols();
+        plant.b = plant.b.insert_column(m, 0.0);
+        plant.b.set_column(m, &rates);
+        plant.d = plant.d.insert_column(m, 0.0);
+        plant.d.set_column(m, &(measured - &self.measured));
+        let exact = |of: &DMatrix<f64>| DMatrix::zeros(of.nrows(), of.ncols());
+        let sizes = [exact(&plant.a), exact(&plant.b), exact(&plant.c)];
+        Ok((UncertainPlant { nominal: plant, sizes }, self.bounds.clone().push(1.0)))
+    }
+
+    /// The length of the bounds of combinations of residuals for a plant.
+    fn bound_of(
+        &self,
+        plant: &UncertainPlant,
+        bounds: &DVector<f64>,
         (decoupling, rows): (&Decoupling, &DMatrix<f64>),
-        mut plant: StateSpace,
     ) -> Result<f64, crate::Error> {
-        let mut scale = problem.period.sqrt();
-        if let Domain::Sampled { period } = self.domain {
-            (plant.a, plant.b) = zero_order_hold(&plant.a, &plant.b, period)?;
-            scale = 1.0;
-        }
-        let filter = &decoupling.filter.generator;
-        let (n, k) = (plant.a.nrows(), filter.a.nrows());
-        let mut a = DMatrix::zeros(n + k, n + k);
-        a.view_mut((0, 0), (n, n)).copy_from(&plant.a);
-        a.view_mut((n, 0), (k, n)).copy_from(&(&filter.b_y * &plant.c));
-        a.view_mut((n, n), (k, k)).copy_from(&filter.a);
-        let mut b = plant.b.clone().resize_vertically(n + k, 0.0);
-        b.rows_mut(n, k).copy_from(&filter.b_u);
-        let mut c = DMatrix::zeros(rows.nrows(), n + k);
-        c.columns_mut(0, n).copy_from(&(rows * &filter.d_y * &plant.c));
-        c.columns_mut(n, k).copy_from(&(rows * &filter.c));
-        let d = rows * &filter.d_u;
-        let gain = peak_gain(&StateSpace { a, b, c, d, domain: self.domain }, WIDTH)?.upper;
-        let of_row = |row: usize| -> f64 {
-            self.bounds.iter().enumerate().map(|(j, bound)| gain[(row, j)] * bound).sum()
-        };
-        Ok((0..rows.nrows()).map(of_row).fold(0.0_f64, f64::hypot) * scale)
+        let refuse = |message: String| self.file.error_at(&self.request.place, message);
+        let mut filter = decoupling.filter.generator.clone();
+        let inputs = bounds.len();
+        filter.b_u = filter.b_u.resize_horizontally(inputs, 0.0);
+        filter.d_u = filter.d_u.resize_horizontally(inputs, 0.0);
+        let found = plant.largest_mean(&filter, rows, bounds).map_err(|error| match error {
+            error @ control::Error::NotHurwitz { .. } => refuse(format!(
+                "the residuals of a wrong model are bounded only if the plant is stable without the \
+                 controller: {error}"
+            )),
+            error => refuse(error.to_string()),
+        })?;
+        let bounds = found.ok_or_else(|| {
+            refuse(
+                "the tolerances of [robustness] are too large for a bound of the residuals: expected smaller \
+                 ones, or `parameters` if the plant is an FMU"
+                    .to_owned(),
+            )
+        })?;
+        Ok(bounds.norm())
     }
 }
 
-/// The largest value at the ends of one deviation, and then from there on at vertices.
-fn search(
+/// The linear plant with errors of its entries within the tolerances.
+fn uncertain(linear: &LinearPlant, tolerance: [f64; 3]) -> UncertainPlant {
+    let nominal = StateSpace {
+        a: linear.a.clone(),
+        b: linear.b.clone(),
+        c: linear.c.clone(),
+        d: DMatrix::zeros(linear.c.nrows(), linear.b.ncols()),
+        domain: Domain::Continuous,
+    };
+    let Tolerances { of: [a, b, c] } = Tolerances::of_values(&nominal, tolerance);
+    let sizes = [
+        a.component_mul(&nominal.a.abs()),
+        b.component_mul(&nominal.b.abs()),
+        c.component_mul(&nominal.c.abs()),
+    ];
+    UncertainPlant { nominal, sizes }
+}
+
+/// The largest value at corners of the box of deviations -1 to 1, at its centre and at the centres of its
+/// faces.
+fn worst(
     count: usize,
     value: impl Fn(&[f64]) -> Result<f64, crate::Error>,
 ) -> Result<f64, crate::Error> {
     let mut best = vec![0.0; count];
     let mut largest = value(&best)?;
-    for at in (0..count).chain(0..count) {
-        for end in [-1.0, 1.0] {
-            let mut other = best.clone();
-            other[at] = end;
-            let found = value(&other)?;
-            if found > largest {
-                (largest, best) = (found, other);
+    if count <= ALL_CORNERS {
+        for corner in 0..1_u32 << count {
+            let sign = |at: usize| if corner >> at & 1 == 1 { 1.0 } else { -1.0 };
+            largest = largest.max(value(&(0..count).map(sign).collect::<Vec<_>>())?);
+        }
+    }
+    for _ in 0..ROUNDS {
+        let before = largest;
+        for at in 0..count {
+            for end in [-1.0, 1.0] {
+                let mut other = best.clone();
+                other[at] = end;
+                let found = value(&other)?;
+                if found > largest {
+                    (largest, best) = (found, other);
+                }
             }
+        }
+        if count <= ALL_CORNERS || largest <= before {
+            break;
         }
     }
     Ok(largest)

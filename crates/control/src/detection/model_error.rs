@@ -1,0 +1,188 @@
+//! The mean that errors of the model give to residuals without a fault.
+
+use crate::eigen::eigenvalues;
+use crate::hold::zero_order_hold;
+use crate::residual::ResidualGenerator;
+use crate::response::peak_gain;
+use crate::{Domain, Error, StateSpace, check};
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// Relative width of the bracket of a peak gain.
+const WIDTH: f64 = 1e-2;
+
+/// A stable plant, in continuous time, whose entries are not known exactly.
+///
+/// ```text
+/// x' = (A + dA) x + (B + dB) u,  y = (C + dC) x + D u,   |dA| <= sizes[0], |dB| <= sizes[1], |dC| <= sizes[2]
+/// ```
+///
+/// entry by entry. The errors dA, dB, dC may vary with time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UncertainPlant {
+    /// A, B, C, D; for a deviation from the operating point that is there from the start on, a column of B
+    /// and D with an input bounded by 1.
+    pub nominal: StateSpace,
+    /// The largest errors of the entries of A, B and C, not below 0.
+    pub sizes: [DMatrix<f64>; 3],
+}
+
+impl UncertainPlant {
+    /// Bounds of the means of the residuals `rows` r of `filter`, one for each row, while no entry of u is
+    /// above `bounds` and the plant starts at rest: no r is larger, in sampled time at a sample. None if
+    /// no bound exists.
+    ///
+    /// ```text
+    /// |x| <= x_max = G_u u_max + G_w w_max,  w_max = |dA| x_max + |dB| u_max      (w = dA x + dB u)
+    /// |r| <= R_u u_max + R_w w_max + R_z |dC| x_max                               (z = dC x)
+    /// ```
+    ///
+    /// with the peak gains G of the plant from u and w to x, and R of plant and filter together to r. It is
+    /// a small-gain bound: `x_max` exists if the spectral radius of `G_w |dA|` is below 1. For a plant with an
+    /// impulse response without sign changes and errors that add up, it is attained by a constant command;
+    /// for a lightly damped one it may be several times too large.
+    ///
+    /// In sampled time u is constant over a sample, and the effect of w over a sample, the integral of
+    /// `e^(A s) w`, is bounded by that of `e^(M s) w_max`, M = A with absolute values off the diagonal.
+    ///
+    /// Source: M. A. Dahleh and M. H. Khammash, Automatica 29 (1993), for peak bounds under structured
+    /// errors; the comparison with M: T. Wazewski (1950).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`] for matrices that do not fit; the errors of [`peak_gain`], [`Error::NotHurwitz`] for
+    /// a plant that is not stable among them.
+    pub fn largest_mean(
+        &self,
+        filter: &ResidualGenerator,
+        rows: &DMatrix<f64>,
+        bounds: &DVector<f64>,
+    ) -> Result<Option<DVector<f64>>, Error> {
+        let StateSpace { a, b, c, d, .. } = &self.nominal;
+        self.nominal.check()?;
+        filter.check()?;
+        let shapes = [("dA", a.shape()), ("dB", b.shape()), ("dC", c.shape())];
+        for (size, (name, shape)) in self.sizes.iter().zip(shapes) {
+            check::shape(name, size, shape)?;
+        }
+        check::shape("the filter's D_y", &filter.d_y, (filter.d_y.nrows(), c.nrows()))?;
+        check::shape("the filter's D_u", &filter.d_u, (filter.d_u.nrows(), b.ncols()))?;
+        let Some([w, z]) = self.errors(bounds)? else { return Ok(None) };
+        let n = a.nrows();
+        let unit = DMatrix::identity(n, n);
+        let (phi, gamma, w) = match filter.domain {
+            Domain::Continuous => (a.clone(), b.clone(), w),
+            Domain::Sampled { period } => {
+                let (phi, gamma) = zero_order_hold(a, b, period)?;
+                let (_, integral) = zero_order_hold(&comparison(a), &unit, period)?;
+                (phi, gamma, integral * w)
+            }
+        };
+        let [state, output] = [
+            [&filter.a, &filter.b_u, &filter.b_y],
+            [&(rows * &filter.c), &(rows * &filter.d_u), &(rows * &filter.d_y)],
+        ];
+        let (k, m, p, q) = (filter.a.nrows(), b.ncols(), c.nrows(), rows.nrows());
+        let mut whole = StateSpace {
+            a: DMatrix::zeros(n + k, n + k),
+            b: DMatrix::zeros(n + k, m + n + p),
+            c: DMatrix::zeros(q, n + k),
+            d: DMatrix::zeros(q, m + n + p),
+            domain: filter.domain,
+        };
+        whole.a.view_mut((0, 0), (n, n)).copy_from(&phi);
+        whole.b.view_mut((0, 0), (n, m)).copy_from(&gamma);
+        whole.b.view_mut((0, m), (n, n)).copy_from(&unit);
+        for (at, to, through, [own, from_u, from_y]) in
+            [(n, &mut whole.a, &mut whole.b, state), (0, &mut whole.c, &mut whole.d, output)]
+        {
+            let count = own.nrows();
+            to.view_mut((at, 0), (count, n)).copy_from(&(from_y * c));
+            to.view_mut((at, n), (count, k)).copy_from(own);
+            through.view_mut((at, 0), (count, m)).copy_from(&(from_u + from_y * d));
+            through.view_mut((at, m + n), (count, p)).copy_from(from_y);
+        }
+        let inputs = DVector::from_iterator(m + n + p, bounds.iter().chain(&w).chain(&z).copied());
+        Ok(Some(peak_gain(&whole, WIDTH)?.upper * inputs))
+    }
+
+    /// Bounds of w = dA x + dB u and of z = dC x.
+    fn errors(&self, bounds: &DVector<f64>) -> Result<Option<[DVector<f64>; 2]>, Error> {
+        let StateSpace { a, b, .. } = &self.nominal;
+        let [of_a, of_b, of_c] = &self.sizes;
+        let (n, m) = b.shape();
+        let unit = DMatrix::identity(n, n);
+        let mut inputs = b.clone().resize_horizontally(m + n, 0.0);
+        inputs.columns_mut(m, n).copy_from(&unit);
+        let d = DMatrix::zeros(n, m + n);
+        let states = StateSpace { a: a.clone(), b: inputs, c: unit, d, domain: Domain::Continuous };
+        let gains = peak_gain(&states, WIDTH)?.upper;
+        let (from_u, from_w) = (gains.columns(0, m), gains.columns(m, n));
+        let feedback = from_w * of_a;
+        let radius = eigenvalues(&feedback)?.into_iter().map(Complex::norm).fold(0.0, f64::max);
+        if radius >= 1.0 {
+            return Ok(None);
+        }
+        let direct = of_b * bounds;
+        let open = from_u * bounds + from_w * &direct;
+        let largest = (DMatrix::identity(n, n) - feedback).lu().solve(&open);
+        Ok(largest.map(|x| [of_a * &x + direct, of_c * x]))
+    }
+}
+
+/// A with the absolute values of the entries off the diagonal: |e^(A s)| <= e^(M s) for s >= 0.
+fn comparison(a: &DMatrix<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(a.nrows(), a.ncols(), |row, column| {
+        let entry = a[(row, column)];
+        if row == column { entry } else { entry.abs() }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scalar(value: f64) -> DMatrix<f64> {
+        DMatrix::from_element(1, 1, value)
+    }
+
+    /// x' = -x + u with an observer of gain 1 as the filter: r = y - `x_hat`.
+    fn filter() -> ResidualGenerator {
+        ResidualGenerator {
+            a: scalar(-2.0),
+            b_u: scalar(1.0),
+            b_y: scalar(1.0),
+            c: scalar(-1.0),
+            d_u: scalar(0.0),
+            d_y: scalar(1.0),
+            domain: Domain::Continuous,
+        }
+    }
+
+    fn bound(sizes: [f64; 3]) -> Option<f64> {
+        let nominal = StateSpace {
+            a: scalar(-1.0),
+            b: scalar(1.0),
+            c: scalar(1.0),
+            d: scalar(0.0),
+            domain: Domain::Continuous,
+        };
+        let plant = UncertainPlant { nominal, sizes: sizes.map(scalar) };
+        let found = plant.largest_mean(&filter(), &scalar(1.0), &DVector::from_element(1, 3.0));
+        found.unwrap().map(|bound| bound[0])
+    }
+
+    /// e' = -2 e + w, |w| <= 0.1 x + 0.2 u, x <= (1 + 0.2) u / (1 - 0.1).
+    #[test]
+    fn a_plant_of_first_order_reaches_the_bound() {
+        let largest = 3.0 * 1.2 / 0.9;
+        let expected = 0.5 * (0.1 * largest + 0.2 * 3.0);
+        let found = bound([0.1, 0.2, 0.0]).unwrap();
+        assert!(found >= expected && found < 1.03 * expected, "{found} {expected}");
+    }
+
+    #[test]
+    fn without_errors_nothing_is_left_and_with_too_large_ones_there_is_no_bound() {
+        assert!(bound([0.0, 0.0, 0.0]).unwrap() < 1e-9);
+        assert!(bound([1.0, 0.0, 0.0]).is_none());
+    }
+}

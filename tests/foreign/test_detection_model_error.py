@@ -1,0 +1,298 @@
+"""`model_error` of `[detection]`: plants within the tolerances, driven by the worst commands, give no false alarms by
+their errors; by numpy and scipy, from the design file alone. What stands beside `[detection]` in a plant file."""
+
+import itertools
+import subprocess
+import tomllib
+
+import numpy as np
+import pytest
+import scipy.linalg
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
+
+from conftest import ROOT
+from design_loop import packed_plant
+from test_detection import COMMAND, DETECTION, PLANT, Filter, T, designed, noise
+
+SIZE = np.array([0.5, 0.4])
+TOLERANCE = 0.05
+COMMANDS = f"model_error = 1.0\ncommands = {{ u1 = {SIZE[0]}, u2 = {SIZE[1]} }}\n[robustness]\ntolerance = {TOLERANCE}\n"
+# With an oscillating mode.
+OSCILLATING = PLANT.replace("[0.0, 0.0, 0.1, -1.0]", "[0.0, 0.0, -20.0, -1.0]")
+
+
+def text(method, sampled, plant=PLANT, extra=""):
+    head = f"sample_time = {T}\n" if sampled else ""
+    return head + plant + extra + DETECTION + f'method = "{method}"\nisolation = {str(method == "cusum").lower()}\n' + COMMANDS
+
+
+def matrices(plant=PLANT):
+    return [np.array(tomllib.loads(plant)[name], dtype=float) for name in "ABC"]
+
+
+def sizes(plant=PLANT):
+    """The largest errors of the entries; 0, 1 and -1 are exact."""
+    return [np.where(np.isin(np.abs(m), [0.0, 1.0]), 0.0, TOLERANCE * np.abs(m)) for m in matrices(plant)]
+
+
+def perturbed(generator, plant=PLANT):
+    """A plant whose entries are at their limits or within them."""
+    corner = generator.random() < 0.7
+    part = lambda shape: np.sign(generator.standard_normal(shape)) if corner else generator.uniform(-1, 1, shape)
+    return [m + part(m.shape) * size for m, size in zip(matrices(plant), sizes(plant), strict=True)]
+
+
+def means(own, plant, period, samples):
+    """The effect of a command in one sample on the tested residuals of later samples: samples x residuals x commands.
+
+    A continuous filter is simulated with commands held over `period` s; its residuals are integrals over such times
+    divided by the root of the period."""
+    a, b, c = plant
+    n, k, q, m = len(a), len(own.a), len(own.c), b.shape[1]
+    whole = np.block([[a, np.zeros((n, k + q))], [own.b_y @ c, own.a, np.zeros((k, q))], [own.d_y @ c, own.c, np.zeros((q, q))]])
+    column = np.vstack([b, own.b_u, own.d_u])
+    if period is None:
+        held = scipy.linalg.expm(np.block([[a, b], [np.zeros((m, n + m))]]) * T)
+        whole = np.block([[held[:n, :n], np.zeros((n, k))], [own.b_y @ c, own.a]])
+        column, read = np.vstack([held[:n, n:], own.b_u]), np.hstack([own.d_y @ c, own.c])
+        first = own.d_u
+    else:
+        step = scipy.linalg.expm(np.block([[whole, column], [np.zeros((m, n + k + q + m))]]) * period)
+        rows = slice(n + k, n + k + q)
+        whole, column = step[: n + k, : n + k], step[: n + k, n + k + q :]
+        read, first = step[rows, : n + k] / np.sqrt(period), step[rows, n + k + q :] / np.sqrt(period)
+    found = [first]
+    for _ in range(samples):
+        found.append(read @ column)
+        column = whole @ column
+    return np.array(found)
+
+
+@pytest.mark.parametrize("plant", [PLANT, OSCILLATING])
+@pytest.mark.parametrize(("method", "sampled"), [("cusum", True), ("cusum", False), ("chi-square", True)])
+def test_no_plant_within_the_tolerances_has_a_larger_mean_and_the_bound_is_near(tmp_path, method, sampled, plant):
+    report, file = designed(tmp_path, text(method, sampled, plant))
+    own = Filter(file["detection"])
+    generator = np.random.default_rng(3)
+    largest = np.zeros(len(own.tests))
+    for _ in range(25):
+        effects = means(own, perturbed(generator, plant), None if sampled else report["sample_time"], 250)
+        # The worst commands have the signs of the effects: each residual by itself.
+        each = np.abs(effects).sum(axis=0) @ SIZE
+        rows = np.split(each, np.cumsum([test["residuals"] for test in own.tests])[:-1])
+        largest = np.maximum(largest, [np.linalg.norm(row) for row in rows])
+    stated = np.array([test["model_error"] for test in report["tests"]])
+    assert (largest <= stated).all(), (largest, stated)
+    assert (stated < 1.5 * largest).all(), stated / largest
+
+
+def test_the_worst_commands_give_no_more_alarms_than_the_noise_alone_may(tmp_path):
+    report, file = designed(tmp_path, text("cusum", True))
+    own = Filter(file["detection"])
+    generator = np.random.default_rng(5)
+    drifts, thresholds = (np.array([test[name] for test in own.tests]) for name in ("drift", "threshold"))
+    bias = np.array([test["model_error"] for test in report["tests"]])
+    plants = [perturbed(generator) for _ in range(50)]
+    steady = [means(own, plant, None, 100).sum(axis=0) for plant in plants]
+    root_w, root_v = (np.sqrt(np.diag(own)) for own in noise())
+    runs, samples = 500, 400
+    allowed = 1.0 - np.exp(-samples * T / 200.0)
+    for test in range(2):
+        at = np.argmax([np.abs(one[test]) @ SIZE for one in steady])
+        a, b, c = plants[at]
+        held = scipy.linalg.expm(np.block([[a, b], [np.zeros((2, 6))]]) * T)
+        # A constant command that moves the mean of this residual as far as it can.
+        u = SIZE * np.sign(steady[at][test])
+        x, x_r = np.zeros((runs, 4)), np.zeros((runs, len(own.a)))
+        sums, simple = np.zeros((2, runs, 2)), np.zeros((2, runs, 2))
+        over = np.zeros((2, runs), dtype=bool)
+        for _ in range(samples):
+            y = x @ c.T + root_v * generator.standard_normal((runs, 3))
+            r = x_r @ own.c.T + own.d_u @ u + y @ own.d_y.T
+            x_r = x_r @ own.a.T + own.b_u @ u + y @ own.b_y.T
+            x = x @ held[:4, :4].T + held[:4, 4:] @ u + root_w * generator.standard_normal((runs, 4))
+            both = np.array([r, -r])
+            sums, simple = np.maximum(0.0, sums + both - drifts), np.maximum(0.0, simple + both - (drifts - bias))
+            over |= np.array([(one > thresholds).any(axis=(0, 2)) for one in (sums, simple)])
+        alarms, without_allowance = over.mean(axis=1)
+        assert alarms <= allowed and without_allowance > 2.0 * allowed, (alarms, without_allowance, allowed)
+
+
+TANK = """
+plant = "{fmu}"
+sample_time = 1.0
+operating_point = {{ Q_1 = 3e-5, Q_2 = 2e-5, h_1 = {levels[0]}, h_2 = {levels[1]}, h_3 = {levels[2]} }}
+measurements = ["y_1", "y_2", "y_3"]
+actuators = [{{ name = "Q_1" }}, {{ name = "Q_2" }}]
+actuator_faults = "all"
+feedback.eigenvalues = [-0.03, -0.035, -0.04]
+observer.eigenvalues = [-0.06, -0.07, -0.08, -0.1, -0.12]
+[robustness]
+parameters = {{ mu_13 = 0.02, mu_32 = 0.02, mu_20 = 0.02 }}
+[detection]
+method = "cusum"
+false_alarm_interval = 3000.0
+noise = 2e-3
+sizes = {{ f_Q_1 = 1e-5, f_Q_2 = 1e-5 }}
+from = 0.0
+model_error = 1.2
+commands = {{ Q_1 = 2e-6, Q_2 = 2e-6 }}
+"""
+
+
+def test_tanks_with_other_pipes_stay_below_the_bound_though_their_levels_at_rest_differ(aso_ftc, tmp_path):
+    """The nonlinear equations of the tanks; at the operating point tanks with other pipes are not at rest."""
+    area, pipe, twice_g, nominal = 0.0154, 5e-5, 2 * 9.81, np.array([0.5, 0.5, 0.675])
+    q = np.array([3e-5, 2e-5])
+    flow = lambda mu, drop: mu * pipe * np.sign(drop) * np.sqrt(twice_g * np.abs(drop))
+    drops = np.array([q[0], q[0], q.sum()]) ** 2 / (nominal * pipe) ** 2 / twice_g
+    start = np.array([drops.sum(), drops[2], drops[1] + drops[2]])
+    fmu = packed_plant(aso_ftc, "ThreeTank")
+    report, file = designed(tmp_path, TANK.format(fmu=fmu, levels=list(start)))
+    own = Filter(file["detection"])
+    largest = np.zeros(2)
+    for signs in itertools.product([-1, 1], repeat=3):
+        mu = nominal * (1 + 0.02 * np.array(signs))
+        for command in ([-2e-6, 2e-6], [2e-6, 2e-6], [-2e-6, -2e-6]):
+            h, x_r, u = start.copy(), np.zeros(len(own.a)), np.array(command)
+            for _ in range(700):
+                r = own.c @ x_r + own.d_u @ u + own.d_y @ (h - start)
+                x_r = own.a @ x_r + own.b_u @ u + own.b_y @ (h - start)
+                for _ in range(2):
+                    q_13, q_32, q_20 = flow(mu, np.array([h[0] - h[2], h[2] - h[1], h[1]]))
+                    inflow = q + u
+                    h = h + 0.5 / area * np.array([inflow[0] - q_13, inflow[1] + q_32 - q_20, q_13 - q_32])
+                largest = np.maximum(largest, np.abs(r))
+    stated = np.array([test["model_error"] for test in report["tests"]])
+    assert (largest <= stated).all() and (stated < 1.2 * 1.1 * largest).all(), (largest, stated)
+
+
+FAMILY = """
+[[family]]
+A = [[-0.55, 0.2, 0.0, 0.0], [0.1, -0.42, 0.3, 0.0], [0.0, 0.1, -0.8, 0.2], [0.0, 0.0, 0.1, -1.0]]
+"""
+
+
+def test_a_member_of_a_family_stays_below_the_bound(tmp_path):
+    report, file = designed(tmp_path, text("cusum", True, extra=FAMILY).replace(f"tolerance = {TOLERANCE}", "tolerance = 0.0"))
+    a, b, c = matrices()
+    a[0, 0], a[1, 1] = -0.55, -0.42
+    own = Filter(file["detection"])
+    each = np.abs(means(own, (a, b, c), None, 250)).sum(axis=0) @ SIZE
+    stated = np.array([test["model_error"] for test in report["tests"]])
+    assert (each <= stated).all() and (stated < 1.05 * each).all(), (each, stated)
+
+
+SCHEDULE = """
+[schedule]
+variable = "y1"
+[[schedule.points]]
+at = 0.0
+[[schedule.points]]
+at = 1.0
+A = [[-0.55, 0.2, 0.0, 0.0], [0.1, -0.4, 0.3, 0.0], [0.0, 0.1, -0.8, 0.2], [0.0, 0.0, 0.1, -1.0]]
+"""
+
+
+@pytest.mark.parametrize(("extra", "change", "sentence"), [
+    (SCHEDULE, ("", ""), "expected no [schedule] with [detection]"),
+    (FAMILY, (COMMANDS, ""), "the other plants of [[family]] would give false alarms: expected `model_error`"),
+    ("", (f"u2 = {SIZE[1]}", ""), "expected `limits` of the actuator `u2`, or commands.u2"),
+    ("", (f"tolerance = {TOLERANCE}", "tolerance = 0.9"), "the tolerances of [robustness] are too large for a bound"),
+    ("", ("[[-0.5, 0.2", "[[0.5, 0.2"), "bounded only if the plant is stable without the controller"),
+    ("", ("model_error = 1.0", "model_error = 0.9"), "expected a factor from 1, found 0.9"),
+    ("", ("model_error = 1.0\n", ""), "it belongs to `model_error`"),
+])
+def test_what_detection_does_not_allow_for_is_refused_at_its_line(tmp_path, extra, change, sentence):
+    whole = text("cusum", True, extra=extra)
+    assert whole.count(change[0]) == 1 or change[0] == ""
+    (tmp_path / "plant.toml").write_text(whole.replace(*change), encoding="utf-8")
+    run = subprocess.run([COMMAND, "design", "plant.toml"], cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == 2 and sentence in run.stderr and "plant.toml:" in run.stderr, run.stderr
+
+
+@pytest.mark.parametrize("option", ["--c-code", "--no-std"])
+@pytest.mark.parametrize(("extra", "entry"), [
+    ("", "detection"), ('[reconfiguration]\nactuators = "all"\n', "reconfigurations"), (SCHEDULE, "schedule"),
+])
+def test_code_for_a_microcontroller_is_refused_with_the_entry_that_it_has_not(tmp_path, option, extra, entry):
+    own = text("cusum", True) if entry == "detection" else f"sample_time = {T}\n" + PLANT + extra
+    (tmp_path / "plant.toml").write_text(own, encoding="utf-8")
+    command = [COMMAND, "design", "plant.toml", option, "code", "--certificate-time", "0"]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == 2 and f"there is no code for its entry `{entry}`" in run.stderr, run.stderr
+    assert not (tmp_path / "code").exists()
+
+
+REFERENCE = ('[reference]\ntrack = ["y1"]\n', ("[-1.0, -1.2, -1.4, -1.6]", "[-1.0, -1.1, -1.2, -1.4, -1.6]"))
+GONE = ('[reconfiguration]\nactuators = "all"\nstuck_at = { u1 = 0.3 }\n', ("", ""))
+
+
+@pytest.mark.parametrize(("extra", "change"), [REFERENCE, GONE], ids=["reference", "reconfiguration"])
+@pytest.mark.parametrize("sampled", [True, False])
+def test_residuals_follow_the_commands_that_are_applied(tmp_path, extra, change, sampled):
+    own = text("cusum", sampled, extra=extra).replace(*change)
+    (tmp_path / "plant.toml").write_text(own, encoding="utf-8")
+    files = ("--fmu", "Detecting.fmu", "--from", ROOT / "dist/AsoController.fmu", "--certificate-time", "0")
+    run = subprocess.run([COMMAND, "design", "plant.toml", *files], cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    section = tomllib.loads((tmp_path / "plant-design.toml").read_text("utf-8"))["detection"]
+    period = section.get("sample_time", T)
+    names = ["u1", "u2", "residual[1]", "residual[2]"]
+    fmu, references = started(tmp_path / "Detecting.fmu", tmp_path / "unpacked")
+    # Measurements held over a step; the filter of the design file by scipy, with the commands of the FMU.
+    own, generator = Filter(section), np.random.default_rng(2)
+    step = 0.001 if not sampled else T
+    state, integral, due, found, expected = np.zeros(len(own.a)), np.zeros(2), period, [], []
+    k = len(own.a)
+    both = np.hstack([own.b_u, own.b_y]), np.hstack([own.d_u, own.d_y])
+    whole = np.block([[own.a, np.zeros((k, 2)), both[0]], [own.c, np.zeros((2, 2)), both[1]], [np.zeros((5, k + 7))]])
+    held = scipy.linalg.expm(whole * step)
+    y, commands = np.zeros(3), []
+    for at in range(40 if sampled else 2000):
+        if at % (1 if sampled else 100) == 0:
+            y = 0.1 * generator.standard_normal(3)
+        fmu.setReal([references[name] for name in ("y1", "y2", "y3")], list(y))
+        if "reference" in extra:
+            fmu.setReal([references["r_y1"]], [0.4])
+        elif at >= (10 if sampled else 500):
+            fmu.setBoolean([references["actuator_gone[1]"]], [True])
+        before = np.array(fmu.getReal([references[name] for name in names[:2]]))
+        fmu.doStep(at * step, step)
+        values = np.array(fmu.getReal([references[name] for name in names]))
+        u = values[:2] if sampled else 0.5 * (before + values[:2])
+        commands.append(values[:2])
+        if sampled:
+            # The sample at the start is not tested; that at the end of this step has the new commands.
+            expected.append(own.c @ state + own.d_u @ u + own.d_y @ y)
+            state = own.a @ state + own.b_u @ u + own.b_y @ y
+            found.append(values[2:])
+            continue
+        moved = held @ np.concatenate([state, integral, u, y])
+        state, integral = moved[:k], moved[k : k + 2]
+        if (at + 1) * step > due - 1e-9:
+            found.append(values[2:])
+            expected.append(integral / np.sqrt(period))
+            integral, due = np.zeros(2), due + period
+    fmu.terminate()
+    fmu.freeInstance()
+    found, expected = np.array(found), np.array(expected)
+    assert np.ptp(np.array(commands), axis=0).min() > 0.1, "the commands move"
+    assert np.abs(found).max() > 1.0 and np.abs(found - expected).max() < (1e-9 if sampled else 0.02) * np.abs(found).max()
+
+
+def started(path, folder):
+    """The initialised FMU and the references of its variables."""
+    description = read_model_description(str(path))
+    fmu = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=extract(str(path), unzipdir=str(folder)),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="controller",
+    )
+    fmu.instantiate()
+    fmu.setupExperiment(startTime=0.0)
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    return fmu, {variable.name: variable.valueReference for variable in description.modelVariables}
