@@ -1,6 +1,5 @@
 //! `aso-ftc design`: designs a controller from a plant file; writes its report and its FMU.
 
-mod outputs;
 mod progress;
 mod terminal;
 
@@ -10,9 +9,9 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::outputs::{Outputs, check_distinct, check_own};
 use anyhow::Context;
 use design::{Design, Language, Precision};
-use outputs::{Outputs, check_distinct, check_own};
 use progress::Bar;
 
 #[derive(clap::Args)]

@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::io::{self, Write};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use indicatif::MultiProgress;
 use study::LogFields;
@@ -10,6 +10,7 @@ use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::filter::LevelFilter;
 use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields, MakeWriter};
+use tracing_subscriber::layer::{Context, Layer, SubscriberExt as _};
 use tracing_subscriber::registry::LookupSpan;
 
 /// `target` of the events for messages of FMUs.
@@ -22,13 +23,53 @@ pub(crate) fn start(verbose: u8, json: bool) {
         1 => LevelFilter::INFO,
         _ => LevelFilter::TRACE,
     };
-    let builder = tracing_subscriber::fmt().with_max_level(level).with_writer(StandardError);
+    let text = tracing_subscriber::fmt::layer().with_writer(StandardError);
+    let registry = tracing_subscriber::registry().with(level).with(Collector);
     // A second call keeps the existing subscriber.
     let _ = if json {
-        tracing::subscriber::set_global_default(builder.json().flatten_event(true).finish())
+        tracing::subscriber::set_global_default(registry.with(text.json().flatten_event(true)))
     } else {
-        tracing::subscriber::set_global_default(builder.event_format(Sentence).finish())
+        tracing::subscriber::set_global_default(registry.with(text.event_format(Sentence)))
     };
+}
+
+/// Largest number of messages that are kept; the rest is counted.
+const KEPT: usize = 1000;
+
+/// The warnings and errors so far, and the number of all of them, if they are kept.
+static COLLECTED: Mutex<Option<(Vec<String>, usize)>> = Mutex::new(None);
+
+/// Keeps warnings and errors from now on.
+pub(crate) fn collect() {
+    *COLLECTED.lock().unwrap_or_else(PoisonError::into_inner) = Some((Vec::new(), 0));
+}
+
+/// Returns the warnings and errors since [`collect`].
+pub(crate) fn collected() -> Vec<String> {
+    let collected = COLLECTED.lock().unwrap_or_else(PoisonError::into_inner);
+    let (mut messages, count) = collected.clone().unwrap_or_default();
+    if count > messages.len() {
+        messages.push(format!("and {} more", count - messages.len()));
+    }
+    messages
+}
+
+/// Keeps warnings and errors for a report.
+struct Collector;
+
+impl<S: Subscriber> Layer<S> for Collector {
+    fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
+        if *event.metadata().level() > Level::WARN {
+            return;
+        }
+        let mut collected = COLLECTED.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((messages, count)) = collected.as_mut() {
+            *count += 1;
+            if messages.len() < KEPT {
+                messages.push(sentence(event));
+            }
+        }
+    }
 }
 
 /// Returns the display of progress bars.
@@ -74,29 +115,29 @@ where
         mut writer: Writer<'_>,
         event: &Event<'_>,
     ) -> fmt::Result {
-        let metadata = event.metadata();
-        let mut parts = LogFields::default();
-        event.record(&mut parts);
-        let word = match *metadata.level() {
-            Level::ERROR => "error",
-            Level::WARN => "warning",
-            Level::INFO => "info",
-            Level::DEBUG => "debug",
-            Level::TRACE => "trace",
-        };
-        if metadata.target() != FMU {
-            return writeln!(writer, "{word}: {}{}", parts.message, parts.others);
-        }
-        let LogFields { message, instance, category, time, others } = parts;
-        write!(writer, "{word}: {}", plain(&instance))?;
-        if let Some(time) = time {
-            write!(writer, ", t = {time} s")?;
-        }
-        if !category.is_empty() {
-            write!(writer, ", {}", plain(&category))?;
-        }
-        writeln!(writer, ": {}{others}", plain(&message))
+        writeln!(writer, "{}", sentence(event))
     }
+}
+
+fn sentence(event: &Event<'_>) -> String {
+    let metadata = event.metadata();
+    let mut parts = LogFields::default();
+    event.record(&mut parts);
+    let word = match *metadata.level() {
+        Level::ERROR => "error",
+        Level::WARN => "warning",
+        Level::INFO => "info",
+        Level::DEBUG => "debug",
+        Level::TRACE => "trace",
+    };
+    let LogFields { message, instance, category, time, others } = parts;
+    if metadata.target() != FMU {
+        return format!("{word}: {message}{others}");
+    }
+    let time = time.map_or_else(String::new, |time| format!(", t = {time} s"));
+    let category =
+        if category.is_empty() { String::new() } else { format!(", {}", plain(&category)) };
+    format!("{word}: {}{time}{category}: {}{others}", plain(&instance), plain(&message))
 }
 
 /// Makes a message of an FMU a single line without control characters, so that it cannot move the

@@ -15,9 +15,11 @@ mod crash;
 mod design;
 mod logging;
 mod new;
+mod outputs;
 mod pack;
 mod paper_figures;
 mod plot;
+mod report;
 mod reproduce;
 mod run;
 mod scenario;
@@ -52,6 +54,8 @@ enum Command {
     /// Do many runs of a system: sweeps, Monte Carlo, fault campaigns, sensitivity; needs the Python
     /// package aso-ftc
     Campaign(campaign::Options),
+    /// Write a page with interactive plots of a results file, and its difference to a second one
+    Report(report::Options),
     /// Check an FMU against the rules of its version of FMI, and try it
     Check(check::Options),
 }
@@ -78,6 +82,7 @@ fn perform(verb: Command) -> ExitCode {
         Command::Run(options) => return run::run(&options),
         Command::Campaign(options) => return campaign::campaign(&options),
         Command::Design(options) => design::design(&options),
+        Command::Report(options) => report::report(&options).map(|()| true),
         Command::Check(options) => check::check(&options),
     };
     match done {

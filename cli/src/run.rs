@@ -1,5 +1,6 @@
 //! `aso-ftc run`: couples FMUs.
 
+mod facts;
 mod interrupt;
 mod open_inputs;
 mod options;
@@ -28,6 +29,9 @@ const LISTED: usize = 20;
 /// the first step, 2 it failed before, 130 it was interrupted.
 pub(crate) fn run(options: &Options) -> ExitCode {
     logging::start(options.verbose, options.log_json);
+    if options.report {
+        logging::collect();
+    }
     if let Err(error) = interrupt::listen() {
         tracing::warn!("{}", files::sentence(error.as_ref()));
     }
@@ -48,6 +52,8 @@ struct Started {
     here: PathBuf,
     /// Units by variable, for the plot.
     units: Vec<(String, String)>,
+    /// What the report says about the run, if one is requested.
+    report: Option<report::Run>,
 }
 
 /// Prepares and starts the run; `None` if only the configuration was requested.
@@ -70,10 +76,14 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     }
     let PreparedRun { config, system, plan, ports, .. } = &prepared;
     check_plot(config, system, ports)?;
+    if options.report && config.results.every == Some(Every::Never) {
+        bail!("--report: there is nothing to report where rows are recorded `never`");
+    }
     describe(options, system, plan, by_name);
     let units = units(system, ports);
+    let report = options.report.then(|| facts::facts(system, plan));
     let run = prepared.start(saved.as_ref())?;
-    Ok(Some(Started { run, here, units }))
+    Ok(Some(Started { run, here, units, report }))
 }
 
 /// Prints the connections and, if variables are connected `by_name`, the inputs without one.
@@ -181,7 +191,8 @@ impl Started {
         let ended = advance(&mut self.run, |_| Ok(()));
         let tally = self.run.tally();
         let time = self.run.simulation.time();
-        println!("{}", summary(tally, start, time));
+        let outcome = summary(tally, start, time);
+        println!("{outcome}");
         self.warn_of_fallbacks(tally);
         let written = self.write(&ended);
         let status = match &ended {
@@ -206,11 +217,32 @@ impl Started {
                 1
             }
         };
-        if let Err(error) = written {
+        let reported = written.and_then(|file| self.report(file.as_deref(), outcome, status != 0));
+        if let Err(error) = reported {
             tracing::error!("{}", files::sentence(error.as_ref()));
             return ExitCode::from(status.max(1));
         }
         ExitCode::from(status)
+    }
+
+    /// Writes the report, if one is requested.
+    fn report(&mut self, file: Option<&Path>, outcome: String, failed: bool) -> anyhow::Result<()> {
+        let (Some(run), Some(file)) = (self.report.take(), file) else {
+            return Ok(());
+        };
+        let run = report::Run { outcome, failed, messages: logging::collected(), ..run };
+        let page = report::page(&report::Request {
+            results: file,
+            against: None,
+            variables: &[],
+            units: &self.units,
+            run: Some(&run),
+        })?;
+        let out = file.with_extension("html");
+        files::whole::write(&out, page.html.as_bytes())
+            .with_context(|| format!("cannot write {}", out.display()))?;
+        println!("{}", out.strip_prefix(&self.here).unwrap_or(&out).display());
+        Ok(())
     }
 
     fn warn_of_fallbacks(&self, tally: RunStatistics) {
@@ -228,15 +260,16 @@ impl Started {
         );
     }
 
-    /// Completes the results, draws the plot, and prints the files written.
-    fn write(&mut self, ended: &RunEnd) -> anyhow::Result<()> {
+    /// Completes the results, draws the plot, and prints the files written; returns the results file.
+    fn write(&mut self, ended: &RunEnd) -> anyhow::Result<Option<PathBuf>> {
         let written = |path: &Path| {
             println!("{}", path.strip_prefix(&self.here).unwrap_or(path).display());
         };
         let results = &self.run.config.results;
         let picture = results.plot_file.clone().filter(|_| !results.plot.is_empty());
         let plotted = results.plot.clone();
-        if let Some(file) = self.run.finish()? {
+        let file = self.run.finish()?.map(Path::to_owned);
+        if let Some(file) = &file {
             written(file);
             if let Some(picture) = picture {
                 let unit = |name: &str| {
@@ -252,7 +285,7 @@ impl Started {
         {
             written(file);
         }
-        Ok(())
+        Ok(file)
     }
 }
 

@@ -128,6 +128,10 @@ pub(crate) struct Options {
     /// File for the plot, .svg or .png [default: plot.svg in the folder of --out]
     #[arg(long, value_name = "FILE")]
     plot_file: Option<PathBuf>,
+    /// Also write a page with interactive plots, statistics, the system and all warnings: the name of the
+    /// results file, with .html
+    #[arg(long)]
+    pub(super) report: bool,
     /// Folder for all files written [default: results/run]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,

@@ -120,7 +120,14 @@ impl Table {
 }
 
 fn unreadable(path: &Path, reason: &impl ToString) -> ResultsError {
-    ResultsError::Read { path: path.to_owned(), reason: reason.to_string() }
+    let mut reason = reason.to_string();
+    if let Some((_, compression)) = reason.split_once("Disabled feature at compile time: ") {
+        reason = format!(
+            "it is compressed by {compression}; expected Snappy (the default of pandas) or no compression, \
+             as by `to_parquet(..., compression=\"snappy\")`"
+        );
+    }
+    ResultsError::Read { path: path.to_owned(), reason }
 }
 
 #[cfg(test)]

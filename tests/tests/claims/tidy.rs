@@ -43,7 +43,7 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
 }
 
 /// The folders of our libraries, each with the libraries that it may use.
-const ARROWS: [(&str, &[&str]); 17] = [
+const ARROWS: [(&str, &[&str]); 18] = [
     ("lapack", &[]),
     ("control", &["aso-lapack"]),
     ("fmu-description", &[]),
@@ -54,6 +54,7 @@ const ARROWS: [(&str, &[&str]); 17] = [
     ("linearise", &["fmu-description", "fmu-import", "slave"]),
     ("ssp", &["fmu-description", "slave"]),
     ("results", &[]),
+    ("report", &["results"]),
     ("solve", &[]),
     ("integrate", &["fmu-description", "slave", "solve"]),
     ("master", &["fmu-description", "slave", "solve"]),

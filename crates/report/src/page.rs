@@ -1,0 +1,256 @@
+//! The HTML document.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use results::Column;
+
+use crate::difference::Compared;
+use crate::plots::Plot;
+use crate::statistics::Statistics;
+use crate::{Request, Run, graph, identity};
+
+const STYLE: &str = include_str!("page/page.css");
+/// uPlot 1.6.32, Leon Sorokin, MIT licence (`page/uPlot-LICENSE`).
+const UPLOT: &str = include_str!("page/uPlot.iife.min.js");
+const UPLOT_STYLE: &str = include_str!("page/uPlot.min.css");
+const UPLOT_LICENCE: &str = include_str!("page/uPlot-LICENSE");
+const SCRIPT: &str = include_str!("page/plots.js");
+/// The content security policy: the page loads nothing, even if a text contains markup.
+const POLICY: &str =
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
+/// Largest number of connections and of messages that are listed.
+const LISTED: usize = 200;
+
+pub(crate) struct Content<'a> {
+    pub(crate) request: &'a Request<'a>,
+    pub(crate) columns: &'a [Column],
+    pub(crate) statistics: &'a [Statistics],
+    /// Variables that are texts.
+    pub(crate) texts: &'a [String],
+    /// Number of variables that are not shown.
+    pub(crate) left_out: usize,
+}
+
+pub(crate) fn render(content: &Content<'_>, plots: &[Plot], compared: Option<&Compared>) -> String {
+    let request = content.request;
+    let file = request.results.display().to_string();
+    let other = request.against.map(|path| path.display().to_string());
+    let data = serde_json::to_string(plots).unwrap_or_default().replace('<', "\\u003c");
+    let document = html! {
+        (DOCTYPE)
+        html lang="en" {
+            (head(&file, request))
+            body {
+                header {
+                    p.kind { "Report of a run" }
+                    h1 { (file) @if let Some(other) = &other { " against " (other) } }
+                    @if let Some(run) = request.run { (outcome(run)) }
+                }
+                main {
+                    section aria-labelledby="plots" {
+                        h2 #plots { "Plots" }
+                        (controls(other.as_deref()))
+                        noscript { p.warned { "The plots need JavaScript; the tables do not." } }
+                        div #figures {}
+                        p.said {
+                            "Drag over a plot to zoom, double-click to show all; all plots have the same time \
+                             axis and cursor. A click on a name hides its curve. Of long runs, a plot keeps the \
+                             lowest and highest value of each short interval, so that no peak is lost."
+                            @if content.left_out > 0 {
+                                " " (content.left_out) " more variables of the file are not shown; "
+                                code { "--variables" } " chooses others."
+                            }
+                            @if !content.texts.is_empty() {
+                                " Texts are not shown: " (listed(content.texts)) "."
+                            }
+                        }
+                    }
+                    @if let Some(compared) = compared { (differences(compared, other.as_deref().unwrap_or_default())) }
+                    (statistics(content))
+                    @if let Some(run) = request.run { (system(run)) (messages(run)) }
+                }
+                footer {
+                    p { "Written by aso-ftc " (env!("CARGO_PKG_VERSION")) ". Plots by uPlot." }
+                    details { summary { "Licence of uPlot" } pre { (UPLOT_LICENCE) } }
+                }
+                script type="application/json" #data { (PreEscaped(data)) }
+                script { (PreEscaped(UPLOT)) }
+                script { (PreEscaped(SCRIPT)) }
+            }
+        }
+    };
+    document.into_string().replace(|sign: char| sign.is_control() && sign != '\n', " ")
+}
+
+fn head(file: &str, request: &Request<'_>) -> Markup {
+    html! {
+        head {
+            meta charset="utf-8";
+            meta name="viewport" content="width=device-width, initial-scale=1";
+            meta name="color-scheme" content="light dark";
+            meta http-equiv="Content-Security-Policy" content=(POLICY);
+            meta name="generator" content=(identity(request.results));
+            title { (file) ", report" }
+            style { (PreEscaped(UPLOT_STYLE)) (PreEscaped(STYLE)) }
+        }
+    }
+}
+
+fn outcome(run: &Run) -> Markup {
+    html! {
+        p.outcome.failed[run.failed] role="status" { (run.outcome) }
+    }
+}
+
+fn controls(other: Option<&str>) -> Markup {
+    html! {
+        form #controls {
+            label { "from " input #from type="number" step="any"; " s" }
+            label { "to " input #to type="number" step="any"; " s" }
+            button type="submit" { "Show" }
+            button type="button" #all { "Show all" }
+            button type="button" #earlier aria-label="Earlier" { "←" }
+            button type="button" #later aria-label="Later" { "→" }
+            button type="button" #closer aria-label="Zoom in" { "+" }
+            button type="button" #wider aria-label="Zoom out" { "−" }
+            @if let Some(other) = other {
+                fieldset {
+                    legend { "Curves" }
+                    label { input type="radio" name="shown" value="both" checked; " both runs (" (other) " dashed)" }
+                    label { input type="radio" name="shown" value="difference"; " difference" }
+                }
+            }
+        }
+    }
+}
+
+/// A number with six digits, all of them in a tooltip.
+fn number(value: f64) -> Markup {
+    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    let short = if value.is_nan() {
+        "–".to_owned()
+    } else if rounded == 0.0 || (1e-3..1e6).contains(&rounded.abs()) {
+        format!("{rounded}")
+    } else {
+        format!("{rounded:e}")
+    };
+    html! { td.number title=(value) { (short) } }
+}
+
+fn statistics(content: &Content<'_>) -> Markup {
+    let rows = content.columns.iter().zip(content.statistics);
+    let gaps = content.statistics.iter().any(|found| found.not_finite > 0);
+    html! {
+        section aria-labelledby="statistics" {
+            h2 #statistics { "Statistics" }
+            div.scroll tabindex="0" role="region" aria-labelledby="statistics" {
+                table {
+                    thead {
+                        tr {
+                            th scope="col" { "variable" }
+                            th scope="col" { "unit" }
+                            @for title in ["first", "last", "smallest", "at t in s", "largest", "at t in s", "mean", "rms"] {
+                                th.number scope="col" { (title) }
+                            }
+                            @if gaps { th.number scope="col" { "not finite" } }
+                        }
+                    }
+                    tbody {
+                        @for (column, found) in rows {
+                            tr {
+                                th scope="row" { (column.name) }
+                                td { (column.unit.as_deref().unwrap_or_default()) }
+                                @for value in [
+                                    found.first, found.last, found.smallest.0, found.smallest.1,
+                                    found.largest.0, found.largest.1, found.mean, found.rms,
+                                ] { (number(value)) }
+                                @if gaps { td.number { (found.not_finite) } }
+                            }
+                        }
+                    }
+                }
+            }
+            p.said { "Mean and rms are over time: integrals by the trapezoidal rule, divided by the length of the run." }
+        }
+    }
+}
+
+fn differences(compared: &Compared, other: &str) -> Markup {
+    let equal = compared.differences.iter().all(|found| found.largest <= 0.0);
+    html! {
+        section aria-labelledby="differences" {
+            h2 #differences { "Difference to " (other) }
+            @if equal {
+                p.outcome { "All " (compared.differences.len()) " common variables are equal in all rows." }
+            }
+            @if compared.outside > 0 {
+                p.outcome.failed { (compared.outside) " rows are outside of the time of " (other) " and are not compared." }
+            }
+            @for (names, whose) in [(&compared.only_here, "this run"), (&compared.only_there, other)] {
+                @if !names.is_empty() { p { "Only in " (whose) ": " (listed(names)) "." } }
+            }
+            div.scroll tabindex="0" role="region" aria-labelledby="differences" {
+                table {
+                    thead {
+                        tr {
+                            th scope="col" { "variable" }
+                            @for title in ["largest difference", "at t in s", "rms", "largest, relative to the range"] {
+                                th.number scope="col" { (title) }
+                            }
+                        }
+                    }
+                    tbody {
+                        @for found in &compared.differences {
+                            tr {
+                                th scope="row" { (found.name) }
+                                @for value in [found.largest, found.at, found.rms, found.relative] { (number(value)) }
+                            }
+                        }
+                    }
+                }
+            }
+            p.said {
+                "This run minus the other one, at the rows of this run; between its rows the other one is interpolated \
+                 linearly, integers and Booleans are held."
+            }
+        }
+    }
+}
+
+fn listed(names: &[String]) -> String {
+    let more = names.len().saturating_sub(LISTED);
+    let shown = names.iter().take(LISTED).cloned().collect::<Vec<_>>().join(", ");
+    if more > 0 { format!("{shown} and {more} more") } else { shown }
+}
+
+fn system(run: &Run) -> Markup {
+    let fmu = |at: usize| run.fmus.get(at).map_or("", |fmu| fmu.name.as_str());
+    html! {
+        section aria-labelledby="system" {
+            h2 #system { "System" }
+            div.scroll tabindex="0" role="region" aria-labelledby="system" { (graph::graph(run)) }
+            ul { @for fmu in &run.fmus { li { strong { (fmu.name) } ": " (fmu.details.join(", ")) } } }
+            details {
+                summary { (run.connections.len()) " connections" }
+                ul {
+                    @for connection in run.connections.iter().take(LISTED) {
+                        li { code { (fmu(connection.from)) "." (connection.output) } " to " code { (fmu(connection.to)) "." (connection.input) } }
+                    }
+                    @if run.connections.len() > LISTED { li { "and " (run.connections.len() - LISTED) " more" } }
+                }
+            }
+            h3 { "Algorithm" }
+            ul { @for line in &run.algorithm { li { (line) } } }
+        }
+    }
+}
+
+fn messages(run: &Run) -> Markup {
+    html! {
+        section aria-labelledby="messages" {
+            h2 #messages { "Warnings and errors" }
+            @if run.messages.is_empty() { p { "None." } }
+            ul { @for message in run.messages.iter().take(LISTED) { li { (message) } } }
+            @if run.messages.len() > LISTED { p { "and " (run.messages.len() - LISTED) " more." } }
+        }
+    }
+}
