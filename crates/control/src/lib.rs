@@ -18,6 +18,7 @@
 //! | margins of a loop: sensitivity, disk, gain, phase, delay, hold time, parameter tolerances | [`robustness`] |
 //! | references: feedforward, integral action, anti-windup | [`tracking`] |
 //! | bound of the estimation error with a proof | [`theorem1`] |
+//! | weights over frequency | [`weight`] |
 //! | linear matrix inequalities (feature `lmi`) | `lmi` |
 //! | the controller as one system, the closed loop, its stability | [`controller`], [`stability`] |
 //! | discretisation, matrix exponential | [`hold`], [`exponential`] |
@@ -64,6 +65,7 @@ mod state_space;
 mod svd;
 pub mod theorem1;
 pub mod tracking;
+pub mod weight;
 pub mod zeros;
 
 pub use domain::Domain;

@@ -9,6 +9,10 @@
 //!   certificate P.
 //! * [`observer_gain`], [`state_feedback`]: compute a gain that places the eigenvalues in a region
 //!   and keeps or minimises such a bound.
+//! * [`weighted_observer_gain`], [`weighted_state_feedback`]: the same with weights over frequency;
+//!   [`weight_of_table`]: the weight whose magnitude is nearest to a table.
+//! * [`observer_norm_lower_bound`], [`feedback_norm_lower_bound`]: the H-infinity norm below which no gain
+//!   and no filter of any order is.
 //! * [`certify_common`], [`common_feedback`]: the same for a family of systems, with one P and one
 //!   gain for all of them.
 //! * [`certify_schedule`]: proves that a sampled loop that depends on a scheduling variable is
@@ -23,7 +27,9 @@ mod affine;
 mod constant_gain;
 mod coordinates;
 pub(crate) mod definite;
+mod descent;
 mod gain;
+mod lower_bound;
 mod observer;
 mod problem;
 mod reachable;
@@ -31,18 +37,23 @@ mod region;
 mod schedule;
 mod solver;
 mod synthesis;
+mod table_weight;
 mod vertices;
+mod weighted;
 
 pub use affine::Affine;
 pub use constant_gain::{ConstantGain, constant_gain};
 pub use gain::{GainBound, Norm, certify_gain};
+pub use lower_bound::{feedback_norm_lower_bound, observer_norm_lower_bound};
 pub use problem::Problem;
 pub use reachable::{ReachableSet, common_reachable_set};
 pub use region::{Disc, Region, RegionCertificate, certify_region};
 pub use schedule::{Interval, ScheduleCertificate, bernstein, certify_schedule, largest_change};
 pub use synthesis::{Performance, Synthesis, observer_gain, state_feedback};
+pub use table_weight::{TableWeight, weight_of_table};
 pub(crate) use vertices::find_common;
 pub use vertices::{CommonFeedback, Vertex, certify_common, common_feedback, largest_scaling};
+pub use weighted::{ChannelWeights, weighted_observer_gain, weighted_state_feedback};
 
 use nalgebra::{DMatrix, DVector};
 

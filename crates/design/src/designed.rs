@@ -179,6 +179,7 @@ fn by_law(law: &DesignedLaw) -> GainResult {
         method: format!("By the law {}, as fast as the requirement on average.", law.law.name()),
         required: Vec::new(),
         quality: None,
+        norm: None,
     }
 }
 

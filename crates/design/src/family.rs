@@ -90,7 +90,8 @@ pub(crate) fn common_feedback(
                 plants.len(),
                 certificate.margin
             );
-            let found = GainResult { gain, method, required: Vec::new(), quality: None };
+            let found =
+                GainResult { gain, method, required: Vec::new(), quality: None, norm: None };
             Ok((found, certificate))
         }
         Outcome::Infeasible { conflict } => {

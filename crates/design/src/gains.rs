@@ -10,6 +10,7 @@ use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
 use super::norm_gains::{NormRequirement, ObserverProblem};
+use super::report::NormReport;
 use super::requirements::{Region, Requirement};
 
 const IN_REGION: &str = "Eigenvalues in the region by linear matrix inequalities";
@@ -25,6 +26,8 @@ pub(crate) struct GainResult {
     pub(crate) required: Vec<Complex<f64>>,
     /// The quality of an eigenvalue assignment.
     pub(crate) quality: Option<Quality>,
+    /// The H-infinity norm, of a design by it.
+    pub(crate) norm: Option<NormReport>,
 }
 
 /// Why no gain was found.
@@ -195,7 +198,7 @@ fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Ass
 
 fn assigned(found: Placement, required: Vec<Complex<f64>>) -> GainResult {
     let method = "Eigenvalues assigned, with well-conditioned eigenvectors.".to_owned();
-    GainResult { gain: found.gain, method, required, quality: Some(found.quality) }
+    GainResult { gain: found.gain, method, required, quality: Some(found.quality), norm: None }
 }
 
 fn partly_assigned(
@@ -208,12 +211,12 @@ fn partly_assigned(
         "{movable} of {all} eigenvalues assigned, with well-conditioned eigenvectors; no gain moves \
          the others."
     );
-    GainResult { gain, method, required, quality: None }
+    GainResult { gain, method, required, quality: None, norm: None }
 }
 
 fn weighted(gain: DMatrix<f64>, method: &str, residual: f64) -> GainResult {
     let method = format!("{method}; relative residual of the Riccati equation {residual:.1e}.");
-    GainResult { gain, method, required: Vec::new(), quality: None }
+    GainResult { gain, method, required: Vec::new(), quality: None, norm: None }
 }
 
 pub(crate) fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<GainResult, Refusal> {
@@ -225,7 +228,13 @@ pub(crate) fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<Gai
             });
             let margin = found.region.margin;
             let method = format!("{method}; region verified with margin {margin:.1e}{bound}.");
-            Ok(GainResult { gain: found.gain, method, required: Vec::new(), quality: None })
+            Ok(GainResult {
+                gain: found.gain,
+                method,
+                required: Vec::new(),
+                quality: None,
+                norm: None,
+            })
         }
         Outcome::Infeasible { conflict } => Err(Refusal::Conflict(contradiction(&conflict))),
         Outcome::Inconclusive(reason) => Err(Refusal::Conflict(format!(

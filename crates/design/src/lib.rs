@@ -11,6 +11,7 @@
 mod analysis;
 mod budget;
 mod certificate;
+mod channel;
 mod checks;
 mod code;
 mod compare;
@@ -34,6 +35,7 @@ pub mod loss_report;
 mod losses;
 mod matrix;
 mod norm_gains;
+mod norm_search;
 mod page;
 mod parameters;
 mod plant_file;

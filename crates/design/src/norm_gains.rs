@@ -1,22 +1,21 @@
-//! Gains by the H-infinity norm: the channel that the plant file weights, and the judgement of the
-//! result.
+//! Gains by the H-infinity norm: the channels of observer and feedback that the plant file weights.
 
 use control::aso::Estimator;
-use control::eigen::eigenvalues;
 use control::faults::FaultChannel;
-use control::lmi::{self, Norm, Outcome, Performance, Synthesis};
+use control::lmi::{
+    self, ChannelWeights, Norm, Performance, feedback_norm_lower_bound, observer_norm_lower_bound,
+    weighted_observer_gain, weighted_state_feedback,
+};
 use control::response::h_infinity;
 use control::riccati::{NormFilterProblem, kalman, norm_filter};
+use control::weight::{Weight, diagonal};
 use control::{Domain, Error, StateSpace};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
-use super::gains::{FeedbackProblem, GainResult, Refusal, synthesised};
-use super::requirements::{Channel, Region};
-
-/// Relative width of a norm.
-const WIDTH: f64 = 1e-4;
-/// Largest order for which the norm without the region is computed.
-const LARGEST_ORDER: usize = 30;
+use super::channel::{Channel, ChannelWeight};
+use super::gains::{FeedbackProblem, GainResult, Refusal};
+use super::norm_search::{LARGEST_ORDER, Search, WIDTH};
+use super::requirements::Region;
 
 /// Ratio of the bounds between which the least norm of any filter is searched, and at which the search
 /// ends.
@@ -70,8 +69,10 @@ impl ObserverProblem<'_> {
         let mut feedthrough = DMatrix::zeros(p, q + noises);
         for (at, noise) in required.channel.noise.iter().enumerate() {
             match self.filter {
-                Some(filter) => disturbance[(order - q - p + at, q + at)] = filter[at] * noise,
-                None => feedthrough[(at, q + at)] = *noise,
+                Some(filter) => {
+                    disturbance[(order - q - p + at, q + at)] = filter[at] * noise.factor();
+                }
+                None => feedthrough[(at, q + at)] = noise.factor(),
             }
         }
         if self.estimator == Estimator::Current {
@@ -81,27 +82,47 @@ impl ObserverProblem<'_> {
         output.columns_mut(order - q, q).fill_with_identity();
         for (channel, weight) in self.channels.iter().zip(&required.channel.weights) {
             for row in [Some(channel.estimate), channel.rate].into_iter().flatten() {
-                output.row_mut(row).scale_mut(*weight);
+                output.row_mut(row).scale_mut(weight.factor());
             }
         }
         let gamma = required.bound;
         Performance { disturbance, output, feedthrough, norm: Norm::HInfinity, gamma }
     }
 
-    /// Computes the filter for the bound, or for the least bound that any filter reaches; regions do
+    /// The weights over frequency of the channel of `performance`, if there are any.
+    fn weights(&self, channel: &Channel, domain: Domain) -> Result<Option<ChannelWeights>, Error> {
+        if !channel.has_states() {
+            return Ok(None);
+        }
+        let one = || Weight::constant(1.0);
+        let mut inputs = vec![one(); self.faults];
+        inputs.extend(channel.noise.iter().map(over_frequency));
+        let mut outputs = vec![one(); self.faults];
+        for (fault, weight) in self.channels.iter().zip(&channel.weights) {
+            for row in [Some(fault.estimate), fault.rate].into_iter().flatten() {
+                outputs[row] = over_frequency(weight);
+            }
+        }
+        let (input, output) = (diagonal(&inputs, domain)?, diagonal(&outputs, domain)?);
+        Ok(Some(ChannelWeights { input, output }))
+    }
+
+    /// Computes the gain of the filter for the bound, or for the least bound that any filter reaches; regions do
     /// not matter. Only in continuous time with noise on each unfiltered measurement.
     fn riccati(
         &self,
         required: NormRequirement<'_>,
         domain: Domain,
-    ) -> Result<Option<Filter>, Error> {
+    ) -> Result<Option<DMatrix<f64>>, Error> {
         let noise = &required.channel.noise;
-        let unsuitable =
-            noise.is_empty() || self.filter.is_some() || self.a_0.nrows() > LARGEST_ORDER;
+        let unsuitable = required.channel.has_states()
+            || noise.is_empty()
+            || self.filter.is_some()
+            || self.a_0.nrows() > LARGEST_ORDER;
         if domain != Domain::Continuous || unsuitable {
             return Ok(None);
         }
-        let squares = noise.iter().map(|one| one * one).collect::<Vec<_>>();
+        let squares = noise.iter().map(|one| one.factor() * one.factor()).collect::<Vec<_>>();
         let given = self.performance(required, domain);
         let rates = given.disturbance.columns(0, self.faults).into_owned();
         let problem = NormFilterProblem {
@@ -114,7 +135,7 @@ impl ObserverProblem<'_> {
         // A plant with a mode at rest that no fault excites has no such filter.
         let solve = |gamma| norm_filter(&problem, gamma).unwrap_or(None);
         if let Some(bound) = required.bound {
-            return Ok(solve(bound).map(|gain| Filter { gain, least: None }));
+            return Ok(solve(bound));
         }
         let process = &rates * rates.transpose();
         let Ok(kalman) = kalman(self.a_0, self.c_0, &process, problem.noise, domain) else {
@@ -137,7 +158,47 @@ impl ObserverProblem<'_> {
                 None => low = middle,
             }
         }
-        Ok(solve(RELAXED * high).map(|gain| Filter { gain, least: Some(high) }))
+        Ok(solve(RELAXED * high))
+    }
+
+    /// Computes a norm below which no filter is, of any order, from the unfiltered measurements; None
+    /// without noise.
+    ///
+    /// The states of a measurement filter contain the measurements before the present sample.
+    fn lower_bound(
+        &self,
+        required: NormRequirement<'_>,
+        domain: Domain,
+    ) -> Result<Option<f64>, Error> {
+        let order = self.a_0.nrows();
+        if required.channel.noise.is_empty() || order > LARGEST_ORDER {
+            return Ok(None);
+        }
+        let Some(filter) = self.filter else {
+            let seen = self.estimator.output_matrix(self.a_0, self.c_0);
+            let performance = self.performance(required, domain);
+            return match self.weights(required.channel, domain)? {
+                None => observer_norm_lower_bound(self.a_0, &seen, &performance, domain),
+                Some(weights) => {
+                    let (a, c, performance) = weights.extend(self.a_0, &seen, &performance);
+                    observer_norm_lower_bound(&a, &c, &performance, domain)
+                }
+            };
+        };
+        let first = order - self.faults - filter.len();
+        let kept: Vec<_> =
+            (0..order).filter(|at| !(first..first + filter.len()).contains(at)).collect();
+        let kept_columns = self.a_0.select_columns(&kept);
+        let rates = DVector::from_column_slice(filter).map(|rate| 1.0 / rate);
+        let unfiltered = ObserverProblem {
+            a_0: &kept_columns.select_rows(&kept),
+            c_0: &(DMatrix::from_diagonal(&rates) * kept_columns.rows(first, filter.len())),
+            channels: self.channels,
+            faults: self.faults,
+            filter: None,
+            estimator: Estimator::Prediction,
+        };
+        unfiltered.lower_bound(required, domain)
     }
 
     /// Computes L; for a current estimator the gain of the correction.
@@ -149,10 +210,16 @@ impl ObserverProblem<'_> {
         let seen = self.estimator.output_matrix(self.a_0, self.c_0);
         let plain = NormRequirement { channel: &Channel::default(), ..required };
         let unweighted = self.performance(plain, domain);
+        let weights = self.weights(required.channel, domain)?;
         let search = Search {
-            synthesise: &|region, performance| {
-                lmi::observer_gain(self.a_0, &seen, region, performance, domain)
+            synthesise: &|region, performance| match performance.zip(weights.as_ref()) {
+                None => lmi::observer_gain(self.a_0, &seen, region, performance, domain),
+                Some((performance, weights)) => {
+                    let pair = (self.a_0, &seen);
+                    weighted_observer_gain(pair, region, performance, weights, domain)
+                }
             },
+            weights: weights.as_ref(),
             system: &|gain, given| StateSpace {
                 a: self.a_0 - gain * &seen,
                 b: &given.disturbance - gain * &given.feedthrough,
@@ -165,6 +232,7 @@ impl ObserverProblem<'_> {
             required,
             domain,
             filter: self.riccati(required, domain)?,
+            lower_bound: self.lower_bound(required, domain)?,
         };
         let noise = if required.channel.noise.is_empty() { "" } else { " and measurement noise" };
         search.result(&format!(
@@ -181,11 +249,41 @@ impl FeedbackProblem<'_> {
         feedthrough.view_mut((p, 0), (m, m)).fill_with_identity();
         let mut output = self.c.clone().resize_vertically(p + m, 0.0);
         for (row, weight) in required.channel.weights.iter().enumerate() {
-            output.row_mut(row).scale_mut(*weight);
-            feedthrough.row_mut(row).scale_mut(*weight);
+            output.row_mut(row).scale_mut(weight.factor());
+            feedthrough.row_mut(row).scale_mut(weight.factor());
         }
         let (disturbance, gamma) = (self.f_a.clone(), required.bound);
         Performance { disturbance, output, feedthrough, norm: Norm::HInfinity, gamma }
+    }
+
+    /// The weights over frequency of measurements and commands, if there are any.
+    fn weights(&self, channel: &Channel, domain: Domain) -> Result<Option<ChannelWeights>, Error> {
+        if !channel.has_states() {
+            return Ok(None);
+        }
+        let inputs = vec![Weight::constant(1.0); self.f_a.ncols()];
+        let outputs: Vec<_> = channel.weights.iter().map(over_frequency).collect();
+        let (input, output) = (diagonal(&inputs, domain)?, diagonal(&outputs, domain)?);
+        Ok(Some(ChannelWeights { input, output }))
+    }
+
+    /// Computes a norm below which no state feedback is, even if it knows the states of the weights.
+    fn lower_bound(
+        &self,
+        performance: &Performance,
+        weights: Option<&ChannelWeights>,
+        domain: Domain,
+    ) -> Result<Option<f64>, Error> {
+        if self.a.nrows() > LARGEST_ORDER {
+            return Ok(None);
+        }
+        let Some(weights) = weights else {
+            return feedback_norm_lower_bound(self.a, self.b, performance, domain);
+        };
+        let dual = performance.transposed();
+        let pair = (self.a.transpose(), self.b.transpose());
+        let (a, c, performance) = weights.transposed().extend(&pair.0, &pair.1, &dual);
+        observer_norm_lower_bound(&a, &c, &performance, domain)
     }
 
     /// Computes K of u = K x.
@@ -195,10 +293,18 @@ impl FeedbackProblem<'_> {
         domain: Domain,
     ) -> Result<GainResult, Refusal> {
         let plain = NormRequirement { channel: &Channel::default(), ..required };
+        let performance = self.performance(required);
+        let weights = self.weights(required.channel, domain)?;
+        let lower_bound = self.lower_bound(&performance, weights.as_ref(), domain)?;
         let search = Search {
-            synthesise: &|region, performance| {
-                lmi::state_feedback(self.a, self.b, region, performance, domain)
+            synthesise: &|region, performance| match performance.zip(weights.as_ref()) {
+                None => lmi::state_feedback(self.a, self.b, region, performance, domain),
+                Some((performance, weights)) => {
+                    let pair = (self.a, self.b);
+                    weighted_state_feedback(pair, region, performance, weights, domain)
+                }
             },
+            weights: weights.as_ref(),
             system: &|gain, given| StateSpace {
                 a: self.a + self.b * gain,
                 b: given.disturbance.clone(),
@@ -206,142 +312,21 @@ impl FeedbackProblem<'_> {
                 d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
                 domain,
             },
-            performance: self.performance(required),
+            performance,
             unweighted: self.performance(plain),
             required,
             domain,
             filter: None,
+            lower_bound,
         };
         search.result("H-infinity norm from the faults to measurements and commands")
     }
 }
 
-/// Computes a gain for a region and, if given, a performance.
-type Synthesise<'a> =
-    dyn Fn(&lmi::Region, Option<&Performance>) -> Result<Outcome<Synthesis>, Error> + 'a;
-
-/// The search for a gain by its norm, the same for observer and feedback.
-struct Search<'a> {
-    synthesise: &'a Synthesise<'a>,
-    /// The closed loop of a gain, from w to z of a performance.
-    system: &'a dyn Fn(&DMatrix<f64>, &Performance) -> StateSpace,
-    performance: Performance,
-    /// The performance without weights and noise.
-    unweighted: Performance,
-    required: NormRequirement<'a>,
-    domain: Domain,
-    /// The filter by a Riccati equation.
-    filter: Option<Filter>,
-}
-
-/// A gain by the Riccati equation of the H-infinity filter.
-struct Filter {
-    gain: DMatrix<f64>,
-    /// The least bound for which a filter was found.
-    least: Option<f64>,
-}
-
-impl Search<'_> {
-    fn norm(&self, gain: &DMatrix<f64>, performance: &Performance) -> Result<f64, Error> {
-        Ok(h_infinity(&(self.system)(gain, performance), WIDTH)?.upper)
-    }
-
-    /// Returns the gain, with a sentence that compares its norm with the bounds.
-    ///
-    /// For the least norm the gain for the region alone is computed, too, and the better one is
-    /// chosen: one Lyapunov matrix for norm and region is sufficient, not necessary. A filter by the
-    /// Riccati equation is used if its eigenvalues are in the region and its norm keeps the bound.
-    fn result(&self, name: &str) -> Result<GainResult, Refusal> {
-        if let Some(filter) = &self.filter
-            && self.usable(&filter.gain)?
-        {
-            return self.filtered(filter, name);
-        }
-        let region = self.required.region.stated();
-        let mut chosen = synthesised((self.synthesise)(&region, Some(&self.performance))?, name)?;
-        let mut norm = self.norm(&chosen.gain, &self.performance)?;
-        let mut remarks = Vec::new();
-        if self.required.bound.is_none() {
-            remarks.push(LEAST.to_owned());
-            if let Outcome::Optimal(plain) = (self.synthesise)(&region, None)? {
-                let other = self.norm(&plain.gain, &self.performance)?;
-                remarks.push(format!(
-                    "The inequalities for norm and region gave a norm of {norm:.4e}, those for the region \
-                     alone {other:.4e}; the smaller one is used."
-                ));
-                if other < norm {
-                    (chosen.gain, norm) = (plain.gain, other);
-                    let margin = plain.region.margin;
-                    chosen.method = format!("{name}; region verified with margin {margin:.1e}.");
-                }
-            }
-            remarks.extend(self.without_region()?);
-        }
-        let figures = self.figures(&chosen.gain, norm)?;
-        chosen.method = format!("{} {figures} {}", chosen.method, remarks.join(" "));
-        chosen.method.truncate(chosen.method.trim_end().len());
-        Ok(chosen)
-    }
-
-    /// Whether the eigenvalues with a gain are in the region and its norm keeps the bound.
-    fn usable(&self, gain: &DMatrix<f64>) -> Result<bool, Error> {
-        let all = eigenvalues(&(self.system)(gain, &self.performance).a)?;
-        let inside = |value| self.required.region.contains(value, self.domain);
-        let bound = self.required.bound.unwrap_or(f64::INFINITY);
-        Ok(all.into_iter().all(inside) && self.norm(gain, &self.performance)? <= bound)
-    }
-
-    fn filtered(&self, filter: &Filter, name: &str) -> Result<GainResult, Refusal> {
-        let norm = self.norm(&filter.gain, &self.performance)?;
-        let figures = self.figures(&filter.gain, norm)?;
-        let least = filter.least.map_or(String::new(), |least| {
-            let above = 100.0 * (norm / least - 1.0);
-            format!(
-                " The least norm of any gain is about {least:.4e} (up to 5 % too large); this one is \
-                 {above:.0} % above, as gains grow without limit towards the least."
-            )
-        });
-        let method = format!("{name}, by the Riccati equation of the filter. {figures}{least}");
-        let gain = filter.gain.clone();
-        Ok(GainResult { gain, method, required: Vec::new(), quality: None })
-    }
-
-    fn figures(&self, gain: &DMatrix<f64>, norm: f64) -> Result<String, Error> {
-        let (plain, size) = (self.plain_norm(gain)?, gain.norm());
-        Ok(format!("Norm {norm:.4e}{plain}; Frobenius norm of the gain {size:.4e}."))
-    }
-
-    /// Says what the norm is without weights and noise, if there are any.
-    fn plain_norm(&self, gain: &DMatrix<f64>) -> Result<String, Error> {
-        if self.performance == self.unweighted {
-            return Ok(String::new());
-        }
-        let plain = self.norm(gain, &self.unweighted)?;
-        Ok(format!(" with weights and noise, {plain:.4e} without"))
-    }
-
-    /// Says what norm a gain reaches that need not keep the region.
-    fn without_region(&self) -> Result<Option<String>, Error> {
-        let order = self.performance.output.ncols();
-        if self.required.region == Region::default() || order > LARGEST_ORDER {
-            return Ok(None);
-        }
-        let gain = if let Some(filter) = &self.filter {
-            filter.gain.clone()
-        } else {
-            let found = (self.synthesise)(&lmi::Region::default(), Some(&self.performance))?;
-            let Outcome::Optimal(found) = found else { return Ok(None) };
-            found.gain
-        };
-        let (norm, size) = (self.norm(&gain, &self.performance)?, gain.norm());
-        Ok(Some(format!(
-            "Without the region, a gain with the norm {norm:.4e} exists; the Frobenius norm of that gain \
-             is {size:.4e}."
-        )))
+/// The weight if it depends on the frequency, else 1: constant weights are factors of the performance.
+fn over_frequency(one: &ChannelWeight) -> Weight {
+    match one.weight.as_constant() {
+        None => one.weight.clone(),
+        Some(_) => Weight::constant(1.0),
     }
 }
-
-/// What "least" means: with a region the inequalities are sufficient, not necessary.
-const LEAST: &str = "Least certified: the inequalities are solved 5 % above the least bound that one \
-                     Lyapunov matrix proves for norm and region together; a gain with a smaller norm in \
-                     this region may exist.";

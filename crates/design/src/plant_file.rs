@@ -6,17 +6,19 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
 
+use super::channel::ChannelSignals;
 use super::detection_request::{DetectionRequest, Disturbance, disturbances};
 use super::estimation::EstimationRequest;
 use super::plausibility::check_names;
 use super::reconfiguration_limits::ReconfigurationRequest;
 use super::references::References;
-use super::requirements::{ChannelSignals, Request, request};
+use super::requirements::{Request, request};
 use super::robustness_limits::RobustnessLimits;
 use super::signals::{
     EntryPoint, Fault, Signal, all_actuator_faults, description, faults, signals,
 };
 use super::variants::{self, Schedule, Variant};
+use control::Domain;
 use files::{Entry, Place, PlaceError, Source, Table};
 
 /// A plant file whose entries are valid and consistent.
@@ -159,15 +161,18 @@ impl<'a> PlantFile<'a> {
         let faults = all_faults(file, &actuators, &measurements)?;
         let references = References::read(file, &measurements)?;
         let sampling = sampling(file)?;
-        let sampled = sampling.is_some();
+        let domain = sampling
+            .as_ref()
+            .map_or(Domain::Continuous, |sampling| Domain::Sampled { period: sampling.period });
         let read = |key: &str, weights, meaning: &str| {
             let outputs: Vec<&str> = match key {
                 "observer" => faults.iter().map(|fault| fault.name.as_str()).collect(),
                 _ => measurements.iter().chain(&actuators).map(|one| one.name.as_str()).collect(),
             };
-            let noises = (key == "observer").then_some(measurements.len());
+            let names = || measurements.iter().map(|one| one.name.as_str()).collect();
+            let noises = (key == "observer").then(names);
             let signals = ChannelSignals { outputs, noises };
-            request(&file.require(key, meaning)?.table()?, weights, &signals, sampled)
+            request(&file.require(key, meaning)?.table()?, weights, &signals, domain)
         };
         let experiment = file.get("experiment").map(|entry| entry.table()).transpose()?;
         if let Some(table) = &experiment {

@@ -151,6 +151,44 @@ pub struct Loop {
     pub pole_error: Option<f64>,
     /// The required region, if there is one.
     pub region: Option<Region>,
+    /// The H-infinity norm, if the gain was designed by it.
+    pub norm: Option<NormReport>,
+}
+
+/// The H-infinity norm of a gain that was designed by it.
+#[derive(Clone, Serialize, JsonSchema)]
+pub struct NormReport {
+    /// From where to where, in words.
+    pub channel: String,
+    /// The norm, with weights and noise; at most 1e-4 of it too large.
+    pub norm: f64,
+    /// A bound of the norm that the bounded real lemma proves, verified by eigenvalues; none if that
+    /// fails in double precision, or for more than 30 states.
+    pub certified: Option<f64>,
+    /// A proven lower bound: no gain, within a region or not, has a smaller norm, nor has a filter of any
+    /// order. None if none is known, as for an observer without noise.
+    pub lower_bound: Option<f64>,
+    /// The relative distance of the norm from its lower bound.
+    pub gap: Option<f64>,
+    /// The norm without weights and noise; none if there are neither.
+    pub unweighted: Option<f64>,
+    /// Frobenius norm of the gain.
+    pub gain: f64,
+    /// The weights over frequency.
+    pub weights: Vec<NormWeight>,
+}
+
+/// A weight over frequency.
+#[derive(Clone, Serialize, JsonSchema)]
+pub struct NormWeight {
+    /// The signal.
+    pub signal: String,
+    /// Numerator in s, of a sampled design in z, the highest power first.
+    pub numerator: Vec<f64>,
+    /// Denominator, likewise.
+    pub denominator: Vec<f64>,
+    /// The largest factor between the weight and the table that states it; none without a table.
+    pub table_deviation: Option<f64>,
 }
 
 /// A required region of eigenvalues, in 1/s and degrees.

@@ -337,6 +337,7 @@ fn closed(
                 sector: region.sector,
             }
         }),
+        norm: found.norm.clone(),
     })
 }
 

@@ -3,6 +3,8 @@
 use crate::matrix::MatrixEntry as _;
 use nalgebra::{Complex, DMatrix};
 
+use super::channel::{CHANNEL, Channel, ChannelSignals};
+use control::Domain;
 use files::{Entry, Place, PlaceError, Table};
 
 /// A requirement on a gain.
@@ -19,24 +21,6 @@ pub(crate) enum Requirement {
     Weights { states: DMatrix<f64>, channels: DMatrix<f64> },
     /// The least H-infinity norm, or a norm below a bound; the eigenvalues also lie in a region.
     HInfinity { bound: Option<f64>, region: Region, channel: Channel },
-}
-
-/// What the H-infinity norm weights.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Channel {
-    /// Factor of each output of the norm: of the errors of the faults' estimates for the observer, of
-    /// measurements, then commands for the feedback. Empty if all are 1.
-    pub(crate) weights: Vec<f64>,
-    /// Weight of the noise of each measurement, in its unit; empty if the norm has no noise.
-    pub(crate) noise: Vec<f64>,
-}
-
-/// The signals that the norm of a gain is about.
-pub(crate) struct ChannelSignals<'a> {
-    /// Names of its outputs.
-    pub(crate) outputs: Vec<&'a str>,
-    /// Number of measurements whose noise the norm can have.
-    pub(crate) noises: Option<usize>,
 }
 
 /// A region of the left half plane: the intersection of the given parts.
@@ -80,15 +64,15 @@ impl Requirement {
 }
 
 const KEYS: [&str; 4] = ["eigenvalues", "sampled_eigenvalues", "region", "h_infinity"];
-const CHANNEL: [&str; 2] = ["weights", "noise"];
 
 /// Reads `[feedback]` (weights Q, R) or `[observer]` (weights W, V).
 pub(crate) fn request(
     table: &Table<'_>,
     weights: [&str; 2],
     signals: &ChannelSignals<'_>,
-    sampled: bool,
+    domain: Domain,
 ) -> Result<Request, PlaceError> {
+    let sampled = domain != Domain::Continuous;
     let mut known = KEYS.to_vec();
     known.extend(weights);
     let allowed: Vec<_> = known.iter().copied().chain(CHANNEL).collect();
@@ -112,7 +96,7 @@ pub(crate) fn request(
     };
     if one.name.ends_with(".h_infinity") {
         let region = region.as_ref().map(self::region).transpose()?.unwrap_or_default();
-        let channel = channel(table, signals)?;
+        let channel = Channel::read(table, signals, domain)?;
         let bound = bound(&one, region, !channel.noise.is_empty())?;
         let requirement = Requirement::HInfinity { bound, region, channel };
         return Ok(Request { requirement, place: one.place, other: None });
@@ -227,45 +211,6 @@ fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
             number + radius
         ))),
     }
-}
-
-/// Reads `weights`, a table from names to factors, and `noise`, a number or one for each measurement.
-fn channel(table: &Table<'_>, signals: &ChannelSignals<'_>) -> Result<Channel, PlaceError> {
-    let mut found = Channel::default();
-    if let Some(entry) = table.get("weights") {
-        found.weights = vec![1.0; signals.outputs.len()];
-        for (name, value) in entry.table()?.entries() {
-            let Some(at) = signals.outputs.iter().position(|output| *output == name) else {
-                let known = signals.outputs.join(", ");
-                return Err(value.error(format!("`{name}` has no weight: expected one of {known}")));
-            };
-            found.weights[at] = value.positive()?;
-        }
-    }
-    if let Some(entry) = table.get("noise") {
-        let Some(count) = signals.noises else {
-            return Err(
-                entry.error("a state feedback has no measurement noise: expected it in `observer`")
-            );
-        };
-        found.noise = noises(&entry, count)?;
-    }
-    Ok(found)
-}
-
-/// Reads one number above 0, or one for each measurement.
-fn noises(entry: &Entry<'_>, count: usize) -> Result<Vec<f64>, PlaceError> {
-    if !entry.is_list() {
-        return Ok(vec![entry.positive()?; count]);
-    }
-    let members = entry.list()?;
-    if members.len() != count {
-        let found = members.len();
-        return Err(
-            entry.error(format!("expected {count} numbers, one per measurement, found {found}"))
-        );
-    }
-    members.iter().map(Entry::positive).collect()
 }
 
 /// Reads a bound of the norm, or the text "least" (`None`).

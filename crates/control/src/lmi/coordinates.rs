@@ -85,6 +85,23 @@ impl Coordinates {
         Some(Self { to: root * &self.to, from, unit: self.unit })
     }
 
+    /// Number of states.
+    pub(super) fn order(&self) -> usize {
+        self.to.nrows()
+    }
+
+    /// These coordinates with further states, each of the given size, behind.
+    pub(super) fn extended(&self, sizes: &DVector<f64>) -> Self {
+        let (order, whole) = (self.order(), self.order() + sizes.len());
+        let mut to = self.to.clone().resize(whole, whole, 0.0);
+        let mut from = self.from.clone().resize(whole, whole, 0.0);
+        for (at, size) in sizes.iter().enumerate() {
+            to[(order + at, order + at)] = 1.0 / size;
+            from[(order + at, order + at)] = *size;
+        }
+        Self { to, from, unit: self.unit }
+    }
+
     /// The coordinates for A' that correspond to these for A.
     pub(super) fn transposed(&self) -> Self {
         Self { to: self.from.transpose(), from: self.to.transpose(), unit: self.unit }

@@ -52,6 +52,20 @@ pub(super) struct ObserverRequirements<'a> {
     pub(super) region: Region,
     pub(super) performance: Option<&'a Performance>,
     pub(super) domain: Domain,
+    /// The error dynamics for the norm, if it has weights with states.
+    pub(super) weighted: Option<WeightedDynamics<'a>>,
+}
+
+/// Error dynamics with m states of weights behind the n states of A; the gain acts on the n states. P of
+/// the norm is block diagonal.
+#[derive(Clone, Copy)]
+pub(super) struct WeightedDynamics<'a> {
+    /// n + m x n + m.
+    pub(super) a: &'a DMatrix<f64>,
+    /// p x n + m.
+    pub(super) c: &'a DMatrix<f64>,
+    /// Number of states of weights of the disturbance, which come first.
+    pub(super) of_disturbance: usize,
 }
 
 impl ObserverRequirements<'_> {
@@ -122,6 +136,8 @@ pub(super) fn speed(
 struct ObserverProgram<'a> {
     requirements: ObserverRequirements<'a>,
     coordinates: Coordinates,
+    /// The same for the states with those of weights.
+    extended: Option<Coordinates>,
     /// Units of the measurements: powers of two near the lengths of the rows of C in the
     /// coordinates.
     units: DVector<f64>,
@@ -141,7 +157,21 @@ impl<'a> ObserverProgram<'a> {
             let norm = c.row(row).norm();
             if norm > 0.0 { power_of_two(norm) } else { 1.0 }
         });
-        Self { requirements, coordinates, units }
+        let extended = requirements.weighted.zip(requirements.performance);
+        let extended = extended.map(|(WeightedDynamics { a, of_disturbance, .. }, given)| {
+            let order = coordinates.order();
+            let size = coordinates.output(&given.output.columns(0, order).into_owned()).norm();
+            let size = if size > 0.0 { power_of_two(size) } else { 1.0 };
+            coordinates.extended(&DVector::from_fn(a.nrows() - order, |at, _| {
+                if at < of_disturbance { 1.0 } else { size }
+            }))
+        });
+        Self { requirements, coordinates, extended, units }
+    }
+
+    /// The coordinates of the states of the norm.
+    fn of_norm(&self) -> &Coordinates {
+        self.extended.as_ref().unwrap_or(&self.coordinates)
     }
 
     /// Coordinates in which the most interior P of the program is the identity.
@@ -201,7 +231,7 @@ impl<'a> ObserverProgram<'a> {
     ///                       the inequalities of the norm at level t
     /// ```
     fn program(&self, level: Option<f64>) -> Program {
-        let ObserverRequirements { a, c, region, performance, domain } = self.requirements;
+        let ObserverRequirements { a, c, region, performance, domain, .. } = self.requirements;
         let (n, outputs) = (a.nrows(), c.nrows());
         let c = divide_rows(&self.coordinates.output(c), &self.units);
         let mut problem = Problem::new();
@@ -220,6 +250,7 @@ impl<'a> ObserverProgram<'a> {
             problem.constrain(&p, MARGIN);
             problem.constrain(&(&Affine::identity(n, LARGEST) - &p), MARGIN);
             problem.constrain(&norm_below(&z, &Affine::identity(1, LARGEST)), MARGIN);
+            let (p, z, dynamics) = self.of_weighted(&mut problem, (&p, &z), dynamics);
             for matrix in self.gain_inequalities(performance, (&p, &z), dynamics, &level) {
                 problem.require("gain", &matrix, MARGIN);
             }
@@ -228,6 +259,29 @@ impl<'a> ObserverProgram<'a> {
             problem.constrain(&norm_below(&z, &level), MARGIN);
         }
         Program { problem, p, z }
+    }
+
+    /// P, Z and P (A - L C) of the norm: with weights [P, 0; 0, `P_2`] and [Z; 0].
+    fn of_weighted(
+        &self,
+        problem: &mut Problem,
+        (p, z): (&Affine, &Affine),
+        dynamics: Affine,
+    ) -> (Affine, Affine, Affine) {
+        let Some(WeightedDynamics { a, c, .. }) = self.requirements.weighted else {
+            return (p.clone(), z.clone(), dynamics);
+        };
+        let (n, outputs) = z.shape();
+        let more = a.nrows() - n;
+        let own = problem.symmetric(more);
+        problem.constrain(&own, MARGIN);
+        problem.constrain(&(&Affine::identity(more, LARGEST) - &own), MARGIN);
+        let side = Affine::zeros(n, more);
+        let p = Affine::blocks(&[&[p, &side], &[&side.transpose(), &own]]);
+        let z = Affine::blocks(&[&[z], &[&Affine::zeros(more, outputs)]]);
+        let c = divide_rows(&self.of_norm().output(c), &self.units);
+        let dynamics = &(&p * &self.of_norm().dynamics(a)) - &(&z * &c);
+        (p, z, dynamics)
     }
 
     /// The inequalities of the norm of {A - L C, B - L `D_y`, E, 0}; `dynamics` is P (A - L C).
@@ -240,8 +294,8 @@ impl<'a> ObserverProgram<'a> {
     ) -> Vec<Affine> {
         let scaling = self.scaling(performance);
         let (b, e, _) = scaling.scale(
-            &self.coordinates.input(&performance.disturbance),
-            &self.coordinates.output(&performance.output),
+            &self.of_norm().input(&performance.disturbance),
+            &self.of_norm().output(&performance.output),
             &performance.feedthrough,
         );
         let d_y = divide_rows(&performance.feedthrough, &self.units) / scaling.disturbance();
@@ -257,8 +311,8 @@ impl<'a> ObserverProgram<'a> {
     }
 
     fn scaling(&self, performance: &Performance) -> GainScaling {
-        let b = self.coordinates.input(&performance.disturbance);
-        let e = self.coordinates.output(&performance.output);
+        let b = self.of_norm().input(&performance.disturbance);
+        let e = self.of_norm().output(&performance.output);
         GainScaling::new(performance.norm, &b, &e, self.coordinates.unit)
     }
 }

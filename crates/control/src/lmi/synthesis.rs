@@ -107,7 +107,8 @@ pub fn observer_gain(
         let (k, r) = (given.disturbance.ncols(), given.output.nrows());
         given.check((n, k), (r, n), (c.nrows(), k))?;
     }
-    let requirements = ObserverRequirements { a, c, region: *region, performance, domain };
+    let requirements =
+        ObserverRequirements { a, c, region: *region, performance, domain, weighted: None };
     requirements.search(|candidate| {
         let Candidate { gain, coordinates } = candidate;
         let dynamics = a - &gain * c;
@@ -156,13 +157,14 @@ pub fn state_feedback(
         let (k, r) = (given.disturbance.ncols(), given.output.nrows());
         given.check((n, k), (r, n), (r, b.ncols()))?;
     }
-    let dual = performance.map(Performance::dual);
+    let dual = performance.map(Performance::transposed);
     let requirements = ObserverRequirements {
         a: &a.transpose(),
         c: &b.transpose(),
         region: *region,
         performance: dual.as_ref(),
         domain,
+        weighted: None,
     };
     requirements.search(|candidate| {
         let gain = -candidate.gain.transpose();
@@ -185,7 +187,7 @@ pub fn state_feedback(
 
 impl Performance {
     /// Checks the matrices against the given shapes, and the bound.
-    fn check(
+    pub(super) fn check(
         &self,
         disturbance: (usize, usize),
         output: (usize, usize),
@@ -198,7 +200,8 @@ impl Performance {
     }
 
     /// The same requirement for the transposed system.
-    fn dual(&self) -> Self {
+    #[must_use]
+    pub fn transposed(&self) -> Self {
         Self {
             disturbance: self.output.transpose(),
             output: self.disturbance.transpose(),
@@ -214,7 +217,7 @@ impl Performance {
 }
 
 /// A bound to prove: that the norm of `system` is at most `gamma`, or any value if None.
-struct Bound {
+pub(super) struct Bound {
     system: StateSpace,
     norm: Norm,
     gamma: Option<f64>,
@@ -224,7 +227,7 @@ struct Bound {
 ///
 /// Each certificate is computed in the coordinates of the candidate first, then in those that suit
 /// the closed-loop dynamics.
-fn prove(
+pub(super) fn prove(
     candidate: Candidate,
     dynamics: &DMatrix<f64>,
     region: &Region,

@@ -1,7 +1,7 @@
 //! The controllable part of a pair, for feedback of a pair that is only stabilisable.
 
 use super::{Mode, Staircase, modes_of};
-use crate::balance::divide_columns;
+use crate::balance::{divide_columns, multiply_rows};
 use crate::{Error, check};
 use nalgebra::DMatrix;
 
@@ -20,6 +20,8 @@ pub struct ControllablePart {
     pub b: DMatrix<f64>,
     /// T, r x n.
     pub coordinates: DMatrix<f64>,
+    /// V, n x r: its columns span the controllable subspace, T V = I.
+    pub basis: DMatrix<f64>,
     /// The n - r uncontrollable modes, see [`super::uncontrollable_modes`].
     pub fixed: Vec<Mode>,
 }
@@ -64,6 +66,7 @@ pub fn controllable_part(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Controlla
         a: staircase.reached_dynamics(),
         b: staircase.reached_input(b),
         coordinates: divide_columns(&staircase.reached_basis.transpose(), &staircase.scale),
+        basis: multiply_rows(&staircase.reached_basis, &staircase.scale),
         fixed: modes_of(&staircase)?,
     })
 }

@@ -172,5 +172,75 @@ pub(super) fn conditioning(report: &Report) -> Markup {
              part that comes from the units of the states. The pole error is the largest distance of an eigenvalue from the \
              required one, relative to that."
         }
+        (norms(report))
+    }
+}
+
+/// Shows the weights over frequency of these norms.
+fn weights(report: &Report) -> Markup {
+    let polynomial =
+        |all: &[f64]| all.iter().map(|one| format!("{one:.5e}")).collect::<Vec<_>>().join(", ");
+    let loops =
+        [&report.feedback, &report.observer].into_iter().filter_map(|one| one.norm.as_ref());
+    let rows: Vec<_> = loops
+        .flat_map(|norm| &norm.weights)
+        .map(|weight| {
+            vec![
+                weight.signal.as_str().into(),
+                Cell::Text(polynomial(&weight.numerator)),
+                Cell::Text(polynomial(&weight.denominator)),
+                weight.table_deviation.map(|factor| 20.0 * factor.log10()).into(),
+            ]
+        })
+        .collect();
+    let variable = if report.sampling.is_some() { "z" } else { "s" };
+    let heads = [
+        "signal",
+        &format!("numerator in {variable}, highest power first"),
+        "denominator",
+        "largest deviation from the table (dB)",
+    ];
+    html! { @if !rows.is_empty() { (table("Weights over frequency", &heads, &rows)) } }
+}
+
+/// Shows the norms of gains that were designed by them, with their bounds.
+fn norms(report: &Report) -> Markup {
+    let loops = [("feedback", &report.feedback), ("observer", &report.observer)];
+    let rows: Vec<_> = loops
+        .into_iter()
+        .filter_map(|(name, system)| {
+            let found = system.norm.as_ref()?;
+            Some(vec![
+                name.into(),
+                found.channel.as_str().into(),
+                Some(found.norm).into(),
+                found.certified.into(),
+                found.lower_bound.into(),
+                found.gap.map(|gap| 100.0 * gap).into(),
+                found.unweighted.into(),
+                Some(found.gain).into(),
+            ])
+        })
+        .collect();
+    let heads = [
+        "loop",
+        "from, to",
+        "norm",
+        "proven bound",
+        "lower bound",
+        "gap (%)",
+        "without weights and noise",
+        "norm of the gain",
+    ];
+    html! {
+        @if !rows.is_empty() {
+            (table("H-infinity norms", &heads, &rows))
+            p {
+                "No gain has a norm below the lower bound, nor has a filter of any order: growing \
+                 disturbances that the measurements do not show prove it. The gap is the relative \
+                 distance from it. Without noise on each measurement no lower bound is known."
+            }
+            (weights(report))
+        }
     }
 }

@@ -108,6 +108,7 @@ mod tests {
             balanced_condition: Some(1.0),
             pole_error: None,
             region: None,
+            norm: None,
         };
         let expected = [
             (Some([-1.0, 2.0]), Some([-1.1, 2.0])),

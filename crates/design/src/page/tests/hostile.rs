@@ -70,6 +70,7 @@ fn sampled_loop(matrix: &str, rates: &[[f64; 2]], region: Option<Region>) -> Loo
         balanced_condition: Some(f64::INFINITY),
         pole_error: None,
         region,
+        norm: None,
     }
 }
 
@@ -457,6 +458,7 @@ pub(super) fn bare() -> Report {
         balanced_condition: None,
         pole_error: None,
         region: None,
+        norm: None,
     };
     Report {
         description: String::new(),

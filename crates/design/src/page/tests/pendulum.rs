@@ -235,6 +235,7 @@ fn system(matrix: &str, wanted: &[f64], reached: &DMatrix<f64>, conditions: [f64
         balanced_condition: Some(conditions[1]),
         pole_error: Some(conditions[2]),
         region: None,
+        norm: None,
     }
 }
 

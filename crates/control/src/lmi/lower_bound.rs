@@ -1,0 +1,280 @@
+//! Lower bounds of the H-infinity norm that hold for every gain and every filter.
+
+use super::affine::Affine;
+use super::definite::margin;
+use super::region::MARGIN;
+use super::{Performance, Problem};
+use crate::balance::power_of_two;
+use crate::blocks::symmetric_part;
+use crate::rank::controllable_part;
+use crate::riccati::kalman;
+use crate::{Domain, Error, check};
+use nalgebra::{DMatrix, SymmetricEigen};
+
+/// A lower bound of the H-infinity norm of the estimation error of every linear filter, with proof.
+///
+/// ```text
+/// x' = A x + B w,  y = C x + D w,  z = E x          (sampled: x[k+1] = A x[k] + B w[k])
+/// gamma_low^2 = tr(E H_xx E') / tr(H_ww)  for a H = [H_xx, H_xw; H_wx, H_ww] >= 0 with
+/// [C, D] H = 0  and  A H_xx + H_xx A' + B H_wx + H_xw B' >= 0
+/// (sampled: [A, B] H [A, B]' - H_xx >= 0)
+/// ```
+///
+/// Such an H is the covariance of growing disturbances that the measurement does not show: every
+/// filter estimates z = 0. So no filter from y to an estimate of z, of any order, has an error with a
+/// smaller norm; for error dynamics A - L C the traces of H with the inequality of the norm (see
+/// [`super::certify_gain`]) give the bound, whatever L is. The largest bound is computed; it equals the
+/// least norm of any filter (strong duality), which gains in general only approach.
+///
+/// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, D = `feedthrough`; its norm
+/// and bound are not used. None if D has not full row rank (a measurement without noise), if no filter
+/// exists, or if the inequalities could not be verified in double precision.
+///
+/// Method: w = -D' (D D')^-1 C x + N d with the null space N of D meets [C, D] H = 0. The
+/// semidefinite program for the covariance of (x, d) is solved for the part of the states that d
+/// reaches, in coordinates in which the covariance of the Kalman filter is the identity, and verified by
+/// eigenvalues in the coordinates of that part.
+///
+/// Source: dual of the inequality of the H-infinity filter; V. Balakrishnan and L. Vandenberghe,
+/// Semidefinite programming duality and linear time-invariant systems, IEEE Trans. Autom. Control 48
+/// (2003), section IV.
+///
+/// # Example
+///
+/// No filter for x' = w, y = x + v has an error of x below the energy of [w; v]:
+///
+/// ```
+/// use control::Domain;
+/// use control::lmi::{Norm, Performance, observer_norm_lower_bound};
+/// use nalgebra::DMatrix;
+/// let row = |entries: &[f64]| DMatrix::from_row_slice(1, entries.len(), entries);
+/// let performance = Performance {
+///     disturbance: row(&[1.0, 0.0]),
+///     output: row(&[1.0]),
+///     feedthrough: row(&[0.0, 1.0]),
+///     norm: Norm::HInfinity,
+///     gamma: None,
+/// };
+/// let (a, c) = (row(&[0.0]), row(&[1.0]));
+/// let bound = observer_norm_lower_bound(&a, &c, &performance, Domain::Continuous)?.unwrap();
+/// assert!(bound < 1.0 && bound > 0.999);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::NotConverged`].
+pub fn observer_norm_lower_bound(
+    a: &DMatrix<f64>,
+    c: &DMatrix<f64>,
+    performance: &Performance,
+    domain: Domain,
+) -> Result<Option<f64>, Error> {
+    let n = check::square("A", a)?;
+    check::shape("C", c, (c.nrows(), n))?;
+    let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
+    performance.check((n, k), (r, n), (c.nrows(), k))?;
+    match HiddenDisturbance::new(a, c, performance, domain)? {
+        Some(hidden) => hidden.largest_ratio(),
+        None => Ok(None),
+    }
+}
+
+/// A lower bound of the H-infinity norm that holds for every state feedback, with proof: that of
+/// [`observer_norm_lower_bound`] for the transposed system.
+///
+/// `a`, `b`, `performance`: as for [`super::state_feedback`]. None as there; D is the transposed
+/// `feedthrough`, so every command must have a weight.
+///
+/// # Errors
+///
+/// Same as [`observer_norm_lower_bound`].
+pub fn feedback_norm_lower_bound(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    performance: &Performance,
+    domain: Domain,
+) -> Result<Option<f64>, Error> {
+    observer_norm_lower_bound(&a.transpose(), &b.transpose(), &performance.transposed(), domain)
+}
+
+/// x' = A x + B d with the disturbance w that keeps y = 0, of energy |W x|^2 + |d|^2, and z = E x.
+struct HiddenDisturbance {
+    a: DMatrix<f64>,
+    b: DMatrix<f64>,
+    energy: DMatrix<f64>,
+    output: DMatrix<f64>,
+    /// Lower triangular R: x = R x~ in coordinates of about one.
+    scale: DMatrix<f64>,
+    domain: Domain,
+}
+
+impl HiddenDisturbance {
+    /// None if D has not full row rank or there is no Kalman filter.
+    fn new(
+        a: &DMatrix<f64>,
+        c: &DMatrix<f64>,
+        performance: &Performance,
+        domain: Domain,
+    ) -> Result<Option<Self>, Error> {
+        let Performance { disturbance: b, output, feedthrough: d, .. } = performance;
+        let noise = symmetric_part(&(d * d.transpose()));
+        if margin(&noise)? <= 0.0 {
+            return Ok(None);
+        }
+        let Some(factor) = noise.clone().cholesky() else { return Ok(None) };
+        let inverse = factor.solve(d).transpose();
+        let free = null_space(&(&inverse * d));
+        let (hidden, driven) = (a - b * &inverse * c, b * free);
+        let part = controllable_part(&hidden, &driven)?;
+        if part.a.is_empty() {
+            return Ok(None);
+        }
+        let seen = c * &part.basis;
+        let process = symmetric_part(&(&part.b * part.b.transpose()));
+        let Ok(filter) = kalman(&part.a, &seen, &process, &noise, domain) else { return Ok(None) };
+        let Some(scale) = filter.covariance.cholesky() else { return Ok(None) };
+        Ok(Some(Self {
+            energy: inverse * seen,
+            output: output * &part.basis,
+            scale: scale.unpack(),
+            a: part.a,
+            b: part.b,
+            domain,
+        }))
+    }
+
+    /// The root of the largest ratio of the energies of z and w.
+    fn largest_ratio(&self) -> Result<Option<f64>, Error> {
+        let (order, free) = self.b.shape();
+        let scale = &self.scale;
+        let solve = |m: DMatrix<f64>| scale.solve_lower_triangular(&m);
+        let Some((a, b)) = solve(&self.a * scale).zip(solve(self.b.clone())) else {
+            return Ok(None);
+        };
+        let continuous = self.domain == Domain::Continuous;
+        let unit = if continuous && a.norm() > 0.0 { power_of_two(a.norm()) } else { 1.0 };
+        let scaled = Self {
+            a: a / unit,
+            b: b / unit.sqrt(),
+            energy: &self.energy * scale / unit.sqrt(),
+            output: &self.output * scale,
+            scale: DMatrix::identity(order, order),
+            domain: self.domain,
+        };
+        let mut problem = Problem::new();
+        let covariance = problem.symmetric(order + free);
+        problem.constrain(&covariance, MARGIN);
+        problem.constrain(&scaled.growth(&covariance), MARGIN);
+        let (of_z, of_w) = scaled.energies();
+        let size = if of_z.norm() > 0.0 { of_z.norm() } else { return Ok(None) };
+        problem.constrain(&(&Affine::identity(1, 1.0) - &product_trace(&covariance, &of_w)), 0.0);
+        problem.minimise(&product_trace(&covariance, &(of_z * (-1.0 / size))));
+        let Some((_, found)) = problem.minimum() else { return Ok(None) };
+        let mut to = DMatrix::identity(order + free, order + free) * unit.sqrt();
+        to.view_mut((0, 0), (order, order)).copy_from(scale);
+        self.verified(&symmetric_part(&(&to * covariance.evaluate(&found) * to.transpose())))
+    }
+
+    /// The ratio of a covariance of (x, d), if its inequalities hold by more than rounding.
+    fn verified(&self, covariance: &DMatrix<f64>) -> Result<Option<f64>, Error> {
+        let growth = self.growth(&Affine::constant(covariance)).constant;
+        if margin(covariance)? <= 0.0 || margin(&growth)? <= 0.0 {
+            return Ok(None);
+        }
+        let (of_z, of_w) = self.energies();
+        Ok(Some((covariance.dot(&of_z) / covariance.dot(&of_w)).sqrt()))
+    }
+
+    /// A X + X A' + B Y + Y' B' of the covariance [X, Y'; Y, U]; sampled: [A, B] [X, Y'; Y, U]
+    /// [A, B]' - X.
+    fn growth(&self, covariance: &Affine) -> Affine {
+        let (order, free) = self.b.shape();
+        let state = DMatrix::identity(order, order + free);
+        let mut next = self.a.clone().resize_horizontally(order + free, 0.0);
+        next.columns_mut(order, free).copy_from(&self.b);
+        let moved = &next * covariance;
+        match self.domain {
+            Domain::Continuous => (&moved * &state.transpose()).plus_transpose(),
+            Domain::Sampled { .. } => {
+                let before = &(&state * covariance) * &state.transpose();
+                &(&moved * &next.transpose()) - &before
+            }
+        }
+    }
+
+    /// M of tr(M H) for the energies of z and of w.
+    fn energies(&self) -> (DMatrix<f64>, DMatrix<f64>) {
+        let (order, free) = self.b.shape();
+        let whole = order + free;
+        let of_z = self.output.tr_mul(&self.output).resize(whole, whole, 0.0);
+        let mut of_w = self.energy.tr_mul(&self.energy).resize(whole, whole, 0.0);
+        of_w.view_mut((order, order), (free, free)).fill_with_identity();
+        (of_z, of_w)
+    }
+}
+
+/// tr(M X).
+fn product_trace(x: &Affine, m: &DMatrix<f64>) -> Affine {
+    let terms = x.terms.iter().map(|(at, unit)| (*at, DMatrix::from_element(1, 1, m.dot(unit))));
+    Affine { constant: DMatrix::from_element(1, 1, m.dot(&x.constant)), terms: terms.collect() }
+}
+
+/// An orthonormal basis of the null space of an orthogonal projector.
+fn null_space(projector: &DMatrix<f64>) -> DMatrix<f64> {
+    let SymmetricEigen { eigenvalues, eigenvectors } = symmetric_part(projector).symmetric_eigen();
+    let columns: Vec<_> = (0..eigenvalues.len()).filter(|&at| eigenvalues[at] < 0.5).collect();
+    eigenvectors.select_columns(&columns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Norm;
+    use super::*;
+
+    fn row(entries: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_row_slice(1, entries.len(), entries)
+    }
+
+    fn performance(b: DMatrix<f64>, e: DMatrix<f64>, d: DMatrix<f64>) -> Performance {
+        Performance {
+            disturbance: b,
+            output: e,
+            feedthrough: d,
+            norm: Norm::HInfinity,
+            gamma: None,
+        }
+    }
+
+    /// For x' = a x + w, y = x + v, z = x: 0 = 2 a X - (1 - `1/gamma^2`) X^2 + 1 has a positive stabilising
+    /// solution for `gamma^2` above 1 / (1 + a^2).
+    #[test]
+    fn the_bound_of_a_scalar_filter_is_that_of_the_riccati_equation() {
+        let given = performance(row(&[1.0, 0.0]), row(&[1.0]), row(&[0.0, 1.0]));
+        for a in [-20.0_f64, -1.0, 0.0] {
+            let found =
+                observer_norm_lower_bound(&row(&[a]), &row(&[1.0]), &given, Domain::Continuous);
+            let least = 1.0 / (1.0 + a * a).sqrt();
+            let bound = found.unwrap().unwrap();
+            assert!(bound <= least && bound > 0.9999 * least, "{a}: {bound}, {least}");
+        }
+    }
+
+    /// An unstable mode: `gamma^2` must make X of 0 = 2 a X - (1 - `1/gamma^2`) X^2 + 1 positive; gamma = 1.
+    #[test]
+    fn the_bound_with_an_unstable_mode_is_above_that_at_each_frequency() {
+        let given = performance(row(&[1.0, 0.0]), row(&[1.0]), row(&[0.0, 1.0]));
+        let found =
+            observer_norm_lower_bound(&row(&[3.0]), &row(&[1.0]), &given, Domain::Continuous);
+        let bound = found.unwrap().unwrap();
+        assert!(bound <= 1.0 && bound > 0.9999, "{bound}");
+    }
+
+    #[test]
+    fn a_measurement_without_noise_has_no_bound() {
+        let given = performance(row(&[1.0]), row(&[1.0]), row(&[0.0]));
+        let found =
+            observer_norm_lower_bound(&row(&[0.0]), &row(&[1.0]), &given, Domain::Continuous);
+        assert_eq!(found.unwrap(), None);
+    }
+}

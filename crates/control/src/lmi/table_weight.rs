@@ -1,0 +1,208 @@
+//! The weight whose magnitude is nearest to a table.
+
+use super::affine::Affine;
+use super::{Outcome, Problem};
+use crate::weight::Weight;
+use crate::{Error, check};
+
+/// Points between two frequencies of the table.
+const BETWEEN: usize = 6;
+/// Relative width of the logarithm of the largest deviation at which the search ends.
+const NARROW: f64 = 1e-3;
+/// Smallest coefficient of the squared magnitude: magnitudes at frequency 0 and infinity are neither 0
+/// nor infinite.
+const SMALLEST: f64 = 1e-6;
+/// Least damping ratio of poles and zeros.
+const DAMPING: f64 = 0.2;
+
+/// A weight and its largest deviation from a table.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct TableWeight {
+    /// The weight.
+    pub weight: Weight,
+    /// The largest factor between its magnitude and the table's, at least 1.
+    pub deviation: f64,
+}
+
+/// Computes the weight of order 1 or 2 with the least largest deviation from a table of frequencies
+/// (rad/s, ascending) and magnitudes, in between straight lines of their logarithms.
+///
+/// ```text
+/// |W(j w)|^2 = N(w^2) / D(w^2),  minimise alpha:  m^2 / alpha <= N / D <= alpha m^2
+/// ```
+///
+/// For a given alpha these are linear inequalities for the coefficients of N and D, and "N and D are
+/// positive with damping ratios of at least 0.2" is a linear matrix inequality; alpha is found by
+/// bisection to 0.1 % of its logarithm. So no other weight of this order with such damping is nearer.
+/// Poles and zeros are the roots in the left half plane (spectral factorisation).
+///
+/// Source: S. P. Wu, S. Boyd and L. Vandenberghe, FIR filter design via spectral factorization and convex
+/// optimization (1996), here for a quotient.
+///
+/// # Errors
+///
+/// [`Error::OutOfRange`] for numbers that are not above zero, frequencies that are not ascending, an
+/// order other than 1 and 2; [`Error::Empty`] for fewer than two points; [`Error::NotConverged`].
+pub fn weight_of_table(table: &[(f64, f64)], order: usize) -> Result<TableWeight, Error> {
+    for &(frequency, magnitude) in table {
+        check::positive("frequency", frequency)?;
+        check::positive("magnitude", magnitude)?;
+    }
+    if let Some(pair) = table.windows(2).find(|pair| pair[1].0 <= pair[0].0) {
+        let rule = "above the frequency before it";
+        return Err(Error::OutOfRange { name: "frequency", value: pair[1].0, rule });
+    }
+    let [(first, _), .., (last, _)] = table else {
+        return Err(Error::Empty { matrix: "table", found: (table.len(), 2) });
+    };
+    if !(1..=2).contains(&order) {
+        let value = f64::from(u32::try_from(order).unwrap_or(u32::MAX));
+        return Err(Error::OutOfRange { name: "order", value, rule: "1 or 2" });
+    }
+    let unit = (first * last).sqrt();
+    let points = interpolated(table);
+    let size = points.iter().map(|(_, m)| m.ln()).sum::<f64>() / count(points.len());
+    let size = size.exp();
+    let fit = |deviation: f64| {
+        let scaled = points.iter().map(|(w, m)| ((w / unit).powi(2), (m / size).powi(2)));
+        coefficients(&scaled.collect::<Vec<_>>(), order, deviation.powi(2))
+    };
+    let farthest = points.iter().map(|(_, m)| (m / size).ln().abs()).fold(0.0, f64::max);
+    let (mut low, mut high) = (0.0, farthest + NARROW);
+    let mut best = fit(high.exp())?;
+    while high - low > NARROW * farthest.max(NARROW) {
+        let middle = 0.5 * (low + high);
+        match fit(middle.exp())? {
+            Some(found) => (best, high) = (Some(found), middle),
+            None => low = middle,
+        }
+    }
+    let Some((numerator, denominator)) = best else {
+        return Err(Error::NotConverged { what: "the weight of a table", iterations: 1 });
+    };
+    let lead = denominator[0];
+    let monic = |all: &[f64], factor: f64| all.iter().map(|one| one * factor / lead).collect();
+    let weight = Weight::from_coefficients(monic(&numerator, size), monic(&denominator, 1.0), unit);
+    let apart = |(w, m): &(f64, f64)| (weight.magnitude(*w) / m).ln().abs();
+    let deviation = points.iter().map(apart).fold(0.0, f64::max).exp();
+    Ok(TableWeight { weight, deviation })
+}
+
+fn count(number: usize) -> f64 {
+    f64::from(u32::try_from(number).unwrap_or(u32::MAX))
+}
+
+/// The table with further points between its own.
+fn interpolated(table: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut points = Vec::new();
+    for pair in table.windows(2) {
+        let ((w, m), (w_next, m_next)) = (pair[0], pair[1]);
+        for at in 0..BETWEEN {
+            let part = count(at) / count(BETWEEN);
+            points.push((w * (w_next / w).powf(part), m * (m_next / m).powf(part)));
+        }
+    }
+    points.extend(table.last());
+    points
+}
+
+/// Coefficients of numerator and denominator in p, the highest power first, whose squared magnitude is
+/// within a factor of that of the points (p^2, magnitude^2); None if there are none.
+fn coefficients(
+    points: &[(f64, f64)],
+    order: usize,
+    factor: f64,
+) -> Result<Option<(Vec<f64>, Vec<f64>)>, Error> {
+    let mut problem = Problem::new();
+    let [numerator, denominator] =
+        [(); 2].map(|()| (0..=order).map(|_| problem.scalar()).collect::<Vec<_>>());
+    for polynomial in [&numerator, &denominator] {
+        for coefficient in polynomial {
+            problem.constrain(coefficient, SMALLEST);
+        }
+        if let [b_0, b_1, b_2] = polynomial.as_slice() {
+            // b_1 >= -(2 - 4 zeta^2) sqrt(b_0 b_2), with s >= 0: b_1 - s is the smallest value.
+            let rest = problem.scalar();
+            problem.constrain(&rest, 0.0);
+            let side = &(b_1 - &rest) * (0.5 / (1.0 - 2.0 * DAMPING * DAMPING));
+            problem.constrain(&Affine::blocks(&[&[b_0, &side], &[&side, b_2]]), 0.0);
+        }
+    }
+    let sum = denominator.iter().skip(1).fold(denominator[0].clone(), |sum, one| &sum + one);
+    problem.constrain(&(&Affine::identity(1, 1.0) - &sum), 0.0);
+    for &(square, magnitude) in points {
+        let scale = 1.0 / (1.0 + square).powi(i32::try_from(order).unwrap_or(2));
+        let value = |all: &[Affine], factor: f64| {
+            let mut power = scale * factor;
+            let mut sum = Affine::zeros(1, 1);
+            for coefficient in all {
+                sum = &sum + &(coefficient * power);
+                power *= square;
+            }
+            sum
+        };
+        let (n, d) = (value(&numerator, 1.0 / magnitude), value(&denominator, 1.0));
+        problem.constrain(&(&(&d * factor) - &n), 0.0);
+        problem.constrain(&(&(&n * factor) - &d), 0.0);
+    }
+    let Outcome::Optimal(found) = problem.solve()? else { return Ok(None) };
+    let root = |all: &[Affine]| {
+        let values: Vec<_> = all.iter().map(|one| found.value(one)[(0, 0)]).collect();
+        spectral_factor(&values)
+    };
+    Ok(Some((root(&numerator), root(&denominator))))
+}
+
+/// The polynomial b in p, the highest power first, with roots in the left half plane and |b(j w)|^2 =
+/// `c_0` + `c_1` w^2 + `c_2` w^4.
+fn spectral_factor(c: &[f64]) -> Vec<f64> {
+    match *c {
+        [c_0, c_1, c_2] => {
+            let (lead, last) = (c_2.sqrt(), c_0.sqrt());
+            vec![lead, (c_1 + 2.0 * lead * last).max(0.0).sqrt(), last]
+        }
+        _ => c.iter().rev().map(|one| one.sqrt()).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_of_a_weight_gives_this_weight() {
+        for order in [1, 2] {
+            let given = Weight::lead_lag(5.0, 3.0, 0.05, order).unwrap();
+            let table: Vec<_> = (-20..=30)
+                .map(|k| 10_f64.powf(0.1 * f64::from(k)))
+                .map(|w| (w, given.magnitude(w)))
+                .collect();
+            let found = weight_of_table(&table, order).unwrap();
+            assert!(found.deviation < 1.02, "{}", found.deviation);
+            let apart = found.weight.magnitude(1.0) / given.magnitude(1.0);
+            assert!((apart - 1.0).abs() < 0.02);
+        }
+    }
+
+    /// By symmetry the best first-order weight for a step from 1 to 4 at once in a table of three
+    /// points is between them.
+    #[test]
+    fn the_stated_deviation_is_that_of_the_weight() {
+        let table = [(1.0, 1.0), (2.0, 4.0), (100.0, 4.0)];
+        let found = weight_of_table(&table, 1).unwrap();
+        let most = table.iter().map(|(w, m)| (found.weight.magnitude(*w) / m).ln().abs());
+        assert!(most.fold(0.0, f64::max) <= found.deviation.ln() + 1e-9);
+        assert!(found.deviation > 1.05 && found.deviation < 1.5, "{}", found.deviation);
+        let second = weight_of_table(&table, 2).unwrap();
+        assert!(second.deviation < found.deviation);
+    }
+
+    #[test]
+    fn bad_tables_are_refused() {
+        assert!(weight_of_table(&[(1.0, 1.0)], 1).is_err());
+        assert!(weight_of_table(&[(1.0, 1.0), (1.0, 2.0)], 1).is_err());
+        assert!(weight_of_table(&[(1.0, 1.0), (2.0, 0.0)], 1).is_err());
+        assert!(weight_of_table(&[(1.0, 1.0), (2.0, 1.0)], 3).is_err());
+    }
+}

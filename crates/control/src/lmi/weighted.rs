@@ -1,0 +1,307 @@
+//! Gains by a norm with weights that have states.
+
+use super::descent::GainNorm;
+use super::observer::{Candidate, ObserverRequirements, WeightedDynamics};
+use super::region::{Region, certify_region};
+use super::synthesis::prove;
+use super::{Outcome, Performance, Synthesis, certify_gain, observer_gain};
+use crate::blocks::symmetric_part;
+use crate::riccati::kalman;
+use crate::{Domain, Error, StateSpace, check};
+use nalgebra::DMatrix;
+
+/// A bound of the norm that is larger than the norm by more than this factor is not stated.
+const LOOSE: f64 = 1.01;
+
+/// Of the gains with a norm up to this factor above the least one, the smallest gain is chosen.
+const NEARLY_LEAST: f64 = 1.05;
+
+const NOT_KEPT: &str = "no gain that keeps the bound was found";
+
+/// Weights of a norm from w to z: the norm is that of `output` G `input`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelWeights {
+    /// From the weighted disturbance to w, k x k.
+    pub input: StateSpace,
+    /// From z to the weighted output, r x r.
+    pub output: StateSpace,
+}
+
+impl ChannelWeights {
+    /// The system with weights. States: those of `system`, of `input`, of `output`.
+    #[must_use]
+    pub fn around(&self, system: &StateSpace) -> StateSpace {
+        let Self { input, output } = self;
+        let none = |rows: usize, cols: usize| DMatrix::zeros(rows, cols);
+        let [n, i, o] = [system.a.nrows(), input.a.nrows(), output.a.nrows()];
+        let driven = &output.b * &system.d;
+        let through = &output.d * &system.d;
+        StateSpace {
+            a: grid(&[
+                &[&system.a, &(&system.b * &input.c), &none(n, o)],
+                &[&none(i, n), &input.a, &none(i, o)],
+                &[&(&output.b * &system.c), &(&driven * &input.c), &output.a],
+            ]),
+            b: grid(&[&[&(&system.b * &input.d)], &[&input.b], &[&(&driven * &input.d)]]),
+            c: grid(&[&[&(&output.d * &system.c), &(&through * &input.c), &output.c]]),
+            d: &through * &input.d,
+            domain: system.domain,
+        }
+    }
+
+    /// The pair (A, C) and the performance of the error dynamics with the states of the weights; a gain L
+    /// of the pair without weights is [L; 0] here.
+    ///
+    /// `a`: n x n; `c`: p x n; `performance`: as for [`super::observer_gain`].
+    #[must_use]
+    pub fn extend(
+        &self,
+        a: &DMatrix<f64>,
+        c: &DMatrix<f64>,
+        performance: &Performance,
+    ) -> (DMatrix<f64>, DMatrix<f64>, Performance) {
+        let Performance { disturbance, output, feedthrough, norm, gamma } = performance;
+        let (r, k) = (output.nrows(), disturbance.ncols());
+        let StateSpace { a, b, c: e, .. } = self.around(&StateSpace {
+            a: a.clone(),
+            b: disturbance.clone(),
+            c: output.clone(),
+            d: DMatrix::zeros(r, k),
+            domain: self.input.domain,
+        });
+        let seen = grid(&[&[
+            c,
+            &(feedthrough * &self.input.c),
+            &DMatrix::zeros(c.nrows(), self.output.a.nrows()),
+        ]]);
+        let performance = Performance {
+            disturbance: b,
+            output: e,
+            feedthrough: feedthrough * &self.input.d,
+            norm: *norm,
+            gamma: *gamma,
+        };
+        (a, seen, performance)
+    }
+
+    /// The weights of the transposed system.
+    #[must_use]
+    pub fn transposed(&self) -> Self {
+        Self { input: self.output.dual(), output: self.input.dual() }
+    }
+}
+
+/// The matrix of the given blocks, row by row.
+fn grid(rows: &[&[&DMatrix<f64>]]) -> DMatrix<f64> {
+    let height = rows.iter().map(|row| row[0].nrows()).sum();
+    let width = rows[0].iter().map(|block| block.ncols()).sum();
+    let mut whole = DMatrix::zeros(height, width);
+    let mut top = 0;
+    for row in rows {
+        let mut left = 0;
+        for block in *row {
+            whole.view_mut((top, left), block.shape()).copy_from(block);
+            left += block.ncols();
+        }
+        top += row[0].nrows();
+    }
+    whole
+}
+
+/// An observer gain L as by [`super::observer_gain`], for a norm with weights.
+///
+/// The gain does not act on the states of the weights: the extended error dynamics have the gain
+/// [L; 0], and the set of these gains with a norm below a bound is not convex. Up to three gains are
+/// computed: one for the region alone and one for region and norm, by linear matrix inequalities (P =
+/// diag(`P_1`, `P_2`), for which Z = `P_1` L makes the inequalities of the norm linear), and that of the
+/// Kalman filter for disturbances of unit intensity, without its rows for the states of the weights. From
+/// each of them the norm itself is lowered within the region, by its derivatives with respect to the
+/// entries of L, as far as possible. Of the results with a norm up to 5 % above the least one, or below a
+/// given bound, that with the smallest Frobenius norm of L is chosen. It is a local minimum; how far it
+/// is from the best gain of any observer, [`super::observer_norm_lower_bound`] for
+/// [`ChannelWeights::extend`] says.
+///
+/// The region is proven as in [`super::observer_gain`]. `bound` of the result is that of the weighted
+/// system, with P for the states of [`ChannelWeights::around`], or None if it could not be proven to 1 %;
+/// [`crate::response::h_infinity`] does not depend on it.
+///
+/// # Errors
+///
+/// Same as [`super::observer_gain`].
+pub fn weighted_observer_gain(
+    (a, c): (&DMatrix<f64>, &DMatrix<f64>),
+    region: &Region,
+    performance: &Performance,
+    weights: &ChannelWeights,
+    domain: Domain,
+) -> Result<Outcome<Synthesis>, Error> {
+    let n = check::square("A", a)?;
+    check::shape("C", c, (c.nrows(), n))?;
+    region.check(domain)?;
+    let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
+    performance.check((n, k), (r, n), (c.nrows(), k))?;
+    let free = Performance { gamma: None, ..performance.clone() };
+    let (wide_a, wide_c, wide) = weights.extend(a, c, &free);
+    let requirements = ObserverRequirements {
+        a,
+        c,
+        region: *region,
+        performance: Some(&wide),
+        domain,
+        weighted: Some(WeightedDynamics {
+            a: &wide_a,
+            c: &wide_c,
+            of_disturbance: weights.input.a.nrows(),
+        }),
+    };
+    let proven = |gain: DMatrix<f64>, coordinates| {
+        let dynamics = a - &gain * c;
+        prove(Candidate { gain, coordinates }, &dynamics, region, None, domain)
+    };
+    let by_norm = requirements.search(|found| proven(found.gain, found.coordinates))?;
+    let plain = observer_gain(a, c, region, None, domain)?;
+    let norm = GainNorm {
+        a: &wide_a,
+        b: &wide.disturbance,
+        c: &wide_c,
+        d: &wide.feedthrough,
+        e: &wide.output,
+        region,
+        domain,
+    };
+    let inequalities = [plain, by_norm];
+    let starts = inequalities.iter().filter_map(|outcome| match outcome {
+        Outcome::Optimal(found) => Some(found.gain.clone()),
+        _ => None,
+    });
+    let mut candidates = Vec::new();
+    for start in starts.chain(kalman_gain(&norm, n)) {
+        let lower = norm.descend(&start);
+        let Some((value, _)) = norm.value(&lower) else { continue };
+        if let Some(region) = certify_region(&(a - &lower * c), region, domain)?.optimal() {
+            candidates.push((value, Synthesis { gain: lower, region, bound: None }));
+        }
+    }
+    let least = candidates.iter().map(|(value, _)| *value).fold(f64::INFINITY, f64::min);
+    let most = performance.gamma.map_or(NEARLY_LEAST * least, |gamma| gamma.max(least));
+    let good = candidates.into_iter().filter(|(value, _)| *value <= most);
+    let smallest = good.min_by(|one, other| one.1.gain.norm().total_cmp(&other.1.gain.norm()));
+    let Some((reached, mut found)) = smallest else {
+        let [_, by_norm] = inequalities;
+        return Ok(by_norm);
+    };
+    if performance.gamma.is_some_and(|gamma| reached > gamma) {
+        return Ok(Outcome::Inconclusive(NOT_KEPT));
+    }
+    let system = weights.around(&StateSpace {
+        a: a - &found.gain * c,
+        b: &performance.disturbance - &found.gain * &performance.feedthrough,
+        c: performance.output.clone(),
+        d: DMatrix::zeros(r, k),
+        domain,
+    });
+    found.bound = certify_gain(&system, performance.norm)?.optimal();
+    found.bound = found.bound.filter(|bound| bound.gamma <= LOOSE * reached);
+    Ok(Outcome::Optimal(found))
+}
+
+/// The first n rows of the gain of the Kalman filter, if there is one.
+///
+/// The noises of states and measurements are correlated: S = B D', V = D D', L = `L_1` + S V^-1 with `L_1` of
+/// the filter for A - S V^-1 C and the intensity B B' - S V^-1 S'.
+fn kalman_gain(norm: &GainNorm<'_>, n: usize) -> Option<DMatrix<f64>> {
+    let GainNorm { a, b, c, d, domain, .. } = *norm;
+    let noise = symmetric_part(&(d * d.transpose()));
+    let correlated = noise.clone().cholesky()?.solve(&(d * b.transpose())).transpose();
+    let process = b * b.transpose() - &correlated * d * b.transpose();
+    let filter =
+        kalman(&(a - &correlated * c), c, &symmetric_part(&process), &noise, domain).ok()?;
+    Some((filter.gain + correlated).rows(0, n).into_owned())
+}
+
+/// A state feedback as by [`super::state_feedback`], for a norm with weights; u = K x does not depend on
+/// the states of the weights. It is the transposed [`weighted_observer_gain`] of the transposed system;
+/// `bound` and `region` are certificates of the transposed loop.
+///
+/// # Errors
+///
+/// Same as [`super::state_feedback`].
+pub fn weighted_state_feedback(
+    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    region: &Region,
+    performance: &Performance,
+    weights: &ChannelWeights,
+    domain: Domain,
+) -> Result<Outcome<Synthesis>, Error> {
+    let pair = (&a.transpose(), &b.transpose());
+    let dual = performance.transposed();
+    let outcome = weighted_observer_gain(pair, region, &dual, &weights.transposed(), domain)?;
+    outcome.then(|found| Ok(Outcome::Optimal(Synthesis { gain: -found.gain.transpose(), ..found })))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lmi::{Norm, observer_norm_lower_bound};
+    use crate::response::h_infinity;
+    use crate::weight::{Weight, diagonal};
+
+    fn row(entries: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_row_slice(1, entries.len(), entries)
+    }
+
+    /// x' = w, y = x + v with weights: a fault seen through noise.
+    fn given() -> Performance {
+        Performance {
+            disturbance: row(&[1.0, 0.0]),
+            output: row(&[1.0]),
+            feedthrough: row(&[0.0, 1.0]),
+            norm: Norm::HInfinity,
+            gamma: None,
+        }
+    }
+
+    fn weights(noise: &Weight, output: &Weight, domain: Domain) -> ChannelWeights {
+        let input = diagonal(&[Weight::constant(1.0), noise.clone()], domain).unwrap();
+        ChannelWeights { input, output: output.system(domain).unwrap() }
+    }
+
+    /// The norm of the scalar loop for every gain on a grid: the search is near the least one.
+    #[test]
+    fn the_weighted_gain_of_a_scalar_observer_is_near_the_best_of_a_search_over_all_gains() {
+        for domain in [Domain::Continuous, Domain::Sampled { period: 0.1 }] {
+            let noise = Weight::lead_lag(0.1, 3.0, 10.0, 1).unwrap();
+            let error = Weight::lead_lag(20.0, 0.3, 0.2, 2).unwrap();
+            let weights = weights(&noise, &error, domain);
+            let (a, mut given) = match domain {
+                Domain::Continuous => (row(&[0.0]), given()),
+                Domain::Sampled { .. } => (row(&[1.0]), given()),
+            };
+            if domain != Domain::Continuous {
+                given.disturbance *= 0.1;
+            }
+            let c = row(&[1.0]);
+            let norm = |gain: f64| {
+                let closed = StateSpace {
+                    a: &a - row(&[gain]),
+                    b: &given.disturbance - &given.feedthrough * gain,
+                    c: row(&[1.0]),
+                    d: DMatrix::zeros(1, 2),
+                    domain,
+                };
+                h_infinity(&weights.around(&closed), 1e-4).map_or(f64::INFINITY, |norm| norm.upper)
+            };
+            let best = (0..400).map(|k| norm(1e-3 * 1.03_f64.powi(k))).fold(f64::MAX, f64::min);
+            let found =
+                weighted_observer_gain((&a, &c), &Region::default(), &given, &weights, domain);
+            let Outcome::Optimal(found) = found.unwrap() else { panic!() };
+            let reached = norm(found.gain[(0, 0)]);
+            assert!(reached < 1.1 * best, "{domain:?}: {reached}, {best}");
+            assert!(found.bound.is_none_or(|bound| bound.gamma >= 0.999 * reached));
+            let (wide_a, wide_c, wide) = weights.extend(&a, &c, &given);
+            let least =
+                observer_norm_lower_bound(&wide_a, &wide_c, &wide, domain).unwrap().unwrap();
+            assert!(least <= best, "{domain:?}: {least}, {best}");
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! What the H-infinity norm weights: reads `weights` and `noise` of a plant file.
+
+use control::Domain;
+use control::lmi::weight_of_table;
+use control::weight::{Weight, bilinear_frequency};
+use files::{Entry, PlaceError, Table};
+
+use super::report::NormWeight;
+
+/// The entries of a plant file that belong to `h_infinity`.
+pub(crate) const CHANNEL: [&str; 2] = ["weights", "noise"];
+
+/// What the H-infinity norm weights.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Channel {
+    /// Factor of each output of the norm: of the errors of the faults' estimates for the observer, of
+    /// measurements, then commands for the feedback. Empty if all are 1.
+    pub(crate) weights: Vec<ChannelWeight>,
+    /// Weight of the noise of each measurement, in its unit; empty if the norm has no noise.
+    pub(crate) noise: Vec<ChannelWeight>,
+}
+
+/// The weight of a signal.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ChannelWeight {
+    /// The signal, in words.
+    pub(crate) signal: String,
+    pub(crate) weight: Weight,
+    /// The largest factor between the weight and the table that states it.
+    pub(crate) deviation: Option<f64>,
+}
+
+/// The signals that the norm of a gain is about.
+pub(crate) struct ChannelSignals<'a> {
+    /// Names of its outputs.
+    pub(crate) outputs: Vec<&'a str>,
+    /// Names of the measurements whose noise the norm can have.
+    pub(crate) noises: Option<Vec<&'a str>>,
+}
+
+impl ChannelWeight {
+    /// The factor of a constant weight; 1 for one over frequency, which acts in addition.
+    pub(crate) fn factor(&self) -> f64 {
+        self.weight.as_constant().unwrap_or(1.0)
+    }
+}
+
+impl Channel {
+    /// Whether a weight depends on the frequency.
+    pub(crate) fn has_states(&self) -> bool {
+        self.all().any(|one| one.weight.as_constant().is_none())
+    }
+
+    fn all(&self) -> impl Iterator<Item = &ChannelWeight> {
+        self.weights.iter().chain(&self.noise)
+    }
+
+    /// The weights over frequency, for the report.
+    pub(crate) fn report(&self, domain: Domain) -> Vec<NormWeight> {
+        let over_frequency = self.all().filter(|one| one.weight.as_constant().is_none());
+        over_frequency
+            .map(|one| {
+                let (numerator, denominator) = one.weight.polynomials(domain);
+                NormWeight {
+                    signal: one.signal.clone(),
+                    numerator,
+                    denominator,
+                    table_deviation: one.deviation,
+                }
+            })
+            .collect()
+    }
+
+    /// Reads `weights`, a table from names to weights, and `noise`, a weight or one for each measurement.
+    pub(crate) fn read(
+        table: &Table<'_>,
+        signals: &ChannelSignals<'_>,
+        domain: Domain,
+    ) -> Result<Self, PlaceError> {
+        let mut found = Self::default();
+        if let Some(entry) = table.get("weights") {
+            let one = |name: &&str| ChannelWeight {
+                signal: (*name).to_owned(),
+                weight: Weight::constant(1.0),
+                deviation: None,
+            };
+            found.weights = signals.outputs.iter().map(one).collect();
+            for (name, value) in entry.table()?.entries() {
+                let Some(at) = signals.outputs.iter().position(|output| *output == name) else {
+                    let known = signals.outputs.join(", ");
+                    return Err(
+                        value.error(format!("`{name}` has no weight: expected one of {known}"))
+                    );
+                };
+                found.weights[at] = weight(&value, name.to_owned(), domain)?;
+            }
+        }
+        if let Some(entry) = table.get("noise") {
+            let Some(names) = &signals.noises else {
+                return Err(entry.error(
+                    "a state feedback has no measurement noise: expected it in `observer`",
+                ));
+            };
+            found.noise = noises(&entry, names, domain)?;
+        }
+        Ok(found)
+    }
+}
+
+/// Reads one weight, or one for each measurement.
+fn noises(
+    entry: &Entry<'_>,
+    names: &[&str],
+    domain: Domain,
+) -> Result<Vec<ChannelWeight>, PlaceError> {
+    let signal = |name: &str| format!("noise of {name}");
+    if !entry.is_list() {
+        let one = weight(entry, String::new(), domain)?;
+        let named = |name: &&str| ChannelWeight { signal: signal(name), ..one.clone() };
+        return Ok(names.iter().map(named).collect());
+    }
+    let members = entry.list()?;
+    let (expected, found) = (names.len(), members.len());
+    if found != expected {
+        return Err(
+            entry.error(format!("expected {expected} numbers, one per measurement, found {found}"))
+        );
+    }
+    let both = members.iter().zip(names);
+    both.map(|(member, name)| weight(member, signal(name), domain)).collect()
+}
+
+/// Reads a number above 0, `{ low, frequency, high }`, or `{ table }`, the latter two with `order`.
+fn weight(entry: &Entry<'_>, signal: String, domain: Domain) -> Result<ChannelWeight, PlaceError> {
+    if !entry.is_table() {
+        let weight = Weight::constant(entry.positive()?);
+        return Ok(ChannelWeight { signal, weight, deviation: None });
+    }
+    let table = entry.table()?;
+    table.allow(&["low", "frequency", "high", "table", "order"])?;
+    let order = match table.get("order") {
+        None => 1,
+        Some(order) => match order.number()? {
+            1.0 => 1,
+            2.0 => 2,
+            other => return Err(order.error(format!("expected 1 or 2, found {other}"))),
+        },
+    };
+    if let Some(points) = table.get("table") {
+        let alone = "a weight is stated by `table` or by `low`, `frequency` and `high`";
+        if let Some(other) = ["low", "frequency", "high"].iter().find_map(|key| table.get(key)) {
+            return Err(other.error(alone));
+        }
+        let found = weight_of_table(&read_points(&points, domain)?, order)
+            .map_err(|error| points.error(error.to_string()))?;
+        let deviation = Some(found.deviation);
+        return Ok(ChannelWeight { signal, weight: found.weight, deviation });
+    }
+    let low = table.require("low", "the magnitude at low frequencies")?.positive()?;
+    let meaning = "in rad/s, where the magnitude is the geometric mean of `low` and `high`";
+    let frequency = mapped(&table.require("frequency", meaning)?, domain)?;
+    let high = table.require("high", "the magnitude at high frequencies")?.positive()?;
+    let weight = Weight::lead_lag(low, frequency, high, order)
+        .map_err(|error| entry.error(error.to_string()))?;
+    Ok(ChannelWeight { signal, weight, deviation: None })
+}
+
+/// Reads pairs of a frequency and a magnitude, in ascending order of the frequency.
+fn read_points(entry: &Entry<'_>, domain: Domain) -> Result<Vec<(f64, f64)>, PlaceError> {
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for member in entry.list()? {
+        let [frequency, magnitude] = &member.list()?[..] else {
+            return Err(member.error("expected [frequency in rad/s, magnitude]"));
+        };
+        let point = (mapped(frequency, domain)?, magnitude.positive()?);
+        if points.last().is_some_and(|last| last.0 >= point.0) {
+            return Err(frequency.error("expected frequencies in ascending order"));
+        }
+        points.push(point);
+    }
+    if points.len() < 2 {
+        return Err(entry.error("expected two or more pairs [frequency in rad/s, magnitude]"));
+    }
+    Ok(points)
+}
+
+/// Reads a frequency in rad/s, in a sampled design below pi / T, as that of the continuous weight.
+fn mapped(entry: &Entry<'_>, domain: Domain) -> Result<f64, PlaceError> {
+    let stated = entry.positive()?;
+    let frequency = bilinear_frequency(stated, domain);
+    match domain {
+        Domain::Sampled { period } if !frequency.is_finite() => {
+            let limit = std::f64::consts::PI / period;
+            Err(entry.error(format!(
+                "expected a frequency below pi / sample_time = {limit:.4e} rad/s, found {stated}"
+            )))
+        }
+        _ => Ok(frequency),
+    }
+}
