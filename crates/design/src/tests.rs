@@ -6,10 +6,11 @@ use std::time::Duration;
 use nalgebra::Complex;
 
 use super::budget::Budget;
+use super::channel::Channel;
 use super::checks::checks;
 use super::designed::design;
 use super::plant_file::{Model, PlantFile};
-use super::requirements::{Channel, Region, Requirement};
+use super::requirements::{Region, Requirement};
 use super::robust_report::Level;
 use super::robustness::{robustness, verdict};
 use super::signals::{EntryPoint, FaultDynamics};

@@ -15,6 +15,9 @@ const SMALLEST: f64 = 1e-6;
 /// Least damping ratio of poles and zeros.
 const DAMPING: f64 = 0.2;
 
+/// Coefficients of numerator and denominator, the highest power first.
+type Quotient = (Vec<f64>, Vec<f64>);
+
 /// A weight and its largest deviation from a table.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -113,7 +116,7 @@ fn coefficients(
     points: &[(f64, f64)],
     order: usize,
     factor: f64,
-) -> Result<Option<(Vec<f64>, Vec<f64>)>, Error> {
+) -> Result<Option<Quotient>, Error> {
     let mut problem = Problem::new();
     let [numerator, denominator] =
         [(); 2].map(|()| (0..=order).map(|_| problem.scalar()).collect::<Vec<_>>());
