@@ -1,6 +1,7 @@
 """A lightly damped chain of 25 masses, 50 states: the numbers of `aso-ftc design --json` by scipy."""
 
 import json
+import sys
 import tomllib
 
 import numpy as np
@@ -8,7 +9,12 @@ import pytest
 from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
 from scipy.optimize import linear_sum_assignment, minimize_scalar
 
+from conftest import ROOT
 from design_oracle import Matrices, closed_loop
+
+sys.path.insert(0, str(ROOT / "scripts"))
+
+import large_plants  # noqa: E402
 
 MASSES, COMMANDS, MEASUREMENTS = 25, 3, 6
 STATES = 2 * MASSES
@@ -145,3 +151,31 @@ def test_the_worst_case_and_the_longest_hold_are_on_the_limit(designed):
         return np.abs(np.linalg.eigvals(np.block([[a, b @ command], [gain @ own.C, k]]))).max()
 
     assert radius(0.999 * hold) < 1 < radius(1.001 * hold)
+
+
+@pytest.mark.parametrize("sample_time", [None, 0.05], ids=["continuous", "sampled"])
+def test_placement_with_50_states_reaches_the_required_eigenvalues_to_the_error_that_it_states(
+    aso_ftc, tmp_path, sample_time
+):
+    text = large_plants.plant_file(STATES, placement=True, sample_time=sample_time, seed=1)
+    (tmp_path / "chain.toml").write_text(text + "[robustness]\ncases = 0\n", encoding="utf-8")
+    options = ("--certificate-time", "0", "--out", tmp_path / "design.toml", "--json")
+    done = aso_ftc("design", tmp_path / "chain.toml", *options)
+    assert done.returncode in (0, 1), done.stderr
+    report = json.loads(done.stdout)
+    own = Matrices(tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8")))
+    a, _, _ = large_plants.chain(STATES, seed=1)
+    for name, dynamics, left in (("feedback", own.fed_back, 0.2), ("observer", own.error_dynamics, 0.5)):
+        above = np.array(large_plants.shifted(a, left))
+        required = np.concatenate([above, above.conj(), [-1.0, -1.2][: len(dynamics) - STATES]])
+        if sample_time is not None:
+            required = np.exp(sample_time * required)
+        distances = np.abs(required[:, None] - np.linalg.eigvals(dynamics)[None, :])
+        reached = distances[linear_sum_assignment(distances)].max()
+        assert report[name]["pole_error"] < 1e-9
+        assert reached < 1e-8, name
+    # The curves of a large loop are thinned, with their peaks.
+    for step in report["steps"]:
+        for curve in step["curves"]:
+            assert len(curve["times"]) == len(curve["values"]) <= 1000
+            assert max(map(abs, curve["values"])) == pytest.approx(abs(curve["peak"]), rel=0.1, abs=1e-12)

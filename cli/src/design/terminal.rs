@@ -303,7 +303,10 @@ fn print_loop(own: &Loop) {
     let rest = if rest > 0 { format!(" and {rest} more") } else { String::new() };
     println!("    eigenvalues {}{rest}", text.collect::<Vec<_>>().join(", "));
     if let Some(condition) = own.condition {
-        println!("    condition of the eigenvectors {condition:.3e}");
+        let error = own.pole_error.map_or(String::new(), |error| {
+            format!(", error of the eigenvalues {error:.1e}, relative")
+        });
+        println!("    condition of the eigenvectors {condition:.3e}{error}");
     }
 }
 

@@ -12,7 +12,7 @@
 //! | largest z for w of unit energy, energy of z for an impulse or white noise | [`energy`] |
 //! | largest amplification of energy | [`h_infinity`] |
 //! | amplification at one frequency | [`frequency_response`] |
-//! | z for a step or a ramp of w | [`step_response`], [`ramp_response`] |
+//! | z for a step or a ramp of w | [`step_response`], [`ramp_response`], [`settled_output`] |
 //! | bounds of errors and states of the loop of [`crate::aso`] under bounded faults | [`fault_bounds`] |
 //! | the same of a sampled loop between its samples, too | [`gains_between_samples`] |
 //! | response of that loop to a reversal of friction | [`reversal`] |
@@ -24,6 +24,7 @@ mod fault_loop;
 mod frequency;
 mod h_infinity;
 mod interval;
+mod known;
 mod peak_gain;
 mod trace;
 mod transient;
@@ -32,9 +33,11 @@ pub use between_samples::{GainsBetweenSamples, gains_between_samples};
 pub use energy::{Energy, energy};
 pub use fault::{FaultBounds, Reversal, fault_bounds, reversal};
 pub use fault_loop::{fault_gains, fault_rate_system, fault_system};
+pub(crate) use frequency::Transfer;
 pub use frequency::{FrequencyPoint, frequency_grid, frequency_response};
-pub(crate) use frequency::{Transfer, grid};
+pub(crate) use h_infinity::norm_of;
 pub use h_infinity::{HInfinity, h_infinity};
+pub(crate) use known::KnownResponse;
 pub use peak_gain::{Bracket, peak_gain};
-pub use trace::{TimeResponse, ramp_response, step_response};
+pub use trace::{TimeResponse, ramp_response, settled_output, step_response};
 pub use transient::Transient;

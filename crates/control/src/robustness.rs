@@ -13,6 +13,7 @@
 //! | changes of gain and phase in all channels at once | [`disk_margin`] |
 //! | changes of gain, phase and delay in one channel | [`channel_margins`] |
 //! | a delay in all channels | [`delay_margin`], [`sampled_delay_margin`] |
+//! | all of these at one point of a large loop | [`OpenedLoop`] |
 //! | the longest time over which signals may be held | [`longest_hold`], [`longest_period`] |
 //! | effect of measurement noise | [`noise_gains`] |
 //! | errors of the plant's parameters | [`EntryFamily`], [`PlantFamily`], [`tolerance_test`] |
@@ -26,6 +27,7 @@ mod entries;
 mod held;
 mod hold_time;
 mod noise;
+mod opened;
 mod scaling;
 mod speed;
 mod sweep;
@@ -38,9 +40,12 @@ pub use disk::{DiskMargin, disk_margin, scaled_peak};
 pub use entries::{PeakDerivatives, peak_derivatives};
 pub use hold_time::{longest_hold, longest_period};
 pub use noise::noise_gains;
+pub use opened::OpenedLoop;
 pub use scaling::ScaledPeak;
 pub use speed::regulator_of_same_speed;
-pub use tolerance::{EntryFamily, PlantFamily, ToleranceTest, Tolerances, tolerance_test};
+pub use tolerance::{
+    Deviated, EntryFamily, PlantFamily, ToleranceSearch, ToleranceTest, Tolerances, tolerance_test,
+};
 
 use crate::blocks::{block_2x2, stacked};
 use crate::{Error, StateSpace, check};

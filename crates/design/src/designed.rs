@@ -83,10 +83,15 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
     let LinearPlant { a, b, c, models, .. } = &linear;
     let extended = ExtendedPlant::new(a, b, c, models, filter)
         .map_err(|error| file.error(&["A"], error.to_string()))?;
-    let (controllability, distance) = check_controllable(file, &linear, &mut warnings)?;
+    let (controllable, detectability) = rayon::join(
+        || check_controllable(file, &linear, &mut warnings),
+        || detectability(&extended.plant, Domain::Continuous),
+    );
+    let (controllability, distance) = controllable?;
     check_faults(file, &linear, &extended)?;
     check_references(file, &linear)?;
-    let detectability = check_detectable(file, &linear, &extended, &mut warnings)?;
+    let detectability = detectability.map_err(|error| file.error(&FAULTS, error.to_string()))?;
+    check_detectable(file, (&linear, &extended), &detectability, &mut warnings)?;
     let (domain, mut plant) = in_domain(file, &extended)?;
     let references = file.references.as_ref();
     let states = extended.states;
@@ -222,14 +227,13 @@ fn compute_gains(
         c: &linear.c.clone().resize_horizontally(order, 0.0),
         f_a: &plant.f_a.rows(0, n).into_owned().resize_vertically(order, 0.0),
     };
-    let feedback = match common {
-        Some(common) => common,
-        None => feedback(&file.feedback.requirement, &problem, domain)
-            .map_err(|refusal| feedback_refused((file, linear), domain, refusal))?,
+    let feedback = || match common {
+        Some(common) => Ok(common),
+        None => feedback(&file.feedback.requirement, &problem, domain),
     };
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let filter = sampled::filter(extended, domain);
-    let problem = ObserverProblem {
+    let observer_problem = ObserverProblem {
         a_0: &a_0,
         c_0: &c_0,
         channels: &extended.channels,
@@ -237,7 +241,9 @@ fn compute_gains(
         filter: filter.as_deref(),
         estimator: estimator(file),
     };
-    let observer = observer(&file.observer.requirement, &problem, domain);
+    let (feedback, observer) =
+        rayon::join(feedback, || observer(&file.observer.requirement, &observer_problem, domain));
+    let feedback = feedback.map_err(|refusal| feedback_refused((file, linear), domain, refusal))?;
     let observer = observer.map_err(|refusal| {
         let order = (a_0.nrows(), "states, filters, faults and rates of ramps");
         let names = observer_states(linear, extended);
@@ -313,12 +319,10 @@ fn consequence(stable: bool, mode: &Mode) -> &'static str {
 /// Checks that the augmented observer exists; the error names the faults and the measurements.
 fn check_detectable(
     file: &PlantFile<'_>,
-    linear: &LinearPlant,
-    extended: &ExtendedPlant,
+    (linear, extended): (&LinearPlant, &ExtendedPlant),
+    found: &Detectability,
     warnings: &mut Vec<PlaceError>,
-) -> Result<Detectability, crate::Error> {
-    let found = detectability(&extended.plant, Domain::Continuous)
-        .map_err(|error| file.error(&FAULTS, error.to_string()))?;
+) -> Result<(), crate::Error> {
     let measurements = names(linear.measurements.iter().map(|signal| signal.name.as_str()));
     let modes = found.unobservable.iter();
     for (mode, stable) in modes.filter(|(mode, _)| above_or_on_the_real_axis(mode)) {
@@ -367,7 +371,7 @@ fn check_detectable(
         .plant
         .check_detectable(Domain::Continuous)
         .map_err(|error| file.error(&FAULTS, error.to_string()))?;
-    Ok(found)
+    Ok(())
 }
 
 /// Returns an error at the entry of the fault in column `column` of F_a.

@@ -2,9 +2,10 @@
 
 use control::estimation::mean_rate;
 use control::response::{
-    fault_gains, fault_rate_system, fault_system, frequency_response, step_response,
+    fault_gains, fault_rate_system, fault_system, frequency_response, settled_output, step_response,
 };
 use control::{Domain, Error, StateSpace};
+use rayon::prelude::*;
 
 use super::designed::ControllerDesign;
 use super::report::{Estimation, EstimationErrors};
@@ -32,16 +33,16 @@ pub(crate) fn estimation(
         found.noise_together[commands..].iter().map(|number| number.value).collect::<Vec<_>>()
     });
     let own = Errors::of(designed)?;
-    let mut errors = Vec::new();
-    for (at, fault) in designed.linear.faults.iter().enumerate() {
-        errors.push(EstimationErrors {
+    let errors = designed.linear.faults.par_iter().enumerate().map(|(at, fault)| {
+        Ok::<_, Error>(EstimationErrors {
             noise: noise.as_ref().map(|list| list[at]),
             noise_peak: peaks.as_ref().map(|list| list[at]),
             fault: fault.name.clone(),
             unit: fault.unit.clone(),
             ..own.of_fault(at)?
-        });
-    }
+        })
+    });
+    let errors = errors.collect::<Result<_, _>>()?;
     let sampled = designed.domain != Domain::Continuous;
     Ok(Estimation {
         law: law.law.name().to_owned(),
@@ -93,29 +94,27 @@ impl<'a> Errors<'a> {
         let ControllerDesign { plant, gains, domain, extended, law, .. } = self.designed;
         let channel = extended.channels[at];
         let row = 2 * plant.a.nrows() + channel.estimate;
-        let step = step_response(&self.of_faults, channel.estimate)?;
-        let transient = step.transient(row, SETTLED);
+        let to_error = |system: &StateSpace| StateSpace {
+            b: system.b.columns(channel.estimate, 1).into(),
+            c: system.c.rows(row, 1).into(),
+            d: system.d.view((row, channel.estimate), (1, 1)).into(),
+            ..system.clone()
+        };
+        let of_fault = to_error(&self.of_faults);
+        let step = step_response(&of_fault, 0)?;
+        let transient = step.transient(0, SETTLED);
         // A ramp of f is a constant f' of its estimate, which a ramp model follows without lag.
         let ramp = match (law.leaks(), channel.rate) {
             (true, _) => None,
             (false, Some(_)) => Some(0.0),
-            (false, None) => {
-                let response = step_response(&self.of_rates, channel.estimate)?;
-                Some(response.final_value[row].abs())
-            }
+            (false, None) => Some(settled_output(&to_error(&self.of_rates), 0)?[0].abs()),
         };
-        let one = StateSpace {
-            b: self.of_faults.b.columns(channel.estimate, 1).into(),
-            c: self.of_faults.c.rows(row, 1).into(),
-            d: self.of_faults.d.view((row, channel.estimate), (1, 1)).into(),
-            ..self.of_faults.clone()
-        };
-        let point = frequency_response(&one, &[self.frequency])?;
+        let point = frequency_response(&of_fault, &[self.frequency])?;
         let [peak, ..] = fault_gains(plant, gains, *domain, (&[row], WIDTH))?;
         Ok(EstimationErrors {
             fault: String::new(),
             unit: None,
-            constant: step.final_value[row].abs(),
+            constant: step.final_value[0].abs(),
             step_settling: transient.settling_time,
             step_peak: transient.peak.abs(),
             ramp,

@@ -52,9 +52,12 @@ pub(crate) fn report(
     let mut checks = checks(designed);
     checks.extend(reached(&references));
     let robustness = robustness(designed, &file.robustness, family, steps)?;
-    let estimation = estimation(designed, robustness.as_ref(), &file.robustness)?;
+    let (estimation, norms) = rayon::join(
+        || estimation(designed, robustness.as_ref(), &file.robustness),
+        || loops.norms(),
+    );
+    let (estimation, norms) = (estimation?, norms?);
     let budget = Budget::start(certificate_time);
-    let norms = loops.norms()?;
     let certificate = steps.run(Step::Certificates, || certificate(designed, norms, &budget));
     let (bounds, left_out) = steps.run(Step::Bounds, || loops.bounds(&budget))?;
     let losses = losses(designed, &budget)?;
@@ -71,6 +74,8 @@ pub(crate) fn report(
     if let Some(found) = &schedule {
         judge_schedule(&mut verdict, designed, found, &file.robustness);
     }
+    let (responses, frequency) =
+        rayon::join(|| steps.run(Step::Responses, || responses(designed)), || loops.frequency());
     let mut warnings: Vec<_> =
         designed.warnings.iter().map(|warning| line(file, warning)).collect();
     warnings.extend(references.iter().filter_map(beyond_limits));
@@ -112,9 +117,9 @@ pub(crate) fn report(
         detection: None,
         certificate,
         bounds,
-        steps: steps.run(Step::Responses, || responses(designed))?,
+        steps: responses?,
         references,
-        frequency: loops.frequency()?,
+        frequency: frequency?,
         effectiveness: effectiveness(designed)?,
         losses,
         reconfiguration,

@@ -17,6 +17,10 @@ use super::signals::Fault;
 pub(crate) const SETTLED: f64 = 0.02;
 /// Points shown within a sample time, besides the samples.
 pub(crate) const BETWEEN: u32 = 4;
+/// From this number of states of the loop on a curve is thinned to at most four points for each of
+/// `PARTS` parts.
+const LARGE: usize = 48;
+const PARTS: usize = 250;
 
 /// Returns the responses to a change of each fault, as a step and as a ramp at the bound of its rate,
 /// and to steps of all faults together.
@@ -199,15 +203,53 @@ impl<'a> ShownLoop<'a> {
             Domain::Continuous => (at_points.peak, at_points.peak_time, at_points.settling_time),
             Domain::Sampled { .. } => transient(points, trace.final_value[row]),
         };
+        let shown = if self.system.a.nrows() < LARGE { points } else { &thinned(points) };
         Curve {
             name,
             unit,
             peak: factor * peak,
             peak_time,
             settling_time,
-            times: points.iter().map(|point| point.0).collect(),
-            values: points.iter().map(|point| factor * point.1).collect(),
+            times: shown.iter().map(|point| point.0).collect(),
+            values: shown.iter().map(|point| factor * point.1).collect(),
         }
+    }
+}
+
+/// Returns the first, the lowest, the highest and the last point of each of `PARTS` parts of a curve; all
+/// points of a short one.
+fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let count = points.len().div_ceil(PARTS);
+    if count <= 4 {
+        return points.to_vec();
+    }
+    let shown = |part: &[(f64, f64)]| {
+        let by_height = |i: &usize, j: &usize| part[*i].1.total_cmp(&part[*j].1);
+        let (lowest, highest) =
+            ((0..part.len()).min_by(by_height), (0..part.len()).max_by(by_height));
+        let mut kept: Vec<usize> = lowest.into_iter().chain(highest).collect();
+        kept.extend([0, part.len() - 1]);
+        kept.sort_unstable();
+        kept.dedup();
+        kept.into_iter().map(|at| part[at]).collect::<Vec<_>>()
+    };
+    points.chunks(count).flat_map(shown).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thinned_curve_keeps_ends_peaks_and_order() {
+        let point =
+            |k: u32| (f64::from(k), if k == 12_345 { 9.0 } else { (0.1 * f64::from(k)).sin() });
+        let all: Vec<_> = (0..50_000).map(point).collect();
+        let kept = thinned(&all);
+        assert!(kept.len() <= 4 * PARTS && kept.is_sorted_by(|x, y| x.0 < y.0), "{}", kept.len());
+        assert_eq!((kept[0], kept[kept.len() - 1]), (all[0], all[49_999]));
+        assert!(kept.contains(&(12_345.0, 9.0)));
+        assert_eq!(thinned(&all[..1000]), all[..1000]);
     }
 }
 

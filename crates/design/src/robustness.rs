@@ -5,9 +5,9 @@ use control::controller::{CompleteController, complete_controller};
 use control::hold::zero_order_hold;
 use control::response::{frequency_grid, frequency_response, h_infinity};
 use control::robustness::{
-    DiskMargin, EntryFamily, Loop, Point, ToleranceTest, Tolerances, channel_margins, delay_margin,
-    disk_margin, longest_hold, longest_period, noise_gains, peak_derivatives,
-    regulator_of_same_speed, sampled_delay_margin, scaled_peak, tolerance_test,
+    DiskMargin, EntryFamily, Loop, OpenedLoop, Point, ToleranceSearch, ToleranceTest, Tolerances,
+    longest_hold, longest_period, noise_gains, peak_derivatives, regulator_of_same_speed,
+    tolerance_test,
 };
 use control::tracking::IntegralAction;
 use control::{Domain, Error, StateSpace};
@@ -48,8 +48,11 @@ pub(crate) fn robustness(
     let Margins { points, delay, hold, noise, noise_together } =
         steps.run(Step::Margins, || margins(designed, &physical, &own, limits))?;
     let slopes = slopes(&designed.linear, &physical, &points)?;
-    let (comparison, tolerance) = rayon::join(
-        || steps.run(Step::Comparison, || comparison(designed, &physical, &points)),
+    let ((comparison, curves), tolerance) = rayon::join(
+        || {
+            let comparison = || comparison(designed, &physical, &points);
+            rayon::join(|| steps.run(Step::Comparison, comparison), || curves(&own))
+        },
         || {
             steps.run(Step::Tolerances, || match family {
                 None => by_entries(designed, &physical, limits),
@@ -60,7 +63,7 @@ pub(crate) fn robustness(
     Ok(Some(Robustness {
         comparison: comparison?,
         tolerance: tolerance?,
-        curves: curves(&own)?,
+        curves: curves?,
         sensitivity: sensitivity(designed, &physical.plant, &slopes),
         points,
         delay_margin: delay,
@@ -88,21 +91,25 @@ pub(crate) fn margins(
     own: &Loop,
     limits: &RobustnessLimits,
 ) -> Result<Margins, crate::Error> {
-    let point = |(point, name): (Point, &str)| {
+    let opened = POINTS.into_par_iter().map(|(at, _)| OpenedLoop::new(own, at));
+    let opened = opened.collect::<Result<Vec<_>, Error>>()?;
+    let point = |(opened, (point, name)): (&OpenedLoop, (Point, &str))| {
         let signals = match point {
             Point::Input => &designed.linear.actuators,
             Point::Output => &designed.linear.measurements,
         };
-        self::point(own, point, name, signals)
+        self::point(opened, name, signals)
     };
     let Physical { plant, controller, .. } = physical;
-    let (points, [delay, hold]) = rayon::join(
-        || POINTS.into_par_iter().map(point).collect::<Result<Vec<_>, Error>>(),
+    let at_input = &opened[0];
+    let (points, (delay, hold)) = rayon::join(
+        || opened.par_iter().zip(POINTS).map(point).collect::<Result<Vec<_>, Error>>(),
         || match designed.domain {
-            Domain::Continuous => [delay_margin(own), longest_hold(own)],
-            Domain::Sampled { .. } => {
-                [sampled_delay_margin(plant, controller), longest_period(plant, controller)]
-            }
+            Domain::Continuous => rayon::join(|| at_input.delay_margin(), || longest_hold(own)),
+            Domain::Sampled { .. } => rayon::join(
+                || at_input.sampled_delay_margin(plant, controller),
+                || longest_period(plant, controller),
+            ),
         },
     );
     let (points, delay, hold) = (points?, delay?, hold?);
@@ -159,22 +166,30 @@ fn complete(designed: &ControllerDesign, gains: &Gains) -> Result<CompleteContro
     complete_controller(&designed.plant, gains, filter, designed.domain)
 }
 
-fn point(own: &Loop, at: Point, name: &str, signals: &[Signal]) -> Result<LoopPoint, Error> {
-    let sensitivity = own.sensitivity(at);
-    let s = h_infinity(&sensitivity, WIDTH)?;
-    let t = h_infinity(&own.complementary(at), WIDTH)?;
-    let scaled = scaled_peak(&sensitivity)?;
-    let same_unit = same_unit(signals);
+fn point(opened: &OpenedLoop, name: &str, signals: &[Signal]) -> Result<LoopPoint, Error> {
     let channel = |(index, signal): (usize, &Signal)| {
-        let found = channel_margins(own, at, index)?;
+        let margins = || opened.channel_margins(index);
+        let (found, disk) = rayon::join(margins, || opened.disk_margin(Some(index)));
+        let found = found?;
         Ok(Channel {
             name: signal.name.clone(),
             gain: found.gain,
             phase: found.phase.to_degrees(),
             delay: found.delay,
-            disk: disk(&disk_margin(own, at, Some(index))?),
+            disk: self::disk(&disk?),
         })
     };
+    let s = opened.sensitivity_peak();
+    let ((t, scaled), (together, channels)) = rayon::join(
+        || rayon::join(|| opened.complementary_peak(), || opened.scaled_peak()),
+        || {
+            let channels = || signals.par_iter().enumerate().map(channel).collect();
+            rayon::join(|| opened.disk_margin(None), channels)
+        },
+    );
+    let (t, scaled) = (t?, scaled?);
+    let channels: Result<Vec<_>, Error> = channels;
+    let same_unit = same_unit(signals);
     Ok(LoopPoint {
         point: name.to_owned(),
         s_peak: s.lower,
@@ -184,8 +199,8 @@ fn point(own: &Loop, at: Point, name: &str, signals: &[Signal]) -> Result<LoopPo
         s_peak_scaled: scaled.value,
         judged: if same_unit { s.lower } else { scaled.value },
         judged_frequency: if same_unit { s.frequency } else { scaled.frequency },
-        together: disk(&disk_margin(own, at, None)?),
-        channels: signals.par_iter().enumerate().map(channel).collect::<Result<_, Error>>()?,
+        together: disk(&together?),
+        channels: channels?,
     })
 }
 
@@ -340,17 +355,17 @@ fn comparison(
     let ControllerDesign { plant, gains, domain, extended, .. } = designed;
     let n = extended.states;
     let ((a, b), k) = (&designed.feedback_pair, &designed.feedback.gain);
-    let feedback = regulator_of_same_speed(a, b, k, *domain)?;
     let a_0 = plant.augmented_dynamics();
     let seen = gains.estimator.output_matrix(&a_0, &plant.augmented_output());
     let l = gains.observer_gain();
     let dual = (-&l).transpose();
     // A law with its own model of the fault has no Kalman filter of the same kind.
-    let observer = match designed.law.a_f {
-        None => regulator_of_same_speed(&a_0.transpose(), &seen.transpose(), &dual, *domain)?,
-        Some(_) => None,
+    let observer = || match designed.law.a_f {
+        None => regulator_of_same_speed(&a_0.transpose(), &seen.transpose(), &dual, *domain),
+        Some(_) => Ok(None),
     };
-    let observer = observer.map(|gain| -gain.transpose());
+    let (feedback, observer) = rayon::join(|| regulator_of_same_speed(a, b, k, *domain), observer);
+    let (feedback, observer) = (feedback?, observer?.map(|gain| -gain.transpose()));
     let mut found = vec![
         Compared {
             name: match gains.integral {
@@ -384,14 +399,15 @@ fn comparison(
         }
         _ => None,
     };
-    for (point, (at, name)) in points.iter().zip(POINTS) {
+    let peaks = points.par_iter().zip(POINTS).map(|(point, (at, name))| {
         let peak = |other: &Loop| h_infinity(&other.sensitivity(at), WIDTH).ok();
-        found.push(Compared {
+        Compared {
             name: format!("peak of S at the {name}"),
             design: point.s_peak,
             linear_quadratic: other.as_ref().and_then(peak).map(|found| found.lower),
-        });
-    }
+        }
+    });
+    found.par_extend(peaks);
     Ok(found)
 }
 
@@ -408,8 +424,12 @@ pub(crate) fn by_entries(
 ) -> Result<ToleranceResult, crate::Error> {
     let tolerances = Tolerances::of_values(&physical.plant, limits.tolerance);
     let family = EntryFamily::new(&physical.plant, &tolerances)?;
-    let request = (limits.cases, u64::from(limits.seed));
-    let found = tolerance_test(&family, &physical.controller, request)?;
+    let search = ToleranceSearch { family: &family, controller: &physical.controller };
+    let cases = search.cases(limits.cases, u64::from(limits.seed)).into_par_iter();
+    let cases = cases.map(|case| Ok::<_, Error>((search.instability(&case)?, case)));
+    let cases = cases.collect::<Result<Vec<_>, _>>()?;
+    let climbs = search.starts(&cases)?.into_par_iter().map(|start| search.climb(start));
+    let found = search.result(&cases, climbs.collect::<Result<Vec<_>, _>>()?)?;
     let entries = u32::try_from(tolerances.count()).unwrap_or(u32::MAX);
     Ok(ToleranceResult { entries, ..tested(designed, limits, &found) })
 }
@@ -463,21 +483,20 @@ fn tested(
 
 /// Returns the singular values of S and T at both points.
 fn curves(own: &Loop) -> Result<Vec<Frequency>, Error> {
-    let mut found = Vec::new();
-    for (at, name) in POINTS {
-        let (s, t) = (own.sensitivity(at), own.complementary(at));
-        for (symbol, system) in [("S", s), ("T", t)] {
-            let grid = frequency_grid(&system, POINTS_PER_DECADE)?;
-            let points = frequency_response(&system, &grid)?;
-            let values = |k: usize| points.iter().map(|point| point.singular_values[k]).collect();
-            found.push(Frequency {
-                name: format!("{symbol} at the {name}"),
-                singular_values: (0..system.d.nrows()).map(values).collect(),
-                frequencies: grid,
-            });
-        }
-    }
-    Ok(found)
+    let systems = POINTS.into_iter().flat_map(|(at, name)| {
+        [("S", own.sensitivity(at), name), ("T", own.complementary(at), name)]
+    });
+    let one = |(symbol, system, name): &(&str, StateSpace, &str)| {
+        let grid = frequency_grid(system, POINTS_PER_DECADE)?;
+        let points = frequency_response(system, &grid)?;
+        let values = |k: usize| points.iter().map(|point| point.singular_values[k]).collect();
+        Ok(Frequency {
+            name: format!("{symbol} at the {name}"),
+            singular_values: (0..system.d.nrows()).map(values).collect(),
+            frequencies: grid,
+        })
+    };
+    systems.collect::<Vec<_>>().par_iter().map(one).collect()
 }
 
 /// Judges a design.

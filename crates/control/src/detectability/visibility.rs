@@ -28,33 +28,46 @@ pub struct Visibility {
 pub(super) fn table(plant: &FaultyPlant, domain: Domain) -> Result<Vec<Vec<Visibility>>, Error> {
     let ((n, q), p) = (plant.f_a.shape(), plant.c.nrows());
     let (a_0, outputs) = (plant.augmented_dynamics(), plant.augmented_output().transpose());
-    let entry = |measurement: usize, fault: usize| {
+    let of_fault = |fault: usize| {
         let start = DMatrix::from_fn(n + q, 1, |i, _| f64::from(u8::from(i == n + fault)));
-        let moved = minimal_part(&a_0, &start, &outputs.columns(measurement, 1).into(), domain)?;
-        let output = plant.c.rows(measurement, 1).transpose();
-        let column = plant.f_a.columns(fault, 1).into();
-        let part = minimal_part(&plant.a, &column, &output, domain)?;
-        let dc_gain = part.map_or(Ok(Some(0.0)), |part| dc_gain(&part))?;
-        Ok(Visibility { visible: moved.is_some(), dc_gain })
+        let column = plant.f_a.columns(fault, 1).into_owned();
+        let reached = Staircase::new(&plant.a, &column)?;
+        Ok((Staircase::new(&a_0, &start)?, reached, column))
     };
-    (0..p).map(|measurement| (0..q).map(|fault| entry(measurement, fault)).collect()).collect()
+    let faults: Vec<_> = (0..q).map(of_fault).collect::<Result<_, Error>>()?;
+    let entry = |measurement: usize, (moved, reached, column): &Reached| {
+        let output = plant.c.rows(measurement, 1).transpose();
+        let part = minimal_part((reached, column), &output, domain)?;
+        let dc_gain = part.map_or(Ok(Some(0.0)), |part| dc_gain(&part))?;
+        let visible = seen(moved, &outputs.columns(measurement, 1).into()).is_some();
+        Ok(Visibility { visible, dc_gain })
+    };
+    (0..p)
+        .map(|measurement| faults.iter().map(|fault| entry(measurement, fault)).collect())
+        .collect()
+}
+
+/// The states that a fault moves by its model, the states that its column b reaches, and b.
+type Reached = (Staircase, Staircase, DMatrix<f64>);
+
+/// The output c, n x 1, of the reached states; None if it is zero.
+fn seen(reached: &Staircase, c: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let (c, norm) = reached.reached_output(c);
+    (c.norm() > TOLERANCE * norm).then_some(c)
 }
 
 /// The controllable and observable part of the system {a, b, c', 0}; None when its transfer
 /// function is identically zero.
 ///
-/// `a`: n x n; `b`, `c`: n x 1.
+/// `controllable`: the states that b reaches; `b`, `c`: n x 1.
 fn minimal_part(
-    a: &DMatrix<f64>,
-    b: &DMatrix<f64>,
+    (controllable, b): (&Staircase, &DMatrix<f64>),
     c: &DMatrix<f64>,
     domain: Domain,
 ) -> Result<Option<StateSpace>, Error> {
-    let controllable = Staircase::new(a, b)?;
-    let (c, norm) = controllable.reached_output(c);
-    if c.norm() <= TOLERANCE * norm {
+    let Some(c) = seen(controllable, c) else {
         return Ok(None);
-    }
+    };
     let b = controllable.reached_input(b);
     let observable = Staircase::new(&controllable.reached_dynamics().transpose(), &c)?;
     let (b, _) = observable.reached_output(&b);

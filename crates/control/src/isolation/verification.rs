@@ -82,7 +82,7 @@ pub(super) fn decoupling_error(
 /// The frequency response of a system that may have no states.
 enum Response<'a> {
     Static(&'a DMatrix<f64>),
-    Dynamic(Transfer<'a>),
+    Dynamic(Transfer),
 }
 
 impl<'a> Response<'a> {

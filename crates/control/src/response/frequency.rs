@@ -102,17 +102,18 @@ pub(crate) fn grid(system: &StateSpace, values: &[Complex<f64>], per_decade: u32
 ///
 /// Source: A. J. Laub, Efficient multivariable frequency response computations, IEEE Trans. Autom.
 /// Control 26 (1981).
-pub(crate) struct Transfer<'a> {
+#[derive(Clone)]
+pub(crate) struct Transfer {
     /// The transpose of A.
     transposed: DMatrix<f64>,
     b: DMatrix<Complex<f64>>,
-    c: DMatrix<Complex<f64>>,
-    d: &'a DMatrix<f64>,
+    pub(super) c: DMatrix<Complex<f64>>,
+    pub(super) d: DMatrix<f64>,
     domain: Domain,
 }
 
-impl<'a> Transfer<'a> {
-    pub(crate) fn new(system: &'a StateSpace) -> Self {
+impl Transfer {
+    pub(crate) fn new(system: &StateSpace) -> Self {
         let Balance { matrix, scale } = Balance::new(&system.a);
         let (b, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
         let (q, h) = matrix.hessenberg().unpack();
@@ -120,12 +121,23 @@ impl<'a> Transfer<'a> {
             transposed: h.transpose(),
             b: to_complex(&q.tr_mul(&b)),
             c: to_complex(&(c * q)),
-            d: &system.d,
+            d: system.d.clone(),
             domain: system.domain,
         }
     }
 
-    pub(super) fn point(&self, frequency: f64) -> Result<FrequencyPoint, Error> {
+    /// From one input to the output of the same number.
+    pub(super) fn channel(&self, channel: usize) -> Self {
+        Self {
+            transposed: self.transposed.clone(),
+            b: self.b.columns(channel, 1).into(),
+            c: self.c.rows(channel, 1).into(),
+            d: self.d.view((channel, channel), (1, 1)).into(),
+            domain: self.domain,
+        }
+    }
+
+    fn point(&self, frequency: f64) -> Result<FrequencyPoint, Error> {
         let gain = self.gain(frequency)?;
         let tall = if gain.nrows() < gain.ncols() { gain.transpose() } else { gain.clone() };
         let singular_values = ComplexSvd::new(&tall)?.values();
@@ -134,6 +146,11 @@ impl<'a> Transfer<'a> {
 
     /// G at one frequency.
     pub(crate) fn gain(&self, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
+        self.with_direct(self.without_direct(frequency)?)
+    }
+
+    /// C (s I - A)^-1 B at one frequency; not finite if s is an eigenvalue.
+    pub(super) fn without_direct(&self, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
         if !(frequency.is_finite() && frequency >= 0.0) {
             let rule = "a finite number, not negative";
             return Err(Error::OutOfRange { name: "frequency", value: frequency, rule });
@@ -142,10 +159,17 @@ impl<'a> Transfer<'a> {
             Domain::Continuous => Complex::new(0.0, frequency),
             Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
         };
-        let overflow = Error::Overflow { what: "the frequency response" };
-        let gain = &self.c * self.states(s) + to_complex(self.d);
+        Ok(&self.c * self.states(s))
+    }
+
+    /// G from C (s I - A)^-1 B.
+    pub(super) fn with_direct(
+        &self,
+        response: DMatrix<Complex<f64>>,
+    ) -> Result<DMatrix<Complex<f64>>, Error> {
+        let gain = response + to_complex(&self.d);
         if gain.iter().any(|entry| !(entry.re.is_finite() && entry.im.is_finite())) {
-            return Err(overflow);
+            return Err(Error::Overflow { what: "the frequency response" });
         }
         Ok(gain)
     }
@@ -186,10 +210,5 @@ impl<'a> Transfer<'a> {
             sums.iter_mut().for_each(|sum| *sum /= pivot);
         }
         by_state.transpose()
-    }
-
-    /// The largest singular value.
-    pub(super) fn size(&self, frequency: f64) -> Result<f64, Error> {
-        Ok(self.point(frequency)?.singular_values[0])
     }
 }

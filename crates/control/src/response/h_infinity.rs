@@ -1,6 +1,6 @@
 //! The H-infinity norm.
 
-use super::frequency::Transfer;
+use super::known::KnownResponse;
 use crate::balance::Balance;
 use crate::blocks::block_2x2;
 use crate::eigen::eigenvalues;
@@ -81,31 +81,30 @@ pub struct HInfinity {
 /// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for `width`; [`Error::NotHurwitz`],
 /// [`Error::NotSchur`]; [`Error::NotConverged`]; [`Error::Overflow`].
 pub fn h_infinity(system: &StateSpace, width: f64) -> Result<HInfinity, Error> {
-    let modes = system.stable_eigenvalues()?;
+    norm_of(&KnownResponse::new(system.clone())?, width)
+}
+
+/// [`h_infinity`] of a system whose response is known in part.
+pub(crate) fn norm_of(known: &KnownResponse, width: f64) -> Result<HInfinity, Error> {
     check::positive("width", width)?;
     let width = width.max(1e-10);
-    let transfer = Transfer::new(system);
+    let system = &known.system;
     let continuous = continuous_equivalent(system)?;
-    let mut best = HInfinity::at_ends(&transfer, &continuous.d, system.domain)?;
-    let modes = modes.iter().filter(|mode| mode.im >= 0.0);
-    let resonances = modes.flat_map(|mode| match system.domain {
-        Domain::Continuous => vec![mode.im.abs(), mode.norm()],
-        Domain::Sampled { period } => vec![mode.arg().abs() / period],
-    });
-    for frequency in resonances {
-        best.offer(&transfer, frequency)?;
+    let mut best = HInfinity::at_ends(known, &continuous.d)?;
+    for frequency in known.resonances() {
+        best.offer(known, frequency)?;
     }
-    best.climb(&transfer, width, system.domain)?;
+    best.climb(known, width)?;
     for _ in 0..ROUNDS {
         if best.lower == 0.0 {
             return Ok(best);
         }
         best.upper = best.lower * (1.0 + width);
         for frequency in crossings(&continuous, best.upper)? {
-            best.offer(&transfer, original_frequency(frequency, system.domain))?;
+            best.offer(known, original_frequency(frequency, system.domain))?;
         }
         if best.lower >= best.upper {
-            best.climb(&transfer, width, system.domain)?;
+            best.climb(known, width)?;
             continue;
         }
         return Ok(best);
@@ -116,33 +115,33 @@ pub fn h_infinity(system: &StateSpace, width: f64) -> Result<HInfinity, Error> {
 impl HInfinity {
     /// The larger of the values at frequency zero and at the highest frequency, where G is `d`, the
     /// D of the continuous equivalent.
-    fn at_ends(transfer: &Transfer, d: &DMatrix<f64>, domain: Domain) -> Result<Self, Error> {
-        let frequency = original_frequency(f64::INFINITY, domain);
+    fn at_ends(known: &KnownResponse, d: &DMatrix<f64>) -> Result<Self, Error> {
+        let frequency = original_frequency(f64::INFINITY, known.system.domain);
         let lower = norm_2(d)?;
         let mut best = Self { lower, upper: lower, frequency };
-        best.offer(transfer, 0.0)?;
+        best.offer(known, 0.0)?;
         Ok(best)
     }
 
     /// Raises the lower bound to the local maximum about its frequency, by steps that grow while they
     /// climb and shrink otherwise: each of them saves eigenvalues of a Hamiltonian matrix.
-    fn climb(&mut self, transfer: &Transfer, width: f64, domain: Domain) -> Result<(), Error> {
-        let last = original_frequency(f64::INFINITY, domain);
+    fn climb(&mut self, known: &KnownResponse, width: f64) -> Result<(), Error> {
+        let last = original_frequency(f64::INFINITY, known.system.domain);
         if self.frequency <= 0.0 || self.frequency >= last {
             return Ok(());
         }
         let mut step = FIRST_STEP;
         while step.abs() > SMALLEST_STEP * width.sqrt() {
             let before = self.lower;
-            self.offer(transfer, (self.frequency * step.exp()).min(last))?;
+            self.offer(known, (self.frequency * step.exp()).min(last))?;
             step *= if self.lower > before { 1.5 } else { -0.5 };
         }
         Ok(())
     }
 
     /// Raises the lower bound to the value at `frequency` if that is larger.
-    fn offer(&mut self, transfer: &Transfer, frequency: f64) -> Result<(), Error> {
-        let size = transfer.size(frequency)?;
+    fn offer(&mut self, known: &KnownResponse, frequency: f64) -> Result<(), Error> {
+        let size = known.size(frequency)?;
         if size > self.lower {
             self.lower = size;
             self.frequency = frequency;

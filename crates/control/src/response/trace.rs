@@ -8,9 +8,11 @@ use std::f64::consts::SQRT_2;
 
 /// A mode is followed until it has decayed to e^-25, about 1e-11.
 const FOLLOWED: f64 = 25.0;
-/// Steps per time constant, and per radian of an oscillation.
-const STEPS: f64 = 10.0;
+/// Steps per time constant, and per radian of an oscillation; the second for `LARGE` systems.
+const STEPS: [f64; 2] = [10.0, 4.0];
 const MOST_SAMPLES: f64 = 200_000.0;
+/// From this order on the outputs of all times are computed together, at fewer points.
+const LARGE: usize = 48;
 
 /// The outputs of a system over time.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,12 +42,13 @@ impl TimeResponse {
 
 /// Computes the response to a unit step of one input, from rest.
 ///
-/// `input`: its index, from 0. The system must be stable. The grid has ten steps per time constant
-/// or radian of the fastest mode that has not yet decayed; a mode counts as decayed after 25 time
-/// constants. A real mode adds about 250 points. Each point is exact up to rounding for every step
+/// `input`: its index, from 0. The system must be stable. The grid has ten steps (four from 48 states
+/// on) per time constant or radian of the fastest mode that has not yet decayed; a mode counts as decayed
+/// after 25 time constants. A real mode adds about 250 points. Each point is exact up to rounding for every step
 /// size: it is computed by matrix exponentials, in sampled time by powers of A, with steps of whole
 /// samples. Rates 1e5 apart cost about four digits. Cost: about 20 (n + 2 m)^3 multiplications per
-/// mode, n^2 per point.
+/// mode, n (n + p) per point; from 48 states on the outputs are products of large matrices, whose last
+/// bits depend on the processor.
 ///
 /// # Errors
 ///
@@ -74,18 +77,41 @@ pub fn ramp_response(
     response(system, input, Some(duration))
 }
 
+/// Computes the limit of z for large times after a unit step of one input, p: that of [`step_response`]
+/// without its points.
+///
+/// # Errors
+///
+/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for `input`; [`Error::NotHurwitz`],
+/// [`Error::NotSchur`]; [`Error::Overflow`].
+pub fn settled_output(system: &StateSpace, input: usize) -> Result<DVector<f64>, Error> {
+    system.stable_eigenvalues()?;
+    check_input(system, input)?;
+    let mut constant = DVector::zeros(system.b.ncols());
+    constant[input] = 1.0;
+    settled(system, &constant)
+}
+
+/// C (s I - A)^-1 B w + D w at the eigenvalue of a constant signal w.
+fn settled(system: &StateSpace, input: &DVector<f64>) -> Result<DVector<f64>, Error> {
+    let rest = system.dc_matrix().lu().solve(&(&system.b * input));
+    let rest = rest.ok_or(Error::Overflow { what: "the settled output" })?;
+    Ok(&system.c * rest + &system.d * input)
+}
+
+fn check_input(system: &StateSpace, input: usize) -> Result<(), Error> {
+    if input < system.b.ncols() {
+        return Ok(());
+    }
+    #[expect(clippy::cast_precision_loss, reason = "an index for a message")]
+    let value = input as f64;
+    let rule = "an index below the number of columns of B";
+    Err(Error::OutOfRange { name: "input", value, rule })
+}
+
 fn response(system: &StateSpace, input: usize, rise: Option<f64>) -> Result<TimeResponse, Error> {
     let eigenvalues = system.stable_eigenvalues()?;
-    let inputs = system.b.ncols();
-    if input >= inputs {
-        #[expect(clippy::cast_precision_loss, reason = "an index for a message")]
-        let value = input as f64;
-        return Err(Error::OutOfRange {
-            name: "input",
-            value,
-            rule: "an index below the number of columns of B",
-        });
-    }
+    check_input(system, input)?;
     let modes = Modes::new(&eigenvalues, system.domain);
     let mut simulation = GridSimulation::from_rest(system);
     if let Some(rise) = rise {
@@ -178,7 +204,7 @@ impl Modes {
                 continue;
             }
             let rate = self.lives[first..].iter().fold(0.0_f64, |most, life| most.max(life.1));
-            let wanted = 1.0 / (STEPS * rate);
+            let wanted = 1.0 / (STEPS[usize::from(self.lives.len() >= LARGE)] * rate);
             if self.period == 0.0 && until < end {
                 // Powers of two, so that neighbouring segments share a step and its propagator.
                 let step = power_of_two(wanted / SQRT_2);
@@ -234,8 +260,10 @@ struct GridSimulation<'a> {
     input: DVector<f64>,
     slope: DVector<f64>,
     time: Vec<f64>,
-    output: Vec<DVector<f64>>,
-    rates: Vec<DVector<f64>>,
+    /// States, inputs and their slopes at all times, one time after the other.
+    states: Vec<f64>,
+    inputs: Vec<f64>,
+    slopes: Vec<f64>,
 }
 
 impl<'a> GridSimulation<'a> {
@@ -247,18 +275,17 @@ impl<'a> GridSimulation<'a> {
             input: DVector::zeros(m),
             slope: DVector::zeros(m),
             time: Vec::new(),
-            output: Vec::new(),
-            rates: Vec::new(),
+            states: Vec::new(),
+            inputs: Vec::new(),
+            slopes: Vec::new(),
         }
     }
 
     fn record(&mut self, time: f64) {
-        let StateSpace { a, b, c, d, domain } = self.system;
         self.time.push(time);
-        self.output.push(c * &self.state + d * &self.input);
-        if *domain == Domain::Continuous {
-            self.rates.push(c * (a * &self.state + b * &self.input) + d * &self.slope);
-        }
+        self.states.extend(self.state.iter());
+        self.inputs.extend(self.input.iter());
+        self.slopes.extend(self.slope.iter());
     }
 
     /// Simulates the segments, from the point where the previous call ended.
@@ -296,18 +323,29 @@ impl<'a> GridSimulation<'a> {
 
     fn finished(self) -> Result<TimeResponse, Error> {
         let StateSpace { a, b, c, d, domain } = self.system;
-        let decay = match domain {
-            Domain::Continuous => -a,
-            Domain::Sampled { .. } => DMatrix::identity(a.nrows(), a.nrows()) - a,
+        let (points, (n, m)) = (self.time.len(), b.shape());
+        let states = DMatrix::from_vec(n, points, self.states);
+        let inputs = DMatrix::from_vec(m, points, self.inputs);
+        let slopes = DMatrix::from_vec(m, points, self.slopes);
+        let sum = |[of_state, of_input]: [&DMatrix<f64>; 2],
+                   (states, inputs): (&DMatrix<f64>, &DMatrix<f64>)| {
+            if n >= LARGE {
+                return of_state * states + of_input * inputs;
+            }
+            // One product for each time has the same bits on every processor.
+            let mut all = DMatrix::zeros(of_state.nrows(), points);
+            for (k, mut column) in all.column_iter_mut().enumerate() {
+                column.copy_from(&(of_state * states.column(k) + of_input * inputs.column(k)));
+            }
+            all
         };
-        let rest = decay.lu().solve(&(b * &self.input));
-        let rest = rest.ok_or(Error::Overflow { what: "the settled output" })?;
-        let output = check::in_range("the response", DMatrix::from_columns(&self.output))?;
+        let output = check::in_range("the response", sum([c, d], (&states, &inputs)))?;
         let slope = match domain {
-            Domain::Continuous => DMatrix::from_columns(&self.rates),
+            Domain::Continuous => sum([c, d], (&sum([a, b], (&states, &inputs)), &slopes)),
             Domain::Sampled { .. } => DMatrix::zeros(output.nrows(), 0),
         };
-        Ok(TimeResponse { time: self.time, output, final_value: c * rest + d * self.input, slope })
+        let final_value = settled(self.system, &self.input)?;
+        Ok(TimeResponse { time: self.time, output, final_value, slope })
     }
 }
 

@@ -4,6 +4,7 @@ use super::crossing::narrowed;
 use super::disk::single;
 use super::sweep::Sweep;
 use super::{Loop, Point};
+use crate::response::KnownResponse;
 use crate::stability::instability;
 use crate::{Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
@@ -49,8 +50,12 @@ pub struct ChannelMargins {
 /// [`Error::NotHurwitz`], [`Error::NotSchur`] for a loop that is not stable; same as
 /// [`crate::response::frequency_response`].
 pub fn channel_margins(closed: &Loop, at: Point, channel: usize) -> Result<ChannelMargins, Error> {
-    let system = single(&closed.complementary(at), channel);
-    let sweep = Sweep::new(&system)?;
+    margins_of(&KnownResponse::new(single(&closed.complementary(at), channel))?)
+}
+
+/// The margins of the channel with this T.
+pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins, Error> {
+    let sweep = Sweep::new(complementary)?;
     let transfer = |t: &DMatrix<Complex<f64>>| open(t[(0, 0)]);
     let crossings = sweep.crossings(|t| transfer(t).im)?;
     let mut limits = vec![];
@@ -63,7 +68,7 @@ pub fn channel_margins(closed: &Loop, at: Point, channel: usize) -> Result<Chann
             limits.push(limit);
         }
     }
-    let gain = Gains { system: &system }.limits(&limits)?;
+    let gain = Gains { system: &complementary.system }.limits(&limits)?;
     let (mut phase, mut phase_frequency, mut delay) = (f64::INFINITY, 0.0, f64::INFINITY);
     for frequency in sweep.crossings(|t| transfer(t).norm() - 1.0)? {
         let lag = (-transfer(&sweep.at(frequency)?)).arg();

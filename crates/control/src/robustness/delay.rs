@@ -6,6 +6,7 @@ use super::sweep::Sweep;
 use super::{Loop, Point};
 use crate::blocks::block_2x2;
 use crate::eigen::schur;
+use crate::response::KnownResponse;
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
@@ -31,10 +32,14 @@ const REFINED_SAMPLES: f64 = 20.0;
 /// [`Error::NotHurwitz`], [`Error::NotSchur`] for a loop that is not stable;
 /// [`Error::NotConverged`], [`Error::Overflow`].
 pub fn delay_margin(closed: &Loop) -> Result<f64, Error> {
-    let system = closed.complementary(Point::Input);
-    let sweep = Sweep::new(&system)?;
+    delay_of(&KnownResponse::new(closed.complementary(Point::Input))?)
+}
+
+/// The delay margin of the loop with this T.
+pub(super) fn delay_of(complementary: &KnownResponse) -> Result<f64, Error> {
+    let sweep = Sweep::new(complementary)?;
     let mut delay = f64::INFINITY;
-    for rank in 0..system.d.nrows() {
+    for rank in 0..complementary.system.d.nrows() {
         let modulus =
             |t: &DMatrix<Complex<f64>>| loci(t).map_or(f64::NAN, |loci| loci[rank].norm() - 1.0);
         for frequency in sweep.crossings(modulus)? {
@@ -67,13 +72,29 @@ fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Complex<f64>>, Error> {
 /// Same as [`Loop::new`], [`crate::hold::zero_order_hold`] and [`delay_margin`]; [`Error::OutOfRange`] when the
 /// controller is continuous.
 pub fn sampled_delay_margin(plant: &StateSpace, controller: &StateSpace) -> Result<f64, Error> {
-    let Domain::Sampled { period } = controller.domain else {
-        let rule = "that of a sampled controller";
-        return Err(Error::OutOfRange { name: "the domain", value: f64::NAN, rule });
-    };
+    let period = period_of(controller)?;
     let (a, b) = hold_inputs(&plant.a, &plant.b, period)?;
     let sampled = StateSpace { a, b, domain: controller.domain, ..plant.clone() };
     let estimate = delay_margin(&Loop::new(sampled, controller.clone())?)?;
+    refined(plant, controller, estimate)
+}
+
+fn period_of(controller: &StateSpace) -> Result<f64, Error> {
+    let rule = "that of a sampled controller";
+    let refused = Error::OutOfRange { name: "the domain", value: f64::NAN, rule };
+    match controller.domain {
+        Domain::Sampled { period } => Ok(period),
+        Domain::Continuous => Err(refused),
+    }
+}
+
+/// The delay margin of a sampled controller from the one that is exact for whole samples.
+pub(super) fn refined(
+    plant: &StateSpace,
+    controller: &StateSpace,
+    estimate: f64,
+) -> Result<f64, Error> {
+    let period = period_of(controller)?;
     let whole = (estimate / period).floor();
     if whole.is_nan() || whole > REFINED_SAMPLES {
         return Ok(estimate);

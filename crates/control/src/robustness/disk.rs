@@ -3,13 +3,12 @@
 use super::scaling::{ScaledPeak, balanced_norm, scaled_norm};
 use super::sweep::Sweep;
 use super::{Loop, Point};
-use crate::balance::{divide_columns, multiply_rows};
 use crate::blocks::to_complex;
-use crate::response::h_infinity;
+use crate::response::{HInfinity, KnownResponse, norm_of};
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix, DVector};
 
-const WIDTH: f64 = 1e-4;
+pub(super) const WIDTH: f64 = 1e-4;
 const REFINEMENTS: usize = 30;
 
 /// The symmetric disk margin: the loop stays stable while each channel, all at the same time and
@@ -80,14 +79,19 @@ impl DiskMargin {
 ///
 /// # Errors
 ///
-/// Same as [`h_infinity`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for a loop that is not stable.
+/// Same as [`crate::response::h_infinity`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for a loop that is not stable.
 pub fn disk_margin(closed: &Loop, at: Point, channel: Option<usize>) -> Result<DiskMargin, Error> {
     let mut system = closed.sensitivity(at);
     if let Some(channel) = channel {
         system = single(&system, channel);
     }
-    system.d *= 0.5;
-    let peak = scaled_peak(&system)?;
+    margin_of(KnownResponse::new(system)?)
+}
+
+/// The disk margin of the channels with this S.
+pub(super) fn margin_of(sensitivity: KnownResponse) -> Result<DiskMargin, Error> {
+    let half = &sensitivity.system.d * 0.5;
+    let peak = peak_of(&sensitivity.with_direct(half))?;
     Ok(DiskMargin {
         alpha: 1.0 / peak.value,
         certified: 1.0 / peak.certified,
@@ -114,23 +118,27 @@ pub(super) fn single(system: &StateSpace, channel: usize) -> StateSpace {
 ///
 /// # Errors
 ///
-/// Same as [`h_infinity`].
+/// Same as [`crate::response::h_infinity`].
 pub fn scaled_peak(system: &StateSpace) -> Result<ScaledPeak, Error> {
-    let whole = h_infinity(system, WIDTH)?;
-    if system.d.nrows() == 1 {
+    peak_of(&KnownResponse::new(system.clone())?)
+}
+
+pub(super) fn peak_of(response: &KnownResponse) -> Result<ScaledPeak, Error> {
+    scaled_below(response, &norm_of(response, WIDTH)?)
+}
+
+/// The scaled peak of a response with the H-infinity norm `whole`.
+pub(super) fn scaled_below(
+    response: &KnownResponse,
+    whole: &HInfinity,
+) -> Result<ScaledPeak, Error> {
+    if response.system.d.nrows() == 1 {
         let (value, frequency) = (whole.lower, whole.frequency);
         return Ok(ScaledPeak { value, frequency, certified: whole.upper });
     }
-    let Largest { value, frequency, scaling } = Largest::search(system)?;
-    let units = scaling.map(f64::exp);
-    let scaled = StateSpace {
-        a: system.a.clone(),
-        b: divide_columns(&system.b, &units),
-        c: multiply_rows(&system.c, &units),
-        d: divide_columns(&multiply_rows(&system.d, &units), &units),
-        domain: system.domain,
-    };
-    let certified = whole.upper.min(h_infinity(&scaled, WIDTH)?.upper).max(value);
+    let Largest { value, frequency, scaling } = Largest::search(response)?;
+    let scaled = response.scaled(&scaling.map(f64::exp));
+    let certified = whole.upper.min(norm_of(&scaled, WIDTH)?.upper).max(value);
     Ok(ScaledPeak { value, frequency, certified })
 }
 
@@ -144,8 +152,8 @@ struct Largest {
 
 impl Largest {
     /// On the frequencies of a [`Sweep`], refined about the largest value.
-    fn search(system: &StateSpace) -> Result<Self, Error> {
-        let sweep = Sweep::new(system)?;
+    fn search(response: &KnownResponse) -> Result<Self, Error> {
+        let (sweep, system) = (Sweep::new(response)?, &response.system);
         let scaling = DVector::zeros(system.d.nrows());
         let mut best = Self { value: 0.0, frequency: 0.0, scaling };
         if system.domain == Domain::Continuous {

@@ -1,16 +1,13 @@
 //! Frequencies at which margins are searched.
 
 use super::crossing::narrowed;
-use crate::response::{Transfer, grid};
-use crate::{Domain, Error, StateSpace};
+use crate::Error;
+use crate::response::KnownResponse;
 use nalgebra::{Complex, DMatrix};
-use std::f64::consts::PI;
-
-const PER_DECADE: u32 = 60;
 
 /// A frequency response on a grid that has the resonances of the system.
 pub(super) struct Sweep<'a> {
-    transfer: Transfer<'a>,
+    response: &'a KnownResponse,
     /// Ascending, in rad per unit of time.
     pub(super) frequencies: Vec<f64>,
     /// G at each of them.
@@ -18,32 +15,16 @@ pub(super) struct Sweep<'a> {
 }
 
 impl<'a> Sweep<'a> {
-    /// From frequency zero to ten times the fastest eigenvalue or to the Nyquist frequency.
-    pub(super) fn new(system: &'a StateSpace) -> Result<Self, Error> {
-        let modes = system.stable_eigenvalues()?;
-        let mut frequencies = grid(system, &modes, PER_DECADE);
-        frequencies.push(0.0);
-        let modes = modes.iter().filter(|mode| mode.im >= 0.0);
-        frequencies.extend(modes.flat_map(|mode| match system.domain {
-            Domain::Continuous => [mode.im.abs(), mode.norm()],
-            Domain::Sampled { period } => {
-                let frequency = mode.arg().abs() / period;
-                [frequency, frequency]
-            }
-        }));
-        if let Domain::Sampled { period } = system.domain {
-            frequencies.retain(|frequency| *frequency <= PI / period);
-        }
-        frequencies.sort_by(f64::total_cmp);
-        frequencies.dedup();
-        let transfer = Transfer::new(system);
-        let values = frequencies.iter().map(|w| transfer.gain(*w)).collect::<Result<_, _>>()?;
-        Ok(Self { transfer, frequencies, values })
+    /// At [`KnownResponse::frequencies`].
+    pub(super) fn new(response: &'a KnownResponse) -> Result<Self, Error> {
+        let frequencies = response.frequencies();
+        let values = frequencies.iter().map(|w| response.gain(*w)).collect::<Result<_, _>>()?;
+        Ok(Self { response, frequencies, values })
     }
 
     /// G at a frequency.
     pub(super) fn at(&self, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
-        self.transfer.gain(frequency)
+        self.response.gain(frequency)
     }
 
     /// The frequencies at which the real function `of` of G changes its sign.

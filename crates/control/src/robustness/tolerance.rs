@@ -3,7 +3,7 @@
 use super::Loop;
 use super::crossing::narrowed;
 use super::held::hold_inputs;
-use super::worst_case::worst_case;
+use super::worst_case::climb;
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
@@ -112,28 +112,96 @@ pub fn tolerance_test<F: PlantFamily>(
     controller: &StateSpace,
     (cases, seed): (u32, u64),
 ) -> Result<ToleranceTest, F::Error> {
-    let loops = Loops { family, controller };
-    let mut random = seed;
-    let mut all = Vec::new();
-    let mut stable = 0;
-    for _ in 0..cases {
-        let deviations: Vec<f64> =
-            (0..family.count()).map(|_| 2.0 * uniform(&mut random) - 1.0).collect();
-        let value = loops.instability(&deviations)?;
-        stable += u32::from(value < 0.0);
-        all.push((value, deviations));
+    let search = ToleranceSearch { family, controller };
+    let evaluate = |deviations: Vec<f64>| Ok((search.instability(&deviations)?, deviations));
+    let cases = search.cases(cases, seed).into_iter().map(evaluate);
+    let cases = cases.collect::<Result<Vec<_>, F::Error>>()?;
+    let climbed = search.starts(&cases)?.into_iter().map(|start| search.climb(start));
+    let climbed = climbed.collect::<Result<Vec<_>, _>>()?;
+    search.result(&cases, climbed)
+}
+
+/// A plant of a family: its [`instability`] with the controller, and its deviations.
+pub type Deviated = (f64, Vec<f64>);
+
+/// The parts of [`tolerance_test`], for a caller that runs cases and climbs at the same time.
+pub struct ToleranceSearch<'a, F> {
+    /// The plants.
+    pub family: &'a F,
+    /// The controller, which does not vary.
+    pub controller: &'a StateSpace,
+}
+
+impl<F: PlantFamily> ToleranceSearch<'_, F> {
+    /// The deviations of the random cases.
+    #[must_use]
+    pub fn cases(&self, cases: u32, seed: u64) -> Vec<Vec<f64>> {
+        let mut random = seed;
+        let mut case =
+            || (0..self.family.count()).map(|_| 2.0 * uniform(&mut random) - 1.0).collect();
+        (0..cases).map(|_| case()).collect()
     }
-    all.sort_by(|x, y| y.0.total_cmp(&x.0));
-    all.truncate(2);
-    let (worst_instability, deviations) = worst_case(&loops, all)?;
-    Ok(ToleranceTest {
-        cases,
-        stable,
-        worst_instability,
-        worst: family.plant(&deviations)?,
-        first_unstable: loops.first_unstable(&deviations)?,
-        deviations,
-    })
+
+    /// The [`instability`] of the loop with a plant of the family.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`tolerance_test`].
+    pub fn instability(&self, deviations: &[f64]) -> Result<f64, F::Error> {
+        self.loops().instability(deviations)
+    }
+
+    /// Where climbs begin: the two worst cases and the nominal plant.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`tolerance_test`].
+    pub fn starts(&self, cases: &[Deviated]) -> Result<Vec<Deviated>, F::Error> {
+        let mut worst: Vec<&Deviated> = cases.iter().collect();
+        worst.sort_by(|x, y| y.0.total_cmp(&x.0));
+        let mut starts: Vec<Deviated> = worst.into_iter().take(2).cloned().collect();
+        let nominal = vec![0.0; self.family.count()];
+        starts.push((self.instability(&nominal)?, nominal));
+        Ok(starts)
+    }
+
+    /// The worst plant that is reached from `start`.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`tolerance_test`].
+    pub fn climb(&self, start: Deviated) -> Result<Deviated, F::Error> {
+        climb(&self.loops(), start)
+    }
+
+    /// The result from all cases and the end of each climb.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`tolerance_test`].
+    pub fn result(
+        &self,
+        cases: &[Deviated],
+        climbed: Vec<Deviated>,
+    ) -> Result<ToleranceTest, F::Error> {
+        let worse = |best: Deviated, found: Deviated| if found.0 > best.0 { found } else { best };
+        let worst = climbed.into_iter().reduce(worse);
+        let (worst_instability, deviations) =
+            worst.ok_or(Error::NotConverged { what: "the worst case", iterations: 0 })?;
+        let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        Ok(ToleranceTest {
+            cases: count(cases.len()),
+            stable: count(cases.iter().filter(|(value, _)| *value < 0.0).count()),
+            worst_instability,
+            worst: self.family.plant(&deviations)?,
+            first_unstable: self.loops().first_unstable(&deviations)?,
+            deviations,
+        })
+    }
+
+    fn loops(&self) -> Loops<'_, F> {
+        Loops { family: self.family, controller: self.controller }
+    }
 }
 
 /// The next number of `SplitMix64` (G. L. Steele, D. Lea and C. H. Flood, OOPSLA 2014), in 0 to 1.

@@ -1,10 +1,10 @@
 //! The search for the worst plant within tolerances.
 
 use super::tolerance::{Loops, PlantFamily};
+use crate::Domain;
 use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;
 use crate::exponential::exponential;
-use crate::{Domain, Error};
 use nalgebra::{Complex, DMatrix, DVector};
 
 type Vector = DVector<Complex<f64>>;
@@ -20,25 +20,8 @@ const LARGE: usize = 50;
 /// Relative shift of the eigenvalue in the inverse iteration.
 const SHIFT: f64 = 1e-9;
 
-/// Returns the largest instability that was found, with its deviations; `starts` are cases to begin
-/// with beside the nominal one.
-pub(super) fn worst_case<F: PlantFamily>(
-    loops: &Loops<'_, F>,
-    mut starts: Vec<(f64, Vec<f64>)>,
-) -> Result<(f64, Vec<f64>), F::Error> {
-    let nominal = vec![0.0; loops.family.count()];
-    starts.push((loops.instability(&nominal)?, nominal));
-    let mut best: Option<(f64, Vec<f64>)> = None;
-    for start in starts {
-        let found = ascend(loops, start)?;
-        if best.as_ref().is_none_or(|(value, _)| found.0 > *value) {
-            best = Some(found);
-        }
-    }
-    Ok(best.ok_or(Error::NotConverged { what: "the worst case", iterations: 0 })?)
-}
-
-fn ascend<F: PlantFamily>(
+/// Returns the largest instability that is found from a case, with its deviations.
+pub(super) fn climb<F: PlantFamily>(
     loops: &Loops<'_, F>,
     (mut value, mut deviations): (f64, Vec<f64>),
 ) -> Result<(f64, Vec<f64>), F::Error> {

@@ -1,0 +1,141 @@
+//! A stable system whose eigenvalues and frequency response are computed once.
+
+use super::frequency::{Transfer, grid};
+use crate::balance::{divide_columns, multiply_rows};
+use crate::svd::ComplexSvd;
+use crate::{Domain, Error, StateSpace};
+use nalgebra::{Complex, DMatrix, DVector};
+use std::collections::HashMap;
+use std::f64::consts::PI;
+
+const PER_DECADE: u32 = 60;
+/// Below this order a scaled system is computed afresh, with the same bits as alone.
+const LARGE: usize = 48;
+
+/// A stable system with its eigenvalues, its Hessenberg form, and its response at frequencies of a sweep.
+///
+/// Systems that differ in B, C and D by a choice of channels, by their sign or by units share all of
+/// them.
+#[derive(Clone)]
+pub(crate) struct KnownResponse {
+    pub(crate) system: StateSpace,
+    /// The eigenvalues of A.
+    pub(crate) modes: Vec<Complex<f64>>,
+    transfer: Transfer,
+    /// C (s I - A)^-1 B by the bits of the frequency.
+    known: HashMap<u64, DMatrix<Complex<f64>>>,
+}
+
+impl KnownResponse {
+    /// # Errors
+    ///
+    /// Same as [`StateSpace::check`]; [`Error::NotHurwitz`], [`Error::NotSchur`].
+    pub(crate) fn new(system: StateSpace) -> Result<Self, Error> {
+        let modes = system.stable_eigenvalues()?;
+        let transfer = Transfer::new(&system);
+        Ok(Self { system, modes, transfer, known: HashMap::new() })
+    }
+
+    /// The same with the response at all [`Self::frequencies`] and [`Self::resonances`].
+    pub(crate) fn swept(mut self) -> Result<Self, Error> {
+        for frequency in self.frequencies().into_iter().chain(self.resonances()) {
+            let response = self.transfer.without_direct(frequency)?;
+            self.known.insert(frequency.to_bits(), response);
+        }
+        Ok(self)
+    }
+
+    /// G at a frequency.
+    pub(crate) fn gain(&self, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
+        match self.known.get(&frequency.to_bits()) {
+            Some(response) => self.transfer.with_direct(response.clone()),
+            None => self.transfer.gain(frequency),
+        }
+    }
+
+    /// The largest singular value of G at a frequency.
+    pub(super) fn size(&self, frequency: f64) -> Result<f64, Error> {
+        let gain = self.gain(frequency)?;
+        let tall = if gain.nrows() < gain.ncols() { gain.transpose() } else { gain };
+        Ok(ComplexSvd::new(&tall)?.values()[0])
+    }
+
+    /// The frequencies of the eigenvalues, where G may have peaks.
+    pub(crate) fn resonances(&self) -> Vec<f64> {
+        let modes = self.modes.iter().filter(|mode| mode.im >= 0.0);
+        let of = |mode: &Complex<f64>| match self.system.domain {
+            Domain::Continuous => vec![mode.im.abs(), mode.norm()],
+            Domain::Sampled { period } => vec![mode.arg().abs() / period],
+        };
+        modes.flat_map(of).collect()
+    }
+
+    /// The frequencies of a sweep, ascending: 60 for each decade from zero to ten times the fastest
+    /// eigenvalue, or to the Nyquist frequency, and the resonances.
+    pub(crate) fn frequencies(&self) -> Vec<f64> {
+        let mut all = grid(&self.system, &self.modes, PER_DECADE);
+        all.push(0.0);
+        all.extend(self.resonances());
+        if let Domain::Sampled { period } = self.system.domain {
+            all.retain(|frequency| *frequency <= PI / period);
+        }
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all
+    }
+
+    /// The system with another D.
+    pub(crate) fn with_direct(mut self, d: DMatrix<f64>) -> Self {
+        self.transfer.d.copy_from(&d);
+        self.system.d = d;
+        self
+    }
+
+    /// The system with -C in place of C.
+    pub(crate) fn negated(mut self) -> Self {
+        self.system.c.neg_mut();
+        self.transfer.c.neg_mut();
+        self.known.values_mut().for_each(DMatrix::neg_mut);
+        self
+    }
+
+    /// The system from one input to the output of the same number.
+    pub(crate) fn channel(&self, channel: usize) -> Self {
+        let StateSpace { a, b, c, d, domain } = &self.system;
+        let (b, c) = (b.columns(channel, 1).into(), c.rows(channel, 1).into());
+        let d = d.view((channel, channel), (1, 1)).into_owned();
+        let of_channel = |(at, gain): (&u64, &DMatrix<Complex<f64>>)| {
+            (*at, gain.view((channel, channel), (1, 1)).into())
+        };
+        Self {
+            modes: self.modes.clone(),
+            transfer: self.transfer.channel(channel),
+            known: self.known.iter().map(of_channel).collect(),
+            system: StateSpace { a: a.clone(), b, c, d, domain: *domain },
+        }
+    }
+
+    /// The system S G S^-1 with the diagonal S of `units`.
+    pub(crate) fn scaled(&self, units: &DVector<f64>) -> Self {
+        let StateSpace { a, b, c, d, domain } = &self.system;
+        let system = StateSpace {
+            a: a.clone(),
+            b: divide_columns(b, units),
+            c: multiply_rows(c, units),
+            d: divide_columns(&multiply_rows(d, units), units),
+            domain: *domain,
+        };
+        let transfer = Transfer::new(&system);
+        let mut known = HashMap::new();
+        if a.nrows() >= LARGE {
+            known.clone_from(&self.known);
+            for gain in known.values_mut() {
+                for (i, j) in (0..gain.nrows()).flat_map(|i| (0..units.len()).map(move |j| (i, j)))
+                {
+                    gain[(i, j)] *= units[i] / units[j];
+                }
+            }
+        }
+        Self { system, modes: self.modes.clone(), transfer, known }
+    }
+}

@@ -1,0 +1,102 @@
+//! All that is asked about one point of a loop.
+
+use super::channel::{self, ChannelMargins};
+use super::delay::{delay_of, refined};
+use super::disk::{self, DiskMargin, WIDTH};
+use super::scaling::ScaledPeak;
+use super::{Loop, Point};
+use crate::response::{HInfinity, KnownResponse, norm_of};
+use crate::{Error, StateSpace};
+
+/// A loop opened at one point, with its eigenvalues and the responses S and T on a sweep of frequencies.
+///
+/// Each answer has the value of the function of the same name; all of them share the sweep: it needs
+/// 4 n^2 (1 + m) multiplications for each of 60 frequencies in a decade and each resonance.
+pub struct OpenedLoop {
+    sensitivity: KnownResponse,
+    complementary: KnownResponse,
+    peak: HInfinity,
+}
+
+impl OpenedLoop {
+    /// Opens `closed` at `at`.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`crate::response::h_infinity`].
+    pub fn new(closed: &Loop, at: Point) -> Result<Self, Error> {
+        let sensitivity = KnownResponse::new(closed.sensitivity(at))?.swept()?;
+        let complementary = sensitivity.clone().negated();
+        let complementary = complementary.with_direct(closed.complementary(at).d);
+        let peak = norm_of(&sensitivity, WIDTH)?;
+        Ok(Self { sensitivity, complementary, peak })
+    }
+
+    /// The H-infinity norm of S, with a relative width of 1e-4.
+    #[must_use]
+    pub fn sensitivity_peak(&self) -> HInfinity {
+        self.peak
+    }
+
+    /// The H-infinity norm of T, with a relative width of 1e-4.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`crate::response::h_infinity`].
+    pub fn complementary_peak(&self) -> Result<HInfinity, Error> {
+        norm_of(&self.complementary, WIDTH)
+    }
+
+    /// [`super::scaled_peak`] of S.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`super::scaled_peak`].
+    pub fn scaled_peak(&self) -> Result<ScaledPeak, Error> {
+        disk::scaled_below(&self.sensitivity, &self.peak)
+    }
+
+    /// [`super::disk_margin`].
+    ///
+    /// # Errors
+    ///
+    /// Same as [`super::disk_margin`].
+    pub fn disk_margin(&self, channel: Option<usize>) -> Result<DiskMargin, Error> {
+        disk::margin_of(match channel {
+            Some(channel) => self.sensitivity.channel(channel),
+            None => self.sensitivity.clone(),
+        })
+    }
+
+    /// [`super::channel_margins`].
+    ///
+    /// # Errors
+    ///
+    /// Same as [`super::channel_margins`].
+    pub fn channel_margins(&self, channel: usize) -> Result<ChannelMargins, Error> {
+        channel::margins_of(&self.complementary.channel(channel))
+    }
+
+    /// [`super::delay_margin`] of a loop opened at its input.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`super::delay_margin`].
+    pub fn delay_margin(&self) -> Result<f64, Error> {
+        delay_of(&self.complementary)
+    }
+
+    /// [`super::sampled_delay_margin`] of a loop opened at its input; `plant`: the continuous plant,
+    /// whose sampled one is in the loop, as `controller` is.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`super::sampled_delay_margin`].
+    pub fn sampled_delay_margin(
+        &self,
+        plant: &StateSpace,
+        controller: &StateSpace,
+    ) -> Result<f64, Error> {
+        refined(plant, controller, self.delay_margin()?)
+    }
+}
