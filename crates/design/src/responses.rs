@@ -236,23 +236,6 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     points.chunks(count).flat_map(shown).collect()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_thinned_curve_keeps_ends_peaks_and_order() {
-        let point =
-            |k: u32| (f64::from(k), if k == 12_345 { 9.0 } else { (0.1 * f64::from(k)).sin() });
-        let all: Vec<_> = (0..50_000).map(point).collect();
-        let kept = thinned(&all);
-        assert!(kept.len() <= 4 * PARTS && kept.is_sorted_by(|x, y| x.0 < y.0), "{}", kept.len());
-        assert_eq!((kept[0], kept[kept.len() - 1]), (all[0], all[49_999]));
-        assert!(kept.contains(&(12_345.0, 9.0)));
-        assert_eq!(thinned(&all[..1000]), all[..1000]);
-    }
-}
-
 /// Appends outputs to a system.
 pub(crate) fn add_outputs(system: &mut StateSpace, c: &DMatrix<f64>, d: &DMatrix<f64>) {
     let rows = system.c.nrows();
@@ -275,4 +258,21 @@ fn transient(points: &[(f64, f64)], final_value: f64) -> (f64, f64, f64) {
     let outside = points.iter().rposition(|point| distance(point) > band);
     let settled = outside.map_or(0.0, |at| points[(at + 1).min(points.len() - 1)].0);
     (peak, peak_time, settled)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thinned_curve_keeps_ends_peaks_and_order() {
+        let point =
+            |k: u32| (f64::from(k), if k == 12_345 { 9.0 } else { (0.1 * f64::from(k)).sin() });
+        let all: Vec<_> = (0..50_000).map(point).collect();
+        let kept = thinned(&all);
+        assert!(kept.len() <= 4 * PARTS && kept.is_sorted_by(|x, y| x.0 < y.0), "{}", kept.len());
+        assert_eq!((kept[0], kept[kept.len() - 1]), (all[0], all[49_999]));
+        assert!(kept.contains(&(12_345.0, 9.0)));
+        assert_eq!(thinned(&all[..1000]), all[..1000]);
+    }
 }
