@@ -108,7 +108,9 @@ fn grid(rows: &[&[&DMatrix<f64>]]) -> DMatrix<f64> {
     whole
 }
 
-/// An observer gain L as by [`super::observer_gain`], for a norm with weights.
+/// An observer gain L as by [`super::observer_gain`], for an H-infinity norm with weights.
+///
+/// `performance`: as there, with [`super::Norm::HInfinity`].
 ///
 /// The gain does not act on the states of the weights: the extended error dynamics have the gain
 /// [L; 0], and the set of these gains with a norm below a bound is not convex. Up to three gains are
@@ -219,7 +221,7 @@ fn kalman_gain(norm: &GainNorm<'_>, n: usize) -> Option<DMatrix<f64>> {
     Some((filter.gain + correlated).rows(0, n).into_owned())
 }
 
-/// A state feedback as by [`super::state_feedback`], for a norm with weights; u = K x does not depend on
+/// A state feedback as by [`super::state_feedback`], for an H-infinity norm with weights; u = K x does not depend on
 /// the states of the weights. It is the transposed [`weighted_observer_gain`] of the transposed system;
 /// `bound` and `region` are certificates of the transposed loop.
 ///
