@@ -88,7 +88,7 @@ impl AsoController {
     /// The mode with no channel at a limit.
     fn free_mode(&self, compensating: bool) -> Mode {
         let mode = Mode::free(compensating, compensating || self.design.monitor);
-        mode.without(self.reconfigurator.gone)
+        mode.without(self.reconfigurator.gone, self.reconfigurator.fallen_back)
     }
 
     /// Decides at `time` which actuators are gone; the estimates of the faults of those that are gone or

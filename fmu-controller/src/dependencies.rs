@@ -47,7 +47,7 @@ fn observed(design: &Design) -> Vec<String> {
 
 /// The kinds of dependency of a command on x_hat and on f_hat.
 fn kinds_of_feedback(design: &Design, limited: bool) -> [DependencyKind; 2] {
-    match (limited, design.reconfigurations.is_empty()) {
+    match (limited, !design.is_reconfigurable()) {
         (true, _) => [Dependent, Dependent],
         (false, true) => [Fixed, Discrete],
         (false, false) => [Discrete, Discrete],

@@ -95,6 +95,12 @@ pub(crate) struct Design {
     /// What the controller does without an actuator, one entry for each actuator that may be gone.
     #[serde(default)]
     pub(crate) reconfigurations: Vec<Reconfiguration>,
+    /// What it does without several of them.
+    #[serde(default)]
+    pub(crate) combinations: Vec<Combination>,
+    /// The feedback that needs not to know which actuator has failed.
+    #[serde(default)]
+    pub(crate) fallback: Option<Fallback>,
     /// The experiment that importers run by default.
     pub(crate) experiment: Defaults,
     /// Matrices and operating points by a scheduling variable, in place of those above.
@@ -116,15 +122,15 @@ pub(crate) struct Reconfiguration {
     pub(crate) actuator: usize,
     /// The command at which it is stuck.
     pub(crate) stuck_at: f64,
-    /// K_x, m x n.
-    #[serde(rename = "K_x")]
-    pub(crate) k_x: Matrix,
+    /// K_x, m x n. It is missing, with K_f and K_s, if only the fall-back serves this case.
+    #[serde(rename = "K_x", default)]
+    pub(crate) k_x: Option<Matrix>,
     /// K_f, m x q.
-    #[serde(rename = "K_f")]
-    pub(crate) k_f: Matrix,
+    #[serde(rename = "K_f", default)]
+    pub(crate) k_f: Option<Matrix>,
     /// K_s, m numbers.
-    #[serde(rename = "K_s")]
-    pub(crate) k_s: Vec<f64>,
+    #[serde(rename = "K_s", default)]
+    pub(crate) k_s: Option<Vec<f64>>,
     /// The states of the fault model that restart at 0 when the actuator is gone or back.
     #[serde(default)]
     pub(crate) restart: Vec<String>,
@@ -136,6 +142,76 @@ pub(crate) struct Reconfiguration {
     pub(crate) loss: Option<f64>,
     #[serde(default)]
     pub(crate) time: Option<f64>,
+}
+
+/// What the controller does without several actuators; each of them has a [`Reconfiguration`], too.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Combination {
+    /// The actuators that are gone, in the order of the actuators.
+    pub(crate) gone: Vec<String>,
+    /// Bit j: actuator j is one of them; set when the file is read.
+    #[serde(default)]
+    pub(crate) mask: u64,
+    /// K_x, m x n.
+    #[serde(rename = "K_x")]
+    pub(crate) k_x: Matrix,
+    /// K_f, m x q.
+    #[serde(rename = "K_f")]
+    pub(crate) k_f: Matrix,
+    /// K_s, m numbers for each actuator that is gone.
+    #[serde(rename = "K_s")]
+    pub(crate) k_s: Matrix,
+}
+
+/// The fall-back; see `reconfiguration.rs`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Fallback {
+    /// K_x, m x n.
+    #[serde(rename = "K_x")]
+    pub(crate) k_x: Matrix,
+    /// K_f, m x q; without it the estimated faults are not compensated.
+    #[serde(rename = "K_f", default)]
+    pub(crate) k_f: Option<Matrix>,
+}
+
+/// The gains in force in place of those of the intact plant.
+#[derive(Clone, Copy)]
+pub(crate) enum GainSet<'a> {
+    Single(&'a Reconfiguration),
+    Several(&'a Combination),
+    Fallback(&'a Fallback),
+}
+
+impl<'a> GainSet<'a> {
+    /// Row `j` of K_x.
+    pub(crate) fn k_x(self, j: usize) -> &'a [f64] {
+        match self {
+            Self::Single(own) => own.k_x.as_ref().map_or(&[], |k_x| k_x.row(j)),
+            Self::Several(own) => own.k_x.row(j),
+            Self::Fallback(own) => own.k_x.row(j),
+        }
+    }
+
+    /// Row `j` of K_f, empty without compensation.
+    pub(crate) fn k_f(self, j: usize) -> &'a [f64] {
+        let k_f = match self {
+            Self::Single(own) => own.k_f.as_ref(),
+            Self::Several(own) => Some(&own.k_f),
+            Self::Fallback(own) => own.k_f.as_ref(),
+        };
+        k_f.map_or(&[], |k_f| k_f.row(j))
+    }
+
+    /// Row `j` of K_s: a number for each stuck actuator, in their order; empty in the fall-back.
+    pub(crate) fn k_s(self, j: usize) -> &'a [f64] {
+        match self {
+            Self::Single(own) => own.k_s.as_ref().map_or(&[], |k_s| &k_s[j..=j]),
+            Self::Several(own) => own.k_s.row(j),
+            Self::Fallback(_) => &[],
+        }
+    }
 }
 
 /// The measurements that the command of a sampled controller is computed from.
@@ -313,6 +389,21 @@ impl Design {
             own.restarted =
                 own.restart.iter().filter_map(|name| at(name, self.faults.iter())).collect();
         }
+        for own in &mut self.combinations {
+            let positions = self.actuators.iter().enumerate();
+            let gone = positions.filter(|(_, actuator)| own.gone.contains(&actuator.name));
+            own.mask = gone.fold(0, |mask, (j, _)| mask | 1 << j);
+        }
+    }
+
+    /// The gains without the actuators whose bits are set in `gone`, if the design has gains for
+    /// them.
+    pub(crate) fn gains_without(&self, gone: u64) -> Option<GainSet<'_>> {
+        if gone.count_ones() == 1 {
+            let own = self.without(gone.trailing_zeros() as usize)?;
+            return own.k_x.as_ref().map(|_| GainSet::Single(own));
+        }
+        self.combinations.iter().find(|own| own.mask == gone).map(GainSet::Several)
     }
 
     /// The reconfiguration without actuator `j`, if there is one.
@@ -320,13 +411,26 @@ impl Design {
         self.reconfigurations.iter().find(|own| own.actuator == j)
     }
 
-    /// Sets the matrices of the reconfigurations, which are no variables, to zero: a direction in the
-    /// space of the variables.
+    /// Sets the matrices of reconfigurations and fall-back, which are no variables, to zero: a direction
+    /// in the space of the variables.
     pub(crate) fn clear_reconfigurations(&mut self) {
         for own in &mut self.reconfigurations {
-            let matrices = own.k_x.values.iter_mut().chain(&mut own.k_f.values);
-            matrices.chain(&mut own.k_s).for_each(|value| *value = 0.0);
+            let matrices = own.k_x.iter_mut().chain(&mut own.k_f).flat_map(|own| &mut own.values);
+            matrices.chain(own.k_s.iter_mut().flatten()).for_each(|value| *value = 0.0);
         }
+        for own in &mut self.combinations {
+            let matrices = [&mut own.k_x, &mut own.k_f, &mut own.k_s];
+            matrices.into_iter().flat_map(|own| &mut own.values).for_each(|value| *value = 0.0);
+        }
+        if let Some(own) = &mut self.fallback {
+            let matrices = own.k_f.iter_mut().chain([&mut own.k_x]);
+            matrices.flat_map(|own| &mut own.values).for_each(|value| *value = 0.0);
+        }
+    }
+
+    /// Whether other gains than those of the intact plant may be in force.
+    pub(crate) fn is_reconfigurable(&self) -> bool {
+        !self.reconfigurations.is_empty() || self.fallback.is_some()
     }
 
     /// The design of one value of the scheduling variable, with the numbers of the plant of the file;

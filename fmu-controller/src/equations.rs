@@ -178,11 +178,11 @@ impl<'a, D: Number> Equations<'a, D> {
         z: Estimate<'_, D>,
         [y, r]: [D::In<'_, [f64]>; 2],
     ) -> D {
-        let own = |design: &'a Design| self.mode.reconfiguration(design);
-        let k_x = |design| own(design).map_or(&design.k_x, |own| &own.k_x).row(j);
+        let own = |design: &'a Design| self.mode.gains(design);
+        let k_x = |design| own(design).map_or_else(|| design.k_x.row(j), |own| own.k_x(j));
         let mut command = self.product(k_x, z.x_hat);
         if self.mode.compensating {
-            let k_f = |design| own(design).map_or(&design.k_f, |own| &own.k_f).row(j);
+            let k_f = |design| own(design).map_or_else(|| design.k_f.row(j), |own| own.k_f(j));
             command += self.product_with_faults(k_f, z, y);
         }
         let Design { k_i, n_r, .. } = D::values(self.design);
@@ -222,15 +222,12 @@ impl<'a, D: Number> Equations<'a, D> {
         gains.map(|(i, gain)| gain * self.fault(i, z, y)).sum()
     }
 
-    /// The part of command `j` that an actuator causes that is stuck: an element of K_s times its command.
+    /// The part of command `j` that stuck actuators cause: row j of K_s times their commands.
     fn stuck_part(self, j: usize, u: D::In<'_, [f64]>) -> D {
-        let stuck = self.mode.reconfiguration(D::values(self.design)).map(|own| own.actuator);
-        stuck.map_or(-D::zero(), |stuck| {
-            let k_s = |design: &'a Design| {
-                self.mode.reconfiguration(design).map_or(&[][..], |own| &own.k_s)
-            };
-            D::at(D::part(self.design, k_s), j) * D::at(u, stuck)
-        })
+        let row = |design: &'a Design| self.mode.gains(design).map_or(&[][..], |own| own.k_s(j));
+        let k_s = D::list(D::part(self.design, row)).zip(self.mode.gone_channels());
+        // -0 + x has the bits of x.
+        k_s.fold(-D::zero(), |sum, (k_s, gone)| sum + k_s * D::at(u, gone))
     }
 
     /// Computes z' = [A x_hat + B u + F_a f_hat + L_x e; A_f f_hat + L_f e; W (y - y_f); x_i'], the second

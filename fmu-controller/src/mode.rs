@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::{Design, Reconfiguration};
+use crate::design::{Design, GainSet};
 use crate::equations::Equations;
 
 /// The switches of the equations: while the mode stays, all equations are linear.
@@ -18,17 +18,20 @@ pub(crate) struct Mode {
     upper: u64,
     /// Bit j: the actuator of channel j is gone.
     gone: u64,
+    /// Whether the gains are those of the fall-back.
+    fallen_back: bool,
 }
 
 impl Mode {
     /// The mode with no channel at a limit.
     pub(crate) fn free(compensating: bool, estimating: bool) -> Self {
-        Self { compensating, estimating, lower: 0, upper: 0, gone: 0 }
+        Self { compensating, estimating, lower: 0, upper: 0, gone: 0, fallen_back: false }
     }
 
-    /// The same mode without the actuators whose bits are set in `gone`.
-    pub(crate) fn without(self, gone: u64) -> Self {
-        Self { gone, ..self }
+    /// The same mode without the actuators whose bits are set in `gone`. In the fall-back the faults are
+    /// always estimated.
+    pub(crate) fn without(self, gone: u64, fallen_back: bool) -> Self {
+        Self { gone, fallen_back, estimating: self.estimating || fallen_back, ..self }
     }
 
     /// Whether the actuator of channel `j` is gone.
@@ -36,22 +39,36 @@ impl Mode {
         self.gone & (1 << j) != 0
     }
 
-    /// The reconfiguration in force: that of the first actuator that is gone.
-    pub(crate) fn reconfiguration(self, design: &Design) -> Option<&Reconfiguration> {
-        if self.gone == 0 { None } else { design.without(self.gone.trailing_zeros() as usize) }
+    /// The channels whose actuators are gone, in their order.
+    pub(crate) fn gone_channels(self) -> impl Iterator<Item = usize> {
+        (0..64).filter(move |j| self.is_gone(*j))
     }
 
-    /// The part of the free command of channel `j` that the stuck actuator causes, in deviations.
+    /// The gains in force in place of those of the intact plant: the fall-back, those without the actuators
+    /// that are gone, or where the design has neither, those without the first of them.
+    pub(crate) fn gains(self, design: &Design) -> Option<GainSet<'_>> {
+        if self.fallen_back {
+            return design.fallback.as_ref().map(GainSet::Fallback);
+        }
+        if self.gone == 0 {
+            return None;
+        }
+        let first = 1 << self.gone.trailing_zeros();
+        design.gains_without(self.gone).or_else(|| design.gains_without(first))
+    }
+
+    /// The part of the free command of channel `j` that stuck actuators cause, in deviations.
     pub(crate) fn stuck_part(self, design: &Design, j: usize) -> f64 {
-        self.reconfiguration(design).map_or(0.0, |own| {
-            own.k_s[j] * self.held_deviation(design, own.actuator).unwrap_or_default()
+        self.gains(design).map_or(0.0, |own| {
+            let stuck = own.k_s(j).iter().zip(self.gone_channels());
+            stuck.map(|(k_s, gone)| k_s * self.held_deviation(design, gone).unwrap_or(0.0)).sum()
         })
     }
 
     /// The same mode, with the channels at a limit whose free command at `z` and the inputs y and r
     /// (deviations) is beyond that limit.
     pub(crate) fn limited(self, design: &Design, z: &[f64], inputs: [&[f64]; 2]) -> Self {
-        let mut mode = Self::free(self.compensating, self.estimating).without(self.gone);
+        let mut mode = Self { lower: 0, upper: 0, ..self };
         let equations = Equations::<f64>::new(design, mode);
         for (j, actuator) in design.actuators.iter().enumerate() {
             if let Some([low, high]) = actuator.range().filter(|_| !self.is_gone(j)) {
@@ -78,8 +95,8 @@ impl Mode {
 
     /// Whether the equations of both modes have the same matrices.
     pub(crate) fn has_the_matrices_of(self, other: Self) -> bool {
-        (self.compensating, self.estimating, self.lower | self.upper, self.gone)
-            == (other.compensating, other.estimating, other.lower | other.upper, other.gone)
+        let free = |mode: Self| Self { lower: mode.lower | mode.upper, upper: 0, ..mode };
+        free(self) == free(other)
     }
 
     /// The command of channel `j` if it is at a limit or stuck; `None` for a free channel.

@@ -8,9 +8,22 @@
 //! u = K_x x_hat + K_f f_hat + K_s (u_stuck - u_op)
 //! ```
 //!
-//! with the matrices of the design for that actuator. The estimates of its faults restart at 0; they are
-//! then the distance of its real effect from the assumed one. With several actuators gone, the matrices
-//! are those of the first one, and all of them are stuck.
+//! with the matrices of the design for the actuators that are gone, all of which are stuck. The estimates of
+//! their faults restart at 0; they are then the distance of the real effect from the assumed one.
+//!
+//! The fall-back is one more set of gains, which serves every case of the design without knowing which one
+//! it is:
+//!
+//! ```text
+//! u = K_x x_hat + K_f f_hat
+//! ```
+//!
+//! the second term if the design states K_f. It is in force while the input `fall_back` is true, and while
+//! the design has no matrices for the actuators that are gone. The observer continues with the commands of
+//! u, and f_hat with its estimates, also while the intact controller would hold them. While `fall_back` is
+//! true no estimate decides that an actuator is gone: the loss of an actuator without a fault of its own may
+//! look like the loss of another one. Without a fall-back the matrices of several actuators that have none
+//! are those of the first one.
 //!
 //! The decision is made at the start of each communication step, at each event, and at each sample; at
 //! initialization no actuator is gone.
@@ -27,11 +40,16 @@ pub(crate) struct Reconfigurator {
     pub(crate) reported: Vec<bool>,
     /// For each reconfiguration of the design: since when its loss is above the stated fraction, in s.
     above_since: Vec<Option<f64>>,
+    /// The input that asks for the fall-back.
+    pub(crate) fall_back: bool,
     /// Bit j: the estimate says that actuator j is gone.
     decided: u64,
     /// Bit j: actuator j is gone.
     pub(crate) gone: u64,
-    /// The output: from 1, the position of the first actuator that is gone; 0 if there is none.
+    /// Whether the gains are those of the fall-back.
+    pub(crate) fallen_back: bool,
+    /// The output: from 1, the position of the first actuator that is gone; 0 if there is none, -1 in the
+    /// fall-back.
     pub(crate) output: i32,
 }
 
@@ -41,8 +59,10 @@ impl Reconfigurator {
         Self {
             reported: vec![false; design.actuators.len()],
             above_since: vec![None; design.reconfigurations.len()],
+            fall_back: false,
             decided: 0,
             gone: 0,
+            fallen_back: false,
             output: 0,
         }
     }
@@ -51,16 +71,18 @@ impl Reconfigurator {
     pub(crate) fn start(&mut self) {
         self.above_since.fill(None);
         (self.decided, self.gone, self.output) = (0, 0, 0);
+        self.fallen_back = false;
     }
 
     /// Decides at `time`, in s; bit j of the result: actuator j is gone or back since the last decision.
     pub(crate) fn decide(&mut self, design: &Design, losses: &[Loss], time: f64) -> u64 {
         let before = self.gone;
         self.gone = 0;
+        let asked = self.fall_back && design.fallback.is_some();
         for (own, since) in design.reconfigurations.iter().zip(&mut self.above_since) {
             if let (Some(most), Some(least_time)) = (own.loss, own.time) {
                 let loss = losses.iter().find(|loss| loss.actuator == own.actuator);
-                let above = loss.is_some_and(|loss| loss.estimate > most);
+                let above = !asked && loss.is_some_and(|loss| loss.estimate > most);
                 *since = since.or(Some(time)).filter(|_| above);
                 // The importer adds up its steps with rounding.
                 let enough = since.is_some_and(|since| time - since >= least_time * (1.0 - 1e-9));
@@ -69,7 +91,10 @@ impl Reconfigurator {
             let gone = self.reported[own.actuator] || self.decided & (1 << own.actuator) != 0;
             self.gone |= u64::from(gone) << own.actuator;
         }
+        let uncovered = self.gone != 0 && design.gains_without(self.gone).is_none();
+        self.fallen_back = design.fallback.is_some() && (asked || uncovered);
         self.output = match self.gone {
+            _ if self.fallen_back => -1,
             0 => 0,
             gone => i32::try_from(gone.trailing_zeros() + 1).unwrap_or_default(),
         };

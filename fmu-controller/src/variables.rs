@@ -119,6 +119,13 @@ fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
         )
         .input()
     }));
+    let text = "Whether an unknown actuator has failed: the gains are those of the fall-back";
+    inputs.extend(design.fallback.as_ref().map(|_| {
+        Variable::boolean("fall_back", text, |model: &mut AsoController| {
+            &mut model.reconfigurator.fall_back
+        })
+        .input()
+    }));
     inputs.extend(schedule_input(design));
     inputs
 }
@@ -152,11 +159,15 @@ fn schedule_at(design: &Design) -> Option<Variable<AsoController>> {
 
 /// The actuator that the controller does without.
 fn reconfiguration(design: &Design) -> Option<Variable<AsoController>> {
-    let text = "Number of the actuator that the controller does without; 0 if there is none";
+    let mut text =
+        "Number of the actuator that the controller does without; 0 if there is none".to_owned();
+    if design.fallback.is_some() {
+        text += "; -1 in the fall-back";
+    }
     let variable = Variable::integer("reconfiguration", text, |model: &mut AsoController| {
         &mut model.reconfigurator.output
     });
-    (!design.reconfigurations.is_empty()).then(|| variable.output(&[]))
+    design.is_reconfigurable().then(|| variable.output(&[]))
 }
 
 fn commands(design: &Design) -> Vec<Variable<AsoController>> {

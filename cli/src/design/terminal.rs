@@ -1,8 +1,10 @@
 //! The summary of a design on the terminal.
 
 use design::detection_report::Detection;
+use design::fallback_report::FallbackReport;
 use design::family_report::MemberReport;
 use design::loss_report::LossLoop;
+use design::reconfiguration_report::ReconfigurationReport;
 use design::report::{CommandPeak, Loop, Matrix, ReferenceStep};
 use design::robust_report::Number;
 use design::schedule_report::ScheduleReport;
@@ -74,11 +76,11 @@ pub(crate) fn summarise(report: &Report) {
     if let Some(losses) = &report.losses {
         losses.loops.iter().for_each(print_losses);
     }
-    for own in report.reconfiguration.iter().flat_map(|found| &found.without) {
-        match &own.outcome {
-            Ok(found) => println!("without {}: {}", own.actuator, found.method),
-            Err(reason) => println!("without {}: no controller: {reason}", own.actuator),
-        }
+    if let Some(found) = &report.reconfiguration {
+        print_reconfigurations(found);
+    }
+    if let Some(found) = &report.fallback {
+        print_fallback(found);
     }
     for check in report.checks.iter().filter(|check| !check.holds) {
         println!("does not hold: {} ({})", check.condition, check.explanation);
@@ -90,6 +92,46 @@ pub(crate) fn summarise(report: &Report) {
     let checked = |reason: &&String| !reason.starts_with("does not hold: ");
     for reason in report.verdict.reasons.iter().filter(checked) {
         println!("    {reason}");
+    }
+}
+
+/// Prints what the controller does without actuators.
+fn print_reconfigurations(found: &ReconfigurationReport) {
+    let single = found.without.iter().map(|own| (own.actuator.clone(), &own.outcome));
+    let several = found.several.iter().map(|own| (own.actuators.join(", "), &own.outcome));
+    for (names, outcome) in single.chain(several) {
+        match outcome {
+            Ok(found) => println!("without {names}: {}", found.method),
+            Err(reason) => println!("without {names}: no controller: {reason}"),
+        }
+    }
+    for own in &found.by_fallback {
+        let names = own.actuators.join(", ");
+        if own.stable {
+            println!("without {names}: the fall-back, decay {} 1/s", number(own.decay));
+        } else {
+            println!("without {names}: the fall-back, which is not stable then");
+        }
+    }
+}
+
+/// Prints decay and price of the fall-back in each case.
+fn print_fallback(found: &FallbackReport) {
+    let compensates = if found.compensates { "compensated" } else { "not compensated" };
+    println!("fall-back: {} Estimated faults are {compensates}.", found.method);
+    for own in &found.cases {
+        let price = own.worst_price().map_or(String::new(), |price| {
+            format!(
+                ", noise on the commands to {} {} times as large",
+                price.name,
+                number(price.value)
+            )
+        });
+        println!("    {}: decay {} 1/s{price}", own.name, number(own.decay));
+    }
+    println!("    intact controller: decay {} 1/s", number(found.intact_decay));
+    if let Err(reason) = &found.whole {
+        println!("    losses that change with time: not proven ({reason})");
     }
 }
 

@@ -87,7 +87,7 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
         if found.reason.is_none() {
             let designed = design_by(&file, &law)?;
             let whole = (&file, family.as_ref());
-            let designed = (&designed, None);
+            let designed = (&designed, None, None);
             let quietly = (Duration::ZERO, &Steps::new(&|_| {}));
             let report = reporting::report(whole, designed, String::new(), quietly)?;
             own_identity = identity(&report);

@@ -10,7 +10,7 @@ use super::designed::{ControllerDesign, fault_names};
 use super::detection::Section;
 use super::linear_plant::LinearPlant;
 use super::plant_file::PlantFile;
-use super::reconfiguration::Reconfiguration;
+use super::reconfiguration::{Combination, Reconfiguration, Reconfigurations};
 use super::report::rows;
 use super::reporting::estimator;
 use super::schedule::Scheduled;
@@ -42,6 +42,31 @@ pub(crate) struct DesignFile<'a> {
     pub(crate) detection: Option<&'a Section>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) reconfigurations: Vec<ReconfigurationEntry>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) combinations: Vec<CombinationEntry>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) fallback: Option<FallbackEntry>,
+}
+
+/// The controller without several actuators.
+#[derive(Serialize)]
+pub(crate) struct CombinationEntry {
+    pub(crate) gone: Vec<String>,
+    #[serde(rename = "K_x")]
+    pub(crate) k_x: Vec<Vec<f64>>,
+    #[serde(rename = "K_f")]
+    pub(crate) k_f: Vec<Vec<f64>>,
+    #[serde(rename = "K_s")]
+    pub(crate) k_s: Vec<Vec<f64>>,
+}
+
+/// The fall-back.
+#[derive(Serialize)]
+pub(crate) struct FallbackEntry {
+    #[serde(rename = "K_x")]
+    pub(crate) k_x: Vec<Vec<f64>>,
+    #[serde(rename = "K_f", skip_serializing_if = "Option::is_none")]
+    pub(crate) k_f: Option<Vec<Vec<f64>>>,
 }
 
 /// The controller without an actuator.
@@ -49,12 +74,12 @@ pub(crate) struct DesignFile<'a> {
 pub(crate) struct ReconfigurationEntry {
     pub(crate) gone: String,
     pub(crate) stuck_at: f64,
-    #[serde(rename = "K_x")]
-    pub(crate) k_x: Vec<Vec<f64>>,
-    #[serde(rename = "K_f")]
-    pub(crate) k_f: Vec<Vec<f64>>,
-    #[serde(rename = "K_s")]
-    pub(crate) k_s: Vec<f64>,
+    #[serde(rename = "K_x", skip_serializing_if = "Option::is_none")]
+    pub(crate) k_x: Option<Vec<Vec<f64>>>,
+    #[serde(rename = "K_f", skip_serializing_if = "Option::is_none")]
+    pub(crate) k_f: Option<Vec<Vec<f64>>>,
+    #[serde(rename = "K_s", skip_serializing_if = "Option::is_none")]
+    pub(crate) k_s: Option<Vec<f64>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) restart: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -111,7 +136,7 @@ impl ControllerDesign {
         &self,
         file: &PlantFile<'_>,
         description: &str,
-        (detection, reconfigurations): (Option<&Section>, &[Reconfiguration]),
+        (detection, reconfigurations): (Option<&Section>, &Reconfigurations),
     ) -> Result<String, crate::Error> {
         let linear = &self.linear;
         let at_origin = self.signals().all(|signal| signal.operating.unwrap_or(0.0) == 0.0);
@@ -154,7 +179,20 @@ impl ControllerDesign {
             faults: self.fault_entries(),
             references: self.tracking.as_ref().map_or(Vec::new(), |own| entries(&own.signals)),
             detection,
-            reconfigurations: reconfigurations.iter().map(|own| self.reconfigured(own)).collect(),
+            reconfigurations: reconfigurations
+                .single
+                .iter()
+                .map(|own| self.reconfigured(own))
+                .collect(),
+            combinations: reconfigurations
+                .combinations
+                .iter()
+                .map(|own| self.combined(own))
+                .collect(),
+            fallback: reconfigurations
+                .fallback
+                .as_ref()
+                .map(|own| FallbackEntry { k_x: rows(&own.k_x), k_f: own.k_f.as_ref().map(rows) }),
         };
         let FaultyPlant { a, b, c, f_a, a_f } = &self.plant;
         let mut matrices = vec![("A", a), ("B", b), ("C", c), ("F_a", f_a)];
@@ -220,12 +258,22 @@ impl ControllerDesign {
         ReconfigurationEntry {
             gone: self.linear.actuators[own.actuator].name.clone(),
             stuck_at: own.stuck_at,
-            k_x: rows(&own.k_x),
-            k_f: rows(&own.k_f),
-            k_s: own.k_s.iter().map(|entry| entry + 0.0).collect(),
+            k_x: own.gains.as_ref().map(|own| rows(&own.k_x)),
+            k_f: own.gains.as_ref().map(|own| rows(&own.k_f)),
+            k_s: own.gains.as_ref().map(|own| own.k_s.iter().map(|entry| entry + 0.0).collect()),
             restart: own.restart.iter().map(|fault| names[*fault].clone()).collect(),
             loss: own.decision.map(|(loss, _)| loss),
             time: own.decision.map(|(_, time)| time),
+        }
+    }
+
+    fn combined(&self, own: &Combination) -> CombinationEntry {
+        let name = |at: &usize| self.linear.actuators[*at].name.clone();
+        CombinationEntry {
+            gone: own.gone.iter().map(name).collect(),
+            k_x: rows(&own.gains.k_x),
+            k_f: rows(&own.gains.k_f),
+            k_s: rows(&own.gains.k_s),
         }
     }
 

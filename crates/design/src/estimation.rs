@@ -110,7 +110,7 @@ impl EstimationRequest {
             let message = format!("expected one of {}, found {found:?}", names.join(", "));
             return Err(stated.error(message));
         };
-        for key in ["family", "schedule", "reconfiguration"] {
+        for key in ["family", "schedule", "reconfiguration", "fallback"] {
             if law != Law::Augmented && file.get(key).is_some() {
                 let message = format!(
                     "with `{key}` the law is the augmented observer: expected \"augmented\""

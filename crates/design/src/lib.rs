@@ -24,6 +24,9 @@ mod detection_request;
 mod error;
 mod estimation;
 mod estimation_report;
+mod fallback;
+pub mod fallback_report;
+mod fallback_request;
 mod family;
 pub mod family_report;
 mod fixed_mode;
@@ -50,6 +53,7 @@ pub mod report;
 mod reporting;
 mod requirements;
 mod responses;
+mod rest;
 pub mod robust_report;
 mod robustness;
 mod robustness_limits;
@@ -149,11 +153,13 @@ fn design_source(
     let description = description(&file, &designed);
     let detection = detection::detection(&file, &designed, family.as_ref())?;
     let section = detection.as_ref().map(|detection| &detection.section);
-    let (reconfigurations, without) = reconfiguration::reconfigurations(&file, &designed)?;
+    let fallback = fallback::fallback(&file, &designed)?;
+    let (reconfigurations, without) =
+        reconfiguration::reconfigurations(&file, &designed, fallback)?;
     let text = designed.file(&file, &description, (section, &reconfigurations))?;
     let report = reporting::report(
         (&file, family.as_ref()),
-        (&designed, without),
+        (&designed, without, reconfigurations.fallback.as_ref()),
         description,
         (certificate_time, steps),
     );

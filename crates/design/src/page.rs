@@ -6,6 +6,7 @@ mod comparison;
 mod curves;
 mod detection;
 mod estimation;
+mod fallback;
 mod family;
 mod loops;
 mod losses;
@@ -137,6 +138,7 @@ fn sections(report: &Report) -> Vec<Section> {
             "Without an actuator",
             reconfiguration::reconfiguration(report),
         ),
+        (report.fallback.is_some(), "fallback", "Fall-back", fallback::fallback(report)),
         (
             !report.interface.is_empty(),
             "interface",

@@ -9,6 +9,7 @@ use nalgebra::DMatrix;
 use super::channel::ChannelSignals;
 use super::detection_request::{DetectionRequest, Disturbance, disturbances};
 use super::estimation::EstimationRequest;
+use super::fallback_request::FallbackRequest;
 use super::plausibility::check_names;
 use super::reconfiguration_limits::ReconfigurationRequest;
 use super::references::References;
@@ -54,6 +55,8 @@ pub(crate) struct PlantFile<'a> {
     pub(crate) detection: Option<DetectionRequest>,
     /// What the controller must be able to do without an actuator.
     pub(crate) reconfiguration: Option<ReconfigurationRequest>,
+    /// What one feedback must be able to do without knowing which actuator has failed.
+    pub(crate) fallback: Option<FallbackRequest>,
 }
 
 /// The source of the plant's matrices.
@@ -94,7 +97,7 @@ pub(crate) struct Sampling {
     pub(crate) current: bool,
 }
 
-const KEYS: [&str; 31] = [
+const KEYS: [&str; 32] = [
     "description",
     "t_on",
     "monitor",
@@ -123,6 +126,7 @@ const KEYS: [&str; 31] = [
     "disturbances",
     "detection",
     "reconfiguration",
+    "fallback",
     "D",
     "family",
     "schedule",
@@ -205,6 +209,7 @@ impl<'a> PlantFile<'a> {
                 &measurements,
                 &faults,
             )?,
+            fallback: FallbackRequest::read(file, &actuators, sampled)?,
             model,
             actuators,
             measurements,

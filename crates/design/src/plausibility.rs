@@ -229,7 +229,9 @@ impl OwnVariables {
         add(limited, &[("u_min", m), ("u_max", m)]);
         let reconfigured = file.reconfiguration.is_some();
         add(reconfigured, &[("actuator_gone", m), ("u_stuck", m)]);
-        own.scalars.extend(reconfigured.then_some("reconfiguration"));
+        let fallback = file.fallback.is_some();
+        own.scalars.extend((reconfigured || fallback).then_some("reconfiguration"));
+        own.scalars.extend(fallback.then_some("fall_back"));
         own
     }
 

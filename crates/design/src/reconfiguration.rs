@@ -1,81 +1,130 @@
-//! Designs the controller without an actuator that is gone.
+//! Designs the controllers without actuators that are gone.
 
 use control::allocation::{allocate, equilibrium};
 use control::aso::Gains;
 use control::controller::{closed_loop, controller};
 use control::eigen::eigenvalues;
 use control::faults::FaultChannel;
-use control::rank::uncontrollable_modes;
-use control::stability::{instability, is_clearly_stable};
-use control::{Domain, Error, sampled};
+use control::stability::instability;
+use control::{Error, sampled};
 use nalgebra::{DMatrix, DVector};
 
 use super::designed::ControllerDesign;
+use super::fallback::Fallback;
 use super::fixed_mode::described;
 use super::gains::{FeedbackProblem, Refusal, feedback};
 use super::plant_file::PlantFile;
 use super::reconfiguration_limits::ReconfigurationRequest;
-use super::reconfiguration_report::{ReconfigurationReport, Reconfigured, WithoutActuator};
+use super::reconfiguration_report::{
+    ReconfigurationReport, Reconfigured, ServedByFallback, WithoutActuator, WithoutSeveral,
+};
 use super::report::{pairs, rows};
 use super::requirements::Requirement;
-use super::robust_report::{Level, Number};
+use super::rest::{Rest, beyond_limits, commands, unreachable_mode};
 use super::signals::{EntryPoint, Signal};
+use super::tracking::decay;
 
 /// Relative size of the effect that the other actuators cannot produce below which the allocation counts
 /// as exact.
 const EXACT: f64 = 1e-9;
 /// Deviation of the kept measurements, relative to the size of C and x, that counts as none.
 const KEPT: f64 = 1e-9;
+/// Largest number of pairs whose loop with the fall-back is reported.
+const MOST_PAIRS: usize = 64;
 
-/// The controller without an actuator: the entry of the design file.
+/// The gains of `[[reconfigurations]]`, `[[combinations]]` and `[fallback]` of the design file.
+#[derive(Default)]
+pub(crate) struct Reconfigurations {
+    pub(crate) single: Vec<Reconfiguration>,
+    pub(crate) combinations: Vec<Combination>,
+    pub(crate) fallback: Option<Fallback>,
+}
+
+/// The controller without an actuator.
 pub(crate) struct Reconfiguration {
     pub(crate) actuator: usize,
     pub(crate) stuck_at: f64,
-    pub(crate) k_x: DMatrix<f64>,
-    pub(crate) k_f: DMatrix<f64>,
-    /// The commands that answer a unit of the stuck command's deviation from the operating point.
-    pub(crate) k_s: DVector<f64>,
+    /// None if only the fall-back serves this case.
+    pub(crate) gains: Option<ReconfiguredGains>,
     /// The states of the fault model that restart at 0.
     pub(crate) restart: Vec<usize>,
     /// Loss and time, in s, of the decision by the estimate.
     pub(crate) decision: Option<(f64, f64)>,
 }
 
-/// The controllers without each of the requested actuators, and the report on them.
+/// The controller without several actuators.
+pub(crate) struct Combination {
+    /// In ascending order.
+    pub(crate) gone: Vec<usize>,
+    pub(crate) gains: ReconfiguredGains,
+}
+
+/// The gains without actuators.
+pub(crate) struct ReconfiguredGains {
+    pub(crate) k_x: DMatrix<f64>,
+    pub(crate) k_f: DMatrix<f64>,
+    /// A column for each actuator that is gone: the commands that answer a unit of the stuck command's
+    /// deviation from the operating point.
+    pub(crate) k_s: DMatrix<f64>,
+}
+
+/// The controllers without each of the requested actuators, and without several of them, with the report.
 pub(crate) fn reconfigurations(
     file: &PlantFile<'_>,
     designed: &ControllerDesign,
-) -> Result<(Vec<Reconfiguration>, Option<ReconfigurationReport>), Error> {
+    fallback: Option<Fallback>,
+) -> Result<(Reconfigurations, Option<ReconfigurationReport>), Error> {
     let Some(request) = &file.reconfiguration else {
-        return Ok((Vec::new(), None));
+        return Ok((Reconfigurations { fallback, ..Reconfigurations::default() }, None));
     };
-    let (mut found, mut reports) = (Vec::new(), Vec::new());
-    for (&actuator, &stuck_at) in request.actuators.iter().zip(&request.stuck_at) {
-        let without = Without { designed, request, actuator, stuck_at };
-        let outcome = without.design(&file.feedback.requirement)?;
-        reports.push(WithoutActuator {
-            actuator: designed.linear.actuators[actuator].name.clone(),
-            unit: designed.linear.actuators[actuator].unit.clone(),
-            stuck_at,
-            outcome: match outcome {
-                Ok((own, report)) => {
-                    found.push(own);
-                    Ok(report)
-                }
-                Err(reason) => Err(reason),
-            },
-        });
+    let requirement = &file.feedback.requirement;
+    let (mut single, mut combinations) = (Vec::new(), Vec::new());
+    let (mut without, mut several, mut by_fallback) = (Vec::new(), Vec::new(), Vec::new());
+    for gone in request.cases() {
+        let own = Without { designed, request, gone };
+        let (gains, outcome) = match own.design(requirement)? {
+            Ok((gains, report)) => (Some(gains), Ok(report)),
+            Err(reason) => (None, Err(reason)),
+        };
+        if let (None, Some(fallback)) = (&gains, &fallback) {
+            by_fallback.push(own.served(fallback)?);
+        }
+        if let [actuator] = own.gone[..] {
+            let signal = &designed.linear.actuators[actuator];
+            let stuck_at = request.stuck_at(actuator);
+            if gains.is_some() || fallback.is_some() {
+                let decision = request.decision.filter(|_| own.is_estimated(actuator));
+                let restart = own.restarted();
+                single.push(Reconfiguration { actuator, stuck_at, gains, restart, decision });
+            }
+            let (actuator, unit) = (signal.name.clone(), signal.unit.clone());
+            without.push(WithoutActuator { actuator, unit, stuck_at, outcome });
+        } else {
+            let actuators = own.names();
+            several.push(WithoutSeveral { actuators, outcome });
+            combinations.extend(gains.map(|gains| Combination { gone: own.gone, gains }));
+        }
     }
-    let by_estimate = request.decision.map(|(loss, time)| [loss, time]);
-    Ok((found, Some(ReconfigurationReport { by_estimate, without: reports })))
+    if let Some(fallback) = fallback.as_ref().filter(|_| request.together == 1) {
+        for gone in request.sets(2).into_iter().take(MOST_PAIRS) {
+            by_fallback.push(Without { designed, request, gone }.served(fallback)?);
+        }
+    }
+    let report = ReconfigurationReport {
+        by_estimate: request.decision.map(|(loss, time)| [loss, time]),
+        without,
+        several,
+        by_fallback,
+    };
+    Ok((Reconfigurations { single, combinations, fallback }, Some(report)))
 }
 
-/// One actuator that is gone.
+/// Actuators that are gone.
 struct Without<'a> {
     designed: &'a ControllerDesign,
     request: &'a ReconfigurationRequest,
-    actuator: usize,
-    stuck_at: f64,
+    /// In ascending order.
+    gone: Vec<usize>,
 }
 
 impl Without<'_> {
@@ -83,15 +132,16 @@ impl Without<'_> {
     fn design(
         &self,
         requirement: &Requirement,
-    ) -> Result<Result<(Reconfiguration, Reconfigured), String>, Error> {
+    ) -> Result<Result<(ReconfiguredGains, Reconfigured), String>, Error> {
         let ControllerDesign { linear, plant, extended, gains, domain, .. } = self.designed;
         let n = extended.states;
-        let b_r = self.without_column(&linear.b);
-        if let Some(reason) = self.unstabilisable(&b_r)? {
+        if let Some(mode) = unreachable_mode(linear, &self.without_columns(&linear.b))? {
+            let reason =
+                format!("the plant cannot be stabilised: the other actuators do not move {mode}");
             return Ok(Err(reason));
         }
         let authority = self.authority();
-        let allocation = allocate(&linear.b, &[self.actuator], &authority)?;
+        let allocation = allocate(&linear.b, &self.gone, &authority)?;
         let (k_x, method) = if allocation.residual < EXACT {
             let method = "Control allocation: the other actuators have the effect of all, with the least \
                           effort relative to their limits; the loop keeps its eigenvalues.";
@@ -106,18 +156,15 @@ impl Without<'_> {
         };
         let (k_f, k_s, rest) = self.static_commands(&k_x, &authority)?;
         let k_x = k_x.resize_horizontally(plant.a.nrows(), 0.0);
-        let mut reduced = plant.clone();
-        reduced.b = self.without_column(&plant.b);
-        let own = Gains { k_x: k_x.clone(), k_f: k_f.clone(), ..gains.clone() };
-        let ones = vec![1.0; plant.b.ncols()];
-        let whole = closed_loop(&reduced, &controller(&reduced, &own, *domain)?, &ones)?;
-        let instability = instability(&whole, *domain)?;
+        let instability = instability(&self.known_loop(&k_x, &k_f)?, *domain)?;
         if instability >= 0.0 {
             return Ok(Err(format!(
                 "the loop without it is not stable: {instability:.3e} beyond the limit"
             )));
         }
-        let fed_back = plant.a.view((0, 0), (n, n)) + reduced.b.rows(0, n) * k_x.columns(0, n);
+        let b_r = self.without_columns(&plant.b);
+        let fed_back = plant.a.view((0, 0), (n, n)) + b_r.rows(0, n) * k_x.columns(0, n);
+        let commands = commands(&linear.actuators, &rest.u, &self.stuck());
         let report = Reconfigured {
             method,
             residual: allocation.residual,
@@ -126,36 +173,51 @@ impl Without<'_> {
             intact_gain_norm: gains.k_x.norm(),
             k_x: rows(&k_x),
             k_f: rows(&k_f),
-            k_s: k_s.iter().copied().collect(),
-            commands: self.commands(&rest.u),
-            beyond_limits: self.beyond_limits(&rest.u),
+            k_s: rows(&k_s),
+            beyond_limits: beyond_limits(&linear.actuators, &commands, &self.gone),
+            commands,
             measurements: rest.measurements,
             kept: rest.kept,
         };
-        let restart = self.restarted();
-        let Self { actuator, stuck_at, .. } = *self;
-        let decision = self.request.decision.filter(|_| self.is_estimated());
-        Ok(Ok((Reconfiguration { actuator, stuck_at, k_x, k_f, k_s, restart, decision }, report)))
+        Ok(Ok((ReconfiguredGains { k_x, k_f, k_s }, report)))
     }
 
-    fn without_column(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut b = b.clone();
-        b.column_mut(self.actuator).fill(0.0);
-        b
+    /// The loop in which the observer knows that the actuators are gone.
+    fn known_loop(&self, k_x: &DMatrix<f64>, k_f: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+        let ControllerDesign { plant, gains, domain, .. } = self.designed;
+        let mut reduced = plant.clone();
+        reduced.b = self.without_columns(&plant.b);
+        let own = Gains { k_x: k_x.clone(), k_f: k_f.clone(), ..gains.clone() };
+        let ones = vec![1.0; plant.b.ncols()];
+        closed_loop(&reduced, &controller(&reduced, &own, *domain)?, &ones)
     }
 
-    /// Names a mode that is not stable and that the other actuators do not reach.
-    fn unstabilisable(&self, b_r: &DMatrix<f64>) -> Result<Option<String>, Error> {
+    /// What the fall-back does in this case, for which there are no other gains.
+    fn served(&self, fallback: &Fallback) -> Result<ServedByFallback, Error> {
+        let none = DMatrix::zeros(fallback.k_x.nrows(), self.designed.gains.k_f.ncols());
+        let whole = self.known_loop(&fallback.k_x, fallback.k_f.as_ref().unwrap_or(&none))?;
+        let decay = decay(&whole, self.designed.domain)?;
         let linear = &self.designed.linear;
-        for mode in uncontrollable_modes(&linear.a, b_r)? {
-            if !is_clearly_stable(mode.eigenvalue, &linear.a, Domain::Continuous)? {
-                let mode = described(&mode, |at| linear.states[at].name.clone());
-                return Ok(Some(format!(
-                    "the plant cannot be stabilised: the other actuators do not move {mode}"
-                )));
-            }
-        }
-        Ok(None)
+        let reached = unreachable_mode(linear, &self.without_columns(&linear.b))?.is_none();
+        let stable = reached && decay > 0.0;
+        let decay = if stable { decay } else { decay.min(0.0) };
+        Ok(ServedByFallback { actuators: self.names(), decay, stable })
+    }
+
+    fn names(&self) -> Vec<String> {
+        let actuators = &self.designed.linear.actuators;
+        self.gone.iter().map(|at| actuators[*at].name.clone()).collect()
+    }
+
+    /// The actuators that are gone and their commands.
+    fn stuck(&self) -> Vec<(usize, f64)> {
+        self.gone.iter().map(|&at| (at, self.request.stuck_at(at))).collect()
+    }
+
+    fn without_columns(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut b = b.clone();
+        self.gone.iter().for_each(|at| b.column_mut(*at).fill(0.0));
+        b
     }
 
     /// The distance of each command from its nearest limit, relative to the largest such distance; 1
@@ -177,16 +239,18 @@ impl Without<'_> {
     fn redesigned(&self, requirement: &Requirement) -> Result<(DMatrix<f64>, String), String> {
         let ControllerDesign { linear, plant, extended, domain, .. } = self.designed;
         let n = extended.states;
-        let gone = self.actuator;
+        let gone = &self.gone;
         let requirement = match requirement {
             Requirement::Weights { states, channels } => Requirement::Weights {
                 states: states.clone(),
-                channels: channels.clone().remove_row(gone).remove_column(gone),
+                channels: channels.clone().remove_rows_at(gone).remove_columns_at(gone),
             },
             Requirement::HInfinity { bound, region, channel } => {
                 let mut channel = channel.clone();
                 if !channel.weights.is_empty() {
-                    channel.weights.remove(linear.c.nrows() + gone);
+                    for own in gone.iter().rev() {
+                        channel.weights.remove(linear.c.nrows() + own);
+                    }
                 }
                 Requirement::HInfinity { bound: *bound, region: *region, channel }
             }
@@ -194,12 +258,15 @@ impl Without<'_> {
         };
         let problem = FeedbackProblem {
             a: &plant.a.view((0, 0), (n, n)).into(),
-            b: &plant.b.rows(0, n).into_owned().remove_column(gone),
+            b: &plant.b.rows(0, n).into_owned().remove_columns_at(gone),
             c: &linear.c,
             f_a: &plant.f_a.rows(0, n).into(),
         };
         match feedback(&requirement, &problem, *domain) {
-            Ok(found) => Ok((found.gain.insert_row(gone, 0.0), found.method)),
+            Ok(found) => {
+                let with_zeros = |gain: DMatrix<f64>, at: &usize| gain.insert_row(*at, 0.0);
+                Ok((gone.iter().fold(found.gain, with_zeros), found.method))
+            }
             Err(Refusal::Control(error)) => Err(not_met(&error.to_string())),
             Err(Refusal::Conflict(message)) => Err(not_met(&message)),
             Err(Refusal::Fixed(mode)) => {
@@ -211,54 +278,50 @@ impl Without<'_> {
 
     /// K_f, K_s and the equilibrium that they lead to.
     ///
-    /// The faults of the actuator that is gone are what it does beside the assumed command; they and the
+    /// The faults of an actuator that is gone are what it does beside the assumed command; they and the
     /// assumed command act through its column of B, so both have the same commands as answer.
     fn static_commands(
         &self,
         k_x: &DMatrix<f64>,
         authority: &[f64],
-    ) -> Result<(DMatrix<f64>, DVector<f64>, Rest), Error> {
+    ) -> Result<(DMatrix<f64>, DMatrix<f64>, Rest), Error> {
         let ControllerDesign { linear, extended, domain, .. } = self.designed;
         let kept = linear.c.select_rows(&self.request.keep);
-        let b_g: DVector<f64> = linear.b.column(self.actuator).into();
-        let unit = equilibrium((&linear.a, &linear.b, &kept), &b_g, &[self.actuator], authority)?;
-        let k_s = &unit.u - k_x * &unit.x;
         let mut reduced = extended.clone();
-        reduced.plant.b = self.without_column(&extended.plant.b);
+        reduced.plant.b = self.without_columns(&extended.plant.b);
         let mut k_f = sampled::compensation_gain(&reduced, *domain)?;
         let modelled = sampled::compensation_gain(extended, *domain)?;
-        for (at, channel) in self.own_faults() {
-            // The intact gain has the mean of the modelled fault over a sample.
-            let intact = modelled.row(self.actuator);
-            let columns = [Some(channel.estimate), channel.rate];
-            for column in columns.into_iter().flatten() {
-                let part = intact[column] / intact[channel.estimate];
-                let part = if at == column { 1.0 } else { part };
-                k_f.set_column(column, &(&k_s * part));
+        let (n, m) = linear.b.shape();
+        let mut k_s = DMatrix::zeros(m, self.gone.len());
+        let (mut x, mut u, mut is_kept) = (DVector::zeros(n), DVector::zeros(m), true);
+        for (position, (actuator, stuck_at)) in self.stuck().into_iter().enumerate() {
+            let b_g: DVector<f64> = linear.b.column(actuator).into();
+            let unit = equilibrium((&linear.a, &linear.b, &kept), &b_g, &self.gone, authority)?;
+            let answer = &unit.u - k_x * &unit.x;
+            for (at, channel) in self.faults_of(actuator) {
+                // The intact gain has the mean of the modelled fault over a sample.
+                let intact = modelled.row(actuator);
+                let columns = [Some(channel.estimate), channel.rate];
+                for column in columns.into_iter().flatten() {
+                    let part = intact[column] / intact[channel.estimate];
+                    let part = if at == column { 1.0 } else { part };
+                    k_f.set_column(column, &(&answer * part));
+                }
             }
+            k_s.set_column(position, &answer);
+            let deviation = stuck_at - linear.actuators[actuator].operating.unwrap_or(0.0);
+            x += &unit.x * deviation;
+            u += &unit.u * deviation;
+            is_kept &= unit.left <= KEPT * linear.c.norm() * unit.x.norm();
         }
-        let deviation = self.stuck_at - linear.actuators[self.actuator].operating.unwrap_or(0.0);
-        let measured = &linear.c * &unit.x * deviation;
-        let named = |(signal, value): (&Signal, &f64)| Number {
-            name: signal.name.clone(),
-            unit: signal.unit.clone(),
-            value: *value,
-        };
-        let rest = Rest {
-            u: &unit.u * deviation,
-            measurements: linear.measurements.iter().zip(measured.iter()).map(named).collect(),
-            kept: unit.left <= KEPT * linear.c.norm() * unit.x.norm(),
-        };
-        Ok((k_f, k_s, rest))
+        Ok((k_f, k_s, Rest::of(linear, (&x, u), is_kept)))
     }
 
-    /// The faults of this actuator: their first column, and their channels.
-    fn own_faults(&self) -> impl Iterator<Item = (usize, FaultChannel)> + '_ {
+    /// The faults of an actuator: their first column, and their channels.
+    fn faults_of(&self, gone: usize) -> impl Iterator<Item = (usize, FaultChannel)> + '_ {
         let ControllerDesign { linear, extended, .. } = self.designed;
-        let own = |point: &EntryPoint| match point {
-            EntryPoint::Actuator(actuator) | EntryPoint::Loss { actuator, .. } => {
-                *actuator == self.actuator
-            }
+        let own = move |point: &EntryPoint| match point {
+            EntryPoint::Actuator(actuator) | EntryPoint::Loss { actuator, .. } => *actuator == gone,
             _ => false,
         };
         let faults = linear.faults.iter().zip(&extended.channels);
@@ -268,71 +331,18 @@ impl Without<'_> {
     }
 
     fn restarted(&self) -> Vec<usize> {
-        self.own_faults().flat_map(|(_, own)| [Some(own.estimate), own.rate]).flatten().collect()
+        let faults = self.gone.iter().flat_map(|gone| self.faults_of(*gone));
+        faults.flat_map(|(_, own)| [Some(own.estimate), own.rate]).flatten().collect()
     }
 
-    fn is_estimated(&self) -> bool {
+    fn is_estimated(&self, gone: usize) -> bool {
         self.designed.linear.faults.iter().any(|fault| match fault.entry_point {
-            EntryPoint::Loss { actuator, .. } => actuator == self.actuator,
+            EntryPoint::Loss { actuator, .. } => actuator == gone,
             _ => false,
         })
     }
-
-    /// The commands of the equilibrium; that of the actuator that is gone is where it is stuck.
-    fn commands(&self, deviations: &DVector<f64>) -> Vec<Number> {
-        let actuators = self.designed.linear.actuators.iter().zip(deviations.iter());
-        let one = |(at, (own, deviation)): (usize, (&Signal, &f64))| Number {
-            name: own.name.clone(),
-            unit: own.unit.clone(),
-            value: if at == self.actuator {
-                self.stuck_at
-            } else {
-                own.operating.unwrap_or(0.0) + deviation
-            },
-        };
-        actuators.enumerate().map(one).collect()
-    }
-
-    /// The other actuators whose commands of the equilibrium are beyond their limits.
-    fn beyond_limits(&self, deviations: &DVector<f64>) -> Vec<String> {
-        let actuators = self.designed.linear.actuators.iter().zip(self.commands(deviations));
-        let beyond = |(at, (own, command)): (usize, (&Signal, Number))| {
-            let [low, high] = own.limits.filter(|_| at != self.actuator)?;
-            (command.value < low || command.value > high).then(|| own.name.clone())
-        };
-        actuators.enumerate().filter_map(beyond).collect()
-    }
-}
-
-/// The equilibrium without the actuator.
-struct Rest {
-    /// Deviations of the commands from the operating point.
-    u: DVector<f64>,
-    /// Deviations of the measurements from the operating point.
-    measurements: Vec<Number>,
-    /// Whether the measurements that must be kept are at the operating point.
-    kept: bool,
 }
 
 fn not_met(message: &str) -> String {
     format!("the requirement on the feedback cannot be met without it: {message}")
-}
-
-impl ReconfigurationReport {
-    /// What actuators that are gone contribute to the verdict.
-    pub(crate) fn reasons(&self) -> Vec<(Level, String)> {
-        let amber = |own: &WithoutActuator| {
-            let name = &own.actuator;
-            let text = match &own.outcome {
-                Err(reason) => format!("without {name} there is no controller: {reason} (amber)"),
-                Ok(found) if !found.beyond_limits.is_empty() => format!(
-                    "without {name} the operating point needs commands beyond the limits of {} (amber)",
-                    found.beyond_limits.join(", ")
-                ),
-                Ok(_) => return None,
-            };
-            Some((Level::Amber, text))
-        };
-        self.without.iter().filter_map(amber).collect()
-    }
 }

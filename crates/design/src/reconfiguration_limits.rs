@@ -6,10 +6,12 @@ use files::{Entry, Place, PlaceError, Table};
 /// What the controller must be able to do without an actuator.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ReconfigurationRequest {
-    /// The actuators that may be gone, from 0, one at a time.
+    /// The actuators that may be gone, from 0.
     pub(crate) actuators: Vec<usize>,
+    /// How many of them may be gone together.
+    pub(crate) together: usize,
     /// The command at which each of them is then stuck, in its unit.
-    pub(crate) stuck_at: Vec<f64>,
+    stuck_at: Vec<f64>,
     /// The measurements to keep at the operating point, from 0.
     pub(crate) keep: Vec<usize>,
     /// An actuator counts as gone if its estimated loss is above the first number for the second, in s.
@@ -17,7 +19,9 @@ pub(crate) struct ReconfigurationRequest {
     pub(crate) place: Place,
 }
 
-const KEYS: [&str; 5] = ["actuators", "stuck_at", "keep", "loss", "time"];
+const KEYS: [&str; 6] = ["actuators", "together", "stuck_at", "keep", "loss", "time"];
+/// Largest number of sets of actuators that are gone together.
+const MOST_SETS: usize = 200;
 
 impl ReconfigurationRequest {
     /// Reads the table, if there is one.
@@ -47,6 +51,7 @@ impl ReconfigurationRequest {
             None => (0..measurements.len()).collect(),
         };
         Ok(Some(Self {
+            together: together(&table, own.len(), actuators.len())?,
             stuck_at: stuck(&table, actuators, &own)?,
             decision: decision(&table, &own, faults)?,
             actuators: own,
@@ -54,10 +59,69 @@ impl ReconfigurationRequest {
             place: entry.place,
         }))
     }
+
+    /// The command at which an actuator is stuck; 0 if it is none of those that may be gone.
+    pub(crate) fn stuck_at(&self, actuator: usize) -> f64 {
+        let position = self.actuators.iter().position(|own| *own == actuator);
+        position.map_or(0.0, |at| self.stuck_at[at])
+    }
+
+    /// The sets of actuators that may be gone, each in ascending order: first each one alone.
+    pub(crate) fn cases(&self) -> Vec<Vec<usize>> {
+        let alone = self.actuators.iter().map(|own| vec![*own]);
+        alone.chain((2..=self.together).flat_map(|size| self.sets(size))).collect()
+    }
+
+    /// The sets of `size` of the actuators that may be gone, each in ascending order.
+    pub(crate) fn sets(&self, size: usize) -> Vec<Vec<usize>> {
+        let mut own = self.actuators.clone();
+        own.sort_unstable();
+        let extended = |sets: Vec<Vec<usize>>, _| {
+            let after = |set: &Vec<usize>| {
+                let later = own.iter().filter(|at| set.last().is_none_or(|last| *at > last));
+                let longer = later.map(|at| set.iter().copied().chain([*at]).collect::<Vec<_>>());
+                longer.collect::<Vec<_>>()
+            };
+            sets.iter().flat_map(after).collect()
+        };
+        (0..size).fold(vec![Vec::new()], extended)
+    }
+}
+
+/// Reads `together`; 1 if missing. `own`: the number of actuators that may be gone, of `all`.
+fn together(table: &Table<'_>, own: usize, all: usize) -> Result<usize, PlaceError> {
+    let Some(entry) = table.get("together") else {
+        return Ok(1);
+    };
+    let most = own.min(all - 1);
+    let number = entry.number()?;
+    let found = (1..=most).find(|count| f64::from(u32::try_from(*count).unwrap_or(0)) == number);
+    let Some(found) = found else {
+        return Err(entry.error(format!(
+            "expected how many actuators may be gone together, from 1 to {most}, found {number}"
+        )));
+    };
+    let mut sets = 0;
+    let mut of_size = 1;
+    for size in 1..=found {
+        of_size = of_size * (own + 1 - size) / size;
+        sets += of_size;
+        if sets > MOST_SETS {
+            return Err(entry.error(format!(
+                "these are more than {MOST_SETS} sets of actuators; expected fewer `actuators`, or a \
+                 smaller number"
+            )));
+        }
+    }
+    Ok(found)
 }
 
 /// Reads names of signals, or the text "all".
-fn positions(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<Vec<usize>, PlaceError> {
+pub(crate) fn positions(
+    entry: &Entry<'_>,
+    signals: &[Signal],
+    what: &str,
+) -> Result<Vec<usize>, PlaceError> {
     if entry.is_text() {
         return match entry.text()? {
             "all" => Ok((0..signals.len()).collect()),

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::report::{OrReason, or_reason};
-use super::robust_report::Number;
+use super::robust_report::{Level, Number};
 
 /// What the controller does without an actuator.
 #[derive(Serialize, JsonSchema)]
@@ -14,6 +14,35 @@ pub struct ReconfigurationReport {
     pub by_estimate: Option<[f64; 2]>,
     /// One entry for each actuator that may be gone.
     pub without: Vec<WithoutActuator>,
+    /// One entry for each set of several actuators that may be gone together; empty unless the plant file
+    /// states `together`.
+    pub several: Vec<WithoutSeveral>,
+    /// The actuators, alone and in pairs, that have no gains of their own when they are gone, so that the
+    /// fall-back is in force; empty without a fall-back.
+    pub by_fallback: Vec<ServedByFallback>,
+}
+
+/// The controller without several actuators.
+#[derive(Serialize, JsonSchema)]
+pub struct WithoutSeveral {
+    /// The actuators.
+    pub actuators: Vec<String>,
+    /// The controller, or the reason why there is none.
+    #[serde(serialize_with = "or_reason")]
+    #[schemars(with = "OrReason<Reconfigured>")]
+    pub outcome: Result<Reconfigured, String>,
+}
+
+/// The fall-back while actuators are known to be gone.
+#[derive(Serialize, JsonSchema)]
+pub struct ServedByFallback {
+    /// The actuators.
+    pub actuators: Vec<String>,
+    /// Decay rate of the slowest eigenvalue of plant and controller together, 1/s; 0 or negative if it is not
+    /// stable.
+    pub decay: f64,
+    /// Whether the loop is stable.
+    pub stable: bool,
 }
 
 /// The controller without one actuator.
@@ -31,7 +60,7 @@ pub struct WithoutActuator {
     pub outcome: Result<Reconfigured, String>,
 }
 
-/// A controller without one actuator: u = K_x x_hat + K_f f_hat + K_s (stuck command - operating point).
+/// A controller without actuators: u = K_x x_hat + K_f f_hat + K_s (stuck command - operating point).
 #[derive(Serialize, JsonSchema)]
 pub struct Reconfigured {
     /// How the feedback was found, in a sentence.
@@ -48,8 +77,8 @@ pub struct Reconfigured {
     pub k_x: Vec<Vec<f64>>,
     /// K_f, row by row.
     pub k_f: Vec<Vec<f64>>,
-    /// K_s, one number for each actuator.
-    pub k_s: Vec<f64>,
+    /// K_s, row by row; a column for each actuator that is gone.
+    pub k_s: Vec<Vec<f64>>,
     /// The commands of the equilibrium.
     pub commands: Vec<Number>,
     /// The actuators whose command of the equilibrium is beyond their limits.
@@ -58,4 +87,27 @@ pub struct Reconfigured {
     pub measurements: Vec<Number>,
     /// Whether the measurements that must be kept are at the operating point.
     pub kept: bool,
+}
+
+impl ReconfigurationReport {
+    /// What actuators that are gone contribute to the verdict.
+    pub(crate) fn reasons(&self) -> Vec<(Level, String)> {
+        let single = self.without.iter().map(|own| (vec![own.actuator.clone()], &own.outcome));
+        let several = self.several.iter().map(|own| (own.actuators.clone(), &own.outcome));
+        let amber = |(actuators, outcome): (Vec<String>, &Result<Reconfigured, String>)| {
+            let name = actuators.join(", ");
+            let mut served = self.by_fallback.iter().filter(|own| own.stable);
+            let text = match outcome {
+                Err(_) if served.any(|own| own.actuators == actuators) => return None,
+                Err(reason) => format!("without {name} there is no controller: {reason} (amber)"),
+                Ok(found) if !found.beyond_limits.is_empty() => format!(
+                    "without {name} the operating point needs commands beyond the limits of {} (amber)",
+                    found.beyond_limits.join(", ")
+                ),
+                Ok(_) => return None,
+            };
+            Some((Level::Amber, text))
+        };
+        single.chain(several).filter_map(amber).collect()
+    }
 }

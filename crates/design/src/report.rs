@@ -6,6 +6,7 @@ use schemars::generate::SchemaSettings;
 use serde::{Serialize, Serializer};
 
 use super::detection_report::Detection;
+use super::fallback_report::FallbackReport;
 use super::family_report::FamilyReport;
 use super::loss_report::LossReport;
 use super::reconfiguration_report::ReconfigurationReport;
@@ -63,6 +64,9 @@ pub struct Report {
     pub losses: Option<LossReport>,
     /// The controllers without each actuator that may be gone; none if `reconfiguration` is not stated.
     pub reconfiguration: Option<ReconfigurationReport>,
+    /// One feedback for every actuator that may fail, without knowing which; none if `fallback` is not
+    /// stated.
+    pub fallback: Option<FallbackReport>,
     /// The assumptions of the report, in sentences.
     pub assumptions: Vec<String>,
     /// The variables of the controller FMU; empty without `--fmu`.

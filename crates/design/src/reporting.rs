@@ -17,6 +17,7 @@ use super::certificate::certificate;
 use super::checks::checks;
 use super::designed::{ControllerDesign, fault_names};
 use super::estimation_report::estimation;
+use super::fallback::{self, Fallback};
 use super::family_report::{self, judge};
 use super::gains::GainResult;
 use super::loss_report::LossReport;
@@ -41,7 +42,11 @@ use super::tracking::{DesignLoop, TrackingAction};
 /// Returns the report on `designed`.
 pub(crate) fn report(
     (file, family): (&PlantFile<'_>, Option<&ParameterFamily<'_>>),
-    (designed, reconfiguration): (&ControllerDesign, Option<ReconfigurationReport>),
+    (designed, reconfiguration, fallback): (
+        &ControllerDesign,
+        Option<ReconfigurationReport>,
+        Option<&Fallback>,
+    ),
     description: String,
     (certificate_time, steps): (Duration, &Steps<'_>),
 ) -> Result<Report, crate::Error> {
@@ -63,7 +68,10 @@ pub(crate) fn report(
     let losses = losses(designed, &budget)?;
     let of_losses = losses.iter().flat_map(LossReport::reasons);
     let further = of_losses.chain(reconfiguration.iter().flat_map(ReconfigurationReport::reasons));
-    let further: Vec<_> = further.collect();
+    let mut further: Vec<_> = further.collect();
+    let fallback = fallback.map(|own| fallback::report(file, designed, own, &budget));
+    let fallback = fallback.transpose()?.flatten();
+    further.extend(fallback.iter().flat_map(|own| own.reasons(file.robustness.red)));
     let family_report = family_report::family(designed, &file.robustness, &budget)?;
     let schedule = schedule_report::schedule(designed, &file.robustness, &budget)?;
     let mut verdict = verdict(&checks, robustness.as_ref(), &file.robustness, further);
@@ -123,6 +131,7 @@ pub(crate) fn report(
         effectiveness: effectiveness(designed)?,
         losses,
         reconfiguration,
+        fallback,
         assumptions: assumptions(designed, &linear.faults),
         interface: Vec::new(),
     })

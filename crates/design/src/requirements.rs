@@ -178,6 +178,14 @@ fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>, PlaceError> {
     Ok(found)
 }
 
+/// Reads a region that is stated alone; that of a sampled design has a decay rate only.
+pub(crate) fn stated_region(entry: &Entry<'_>, sampled: bool) -> Result<Region, PlaceError> {
+    if sampled {
+        refuse_unsampled(entry)?;
+    }
+    region(entry)
+}
+
 fn region(entry: &Entry<'_>) -> Result<Region, PlaceError> {
     let table = entry.table()?;
     table.allow(&["decay", "disc", "sector"])?;

@@ -117,6 +117,22 @@ pub(crate) fn margins(
     Ok(Margins { points, delay, hold, noise, noise_together })
 }
 
+/// Returns the margins of a loop opened at its `inputs` and at its `outputs`.
+pub(crate) fn loop_points(
+    own: &Loop,
+    inputs: &[Signal],
+    outputs: &[Signal],
+) -> Result<Vec<LoopPoint>, Error> {
+    let point = |(at, name): (Point, &str)| {
+        let signals = match at {
+            Point::Input => inputs,
+            Point::Output => outputs,
+        };
+        self::point(&OpenedLoop::new(own, at)?, name, signals)
+    };
+    POINTS.into_par_iter().map(point).collect()
+}
+
 /// The plant without filters, and the controller with its filters and integrals.
 pub(crate) struct Physical {
     pub(crate) plant: StateSpace,
@@ -132,6 +148,15 @@ impl Physical {
 
     /// Another plant with the same controller.
     pub(crate) fn with(designed: &ControllerDesign, linear: &LinearPlant) -> Result<Self, Error> {
+        Self::of_gains(designed, linear, &designed.gains)
+    }
+
+    /// Another plant and other gains in the same controller.
+    pub(crate) fn of_gains(
+        designed: &ControllerDesign,
+        linear: &LinearPlant,
+        gains: &Gains,
+    ) -> Result<Self, Error> {
         let plant = StateSpace {
             a: linear.a.clone(),
             b: linear.b.clone(),
@@ -139,7 +164,7 @@ impl Physical {
             d: DMatrix::zeros(linear.c.nrows(), linear.b.ncols()),
             domain: Domain::Continuous,
         };
-        let CompleteController { commands, estimates } = complete(designed, &designed.gains)?;
+        let CompleteController { commands, estimates } = complete(designed, gains)?;
         let channels: Vec<_> =
             designed.extended.channels.iter().map(|channel| channel.estimate).collect();
         let estimates = StateSpace {
@@ -151,13 +176,18 @@ impl Physical {
     }
 
     pub(crate) fn closed(&self, controller: &StateSpace) -> Result<Loop, Error> {
-        let mut plant = self.plant.clone();
-        if let Domain::Sampled { period } = controller.domain {
-            (plant.a, plant.b) = zero_order_hold(&plant.a, &plant.b, period)?;
-            plant.domain = controller.domain;
-        }
-        Loop::new(plant, controller.clone())
+        closed(&self.plant, controller)
     }
+}
+
+/// The loop of a continuous plant and a controller, in the time domain of the controller.
+pub(crate) fn closed(plant: &StateSpace, controller: &StateSpace) -> Result<Loop, Error> {
+    let mut plant = plant.clone();
+    if let Domain::Sampled { period } = controller.domain {
+        (plant.a, plant.b) = zero_order_hold(&plant.a, &plant.b, period)?;
+        plant.domain = controller.domain;
+    }
+    Loop::new(plant, controller.clone())
 }
 
 /// The controller with `gains`, its filter and its integrals.

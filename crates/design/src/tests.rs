@@ -473,7 +473,7 @@ fn the_worst_plant_is_a_plant_file() {
         let time = super::CERTIFICATE_TIME;
         let report = super::reporting::report(
             (file, None),
-            (&designed, None),
+            (&designed, None, None),
             String::new(),
             (time, &unobserved()),
         )
@@ -498,7 +498,7 @@ fn without_time_for_certificates_the_report_says_what_is_left_out() {
                 let designed = design(file).unwrap();
                 super::reporting::report(
                     (file, None),
-                    (&designed, None),
+                    (&designed, None, None),
                     String::new(),
                     (time, &unobserved()),
                 )

@@ -192,27 +192,41 @@ impl Design {
             || self.p_f.is_some()
             || self.sliding_mode.is_some()
             || self.schedule.is_some();
-        if !self.reconfigurations.is_empty() && others {
+        if self.is_reconfigurable() && others {
             return Some(
-                "reconfigurations exclude references, P_f, sliding_mode and schedule".to_owned(),
+                "reconfigurations and fallback exclude references, P_f, sliding_mode and schedule"
+                    .to_owned(),
             );
         }
+        let singles = self.contradiction_of_single_reconfigurations();
+        singles.or_else(|| self.contradiction_of_combinations())
+    }
+
+    fn contradiction_of_single_reconfigurations(&self) -> Option<String> {
         let (n, m, q) = (self.states.len(), self.actuators.len(), self.faults.len());
         self.reconfigurations.iter().enumerate().find_map(|(at, own)| {
             let gone = &own.gone;
             let begin = format!("reconfiguration without {gone}: ");
-            let shape = |found: &Matrix| (found.rows, found.columns);
+            let parts = (own.k_x.as_ref(), own.k_f.as_ref(), own.k_s.as_ref());
+            let fits = match parts {
+                (Some(k_x), Some(k_f), Some(k_s)) => {
+                    shape(k_x) == (m, n) && shape(k_f) == (m, q) && k_s.len() == m
+                }
+                (None, None, None) => self.fallback.is_some(),
+                _ => false,
+            };
             let decided = own.loss.zip(own.time);
             let lost = self.faults.iter().any(|fault| fault.loss_of.as_ref() == Some(gone));
-            let numbers = own.k_x.values.iter().chain(&own.k_f.values).chain(&own.k_s);
+            let matrices = own.k_x.iter().chain(&own.k_f).flat_map(|own| &own.values);
+            let mut numbers = matrices.chain(own.k_s.iter().flatten()).chain([&own.stuck_at]);
             let text = if !self.actuators.iter().any(|actuator| actuator.name == *gone) {
                 "there is no actuator of this name"
             } else if self.reconfigurations[..at].iter().any(|other| other.gone == *gone) {
                 "it is there twice"
-            } else if shape(&own.k_x) != (m, n) || shape(&own.k_f) != (m, q) || own.k_s.len() != m {
+            } else if !fits {
                 "expected K_x of actuators x states, K_f of actuators x faults, K_s with one number \
-                 for each actuator"
-            } else if numbers.chain([&own.stuck_at]).any(|value| !value.is_finite()) {
+                 for each actuator; or none of them together with [fallback]"
+            } else if numbers.any(|value| !value.is_finite()) {
                 "a number is not finite"
             } else if own.restart.iter().any(|name| !self.faults.iter().any(|f| f.name == *name)) {
                 "`restart` names a fault that does not exist"
@@ -224,6 +238,46 @@ impl Design {
                 return None;
             };
             Some(begin + text)
+        })
+    }
+
+    fn contradiction_of_combinations(&self) -> Option<String> {
+        let (n, m, q) = (self.states.len(), self.actuators.len(), self.faults.len());
+        let finite = |matrix: &Matrix| matrix.values.iter().all(|value| value.is_finite());
+        if let Some(own) = &self.fallback {
+            let k_f = own.k_f.as_ref();
+            if shape(&own.k_x) != (m, n) || k_f.is_some_and(|k_f| shape(k_f) != (m, q)) {
+                let text =
+                    "fallback: expected K_x of actuators x states, K_f of actuators x faults";
+                return Some(text.to_owned());
+            }
+            if !finite(&own.k_x) || !k_f.is_none_or(finite) {
+                return Some("fallback: a number is not finite".to_owned());
+            }
+        }
+        let position = |name: &String| self.reconfigurations.iter().position(|r| r.gone == *name);
+        let order = |name: &String| self.actuators.iter().position(|own| own.name == *name);
+        self.combinations.iter().enumerate().find_map(|(at, own)| {
+            let ordered = own.gone.windows(2).all(|pair| order(&pair[0]) < order(&pair[1]));
+            let count = own.gone.len();
+            let text = if count < 2 || !own.gone.iter().all(|name| position(name).is_some()) {
+                "expected at least two actuators, each with an entry in reconfigurations"
+            } else if !ordered {
+                "expected each actuator once, in the order of the actuators"
+            } else if self.combinations[..at].iter().any(|other| other.gone == own.gone) {
+                "it is there twice"
+            } else if shape(&own.k_x) != (m, n)
+                || shape(&own.k_f) != (m, q)
+                || shape(&own.k_s) != (m, count)
+            {
+                "expected K_x of actuators x states, K_f of actuators x faults, K_s with one number \
+                 for each actuator and each that is gone"
+            } else if ![&own.k_x, &own.k_f, &own.k_s].into_iter().all(finite) {
+                "a number is not finite"
+            } else {
+                return None;
+            };
+            Some(format!("combination without {}: {text}", own.gone.join(", ")))
         })
     }
 
@@ -349,4 +403,8 @@ impl Design {
     pub(crate) fn step_size(&self) -> f64 {
         self.experiment.step_size.or(self.sample_time).unwrap_or_default()
     }
+}
+
+fn shape(matrix: &Matrix) -> (usize, usize) {
+    (matrix.rows, matrix.columns)
 }

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::number::number;
 use super::table::{Cell, table};
-use crate::reconfiguration_report::{Reconfigured, WithoutActuator};
+use crate::reconfiguration_report::{Reconfigured, ServedByFallback};
 use crate::report::Report;
 use crate::robust_report::Number;
 
@@ -24,22 +24,46 @@ pub(super) fn reconfiguration(report: &Report) -> Markup {
             ". The observer stays the same, so that its eigenvalues and those of the feedback are those of \
              the loop."
         }
-        @for own in &found.without { (without(own)) }
+        @for own in &found.without { (without(&own.actuator, &own.outcome)) }
+        @for own in &found.several { (without(&own.actuators.join(", "), &own.outcome)) }
+        (by_fallback(&found.by_fallback))
     }
 }
 
-fn without(own: &WithoutActuator) -> Markup {
+/// The sets of actuators without which the fall-back is in force.
+fn by_fallback(found: &[ServedByFallback]) -> Markup {
+    let row = |own: &ServedByFallback| {
+        let stable = Cell::Holds(own.stable);
+        vec![own.actuators.join(", ").as_str().into(), own.decay.into(), stable]
+    };
+    let rows: Vec<Vec<Cell>> = found.iter().map(row).collect();
     html! {
-        h3 { "Without " (own.actuator) }
-        @match &own.outcome {
-            Err(reason) => p { strong { "There is no controller: " } (reason) "." },
-            Ok(found) => (controller(own, found)),
+        @if !rows.is_empty() {
+            h3 { "Without gains of their own" }
+            p {
+                "While these actuators are gone the fall-back is in force; the observer knows their stuck \
+                 commands."
+            }
+            (table(
+                "Actuators that are gone in the fall-back",
+                &["without", "decay of the loop, 1/s", "stable"],
+                &rows,
+            ))
         }
     }
 }
 
-fn controller(own: &WithoutActuator, found: &Reconfigured) -> Markup {
-    let name = &own.actuator;
+fn without(name: &str, outcome: &Result<Reconfigured, String>) -> Markup {
+    html! {
+        h3 { "Without " (name) }
+        @match outcome {
+            Err(reason) => p { strong { "There is no controller: " } (reason) "." },
+            Ok(found) => (controller(name, found)),
+        }
+    }
+}
+
+fn controller(name: &str, found: &Reconfigured) -> Markup {
     let numbers = |all: &[Number]| -> Vec<Vec<Cell>> {
         let row =
             |own: &Number| vec![own.name.as_str().into(), own.value.into(), (&own.unit).into()];

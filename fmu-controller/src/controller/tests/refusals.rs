@@ -140,3 +140,31 @@ fn a_reconfiguration_that_does_not_fit_is_refused_by_its_actuator() {
         assert!(message.contains(expected), "{message:?} has no {expected:?}");
     }
 }
+
+#[test]
+fn a_fall_back_or_a_combination_that_does_not_fit_is_refused() {
+    let wrong = [
+        ("[fallback]\nK_x = [[0.0]]", "fallback: expected K_x of actuators x states"),
+        ("[fallback]\nK_x = [[0.0, inf]]", "fallback: a number is not finite"),
+        ("[fallback]\nK_x = [[0.0, 0.0]]\nK_f = [[0.0, 0.0]]", "K_f of actuators x faults"),
+        (
+            "[[reconfigurations]]\ngone = \"u\"\nstuck_at = 0.0",
+            "without u: expected K_x of actuators x states, K_f of actuators x faults, K_s with one \
+             number for each actuator; or none of them together with [fallback]",
+        ),
+        (
+            "[[combinations]]\ngone = [\"u\", \"v\"]\nK_x = [[0.0, 0.0]]\nK_f = [[0.0]]\nK_s = [[0.0, 0.0]]",
+            "combination without u, v: expected at least two actuators, each with an entry",
+        ),
+    ];
+    let fault = "[[faults]]\nname = \"f\"";
+    for (entry, expected) in wrong {
+        let message = message("", fault, &format!("{entry}\n\n{fault}"));
+        assert!(message.contains(expected), "{message:?} has no {expected:?}");
+    }
+    let fits = small("").replace(
+        fault,
+        &format!("[[reconfigurations]]\ngone = \"u\"\nstuck_at = 0.0\n\n[fallback]\nK_x = [[0.0, 0.0]]\n\n{fault}"),
+    );
+    assert!(with_design(&fits).is_ok());
+}

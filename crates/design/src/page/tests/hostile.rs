@@ -3,8 +3,12 @@
 use std::f64::consts::PI;
 
 use crate::detection_report::{DecoupledInput, DetectedFault, Detection, Test};
+use crate::fallback_report::{FallbackCase, FallbackReport};
+use crate::family_report::CommonCertificate;
 use crate::loss_report::{CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport};
-use crate::reconfiguration_report::{ReconfigurationReport, Reconfigured, WithoutActuator};
+use crate::reconfiguration_report::{
+    ReconfigurationReport, Reconfigured, ServedByFallback, WithoutActuator, WithoutSeveral,
+};
 use crate::report::{
     Bound, Certificate, Check, CommandPeak, Curve, Effectiveness, Estimation, EstimationErrors,
     FreeP, Frequency, Loop, Matrix, Norm, Plant, ReferenceStep, Region, Report, Sampled, Signal,
@@ -145,7 +149,7 @@ fn reconfiguration() -> ReconfigurationReport {
         intact_gain_norm: 1e300,
         k_x: vec![vec![1.0]],
         k_f: vec![vec![1.0]],
-        k_s: vec![1.0],
+        k_s: vec![vec![1.0]],
         commands: vec![number()],
         beyond_limits: vec![MARKUP.to_owned()],
         measurements: vec![number()],
@@ -160,6 +164,44 @@ fn reconfiguration() -> ReconfigurationReport {
     ReconfigurationReport {
         by_estimate: Some([0.9, 1.0]),
         without: vec![without(Ok(found)), without(Err(MARKUP.to_owned()))],
+        several: vec![WithoutSeveral {
+            actuators: vec![QUOTES.to_owned(), MARKUP.to_owned()],
+            outcome: Err(QUOTES.to_owned()),
+        }],
+        by_fallback: vec![ServedByFallback {
+            actuators: vec![MARKUP.to_owned()],
+            decay: -0.0,
+            stable: false,
+        }],
+    }
+}
+
+fn fallback() -> FallbackReport {
+    let number = || Number { name: MARKUP.to_owned(), unit: Some(QUOTES.to_owned()), value: -0.0 };
+    let case = FallbackCase {
+        name: QUOTES.to_owned(),
+        decay: 0.5,
+        feedback_decay: f64::NAN,
+        points: Vec::new(),
+        delay_margin: f64::INFINITY,
+        price: vec![number()],
+        commands: vec![number()],
+        beyond_limits: vec![MARKUP.to_owned()],
+        measurements: vec![number()],
+    };
+    FallbackReport {
+        loss: 1.0,
+        method: MARKUP.to_owned(),
+        decay: 0.5,
+        compensates: false,
+        k_x: vec![vec![1.0]],
+        gain_norm: f64::NAN,
+        intact_gain_norm: 1e300,
+        intact_decay: 1.0,
+        feedback: CommonCertificate { p: vec![vec![1.0]], margin: 1e-300 },
+        whole: Err(MARKUP.to_owned()),
+        whole_left_out: false,
+        cases: vec![case],
     }
 }
 
@@ -418,6 +460,7 @@ pub(super) fn hostile() -> Report {
         }],
         losses: Some(losses()),
         reconfiguration: Some(reconfiguration()),
+        fallback: Some(fallback()),
         assumptions: vec![format!("linear {MARKUP}"), "bell \u{7} and nul \0".to_owned()],
         interface: interface(),
     }
@@ -501,6 +544,7 @@ pub(super) fn bare() -> Report {
         effectiveness: Vec::new(),
         losses: None,
         reconfiguration: None,
+        fallback: None,
         assumptions: Vec::new(),
         interface: Vec::new(),
     }

@@ -302,6 +302,7 @@ pub(super) fn pendulum() -> Report {
         effectiveness: Vec::new(),
         losses: None,
         reconfiguration: None,
+        fallback: None,
         assumptions: vec![
             "The plant is linear around its operating point.".to_owned(),
             "Faults are constant; what they change by per second is a disturbance.".to_owned(),

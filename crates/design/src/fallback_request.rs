@@ -1,0 +1,54 @@
+//! The table `[fallback]` of a plant file: one feedback for the plant and for every actuator that may fail.
+
+use super::reconfiguration_limits::positions;
+use super::requirements::{Region, stated_region};
+use super::signals::Signal;
+use files::{Place, PlaceError, Table};
+
+/// The failures that one feedback must serve without knowing which of them there is.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct FallbackRequest {
+    /// The actuators that may fail, from 0, one at a time.
+    pub(crate) actuators: Vec<usize>,
+    /// The largest fraction of its effect that one of them may lose; 1 if it may be gone.
+    pub(crate) loss: f64,
+    /// The region of the eigenvalues in all cases, if stated.
+    pub(crate) region: Option<Region>,
+    pub(crate) place: Place,
+}
+
+const KEYS: [&str; 3] = ["actuators", "loss", "region"];
+
+impl FallbackRequest {
+    /// Reads the table, if there is one.
+    pub(crate) fn read(
+        file: &Table<'_>,
+        actuators: &[Signal],
+        sampled: bool,
+    ) -> Result<Option<Self>, PlaceError> {
+        let Some(entry) = file.get("fallback") else {
+            return Ok(None);
+        };
+        for other in ["reference", "schedule", "family"] {
+            if file.get(other).is_some() {
+                return Err(entry.error(format!("it is not possible together with `{other}`")));
+            }
+        }
+        let table = entry.table()?;
+        table.allow(&KEYS)?;
+        let meaning = "the names of the actuators that may fail, or \"all\"";
+        let own = positions(&table.require("actuators", meaning)?, actuators, "actuator")?;
+        let loss = match table.get("loss") {
+            None => 1.0,
+            Some(entry) => match entry.positive()? {
+                loss if loss <= 1.0 => loss,
+                loss => {
+                    let rule = "expected a fraction above 0 and at most 1";
+                    return Err(entry.error(format!("{rule}, found {loss}")));
+                }
+            },
+        };
+        let region = table.get("region").map(|entry| stated_region(&entry, sampled)).transpose()?;
+        Ok(Some(Self { actuators: own, loss, region, place: entry.place }))
+    }
+}
