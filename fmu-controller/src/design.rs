@@ -399,7 +399,7 @@ impl Design {
     /// The gains without the actuators whose bits are set in `gone`, if the design has gains for
     /// them.
     pub(crate) fn gains_without(&self, gone: u64) -> Option<GainSet<'_>> {
-        if gone.count_ones() == 1 {
+        if gone.is_power_of_two() {
             let own = self.without(gone.trailing_zeros() as usize)?;
             return own.k_x.as_ref().map(|_| GainSet::Single(own));
         }

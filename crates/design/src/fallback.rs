@@ -116,7 +116,7 @@ impl Search<'_> {
             return Ok(None);
         }
         for &actuator in &self.request.actuators {
-            let b = self.remaining(&linear.b, Some(actuator), 1.0);
+            let b = remaining(&linear.b, Some(actuator), 1.0);
             if let Some(mode) = unreachable_mode(linear, &b)? {
                 let name = &linear.actuators[actuator].name;
                 return Ok(Some(format!(
@@ -252,15 +252,6 @@ impl Search<'_> {
         format!("without {name}")
     }
 
-    /// The columns of B in a case.
-    fn remaining(&self, b: &DMatrix<f64>, case: Option<usize>, loss: f64) -> DMatrix<f64> {
-        let mut b = b.clone();
-        if let Some(actuator) = case {
-            b.column_mut(actuator).scale_mut(1.0 - loss);
-        }
-        b
-    }
-
     /// A and B of the states in each case, in the time domain of the design.
     fn vertices(&self) -> Vec<Vertex> {
         let ControllerDesign { plant, extended, .. } = self.designed;
@@ -268,7 +259,7 @@ impl Search<'_> {
         let (a, b) = (plant.a.view((0, 0), (n, n)), plant.b.rows(0, n).into_owned());
         let vertex = |case: Option<usize>| Vertex {
             a: a.into_owned(),
-            b: self.remaining(&b, case, self.request.loss),
+            b: remaining(&b, case, self.request.loss),
         };
         self.cases().into_iter().map(vertex).collect()
     }
@@ -295,6 +286,15 @@ fn better(
         (Ok(one), _) => Ok(one),
         (Err(_), other) => other,
     }
+}
+
+/// The columns of B in a case.
+fn remaining(b: &DMatrix<f64>, case: Option<usize>, loss: f64) -> DMatrix<f64> {
+    let mut b = b.clone();
+    if let Some(actuator) = case {
+        b.column_mut(actuator).scale_mut(1.0 - loss);
+    }
+    b
 }
 
 fn described(region: Region) -> String {

@@ -68,6 +68,7 @@ pub struct FallbackCase {
 
 impl FallbackCase {
     /// The measurement with the largest price.
+    #[must_use]
     pub fn worst_price(&self) -> Option<&Number> {
         self.price.iter().max_by(|x, y| x.value.total_cmp(&y.value))
     }

@@ -60,6 +60,7 @@ pub(crate) struct Combination {
 }
 
 /// The gains without actuators.
+#[expect(clippy::struct_field_names, reason = "the names of the design file")]
 pub(crate) struct ReconfiguredGains {
     pub(crate) k_x: DMatrix<f64>,
     pub(crate) k_f: DMatrix<f64>,

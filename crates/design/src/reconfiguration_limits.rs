@@ -95,7 +95,8 @@ fn together(table: &Table<'_>, own: usize, all: usize) -> Result<usize, PlaceErr
     };
     let most = own.min(all - 1);
     let number = entry.number()?;
-    let found = (1..=most).find(|count| f64::from(u32::try_from(*count).unwrap_or(0)) == number);
+    let found = (1..=most)
+        .find(|count| f64::from(u32::try_from(*count).unwrap_or(0)).total_cmp(&number).is_eq());
     let Some(found) = found else {
         return Err(entry.error(format!(
             "expected how many actuators may be gone together, from 1 to {most}, found {number}"

@@ -8,7 +8,7 @@ use control::robustness::{delay_margin, sampled_delay_margin};
 use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
-use super::{Fallback, Search};
+use super::{Fallback, Search, remaining};
 use crate::budget::Budget;
 use crate::designed::ControllerDesign;
 use crate::fallback_report::{FallbackCase, FallbackReport};
@@ -110,7 +110,7 @@ impl Examination<'_> {
         let LinearPlant { actuators, measurements, b, .. } = &designed.linear;
         let Physical { mut plant, mut controller, .. } =
             Physical::of_gains(designed, &designed.linear, &self.gains)?;
-        plant.b = self.search.remaining(b, failed, request.loss);
+        plant.b = remaining(b, failed, request.loss);
         let mut inputs = actuators.clone();
         if let Some(gone) = failed.filter(|_| request.loss >= 1.0) {
             inputs.remove(gone);

@@ -162,7 +162,8 @@ fn only_sections_with_content_appear_in_reading_order() {
             "14. Assumptions",
             "15. Loss of effectiveness",
             "16. Without an actuator",
-            "17. Interface of the FMU",
+            "17. Fall-back",
+            "18. Interface of the FMU",
         ]
     );
     assert_eq!(
