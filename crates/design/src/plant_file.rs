@@ -209,7 +209,7 @@ impl<'a> PlantFile<'a> {
                 &measurements,
                 &faults,
             )?,
-            fallback: FallbackRequest::read(file, &actuators, sampled)?,
+            fallback: FallbackRequest::read(file, &actuators, sampling.is_some())?,
             model,
             actuators,
             measurements,
