@@ -1,13 +1,13 @@
 //! The summary of a design on the terminal.
 
-use design::detection_report::Detection;
-use design::fallback_report::FallbackReport;
-use design::family_report::MemberReport;
-use design::loss_report::LossLoop;
-use design::reconfiguration_report::ReconfigurationReport;
+use design::detection::report::Detection;
+use design::fallback::report::FallbackReport;
+use design::family::report::MemberReport;
+use design::losses::report::LossLoop;
+use design::reconfiguration::report::ReconfigurationReport;
 use design::report::{CommandPeak, Loop, Matrix, ReferenceStep};
-use design::robust_report::Number;
-use design::schedule_report::ScheduleReport;
+use design::robustness::report::Number;
+use design::schedule::report::ScheduleReport;
 use design::{Comparison, Report};
 
 /// The most rows or columns of a gain that are printed; the design file has all.

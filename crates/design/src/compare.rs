@@ -15,8 +15,8 @@ use super::parameters::ParameterFamily;
 use super::plant_file::PlantFile;
 use super::progress::Steps;
 use super::report::Estimation;
-use super::robust_report::Verdict;
 use super::{page, reporting};
+use crate::robustness::report::Verdict;
 
 /// The laws on one plant, all for the same requirement.
 #[derive(Serialize)]

@@ -6,16 +6,18 @@ mod file;
 mod model_error;
 mod prediction;
 mod problem;
+pub mod report;
+pub(crate) mod request;
 
 use control::detection::{Cusum, WindowTest};
 use nalgebra::DMatrix;
 
 use super::designed::ControllerDesign;
-use super::detection_report::{DecoupledInput, DetectedFault, Detection as Report, Test};
-use super::detection_request::{DetectionRequest, Method};
 use super::parameters::ParameterFamily;
 use super::plant_file::PlantFile;
 use super::report::{Matrix, rows};
+use crate::detection::report::{DecoupledInput, DetectedFault, Detection as Report, Test};
+use crate::detection::request::{DetectionRequest, Method};
 use decoupling::Decoupling;
 pub(crate) use file::Section;
 use model_error::ModelErrors;

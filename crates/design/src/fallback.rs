@@ -11,6 +11,8 @@
 //! for the inequalities.
 
 mod examination;
+pub mod report;
+pub(crate) mod request;
 
 pub(crate) use examination::report;
 
@@ -21,12 +23,12 @@ use control::lmi::{self, CommonFeedback, Outcome, RegionCertificate, Vertex, cer
 use nalgebra::DMatrix;
 
 use super::designed::ControllerDesign;
-use super::fallback_request::FallbackRequest;
 use super::page::rounded;
 use super::plant_file::PlantFile;
 use super::requirements::Region;
 use super::rest::unreachable_mode;
 use super::tracking::decay;
+use crate::fallback::request::FallbackRequest;
 
 /// Largest number of states of plant and controller for which linear matrix inequalities are solved.
 const LARGEST_ORDER: usize = 30;

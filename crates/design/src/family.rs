@@ -1,5 +1,7 @@
 //! The members of a family of plants that one controller serves.
 
+pub mod report;
+
 use control::hold::zero_order_hold;
 use control::lmi::{self, CommonFeedback, Outcome, RegionCertificate, Vertex};
 use control::{Domain, Error};

@@ -13,8 +13,8 @@ use nalgebra::DMatrix;
 use super::estimation::Law;
 use super::linear_plant::LinearPlant;
 use super::report::Check;
-use super::robust_report::Number;
 use super::signals::FaultDynamics;
+use crate::robustness::report::Number;
 
 /// The default of `K_1`.
 const KEPT: f64 = 0.99;

@@ -6,9 +6,9 @@ use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
 
-use super::detection_request::{Disturbance, DisturbanceEntry};
 use super::plant_file::{self, PlantFile};
 use super::signals::{EntryPoint, Fault, FaultDynamics, Signal};
+use crate::detection::request::{Disturbance, DisturbanceEntry};
 use files::PlaceError;
 
 /// Relative size in its row below which an entry of D or G counts as zero.

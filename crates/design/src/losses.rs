@@ -1,6 +1,8 @@
 //! Losses of effectiveness up to the fractions that the plant file states: what is proven, and what
 //! constant losses make unstable.
 
+pub mod report;
+
 use control::aso::{FaultyPlant, Gains};
 use control::controller::controller;
 use control::faults::LossyLoop;
@@ -10,12 +12,14 @@ use nalgebra::{DMatrix, DVector};
 
 use super::budget::Budget;
 use super::designed::ControllerDesign;
-use super::loss_report::{CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport};
 use super::page::rounded;
 use super::report::rows;
-use super::robust_report::{Level, Number};
 use super::signals::EntryPoint;
 use super::tracking::DesignLoop;
+use crate::losses::report::{
+    CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport,
+};
+use crate::robustness::report::{Level, Number};
 
 /// Largest number of states of plant and controller for which linear matrix inequalities are solved.
 const LARGEST_ORDER: usize = 30;

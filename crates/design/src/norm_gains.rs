@@ -1,5 +1,7 @@
 //! Gains by the H-infinity norm: the channels of observer and feedback that the plant file weights.
 
+pub(crate) mod search;
+
 use control::aso::Estimator;
 use control::faults::FaultChannel;
 use control::lmi::{
@@ -14,8 +16,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::channel::{Channel, ChannelWeight};
 use super::gains::{FeedbackProblem, GainResult, Refusal};
-use super::norm_search::{LARGEST_ORDER, Search, WIDTH};
 use super::requirements::Region;
+use crate::norm_gains::search::{LARGEST_ORDER, Search, WIDTH};
 
 /// Ratio of the bounds between which the least norm of any filter is searched, and at which the search
 /// ends.

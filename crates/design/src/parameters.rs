@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::linear_plant;
 use super::plant_file::{PlantFile, PlantFmu};
-use super::robust_report::Parameter;
+use crate::robustness::report::Parameter;
 
 /// Number of equal steps in which the worst direction is followed to the limits.
 const STEPS: u32 = 20;
@@ -49,7 +49,7 @@ pub(crate) fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceEr
                 }
             }
         } else {
-            Tolerance::Relative(super::robustness_limits::fraction(&entry)?)
+            Tolerance::Relative(crate::robustness::limits::fraction(&entry)?)
         };
         Ok(ParameterTolerance { name: name.to_owned(), tolerance, place: entry.place.clone() })
     };

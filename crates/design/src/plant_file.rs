@@ -7,18 +7,18 @@ use std::path::{Path, PathBuf};
 use nalgebra::DMatrix;
 
 use super::channel::ChannelSignals;
-use super::detection_request::{DetectionRequest, Disturbance, disturbances};
 use super::estimation::EstimationRequest;
-use super::fallback_request::FallbackRequest;
 use super::plausibility::check_names;
-use super::reconfiguration_limits::ReconfigurationRequest;
 use super::references::References;
 use super::requirements::{Request, request};
-use super::robustness_limits::RobustnessLimits;
 use super::signals::{
     EntryPoint, Fault, Signal, all_actuator_faults, description, faults, signals,
 };
 use super::variants::{self, Schedule, Variant};
+use crate::detection::request::{DetectionRequest, Disturbance, disturbances};
+use crate::fallback::request::FallbackRequest;
+use crate::reconfiguration::limits::ReconfigurationRequest;
+use crate::robustness::limits::RobustnessLimits;
 use control::Domain;
 use files::{Entry, Place, PlaceError, Source, Table};
 

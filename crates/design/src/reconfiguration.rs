@@ -1,5 +1,8 @@
 //! Designs the controllers without actuators that are gone.
 
+pub(crate) mod limits;
+pub mod report;
+
 use control::allocation::{allocate, equilibrium};
 use control::aso::Gains;
 use control::controller::{closed_loop, controller};
@@ -14,15 +17,15 @@ use super::fallback::Fallback;
 use super::fixed_mode::described;
 use super::gains::{FeedbackProblem, Refusal, feedback};
 use super::plant_file::PlantFile;
-use super::reconfiguration_limits::ReconfigurationRequest;
-use super::reconfiguration_report::{
-    ReconfigurationReport, Reconfigured, ServedByFallback, WithoutActuator, WithoutSeveral,
-};
 use super::report::{pairs, rows};
 use super::requirements::Requirement;
 use super::rest::{Rest, beyond_limits, commands, unreachable_mode};
 use super::signals::{EntryPoint, Signal};
 use super::tracking::decay;
+use crate::reconfiguration::limits::ReconfigurationRequest;
+use crate::reconfiguration::report::{
+    ReconfigurationReport, Reconfigured, ServedByFallback, WithoutActuator, WithoutSeveral,
+};
 
 /// Relative size of the effect that the other actuators cannot produce below which the allocation counts
 /// as exact.

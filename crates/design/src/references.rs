@@ -1,5 +1,7 @@
 //! The table `[reference]` of a plant file: set points of measurements.
 
+pub(crate) mod steps;
+
 use files::{Entry, Place, PlaceError, Table};
 use nalgebra::DMatrix;
 

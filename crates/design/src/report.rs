@@ -5,13 +5,13 @@ use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::{Serialize, Serializer};
 
-use super::detection_report::Detection;
-use super::fallback_report::FallbackReport;
-use super::family_report::FamilyReport;
-use super::loss_report::LossReport;
-use super::reconfiguration_report::ReconfigurationReport;
-use super::robust_report::{Number, Robustness, Verdict};
-use super::schedule_report::ScheduleReport;
+use crate::detection::report::Detection;
+use crate::fallback::report::FallbackReport;
+use crate::family::report::FamilyReport;
+use crate::losses::report::LossReport;
+use crate::reconfiguration::report::ReconfigurationReport;
+use crate::robustness::report::{Number, Robustness, Verdict};
+use crate::schedule::report::ScheduleReport;
 
 /// The data of a design report.
 #[derive(Serialize, JsonSchema)]

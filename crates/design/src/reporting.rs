@@ -16,28 +16,28 @@ use super::budget::Budget;
 use super::certificate::certificate;
 use super::checks::checks;
 use super::designed::{ControllerDesign, fault_names};
-use super::estimation_report::estimation;
 use super::fallback::{self, Fallback};
-use super::family_report::{self, judge};
 use super::gains::GainResult;
-use super::loss_report::LossReport;
 use super::losses::losses;
 use super::page::rounded;
 use super::parameters::ParameterFamily;
 use super::plant_file::PlantFile;
 use super::plausibility::line;
 use super::progress::{Step, Steps};
-use super::reconfiguration_report::ReconfigurationReport;
-use super::reference_steps::{beyond_limits, reached, reference_steps};
 use super::report::{
     Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal, pairs, rows,
 };
 use super::requirements::{self, Requirement};
 use super::responses::responses;
 use super::robustness::{robustness, verdict};
-use super::schedule_report::{self, judge_schedule};
 use super::signals::{self, EntryPoint, Fault, FaultDynamics};
 use super::tracking::{DesignLoop, TrackingAction};
+use crate::estimation::report::estimation;
+use crate::family::report::{self as family_report, judge};
+use crate::losses::report::LossReport;
+use crate::reconfiguration::report::ReconfigurationReport;
+use crate::references::steps::{beyond_limits, reached, reference_steps};
+use crate::schedule::report::{self as schedule_report, judge_schedule};
 
 /// Returns the report on `designed`.
 pub(crate) fn report(

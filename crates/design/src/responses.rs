@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use super::analysis::Outputs;
 use super::designed::ControllerDesign;
 use super::report::{Curve, StepResponse};
-use super::robust_report::Number;
 use super::signals::Fault;
+use crate::robustness::report::Number;
 
 /// Relative band of the settling time: a response has settled when it stays within this fraction of
 /// its largest distance.

@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::fixed_mode::described;
 use super::linear_plant::LinearPlant;
-use super::robust_report::Number;
 use super::signals::Signal;
+use crate::robustness::report::Number;
 
 /// The equilibrium without actuators.
 pub(crate) struct Rest {

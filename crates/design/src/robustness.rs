@@ -1,5 +1,8 @@
 //! Analyses the robustness of a design and judges it.
 
+pub(crate) mod limits;
+pub mod report;
+
 use control::aso::Gains;
 use control::controller::{CompleteController, complete_controller};
 use control::hold::zero_order_hold;
@@ -21,12 +24,12 @@ use super::page::rounded;
 use super::parameters::ParameterFamily;
 use super::progress::{Step, Steps};
 use super::report::{Check, Frequency, Matrix, rows};
-use super::robust_report::{
+use super::signals::Signal;
+use crate::robustness::limits::RobustnessLimits;
+use crate::robustness::report::{
     Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Parameter, PeakSensitivity,
     Robustness, ToleranceResult, Verdict,
 };
-use super::robustness_limits::RobustnessLimits;
-use super::signals::Signal;
 
 const WIDTH: f64 = 1e-4;
 const POINTS_PER_DECADE: u32 = 20;

@@ -1,5 +1,7 @@
 //! The designs at the points of a schedule, and the loop between them.
 
+pub mod report;
+
 use control::aso::{FaultyPlant, Gains};
 use control::controller::complete_controller;
 use control::hold::zero_order_hold;

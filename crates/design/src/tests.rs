@@ -11,9 +11,9 @@ use super::checks::checks;
 use super::designed::design;
 use super::plant_file::{Model, PlantFile};
 use super::requirements::{Region, Requirement};
-use super::robust_report::Level;
 use super::robustness::{robustness, verdict};
 use super::signals::{EntryPoint, FaultDynamics};
+use crate::robustness::report::Level;
 use files::{Source, Table};
 
 const MASS: &str = r#"A = [[0, 1], [0, 0]]

@@ -7,7 +7,7 @@ use super::designed::ControllerDesign;
 use super::identity::identity;
 use super::plant_file::PlantFile;
 use super::report::Report;
-use super::robust_report::Parameter;
+use crate::robustness::report::Parameter;
 
 /// Returns the plant file with A, B and C of the worst plant; a plant that is an FMU becomes one
 /// that matrices describe.

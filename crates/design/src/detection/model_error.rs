@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::decoupling::Decoupling;
 use super::problem::Problem;
 use crate::designed::ControllerDesign;
-use crate::detection_request::ModelError;
+use crate::detection::request::ModelError;
 use crate::linear_plant::LinearPlant;
 use crate::parameters::ParameterFamily;
 use crate::plant_file::PlantFile;

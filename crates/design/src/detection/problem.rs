@@ -13,7 +13,7 @@ use super::decoupling::Decoupling;
 use super::prediction::whole;
 use crate::design_file::round;
 use crate::designed::ControllerDesign;
-use crate::detection_request::DetectionRequest;
+use crate::detection::request::DetectionRequest;
 use crate::plant_file::PlantFile;
 
 /// Time constants of the slowest mode after which a mean has settled.

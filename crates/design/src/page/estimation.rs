@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::number::number;
 use super::table::{Cell, table};
 use crate::report::{Check, Estimation, EstimationErrors, Report};
-use crate::robust_report::Number;
+use crate::robustness::report::Number;
 
 pub(super) fn estimation(report: &Report) -> Markup {
     let own = &report.estimation;

@@ -7,7 +7,7 @@ use super::matrix::matrices;
 use super::number::number;
 use super::table::{Cell, table};
 use crate::report::{Matrix, Report};
-use crate::robust_report::{Disk, Parameter, PeakSensitivity, Robustness, ToleranceResult};
+use crate::robustness::report::{Disk, Parameter, PeakSensitivity, Robustness, ToleranceResult};
 
 /// Number of parameters in the table of the sensitivities.
 const SHOWN: usize = 12;
@@ -82,7 +82,7 @@ fn disks(found: &Robustness) -> Markup {
 }
 
 fn peaks(found: &Robustness) -> Markup {
-    let row = |point: &crate::robust_report::LoopPoint| {
+    let row = |point: &crate::robustness::report::LoopPoint| {
         vec![
             format!("at the {}", point.point).as_str().into(),
             point.s_peak.into(),

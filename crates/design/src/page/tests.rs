@@ -7,7 +7,7 @@ mod pendulum;
 use resvg::usvg::roxmltree::{Document, Node};
 
 use crate::report::Report;
-use crate::robust_report::Level;
+use crate::robustness::report::Level;
 use hostile::{bare, hostile};
 use pendulum::pendulum;
 

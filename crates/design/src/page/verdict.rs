@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::number::number;
 use super::plane::Plane;
 use crate::report::{Loop, Report};
-use crate::robust_report::Level;
+use crate::robustness::report::Level;
 
 pub(super) fn verdict(report: &Report) -> Markup {
     let failures = failures(report);

@@ -2,11 +2,13 @@
 
 use std::f64::consts::PI;
 
-use crate::detection_report::{DecoupledInput, DetectedFault, Detection, Test};
-use crate::fallback_report::{FallbackCase, FallbackReport};
-use crate::family_report::CommonCertificate;
-use crate::loss_report::{CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport};
-use crate::reconfiguration_report::{
+use crate::detection::report::{DecoupledInput, DetectedFault, Detection, Test};
+use crate::fallback::report::{FallbackCase, FallbackReport};
+use crate::family::report::CommonCertificate;
+use crate::losses::report::{
+    CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport,
+};
+use crate::reconfiguration::report::{
     ReconfigurationReport, Reconfigured, ServedByFallback, WithoutActuator, WithoutSeveral,
 };
 use crate::report::{
@@ -15,7 +17,7 @@ use crate::report::{
     StepResponse, Theorem1, Ultimate, Variable,
 };
 
-use crate::robust_report::{
+use crate::robustness::report::{
     Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Parameter, PeakSensitivity,
     Robustness, ToleranceResult, Verdict,
 };

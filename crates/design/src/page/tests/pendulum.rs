@@ -9,7 +9,7 @@ use crate::report::{
     Signal, StepResponse, pairs, rows,
 };
 
-use crate::robust_report::{Level, Limits, Verdict};
+use crate::robustness::report::{Level, Limits, Verdict};
 
 const DESIGN: &str = include_str!("../../../../../fmu-controller/resources/design.toml");
 const STATES: [(&str, &str, &str); 4] = [

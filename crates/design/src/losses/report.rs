@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::report::{OrReason, or_reason};
-use super::robust_report::Number;
+use crate::report::{OrReason, or_reason};
+use crate::robustness::report::Number;
 
 /// What is proven about losses of effectiveness up to the fractions that the plant file states.
 #[derive(Serialize, JsonSchema)]

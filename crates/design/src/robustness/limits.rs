@@ -2,7 +2,7 @@
 
 use files::{Entry, PlaceError, Table};
 
-use super::parameters::{self, ParameterTolerance};
+use crate::parameters::{self, ParameterTolerance};
 
 /// What the robustness of a design is tested with, and the limits of its verdict.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,10 +6,10 @@ use control::response::h_infinity;
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-use super::gains::{GainResult, Refusal, synthesised};
-use super::norm_gains::NormRequirement;
-use super::report::NormReport;
-use super::requirements::Region;
+use crate::gains::{GainResult, Refusal, synthesised};
+use crate::norm_gains::NormRequirement;
+use crate::report::NormReport;
+use crate::requirements::Region;
 
 /// Relative width of a norm.
 pub(crate) const WIDTH: f64 = 1e-4;

@@ -7,11 +7,11 @@ use control::response::{
 use control::{Domain, Error, StateSpace};
 use rayon::prelude::*;
 
-use super::designed::ControllerDesign;
-use super::report::{Estimation, EstimationErrors};
-use super::robust_report::Robustness;
-use super::robustness::noise_peaks;
-use super::robustness_limits::RobustnessLimits;
+use crate::designed::ControllerDesign;
+use crate::report::{Estimation, EstimationErrors};
+use crate::robustness::limits::RobustnessLimits;
+use crate::robustness::noise_peaks;
+use crate::robustness::report::Robustness;
 
 /// Relative width of the brackets of the peak gains.
 const WIDTH: f64 = 1e-3;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::report::Matrix;
+use crate::report::Matrix;
 
 /// The detection of faults: tests, false alarms, delays, structure.
 #[derive(Serialize, JsonSchema)]

@@ -6,15 +6,15 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::budget::Budget;
-use super::checks::checks;
-use super::designed::ControllerDesign;
-use super::family_report::{CommonCertificate, MemberReport, common, judge, member};
-use super::report::{Matrix, OrReason, or_reason, rows};
-use super::reporting::gains;
-use super::robust_report::{Level, Verdict};
-use super::robustness_limits::RobustnessLimits;
-use super::schedule::{Scheduled, ScheduledLoop, coupled};
+use crate::budget::Budget;
+use crate::checks::checks;
+use crate::designed::ControllerDesign;
+use crate::family::report::{CommonCertificate, MemberReport, common, judge, member};
+use crate::report::{Matrix, OrReason, or_reason, rows};
+use crate::reporting::gains;
+use crate::robustness::limits::RobustnessLimits;
+use crate::robustness::report::{Level, Verdict};
+use crate::schedule::{Scheduled, ScheduledLoop, coupled};
 
 /// Values of the scheduling variable in each interval, its ends included, at which eigenvalues are
 /// computed, less 1.

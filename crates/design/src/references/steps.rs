@@ -6,11 +6,11 @@ use control::tracking::{Action, reference_system};
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-use super::designed::ControllerDesign;
-use super::report::{Check, CommandPeak, Curve, ReferenceStep};
-use super::responses::{BETWEEN, SETTLED, add_outputs};
-use super::robust_report::Number;
-use super::tracking::{Tracking, TrackingAction};
+use crate::designed::ControllerDesign;
+use crate::report::{Check, CommandPeak, Curve, ReferenceStep};
+use crate::responses::{BETWEEN, SETTLED, add_outputs};
+use crate::robustness::report::Number;
+use crate::tracking::{Tracking, TrackingAction};
 
 /// Relative error of a constant reference below which it counts as reached.
 const REACHED: f64 = 1e-9;

@@ -8,14 +8,14 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::budget::Budget;
-use super::designed::ControllerDesign;
-use super::family::{NOMINAL, name};
-use super::linear_plant::LinearPlant;
-use super::report::{OrReason, or_reason, rows};
-use super::robust_report::{Level, LoopPoint, Number, ToleranceResult, Verdict};
-use super::robustness::{Margins, Physical, by_entries, margins};
-use super::robustness_limits::RobustnessLimits;
+use crate::budget::Budget;
+use crate::designed::ControllerDesign;
+use crate::family::{NOMINAL, name};
+use crate::linear_plant::LinearPlant;
+use crate::report::{OrReason, or_reason, rows};
+use crate::robustness::limits::RobustnessLimits;
+use crate::robustness::report::{Level, LoopPoint, Number, ToleranceResult, Verdict};
+use crate::robustness::{Margins, Physical, by_entries, margins};
 
 /// A family of plants with one controller.
 #[derive(Serialize, JsonSchema)]
