@@ -1,34 +1,37 @@
 //! Analyses the robustness of a design and judges it.
 
 pub(crate) mod limits;
+mod noise;
 pub mod report;
+mod tolerances;
+mod verdict;
+
+pub(crate) use noise::noise_peaks;
+pub(crate) use tolerances::by_entries;
+pub(crate) use verdict::verdict;
 
 use control::aso::Gains;
 use control::controller::{CompleteController, complete_controller};
 use control::hold::zero_order_hold;
 use control::response::{frequency_grid, frequency_response, h_infinity};
 use control::robustness::{
-    DiskMargin, EntryFamily, Loop, OpenedLoop, Point, ToleranceSearch, ToleranceTest, Tolerances,
-    longest_hold, longest_period, noise_gains, peak_derivatives, regulator_of_same_speed,
-    tolerance_test,
+    DiskMargin, Loop, OpenedLoop, Point, Tolerances, longest_hold, longest_period,
+    peak_derivatives, regulator_of_same_speed,
 };
 use control::tracking::IntegralAction;
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::analysis::largest_gain;
 use super::designed::ControllerDesign;
 use super::linear_plant::LinearPlant;
-use super::page::rounded;
 use super::parameters::ParameterFamily;
 use super::progress::{Step, Steps};
-use super::report::{Check, Frequency, Matrix, rows};
+use super::report::{Frequency, Matrix, rows};
 use super::signals::Signal;
 use crate::robustness::limits::RobustnessLimits;
 use crate::robustness::report::{
-    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Parameter, PeakSensitivity,
-    Robustness, ToleranceResult, Verdict,
+    Channel, Compared, Disk, LoopPoint, Number, PeakSensitivity, Robustness,
 };
 
 const WIDTH: f64 = 1e-4;
@@ -59,7 +62,9 @@ pub(crate) fn robustness(
         || {
             steps.run(Step::Tolerances, || match family {
                 None => by_entries(designed, &physical, limits),
-                Some(family) => by_parameters(designed, &physical, (limits, family), &slopes),
+                Some(family) => {
+                    tolerances::by_parameters(designed, &physical, (limits, family), &slopes)
+                }
             })
         },
     );
@@ -116,7 +121,7 @@ pub(crate) fn margins(
         },
     );
     let (points, delay, hold) = (points?, delay?, hold?);
-    let (noise, noise_together) = noise(designed, own, &physical.estimates, limits)?;
+    let (noise, noise_together) = noise::noise(designed, own, &physical.estimates, limits)?;
     Ok(Margins { points, delay, hold, noise, noise_together })
 }
 
@@ -306,79 +311,6 @@ fn disk(found: &DiskMargin) -> Disk {
     }
 }
 
-/// Returns the effect of each measurement noise on commands and estimated faults, and of all
-/// together.
-fn noise(
-    designed: &ControllerDesign,
-    own: &Loop,
-    estimates: &StateSpace,
-    limits: &RobustnessLimits,
-) -> Result<(Matrix, Vec<Number>), Error> {
-    let of = |output: &StateSpace| {
-        let mut gains = noise_or_infinite(own.from_noise(output)?)?;
-        for (mut column, noise) in gains.column_iter_mut().zip(&limits.noise) {
-            column *= *noise;
-        }
-        Ok::<_, Error>(gains)
-    };
-    let (commands, faults) = (of(own.controller())?, of(estimates)?);
-    let linear = &designed.linear;
-    let named = linear.actuators.iter().map(|signal| (signal.name.clone(), signal.unit.clone()));
-    let estimated = linear.faults.iter();
-    let estimated =
-        estimated.map(|fault| (format!("estimate of {}", fault.name), fault.unit.clone()));
-    let names: Vec<_> = named.chain(estimated).collect();
-    let all = commands.row_iter().chain(faults.row_iter());
-    let together = names.iter().zip(all).map(|((name, unit), row)| Number {
-        name: name.clone(),
-        unit: unit.clone(),
-        value: row.norm(),
-    });
-    let together: Vec<_> = together.collect();
-    let mut values = rows(&commands);
-    values.extend(rows(&faults));
-    let matrix = Matrix {
-        name: "noise".to_owned(),
-        meaning: "root-mean-square values under the noise of each measurement".to_owned(),
-        rows: names.into_iter().map(|(name, _)| name).collect(),
-        columns: linear.measurements.iter().map(|signal| signal.name.clone()).collect(),
-        values,
-    };
-    Ok((matrix, together))
-}
-
-/// [`noise_gains`], infinite where a direct term passes white noise of continuous time.
-fn noise_or_infinite(mut system: StateSpace) -> Result<DMatrix<f64>, Error> {
-    let direct = system.d.clone();
-    if system.domain != Domain::Continuous {
-        return noise_gains(&system);
-    }
-    system.d.fill(0.0);
-    let passed = |gain: f64, direct: f64| if direct == 0.0 { gain } else { f64::INFINITY };
-    Ok(noise_gains(&system)?.zip_map(&direct, passed))
-}
-
-/// Returns for each fault the largest amplification of a sinusoidal error of the measurements to its
-/// estimate, all measurements together, in the units of `noise`.
-pub(crate) fn noise_peaks(designed: &ControllerDesign, noise: &[f64]) -> Result<Vec<f64>, Error> {
-    let physical = Physical::of(designed)?;
-    let own = physical.closed(&physical.controller)?;
-    let mut system = own.from_noise(&physical.estimates)?;
-    for (k, noise) in noise.iter().enumerate() {
-        system.b.column_mut(k).scale_mut(*noise);
-        system.d.column_mut(k).scale_mut(*noise);
-    }
-    let peak = |row: usize| {
-        let one = StateSpace {
-            c: system.c.rows(row, 1).into(),
-            d: system.d.rows(row, 1).into(),
-            ..system.clone()
-        };
-        Ok(largest_gain(&one)?.0)
-    };
-    (0..system.c.nrows()).map(peak).collect()
-}
-
 /// Returns the gains, and the peaks of S, beside those of the linear-quadratic design.
 fn comparison(
     designed: &ControllerDesign,
@@ -449,71 +381,6 @@ fn norm(m: &DMatrix<f64>) -> f64 {
     (m * m.transpose()).symmetric_eigenvalues().max().max(0.0).sqrt()
 }
 
-/// Returns what the loop does while the entries of the plant's matrices vary.
-pub(crate) fn by_entries(
-    designed: &ControllerDesign,
-    physical: &Physical,
-    limits: &RobustnessLimits,
-) -> Result<ToleranceResult, crate::Error> {
-    let tolerances = Tolerances::of_values(&physical.plant, limits.tolerance);
-    let family = EntryFamily::new(&physical.plant, &tolerances)?;
-    let search = ToleranceSearch { family: &family, controller: &physical.controller };
-    let cases = search.cases(limits.cases, u64::from(limits.seed)).into_par_iter();
-    let cases = cases.map(|case| Ok::<_, Error>((search.instability(&case)?, case)));
-    let cases = cases.collect::<Result<Vec<_>, _>>()?;
-    let climbs = search.starts(&cases)?.into_par_iter().map(|start| search.climb(start));
-    let found = search.result(&cases, climbs.collect::<Result<Vec<_>, _>>()?)?;
-    let entries = u32::try_from(tolerances.count()).unwrap_or(u32::MAX);
-    Ok(ToleranceResult { entries, ..tested(designed, limits, &found) })
-}
-
-/// Returns what the loop does while the parameters of the plant's FMU vary.
-fn by_parameters(
-    designed: &ControllerDesign,
-    physical: &Physical,
-    (limits, family): (&RobustnessLimits, &ParameterFamily<'_>),
-    slopes: &[[DMatrix<f64>; 3]],
-) -> Result<ToleranceResult, crate::Error> {
-    let request = (limits.cases, u64::from(limits.seed));
-    let found = tolerance_test(family, &physical.controller, request)?;
-    let parameters = family.report(&found.deviations, slopes);
-    Ok(ToleranceResult { parameters, ..tested(designed, limits, &found) })
-}
-
-fn tested(
-    designed: &ControllerDesign,
-    limits: &RobustnessLimits,
-    found: &ToleranceTest,
-) -> ToleranceResult {
-    let linear = &designed.linear;
-    let (states, actuators) = (names(&linear.states), names(&linear.actuators));
-    let matrix = |name: &str, values: &DMatrix<f64>, of: &[String], by: &[String]| Matrix {
-        name: name.to_owned(),
-        meaning: "worst plant within the tolerances".to_owned(),
-        rows: of.to_vec(),
-        columns: by.to_vec(),
-        values: rows(values),
-    };
-    ToleranceResult {
-        entries: 0,
-        parameters: Vec::new(),
-        cases: found.cases,
-        seed: limits.seed,
-        stable: if found.cases == 0 {
-            1.0
-        } else {
-            f64::from(found.stable) / f64::from(found.cases)
-        },
-        worst_instability: found.worst_instability,
-        first_unstable: found.first_unstable.unwrap_or(f64::INFINITY),
-        worst: vec![
-            matrix("A", &found.worst.a, &states, &states),
-            matrix("B", &found.worst.b, &states, &actuators),
-            matrix("C", &found.worst.c, &names(&linear.measurements), &states),
-        ],
-    }
-}
-
 /// Returns the singular values of S and T at both points.
 fn curves(own: &Loop) -> Result<Vec<Frequency>, Error> {
     let systems = POINTS.into_iter().flat_map(|(at, name)| {
@@ -530,75 +397,4 @@ fn curves(own: &Loop) -> Result<Vec<Frequency>, Error> {
         })
     };
     systems.collect::<Vec<_>>().par_iter().map(one).collect()
-}
-
-/// Judges a design.
-pub(crate) fn verdict(
-    checks: &[Check],
-    robustness: Option<&Robustness>,
-    limits: &RobustnessLimits,
-    further: Vec<(Level, String)>,
-) -> Verdict {
-    let mut level = Level::Green;
-    let mut reasons = Vec::new();
-    for check in checks.iter().filter(|check| !check.holds) {
-        level = Level::Red;
-        reasons.push(format!("does not hold: {}", check.condition));
-    }
-    for point in robustness.iter().flat_map(|found| &found.points) {
-        let peak = point.judged;
-        let (limit, reached) = match peak {
-            peak if peak > limits.red => (limits.red, Level::Red),
-            peak if peak > limits.amber => (limits.amber, Level::Amber),
-            _ => continue,
-        };
-        if level != Level::Red {
-            level = reached;
-        }
-        reasons.push(format!(
-            "the peak of S at the {} is {peak:.3}, above {limit} ({})",
-            point.point,
-            reached.word()
-        ));
-    }
-    if let Some(found) = robustness.map(|found| &found.tolerance) {
-        let unstable = found.stable < 1.0 || found.worst_instability >= 0.0;
-        if unstable {
-            level = Level::Red;
-            reasons.push(instability(found, limits.tolerance));
-        }
-    }
-    for (reached, reason) in further {
-        level = level.max(reached);
-        reasons.push(reason);
-    }
-    let RobustnessLimits { amber, red, tolerance, .. } = *limits;
-    Verdict { level, reasons, limits: Limits { amber, red, tolerance } }
-}
-
-/// The sentence about a loop that parameters within their tolerances make unstable.
-fn instability(found: &ToleranceResult, tolerance: [f64; 3]) -> String {
-    let range = if found.parameters.is_empty() {
-        let [a, b, c] = tolerance.map(|part| 100.0 * part);
-        format!("parameters within ±{a} % of A, ±{b} % of B, ±{c} % of C")
-    } else {
-        let limits = |own: &Parameter| {
-            let [low, high] = own.limits.map(rounded);
-            format!("{} from {low} to {high}", own.name)
-        };
-        found.parameters.iter().map(limits).collect::<Vec<_>>().join(", ")
-    };
-    let worst =
-        format!("the worst case found, from {:.3} of the tolerances on", found.first_unstable);
-    let cases = found.cases;
-    if found.stable < 1.0 {
-        let unstable = 100.0 * (1.0 - found.stable);
-        format!(
-            "{range} make the loop unstable: {unstable:.1} % of {cases} random cases, and {worst}"
-        )
-    } else if cases > 0 {
-        format!("{range} make the loop unstable: none of {cases} random cases, but {worst}")
-    } else {
-        format!("{range} make the loop unstable: {worst}")
-    }
 }

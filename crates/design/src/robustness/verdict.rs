@@ -1,0 +1,77 @@
+//! Judges a design by its checks, its margins and its tolerances.
+
+use super::limits::RobustnessLimits;
+use super::report::{Level, Limits, Parameter, Robustness, ToleranceResult, Verdict};
+use crate::page::rounded;
+use crate::report::Check;
+
+/// Judges a design.
+pub(crate) fn verdict(
+    checks: &[Check],
+    robustness: Option<&Robustness>,
+    limits: &RobustnessLimits,
+    further: Vec<(Level, String)>,
+) -> Verdict {
+    let mut level = Level::Green;
+    let mut reasons = Vec::new();
+    for check in checks.iter().filter(|check| !check.holds) {
+        level = Level::Red;
+        reasons.push(format!("does not hold: {}", check.condition));
+    }
+    for point in robustness.iter().flat_map(|found| &found.points) {
+        let peak = point.judged;
+        let (limit, reached) = match peak {
+            peak if peak > limits.red => (limits.red, Level::Red),
+            peak if peak > limits.amber => (limits.amber, Level::Amber),
+            _ => continue,
+        };
+        if level != Level::Red {
+            level = reached;
+        }
+        reasons.push(format!(
+            "the peak of S at the {} is {peak:.3}, above {limit} ({})",
+            point.point,
+            reached.word()
+        ));
+    }
+    if let Some(found) = robustness.map(|found| &found.tolerance) {
+        let unstable = found.stable < 1.0 || found.worst_instability >= 0.0;
+        if unstable {
+            level = Level::Red;
+            reasons.push(instability(found, limits.tolerance));
+        }
+    }
+    for (reached, reason) in further {
+        level = level.max(reached);
+        reasons.push(reason);
+    }
+    let RobustnessLimits { amber, red, tolerance, .. } = *limits;
+    Verdict { level, reasons, limits: Limits { amber, red, tolerance } }
+}
+
+/// The sentence about a loop that parameters within their tolerances make unstable.
+fn instability(found: &ToleranceResult, tolerance: [f64; 3]) -> String {
+    let range = if found.parameters.is_empty() {
+        let [a, b, c] = tolerance.map(|part| 100.0 * part);
+        format!("parameters within ±{a} % of A, ±{b} % of B, ±{c} % of C")
+    } else {
+        let limits = |own: &Parameter| {
+            let [low, high] = own.limits.map(rounded);
+            format!("{} from {low} to {high}", own.name)
+        };
+        found.parameters.iter().map(limits).collect::<Vec<_>>().join(", ")
+    };
+    let worst =
+        format!("the worst case found, from {:.3} of the tolerances on", found.first_unstable);
+    let cases = found.cases;
+    if found.stable < 1.0 {
+        let unstable = 100.0 * (1.0 - found.stable);
+        format!(
+            "{range} make the loop unstable: {unstable:.1} % of {cases} random cases, and {worst}"
+        )
+    } else if cases > 0 {
+        format!("{range} make the loop unstable: none of {cases} random cases, but {worst}")
+    } else {
+        format!("{range} make the loop unstable: {worst}")
+    }
+}
