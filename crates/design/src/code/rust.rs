@@ -6,7 +6,7 @@ use super::c::wrapped;
 use super::controller::Controller;
 use super::recursion::{Operation, Recursion, Statement, Term, When};
 use super::rounding::RoundingBound;
-use super::summary::{Fields, Vocabulary, ascii, summary};
+use super::summary::{Fields, Vocabulary, ascii, descriptions, descriptions_of_estimates, summary};
 use super::symbols::{Kind, Vector};
 use super::tables::{Constants, kept, locals, shown, stored, tables};
 use super::{Precision, Request};
@@ -145,20 +145,27 @@ impl Source<'_> {
     fn structures(&self, lines: &mut Vec<String>) {
         let Self { controller, recursion: _, fields, real, .. } = self;
         let estimates = fields.estimates(controller);
-        for (name, text, count, fields) in [
+        let described = [
+            descriptions(&controller.measurements),
+            descriptions(&controller.references),
+            descriptions(&controller.actuators),
+            descriptions_of_estimates(controller),
+        ];
+        let groups = [
             ("Measurements", "The measurements of a sample.", "MEASUREMENTS", &fields.measurements),
             ("References", "The references of a sample.", "REFERENCES", &fields.references),
             ("Commands", "The commands of a sample.", "ACTUATORS", &fields.actuators),
             ("Estimates", "The estimates of a sample.", "ESTIMATES", &estimates),
-        ] {
+        ];
+        for ((name, text, count, fields), described) in groups.into_iter().zip(&described) {
             if fields.is_empty() {
                 continue;
             }
             lines.push(format!("\n/// {text}"));
             lines.push("#[derive(Clone, Copy, Debug, Default, PartialEq)]".to_owned());
             lines.push(format!("pub struct {name} {{"));
-            for field in fields {
-                lines.push(format!("    #[allow(missing_docs)]\n    pub {field}: {real},"));
+            for (field, text) in fields.iter().zip(described) {
+                lines.push(format!("    /// {text}.\n    pub {field}: {real},"));
             }
             lines.push("}".to_owned());
             let values: Vec<_> = (1..=fields.len()).map(|k| format!("v{k}")).collect();

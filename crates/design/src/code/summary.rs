@@ -1,7 +1,7 @@
 //! What the user of the code must know: the same sentences for C and Rust.
 
 use super::arithmetic::{Arithmetic, Memory};
-use super::controller::{Controller, Estimator, Signal};
+use super::controller::{Controller, Estimator, Loss, Signal};
 use super::names::fields;
 use super::recursion::Recursion;
 use super::rounding::RoundingBound;
@@ -56,6 +56,33 @@ impl Fields {
         let integrals = self.integrals.iter().map(|field| format!("x_i_{field}"));
         states.chain(faults).chain(losses).chain(integrals).collect()
     }
+}
+
+/// One line on each signal: name, unit and description.
+pub(super) fn descriptions(signals: &[Signal]) -> Vec<String> {
+    let described = |signal: &Signal| {
+        let unit = signal.unit.as_ref().map_or_else(String::new, |unit| format!(" in {unit}"));
+        let text = one_line(&signal.description);
+        let text = text.trim_end_matches('.');
+        let text = if text.is_empty() { String::new() } else { format!(": {text}") };
+        ascii(&format!("`{}`{unit}{text}", one_line(&signal.name)))
+    };
+    signals.iter().map(described).collect()
+}
+
+/// One line on each of the [`Fields::estimates`].
+pub(super) fn descriptions_of_estimates(controller: &Controller) -> Vec<String> {
+    let estimate = |text: String| format!("Estimate of {text}");
+    let states = descriptions(&controller.states).into_iter().map(estimate);
+    let faults = descriptions(&controller.faults).into_iter().map(estimate);
+    let name = |loss: &Loss| ascii(&one_line(&controller.actuators[loss.actuator].name));
+    let losses = controller.losses.iter();
+    let losses =
+        losses.map(|loss| format!("Estimate of the lost part of the effect of `{}`", name(loss)));
+    let integrals = controller.references.iter().filter(|_| controller.h.is_some());
+    let integrals = integrals
+        .map(|signal| format!("Integral for the reference `{}`", ascii(&one_line(&signal.name))));
+    states.chain(faults).chain(losses).chain(integrals).collect()
 }
 
 /// Returns the lines that describe a controller, in ASCII.
