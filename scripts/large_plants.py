@@ -15,7 +15,7 @@ import numpy as np
 COMMANDS, MEASUREMENTS, FAULTS = 4, 10, 2
 
 
-def chain(states, seed=None):
+def chain(states, seed=None, commands=COMMANDS, measurements=MEASUREMENTS):
     """A, B and C."""
     masses = states // 2
     rng = np.random.default_rng(seed)
@@ -23,11 +23,11 @@ def chain(states, seed=None):
     stiffness = np.diag(springs[:-1] + springs[1:])
     stiffness -= np.diag(springs[1:-1], 1) + np.diag(springs[1:-1], -1)
     a = np.block([[np.zeros((masses, masses)), np.eye(masses)], [-stiffness, -0.01 * stiffness]])
-    b, c = np.zeros((states, COMMANDS)), np.zeros((MEASUREMENTS, states))
-    for at in range(COMMANDS):
-        b[masses + at * masses // COMMANDS + 3, at] = 1
-    for at in range(MEASUREMENTS):
-        c[at, at * masses // MEASUREMENTS + 2] = 1
+    b, c = np.zeros((states, commands)), np.zeros((measurements, states))
+    for at in range(commands):
+        b[masses + at * masses // commands + 3, at] = 1
+    for at in range(measurements):
+        c[at, at * masses // measurements + 2] = 1
     return a, b, c
 
 

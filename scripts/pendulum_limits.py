@@ -18,6 +18,8 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
+from split_mix import uniform
+
 ROOT = Path(__file__).resolve().parents[1]
 FILE = ROOT / "fmu-controller" / "pendulum-masses.toml"
 NOMINAL = {"M": 3.2, "m": 0.535}
@@ -63,16 +65,6 @@ def pendulum(M=3.2, m=0.535, J=0.062, l=0.365, F_x=6.2, F_theta=0.009, g=9.807):
     force = np.array([[0, 0, -F_x, 0, 1], [0, m * l * g, 0, -F_theta, 0]])
     rows = np.linalg.solve(mass, force)
     return np.vstack([[0, 0, 1, 0], [0, 0, 0, 1], rows[:, :4]]), np.vstack([[0], [0], rows[:, 4:]])
-
-
-def uniform(state):
-    """The numbers of SplitMix64 (Steele, Lea, Flood 2014) from 0 to 1."""
-    mask = 2**64 - 1
-    while True:
-        state = (state + 0x9E3779B97F4A7C15) & mask
-        z = ((state ^ (state >> 30)) * 0xBF58476D1CE4E5B9) & mask
-        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & mask
-        yield ((z ^ (z >> 31)) >> 11) / 2**53
 
 
 class Loop:

@@ -2,7 +2,6 @@
 
 import csv
 import re
-import sys
 import zipfile
 
 import fmpy
@@ -10,11 +9,8 @@ import pytest
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
-from conftest import ROOT
 
-sys.path.insert(0, str(ROOT / "scripts"))
-
-from residual_over_sample_time import CONSTANT, plant_file  # noqa: E402
+from residual_over_sample_time import CONSTANT, plant_file
 
 MODEL = "tests/models/clocks"
 

@@ -1,7 +1,6 @@
 """A lightly damped chain of 25 masses, 50 states: the numbers of `aso-ftc design --json` by scipy."""
 
 import json
-import sys
 import tomllib
 
 import numpy as np
@@ -9,36 +8,19 @@ import pytest
 from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
 from scipy.optimize import linear_sum_assignment, minimize_scalar
 
-from conftest import ROOT
 from design_oracle import Matrices, closed_loop
 
-sys.path.insert(0, str(ROOT / "scripts"))
-
-import large_plants  # noqa: E402
+import large_plants
 
 MASSES, COMMANDS, MEASUREMENTS = 25, 3, 6
 STATES = 2 * MASSES
-
-
-def chain():
-    """A, B, C: unit masses and springs, damped by 1 %; forces and measured positions are spread out."""
-    stiffness = 2 * np.eye(MASSES) - np.eye(MASSES, k=1) - np.eye(MASSES, k=-1)
-    a = np.block(
-        [[np.zeros((MASSES, MASSES)), np.eye(MASSES)], [-stiffness, -0.01 * stiffness]]
-    )
-    b, c = np.zeros((STATES, COMMANDS)), np.zeros((MEASUREMENTS, STATES))
-    for at in range(COMMANDS):
-        b[MASSES + at * MASSES // COMMANDS + 3, at] = 1
-    for at in range(MEASUREMENTS):
-        c[at, at * MASSES // MEASUREMENTS + 2] = 1
-    return a, b, c
 
 
 @pytest.fixture(scope="module")
 def designed(aso_ftc, tmp_path_factory):
     """The report and the matrices of the design file."""
     folder = tmp_path_factory.mktemp("chain")
-    a, b, c = chain()
+    a, b, c = large_plants.chain(STATES, commands=COMMANDS, measurements=MEASUREMENTS)
     text = "".join(f"{name} = {matrix.tolist()}\n" for name, matrix in zip("ABC", (a, b, c)))
     text += f"feedback.Q = {[1.0] * STATES}\nfeedback.R = {[1.0] * COMMANDS}\n"
     text += f"observer.W = {[1.0] * (STATES + 1)}\nobserver.V = {[0.01] * MEASUREMENTS}\n"
@@ -78,7 +60,7 @@ def h_infinity(a, b, c, d, start):
 
 def test_the_gains_are_those_of_scipys_riccati_equations(designed):
     _, own = designed
-    a, b, c = chain()
+    a, b, c = large_plants.chain(STATES, commands=COMMANDS, measurements=MEASUREMENTS)
     p = solve_continuous_are(a, b, np.eye(STATES), np.eye(COMMANDS))
     assert np.abs(own.K_x + b.T @ p).max() < 1e-9 * np.abs(p).max()
     a_0, c_0, gain = own.augmented

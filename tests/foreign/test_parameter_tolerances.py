@@ -10,6 +10,7 @@ import pytest
 
 from design_loop import packed_plant
 from design_oracle import Matrices, closed_loop, commands
+from split_mix import uniform
 
 NOMINAL = {"J": 3.2284e-6, "k": 0.0274, "R": 4.0, "F_v": 3.5077e-6}
 LIMITS = {
@@ -25,16 +26,6 @@ def servo(**changed):
     """A and B of the servo with other parameters."""
     J, k, R, F_v = (NOMINAL | changed).values()
     return np.array([[0, 1], [0, -(F_v + k**2 / R) / J]]), np.array([[0], [k / (R * J)]])
-
-
-def uniform(state):
-    """The numbers of SplitMix64 from 0 to 1."""
-    mask = 2**64 - 1
-    while True:
-        state = (state + 0x9E3779B97F4A7C15) & mask
-        z = ((state ^ (state >> 30)) * 0xBF58476D1CE4E5B9) & mask
-        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & mask
-        yield ((z ^ (z >> 31)) >> 11) / 2**53
 
 
 def value(name, deviation):

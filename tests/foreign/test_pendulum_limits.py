@@ -1,15 +1,11 @@
 """The paper's pendulum with masses 20 % off: the figures of the report computed again from the gains and the equations."""
 
-import sys
 
 import numpy as np
 import pytest
 
-from conftest import ROOT
 
-sys.path.insert(0, str(ROOT / "scripts"))
-
-import pendulum_limits  # noqa: E402
+import pendulum_limits
 
 
 @pytest.mark.parametrize("name", pendulum_limits.VARIANTS)

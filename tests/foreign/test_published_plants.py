@@ -1,15 +1,12 @@
 """The published plants of examples/plants: the report's figures computed again with numpy, and the placement beside scipy's."""
 
-import sys
 import warnings
 
 import pytest
 
 from conftest import ROOT
 
-sys.path.insert(0, str(ROOT / "scripts"))
-
-import published_plants  # noqa: E402
+import published_plants
 
 PLANTS = sorted((ROOT / "examples" / "plants").glob("*.toml"))
 

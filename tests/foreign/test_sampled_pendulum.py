@@ -2,15 +2,12 @@
 
 import json
 import re
-import sys
 
 import pytest
 
 from conftest import ROOT
 
-sys.path.insert(0, str(ROOT / "scripts"))
-
-from residual_over_sample_time import (  # noqa: E402
+from residual_over_sample_time import (
     CONSTANT,
     CONSTANT_PREDICTION,
     RAMP,

@@ -48,6 +48,12 @@ pub(crate) fn in_range(what: &'static str, m: DMatrix<f64>) -> Result<DMatrix<f6
     if m.iter().all(|value| value.is_finite()) { Ok(m) } else { Err(Error::Overflow { what }) }
 }
 
+/// A number of rows, inputs or samples as a float.
+#[expect(clippy::cast_precision_loss, reason = "far below 2^52")]
+pub(crate) fn as_number(count: usize) -> f64 {
+    count as f64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,6 +2,7 @@
 
 use super::Delay;
 use super::chi_square::{normal_below, normal_density};
+use crate::check::as_number;
 use crate::{Error, check};
 use nalgebra::{DMatrix, DVector};
 
@@ -101,8 +102,8 @@ impl Cusum {
         0.5 * self.run_length(0.0)
     }
 
-    /// A lower bound of the mean number of samples between false alarms while a residual without faults
-    /// has any mean of at most `bias`: that of the constant mean `bias`.
+    /// A lower bound of the mean number of samples between false alarms if errors of the model move the
+    /// mean of the residual by at most `bias`, in either direction: the number for the constant mean `bias`.
     #[must_use]
     pub fn between_false_alarms_with_bias(&self, bias: f64) -> f64 {
         let bias = bias.abs();
@@ -120,7 +121,7 @@ impl Cusum {
     #[must_use]
     pub fn run_length(&self, mean: f64) -> f64 {
         let (group, test) = self.grouped();
-        real(group) * test.single_run_length(mean * real(group).sqrt())
+        as_number(group) * test.single_run_length(mean * as_number(group).sqrt())
     }
 
     fn single_run_length(&self, mean: f64) -> f64 {
@@ -157,10 +158,12 @@ impl Cusum {
         while missed.len() <= most {
             let start = missed.len() - 1;
             let sum: f64 = (start..start + group).map(&mean).sum();
-            sums.step(sign * sum / real(group).sqrt());
+            sums.step(sign * sum / as_number(group).sqrt());
             let (before, left) = (missed[start], sums.total());
             // Within a group the probability is interpolated.
-            missed.extend((1..=group).map(|k| before + (left - before) * real(k) / real(group)));
+            missed.extend(
+                (1..=group).map(|k| before + (left - before) * as_number(k) / as_number(group)),
+            );
             if left < 1e-6 {
                 break;
             }
@@ -176,7 +179,7 @@ impl Cusum {
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 1e10")]
         let group = (self.threshold / REDUCED).powi(2).ceil() as usize;
-        let root = real(group).sqrt();
+        let root = as_number(group).sqrt();
         let threshold = (self.threshold + EXCESS) / root - EXCESS;
         (group, Self { drift: self.drift * root, threshold })
     }
@@ -252,13 +255,15 @@ fn gauss_legendre(count: usize) -> (Vec<f64>, Vec<f64>) {
     let legendre = |x: f64| {
         let (mut before, mut value) = (1.0, x);
         for k in 2..=count {
-            let next = (real(2 * k - 1) * x * value - real(k - 1) * before) / real(k);
+            let next =
+                (as_number(2 * k - 1) * x * value - as_number(k - 1) * before) / as_number(k);
             (before, value) = (value, next);
         }
-        (value, real(count) * (x * value - before) / (x * x - 1.0))
+        (value, as_number(count) * (x * value - before) / (x * x - 1.0))
     };
     let root = |at: usize| {
-        let mut x = (std::f64::consts::PI * (real(at) + 0.75) / (real(count) + 0.5)).cos();
+        let mut x =
+            (std::f64::consts::PI * (as_number(at) + 0.75) / (as_number(count) + 0.5)).cos();
         for _ in 0..100 {
             let (value, slope) = legendre(x);
             x -= value / slope;
@@ -269,11 +274,6 @@ fn gauss_legendre(count: usize) -> (Vec<f64>, Vec<f64>) {
         (x, 2.0 / ((1.0 - x * x) * legendre(x).1.powi(2)))
     };
     (0..count).map(root).unzip()
-}
-
-#[expect(clippy::cast_precision_loss, reason = "numbers of samples are far below 2^52")]
-fn real(number: usize) -> f64 {
-    number as f64
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::Delay;
 use super::chi_square::{noncentral_quantile, noncentral_survival};
 use crate::Error;
+use crate::check::as_number;
 
 /// At most as many phases of a window are averaged for a delay.
 const PHASES: usize = 32;
@@ -43,7 +44,7 @@ impl WindowTest {
         samples: f64,
         bias: f64,
     ) -> Result<Self, Error> {
-        let length = real(window);
+        let length = as_number(window);
         if residuals == 0 || window == 0 {
             let (name, rule) = ("the number of residuals or of samples", "at least 1");
             return Err(Error::OutOfRange { name, value: 0.0, rule });
@@ -63,13 +64,13 @@ impl WindowTest {
     /// The mean number of samples between false alarms, residuals with mean zero.
     #[must_use]
     pub fn between_false_alarms(&self) -> f64 {
-        real(self.window) / self.alarm_probability(0.0)
+        as_number(self.window) / self.alarm_probability(0.0)
     }
 
     /// The probability of an alarm in a window in which the mean of the residuals has this length.
     #[must_use]
     pub fn alarm_probability(&self, mean: f64) -> f64 {
-        noncentral_survival(self.residuals, real(self.window) * mean * mean, self.threshold)
+        noncentral_survival(self.residuals, as_number(self.window) * mean * mean, self.threshold)
     }
 
     /// The distribution of the delay of a fault that moves the mean of the residuals to `mean(k)`, m
@@ -93,23 +94,18 @@ impl WindowTest {
                 if k == end {
                     let shift = sums[end].iter().zip(&sums[start]).map(|(end, start)| end - start);
                     let squared: f64 = shift.map(|value| value * value).sum();
-                    let noncentrality = squared / real(self.window);
+                    let noncentrality = squared / as_number(self.window);
                     left *=
                         1.0 - noncentral_survival(self.residuals, noncentrality, self.threshold);
                     (start, end) = (end, end + self.window);
                 }
-                *missed += left / real(phases);
+                *missed += left / as_number(phases);
             }
         }
         let done = missed.iter().position(|missed| *missed < 1e-6).unwrap_or(most);
         missed.truncate(done + 1);
         Delay { missed }
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "numbers of samples are far below 2^52")]
-fn real(number: usize) -> f64 {
-    number as f64
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! Loss of effectiveness: its estimate, and the loss up to which the loop is stable.
 
-use super::lossy_loop::{LossyLoop, as_number, grid};
+use super::lossy_loop::{LossyLoop, grid};
 use crate::aso::FaultyPlant;
+use crate::check::as_number;
 use crate::{Error, StateSpace};
 
 /// Largest number of points of the grid over several inputs.

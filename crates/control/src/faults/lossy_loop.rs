@@ -8,6 +8,7 @@ mod certified;
 pub use certified::CertifiedLoss;
 
 use crate::aso::FaultyPlant;
+use crate::check::as_number;
 use crate::controller::closed_loop;
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace, check};
@@ -180,11 +181,6 @@ impl LossyLoop {
             None => Ok(()),
         }
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a count far below 2^52")]
-pub(super) fn as_number(count: usize) -> f64 {
-    count as f64
 }
 
 /// The corners of the box from 0 to `largest`.
