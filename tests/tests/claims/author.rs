@@ -1,9 +1,9 @@
 //! Tests of the author's view: the examples, `aso-ftc new`, `aso-ftc pack PATH`.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use fmu_description::ModelDescription;
@@ -64,6 +64,22 @@ fn a_model_is_one_file_of_fewer_than_60_lines_and_a_ball_for_both_interfaces_of_
     }
 }
 
+/// All files below `folder`, by their paths in it.
+fn content(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let (mut found, mut open) = (BTreeMap::new(), vec![folder.to_owned()]);
+    while let Some(next) = open.pop() {
+        for path in fs::read_dir(next).unwrap().map(|item| item.unwrap().path()) {
+            if path.is_dir() {
+                open.push(path);
+            } else {
+                let name = path.strip_prefix(folder).unwrap().to_owned();
+                found.insert(name, fs::read(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
 #[test]
 fn a_new_crate_with_the_files_of_its_author_is_packed_to_the_same_bytes_in_any_folder() {
     let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
@@ -74,8 +90,13 @@ fn a_new_crate_with_the_files_of_its_author_is_packed_to_the_same_bytes_in_any_f
         assert!(output.status.success(), "{}", message(&output));
         fs::read(folder.path().join("HeatPump.fmu")).unwrap()
     });
-    assert!(one == other);
-    let fmu = Unpacked::open_whole(&folders[0].path().join("HeatPump.fmu")).unwrap();
+    let [fmu, second] = folders
+        .each_ref()
+        .map(|folder| Unpacked::open_whole(&folder.path().join("HeatPump.fmu")).unwrap());
+    let (first, second) = (content(fmu.folder()), content(second.folder()));
+    let differs = |path: &&PathBuf| first.get(*path) != second.get(*path);
+    let different: BTreeSet<_> = first.keys().chain(second.keys()).filter(differs).collect();
+    assert!(one == other, "files that differ: {different:?}");
     let library = fs::read(fmu.library("HeatPump").unwrap()).unwrap();
     let home = std::env::var("HOME").unwrap_or_default();
     for path in [folders[0].path(), &root(), Path::new(&home)] {
