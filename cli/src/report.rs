@@ -12,7 +12,7 @@ pub(crate) struct Options {
     /// The results file, .csv or .parquet, of this program or another one
     #[arg(value_name = "RESULTS")]
     results: PathBuf,
-    /// A second results file: also show the difference of both
+    /// A second results file, which is subtracted from the first
     #[arg(long, value_name = "RESULTS")]
     against: Option<PathBuf>,
     /// Show these variables only, by name or pattern (`plant.*`); may be repeated

@@ -84,7 +84,7 @@ fn remaining(b: &DMatrix<f64>, gone: &[usize], authority: &[f64]) -> Result<DMat
 pub struct Equilibrium {
     /// The states, n.
     pub x: DVector<f64>,
-    /// The commands, m; zero for inputs that are gone.
+    /// The m commands; 0 for inputs that are gone.
     pub u: DVector<f64>,
     /// Norm of C x: what is left of the outputs that should be zero.
     pub left: f64,

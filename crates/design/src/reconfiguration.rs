@@ -47,7 +47,7 @@ pub(crate) struct Reconfigurations {
 pub(crate) struct Reconfiguration {
     pub(crate) actuator: usize,
     pub(crate) stuck_at: f64,
-    /// None if only the fall-back serves this case.
+    /// None if the controller falls back without this actuator.
     pub(crate) gains: Option<ReconfiguredGains>,
     /// The states of the fault model that restart at 0.
     pub(crate) restart: Vec<usize>,

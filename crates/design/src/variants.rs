@@ -23,7 +23,7 @@ pub(crate) struct Variant {
     operating: [Option<Vec<f64>>; 2],
 }
 
-/// The schedule of a controller: its variable, and plants at some of its values.
+/// The schedule of a controller: the variable that selects the gains, and the plant at each grid point.
 #[derive(Clone)]
 pub(crate) struct Schedule {
     pub(crate) variable: Variable,

@@ -12,7 +12,7 @@ pub(crate) struct FallbackRequest {
     pub(crate) actuators: Vec<usize>,
     /// The largest fraction of its effect that one of them may lose; 1 if it may be gone.
     pub(crate) loss: f64,
-    /// The region of the eigenvalues in all cases, if stated.
+    /// The region in which the eigenvalues must be in all cases; None if the file states none.
     pub(crate) region: Option<Region>,
     pub(crate) place: Place,
 }

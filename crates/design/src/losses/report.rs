@@ -70,7 +70,8 @@ pub struct LossProof {
 /// The bound of a state under a disturbance, for all losses up to the stated ones.
 #[derive(Serialize, JsonSchema)]
 pub struct LossPeak {
-    /// The disturbance: a fault, or the command of the operating point that an actuator loses.
+    /// What moves the state: the name of a fault, or of an actuator, which loses a part of its command at the
+    /// operating point.
     pub disturbance: String,
     /// The largest absolute value of the disturbance.
     pub size: f64,

@@ -30,7 +30,7 @@ pub(super) fn reconfiguration(report: &Report) -> Markup {
     }
 }
 
-/// The sets of actuators without which the fall-back is in force.
+/// A table of the sets of actuators that have no gains of their own: when they are gone, the controller falls back.
 fn by_fallback(found: &[ServedByFallback]) -> Markup {
     let row = |own: &ServedByFallback| {
         let stable = Cell::Holds(own.stable);
