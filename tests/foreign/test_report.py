@@ -158,17 +158,43 @@ def test_the_report_of_a_run_has_its_system_its_algorithm_and_units(of_a_run):
     assert "rad" in {plot["unit"] for plot in plots}
 
 
+def in_a_browser(page, folder, script):
+    """The page after `script`, which follows its own scripts."""
+    text = page.read_text(encoding="utf-8").replace("</body>", f"<script>{script}</script></body>")
+    probe = folder / "probe.html"
+    probe.write_text(text, encoding="utf-8")
+    words = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}"]
+    words += ["--virtual-time-budget=8000", "--enable-logging=stderr", "--dump-dom", probe.as_uri()]
+    done = subprocess.run([BROWSER, *words], capture_output=True, text=True, timeout=120, check=True)
+    assert "CONSOLE" not in done.stderr, done.stderr
+    return html.fromstring(done.stdout)
+
+
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_a_browser_draws_every_plot_without_an_error_or_a_request(of_a_run, tmp_path):
-    done = subprocess.run(
-        [
-            BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}", "--dump-dom",
-            "--virtual-time-budget=8000", "--enable-logging=stderr", of_a_run.as_uri(),
-        ],
-        capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
-    page = html.fromstring(done.stdout)
+    script = "document.title = performance.getEntriesByType('resource').length"
+    page = in_a_browser(of_a_run, tmp_path, script)
     plots = json.loads(page.xpath("//script[@id='data']")[0].text)
     assert len(page.xpath("//figure//canvas")) == len(plots) > 2
-    assert "CONSOLE" not in done.stderr, done.stderr
-    assert page.xpath("//input[@id='to']")
+    assert page.xpath("//title")[0].text == "0"
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_the_controls_zoom_all_plots_and_show_the_difference(aso_ftc, write, tmp_path):
+    report(aso_ftc, write("own.csv", frame()), "--against", write("other.csv", frame(137, 0.25)))
+    script = """
+    const id = (name) => document.getElementById(name);
+    const range = () => [Number(id("from").value), Number(id("to").value)];
+    const curves = () => document.querySelectorAll(".u-legend .u-series").length;
+    const found = [range(), curves()];
+    id("closer").click(); found.push(range());
+    id("later").click(); found.push(range());
+    id("from").value = 1; id("to").value = 2; id("controls").requestSubmit(); found.push(range());
+    document.querySelector("input[value=difference]").click(); found.push(range(), curves());
+    id("all").click(); found.push(range());
+    document.title = JSON.stringify(found);"""
+    found = json.loads(in_a_browser(tmp_path / "own.html", tmp_path, script).xpath("//title")[0].text)
+    whole, both, closer, later, typed, kept, differences, end = found
+    assert (whole, closer, later, typed, kept, end) == ([0, 4], [1, 3], [2, 4], [1, 2], [1, 2], [0, 4])
+    # Each plot has a line for the time, and one for each curve.
+    assert both - differences == 3
