@@ -1,6 +1,6 @@
 # Recipes for daily work; `just --list` prints them. scripts/test runs all tests.
 
-features := "tests/fmi,aso-control/lmi"
+features := "tests/fmi,aso-control/lmi,aso-ftc/sbom"
 
 # Format, lints and unit tests: under two minutes once everything is built.
 quick:
