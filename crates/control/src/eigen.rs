@@ -1,9 +1,11 @@
 //! Eigenvalues of a real square matrix.
 
 mod francis;
+mod hamiltonian;
 
 use crate::balance::Balance;
 use crate::{Error, check};
+pub(crate) use hamiltonian::Hamiltonian;
 use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, Schur};
 
 /// Largest number of QR iterations per row of the matrix; two or three are usual.

@@ -1,9 +1,8 @@
 //! The H-infinity norm.
 
 use super::known::KnownResponse;
-use crate::balance::Balance;
 use crate::blocks::block_2x2;
-use crate::eigen::eigenvalues;
+use crate::eigen::{Hamiltonian, eigenvalues};
 use crate::svd::norm_2;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
@@ -48,7 +47,8 @@ pub struct HInfinity {
 /// need not be decided which eigenvalues are imaginary; of a large matrix those that are clearly not
 /// are left out. Otherwise the largest value found, raised to
 /// the local maximum about it, replaces gamma. A sampled system is first transformed to a continuous one
-/// by z = (1 + s) / (1 - s). About 100 n^3 multiplications for the eigenvalues and 4 n^2 (1 + m) for
+/// by z = (1 + s) / (1 - s). About 100 n^3 multiplications for the eigenvalues, a quarter of them from n = 48
+/// on, where the square of the Hamiltonian matrix is reduced (Van Loan 1984), and 4 n^2 (1 + m) for
 /// each of the 4 n frequencies in a round; usually 1 or 2 rounds.
 ///
 /// Source: N. A. Bruinsma and M. Steinbuch, A fast algorithm to compute the H-infinity norm of a
@@ -185,19 +185,21 @@ fn crossings(system: &StateSpace, gamma: f64) -> Result<Vec<f64>, Error> {
     let inverse = r.try_inverse().ok_or(overflow)?;
     let a = &system.a + &b * &inverse * d.tr_mul(&c);
     let weight = DMatrix::identity(p, p) + &d * &inverse * d.transpose();
-    let hamiltonian = block_2x2(
-        [&a, &(&b * inverse * b.transpose())],
-        [&-(c.tr_mul(&weight) * &c), &-a.transpose()],
-    );
+    let (g, q) = (&b * inverse * b.transpose(), -(c.tr_mul(&weight) * &c));
+    let hamiltonian = block_2x2([&a, &g], [&q, &-a.transpose()]);
     let hamiltonian = check::in_range("the Hamiltonian matrix", hamiltonian)?;
-    let rounding = if hamiltonian.nrows() < LARGE {
-        f64::INFINITY
+    let mut found = if hamiltonian.nrows() < LARGE {
+        eigenvalues(&hamiltonian)?.iter().map(|x| x.im.abs()).collect()
     } else {
-        ROUNDING * Balance::new(&hamiltonian).matrix.norm()
+        let halved = Hamiltonian::balanced(&a, &g, &q);
+        let rounding = ROUNDING * halved.norm();
+        let possible = |x: &&Complex<f64>| x.re.abs() <= rounding.max(IMAGINARY * x.norm());
+        let all = match halved.eigenvalues() {
+            Some(all) => all,
+            None => eigenvalues(&hamiltonian)?,
+        };
+        all.iter().filter(possible).map(|x| x.im.abs()).collect::<Vec<_>>()
     };
-    let possible = |x: &&Complex<f64>| x.re.abs() <= rounding.max(IMAGINARY * x.norm());
-    let all = eigenvalues(&hamiltonian)?;
-    let mut found: Vec<f64> = all.iter().filter(possible).map(|x| x.im.abs()).collect();
     found.push(0.0);
     found.sort_by(f64::total_cmp);
     found.dedup();
