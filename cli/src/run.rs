@@ -14,7 +14,9 @@ use anyhow::{Context, bail};
 use fmu_import::CallLog;
 use master::{Coupling, Port, Simulation, System, SystemError, by_direct_dependencies};
 use results::Selection;
-use study::{AssemblyOptions, Config, Every, Plan, PreparedRun, Run, RunEnd, RunStatistics};
+use study::{
+    AssemblyOptions, Config, Every, Plan, PreparedRun, RealTime, Run, RunEnd, RunStatistics,
+};
 
 use crate::logging;
 use crate::plot;
@@ -54,6 +56,8 @@ struct Started {
     units: Vec<(String, String)>,
     /// What the report says about the run, if one is requested.
     report: Option<report::Run>,
+    /// The pacing by the clock, if one is requested.
+    pace: Option<RealTime>,
 }
 
 /// Prepares and starts the run; `None` if only the configuration was requested.
@@ -83,7 +87,8 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     let units = units(system, ports);
     let report = options.report.then(|| facts::facts(system, plan));
     let run = prepared.start(saved.as_ref())?;
-    Ok(Some(Started { run, here, units, report }))
+    let pace = options.real_time.map(RealTime::new);
+    Ok(Some(Started { run, here, units, report, pace }))
 }
 
 /// Prints the connections and, if variables are connected `by_name`, the inputs without one.
@@ -188,10 +193,19 @@ fn units(system: &System, ports: &[Port]) -> Vec<(String, String)> {
 impl Started {
     fn go(mut self) -> ExitCode {
         let start = self.run.simulation.time();
-        let ended = advance(&mut self.run, |_| Ok(()));
+        let ended = match &mut self.pace {
+            None => advance(&mut self.run, |_| Ok(())),
+            Some(pace) => advance(&mut self.run, |simulation| {
+                pace.wait(simulation.time(), interrupt::is_raised);
+                Ok(())
+            }),
+        };
         let tally = self.run.tally();
         let time = self.run.simulation.time();
-        let outcome = summary(tally, start, time);
+        let mut outcome = summary(tally, start, time);
+        if let Some(pace) = &self.pace {
+            outcome = format!("{outcome}; {}", pace.overruns());
+        }
         println!("{outcome}");
         self.warn_of_fallbacks(tally);
         let written = self.write(&ended);

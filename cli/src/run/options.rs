@@ -6,7 +6,10 @@ use anyhow::{Context, bail};
 use master::{AlgorithmRequest, Coupling, Extrapolation, Method, StepControl};
 use toml::Spanned;
 
-use study::{Config, ConnectionEntry, Every, Interface, LoadedConfig, Memory, SavedRun, Solver};
+use study::{
+    Config, ConnectionEntry, Every, Interface, LoadedConfig, Memory, RealTimeFactor, SavedRun,
+    Solver,
+};
 
 /// Default folder of the results.
 const OUT: &str = "results/run";
@@ -135,6 +138,11 @@ pub(crate) struct Options {
     /// Folder for all files written [default: results/run]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
+    /// Pace the run by the clock: FACTOR seconds of simulated time take one second [default without
+    /// a value: 1]. Steps that end late are counted
+    #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1")]
+    #[arg(allow_negative_numbers = true, value_parser = str::parse::<RealTimeFactor>)]
+    pub(super) real_time: Option<RealTimeFactor>,
     /// Run each FMU in a separate process
     #[arg(long)]
     isolate: bool,

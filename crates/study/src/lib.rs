@@ -16,6 +16,7 @@ mod link;
 mod log_fields;
 #[cfg(feature = "load")]
 mod plan;
+mod real_time;
 #[cfg(feature = "load")]
 mod record;
 #[cfg(feature = "load")]
@@ -37,6 +38,7 @@ pub use link::link;
 pub use log_fields::LogFields;
 #[cfg(feature = "load")]
 pub use plan::{Plan, plan};
+pub use real_time::{Overruns, RealTime, RealTimeFactor};
 #[cfg(feature = "load")]
 pub use record::{Recorder, keep_results, select, unit};
 #[cfg(feature = "load")]
