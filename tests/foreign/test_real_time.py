@@ -14,7 +14,7 @@ SYSTEMS = {
     "FMUs": FMUS,
     "--fmu": ["--fmu", f"plant={FMUS[0]}", "--fmu", f"controller={FMUS[1]}"],
     "SSP": [ROOT / "dist" / "InvertedPendulum.ssp"],
-    "system.toml": [ROOT / "docs" / "tutorials" / "first" / "servo.toml"],
+    "system.toml": ["system.toml"],
 }
 
 
@@ -28,13 +28,17 @@ def overruns(text):
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_a_paced_run_takes_its_time_and_keeps_its_bits(aso_ftc, tmp_path, system):
     paced, free = tmp_path / "paced", tmp_path / "free"
+    files = "".join(f"{name} = '{fmu}'\n" for name, fmu in zip(["plant", "controller"], FMUS))
+    (tmp_path / "system.toml").write_text(f"[fmus]\n{files}", encoding="utf-8")
+    named = [tmp_path / one if one == "system.toml" else one for one in SYSTEMS[system]]
+    options = [*named, "--stop-time", 0.4, "--out"]
     begin = time.monotonic()
-    done = aso_ftc("run", *SYSTEMS[system], "--stop-time", 0.4, "--out", paced, "--real-time", 2)
-    assert time.monotonic() - begin >= 0.2
+    done = aso_ftc("run", *options, paced, "--real-time", 2)
     assert done.returncode == 0, done.stderr
+    assert time.monotonic() - begin >= 0.2
     assert "paced at 2 times real time" in done.stdout
-    done = aso_ftc("run", *SYSTEMS[system], "--stop-time", 0.4, "--out", free)
-    assert done.returncode == 0 and "paced" not in done.stdout
+    done = aso_ftc("run", *options, free)
+    assert done.returncode == 0 and "paced at" not in done.stdout
     assert (paced / "results.csv").read_bytes() == (free / "results.csv").read_bytes()
 
 
@@ -60,7 +64,7 @@ def test_a_wait_ends_with_ctrl_c(tmp_path):
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=5)
     assert process.returncode == 130 and "the run was interrupted" in said
-    assert (tmp_path / "results.csv").read_text(encoding="utf-8").startswith("time")
+    assert len((tmp_path / "results.csv").read_text(encoding="utf-8").splitlines()) > 1
 
 
 @pytest.mark.parametrize("factor", ["0", "-1", "nan", "inf", "1e999", "system.toml"])

@@ -107,10 +107,9 @@ impl RealTime {
                 return;
             }
             let left = Duration::try_from_secs_f64(left).unwrap_or(Duration::MAX);
-            if left > SPIN {
-                std::thread::sleep((left - SPIN).min(SLICE));
-            } else {
-                std::hint::spin_loop();
+            match left.checked_sub(SPIN) {
+                Some(sleep) => std::thread::sleep(sleep.min(SLICE)),
+                None => std::hint::spin_loop(),
             }
         }
     }
