@@ -29,7 +29,7 @@ const HYSTERESIS: f64 = 1e-9;
 /// Fields without a comment have the name of their FMI variable.
 #[derive(Clone, Serialize, Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that are independent")]
-pub(crate) struct AsoController {
+pub struct AsoController {
     /// Copied where a parameter is changed, not with an FMU state.
     pub(crate) design: Shared<Design>,
     pub(crate) x_hat_0: Vec<f64>,
@@ -318,34 +318,24 @@ fn clock_rounding(time: f64) -> f64 {
     8.0 * f64::EPSILON * time.abs()
 }
 
-impl Model for AsoController {
-    const IDENTIFIER: &'static str = "AsoController";
-
-    const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = true;
-
-    fn about(&self) -> About {
-        About {
-            description: self.design.description.clone(),
-            author: String::new(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            license: env!("CARGO_PKG_LICENSE").to_owned(),
-            default_experiment: DefaultExperiment {
-                start_time: Some(0.0),
-                stop_time: Some(self.design.experiment.stop_time),
-                tolerance: Some(1e-9),
-                step_size: Some(self.design.step_size()),
-            },
-        }
+impl AsoController {
+    /// The controller of the design in `text`, the content of `design.toml`.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] if the design is refused.
+    pub fn from_design(text: &str) -> Result<Self, Failure> {
+        let design = Design::parse(text, "design.toml".to_owned());
+        design.map(Self::with).map_err(|error| Failure::Error(error.to_string()))
     }
 
-    fn new(resources: &Path) -> Result<Self, Failure> {
-        let design = Design::read(resources).map_err(|error| Failure::Error(error.to_string()))?;
+    fn with(design: Design) -> Self {
         let operating = design.states.iter().map(|state| state.operating.unwrap_or_default());
         let (mut values, deviations) = (Values::zero(&design), Signals::zero(&design));
         let operating_point = OperatingPoint::of(&design);
         values.r.copy_from_slice(&operating_point.r);
         let start = design.schedule.as_ref().map_or(0.0, |schedule| schedule.range()[0]);
-        Ok(Self {
+        Self {
             x_hat_0: operating.collect(),
             f_hat_0: vec![0.0; design.faults.len()],
             x_i_0: vec![0.0; design.integrals()],
@@ -372,7 +362,33 @@ impl Model for AsoController {
             operating_point,
             deviations,
             design: Shared::from(design),
-        })
+        }
+    }
+}
+
+impl Model for AsoController {
+    const IDENTIFIER: &'static str = "AsoController";
+
+    const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = true;
+
+    fn about(&self) -> About {
+        About {
+            description: self.design.description.clone(),
+            author: String::new(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            license: env!("CARGO_PKG_LICENSE").to_owned(),
+            default_experiment: DefaultExperiment {
+                start_time: Some(0.0),
+                stop_time: Some(self.design.experiment.stop_time),
+                tolerance: Some(1e-9),
+                step_size: Some(self.design.step_size()),
+            },
+        }
+    }
+
+    fn new(resources: &Path) -> Result<Self, Failure> {
+        let design = Design::read(resources).map_err(|error| Failure::Error(error.to_string()))?;
+        Ok(Self::with(design))
     }
 
     fn variables(&self) -> Vec<Variable<Self>> {

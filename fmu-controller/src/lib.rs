@@ -20,6 +20,7 @@ mod shared;
 mod signals;
 mod variables;
 
-use controller::AsoController;
+pub use controller::AsoController;
 
+#[cfg(feature = "export")]
 fmu::export!(AsoController);

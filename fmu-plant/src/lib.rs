@@ -11,6 +11,7 @@ mod pendulum;
 mod plant;
 pub mod response;
 
-use pendulum::FrictionPendulum;
+pub use pendulum::FrictionPendulum;
 
+#[cfg(feature = "export")]
 fmu::export!(FrictionPendulum);

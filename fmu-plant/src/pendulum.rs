@@ -18,7 +18,7 @@ mod variables;
 
 /// Inverted pendulum on a cart with Stribeck friction; fields carry the names of the variables.
 #[derive(Clone, Serialize, Deserialize)]
-pub(crate) struct FrictionPendulum {
+pub struct FrictionPendulum {
     parameters: Parameters,
     /// `[x_p_0, theta_0, v_p_0, omega_0]`.
     initial: [f64; 4],

@@ -12,6 +12,7 @@ use std::ffi::{CStr, CString, c_char, c_void};
 use std::mem::MaybeUninit;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use fmu_description::abi::{
     self, DescribeSink, Status, fmi2Boolean, fmi2CallbackFunctions, fmi2Component, fmi2FMUstate,
@@ -38,6 +39,8 @@ pub(crate) enum Callbacks {
     Version2 { functions: fmi2CallbackFunctions, instance_name: CString },
     /// FMI 3.0.
     Version3 { environment: fmi3InstanceEnvironment, log: Option<fmi3LogMessageCallback> },
+    /// An importer in the same program, which collects the messages.
+    Linked(Arc<Mutex<Vec<String>>>),
 }
 
 // SAFETY: by the standard the importer's callbacks may be called from any thread that calls the FMU;
@@ -54,10 +57,17 @@ impl Callbacks {
     /// Sends a message to the importer's logger. The format string of FMI 2.0 is `%s`; `#`, by which the
     /// standard marks value references, is doubled.
     pub(crate) fn log(&self, status: Status, category: &str, message: &str) {
+        if let Self::Linked(messages) = self {
+            return messages
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .push(message.to_owned());
+        }
         let c_string = |text: &str| CString::new(text.replace('\0', "")).unwrap_or_default();
         let (category, message) = (c_string(category), c_string(&message.replace('#', "##")));
         let (category, message) = (category.as_ptr(), message.as_ptr());
         match self {
+            Self::Linked(_) => {}
             Self::Version2 { functions, instance_name } => {
                 let Some(logger) = functions.logger else { return };
                 let (environment, name) = (functions.component_environment, instance_name.as_ptr());
@@ -197,10 +207,9 @@ pub(crate) fn filled<T: Copy>(room: &mut [MaybeUninit<T>], value: T) -> &mut [T]
     unsafe { &mut *(std::ptr::from_mut(room) as *mut [T]) }
 }
 
-/// Converts values to memory for output values.
-#[cfg(test)]
+/// Converts values to memory for output values, which its user only writes.
 pub(crate) fn room_of<T: Copy>(values: &mut [T]) -> &mut [MaybeUninit<T>] {
-    // SAFETY: the tests hand this to functions that only write values.
+    // SAFETY: the functions of the instance that take this only write values.
     unsafe { &mut *(std::ptr::from_mut(values) as *mut [MaybeUninit<T>]) }
 }
 

@@ -122,23 +122,27 @@ impl<M: Model> Instance<M> {
         guid: &str,
         callbacks: Callbacks,
     ) -> Result<Self, Failure> {
-        let instance = Self::build(resources, callbacks, |interface, description| {
-            interface.restrict(description)?;
-            if interface_type == InterfaceType::ModelExchange && !interface.offers_exchange() {
-                let message =
-                    "fmuType is fmi2ModelExchange, and this FMU offers co-simulation only";
-                return Err(Failure::Error(message.to_owned()));
-            }
-            check_guid::<M>(interface.guid, "GUID", guid, resources)?;
-            Ok(None)
-        })?;
+        let instance = Self::build(
+            || new_model::<M>(resources),
+            callbacks,
+            |interface, description| {
+                interface.restrict(description)?;
+                if interface_type == InterfaceType::ModelExchange && !interface.offers_exchange() {
+                    let message =
+                        "fmuType is fmi2ModelExchange, and this FMU offers co-simulation only";
+                    return Err(Failure::Error(message.to_owned()));
+                }
+                check_guid::<M>(interface.guid, "GUID", guid, resources)?;
+                Ok(None)
+            },
+        )?;
         Ok(instance.into_type(interface_type))
     }
 
     /// Makes the model and its interface. `session` makes the part of FMI 3.0, and refuses what the
     /// importer may not ask for: inside of the fence, because the model is dropped then.
     fn build(
-        resources: &Path,
+        make: impl FnOnce() -> Result<M, Failure>,
         callbacks: Callbacks,
         session: impl FnOnce(
             &mut Interface<M>,
@@ -148,7 +152,7 @@ impl<M: Model> Instance<M> {
         // The guard outlives a panic of the model, during which it could not restore the hook.
         let hook_guard = HookGuard::new();
         let made = guarded(|| {
-            let mut fresh = new_model::<M>(resources)?;
+            let mut fresh = make()?;
             let messages = fresh.log().map(Log::take).unwrap_or_default();
             let (mut interface, mut description) = Interface::new(&mut fresh)?;
             let session = session(&mut interface, &mut description)?;
@@ -171,6 +175,25 @@ impl<M: Model> Instance<M> {
             })
         })?;
         Ok(made(hook_guard))
+    }
+
+    /// An instance for co-simulation of `model` in the same program, with its model description of FMI 2.0.
+    pub(crate) fn linked(
+        model: M,
+        callbacks: Callbacks,
+    ) -> Result<(Self, ModelDescription), Failure> {
+        let mut described = None;
+        let instance = Self::build(
+            || Ok(model),
+            callbacks,
+            |interface, description| {
+                interface.restrict(description)?;
+                described = Some(description.clone());
+                Ok(None)
+            },
+        )?;
+        let missing = || Failure::Error("the model has no description".to_owned());
+        Ok((instance, described.ok_or_else(missing)?))
     }
 
     fn into_type(mut self, interface_type: InterfaceType) -> Self {

@@ -103,6 +103,7 @@ mod fence;
 pub mod ffi;
 mod instance;
 mod interface;
+mod linked;
 mod log;
 mod model;
 mod simulation;
@@ -117,6 +118,7 @@ pub use fmu_description::{self as description, Experiment};
 #[doc(hidden)]
 pub use fmu_description::{abi, abi3, call_order, call_order3};
 pub use interface::{describe, describe_3, problems};
+pub use linked::Linked;
 pub use log::Log;
 pub use model::{About, At, Event, Failure, Model, ModelExchange, Step};
 pub use simulation::Simulation;

@@ -109,7 +109,7 @@ fn only_tests_use_a_model_or_the_command() {
             let Some(dependencies) = manifest.get(section).and_then(toml::Value::as_table) else {
                 continue;
             };
-            for forbidden in ["fmu-plant", "fmu-controller", "aso-ftc", "aso-ftc-python"] {
+            for forbidden in ["fmu-plant", "fmu-controller", "aso-ftc", "aso-ftc-python", "web"] {
                 assert!(
                     !dependencies.contains_key(forbidden),
                     "{} uses {forbidden}",
@@ -147,6 +147,8 @@ fn unsafe_code_is_at_foreign_boundaries_only() {
         "tests/robustness/src/sequence3.rs",
         "tests/robustness/tests/robustness/uninitialised.rs",
         "fuzz/src/design.rs",
+        // The functions of the WebAssembly module.
+        "web/src/exports.rs",
     ];
     for file in files(&root(), "rs") {
         let path = name(&file);

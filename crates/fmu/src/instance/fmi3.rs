@@ -7,6 +7,7 @@ mod intermediate;
 mod step;
 mod values;
 
+use crate::interface::new_model;
 use std::path::Path;
 
 use super::{Instance, check_guid};
@@ -54,37 +55,45 @@ pub(crate) struct Instantiation<'a> {
 impl<M: Model> Instance<M> {
     /// `fmi3InstantiateModelExchange`, `fmi3InstantiateCoSimulation`.
     pub(crate) fn new_3(made: &Instantiation<'_>, callbacks: Callbacks) -> Result<Self, Failure> {
-        let mut instance = Self::build(made.resources, callbacks, |interface, description| {
-            let (table, _) = interface.convert(description)?;
-            if !interface.offers_exchange() {
-                if made.interface_type == InterfaceType::ModelExchange {
-                    return Err(Failure::Error("this FMU offers co-simulation only".to_owned()));
+        let mut instance = Self::build(
+            || new_model::<M>(made.resources),
+            callbacks,
+            |interface, description| {
+                let (table, _) = interface.convert(description)?;
+                if !interface.offers_exchange() {
+                    if made.interface_type == InterfaceType::ModelExchange {
+                        return Err(Failure::Error(
+                            "this FMU offers co-simulation only".to_owned(),
+                        ));
+                    }
+                    if made.event_mode_used {
+                        let message =
+                            "eventModeUsed is true, but hasEventMode of this FMU is false";
+                        return Err(Failure::Error(message.to_owned()));
+                    }
                 }
-                if made.event_mode_used {
-                    let message = "eventModeUsed is true, but hasEventMode of this FMU is false";
-                    return Err(Failure::Error(message.to_owned()));
-                }
-            }
-            check_guid::<M>(interface.guid, "instantiationToken", made.token, made.resources)?;
-            let indicators = vec![0.0; interface.event_indicators.unwrap_or_default()];
-            let wanted = |(update, required): (IntermediateUpdate, &[u32])| {
-                let sets = |name: &str| interface.interpolates(name);
-                let is_set = required.iter().any(|own| table.name(*own).is_some_and(sets));
-                is_set.then(|| Box::new(Intermediate::new(update, interface.interpolated.len())))
-            };
-            let intermediate = made.intermediate.and_then(wanted);
-            Ok(Some(Box::new(Session {
-                table,
-                event_mode_used: made.event_mode_used,
-                early_return_allowed: made.early_return_allowed,
-                intermediate,
-                places: Vec::new(),
-                integers: Vec::new(),
-                indicators,
-                structural: Vec::new(),
-                binaries: Vec::new(),
-            })))
-        })?;
+                check_guid::<M>(interface.guid, "instantiationToken", made.token, made.resources)?;
+                let indicators = vec![0.0; interface.event_indicators.unwrap_or_default()];
+                let wanted = |(update, required): (IntermediateUpdate, &[u32])| {
+                    let sets = |name: &str| interface.interpolates(name);
+                    let is_set = required.iter().any(|own| table.name(*own).is_some_and(sets));
+                    is_set
+                        .then(|| Box::new(Intermediate::new(update, interface.interpolated.len())))
+                };
+                let intermediate = made.intermediate.and_then(wanted);
+                Ok(Some(Box::new(Session {
+                    table,
+                    event_mode_used: made.event_mode_used,
+                    early_return_allowed: made.early_return_allowed,
+                    intermediate,
+                    places: Vec::new(),
+                    integers: Vec::new(),
+                    indicators,
+                    structural: Vec::new(),
+                    binaries: Vec::new(),
+                })))
+            },
+        )?;
         instance.debug_logging = true;
         instance.categories = (!made.logging_on).then(Vec::new);
         instance.session_mut()?.structural = instance.structural_parameters();

@@ -1,0 +1,9 @@
+//! The experiment of the paper in one program: plant, controller and master, as native.
+#![deny(unsafe_code)]
+
+mod exports;
+mod linked;
+mod paper;
+
+pub use linked::LinkedSlave;
+pub use paper::{COLUMNS, Paper};
