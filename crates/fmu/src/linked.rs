@@ -56,7 +56,7 @@ impl<M: Model> Linked<M> {
     calls! {
         /// `fmi2SetupExperiment`.
         setup_experiment = SetupExperiment(experiment: &Experiment),
-            instance => instance.setup_experiment(experiment.clone());
+            instance => instance.setup_experiment(*experiment);
         /// `fmi2EnterInitializationMode`.
         enter_initialization_mode = EnterInitializationMode(),
             instance => instance.enter_initialization_mode();

@@ -1,0 +1,12 @@
+import fs from "fs";
+const {instance:{exports:x}} = await WebAssembly.instantiate(fs.readFileSync(process.argv[2]),{});
+const s=new TextEncoder().encode("");x.text(0);
+const say=()=>{const n=x.text_length();const p=x.text(n);return new TextDecoder().decode(new Uint8Array(x.memory.buffer,p,n))};
+if(x.start(0.001,100)) throw say();
+const t=performance.now();
+if(x.advance(100001,10)) throw say();
+console.error((performance.now()-t).toFixed(0)+" ms");
+const r=new Float64Array(x.memory.buffer,x.rows(),x.rows_length());
+let out="time,plant.x_p,plant.theta,plant.v_p,plant.omega,plant.f_fric,plant.regime,controller.u,controller.f_hat\n";
+for(let i=0;i<r.length;i+=9) out+=Array.from(r.subarray(i,i+9)).join(",")+"\n";
+fs.writeFileSync(process.argv[3],out);
