@@ -47,23 +47,61 @@ pub extern "C" fn start(step: f64, stop: f64) -> i32 {
     told(Paper::new(&settings, step, stop).map(|paper| RUN.set(Some(paper))))
 }
 
-/// Makes up to `steps` steps and keeps a row before every `every`th of them; 1: a step failed.
+/// Sets an input or a tunable parameter, `fmu.variable=value` in the text buffer; 1: it is refused.
+#[unsafe(no_mangle)]
+pub extern "C" fn set() -> i32 {
+    let text = TEXT.with_borrow(|text| String::from_utf8_lossy(text).into_owned());
+    let (name, value) = text.split_once('=').unwrap_or((&text, ""));
+    with(|run| run.set(name.trim(), value.trim()))
+}
+
+/// Puts the gains that were designed into the text buffer; 1: no run is started.
+#[unsafe(no_mangle)]
+pub extern "C" fn gains() -> i32 {
+    let mut found = String::new();
+    let status = with(|run| {
+        found.push_str(run.gains());
+        Ok(())
+    });
+    if status == 0 {
+        TEXT.set(found.into_bytes());
+    }
+    status
+}
+
+/// Makes up to `steps` steps. Keeps a row at each multiple of `every` steps since the start, and one at the
+/// end; 1: a step failed.
 #[unsafe(no_mangle)]
 pub extern "C" fn advance(steps: u32, every: u32) -> i32 {
-    ROWS.set(Vec::new());
+    ROWS.with_borrow_mut(Vec::clear);
+    let keep = |row: [f64; 9]| ROWS.with_borrow_mut(|rows| rows.extend(row));
     with(|run| {
-        for step in 0..steps {
-            if step % every.max(1) == 0 {
-                let row = run.row()?;
-                ROWS.with_borrow_mut(|rows| rows.extend(row));
-            }
+        for _ in 0..steps {
             if run.is_finished() {
                 break;
             }
+            if run.steps() % u64::from(every.max(1)) == 0 {
+                keep(run.row()?);
+            }
             run.step()?;
+            if run.is_finished() {
+                keep(run.row()?);
+            }
         }
         Ok(())
     })
+}
+
+/// The time of the run in s; NaN: no run is started.
+#[unsafe(no_mangle)]
+pub extern "C" fn time() -> f64 {
+    RUN.with_borrow(|run| run.as_ref().map_or(f64::NAN, Paper::time))
+}
+
+/// Whether the stop time is reached: 1, or no run is started.
+#[unsafe(no_mangle)]
+pub extern "C" fn is_finished() -> i32 {
+    RUN.with_borrow(|run| run.as_ref().is_none_or(Paper::is_finished).into())
 }
 
 /// The address of the rows of the last [`advance`]: time and values, nine numbers each.

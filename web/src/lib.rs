@@ -4,6 +4,7 @@
 mod exports;
 mod linked;
 mod paper;
+mod settings;
 
 pub use linked::LinkedSlave;
 pub use paper::{COLUMNS, Paper};

@@ -116,7 +116,12 @@ impl<M: Model + Send> Slave for LinkedSlave<M> {
         self.done("fmi2GetRealOutputDerivatives", status)
     }
 
-    fn do_step(&mut self, time: f64, size: f64, _never_back: bool) -> Result<StepResult, CallError> {
+    fn do_step(
+        &mut self,
+        time: f64,
+        size: f64,
+        _never_back: bool,
+    ) -> Result<StepResult, CallError> {
         match self.0.do_step(time, size) {
             Status::Discard => Ok(StepResult::Part {
                 reached: self.0.last_successful_time(),

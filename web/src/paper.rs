@@ -1,11 +1,14 @@
 //! The closed loop of the paper: both models, connected by equal names.
 
+use std::collections::VecDeque;
+
 use controller::AsoController;
 use fmu::description::Experiment;
-use master::{AlgorithmRequest, Checkpoint, Probe, Simulation, System, choose};
+use master::{AlgorithmRequest, Checkpoint, Probe, Simulation, System, Value, choose};
 use plant::FrictionPendulum;
 
 use crate::LinkedSlave;
+use crate::settings::Settings;
 
 /// The design that the controller FMU contains.
 const DESIGN: &str = include_str!("../../fmu-controller/resources/design.toml");
@@ -22,44 +25,84 @@ pub const COLUMNS: [&str; 8] = [
     "controller.f_hat",
 ];
 
+/// Number of states that [`Paper::back`] can return to.
+const SAVED: usize = 240;
+
 /// A run of the closed loop.
 pub struct Paper {
     simulation: Simulation,
     probe: Probe,
-    saved: Option<Checkpoint>,
+    saved: VecDeque<(Checkpoint, u64)>,
+    /// Number of steps made.
+    steps: u64,
+    /// The gains that were designed for the run, as settings of the controller FMU.
+    gains: String,
 }
 
 impl Paper {
-    /// Starts a run with communication steps of `step` s until `stop` s; `settings` are lines
-    /// `fmu.variable=value`.
+    /// Starts a run with communication steps of `step` s until `stop` s. `settings` has a setting in each
+    /// line, see [`Settings::parse`].
     ///
     /// # Errors
     ///
-    /// A sentence: an unknown variable, a value out of its range, or a failure of a model.
+    /// A sentence: a setting that is unknown or out of its range, eigenvalues that make no observer, or a
+    /// failure of a model.
     pub fn new(settings: &str, step: f64, stop: f64) -> Result<Self, String> {
+        if !(step > 0.0 && stop > 0.0 && stop / step < 1e8) {
+            return Err(format!("a step of {step} s until {stop} s: expected both above 0"));
+        }
         let mut system = System::default();
         let plant = LinkedSlave::new(model::<FrictionPendulum>()?);
         let plant = plant.map_err(|failure| failure.to_string())?;
         let controller = AsoController::from_design(DESIGN).and_then(LinkedSlave::new);
         let controller = controller.map_err(|failure| failure.to_string())?;
-        let told = |error: master::SystemError| error.to_string();
         system.add("plant", Box::new(plant)).map_err(told)?;
         system.add("controller", Box::new(controller)).map_err(told)?;
         system.connect_equal_names().map_err(told)?;
-        for line in settings.lines().filter(|line| !line.trim().is_empty()) {
-            let (name, value) = line
-                .split_once('=')
-                .ok_or_else(|| format!("{line:?}: expected fmu.variable=value"))?;
-            let port = system.port(name.trim()).map_err(told)?;
-            system.set_port(port, value.trim()).map_err(told)?;
+        let settings = Settings::parse(settings)?;
+        let gains = settings.gains(DESIGN)?;
+        for (name, value) in settings.values.iter().chain(&gains) {
+            let port = system.port(name).map_err(told)?;
+            system.set_port(port, value).map_err(told)?;
         }
         let request = AlgorithmRequest { step: Some(step), ..AlgorithmRequest::default() };
         let algorithm = choose(&system, &request, stop).map_err(told)?.algorithm;
         let ports = COLUMNS.iter().map(|name| system.port(name)).collect::<Result<Vec<_>, _>>();
         let probe = Probe::new(&system, &ports.map_err(told)?);
+        let scenario = settings.scenario(&system, step)?;
         let experiment = Experiment { start_time: 0.0, stop_time: Some(stop), tolerance: None };
-        let simulation = Simulation::new(system, &algorithm, &experiment).map_err(told)?;
-        Ok(Self { simulation, probe, saved: None })
+        let simulation = Simulation::with_scenario(system, &algorithm, &experiment, scenario);
+        let gains = gains.iter().map(|(name, value)| format!("{name}={value}\n")).collect();
+        let simulation = simulation.map_err(told)?;
+        Ok(Self { simulation, probe, saved: VecDeque::new(), steps: 0, gains })
+    }
+
+    /// The gains that were designed for this run: lines `fmu.variable=value`, none for those of the paper.
+    pub fn gains(&self) -> &str {
+        &self.gains
+    }
+
+    /// The time in s.
+    pub fn time(&self) -> f64 {
+        self.simulation.time()
+    }
+
+    /// Number of steps made.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Sets an input without connection or a tunable parameter between two steps.
+    ///
+    /// # Errors
+    ///
+    /// A sentence: an unknown variable, or a value that it does not take.
+    pub fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
+        let system = self.simulation.system();
+        let port = system.port(name).map_err(told)?;
+        let parsed = Value::parse(&system.variable(port).kind, &[], value);
+        let parsed = parsed.map_err(|expected| format!("{name}={value}: expected {expected}"))?;
+        system.set_value(port, &parsed).map_err(told)
     }
 
     /// Whether the stop time is reached.
@@ -73,7 +116,8 @@ impl Paper {
     ///
     /// A sentence: the failure of a model.
     pub fn step(&mut self) -> Result<(), String> {
-        self.simulation.step().map_err(|error| error.to_string())
+        self.steps += 1;
+        self.simulation.step().map_err(told)
     }
 
     /// Returns the time in s and the values of [`COLUMNS`].
@@ -87,28 +131,47 @@ impl Paper {
         let values = &mut row[1..];
         let time = self.simulation.time();
         let read = self.probe.read(self.simulation.system(), time, values);
-        read.map(|()| row).map_err(|error| error.to_string())
+        read.map(|()| row).map_err(told)
     }
 
-    /// Saves the present state, for [`Paper::back`].
+    /// Saves the present state, for [`Paper::back`]; of many, the oldest is dropped.
     ///
     /// # Errors
     ///
     /// A sentence: a model cannot serialise its state.
     pub fn save(&mut self) -> Result<(), String> {
-        self.saved = Some(self.simulation.checkpoint().map_err(|error| error.to_string())?);
+        if self.saved.len() == SAVED {
+            self.saved.pop_front();
+        }
+        self.saved.push_back((self.simulation.checkpoint().map_err(told)?, self.steps));
         Ok(())
     }
 
-    /// Returns to the state of [`Paper::save`].
+    /// Returns to the state saved last, and forgets it.
     ///
     /// # Errors
     ///
     /// A sentence: no state is saved, or a model refuses it.
     pub fn back(&mut self) -> Result<(), String> {
-        let saved = self.saved.as_ref().ok_or("no state is saved")?;
-        self.simulation.restore(saved).map_err(|error| error.to_string())
+        let (saved, steps) = self.saved.pop_back().ok_or("no earlier state is kept")?;
+        self.simulation.restore(&saved).map_err(told)?;
+        self.steps = steps;
+        Ok(())
     }
+}
+
+/// An error as a sentence.
+fn told(error: impl std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(inner) = cause {
+        let more = inner.to_string();
+        if !text.contains(&more) {
+            text = format!("{text}: {more}");
+        }
+        cause = inner.source();
+    }
+    text
 }
 
 /// A model that needs no resources.

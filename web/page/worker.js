@@ -1,0 +1,146 @@
+"use strict";
+// Runs the WebAssembly module. Messages in: {kind: "start" | "run" | "pause" | "step" | "back" | "set", ..}.
+// Messages out: {kind: "ready" | "started" | "rows" | "set" | "back" | "refused" | "failed" | "stopped", ..}.
+const COLUMNS = 9; // of a row: the time and eight variables
+const EVERY = 10; // steps between two rows
+const FRAME = 16; // ms between two turns
+const SAVE_EVERY = 0.5; // s of simulated time between two kept states
+
+let wasm = null;
+let timer = null;
+let run = null; // {step, speed, time, saved, due}
+
+const loaded = WebAssembly.instantiateStreaming(fetch("paper.wasm"), {}).catch(async () =>
+  // A server that does not name the type of the file.
+  WebAssembly.instantiate(await (await fetch("paper.wasm")).arrayBuffer(), {}));
+
+function write(text) {
+  const bytes = new TextEncoder().encode(text);
+  const place = wasm.text(bytes.length);
+  new Uint8Array(wasm.memory.buffer, place, bytes.length).set(bytes);
+}
+
+function read() {
+  const length = wasm.text_length();
+  return new TextDecoder().decode(new Uint8Array(wasm.memory.buffer, wasm.text(length), length));
+}
+
+function pause() {
+  clearTimeout(timer);
+  timer = null;
+}
+
+// Makes `count` steps and sends their rows.
+function advance(count) {
+  const status = wasm.advance(count, EVERY);
+  const rows = new Float64Array(wasm.memory.buffer, wasm.rows(), wasm.rows_length()).slice();
+  if (rows.length > 0) {
+    run.time = rows[rows.length - COLUMNS];
+    postMessage({ kind: "rows", rows }, [rows.buffer]);
+  }
+  if (status !== 0) {
+    pause();
+    postMessage({ kind: "failed", text: read() });
+  } else if (wasm.is_finished()) {
+    pause();
+    postMessage({ kind: "stopped", spent: run.spent });
+  }
+}
+
+function save() {
+  if (run.time >= run.saved + SAVE_EVERY) {
+    run.saved = run.time;
+    if (wasm.save() !== 0) postMessage({ kind: "refused", text: read() });
+  }
+}
+
+// One turn: the steps of the time that has passed, at most for the length of a few frames.
+function turn() {
+  timer = setTimeout(turn, FRAME);
+  const begin = performance.now();
+  const whole = run.speed === Infinity;
+  const wanted = whole ? Infinity : ((begin - run.last) / 1000) * run.speed / run.step + run.due;
+  run.last = begin;
+  let left = wanted;
+  const budget = whole ? 40 : 12;
+  while (timer !== null && left >= 1 && performance.now() - begin < budget) {
+    const count = Math.min(left, 500);
+    save();
+    advance(Math.floor(count));
+    left -= Math.floor(count);
+  }
+  // A machine that is too slow does not save up steps.
+  run.due = Number.isFinite(left) ? Math.min(left, 1) : 0;
+  run.spent += performance.now() - begin;
+  if (timer !== null && whole) {
+    clearTimeout(timer);
+    timer = setTimeout(turn, 0);
+  }
+}
+
+const actions = {
+  start({ settings, step, stop }) {
+    pause();
+    write(settings);
+    if (wasm.start(step, stop) !== 0) {
+      run = null;
+      postMessage({ kind: "refused", text: read() });
+      return;
+    }
+    run = { step, speed: 1, time: 0, saved: 0, due: 0, spent: 0, last: 0 };
+    wasm.gains();
+    postMessage({ kind: "started", gains: read() });
+    wasm.save();
+  },
+  run({ speed }) {
+    if (!run || wasm.is_finished()) return;
+    pause();
+    run.speed = speed;
+    run.last = performance.now();
+    turn();
+  },
+  pause,
+  step() {
+    pause();
+    if (run && !wasm.is_finished()) {
+      save();
+      advance(EVERY);
+    }
+  },
+  back() {
+    pause();
+    if (!run) return;
+    if (wasm.back() !== 0) {
+      postMessage({ kind: "refused", text: read() });
+      return;
+    }
+    run.time = 0;
+    run.saved = -Infinity;
+    postMessage({ kind: "back", at: wasm.time() });
+    advance(1);
+    run.saved = run.time;
+  },
+  set({ settings }) {
+    if (!run) return;
+    for (const line of settings) {
+      write(line);
+      if (wasm.set() !== 0) postMessage({ kind: "refused", text: read() });
+      else postMessage({ kind: "set", line, at: wasm.time() });
+    }
+  },
+};
+
+onmessage = async ({ data }) => {
+  try {
+    wasm ??= (await loaded).instance.exports;
+    actions[data.kind](data);
+  } catch (error) {
+    pause();
+    run = null;
+    wasm = null;
+    postMessage({ kind: "failed", text: `The module stopped: ${error.message}. Reload the page to go on.` });
+  }
+};
+
+loaded.then(() => postMessage({ kind: "ready" }), (error) =>
+  postMessage({ kind: "failed", text: `paper.wasm cannot be loaded: ${error.message}` }));

@@ -1,0 +1,162 @@
+//! What the page sets before a run: values of variables, eigenvalues of the observer, faults.
+
+use control::aso::{FaultyPlant, design};
+use control::placement::real_poles;
+use master::fault::{Fault, FaultChain, NoiseDistribution, RandomSeries, Window};
+use master::{Scenario, System};
+use nalgebra::DMatrix;
+
+/// Eigenvalues of A + B `K_x` in the plant file of the paper, in 1/s; the page does not change them.
+const FEEDBACK: [f64; 4] = [-4.5, -6.0, -7.5, -9.0];
+
+/// The settings of a run.
+#[derive(Default)]
+pub(crate) struct Settings {
+    /// Variables and their values, as text.
+    pub(crate) values: Vec<(String, String)>,
+    /// Eigenvalues of the observer in 1/s, if they are not those of the paper.
+    eigenvalues: Option<Vec<f64>>,
+    /// Inputs and the faults on their connections, in this order.
+    faults: Vec<(String, FaultKind, f64)>,
+    /// Time in s from which bias and gain act.
+    from: f64,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum FaultKind {
+    Bias,
+    Gain,
+    Delay,
+    Noise,
+}
+
+impl Settings {
+    /// Reads lines of these kinds:
+    ///
+    /// ```text
+    /// plant.F_c=20                     a variable
+    /// eigenvalues=-900 -1000 -1100 ..  of the observer, real, in 1/s
+    /// bias controller.theta=0.01       on the connection to this input, from the time `from` on
+    /// gain plant.u=0.5                 the same
+    /// delay controller.theta=0.001     in s, always
+    /// noise controller.theta=1e-5      standard deviation, always
+    /// from=50                          in s
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// A sentence with the line that is not understood.
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
+        let mut settings = Self::default();
+        for line in text.lines().filter(|line| !line.trim().is_empty()) {
+            let (name, value) =
+                line.split_once('=').ok_or_else(|| format!("{line:?}: expected name=value"))?;
+            let (name, value) = (name.trim(), value.trim());
+            let kinds = [
+                ("bias ", FaultKind::Bias),
+                ("gain ", FaultKind::Gain),
+                ("delay ", FaultKind::Delay),
+                ("noise ", FaultKind::Noise),
+            ];
+            if let Some((word, kind)) = kinds.iter().find(|(word, _)| name.starts_with(word)) {
+                let input = name[word.len()..].trim().to_owned();
+                settings.faults.push((input, *kind, number(line, value)?));
+            } else if name == "from" {
+                settings.from = number(line, value)?;
+            } else if name == "eigenvalues" {
+                let parts = value.split([' ', ',']).filter(|part| !part.is_empty());
+                let parsed: Result<Vec<_>, _> = parts.map(|part| number(line, part)).collect();
+                settings.eigenvalues = Some(parsed?);
+            } else {
+                settings.values.push((name.to_owned(), value.to_owned()));
+            }
+        }
+        Ok(settings)
+    }
+
+    /// `L_x` and `L_f` for the eigenvalues, as settings of the controller FMU; none for those of the paper.
+    ///
+    /// # Errors
+    ///
+    /// The sentence of `control`: eigenvalues that no observer has, or too many or too few.
+    pub(crate) fn gains(&self, file: &str) -> Result<Vec<(String, String)>, String> {
+        let Some(eigenvalues) = &self.eigenvalues else { return Ok(Vec::new()) };
+        if let Some(slow) = eigenvalues.iter().find(|value| **value >= 0.0) {
+            return Err(format!("eigenvalue {slow} 1/s of the observer: expected below 0"));
+        }
+        let file: toml::Table = file.parse().map_err(|error: toml::de::Error| error.to_string())?;
+        let plant = FaultyPlant::with_constant_faults(
+            matrix(&file, "A")?,
+            matrix(&file, "B")?,
+            matrix(&file, "C")?,
+            matrix(&file, "F_a")?,
+        );
+        let designed = design(&plant, &real_poles(&FEEDBACK), &real_poles(eigenvalues), None);
+        let gains = designed.map_err(|error| error.to_string())?.gains;
+        let named = [("L_x", &gains.l_x), ("L_f", &gains.l_f)];
+        Ok(named
+            .iter()
+            .flat_map(|(name, matrix)| {
+                let places =
+                    (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| (i, j)));
+                places.map(move |(i, j)| {
+                    let variable = format!("controller.{name}[{},{}]", i + 1, j + 1);
+                    (variable, format!("{:?}", matrix[(i, j)]))
+                })
+            })
+            .collect())
+    }
+
+    /// The faults, each at the connection to its input.
+    ///
+    /// # Errors
+    ///
+    /// A sentence: an unknown input, or a delay of too many steps.
+    pub(crate) fn scenario(&self, system: &System, step: f64) -> Result<Scenario, String> {
+        let mut scenario = Scenario::default();
+        let mut inputs: Vec<&String> = self.faults.iter().map(|(input, ..)| input).collect();
+        inputs.dedup();
+        for input in inputs {
+            let port = system.port(input).map_err(|error| error.to_string())?;
+            let own = self.faults.iter().filter(|(name, ..)| name == input).enumerate();
+            let chain =
+                own.map(|(place, (_, kind, value))| self.fault(input, place, *kind, *value));
+            let chain =
+                FaultChain::new(chain.collect(), step).map_err(|error| error.to_string())?;
+            scenario.faults.push((port, chain));
+        }
+        Ok(scenario)
+    }
+
+    fn fault(&self, input: &str, place: usize, kind: FaultKind, value: f64) -> (Window, Fault) {
+        let from = if matches!(kind, FaultKind::Bias | FaultKind::Gain) { self.from } else { 0.0 };
+        let fault = match kind {
+            FaultKind::Bias => Fault::Bias(value),
+            FaultKind::Gain => Fault::Gain(value),
+            FaultKind::Delay => Fault::Delay { seconds: value, hold: false, initial: None },
+            FaultKind::Noise => Fault::Noise {
+                spread: NoiseDistribution::Normal(value),
+                draw: RandomSeries::new(0, input, place as u64, None),
+            },
+        };
+        (Window { from, until: None }, fault)
+    }
+}
+
+fn number(line: &str, text: &str) -> Result<f64, String> {
+    let parsed = text.parse::<f64>().ok().filter(|value| value.is_finite());
+    parsed.ok_or_else(|| format!("{line}: expected a number, found {text:?}"))
+}
+
+fn matrix(file: &toml::Table, name: &str) -> Result<DMatrix<f64>, String> {
+    let rows = file.get(name).and_then(toml::Value::as_array);
+    let rows = rows.ok_or_else(|| format!("the design has no matrix {name}"))?;
+    let row = |row: &toml::Value| -> Option<Vec<f64>> {
+        row.as_array()?.iter().map(toml::Value::as_float).collect()
+    };
+    let rows: Option<Vec<Vec<f64>>> = rows.iter().map(row).collect();
+    let rows =
+        rows.filter(|rows| !rows.is_empty() && rows.iter().all(|r| r.len() == rows[0].len()));
+    let rows = rows.ok_or_else(|| format!("{name} of the design is not a matrix of numbers"))?;
+    Ok(DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j]))
+}
