@@ -27,6 +27,10 @@ bench:
     cargo bench --package cosim-results --bench results
     cargo bench --package tests
 
+# the page of the pendulum in a browser, tried in Chromium
+web:
+    scripts/web --test
+
 # The book, with its links checked.
 book:
     scripts/book

@@ -31,7 +31,7 @@
   for (const field of FIELDS) {
     const label = document.createElement("label");
     const input = document.createElement("input");
-    input.id = field.id;
+    input.id = `set-${field.id}`;
     input.type = typeof field.value === "boolean" ? "checkbox" : "text";
     if (input.type === "text" && !field.list) input.inputMode = "decimal";
     const unit = field.unit ? ` in ${field.unit}` : "";
@@ -43,8 +43,8 @@
 
   function fill() {
     for (const field of FIELDS) {
-      if (typeof field.value === "boolean") id(field.id).checked = values[field.id];
-      else id(field.id).value = values[field.id];
+      if (typeof field.value === "boolean") id(`set-${field.id}`).checked = values[field.id];
+      else id(`set-${field.id}`).value = values[field.id];
     }
   }
 

@@ -1,0 +1,121 @@
+"""A Chromium without a window, driven by the DevTools protocol."""
+
+import asyncio
+import base64
+import json
+import shutil
+import subprocess
+import threading
+import time
+import urllib.request
+from contextlib import contextmanager
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+
+from tornado.websocket import websocket_connect
+
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+LIMIT = 120  # s for one answer of the browser
+
+
+class Page:
+    """A page of the browser, with what it asked for and what it complained about."""
+
+    def __init__(self, loop, connection):
+        self.loop, self.connection, self.number = loop, connection, 0
+        self.requests, self.complaints = [], []
+
+    def _note(self, message):
+        method, values = message.get("method"), message.get("params", {})
+        if method == "Network.requestWillBeSent":
+            self.requests.append(values["request"]["url"])
+        elif method == "Runtime.exceptionThrown":
+            self.complaints.append(json.dumps(values["exceptionDetails"]))
+        elif method == "Log.entryAdded" and values["entry"]["level"] in ("error", "warning"):
+            self.complaints.append(values["entry"]["text"])
+        elif method == "Runtime.consoleAPICalled" and values["type"] in ("error", "warning"):
+            self.complaints.append(json.dumps(values["args"]))
+
+    async def _call(self, method, values):
+        self.number += 1
+        await self.connection.write_message(json.dumps({"id": self.number, "method": method, "params": values}))
+        while True:
+            message = json.loads(await asyncio.wait_for(self.connection.read_message(), LIMIT))
+            if message.get("id") == self.number:
+                assert "error" not in message, message
+                return message["result"]
+            self._note(message)
+
+    def call(self, method, **values):
+        """A command of the protocol."""
+        return self.loop.run_until_complete(self._call(method, values))
+
+    def evaluate(self, script):
+        """The value of an expression, or of the promise that it is."""
+        words = {"expression": script, "awaitPromise": True, "returnByValue": True}
+        answer = self.call("Runtime.evaluate", **words)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def until(self, script, limit=60):
+        """Waits until an expression is true."""
+        end = time.monotonic() + limit
+        while not self.evaluate(script):
+            assert time.monotonic() < end, f"{script} did not become true; {self.complaints}"
+            time.sleep(0.05)
+
+    def open(self, address):
+        """Loads a page."""
+        self.call("Page.navigate", url=address)
+        self.until("document.readyState === 'complete'")
+
+    def picture(self, path):
+        """Writes a screenshot of the whole page."""
+        shot = self.call("Page.captureScreenshot", captureBeyondViewport=True)
+        path.write_bytes(base64.b64decode(shot["data"]))
+
+
+@contextmanager
+def browser(folder, width=1200, height=900):
+    """A page in a new browser; `folder` keeps its profile."""
+    words = ["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0", f"--user-data-dir={folder}"]
+    words += [f"--window-size={width},{height}", "--no-first-run", "about:blank"]
+    process = subprocess.Popen([CHROMIUM, *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    loop = asyncio.new_event_loop()
+    try:
+        place, end = folder / "DevToolsActivePort", time.monotonic() + 60
+        while not (place.exists() and place.read_text(encoding="ascii").count("\n")):
+            assert process.poll() is None and time.monotonic() < end, "the browser did not start"
+            time.sleep(0.05)
+        port = place.read_text(encoding="ascii").split()[0]
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json") as answer:
+            target = next(page for page in json.load(answer) if page["type"] == "page")
+        address = target["webSocketDebuggerUrl"]
+        page = Page(loop, loop.run_until_complete(_connected(address)))
+        for domain in ("Page", "Runtime", "Network", "Log"):
+            page.call(f"{domain}.enable")
+        yield page
+    finally:
+        process.kill()
+        process.wait()
+        loop.close()
+
+
+async def _connected(address):
+    return await websocket_connect(address, max_message_size=1 << 28)
+
+
+class _Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        """Nothing."""
+
+
+@contextmanager
+def served(folder):
+    """The address of a file server of a folder."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=folder))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        yield f"http://127.0.0.1:{server.server_address[1]}"
+    finally:
+        server.shutdown()

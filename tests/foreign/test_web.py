@@ -1,0 +1,145 @@
+"""The paper in the browser: the page of `scripts/web` in Chromium, against the command."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from browser import CHROMIUM, browser, served
+from conftest import ROOT
+
+PAGE = ROOT / "target" / "web" / "page"
+pytestmark = [
+    pytest.mark.skipif(not CHROMIUM, reason="no Chromium is installed"),
+    pytest.mark.skipif(not (PAGE / "paper.wasm").exists(), reason="scripts/web has not built the page"),
+]
+NAMES = ["plant.x_p", "plant.theta", "plant.v_p", "plant.omega", "plant.f_fric", "plant.regime", "controller.u", "controller.f_hat"]
+
+
+@pytest.fixture
+def open_page(tmp_path):
+    """A function that opens the page with a permalink."""
+    with served(PAGE) as address, browser(tmp_path / "profile") as page:
+
+        def opened(link=""):
+            page.open(f"{address}/index.html{link}")
+            page.until("document.body.dataset.ready === 'true'")
+            return page
+
+        yield opened
+        assert page.complaints == []
+        assert all(request.startswith((address, "data:", "blob:")) for request in page.requests)
+
+
+def run_to_the_end(page):
+    page.evaluate("document.getElementById('speed').value = 'Infinity'; document.getElementById('play').click()")
+    page.until("document.body.dataset.spent !== undefined", limit=120)
+    return page.evaluate("window.paper.csv()")
+
+
+def rows(text):
+    """The values of a results file, by name."""
+    header, *lines = list(csv.reader(text.splitlines()))
+    return {name: np.array(column, dtype=float) for name, column in zip(header, zip(*lines, strict=True), strict=True)}
+
+
+def of_the_command(aso_ftc, page, folder):
+    """The rows of the command for the system.toml that the page shows."""
+    text = page.evaluate("document.getElementById('native').textContent")
+    text = text.replace('"dist/', f'"{ROOT}/dist/')
+    file, results = folder / "paper.toml", folder / "results.csv"
+    file.write_text(text, encoding="utf-8")
+    recorded = [word for name in NAMES for word in ("--record", name)]
+    done = aso_ftc("run", file, "--results", results, *recorded)
+    assert done.returncode == 0, done.stderr
+    return rows(results.read_text(encoding="utf-8"))
+
+
+def equal(own, theirs):
+    """Every row of the page is a row of the command, bit for bit."""
+    at = np.searchsorted(theirs["time"], own["time"])
+    assert len(own["time"]) > 100
+    for name in ["time", *NAMES]:
+        assert np.array_equal(own[name], theirs[name][at]), name
+
+
+def test_100_s_of_the_page_are_those_of_the_command_bit_for_bit(aso_ftc, open_page, tmp_path):
+    page = open_page()
+    own = rows(run_to_the_end(page))
+    assert len(own["time"]) == 10001 and own["time"][-1] == 100
+    equal(own, of_the_command(aso_ftc, page, tmp_path))
+    print("100 s were computed in", page.evaluate("document.body.dataset.spent"), "ms")
+
+
+def test_faults_noise_and_an_observer_designed_in_the_page_are_those_of_the_command(aso_ftc, open_page, tmp_path):
+    link = "#stop=12&t_on=4&F_s=28&M=3.3&eigenvalues=-900+-1000+-1100+-1200+-1300&noise_theta=1e-6&bias_x=0.001&gain_u=0.95&from=6"
+    page = open_page(link)
+    own = rows(run_to_the_end(page))
+    assert "controller.L_f[1,2]" in page.evaluate("document.getElementById('native').textContent")
+    equal(own, of_the_command(aso_ftc, page, tmp_path))
+
+
+def test_changes_during_the_run_are_in_the_system_toml(aso_ftc, open_page, tmp_path):
+    page = open_page("#stop=6&t_on=1")
+    page.evaluate("document.getElementById('speed').value = '5'; document.getElementById('play').click()")
+    page.until("window.paper.rows[0].at(-1) > 2")
+    page.evaluate(
+        "const f = document.getElementById('set-F_c'); f.value = '15'; f.dispatchEvent(new Event('change'));"
+        "document.getElementById('set-compensate').click()"
+    )
+    page.until("window.paper.rows[0].at(-1) > 3")
+    own = rows(run_to_the_end_of(page))
+    text = page.evaluate("document.getElementById('native').textContent")
+    assert text.count("[[scenario.set]]") == 2 and "plant.F_c" in text
+    equal(own, of_the_command(aso_ftc, page, tmp_path))
+
+
+def run_to_the_end_of(page):
+    page.until("document.body.dataset.spent !== undefined", limit=60)
+    return page.evaluate("window.paper.csv()")
+
+
+def test_every_control_answers_and_settings_without_a_design_are_refused(open_page):
+    page = open_page("#stop=20&nonsense=1")
+    state = "document.getElementById('status').textContent"
+    assert "unknown setting nonsense" in page.evaluate(state)
+    click = "document.getElementById('{}').click()"
+    for name in ["step", "step", "step", "back"]:
+        page.evaluate(click.format(name))
+    page.until("window.paper.rows[0].length > 0")
+    page.evaluate("document.getElementById('speed').value = '20'")
+    page.evaluate(click.format("play"))
+    page.until("window.paper.rows[0].at(-1) > 1")
+    page.evaluate(click.format("play"))
+    assert page.evaluate(state) == "Paused."
+    shown = "FIELDS.every((f) => document.querySelectorAll(`#set-${f.id}`).length === 1 && document.getElementById(`set-${f.id}`).value !== '')"
+    assert page.evaluate(shown)
+    fields = json.loads(page.evaluate("JSON.stringify(FIELDS.filter((f) => typeof f.value === 'number'))"))
+    for field in fields:
+        page.evaluate(
+            f"{{ const f = document.getElementById('set-{field['id']}'); f.value = 'x'; f.dispatchEvent(new Event('change')); }}"
+        )
+        assert "expected a number" in page.evaluate(state), field
+        page.evaluate(f"document.getElementById('set-{field['id']}').value = '{field['value']}'")
+    for text, sentence in [("-1 -2", "eigenvalues"), ("-1 -2 -3 -4 5", "below 0"), ("a b", "expected a number")]:
+        page.evaluate(
+            f"{{ const f = document.getElementById('set-eigenvalues'); f.value = '{text}'; f.dispatchEvent(new Event('change')); }}"
+        )
+        page.until(f"{state}.includes('{sentence}')", limit=10)
+    page.evaluate(click.format("defaults"))
+    page.until(f"{state} === 'Ready.'")
+
+
+def test_a_results_file_dropped_on_the_page_is_drawn(open_page):
+    page = open_page()
+    page.evaluate(
+        """(async () => {
+        const text = 'time,a,"b[1,2]"\\n0,1,2\\n1,2,3\\n';
+        const file = new File([text], 'own.csv');
+        const all = new DataTransfer(); all.items.add(file);
+        document.dispatchEvent(new DragEvent('drop', {dataTransfer: all, bubbles: true, cancelable: true}));
+        })()"""
+    )
+    page.until("document.querySelectorAll('#dropped canvas').length === 2")
+    assert "2 rows" in page.evaluate("document.getElementById('status').textContent")
