@@ -27,7 +27,7 @@ bench:
     cargo bench --package cosim-results --bench results
     cargo bench --package tests
 
-# the page of the pendulum in a browser, tried in Chromium
+# The page of the pendulum in a browser, tried in Chromium.
 web:
     scripts/web --test
 
