@@ -1,6 +1,6 @@
 # Recipes for daily work; `just --list` prints them. scripts/test runs all tests.
 
-features := "tests/fmi,aso-control/lmi,aso-ftc/sbom"
+features := "tests/fmi,aso-control/lmi"
 
 # Format, lints and unit tests: under two minutes once everything is built.
 quick:
