@@ -2,6 +2,7 @@
 
 import csv
 import json
+import tomllib
 
 import numpy as np
 import pytest
@@ -34,6 +35,10 @@ def open_page(tmp_path):
 
 def run_to_the_end(page):
     page.evaluate("document.getElementById('speed').value = 'Infinity'; document.getElementById('play').click()")
+    return at_the_end(page)
+
+
+def at_the_end(page):
     page.until("document.body.dataset.spent !== undefined", limit=120)
     return page.evaluate("window.paper.csv()")
 
@@ -76,7 +81,13 @@ def test_faults_noise_and_an_observer_designed_in_the_page_are_those_of_the_comm
     link = "#stop=12&t_on=4&F_s=28&M=3.3&eigenvalues=-900+-1000+-1100+-1200+-1300&noise_theta=1e-6&bias_x=0.001&gain_u=0.95&from=6"
     page = open_page(link)
     own = rows(run_to_the_end(page))
-    assert "controller.L_f[1,2]" in page.evaluate("document.getElementById('native').textContent")
+    settings = tomllib.loads(page.evaluate("document.getElementById('native').textContent"))["settings"]
+    file = tomllib.loads((ROOT / "fmu-controller" / "resources" / "design.toml").read_text(encoding="utf-8"))
+    a, c, f_a = (np.array(file[name]) for name in ("A", "C", "F_a"))
+    gain = {n: [[settings[f"controller.{n}[{i},{j}]"] for j in (1, 2)] for i in range(1, k + 1)] for n, k in (("L_x", 4), ("L_f", 1))}
+    error = np.block([[a - gain["L_x"] @ c, -f_a], [gain["L_f"] @ c, np.zeros((1, 1))]])
+    found = np.sort(np.linalg.eigvals(error).real)
+    assert np.allclose(found, [-1300, -1200, -1100, -1000, -900], rtol=1e-6)
     equal(own, of_the_command(aso_ftc, page, tmp_path))
 
 
@@ -89,15 +100,10 @@ def test_changes_during_the_run_are_in_the_system_toml(aso_ftc, open_page, tmp_p
         "document.getElementById('set-compensate').click()"
     )
     page.until("window.paper.rows[0].at(-1) > 3")
-    own = rows(run_to_the_end_of(page))
+    own = rows(at_the_end(page))
     text = page.evaluate("document.getElementById('native').textContent")
     assert text.count("[[scenario.set]]") == 2 and "plant.F_c" in text
     equal(own, of_the_command(aso_ftc, page, tmp_path))
-
-
-def run_to_the_end_of(page):
-    page.until("document.body.dataset.spent !== undefined", limit=60)
-    return page.evaluate("window.paper.csv()")
 
 
 def test_every_control_answers_and_settings_without_a_design_are_refused(open_page):

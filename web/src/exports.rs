@@ -40,14 +40,14 @@ pub extern "C" fn text_length() -> usize {
     TEXT.with_borrow(Vec::len)
 }
 
-/// Starts a run with the settings in the text buffer; 1: it cannot be started.
+/// Starts a run with the settings in the text buffer; returns 1 if it cannot be started.
 #[unsafe(no_mangle)]
 pub extern "C" fn start(step: f64, stop: f64) -> i32 {
     let settings = TEXT.with_borrow(|text| String::from_utf8_lossy(text).into_owned());
     told(Paper::new(&settings, step, stop).map(|paper| RUN.set(Some(paper))))
 }
 
-/// Sets an input or a tunable parameter, `fmu.variable=value` in the text buffer; 1: it is refused.
+/// Sets an input or a tunable parameter, `fmu.variable=value` in the text buffer; returns 1 if it is refused.
 #[unsafe(no_mangle)]
 pub extern "C" fn set() -> i32 {
     let text = TEXT.with_borrow(|text| String::from_utf8_lossy(text).into_owned());
@@ -55,7 +55,7 @@ pub extern "C" fn set() -> i32 {
     with(|run| run.set(name.trim(), value.trim()))
 }
 
-/// Puts the gains that were designed into the text buffer; 1: no run is started.
+/// Puts the gains that were designed into the text buffer; returns 1 if no run is started.
 #[unsafe(no_mangle)]
 pub extern "C" fn gains() -> i32 {
     let mut found = String::new();
@@ -70,7 +70,7 @@ pub extern "C" fn gains() -> i32 {
 }
 
 /// Makes up to `steps` steps. Keeps a row at each multiple of `every` steps since the start, and one at the
-/// end; 1: a step failed.
+/// end; returns 1 if a step failed.
 #[unsafe(no_mangle)]
 pub extern "C" fn advance(steps: u32, every: u32) -> i32 {
     ROWS.with_borrow_mut(Vec::clear);
@@ -116,13 +116,13 @@ pub extern "C" fn rows_length() -> usize {
     ROWS.with_borrow(Vec::len)
 }
 
-/// Saves the state; 1: it cannot be saved.
+/// Saves the state; returns 1 if it cannot be saved.
 #[unsafe(no_mangle)]
 pub extern "C" fn save() -> i32 {
     with(Paper::save)
 }
 
-/// Returns to the saved state; 1: there is none.
+/// Goes back to the state saved last; returns 1 if none is kept.
 #[unsafe(no_mangle)]
 pub extern "C" fn back() -> i32 {
     with(Paper::back)

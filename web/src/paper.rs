@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use controller::AsoController;
+use files::sentence;
 use fmu::description::Experiment;
 use master::{AlgorithmRequest, Checkpoint, Probe, Simulation, System, Value, choose};
 use plant::FrictionPendulum;
@@ -25,6 +26,9 @@ pub const COLUMNS: [&str; 8] = [
     "controller.f_hat",
 ];
 
+/// A run may have fewer steps than this.
+const MOST_STEPS: f64 = 1e8;
+
 /// Number of states that [`Paper::back`] can return to.
 const SAVED: usize = 240;
 
@@ -45,11 +49,13 @@ impl Paper {
     ///
     /// # Errors
     ///
-    /// A sentence: a setting that is unknown or out of its range, eigenvalues that make no observer, or a
+    /// The reason, as a sentence: a setting that is unknown or out of its range, eigenvalues that make no observer, or a
     /// failure of a model.
     pub fn new(settings: &str, step: f64, stop: f64) -> Result<Self, String> {
-        if !(step > 0.0 && stop > 0.0 && stop / step < 1e8) {
-            return Err(format!("a step of {step} s until {stop} s: expected both above 0"));
+        if !(step > 0.0 && stop > 0.0 && stop / step < MOST_STEPS) {
+            return Err(format!(
+                "a step of {step} s until {stop} s: expected both above 0, and fewer than {MOST_STEPS:e} steps"
+            ));
         }
         let mut system = System::default();
         let plant = LinkedSlave::new(model::<FrictionPendulum>()?);
@@ -96,7 +102,7 @@ impl Paper {
     ///
     /// # Errors
     ///
-    /// A sentence: an unknown variable, or a value that it does not take.
+    /// The reason, as a sentence: an unknown variable, or a value that it does not take.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
         let system = self.simulation.system();
         let port = system.port(name).map_err(told)?;
@@ -114,7 +120,7 @@ impl Paper {
     ///
     /// # Errors
     ///
-    /// A sentence: the failure of a model.
+    /// The reason, as a sentence: the failure of a model.
     pub fn step(&mut self) -> Result<(), String> {
         self.steps += 1;
         self.simulation.step().map_err(told)
@@ -124,7 +130,7 @@ impl Paper {
     ///
     /// # Errors
     ///
-    /// A sentence: the failure of a model.
+    /// The reason, as a sentence: the failure of a model.
     pub fn row(&mut self) -> Result<[f64; 9], String> {
         let mut row = [0.0; 9];
         row[0] = self.simulation.time();
@@ -138,7 +144,7 @@ impl Paper {
     ///
     /// # Errors
     ///
-    /// A sentence: a model cannot serialise its state.
+    /// The reason, as a sentence: a model cannot serialise its state.
     pub fn save(&mut self) -> Result<(), String> {
         if self.saved.len() == SAVED {
             self.saved.pop_front();
@@ -151,7 +157,7 @@ impl Paper {
     ///
     /// # Errors
     ///
-    /// A sentence: no state is saved, or a model refuses it.
+    /// The reason, as a sentence: no state is saved, or a model refuses it.
     pub fn back(&mut self) -> Result<(), String> {
         let (saved, steps) = self.saved.pop_back().ok_or("no earlier state is kept")?;
         self.simulation.restore(&saved).map_err(told)?;
@@ -160,18 +166,9 @@ impl Paper {
     }
 }
 
-/// An error as a sentence.
-fn told(error: impl std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(inner) = cause {
-        let more = inner.to_string();
-        if !text.contains(&more) {
-            text = format!("{text}: {more}");
-        }
-        cause = inner.source();
-    }
-    text
+/// An error and its causes as a sentence.
+pub(crate) fn told(error: impl std::error::Error) -> String {
+    sentence(&error)
 }
 
 /// A model that needs no resources.

@@ -1,13 +1,14 @@
 //! What the page sets before a run: values of variables, eigenvalues of the observer, faults.
 
-use control::aso::{FaultyPlant, design};
-use control::placement::real_poles;
+use std::collections::BTreeSet;
+
+use control::aso::FaultyPlant;
+use control::placement::{place_balanced, real_poles};
 use master::fault::{Fault, FaultChain, NoiseDistribution, RandomSeries, Window};
 use master::{Scenario, System};
 use nalgebra::DMatrix;
 
-/// Eigenvalues of A + B `K_x` in the plant file of the paper, in 1/s; the page does not change them.
-const FEEDBACK: [f64; 4] = [-4.5, -6.0, -7.5, -9.0];
+use crate::paper::told;
 
 /// The settings of a run.
 #[derive(Default)]
@@ -45,7 +46,7 @@ impl Settings {
     ///
     /// # Errors
     ///
-    /// A sentence with the line that is not understood.
+    /// The reason, as a sentence with the line that is not understood.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let mut settings = Self::default();
         for line in text.lines().filter(|line| !line.trim().is_empty()) {
@@ -78,22 +79,27 @@ impl Settings {
     ///
     /// # Errors
     ///
-    /// The sentence of `control`: eigenvalues that no observer has, or too many or too few.
+    /// The reason, as a sentence: eigenvalues that no observer has, or too many or too few.
     pub(crate) fn gains(&self, file: &str) -> Result<Vec<(String, String)>, String> {
         let Some(eigenvalues) = &self.eigenvalues else { return Ok(Vec::new()) };
         if let Some(slow) = eigenvalues.iter().find(|value| **value >= 0.0) {
             return Err(format!("eigenvalue {slow} 1/s of the observer: expected below 0"));
         }
-        let file: toml::Table = file.parse().map_err(|error: toml::de::Error| error.to_string())?;
+        let file: toml::Table = file.parse().map_err(|error: toml::de::Error| told(error))?;
         let plant = FaultyPlant::with_constant_faults(
             matrix(&file, "A")?,
             matrix(&file, "B")?,
             matrix(&file, "C")?,
             matrix(&file, "F_a")?,
         );
-        let designed = design(&plant, &real_poles(&FEEDBACK), &real_poles(eigenvalues), None);
-        let gains = designed.map_err(|error| error.to_string())?.gains;
-        let named = [("L_x", &gains.l_x), ("L_f", &gains.l_f)];
+        plant.check_observer_exists().map_err(told)?;
+        let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
+        let poles = real_poles(eigenvalues);
+        let placed = place_balanced(&a_0.transpose(), &c_0.transpose(), &poles).map_err(told)?;
+        // A_0 - L C_0 has the eigenvalues, L = [L_x; -L_f].
+        let l = -placed.gain.transpose();
+        let (n, q) = plant.f_a.shape();
+        let named = [("L_x", l.rows(0, n).into_owned()), ("L_f", -l.rows(n, q))];
         Ok(named
             .iter()
             .flat_map(|(name, matrix)| {
@@ -111,18 +117,16 @@ impl Settings {
     ///
     /// # Errors
     ///
-    /// A sentence: an unknown input, or a delay of too many steps.
+    /// The reason, as a sentence: an unknown input, or a delay of too many steps.
     pub(crate) fn scenario(&self, system: &System, step: f64) -> Result<Scenario, String> {
         let mut scenario = Scenario::default();
-        let mut inputs: Vec<&String> = self.faults.iter().map(|(input, ..)| input).collect();
-        inputs.dedup();
+        let inputs: BTreeSet<&String> = self.faults.iter().map(|(input, ..)| input).collect();
         for input in inputs {
-            let port = system.port(input).map_err(|error| error.to_string())?;
+            let port = system.port(input).map_err(told)?;
             let own = self.faults.iter().filter(|(name, ..)| name == input).enumerate();
             let chain =
                 own.map(|(place, (_, kind, value))| self.fault(input, place, *kind, *value));
-            let chain =
-                FaultChain::new(chain.collect(), step).map_err(|error| error.to_string())?;
+            let chain = FaultChain::new(chain.collect(), step).map_err(told)?;
             scenario.faults.push((port, chain));
         }
         Ok(scenario)
