@@ -33,7 +33,7 @@ pub(crate) fn by_entries(
     Ok(ToleranceResult { entries, ..tested(designed, limits, &found) })
 }
 
-/// Returns what the loop does while the parameters of the plant's FMU vary.
+/// Examines the loop for other parameters of the plant's FMU, as [`by_entries`] does for entries.
 pub(super) fn by_parameters(
     designed: &ControllerDesign,
     physical: &Physical,
