@@ -54,11 +54,27 @@ pub(crate) fn collected() -> Vec<String> {
     messages
 }
 
-/// Keeps warnings and errors for a report.
+/// The way of messages to a live view, if there is one.
+static FORWARDED: OnceLock<live::Messages> = OnceLock::new();
+
+/// Passes messages to a live view from now on.
+pub(crate) fn forward(messages: live::Messages) {
+    // There is one run in a process, and one view of it.
+    let _ = FORWARDED.set(messages);
+}
+
+/// Keeps warnings and errors for a report, and forwards messages to a live view.
 struct Collector;
 
 impl<S: Subscriber> Layer<S> for Collector {
     fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
+        if let Some(messages) = FORWARDED.get().filter(|_| *event.metadata().level() <= Level::INFO)
+        {
+            let mut parts = LogFields::default();
+            event.record(&mut parts);
+            let is_of_fmu = event.metadata().target() == FMU;
+            messages.send(if is_of_fmu { &parts.instance } else { "" }, sentence(event));
+        }
         if *event.metadata().level() > Level::WARN {
             return;
         }

@@ -1,6 +1,7 @@
 //! `aso-ftc reproduce`: repeats the paper's experiment, from the sources to the figures.
 
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -59,7 +60,10 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     let prepared = PreparedRun::new(experiment(options, &settings), &AssemblyOptions::default())?;
     let mut watch = Watch::new(&prepared.system)?;
     let mut run = prepared.start(None)?;
-    let ended = advance(&mut run, |simulation| watch.add(simulation));
+    let ended = advance(&mut run, |run| {
+        watch.add(&mut run.simulation)?;
+        Ok(ControlFlow::Continue(()))
+    });
     run.finish()?;
     let lost = match ended {
         RunEnd::Failed(error) => Some(error.sentence()),

@@ -2,6 +2,7 @@
 
 mod facts;
 mod interrupt;
+mod live;
 mod open_inputs;
 mod options;
 mod progress;
@@ -12,15 +13,16 @@ use std::process::ExitCode;
 
 use anyhow::{Context, bail};
 use fmu_import::CallLog;
-use master::{Coupling, Port, Simulation, System, SystemError, by_direct_dependencies};
+use master::{Coupling, Port, System, by_direct_dependencies};
 use results::Selection;
 use study::{
-    AssemblyOptions, Config, Every, Plan, PreparedRun, RealTime, Run, RunEnd, RunStatistics,
+    AssemblyOptions, Config, Error, Every, Plan, PreparedRun, RealTime, Run, RunEnd, RunStatistics,
 };
 
 use crate::logging;
 use crate::plot;
 pub(crate) use interrupt::{STATUS as INTERRUPTED, has_started};
+use live::Live;
 pub(crate) use options::{AlgorithmOptions, Options, setting};
 use progress::Progress;
 
@@ -58,6 +60,8 @@ struct Started {
     report: Option<report::Run>,
     /// The pacing by the clock, if one is requested.
     pace: Option<RealTime>,
+    /// The live view, if one is requested.
+    live: Option<Live>,
 }
 
 /// Prepares and starts the run; `None` if only the configuration was requested.
@@ -86,9 +90,13 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     describe(options, system, plan, by_name);
     let units = units(system, ports);
     let report = options.report.then(|| facts::facts(system, plan));
-    let run = prepared.start(saved.as_ref())?;
+    let ports = prepared.ports.clone();
+    let mut run = prepared.start(saved.as_ref())?;
     let pace = options.real_time.map(RealTime::new);
-    Ok(Some(Started { run, here, units, report, pace }))
+    let factor = pace.as_ref().map(|pace| pace.overruns().factor);
+    let open = |start| Live::open(&mut run, &ports, factor, start, &here);
+    let live = options.live.map(open).transpose()?;
+    Ok(Some(Started { run, here, units, report, pace, live }))
 }
 
 /// Prints the connections and, if variables are connected `by_name`, the inputs without one.
@@ -109,21 +117,21 @@ fn open_call_log(path: &Path) -> anyhow::Result<CallLog> {
 }
 
 /// Advances `run` to its end, or to the step at which a signal arrives, with a progress bar. Calls
-/// `watch` at the start and after every step.
+/// `watch` at the start and after every step; `watch` can end the run.
 pub(crate) fn advance(
     run: &mut Run,
-    mut watch: impl FnMut(&mut Simulation) -> Result<(), SystemError>,
+    mut watch: impl FnMut(&mut Run) -> Result<ControlFlow<()>, Error>,
 ) -> RunEnd {
     interrupt::start();
     let mut progress = Progress::new(run.simulation.time(), run.plan.stop);
-    let ended = run.advance(|simulation| {
-        watch(simulation)?;
-        progress.show(simulation.time());
+    let ended = run.advance_open(|run| {
+        let flow = watch(run)?;
+        progress.show(run.simulation.time());
         let raised = interrupt::is_raised();
-        if raised || simulation.is_finished() {
+        if raised || run.simulation.is_finished() {
             interrupt::notice();
         }
-        Ok(if raised { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+        Ok(if raised { ControlFlow::Break(()) } else { flow })
     });
     interrupt::notice();
     ended
@@ -193,11 +201,14 @@ fn units(system: &System, ports: &[Port]) -> Vec<(String, String)> {
 impl Started {
     fn go(mut self) -> ExitCode {
         let start = self.run.simulation.time();
-        let ended = match &mut self.pace {
-            None => advance(&mut self.run, |_| Ok(())),
-            Some(pace) => advance(&mut self.run, |simulation| {
-                pace.wait(simulation.time(), interrupt::is_raised);
-                Ok(())
+        let ended = match (&mut self.pace, &mut self.live) {
+            (None, None) => advance(&mut self.run, |_| Ok(ControlFlow::Continue(()))),
+            (pace, live) => advance(&mut self.run, |run| {
+                if let Some(pace) = pace {
+                    pace.wait(run.simulation.time(), interrupt::is_raised);
+                }
+                let go_on = ControlFlow::Continue(());
+                Ok(live.as_mut().map_or(go_on, |live| live.attend(run, pace.as_mut())))
             }),
         };
         let tally = self.run.tally();
@@ -206,9 +217,14 @@ impl Started {
         if let Some(pace) = &self.pace {
             outcome = format!("{outcome}; {}", pace.overruns());
         }
+        if let Some(live) = &self.live {
+            outcome.push_str(&live.summary());
+        }
         println!("{outcome}");
         self.warn_of_fallbacks(tally);
         let written = self.write(&ended);
+        // What the live view says of the end.
+        let mut told = outcome.clone();
         let status = match &ended {
             RunEnd::AtStop => 0,
             RunEnd::ByFmu(name) => {
@@ -219,24 +235,40 @@ impl Started {
                 );
                 0
             }
+            RunEnd::Interrupted if self.is_stopped() => {
+                told = format!("the run was stopped in the live view at t = {time} s");
+                println!("{told}");
+                0
+            }
             RunEnd::Interrupted => {
                 let more = self.run.checkpoint_file().map(|path| resume_hint(path, &self.here));
                 let more = more.unwrap_or_default();
-                tracing::error!("the run was interrupted at t = {time} s{more}");
+                told = format!("the run was interrupted at t = {time} s{more}");
+                tracing::error!("{told}");
                 interrupt::STATUS
             }
             RunEnd::Failed(error) => {
                 let error = error.sentence();
-                tracing::error!("the run ended early, after t = {time} s: {error}");
+                told = format!("the run ended early, after t = {time} s: {error}");
+                tracing::error!("{told}");
                 1
             }
         };
+        if let Some(live) = self.live.take() {
+            live.end(&told, &self.here);
+        }
         let reported = written.and_then(|file| self.report(file.as_deref(), outcome, status != 0));
         if let Err(error) = reported {
             tracing::error!("{}", files::sentence(error.as_ref()));
             return ExitCode::from(status.max(1));
         }
         ExitCode::from(status)
+    }
+
+    /// Whether the live view has stopped the run.
+    fn is_stopped(&self) -> bool {
+        let by_page = self.live.as_ref().is_some_and(|live| live.stopped);
+        by_page && !interrupt::is_raised()
     }
 
     /// Writes the report, if one is requested.

@@ -11,6 +11,8 @@ use study::{
     Solver,
 };
 
+use super::live::LiveStart;
+
 /// Default folder of the results.
 const OUT: &str = "results/run";
 /// The FMUs that are coupled by default.
@@ -143,6 +145,11 @@ pub(crate) struct Options {
     #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1")]
     #[arg(allow_negative_numbers = true, value_parser = str::parse::<RealTimeFactor>)]
     pub(super) real_time: Option<RealTimeFactor>,
+    /// Show the run on a page on this machine, which can pause, change and stop it; --live=paused waits for
+    /// the page at the start
+    #[arg(long, value_name = "START", num_args = 0..=1, require_equals = true)]
+    #[arg(default_missing_value = "running", conflicts_with = "resume")]
+    pub(super) live: Option<LiveStart>,
     /// Run each FMU in a separate process
     #[arg(long)]
     isolate: bool,

@@ -322,6 +322,22 @@ impl Drives {
         self.all.iter().filter_map(|drive| drive.next_break(after)).reduce(f64::min)
     }
 
+    /// Takes over the state of the drives of `earlier`, each of which this collection drives too;
+    /// returns false if it does not, or if the faults of `earlier` are not the first ones here.
+    pub(crate) fn inherit(&mut self, earlier: &Self) -> bool {
+        earlier.all.iter().all(|old| {
+            let Some(new) = self.all.iter_mut().find(|new| new.port == old.port) else {
+                return false;
+            };
+            (new.written, new.accepted) = (old.written, old.accepted);
+            match (&mut new.faults, &old.faults) {
+                (_, None) => true,
+                (Some(new), Some(old)) => new.inherit(old),
+                (None, Some(_)) => false,
+            }
+        })
+    }
+
     /// Returns the state of all drives for a checkpoint, in their order.
     #[must_use]
     pub fn state(&self) -> Vec<DriveState> {

@@ -94,8 +94,8 @@ impl Engine {
         let groups = Groups::new(&system, algorithm.method, order);
         let background = system.slaves.iter_mut().any(|(_, slave)| slave.in_background().is_some());
         let threads = Threads::new(algorithm.jobs, groups.len())?;
-        Ok(Self {
-            passes: threads.is_none() && !background && exchange.passes(),
+        let mut engine = Self {
+            passes: false,
             repeats: algorithm.repeats(),
             sizes: vec![0.0; multiples.len()],
             system,
@@ -106,7 +106,15 @@ impl Engine {
             multiples,
             background,
             threads,
-        })
+        };
+        engine.choose_sweep();
+        Ok(engine)
+    }
+
+    /// Chooses between [`Engine::pass`] and [`Engine::step_groups`]. Call it after a change of the
+    /// faults.
+    pub(crate) fn choose_sweep(&mut self) {
+        self.passes = self.threads.is_none() && !self.background && self.exchange.passes();
     }
 
     /// Makes a sweep: sets the driven variables and steps all slaves from `time` over `size`.

@@ -114,6 +114,12 @@ impl Exchange {
         Ok(())
     }
 
+    /// Returns the faults on the connection to an input.
+    pub(crate) fn fault(&self, input: Port) -> Option<&FaultChain> {
+        let reals = self.reals.fault(input);
+        reals.or_else(|| self.integers.fault(input)).or_else(|| self.booleans.fault(input))
+    }
+
     /// Records the undisturbed values in the faults; the communication point `time` is final.
     #[inline]
     pub(crate) fn commit(&mut self, time: f64) {

@@ -229,6 +229,17 @@ impl FaultChain {
         self.stages.iter().filter_map(|stage| stage.next_break(after)).reduce(f64::min)
     }
 
+    /// Takes over the memory of `earlier`, whose faults are the first ones of this chain; returns
+    /// false if they are not.
+    pub(crate) fn inherit(&mut self, earlier: &Self) -> bool {
+        let Some(first) = self.stages.get_mut(..earlier.stages.len()) else { return false };
+        let same = first.iter().zip(&earlier.stages).all(|(own, theirs)| own.is_same_fault(theirs));
+        if same {
+            first.clone_from_slice(&earlier.stages);
+        }
+        same
+    }
+
     /// Returns the number of faults.
     #[must_use]
     pub fn len(&self) -> usize {

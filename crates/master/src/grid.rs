@@ -4,6 +4,7 @@ use std::fmt;
 
 use crate::algorithm::Algorithm;
 use crate::error::SystemError;
+use crate::signal::reached;
 use crate::system::System;
 use slave::Slave;
 
@@ -146,6 +147,19 @@ impl Grid {
     /// Returns the end of a step of `size` s from the time reached.
     pub(crate) fn end_of(&self, size: f64) -> f64 {
         self.limited(self.time + size, size)
+    }
+
+    /// Returns the first grid point after `time`, in s; both may be beyond the stop time.
+    #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
+    pub(crate) fn point_after(&self, time: f64) -> f64 {
+        let mut count = self.count + 1;
+        loop {
+            let point = self.start + count as f64 * self.step;
+            if !reached(time, point) {
+                return point;
+            }
+            count += 1;
+        }
     }
 
     /// Returns end and size of the next step: H, or the rest up to the stop time.

@@ -74,8 +74,10 @@ impl Readout {
 
     /// Makes driven variables show the value of their signal at the time read, instead of the value
     /// that the FMU received for its last step.
-    pub(crate) fn follow(&mut self, drives: &Drives, system: &System, ports: &[Port]) {
+    pub(crate) fn follow(&mut self, drives: &Drives, system: &System) {
         let kind = |port: Port| array(ValueType::of(&system.variable(port).kind));
+        let ports = &self.ports;
+        self.driven.clear();
         for (number, drive) in drives.iter().enumerate() {
             if let Some(at) = ports.iter().position(|port| *port == drive.port()) {
                 let same = |port: &&Port| kind(**port) == kind(drive.port());

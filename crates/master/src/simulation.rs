@@ -4,6 +4,7 @@
 //! [`Events`] shorten it, [`Coupler`] repeats it until inputs and outputs agree, and [`Engine`]
 //! makes each sweep over the slaves.
 
+mod change;
 mod checkpoint;
 
 use fmu_description::Experiment;
@@ -38,6 +39,8 @@ pub struct Simulation {
     order: Order,
     early_end: Option<EarlyEnd>,
     origin: Origin,
+    /// The latest end in s of a step that was attempted.
+    attempted: f64,
     /// Whether a slave requested the end of the simulation.
     ended: Option<Ending>,
 }
@@ -107,6 +110,7 @@ impl Simulation {
             order,
             early_end,
             origin,
+            attempted: experiment.start_time,
             ended: None,
         })
     }
@@ -172,8 +176,14 @@ impl Simulation {
     #[must_use]
     pub fn readout(&self, ports: &[Port]) -> Readout {
         let mut readout = Readout::new(&self.engine.system, ports);
-        readout.follow(&self.engine.drives, &self.engine.system, ports);
+        self.follow(&mut readout);
         readout
+    }
+
+    /// Lets `readout`, which [`Simulation::readout`] has created, follow the driven variables of now.
+    /// Call it after [`Simulation::change_scenario`].
+    pub fn follow(&self, readout: &mut Readout) {
+        readout.follow(&self.engine.drives, &self.engine.system);
     }
 
     /// Reads the values at the time reached. A driven variable has the value of its signal at this
@@ -202,6 +212,7 @@ impl Simulation {
         let Self { engine, coupler, control, events, .. } = self;
         let start = engine.grid.time;
         let planned = control.plan(engine);
+        self.attempted = self.attempted.max(planned.end);
         let made = match events {
             None => control.step(engine, coupler, planned)?,
             Some(events) => events.step(engine, coupler, control, planned)?,

@@ -9,7 +9,7 @@ use crate::engine::{Ending, Engine, SavedState, Swept};
 use crate::error::SystemError;
 use crate::exchange::Reals;
 use crate::grid::{Grid, size_between};
-use crate::signal::near;
+use crate::signal::{near, reached};
 use crate::system::{Port, System};
 use fmu_description::Kind;
 use solve::{Bond, EnergyControl, ErrorControl, ForwardControl, Scale, SizeBounds, Verdict};
@@ -146,6 +146,18 @@ impl SizeControl {
         let (time, end) = (engine.grid.time, engine.grid.end_of(self.size));
         let breaks = engine.next_breaks(time + 1e-9 * self.size);
         PlannedStep::between(time, breaks.fold(end, f64::min))
+    }
+
+    /// Returns the end of a step from `time`, in s, in a run whose steps vary; `None` if all steps
+    /// end on the grid.
+    pub(crate) fn varied_end(&self, time: f64) -> Option<f64> {
+        let varies = self.kind != StepControl::Fixed;
+        // A size below the rounding of the time would end at the time itself.
+        let mut size = self.size;
+        while varies && reached(time, time + size) {
+            size *= 2.0;
+        }
+        varies.then_some(time + size)
     }
 
     /// Makes the planned step, or a shorter one that all slaves complete and whose error is within

@@ -9,9 +9,10 @@ use crate::statistics::Statistics;
 use crate::{Request, Run, graph, identity};
 
 const STYLE: &str = include_str!("page/page.css");
-/// uPlot 1.6.32, Leon Sorokin, MIT licence (`page/uPlot-LICENSE`).
-const UPLOT: &str = include_str!("page/uPlot.iife.min.js");
-const UPLOT_STYLE: &str = include_str!("page/uPlot.min.css");
+/// The script of the plots: uPlot 1.6.32, Leon Sorokin, MIT licence (`page/uPlot-LICENSE`).
+pub const UPLOT: &str = include_str!("page/uPlot.iife.min.js");
+/// The style sheet of uPlot.
+pub const UPLOT_STYLE: &str = include_str!("page/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("page/uPlot-LICENSE");
 const SCRIPT: &str = include_str!("page/plots.js");
 /// The content security policy: the page loads nothing, even if a text contains markup.

@@ -42,7 +42,7 @@ pub use real_time::{Overruns, RealTime, RealTimeFactor};
 #[cfg(feature = "load")]
 pub use record::{Recorder, keep_results, select, unit};
 #[cfg(feature = "load")]
-pub use run::{PreparedRun, Run, RunEnd, RunStatistics};
+pub use run::{Intervention, PreparedRun, Run, RunEnd, RunStatistics};
 #[cfg(feature = "load")]
 pub use saved::SavedRun;
 #[cfg(feature = "load")]

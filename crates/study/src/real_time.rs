@@ -114,6 +114,15 @@ impl RealTime {
         }
     }
 
+    /// Shifts all later instants by the time `paused`, in which the run was held.
+    pub fn shift(&mut self, paused: Duration) {
+        if let Some((_, start)) = &mut self.start
+            && let Some(later) = start.checked_add(paused)
+        {
+            *start = later;
+        }
+    }
+
     /// Returns the overruns so far.
     #[must_use]
     pub fn overruns(&self) -> Overruns {

@@ -119,6 +119,11 @@ impl Recorder {
         Ok(self.slow.before_step(simulation)?)
     }
 
+    /// Lets the rows follow the driven variables of now, after a change of the scenario.
+    pub(crate) fn follow(&mut self, simulation: &Simulation) {
+        simulation.follow(&mut self.readout);
+    }
+
     /// Returns the state of the recording for a checkpoint.
     pub fn slow_state(&self, simulation: &mut Simulation) -> SlowState {
         self.slow.state(simulation.system())

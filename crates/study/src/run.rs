@@ -1,5 +1,7 @@
 //! A run: prepared from a configuration, started or resumed, advanced to its end.
 
+mod intervention;
+
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,6 +20,7 @@ use crate::record::{Recorder, select};
 use crate::resume::resume;
 use crate::saved::SavedRun;
 use crate::scenario::Setup;
+pub use intervention::Intervention;
 
 /// A run with all settings chosen, before initialisation.
 pub struct PreparedRun {
@@ -242,7 +245,16 @@ impl Run {
     /// `watch` at the start and after every step; `watch` can end the run.
     pub fn advance(
         &mut self,
-        watch: impl FnMut(&mut Simulation) -> Result<ControlFlow<()>, SystemError>,
+        mut watch: impl FnMut(&mut Simulation) -> Result<ControlFlow<()>, SystemError>,
+    ) -> RunEnd {
+        self.advance_open(|run| Ok(watch(&mut run.simulation)?))
+    }
+
+    /// Like [`Run::advance`], but `watch` gets the run, whose scenario it may change by
+    /// [`Run::intervene`].
+    pub fn advance_open(
+        &mut self,
+        watch: impl FnMut(&mut Self) -> Result<ControlFlow<()>, Error>,
     ) -> RunEnd {
         let start = Instant::now();
         let ended = self.steps(watch).unwrap_or_else(RunEnd::Failed);
@@ -252,13 +264,13 @@ impl Run {
 
     fn steps(
         &mut self,
-        mut watch: impl FnMut(&mut Simulation) -> Result<ControlFlow<()>, SystemError>,
+        mut watch: impl FnMut(&mut Self) -> Result<ControlFlow<()>, Error>,
     ) -> Result<RunEnd, Error> {
         let start = self.simulation.time();
         let interval = self.checkpoints.as_ref().and_then(|own| own.interval);
         let mut saved = 0.0;
         let mut save_at = interval.map_or(f64::INFINITY, |interval| start + interval);
-        let mut flow = watch(&mut self.simulation)?;
+        let mut flow = watch(self)?;
         if !self.resumed {
             self.sample()?;
         }
@@ -269,7 +281,7 @@ impl Run {
             let before = self.simulation.time();
             self.simulation.step()?;
             self.tally.steps += 1;
-            flow = watch(&mut self.simulation)?;
+            flow = watch(self)?;
             let time = self.simulation.time();
             // An FMU may request the end at a time that the other FMUs have not reached.
             if time > before {

@@ -43,7 +43,7 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
 }
 
 /// The folders of our libraries, each with the libraries that it may use.
-const ARROWS: [(&str, &[&str]); 18] = [
+const ARROWS: [(&str, &[&str]); 19] = [
     ("lapack", &[]),
     ("control", &["aso-lapack"]),
     ("fmu-description", &[]),
@@ -55,6 +55,7 @@ const ARROWS: [(&str, &[&str]); 18] = [
     ("ssp", &["fmu-description", "slave"]),
     ("results", &[]),
     ("report", &["results"]),
+    ("live", &["report"]),
     ("solve", &[]),
     ("integrate", &["fmu-description", "slave", "solve"]),
     ("master", &["fmu-description", "slave", "solve"]),

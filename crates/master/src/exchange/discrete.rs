@@ -159,6 +159,12 @@ impl<T: Clone + Default> Channel<T> {
         true
     }
 
+    /// Returns the faults on the connection to an input.
+    pub(crate) fn fault(&self, input: Port) -> Option<&FaultChain> {
+        let k = self.input_ports.iter().position(|&port| port == input)?;
+        self.faults[k].as_ref()
+    }
+
     /// Records the undisturbed values in the faults at the final communication point `time`. Slaves
     /// for which `ahead` is true contribute the value at the start of their step.
     pub(crate) fn commit(&mut self, time: f64, ahead: impl Fn(usize) -> bool) {

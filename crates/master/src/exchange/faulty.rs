@@ -16,6 +16,12 @@ impl Reals {
         true
     }
 
+    /// Returns the faults on the connection to an input.
+    pub(crate) fn fault(&self, input: Port) -> Option<&FaultChain> {
+        let k = self.layout.input_ports.iter().position(|&port| port == input)?;
+        self.faults.get(k)?.as_ref()
+    }
+
     /// Records the undisturbed values in the faults at the final communication point `time`.
     pub(crate) fn commit(&mut self, time: f64) {
         for k in 0..self.faults.len() {

@@ -27,6 +27,11 @@ impl Stage {
         Ok(Self { window, fault, kept: None, line })
     }
 
+    /// Whether both are the same fault in the same window, whatever they remember.
+    pub(super) fn is_same_fault(&self, other: &Self) -> bool {
+        self.window == other.window && self.fault == other.fault
+    }
+
     /// Applies the fault to a value with its first two derivatives with respect to time.
     pub(super) fn apply(&self, time: f64, derivatives: [f64; 3]) -> [f64; 3] {
         if !self.window.contains(time) {

@@ -133,6 +133,7 @@ impl Simulation {
             .restore(checkpoint.drives.clone())
             .map_err(|error| SystemError::Algorithm { what: error.to_string() })?;
         self.engine.grid.resume(checkpoint.time, checkpoint.count);
+        self.attempted = checkpoint.time;
         self.ended = checkpoint.ended;
         self.control.size = checkpoint.size;
         self.control.controller = checkpoint.controller.clone();

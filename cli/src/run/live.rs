@@ -1,0 +1,328 @@
+//! The live view of a run: publishes samples, performs the requests of the page between steps.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use fmu_description::{Causality, Kind, ScalarVariable, Variability};
+use live::{Action, Facts, Phase, Request, Sample, Source, Variable, View};
+use master::{Port, Probe, Readout, System};
+use study::config::CheckpointSettings;
+use study::{Error, RealTime, Run};
+
+use super::{interrupt, quoted};
+use crate::logging;
+
+/// Largest number of signals, and of variables that can be set, on the page.
+const SIGNALS: usize = 500;
+const SETTINGS: usize = 5000;
+/// Interval between two looks for a signal of the operating system while the run is paused.
+const LOOK: Duration = Duration::from_millis(50);
+/// Time in which an open page can see the end of the run.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// State of the run at its start, as `--live` gives it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum LiveStart {
+    /// The run starts at once
+    Running,
+    /// The run waits for the page
+    Paused,
+}
+
+/// The live view of a run.
+pub(super) struct Live {
+    view: View,
+    probe: Probe,
+    /// Whether the FMUs let the signals be read.
+    readable: bool,
+    phase: Phase,
+    /// Whether the run pauses again after the step that it makes.
+    pauses_again: bool,
+    start: Instant,
+    /// Time of all pauses.
+    paused: Duration,
+    /// Lines of the file that repeats the run: interventions, and the stop.
+    remarks: Vec<String>,
+    file: PathBuf,
+    /// Whether the page has stopped the run.
+    pub(super) stopped: bool,
+}
+
+impl Live {
+    /// Starts the view of a run whose recorded variables are `ports`, and prints its address. `here`
+    /// is the current folder.
+    pub(super) fn open(
+        run: &mut Run,
+        ports: &[Port],
+        pace: Option<f64>,
+        start: LiveStart,
+        here: &Path,
+    ) -> anyhow::Result<Self> {
+        let results = run.config.results.file.clone().unwrap_or_default();
+        let file = results.with_file_name("live.toml");
+        let shown = shown(&file, here);
+        let repeat = repeat_command(&shown);
+        let probe = probe(run, ports)?;
+        let (begin, stop) = (run.simulation.time(), run.plan.stop);
+        let system = run.simulation.system();
+        let facts = Facts {
+            system: system
+                .slaves
+                .iter()
+                .map(|(name, _)| name.as_str())
+                .collect::<Vec<_>>()
+                .join(", "),
+            start: begin,
+            stop,
+            pace,
+            signals: probe.names().iter().filter_map(|name| named(system, name)).collect(),
+            settings: settings(system),
+            inputs: inputs(system),
+            file: shown,
+            repeat,
+        };
+        let phase = match start {
+            LiveStart::Running => Phase::Running,
+            LiveStart::Paused => Phase::Paused,
+        };
+        let view = View::open(&facts, phase).context("--live: the page cannot be served")?;
+        logging::forward(view.messages());
+        println!("live view: {}", view.address());
+        Ok(Self {
+            view,
+            probe,
+            readable: true,
+            phase,
+            pauses_again: false,
+            start: Instant::now(),
+            paused: Duration::ZERO,
+            remarks: Vec::new(),
+            file,
+            stopped: false,
+        })
+    }
+
+    /// Does what the page asks for, at a communication point of the run; one atomic load if it asks for
+    /// nothing.
+    #[inline]
+    pub(super) fn attend(&mut self, run: &mut Run, pace: Option<&mut RealTime>) -> ControlFlow<()> {
+        if self.view.is_called() { self.perform_all(run, pace) } else { ControlFlow::Continue(()) }
+    }
+
+    #[cold]
+    fn perform_all(&mut self, run: &mut Run, pace: Option<&mut RealTime>) -> ControlFlow<()> {
+        let due = self.view.take_calls();
+        if std::mem::take(&mut self.pauses_again) {
+            self.set_phase(Phase::Paused);
+        }
+        if due || self.phase == Phase::Paused {
+            self.sample(run, pace.as_deref());
+        }
+        let start = Instant::now();
+        loop {
+            let wait = (self.phase == Phase::Paused).then_some(LOOK);
+            while let Some(request) = self.view.request(wait) {
+                self.perform(run, request);
+                if self.stopped || wait.is_some() {
+                    break;
+                }
+            }
+            let holds = self.phase == Phase::Paused && !run.simulation.is_finished();
+            if !holds || self.stopped || interrupt::is_raised() {
+                break;
+            }
+            if self.view.take_calls() {
+                self.sample(run, pace.as_deref());
+            }
+        }
+        let held = start.elapsed();
+        self.paused += held;
+        if let Some(pace) = pace {
+            pace.shift(held);
+        }
+        if self.stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    fn set_phase(&mut self, phase: Phase) {
+        self.phase = phase;
+        self.view.set_phase(phase);
+    }
+
+    fn perform(&mut self, run: &mut Run, request: Request) {
+        let time = run.simulation.time();
+        if run.simulation.is_finished() {
+            return request.answer(Err(format!("the run has reached its end, t = {time} s")));
+        }
+        let answer = match &request.action {
+            Action::Pause => {
+                self.set_phase(Phase::Paused);
+                Ok(format!("The run is paused at t = {time} s."))
+            }
+            Action::Continue => {
+                self.set_phase(Phase::Running);
+                Ok(format!("The run goes on from t = {time} s."))
+            }
+            Action::Step => {
+                self.set_phase(Phase::Running);
+                self.pauses_again = true;
+                self.view.call_again();
+                Ok(format!("The run makes one step from t = {time} s."))
+            }
+            Action::Stop => {
+                self.stopped = true;
+                self.remarks.push(format!(
+                    "The run was stopped at t = {time} s; a repetition goes on to the stop time."
+                ));
+                self.write(run).map(|()| format!("The run is stopped at t = {time} s."))
+            }
+            Action::Intervene(text) => self.intervene(run, text),
+        };
+        request.answer(answer);
+    }
+
+    fn intervene(&mut self, run: &mut Run, text: &str) -> Result<String, String> {
+        let done = run.intervene(text).map_err(|error| error.sentence())?;
+        let from = done.from;
+        let line = format!("At t = {} s, to take effect at t = {from} s or later:", done.time);
+        self.view.intervened(done.time, format!("{line}\n{}", done.text));
+        let entries = done.text.lines().map(|line| format!("  {line}"));
+        self.remarks.extend(std::iter::once(line).chain(entries));
+        self.write(run)?;
+        Ok(format!("Accepted: it takes effect at t = {from} s, or at the time stated."))
+    }
+
+    /// Writes the file that repeats the run.
+    fn write(&self, run: &Run) -> Result<(), String> {
+        let text = self.repetition(run).map_err(|error| error.sentence())?;
+        files::whole::write(&self.file, text.as_bytes()).map_err(|error| {
+            let said = format!("done, but {} cannot be written: {error}", self.file.display());
+            tracing::error!("{said}");
+            said
+        })
+    }
+
+    /// Returns the complete configuration of the run with all interventions. Its results get other
+    /// names than those of the run.
+    fn repetition(&self, run: &Run) -> Result<String, Error> {
+        let mut config = run.config.clone();
+        for (path, name) in
+            [(&mut config.results.file, "repeat"), (&mut config.results.plot_file, "repeat-plot")]
+        {
+            if let Some(path) = path {
+                let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();
+                *path = path.with_file_name(format!("{name}.{ending}"));
+            }
+        }
+        config.checkpoint = CheckpointSettings::default();
+        let first =
+            "A run with --live, with its interventions. `aso-ftc run` with this file repeats it.";
+        let remarks = std::iter::once(first).chain(self.remarks.iter().map(String::as_str));
+        let remarks: String = remarks.flat_map(|line| ["# ", line, "\n"]).collect();
+        Ok(remarks + &config.render()?)
+    }
+
+    /// Publishes the values of the signals.
+    fn sample(&mut self, run: &mut Run, pace: Option<&RealTime>) {
+        let start = Instant::now();
+        let time = run.simulation.time();
+        let mut values = vec![f64::NAN; self.probe.names().len()];
+        if self.readable
+            && let Err(error) = self.probe.read(run.simulation.system(), time, &mut values)
+        {
+            self.readable = false;
+            tracing::warn!(
+                "--live: the signals are not shown any more: {}",
+                files::sentence(&error)
+            );
+        }
+        let seconds = self.start.elapsed().saturating_sub(self.paused).as_secs_f64();
+        self.view.publish(Sample {
+            time,
+            values,
+            steps: run.tally().steps,
+            seconds,
+            fallbacks: run.simulation.fallbacks().map(|known| known.count),
+            late: pace.map(|pace| pace.overruns().count),
+        });
+        self.view.set_cost(start.elapsed());
+    }
+
+    /// Returns the part of the run's summary on pauses.
+    pub(super) fn summary(&self) -> String {
+        let paused = self.paused.as_secs_f64();
+        if paused < 0.001 {
+            return String::new();
+        }
+        format!("; {paused:.3} s of it paused by the live view")
+    }
+
+    /// Prints how the run is repeated, tells the page how it ended, and closes the page. `here` is the
+    /// current folder.
+    pub(super) fn end(self, outcome: &str, here: &Path) {
+        if !self.remarks.is_empty() {
+            println!("to repeat it: {}", repeat_command(&shown(&self.file, here)));
+        }
+        self.view.end(outcome, PATIENCE);
+    }
+}
+
+fn shown(file: &Path, here: &Path) -> String {
+    file.strip_prefix(here).unwrap_or(file).display().to_string()
+}
+
+fn repeat_command(file: &str) -> String {
+    let command = std::env::args().next().unwrap_or_else(|| "aso-ftc".to_owned());
+    format!("{} run {}", quoted(&command), quoted(file))
+}
+
+/// Returns a probe of the recorded variables that the FMUs let read.
+fn probe(run: &mut Run, ports: &[Port]) -> anyhow::Result<Probe> {
+    let time = run.simulation.time();
+    let system = run.simulation.system();
+    let refused = Readout::new(system, ports).unreadable(system, ports, time)?;
+    let kept = ports.iter().copied().filter(|port| refused.iter().all(|(known, _)| known != port));
+    let kept: Vec<Port> = kept.take(SIGNALS).collect();
+    Ok(Probe::new(system, &kept))
+}
+
+fn named(system: &System, name: &str) -> Option<Variable> {
+    system.port(name).ok().map(|port| variable(system, port))
+}
+
+fn variable(system: &System, port: Port) -> Variable {
+    let ScalarVariable { kind, description, .. } = system.variable(port);
+    let kind = if kind.as_real().is_some() { "Real" } else { kind.element() };
+    Variable {
+        name: system.name(port),
+        unit: study::unit(system, port).unwrap_or_default(),
+        kind: kind.to_owned(),
+        description: description.clone().unwrap_or_default(),
+    }
+}
+
+/// Returns the inputs without a connection and the tunable parameters.
+fn settings(system: &System) -> Vec<Variable> {
+    let inputs = system.ports(Causality::Input).into_iter();
+    let free = inputs.filter(|port| system.source(*port).is_none());
+    let parameters = system.ports(Causality::Parameter).into_iter();
+    let is_tunable = |port: &Port| system.variable(*port).variability == Variability::Tunable;
+    free.chain(parameters.filter(is_tunable))
+        .take(SETTINGS)
+        .map(|port| variable(system, port))
+        .collect()
+}
+
+/// Returns the connected inputs on which a fault can act.
+fn inputs(system: &System) -> Vec<Source> {
+    let fits = |port: Port| {
+        !matches!(system.variable(port).kind, Kind::String(_) | Kind::Binary(_) | Kind::Clock(_))
+    };
+    let connections = system.connections.iter().filter(|connection| fits(connection.to));
+    let source = |connection: &master::Connection| Source {
+        input: variable(system, connection.to),
+        output: system.name(connection.from),
+    };
+    connections.map(source).collect()
+}

@@ -1,0 +1,30 @@
+//! A page on localhost that shows a running simulation and passes requests to it.
+//!
+//! [`View::open`] starts a server at a random port of 127.0.0.1; the address of the page contains a
+//! random token. The thread of the run calls [`View::is_called`] at each communication point, one
+//! atomic load. If it returns true, the run publishes a [`Sample`] and answers requests. No call but
+//! [`View::end`] waits for the server: what it cannot take at once is dropped and counted.
+//!
+//! The server answers requests that state the token, its own address as `Host`, and no foreign
+//! `Origin`; it limits the size of a request, the time for it and the number of connections
+//! (`server.rs`, `request.rs`, `guard.rs`).
+#![forbid(unsafe_code)]
+
+mod answer;
+mod facts;
+mod guard;
+mod request;
+mod routes;
+mod server;
+mod shared;
+mod store;
+mod view;
+
+pub use facts::{Facts, Source, Variable};
+pub use shared::Phase;
+pub use store::Sample;
+pub use view::{Action, Messages, Request, View};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

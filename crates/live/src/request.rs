@@ -1,0 +1,171 @@
+//! Reads a request of HTTP/1.1 within limits of size and time.
+
+use std::io::{ErrorKind, Read};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+/// Limits: bytes of request line and headers, number of headers, bytes of the body.
+const HEAD: usize = 8 << 10;
+const HEADERS: usize = 64;
+const BODY: usize = 64 << 10;
+
+/// A request.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) struct Parsed {
+    pub(crate) method: String,
+    pub(crate) path: String,
+    /// The part after the question mark.
+    pub(crate) query: String,
+    pub(crate) host: Option<String>,
+    pub(crate) origin: Option<String>,
+    /// `Sec-Fetch-Site` and `Sec-Fetch-Mode`, which browsers state.
+    pub(crate) site: Option<String>,
+    pub(crate) mode: Option<String>,
+    pub(crate) kind: Option<String>,
+    pub(crate) body: String,
+}
+
+/// Why a request is refused: status and reason; `None` if nothing can be answered.
+pub(crate) type Refusal = Option<(u16, &'static str)>;
+
+/// The start of a request: its parts, the length of the head and that of the body, in bytes.
+type Head = (Parsed, usize, usize);
+
+/// Reads a request until `deadline`.
+pub(crate) fn read(stream: &mut TcpStream, deadline: Instant) -> Result<Parsed, Refusal> {
+    let mut bytes = Vec::new();
+    let (mut parsed, head, length) = loop {
+        if let Some(found) = head(&bytes).map_err(Some)? {
+            break found;
+        }
+        receive(stream, deadline, &mut bytes)?;
+    };
+    while bytes.len() < head + length {
+        receive(stream, deadline, &mut bytes)?;
+    }
+    let body = bytes[head..head + length].to_vec();
+    parsed.body = String::from_utf8(body).map_err(|_| Some((400, "the body is not UTF-8")))?;
+    Ok(parsed)
+}
+
+/// Appends the bytes that arrive next.
+fn receive(stream: &mut TcpStream, deadline: Instant, bytes: &mut Vec<u8>) -> Result<(), Refusal> {
+    let late = Some((408, "the request took too long"));
+    let left = deadline.saturating_duration_since(Instant::now());
+    if left < Duration::from_millis(1) {
+        return Err(late);
+    }
+    stream.set_read_timeout(Some(left)).map_err(|_| None)?;
+    let mut chunk = [0; 4096];
+    match stream.read(&mut chunk) {
+        Ok(0) => Err(None),
+        Ok(count) => {
+            bytes.extend_from_slice(&chunk[..count]);
+            Ok(())
+        }
+        Err(error) => match error.kind() {
+            ErrorKind::Interrupted => Ok(()),
+            ErrorKind::WouldBlock | ErrorKind::TimedOut => Err(late),
+            _ => Err(None),
+        },
+    }
+}
+
+/// Parses the head of a request; `None` if it is not complete.
+fn head(bytes: &[u8]) -> Result<Option<Head>, (u16, &'static str)> {
+    let mut headers = [httparse::EMPTY_HEADER; HEADERS];
+    let mut request = httparse::Request::new(&mut headers);
+    let size = match request.parse(bytes) {
+        Ok(httparse::Status::Complete(size)) if size <= HEAD => size,
+        Ok(httparse::Status::Partial) if bytes.len() < HEAD => return Ok(None),
+        Err(httparse::Error::TooManyHeaders) | Ok(_) => {
+            return Err((431, "the head of the request is too large"));
+        }
+        Err(_) => return Err((400, "this is no request of HTTP/1.1")),
+    };
+    let target = request.path.unwrap_or_default();
+    let (path, query) = target.split_once('?').unwrap_or((target, ""));
+    let mut parsed = Parsed {
+        method: request.method.unwrap_or_default().to_owned(),
+        path: path.to_owned(),
+        query: query.to_owned(),
+        ..Parsed::default()
+    };
+    let mut length = None;
+    for header in request.headers {
+        let name = header.name.to_ascii_lowercase();
+        let value = std::str::from_utf8(header.value).unwrap_or("?").trim().to_owned();
+        let place = match name.as_str() {
+            "host" => &mut parsed.host,
+            "origin" => &mut parsed.origin,
+            "sec-fetch-site" => &mut parsed.site,
+            "sec-fetch-mode" => &mut parsed.mode,
+            "content-type" => &mut parsed.kind,
+            "content-length" => &mut length,
+            "transfer-encoding" => return Err((411, "expected a body with its Content-Length")),
+            _ => continue,
+        };
+        if place.replace(value).is_some() {
+            return Err((400, "a header is stated twice"));
+        }
+    }
+    let digits = |text: &String| text.bytes().all(|byte| byte.is_ascii_digit());
+    let length = match length {
+        None => 0,
+        Some(text) if !text.is_empty() && digits(&text) => text.parse().unwrap_or(usize::MAX),
+        Some(_) => return Err((400, "the Content-Length is no number")),
+    };
+    if length > BODY {
+        return Err((413, "the body of the request is too large"));
+    }
+    Ok(Some((parsed, size, length)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn status(text: &str) -> u16 {
+        head(text.as_bytes())
+            .map_or_else(|(status, _)| status, |found| if found.is_some() { 200 } else { 0 })
+    }
+
+    #[test]
+    fn a_head_is_read_whole_and_only_once_it_is_complete() {
+        let text = "POST /t/scenario?a=b HTTP/1.1\r\nHost: 127.0.0.1:1\r\nORIGIN: http://x\r\nContent-Length: 3\r\n\r\nabc";
+        let (found, size, length) = head(text.as_bytes()).unwrap().unwrap();
+        assert_eq!((found.method.as_str(), found.path.as_str()), ("POST", "/t/scenario"));
+        assert_eq!((found.query.as_str(), length, size), ("a=b", 3, text.len() - 3));
+        assert_eq!(
+            (found.host.as_deref(), found.origin.as_deref()),
+            (Some("127.0.0.1:1"), Some("http://x"))
+        );
+        for end in 0..size {
+            assert!(head(&text.as_bytes()[..end]).unwrap().is_none(), "{end}");
+        }
+    }
+
+    #[test]
+    fn ambiguous_and_oversized_heads_are_refused() {
+        assert_eq!(status("GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n"), 400);
+        assert_eq!(
+            status("POST / HTTP/1.1\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\n"),
+            400
+        );
+        assert_eq!(status("POST / HTTP/1.1\r\nContent-Length: +1\r\n\r\n"), 400);
+        assert_eq!(status("POST / HTTP/1.1\r\nContent-Length: -1\r\n\r\n"), 400);
+        assert_eq!(status("POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n"), 411);
+        assert_eq!(status("POST / HTTP/1.1\r\nContent-Length: 65537\r\n\r\n"), 413);
+        assert_eq!(
+            status(&format!("POST / HTTP/1.1\r\nContent-Length: {}\r\n\r\n", "9".repeat(40))),
+            413
+        );
+        assert_eq!(status(&format!("GET /{} HTTP/1.1\r\n", "a".repeat(HEAD))), 431);
+        assert_eq!(
+            status(&format!("GET / HTTP/1.1\r\n{}\r\n", "a: b\r\n".repeat(HEADERS + 1))),
+            431
+        );
+        assert_eq!(status("nonsense\r\n\r\n"), 400);
+        assert_eq!(status("\x16\x03\x01\x02"), 400);
+    }
+}

@@ -1,0 +1,161 @@
+//! The addresses of the page.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::time::Duration;
+
+use serde_json::json;
+
+use crate::answer::Answer;
+use crate::guard::Guard;
+use crate::request::Parsed;
+use crate::shared::{Phase, Shared};
+use crate::store::{Query, SHOWN};
+use crate::view::{Action, Request};
+
+/// Time that an answer of the run may take: a step may be long.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// The type of the entries of a scenario. Browsers send it to another site only after asking for leave, which this
+/// server never gives.
+const TOML: &str = "application/toml";
+
+const HTML: &str = include_str!("page/page.html");
+const STYLE: &str = include_str!("page/page.css");
+const SCRIPT: &str = include_str!("page/page.js");
+
+/// What the server serves.
+pub(crate) struct Site {
+    pub(crate) guard: Guard,
+    /// The facts, in JSON.
+    pub(crate) facts: String,
+    pub(crate) shared: Arc<Shared>,
+    pub(crate) requests: SyncSender<Request>,
+}
+
+impl Site {
+    /// Answers a request.
+    pub(crate) fn answer(&self, request: &Parsed) -> Answer {
+        let path = match self.guard.admit(request) {
+            Ok(path) => path,
+            Err((status, reason)) => return Answer::refusal(status, reason),
+        };
+        self.shared.store().ask();
+        let action = match path {
+            "pause" => Some(Action::Pause),
+            "continue" => Some(Action::Continue),
+            "step" => Some(Action::Step),
+            "stop" => Some(Action::Stop),
+            "scenario" => Some(Action::Intervene(request.body.clone())),
+            _ => None,
+        };
+        let is_read =
+            ["", "page.css", "page.js", "uPlot.css", "uPlot.js", "facts", "state"].contains(&path);
+        match (action, request.method.as_str()) {
+            (Some(action), "POST") => self.perform(action, request),
+            (Some(_), _) => Answer { allow: Some("POST"), ..Answer::refusal(405, "expected POST") },
+            (None, "GET") if is_read => self.read(path, request),
+            (None, _) if is_read => {
+                Answer { allow: Some("GET"), ..Answer::refusal(405, "expected GET") }
+            }
+            (None, _) => Answer::refusal(404, "there is nothing at this address"),
+        }
+    }
+
+    fn read(&self, path: &str, request: &Parsed) -> Answer {
+        match path {
+            "" => Answer::file("text/html", HTML),
+            "page.css" => Answer::file("text/css", STYLE),
+            "page.js" => Answer::file("text/javascript", SCRIPT),
+            "uPlot.css" => Answer::file("text/css", report::UPLOT_STYLE),
+            "uPlot.js" => Answer::file("text/javascript", report::UPLOT),
+            "facts" => Answer::text_of_json(200, self.facts.clone()),
+            _ => match query(&request.query) {
+                Some(query) => self.state(&query),
+                None => Answer::refusal(400, "expected state?rows=N&messages=N&show=N,N"),
+            },
+        }
+    }
+
+    fn state(&self, query: &Query) -> Answer {
+        // The run makes a sample at once for the first question of a page.
+        self.shared.call_for_sample();
+        let dropped = self.shared.dropped.load(Ordering::Relaxed);
+        // Read before the events, so that a page that sees the end has seen them all.
+        let phase = self.shared.phase().name();
+        let state = self.shared.store().state(query, phase, dropped);
+        Answer::json(200, &state)
+    }
+
+    fn perform(&self, action: Action, request: &Parsed) -> Answer {
+        let kind = request.kind.as_deref().unwrap_or_default();
+        if kind.split(';').next().unwrap_or_default().trim() != TOML {
+            return Answer::refusal(415, "expected the Content-Type application/toml");
+        }
+        let (sender, answer) = sync_channel(1);
+        let ended = || Answer::refusal(410, "the run has ended");
+        if self.shared.phase() == Phase::Ended {
+            return ended();
+        }
+        match self.requests.try_send(Request { action, answer: sender }) {
+            Ok(()) => self.shared.call_for_request(),
+            Err(TrySendError::Full(_)) => {
+                return Answer::refusal(503, "the run has not answered the requests before");
+            }
+            Err(TrySendError::Disconnected(_)) => return ended(),
+        }
+        match answer.recv_timeout(PATIENCE) {
+            Ok(Ok(sentence)) => Answer::json(200, &json!({ "answer": sentence })),
+            Ok(Err(sentence)) => Answer::refusal(422, &sentence),
+            Err(RecvTimeoutError::Timeout) => {
+                let sentence = "the run is still within a step; it answers after it";
+                Answer::json(202, &json!({ "answer": sentence }))
+            }
+            Err(RecvTimeoutError::Disconnected) => ended(),
+        }
+    }
+}
+
+/// Reads `rows=N&messages=N&show=N,N`; every part may be missing.
+fn query(text: &str) -> Option<Query> {
+    let mut query = Query::default();
+    for part in text.split('&').filter(|part| !part.is_empty()) {
+        let (name, value) = part.split_once('=')?;
+        match name {
+            "rows" => query.rows_after = value.parse().ok()?,
+            "messages" => query.messages_after = value.parse().ok()?,
+            "show" => {
+                let numbers = value.split(',').filter(|number| !number.is_empty()).take(SHOWN);
+                query.shown = numbers.map(|number| number.parse().ok()).collect::<Option<_>>()?;
+            }
+            _ => return None,
+        }
+    }
+    Some(query)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_query_is_three_lists_of_numbers() {
+        let found = query("rows=3&messages=4&show=1,2").unwrap();
+        assert_eq!(found, Query { rows_after: 3, messages_after: 4, shown: vec![1, 2] });
+        assert_eq!(query(""), Some(Query::default()));
+        assert_eq!(query("show=").unwrap().shown, Vec::<usize>::new());
+        for wrong in [
+            "rows",
+            "rows=",
+            "rows=-1",
+            "rows=1e3",
+            "show=a",
+            "other=1",
+            "rows=99999999999999999999",
+        ] {
+            assert_eq!(query(wrong), None, "{wrong}");
+        }
+        let many = (0..1000).map(|number| number.to_string()).collect::<Vec<_>>().join(",");
+        assert_eq!(query(&format!("show={many}")).unwrap().shown.len(), SHOWN);
+    }
+}

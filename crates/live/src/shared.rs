@@ -1,0 +1,118 @@
+//! What the run and the server share: flags, and a queue from the run to the server.
+
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
+use std::sync::mpsc::Receiver;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use crate::store::{Event, Store};
+
+/// Bits of the flags by which the server calls the run.
+const SAMPLE: u8 = 1;
+const REQUEST: u8 = 2;
+
+/// What the run does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// It steps.
+    Running,
+    /// It is held at a communication point.
+    Paused,
+    /// It has ended.
+    Ended,
+}
+
+impl Phase {
+    /// Returns the name on the page.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Phase::Running => "running",
+            Phase::Paused => "paused",
+            Phase::Ended => "ended",
+        }
+    }
+}
+
+/// The state that the run and the server share.
+pub(crate) struct Shared {
+    flags: AtomicU8,
+    phase: AtomicU8,
+    /// Processor time in ns that the last sample took.
+    cost: AtomicU64,
+    /// Number of events that were dropped because the queue was full.
+    pub(crate) dropped: AtomicU64,
+    pub(crate) closed: AtomicBool,
+    events: Mutex<Receiver<Event>>,
+    store: Mutex<Store>,
+}
+
+impl Shared {
+    pub(crate) fn new(events: Receiver<Event>, store: Store, phase: Phase) -> Self {
+        let shared = Self {
+            flags: AtomicU8::new(REQUEST),
+            phase: AtomicU8::new(0),
+            cost: AtomicU64::new(0),
+            dropped: AtomicU64::new(0),
+            closed: AtomicBool::new(false),
+            events: Mutex::new(events),
+            store: Mutex::new(store),
+        };
+        shared.set_phase(phase);
+        shared
+    }
+
+    #[inline]
+    pub(crate) fn is_called(&self) -> bool {
+        self.flags.load(Ordering::Relaxed) != 0
+    }
+
+    /// Takes the flags; returns whether a sample is due.
+    pub(crate) fn take_calls(&self) -> bool {
+        self.flags.swap(0, Ordering::Acquire) & SAMPLE != 0
+    }
+
+    pub(crate) fn call_for_sample(&self) {
+        self.flags.fetch_or(SAMPLE, Ordering::Release);
+    }
+
+    pub(crate) fn call_for_request(&self) {
+        self.flags.fetch_or(REQUEST, Ordering::Release);
+    }
+
+    pub(crate) fn phase(&self) -> Phase {
+        match self.phase.load(Ordering::Acquire) {
+            0 => Phase::Running,
+            1 => Phase::Paused,
+            _ => Phase::Ended,
+        }
+    }
+
+    pub(crate) fn set_phase(&self, phase: Phase) {
+        let number = match phase {
+            Phase::Running => 0,
+            Phase::Paused => 1,
+            Phase::Ended => 2,
+        };
+        self.phase.store(number, Ordering::Release);
+    }
+
+    pub(crate) fn cost(&self) -> Duration {
+        Duration::from_nanos(self.cost.load(Ordering::Relaxed))
+    }
+
+    pub(crate) fn set_cost(&self, cost: Duration) {
+        let nanoseconds = u64::try_from(cost.as_nanos()).unwrap_or(u64::MAX);
+        self.cost.store(nanoseconds, Ordering::Relaxed);
+    }
+
+    /// Moves all events of the run into the store and returns the store. Only threads of the server
+    /// call this, so the run never waits for it.
+    pub(crate) fn store(&self) -> MutexGuard<'_, Store> {
+        let events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut store = self.store.lock().unwrap_or_else(PoisonError::into_inner);
+        for event in events.try_iter() {
+            store.add(event);
+        }
+        store
+    }
+}

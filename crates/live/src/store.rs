@@ -1,0 +1,245 @@
+//! What the server keeps of a run: rows, messages, interventions.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// Limits of the rows: their number, and the number of all values in them.
+const MOST_ROWS: usize = 4000;
+const LEAST_ROWS: usize = 100;
+const VALUES: usize = 1_000_000;
+/// Largest number of messages kept, and sent at once.
+const MESSAGES: usize = 1000;
+/// Largest number of signals sent at once.
+pub(crate) const SHOWN: usize = 32;
+/// A page that has not asked for this time is closed.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// The state of a run at a communication point.
+#[derive(Clone, Debug, Default)]
+pub struct Sample {
+    /// Time in s.
+    pub time: f64,
+    /// Values of [`crate::Facts::signals`].
+    pub values: Vec<f64>,
+    /// Number of communication steps so far.
+    pub steps: u64,
+    /// Wall-clock time in s so far, without pauses.
+    pub seconds: f64,
+    /// Number of steps whose iteration failed; `None` without iteration.
+    pub fallbacks: Option<u64>,
+    /// Number of steps that ended after their instant; `None` if the run is not paced.
+    pub late: Option<u64>,
+}
+
+/// What the run tells the server.
+pub(crate) enum Event {
+    Sample(Sample),
+    /// A message; the name of its FMU is empty if it has none.
+    Message {
+        fmu: String,
+        text: String,
+    },
+    Intervention {
+        time: f64,
+        text: String,
+    },
+    Ended {
+        outcome: String,
+    },
+}
+
+/// A message with its FMU.
+#[derive(Clone, Serialize)]
+struct Message {
+    fmu: String,
+    text: String,
+}
+
+/// A row of the signals; numbers grow with time.
+struct Row {
+    number: u64,
+    time: f64,
+    values: Vec<f64>,
+}
+
+/// What a page asks for: the rows and messages after these numbers, of these signals.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) struct Query {
+    pub(crate) rows_after: u64,
+    pub(crate) messages_after: u64,
+    pub(crate) shown: Vec<usize>,
+}
+
+/// The state of a run on the side of the server.
+pub(crate) struct Store {
+    signals: usize,
+    rows: VecDeque<Row>,
+    last: Sample,
+    /// Number of the last row.
+    row_number: u64,
+    messages: VecDeque<Message>,
+    message_count: u64,
+    counts: BTreeMap<String, u64>,
+    interventions: Vec<(f64, String)>,
+    outcome: Option<String>,
+    /// When a page last asked, and whether it has seen the outcome.
+    asked: Option<Instant>,
+    pub(crate) seen: bool,
+}
+
+impl Store {
+    /// Creates the store of a run with this number of signals that starts at `start` s.
+    pub(crate) fn new(signals: usize, start: f64) -> Self {
+        Self {
+            signals,
+            rows: VecDeque::new(),
+            last: Sample { time: start, ..Sample::default() },
+            row_number: 0,
+            messages: VecDeque::new(),
+            message_count: 0,
+            counts: BTreeMap::new(),
+            interventions: Vec::new(),
+            outcome: None,
+            asked: None,
+            seen: false,
+        }
+    }
+
+    pub(crate) fn add(&mut self, event: Event) {
+        match event {
+            Event::Sample(sample) => self.add_sample(sample),
+            Event::Message { fmu, text } => {
+                self.message_count += 1;
+                *self.counts.entry(fmu.clone()).or_default() += 1;
+                if self.messages.len() == MESSAGES {
+                    self.messages.pop_front();
+                }
+                self.messages.push_back(Message { fmu, text });
+            }
+            Event::Intervention { time, text } => self.interventions.push((time, text)),
+            Event::Ended { outcome } => self.outcome = Some(outcome),
+        }
+    }
+
+    fn add_sample(&mut self, mut sample: Sample) {
+        let values = std::mem::take(&mut sample.values);
+        let repeated = self.rows.back().is_some_and(|row| row.time >= sample.time);
+        let time = sample.time;
+        self.last = sample;
+        if repeated || values.len() != self.signals {
+            return;
+        }
+        self.row_number += 1;
+        self.rows.push_back(Row { number: self.row_number, time, values });
+        let most = (VALUES / self.signals.max(1)).clamp(LEAST_ROWS, MOST_ROWS);
+        if self.rows.len() > most {
+            // The older a row, the more of its neighbours are gone.
+            let mut position = 0;
+            let newest = self.rows.len() - most / 4;
+            self.rows.retain(|_| {
+                position += 1;
+                position % 2 == 1 || position > newest
+            });
+        }
+    }
+
+    /// Records that a page has asked.
+    pub(crate) fn ask(&mut self) {
+        self.asked = Some(Instant::now());
+    }
+
+    /// Whether a page is open.
+    pub(crate) fn is_watched(&self) -> bool {
+        self.asked.is_some_and(|asked| asked.elapsed() < PATIENCE)
+    }
+
+    /// Returns what the page asks for; values that are not finite are null.
+    pub(crate) fn state(&mut self, query: &Query, phase: &str, dropped: u64) -> Value {
+        self.seen |= self.outcome.is_some();
+        let rows: Vec<&Row> =
+            self.rows.iter().filter(|row| row.number > query.rows_after).collect();
+        let column = |signal: &usize| -> Vec<Option<f64>> {
+            rows.iter().map(|row| row.values.get(*signal).copied()).collect()
+        };
+        let first = self.message_count - self.messages.len() as u64;
+        let skipped = usize::try_from(query.messages_after.saturating_sub(first)).unwrap_or(0);
+        let messages: Vec<&Message> = self.messages.iter().skip(skipped).collect();
+        let Sample { time, steps, seconds, fallbacks, late, .. } = &self.last;
+        let interventions: Vec<_> = self
+            .interventions
+            .iter()
+            .map(|(time, text)| json!({ "time": time, "text": text }))
+            .collect();
+        json!({
+            "phase": phase,
+            "time": time,
+            "steps": steps,
+            "seconds": seconds,
+            "fallbacks": fallbacks,
+            "late": late,
+            "row": self.row_number,
+            "times": rows.iter().map(|row| row.time).collect::<Vec<_>>(),
+            "values": query.shown.iter().take(SHOWN).map(column).collect::<Vec<_>>(),
+            "message": self.message_count,
+            "messages": messages,
+            "counts": self.counts,
+            "dropped": dropped,
+            "interventions": interventions,
+            "outcome": self.outcome,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(time: f64) -> Event {
+        Event::Sample(Sample { time, values: vec![time, f64::NAN], ..Sample::default() })
+    }
+
+    #[test]
+    fn a_long_run_keeps_few_rows_from_its_whole_length() {
+        let mut store = Store::new(2, 0.0);
+        for step in 0..100_000 {
+            store.add(sample(f64::from(step)));
+        }
+        assert!(store.rows.len() <= MOST_ROWS);
+        let times: Vec<f64> = store.rows.iter().map(|row| row.time).collect();
+        assert!(times.windows(2).all(|pair| pair[0] < pair[1]));
+        assert!(times[0] < 1.0 && *times.last().unwrap() >= 99_999.0);
+    }
+
+    #[test]
+    fn a_page_gets_the_rows_after_its_last_one_and_null_for_what_is_no_number() {
+        let mut store = Store::new(2, 0.0);
+        (0..5).for_each(|step| store.add(sample(f64::from(step))));
+        // A sample of a paused run repeats the time.
+        store.add(sample(4.0));
+        let query = Query { rows_after: 3, shown: vec![1, 0, 7], ..Query::default() };
+        let state = store.state(&query, "running", 0);
+        assert_eq!(state["times"], json!([3.0, 4.0]));
+        assert_eq!(state["values"], json!([[null, null], [3.0, 4.0], [null, null]]));
+        assert_eq!(state["row"], 5);
+    }
+
+    #[test]
+    fn messages_are_counted_by_fmu_and_the_last_ones_kept() {
+        let mut store = Store::new(0, 0.0);
+        for number in 0..1500 {
+            let fmu = if number % 3 == 0 { "plant" } else { "" }.to_owned();
+            store.add(Event::Message { fmu, text: number.to_string() });
+        }
+        let state = store.state(&Query { messages_after: 1499, ..Query::default() }, "running", 0);
+        assert_eq!(state["counts"], json!({ "": 1000, "plant": 500 }));
+        assert_eq!(state["messages"], json!([{ "fmu": "", "text": "1499" }]));
+        let all = store.state(&Query::default(), "running", 0);
+        assert_eq!(all["messages"].as_array().unwrap().len(), MESSAGES);
+        let none =
+            store.state(&Query { messages_after: u64::MAX, ..Query::default() }, "running", 0);
+        assert_eq!(none["messages"], json!([]));
+    }
+}

@@ -1,0 +1,58 @@
+//! Changes of the scenario during the run.
+
+use super::Simulation;
+use crate::drive::Scenario;
+use crate::error::SystemError;
+
+impl Simulation {
+    /// Returns the earliest time in s at which a change of the scenario may take effect: the first
+    /// communication point to come that no step so far has touched, also no rejected one and none of
+    /// a slave that is ahead. `None` if the run ends before.
+    ///
+    /// A run that has the change in its scenario from the start gives the same results, bit for bit,
+    /// because it uses nothing of the change before this time.
+    #[must_use]
+    pub fn next_change(&self) -> Option<f64> {
+        if self.is_finished() {
+            return None;
+        }
+        let grid = &self.engine.grid;
+        let ahead = self.slow_slaves().filter_map(|slave| self.current_step(slave));
+        let touched = ahead.fold(self.attempted.max(grid.time), |last, (_, end)| last.max(end));
+        let next = self.control.varied_end(touched).unwrap_or_else(|| grid.point_after(touched));
+        grid.stop().is_none_or(|stop| next < stop).then_some(next)
+    }
+
+    /// Replaces the scenario by one that adds to it: further driven variables, further points of
+    /// signals, and faults after those that a connection has. What is added takes effect at
+    /// [`Simulation::next_change`] or later. A [`crate::fault::Fault::Delay`] that is added has no
+    /// values from before now.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error, and keeps the scenario, if a driven variable or a fault is missing or has
+    /// changed, or if a fault has no connection.
+    pub fn change_scenario(&mut self, mut scenario: Scenario) -> Result<(), SystemError> {
+        let engine = &mut self.engine;
+        let earlier = engine.exchange.faults().count();
+        let mut kept = 0;
+        let mut same = scenario.drives.inherit(&engine.drives);
+        for (input, chain) in &mut scenario.faults {
+            if let Some(earlier) = engine.exchange.fault(*input) {
+                same &= chain.inherit(earlier);
+                kept += 1;
+            }
+        }
+        if !same || kept != earlier {
+            let what = "the new scenario lacks a driven variable or a fault of the present one, \
+                        expected all of them";
+            return Err(SystemError::Algorithm { what: what.to_owned() });
+        }
+        engine.exchange.set_faults(&engine.system, &scenario.faults)?;
+        engine.drives = scenario.drives;
+        engine.choose_sweep();
+        // What a new fault has to remember of the values of now.
+        engine.commit();
+        Ok(())
+    }
+}
