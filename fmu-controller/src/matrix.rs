@@ -1,6 +1,5 @@
 //! A matrix as a list of rows: the form of the design file and of the FMI variables.
 
-#[cfg(test)]
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +42,6 @@ impl Matrix {
     }
 
     /// The matrix for linear algebra.
-    #[cfg(test)]
     pub(crate) fn dense(&self) -> DMatrix<f64> {
         DMatrix::from_row_slice(self.rows, self.columns, &self.values)
     }

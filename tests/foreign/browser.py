@@ -11,9 +11,12 @@ import urllib.request
 from contextlib import contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from importlib.util import find_spec
+from pathlib import Path
 
 from tornado.websocket import websocket_connect
 
+AXE = Path(find_spec("axe_playwright_python").submodule_search_locations[0]) / "axe.min.js"
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 LIMIT = 120  # s for one answer of the browser
 
@@ -68,6 +71,17 @@ class Page:
         """Loads a page."""
         self.call("Page.navigate", url=address)
         self.until("document.readyState === 'complete'")
+
+    def violations(self):
+        """What axe-core finds serious or critical in the page, light and dark: rule and elements."""
+        found = []
+        for scheme in ("light", "dark"):
+            self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+            self.evaluate(AXE.read_text(encoding="utf-8"))
+            for own in self.evaluate("axe.run(document, {resultTypes: ['violations']}).then((found) => found.violations)"):
+                places = [node["target"][0] for node in own["nodes"]]
+                found += [(scheme, own["id"], places)] if own["impact"] in ("serious", "critical") else []
+        return found
 
     def picture(self, path):
         """Writes a screenshot of the whole page."""

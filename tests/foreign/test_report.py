@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from lxml import html
 
+from browser import browser
 from conftest import ROOT
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
@@ -198,3 +199,16 @@ def test_the_controls_zoom_all_plots_and_show_the_difference(aso_ftc, write, tmp
     assert (whole, closer, later, typed, kept, end) == ([0, 4], [1, 3], [2, 4], [1, 2], [1, 2], [0, 4])
     # Each plot has a line for the time, and one for each curve.
     assert both - differences == 3
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_axe_finds_nothing_serious_in_the_reports_of_runs_and_designs(aso_ftc, of_a_run, write, tmp_path):
+    report(aso_ftc, write("own.csv", frame()), "--against", write("other.csv", frame(137, 0.25)))
+    plant = ROOT / "examples" / "plants" / "quadruple-tank.toml"
+    outputs = ("--out", tmp_path / "design.toml", "--report", tmp_path / "design.html")
+    done = aso_ftc("design", plant, *outputs)
+    assert done.returncode in (0, 1), done.stderr
+    with browser(tmp_path / "profile") as page:
+        for file in (of_a_run, tmp_path / "own.html", tmp_path / "design.html"):
+            page.open(file.as_uri())
+            assert page.violations() == [], file

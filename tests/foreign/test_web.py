@@ -1,10 +1,13 @@
 """The paper in the browser: the page of `scripts/web` in Chromium, against the command."""
 
+import base64
 import csv
 import json
 import tomllib
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from browser import CHROMIUM, browser, served
@@ -137,15 +140,56 @@ def test_every_control_answers_and_settings_without_a_design_are_refused(open_pa
     page.until(f"{state} === 'Ready.'")
 
 
+def drop(page, name, content):
+    """Drops a file on the page."""
+    page.evaluate(
+        f"""(() => {{
+        const bytes = Uint8Array.from(atob('{base64.b64encode(content).decode()}'), (c) => c.charCodeAt(0));
+        const all = new DataTransfer(); all.items.add(new File([bytes], '{name}'));
+        document.dispatchEvent(new DragEvent('drop', {{dataTransfer: all, bubbles: true, cancelable: true}}));
+        }})()"""
+    )
+
+
 def test_a_results_file_dropped_on_the_page_is_drawn(open_page):
     page = open_page()
-    page.evaluate(
-        """(async () => {
-        const text = 'time,a,"b[1,2]"\\n0,1,2\\n1,2,3\\n';
-        const file = new File([text], 'own.csv');
-        const all = new DataTransfer(); all.items.add(file);
-        document.dispatchEvent(new DragEvent('drop', {dataTransfer: all, bubbles: true, cancelable: true}));
-        })()"""
-    )
+    drop(page, "own.csv", b'time,a,"b[1,2]"\n0,1,2\n1,2,3\n')
     page.until("document.querySelectorAll('#dropped canvas').length === 2")
-    assert "2 rows" in page.evaluate("document.getElementById('status').textContent")
+    assert "own.csv: 2 rows" in page.evaluate("document.getElementById('status').textContent")
+
+
+@pytest.mark.parametrize("compression", ["none", "snappy"])
+def test_a_parquet_file_is_read_as_pyarrow_wrote_it(open_page, tmp_path, compression):
+    times = np.linspace(0.0, 1.0, 1001)
+    values = {"time": times, "a": np.sin(times), "n": np.arange(1001) - 2**40, "on": times > 0.5, "text": ["x"] * 1001}
+    pq.write_table(pa.table(values), tmp_path / "own.parquet", compression=compression)
+    content = (tmp_path / "own.parquet").read_bytes()
+    page = open_page()
+    drop(page, "own.parquet", content)
+    page.until("document.querySelectorAll('#dropped canvas').length === 3")
+    data = base64.b64encode(content).decode()
+    read = f"parseParquet(Uint8Array.from(atob('{data}'), (c) => c.charCodeAt(0)).buffer)"
+    table = page.evaluate(read)
+    assert table["names"] == ["time", "a", "n", "on"]
+    assert np.array_equal(table["columns"], [np.asarray(values[name], dtype=float) for name in table["names"]])
+    drop(page, "bad.parquet", b"PAR1 and nothing more")
+    page.until("document.getElementById('status').textContent.startsWith('bad.parquet: ')")
+    assert "rows" not in page.evaluate("document.getElementById('status').textContent")
+
+
+def test_the_results_of_the_command_in_parquet_are_drawn(aso_ftc, open_page, tmp_path):
+    results = tmp_path / "results.parquet"
+    plant = ROOT / "dist" / "FrictionPendulum.fmu"
+    done = aso_ftc("run", plant, "--stop-time", "1", "--step", "0.01", "--results", results)
+    assert done.returncode == 0, done.stderr
+    page = open_page()
+    drop(page, "results.parquet", results.read_bytes())
+    page.until("document.querySelectorAll('#dropped canvas').length > 2")
+    assert "results.parquet: 101 rows" in page.evaluate("document.getElementById('status').textContent")
+
+
+def test_axe_finds_nothing_serious_before_and_after_a_run(open_page):
+    page = open_page("#stop=5")
+    assert page.violations() == []
+    run_to_the_end(page)
+    assert page.violations() == []

@@ -87,15 +87,25 @@ function parseCsv(text) {
   return { names, columns: columns.map((column) => column.map((value) => (Number.isNaN(value) ? null : value))) };
 }
 
+// Reads a results file in Parquet, as parseCsv; variables that are no numbers are left out.
+async function parseParquet(bytes) {
+  const { parquetReadObjects } = await import("./hyparquet.min.js");
+  const all = await parquetReadObjects({ file: bytes });
+  if (all.length === 0) throw new Error("expected rows, found none");
+  const plain = (value) => ["number", "bigint", "boolean"].includes(typeof value);
+  const names = Object.keys(all[0]).filter((name, k) => k === 0 || all.some((row) => plain(row[name])));
+  const columns = names.map((name) => all.map((row) => (plain(row[name]) ? Number(row[name]) : null)));
+  if (names.length < 2) throw new Error("expected a column of times and variables that are numbers");
+  if (columns[0].includes(null)) throw new Error(`the column "${names[0]}" is not a time`);
+  return { names, columns };
+}
+
 // Shows a results file below `place`; answers with a sentence.
 async function showFile(file, place) {
   place.replaceChildren();
-  if (file.name.endsWith(".parquet")) {
-    return "This page does not read Parquet: `aso-ftc report FILE.parquet` makes a page of it.";
-  }
   let table;
   try {
-    table = parseCsv(await file.text());
+    table = file.name.endsWith(".parquet") ? await parseParquet(await file.arrayBuffer()) : parseCsv(await file.text());
   } catch (error) {
     return `${file.name}: ${error.message}`;
   }

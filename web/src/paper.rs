@@ -12,7 +12,7 @@ use crate::LinkedSlave;
 use crate::settings::Settings;
 
 /// The design that the controller FMU contains.
-const DESIGN: &str = include_str!("../../fmu-controller/resources/design.toml");
+const DESIGN: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/design"));
 
 /// The variables of a row, after the time.
 pub const COLUMNS: [&str; 8] = [
@@ -60,13 +60,14 @@ impl Paper {
         let mut system = System::default();
         let plant = LinkedSlave::new(model::<FrictionPendulum>()?);
         let plant = plant.map_err(|failure| failure.to_string())?;
-        let controller = AsoController::from_design(DESIGN).and_then(LinkedSlave::new);
-        let controller = controller.map_err(|failure| failure.to_string())?;
+        let controller =
+            AsoController::from_bytes(DESIGN).map_err(|failure| failure.to_string())?;
+        let settings = Settings::parse(settings)?;
+        let gains = settings.gains(&controller.plant())?;
+        let controller = LinkedSlave::new(controller).map_err(|failure| failure.to_string())?;
         system.add("plant", Box::new(plant)).map_err(told)?;
         system.add("controller", Box::new(controller)).map_err(told)?;
         system.connect_equal_names().map_err(told)?;
-        let settings = Settings::parse(settings)?;
-        let gains = settings.gains(DESIGN)?;
         for (name, value) in settings.values.iter().chain(&gains) {
             let port = system.port(name).map_err(told)?;
             system.set_port(port, value).map_err(told)?;

@@ -6,7 +6,6 @@ use control::aso::FaultyPlant;
 use control::placement::{place_balanced, real_poles};
 use master::fault::{Fault, FaultChain, NoiseDistribution, RandomSeries, Window};
 use master::{Scenario, System};
-use nalgebra::DMatrix;
 
 use crate::paper::told;
 
@@ -80,18 +79,11 @@ impl Settings {
     /// # Errors
     ///
     /// The reason, as a sentence: eigenvalues that no observer has, or too many or too few.
-    pub(crate) fn gains(&self, file: &str) -> Result<Vec<(String, String)>, String> {
+    pub(crate) fn gains(&self, plant: &FaultyPlant) -> Result<Vec<(String, String)>, String> {
         let Some(eigenvalues) = &self.eigenvalues else { return Ok(Vec::new()) };
         if let Some(slow) = eigenvalues.iter().find(|value| **value >= 0.0) {
             return Err(format!("eigenvalue {slow} 1/s of the observer: expected below 0"));
         }
-        let file: toml::Table = file.parse().map_err(|error: toml::de::Error| told(error))?;
-        let plant = FaultyPlant::with_constant_faults(
-            matrix(&file, "A")?,
-            matrix(&file, "B")?,
-            matrix(&file, "C")?,
-            matrix(&file, "F_a")?,
-        );
         plant.check_observer_exists().map_err(told)?;
         let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
         let poles = real_poles(eigenvalues);
@@ -150,17 +142,4 @@ impl Settings {
 fn number(line: &str, text: &str) -> Result<f64, String> {
     let parsed = text.parse::<f64>().ok().filter(|value| value.is_finite());
     parsed.ok_or_else(|| format!("{line}: expected a number, found {text:?}"))
-}
-
-fn matrix(file: &toml::Table, name: &str) -> Result<DMatrix<f64>, String> {
-    let rows = file.get(name).and_then(toml::Value::as_array);
-    let rows = rows.ok_or_else(|| format!("the design has no matrix {name}"))?;
-    let row = |row: &toml::Value| -> Option<Vec<f64>> {
-        row.as_array()?.iter().map(toml::Value::as_float).collect()
-    };
-    let rows: Option<Vec<Vec<f64>>> = rows.iter().map(row).collect();
-    let rows =
-        rows.filter(|rows| !rows.is_empty() && rows.iter().all(|r| r.len() == rows[0].len()));
-    let rows = rows.ok_or_else(|| format!("{name} of the design is not a matrix of numbers"))?;
-    Ok(DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j]))
 }
