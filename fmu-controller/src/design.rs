@@ -439,10 +439,11 @@ impl Design {
         self.schedule.is_some().then(|| Self { schedule: None, ..self.clone() })
     }
 
-    /// The matrices that depend on the scheduling variable, in the order of [`Design::matrices`].
-    pub(crate) fn scheduled_mut(&mut self) -> [&mut Matrix; 8] {
-        let Self { a, b, c, f_a, k_x, k_f, l_x, l_f, .. } = self;
-        [a, b, c, f_a, k_x, k_f, l_x, l_f]
+    /// The matrices that depend on the scheduling variable; the last ones where they are stated.
+    pub(crate) fn scheduled_mut(&mut self) -> impl Iterator<Item = &mut Matrix> {
+        let Self { a, b, c, f_a, k_x, k_f, l_x, l_f, k_i, l_w, n_r, .. } = self;
+        let stated = [k_i, l_w, n_r].into_iter().flatten();
+        [a, b, c, f_a, k_x, k_f, l_x, l_f].into_iter().chain(stated)
     }
 
     /// Takes what the importer can change: the limits of the actuators and the filter.

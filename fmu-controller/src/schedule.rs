@@ -6,7 +6,8 @@
 //! M(theta) = (1 - t) M_i + t M_{i+1},  t = (theta - theta_i) / (theta_{i+1} - theta_i)
 //! ```
 //!
-//! for each of A, B, C, F_a, K_x, K_f, L_x, L_f, x_op, u_op, y_op. The controller then takes the sample
+//! for each of A, B, C, F_a, K_x, K_f, L_x, L_f, x_op, u_op, y_op, and, where the design has them, K_i, L_w,
+//! N_r, r_op. The controller then takes the sample
 //! like one whose design states these numbers. The estimates are those of states, not of deviations,
 //! so that a change of the operating point does not change them.
 
@@ -55,12 +56,21 @@ pub(crate) struct Point {
     l_x: Matrix,
     #[serde(rename = "L_f")]
     l_f: Matrix,
+    #[serde(rename = "K_i", default)]
+    k_i: Option<Matrix>,
+    #[serde(rename = "L_w", default)]
+    l_w: Option<Matrix>,
+    #[serde(rename = "N_r", default)]
+    n_r: Option<Matrix>,
+    /// The references at the operating point; empty without references.
+    #[serde(default)]
+    pub(crate) r_op: Vec<f64>,
 }
 
 impl Point {
-    /// The matrices, in the order of [`Design::matrices`].
-    pub(crate) fn matrices(&self) -> [(&'static str, &Matrix); 8] {
-        [
+    /// The matrices, in the order of [`Design::scheduled_mut`].
+    pub(crate) fn matrices(&self) -> impl Iterator<Item = (&'static str, &Matrix)> {
+        let always = [
             ("A", &self.a),
             ("B", &self.b),
             ("C", &self.c),
@@ -69,7 +79,9 @@ impl Point {
             ("K_f", &self.k_f),
             ("L_x", &self.l_x),
             ("L_f", &self.l_f),
-        ]
+        ];
+        let stated = [("K_i", &self.k_i), ("L_w", &self.l_w), ("N_r", &self.n_r)].into_iter();
+        always.into_iter().chain(stated.filter_map(|(name, own)| Some((name, own.as_ref()?))))
     }
 }
 
@@ -136,9 +148,7 @@ impl Schedule {
     fn write(&self, interval: usize, mix: impl Fn([f64; 2]) -> f64, design: &mut Design) {
         let [from, to] = [0, 1].map(|end| &self.points[interval + end]);
         let places = design.scheduled_mut();
-        for ((place, (_, from)), (_, to)) in
-            places.into_iter().zip(from.matrices()).zip(to.matrices())
-        {
+        for ((place, (_, from)), (_, to)) in places.zip(from.matrices()).zip(to.matrices()) {
             let ends = from.values.iter().zip(&to.values);
             for (value, (from, to)) in place.values.iter_mut().zip(ends) {
                 *value = mix([*from, *to]);
@@ -153,6 +163,9 @@ impl Schedule {
         }
         for (k, signal) in design.measurements.iter_mut().enumerate() {
             signal.operating = point([&from.y_op, &to.y_op], k);
+        }
+        for (k, signal) in design.references.iter_mut().enumerate() {
+            signal.operating = point([&from.r_op, &to.r_op], k);
         }
     }
 }

@@ -10,7 +10,10 @@
 //!
 //! or the references act on the commands by a constant gain, u = `K_x` `x_hat` + `K_f` `f_hat` + `N_r` r.
 //! `F_s` f is the effect of sensor faults on y. The integral makes H y equal to a constant r for every
-//! plant for which the loop is stable; the feedforward only if A, B, C are right.
+//! plant for which the loop is stable; the feedforward only if A, B, C are right. Both together,
+//! u = `K_x` `x_hat` + `K_f` `f_hat` + `K_i` `x_i` + `N_r` r, are two degrees of freedom
+//! ([`integral_feedforward`]): the commands answer a reference at once, and the integrals answer what the
+//! model does not explain.
 //!
 //! K = [`K_x`, `K_i`] is the gain of the plant [x; `x_i`] of [`extended_pair`]. The estimation errors do not
 //! depend on r, `x_i` or K, so that the loop has the eigenvalues of the extended plant under K and those of
@@ -23,9 +26,10 @@
 
 use crate::aso::Gains;
 use crate::blocks::{block_2x2, stacked};
+use crate::eigen::eigenvalues;
 use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace, check};
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 
 /// Singular values below this, relative to the largest, count as zero; rows and columns have length one.
 const TOLERANCE: f64 = 1e-12;
@@ -203,6 +207,133 @@ pub fn feedforward(
     Ok(found)
 }
 
+/// The feedforward `N_r` beside integral action, and the eigenvalues that references do not excite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IntegralFeedforward {
+    /// `N_r`, m x t.
+    pub gain: DMatrix<f64>,
+    /// The t slowest eigenvalues of the feedback, which no reference excites.
+    pub silent: Vec<Complex<f64>>,
+}
+
+/// The feedforward `N_r`, m x t, beside integral action: the references do not excite the t slowest modes.
+///
+/// ```text
+/// x_e' = (A_e + B_e K) x_e + [B N_r; I] r,   x_e = [x; x_i]        sampled: T I in place of I
+/// W' (A_e + B_e K) = S W',   W = [W_x; W_i], (n + t) x t
+/// W' [B N_r; I] = 0,   so   N_r = -(W_x' B)^+ W_i'                 sampled: -T (W_x' B)^+ W_i'
+/// ```
+///
+/// S has the t slowest eigenvalues (real ones, and whole pairs of complex ones). With this `N_r` the signal s
+/// = W' `x_e` obeys s' = S s whatever the references do: it stays zero after every change of them, and only
+/// disturbances, faults and errors of the model move it. So references are answered by the other n
+/// modes, without the overshoot that an integral of the distance from them causes, and H y reaches a
+/// constant r for every plant for which the loop is stable, because the integrals are part of it. Faults
+/// and disturbances are answered as without `N_r`: the feedback K is the same.
+///
+/// `a`, `b`, `output`: as in [`extended_pair`]; `k`: K = [`K_x`, `K_i`], m x (n + t), such that `A_e` + `B_e` K
+/// is stable. W is the left null space of the polynomial of `A_e` + `B_e` K with these t roots, from a singular
+/// value decomposition. Of several `N_r` (more commands than references) it is the one of least
+/// norm in the given units. The inner result is the reason why there is none: no set of t slow
+/// eigenvalues without half of a pair; `W_x'` B of a rank below t.
+///
+/// For one reference it is the zero of the classical set-point weight, which cancels the slowest pole: K. J.
+/// Åström and T. Hägglund, PID controllers, 2nd edition (1995), section 3.4; G. F. Franklin, J. D. Powell and
+/// M. Workman (1998), section 8.5.
+///
+/// # Errors
+///
+/// Same as [`extended_pair`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for an unstable feedback;
+/// [`Error::NotConverged`]; [`Error::ResidualTooLarge`] when W is not invariant to 1e-8 or W' [B `N_r`; I]
+/// is above 1e-9, both relative.
+pub fn integral_feedforward(
+    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    output: &DMatrix<f64>,
+    k: &DMatrix<f64>,
+    domain: Domain,
+) -> Result<Result<IntegralFeedforward, &'static str>, Error> {
+    let (a_e, b_e) = extended_pair(a, b, output, domain)?;
+    let (n, t) = (a.nrows(), output.nrows());
+    check::shape("K", k, (b.ncols(), n + t))?;
+    let controlled = &a_e + &b_e * k;
+    crate::stability::require_stable("A_e + B_e K", &controlled, domain)?;
+    let Some(silent) = slowest(&eigenvalues(&controlled)?, t, domain) else {
+        return Ok(Err(
+            "the slow eigenvalues of the feedback are complex pairs, and the integrals are an odd \
+                       number: none of them may be half of a pair; expected a slow real eigenvalue",
+        ));
+    };
+    let w = left_invariant(&controlled, &silent)?;
+    let dynamics = w.transpose() * &controlled * &w;
+    let residual =
+        (w.transpose() * &controlled - &dynamics * w.transpose()).norm() / controlled.norm();
+    if residual.is_nan() || residual > 1e-8 {
+        return Err(Error::ResidualTooLarge {
+            equation: "W' (A_e + B_e K) = S W'",
+            residual,
+            allowed: 1e-8,
+        });
+    }
+    let acting = w.rows(0, n).transpose() * b;
+    let svd = Svd::new(&acting.transpose())?;
+    if svd.rank(1e-9) < t {
+        return Ok(Err(
+            "the commands act on the slowest modes of the feedback in fewer independent ways \
+                       than there are integrals",
+        ));
+    }
+    let wanted = w.rows(n, t).transpose() * -integration(domain).0;
+    // (W_x' B)^+ = (B' W_x)^+ transposed.
+    let left = svd.left.columns(0, t);
+    let gain = left * svd.whitening(t).transpose() * &wanted;
+    let residual = (&acting * &gain - &wanted).norm() / wanted.norm();
+    if residual.is_nan() || residual > 1e-9 {
+        return Err(Error::ResidualTooLarge {
+            equation: "W' [B N_r; I] = 0",
+            residual,
+            allowed: 1e-9,
+        });
+    }
+    Ok(Ok(IntegralFeedforward { gain, silent }))
+}
+
+/// The `count` slowest eigenvalues, pairs together, if there are such.
+fn slowest(values: &[Complex<f64>], count: usize, domain: Domain) -> Option<Vec<Complex<f64>>> {
+    let slow = |value: &Complex<f64>| match domain {
+        Domain::Continuous => value.re,
+        Domain::Sampled { .. } => value.norm(),
+    };
+    let mut upper: Vec<_> = values.iter().filter(|value| value.im >= 0.0).copied().collect();
+    upper.sort_by(|x, y| slow(y).total_cmp(&slow(x)));
+    let mut found = Vec::new();
+    for value in upper {
+        let whole = if value.im > 0.0 { vec![value, value.conj()] } else { vec![value] };
+        if found.len() + whole.len() <= count {
+            found.extend(whole);
+        }
+    }
+    (found.len() == count).then_some(found)
+}
+
+/// An orthonormal basis W of the left invariant subspace of `a` for some eigenvalues, pairs together.
+fn left_invariant(a: &DMatrix<f64>, values: &[Complex<f64>]) -> Result<DMatrix<f64>, Error> {
+    let n = a.nrows();
+    let identity = DMatrix::<f64>::identity(n, n);
+    let mut polynomial = identity.clone();
+    for value in values.iter().filter(|value| value.im >= 0.0) {
+        let factor = if value.im > 0.0 {
+            a * a - a * (2.0 * value.re) + &identity * value.norm_sqr()
+        } else {
+            a - &identity * value.re
+        };
+        let product = polynomial * factor;
+        let size = product.norm();
+        polynomial = if size > 0.0 { product / size } else { product };
+    }
+    let svd = Svd::new(&polynomial)?;
+    Ok(svd.left.columns(n - values.len(), values.len()).into_owned())
+}
+
 /// The gain `L_w`, t x m, of the back-calculation that keeps integrals from winding up.
 ///
 /// ```text
@@ -276,14 +407,20 @@ pub fn reference_system(
     check::shape("B", b, (n, m))?;
     check::shape("K_x", k_x, (m, n))?;
     let (a_e, b_e, k, into, direct) = match action {
-        Action::Integral { output, gain } => {
+        Action::Integral { output, gain, feedforward } => {
             let t = output.nrows();
             check::shape("K_i", gain, (m, t))?;
             let (a_e, b_e) = extended_pair(a, b, output, domain)?;
             let k = stacked(&k_x.transpose(), &gain.transpose()).transpose();
             let mut into = DMatrix::zeros(n + t, t);
             into.rows_mut(n, t).fill_diagonal(integration(domain).0);
-            (a_e, b_e, k, into, DMatrix::zeros(m, t))
+            let mut direct = DMatrix::zeros(m, t);
+            if let Some(feedforward) = feedforward {
+                check::shape("N_r", feedforward, (m, t))?;
+                into.rows_mut(0, n).copy_from(&(b * *feedforward));
+                direct.copy_from(feedforward);
+            }
+            (a_e, b_e, k, into, direct)
         }
         Action::Feedforward(gain) => {
             check::shape("N_r", gain, (m, gain.ncols()))?;
@@ -310,6 +447,8 @@ pub enum Action<'a> {
         output: &'a DMatrix<f64>,
         /// `K_i`, m x t.
         gain: &'a DMatrix<f64>,
+        /// `N_r`, m x t, beside the integrals.
+        feedforward: Option<&'a DMatrix<f64>>,
     },
     /// By the feedforward `N_r`, m x t.
     Feedforward(&'a DMatrix<f64>),

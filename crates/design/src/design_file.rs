@@ -15,7 +15,6 @@ use super::report::rows;
 use super::reporting::estimator;
 use super::schedule::Scheduled;
 use super::signals::{EntryPoint, Signal};
-use super::tracking::TrackingAction;
 
 /// The content of the file except the matrices.
 #[derive(Serialize)]
@@ -207,10 +206,9 @@ impl ControllerDesign {
             matrices.extend([("H", &integral.h), ("K_i", &integral.gain)]);
             matrices.extend((integral.faults.amax() > 0.0).then_some(("F_i", &integral.faults)));
         }
-        match self.tracking.as_ref().map(|own| &own.action) {
-            Some(TrackingAction::Feedforward(n_r)) => matrices.push(("N_r", n_r)),
-            Some(TrackingAction::Integral { windup: Some(l_w), .. }) => matrices.push(("L_w", l_w)),
-            _ => {}
+        if let Some(tracking) = &self.tracking {
+            matrices.extend(tracking.windup().map(|l_w| ("L_w", l_w)));
+            matrices.extend(tracking.feedforward().map(|n_r| ("N_r", n_r)));
         }
         let mut text = head.render(&matrices)?;
         if let Some(schedule) = &self.schedule {
@@ -231,11 +229,14 @@ impl ControllerDesign {
             let LinearPlant { states, actuators, measurements, .. } = &design.linear;
             let filtered = if design.filter.is_some() { &measurements[..] } else { &[] };
             let x_op: Vec<_> = states.iter().chain(filtered).collect();
-            for (name, signals) in [
+            let mut points = vec![
                 ("x_op", x_op),
                 ("u_op", actuators.iter().collect()),
                 ("y_op", measurements.iter().collect()),
-            ] {
+            ];
+            let references = design.tracking.as_ref().map(|own| own.signals.iter().collect());
+            points.extend(references.map(|own| ("r_op", own)));
+            for (name, signals) in points {
                 let values: Vec<_> = signals
                     .iter()
                     .map(|signal| format!("{:?}", signal.operating.unwrap_or(0.0) + 0.0))
@@ -244,9 +245,14 @@ impl ControllerDesign {
             }
             let FaultyPlant { a, b, c, f_a, .. } = &design.plant;
             let Gains { k_x, k_f, l_x, l_f, .. } = &design.gains;
-            let gains = [("K_x", k_x), ("K_f", k_f), ("L_x", l_x), ("L_f", l_f)];
-            for (name, matrix) in [("A", a), ("B", b), ("C", c), ("F_a", f_a)].iter().chain(&gains)
-            {
+            let mut matrices = vec![("A", a), ("B", b), ("C", c), ("F_a", f_a)];
+            matrices.extend([("K_x", k_x), ("K_f", k_f), ("L_x", l_x), ("L_f", l_f)]);
+            matrices.extend(design.gains.integral.as_ref().map(|own| ("K_i", &own.gain)));
+            if let Some(tracking) = &design.tracking {
+                matrices.extend(tracking.windup().map(|l_w| ("L_w", l_w)));
+                matrices.extend(tracking.feedforward().map(|n_r| ("N_r", n_r)));
+            }
+            for (name, matrix) in matrices {
                 write_matrix(&mut text, name, matrix);
             }
         }

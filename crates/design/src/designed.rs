@@ -10,7 +10,7 @@ use super::norm_gains::ObserverProblem;
 use super::plant_file::PlantFile;
 use super::plausibility::{check_faults, check_limits};
 use super::requirements::{Request, Requirement};
-use super::schedule::Scheduled;
+use super::schedule::{Scheduled, check_windup};
 use super::tracking::{
     DesignLoop, Tracking, check_references, decay, feedback_pair, integral_action,
 };
@@ -100,7 +100,7 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
     let members = family::members(file, &linear, &mut warnings)?;
     let common = match &file.feedback.requirement {
         Requirement::Region(region) if !members.is_empty() => {
-            let found = common_feedback((&linear, &members), *region, domain);
+            let found = common_feedback((&linear, &members), references, *region, domain);
             Some(found.map_err(|refusal| feedback_refused((file, &linear), domain, refusal))?)
         }
         _ => None,
@@ -131,7 +131,7 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
     let controlled = &pair.0 + &pair.1 * &feedback.gain;
     let tracking = Tracking::of(file, (&linear, (&own.0, &own.1)), (&gains, &controlled), domain)?;
     let schedule = Scheduled::of(file, &linear)?;
-    Ok(ControllerDesign {
+    let found = ControllerDesign {
         family: (!members.is_empty()).then_some(Family { members, feedback: certificate }),
         schedule,
         cancellation_residual: cancellation_residual(&extended)?,
@@ -159,7 +159,11 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
         tracking,
         feedback_pair: pair,
         whole,
-    })
+    };
+    if let Some(own) = &found.schedule {
+        check_windup(file, own, &found)?;
+    }
+    Ok(found)
 }
 
 /// An error at the law of the file, with the laws that exist.

@@ -11,8 +11,10 @@ use super::checks::AT_REST;
 use super::gains::{GainResult, Refusal};
 use super::linear_plant::LinearPlant;
 use super::plant_file::PlantFile;
+use super::references::References;
 use super::requirements::Region;
 use super::signals::Signal;
+use super::tracking::{check_member, feedback_pair};
 use super::variants::Variant;
 
 /// The name of the plant of the file among the members.
@@ -43,6 +45,7 @@ pub(crate) fn members(
         let linear = LinearPlant::of(&file.with(variant))
             .map_err(|error| error.within(format!("member `{}` of the family", variant.name)))?;
         check_states(file, variant, (nominal, &linear))?;
+        check_member(file, variant, &linear)?;
         if linear.residual.is_some_and(|residual| residual >= AT_REST) {
             let message = format!(
                 "the operating point is no equilibrium of the member `{}`: what accelerates it there \
@@ -75,14 +78,17 @@ pub(crate) fn check_states(
     Err(file.error_at(&variant.place, message))
 }
 
-/// Computes one K_x for the nominal plant and all members, with its certificate.
+/// Computes one K_x for the nominal plant and all members, with its certificate; with integral action one
+/// K = [K_x, K_i] for all of them with their integrals.
 pub(crate) fn common_feedback(
     (nominal, members): (&LinearPlant, &[Member]),
+    references: Option<&References>,
     region: Region,
     domain: Domain,
 ) -> Result<(GainResult, RegionCertificate), Refusal> {
     let all = std::iter::once(nominal).chain(members.iter().map(|member| &member.linear));
-    let plants = all.map(|plant| vertex(plant, domain)).collect::<Result<Vec<_>, _>>()?;
+    let plants =
+        all.map(|plant| vertex(plant, references, domain)).collect::<Result<Vec<_>, _>>()?;
     let stated = region.stated();
     match lmi::common_feedback(&plants, &stated, domain)? {
         Outcome::Optimal(CommonFeedback { gain, certificate, .. }) => {
@@ -108,11 +114,16 @@ pub(crate) fn common_feedback(
     }
 }
 
-fn vertex(plant: &LinearPlant, domain: Domain) -> Result<Vertex, Error> {
+fn vertex(
+    plant: &LinearPlant,
+    references: Option<&References>,
+    domain: Domain,
+) -> Result<Vertex, Error> {
     let (a, b) = match domain {
         Domain::Continuous => (plant.a.clone(), plant.b.clone()),
         Domain::Sampled { period } => zero_order_hold(&plant.a, &plant.b, period)?,
     };
+    let (a, b) = feedback_pair(references, [&a, &b, &plant.c], domain)?;
     Ok(Vertex { a, b })
 }
 

@@ -39,7 +39,7 @@ fn described_at(
 
 /// Returns an eigenvalue as text with six digits; a complex one together with its conjugate. A number
 /// that is read from the text differs by less than 1e-5 relative to the eigenvalue.
-fn shown(value: Complex<f64>) -> String {
+pub(crate) fn shown(value: Complex<f64>) -> String {
     match value.im {
         0.0 => digits(value.re),
         im => format!("{} ± {}i", digits(value.re), digits(im.abs())),

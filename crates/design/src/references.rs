@@ -20,11 +20,15 @@ pub(crate) struct References {
     pub(crate) places: Vec<Place>,
     /// Whether the distance from the references is integrated; otherwise they act by a feedforward.
     pub(crate) integral: bool,
+    /// Whether the references act on the commands by a constant gain, too.
+    pub(crate) feedforward: bool,
+    /// Where `feedforward` is stated.
+    pub(crate) feedforward_place: Option<Place>,
     /// Time constant, in s, with which the integrals follow a command at its limit.
     pub(crate) windup_time: Option<f64>,
 }
 
-const KEYS: [&str; 3] = ["track", "integral", "windup_time"];
+const KEYS: [&str; 4] = ["track", "integral", "feedforward", "windup_time"];
 const REFERENCE: [&str; 6] = ["measurement", "combination", "name", "unit", "description", "step"];
 
 impl References {
@@ -44,6 +48,13 @@ impl References {
             return Err(track.error("expected at least one measurement"));
         }
         let integral = table.get("integral").map_or(Ok(true), |entry| entry.flag())?;
+        let stated = table.get("feedforward");
+        let feedforward = stated.as_ref().map_or(Ok(!integral), |entry| entry.flag())?;
+        if let Some(entry) = stated.as_ref().filter(|_| !integral && !feedforward) {
+            let message = "`integral` and `feedforward` are false, so that no reference acts on a command; \
+                           expected one of them";
+            return Err(entry.error(message));
+        }
         let windup_time = table.get("windup_time");
         if let Some(entry) = windup_time.as_ref().filter(|_| !integral) {
             return Err(entry.error("only integral action winds up, and `integral` is false"));
@@ -54,6 +65,8 @@ impl References {
             steps: Vec::new(),
             places: Vec::new(),
             integral,
+            feedforward,
+            feedforward_place: stated.map(|entry| entry.place),
             windup_time: windup_time.map(|entry| entry.positive()).transpose()?,
         };
         for (at, member) in members.iter().enumerate() {

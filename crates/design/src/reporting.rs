@@ -17,6 +17,7 @@ use super::certificate::certificate;
 use super::checks::checks;
 use super::designed::{ControllerDesign, fault_names};
 use super::fallback::{self, Fallback};
+use super::fixed_mode::shown;
 use super::gains::GainResult;
 use super::losses::losses;
 use super::page::rounded;
@@ -242,14 +243,11 @@ impl Names {
             let k_i = &integral.gain;
             all.push(matrix("K_i", "integral action", k_i, actuators, references));
         }
-        match &tracking.action {
-            TrackingAction::Feedforward(n_r) => {
-                all.push(matrix("N_r", "feedforward", n_r, actuators, references));
-            }
-            TrackingAction::Integral { windup: Some(l_w), .. } => {
-                all.push(matrix("L_w", "back-calculation", l_w, references, actuators));
-            }
-            TrackingAction::Integral { .. } => {}
+        if let Some(l_w) = tracking.windup() {
+            all.push(matrix("L_w", "back-calculation", l_w, references, actuators));
+        }
+        if let Some(n_r) = tracking.feedforward() {
+            all.push(matrix("N_r", "feedforward", n_r, actuators, references));
         }
         all
     }
@@ -442,11 +440,21 @@ fn tracking_assumption(designed: &ControllerDesign) -> Option<String> {
              no integral action."
                 .to_owned()
         }
-        TrackingAction::Integral { windup_time, .. } => format!(
+        TrackingAction::Integral { windup_time, feedforward, .. } => format!(
             "A constant reference is reached without error for every plant for which the loop is stable. \
              While a command is at a limit, the integrals follow it with a time constant of {} s; the \
-             responses are those within the limits.",
-            rounded(*windup_time)
+             responses are those within the limits.{}",
+            rounded(*windup_time),
+            feedforward.as_ref().map_or(String::new(), |own| format!(
+                " In the plant of the model, references do not excite the slowest eigenvalues of the \
+                 feedback ({}): these answer disturbances and errors of the model.",
+                own.silent
+                    .iter()
+                    .filter(|value| value.im >= 0.0)
+                    .map(|value| shown(*value))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            ))
         ),
     })
 }

@@ -4,10 +4,12 @@ pub mod report;
 
 use control::aso::{FaultyPlant, Gains};
 use control::controller::complete_controller;
+use control::eigen::eigenvalues;
 use control::hold::zero_order_hold;
 use control::lmi::{Interval, bernstein};
 use control::robustness::Loop;
 use control::stability::instability;
+use control::tracking::IntegralAction;
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
@@ -18,6 +20,8 @@ use super::plant_file::PlantFile;
 use super::signals::Signal;
 use super::variants::Variable;
 
+/// An eigenvalue this far beyond the unit circle is on it, with rounding errors.
+const NEUTRAL: f64 = 1e-9;
 /// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p`.
 const DEGREE: u32 = 4;
 
@@ -127,6 +131,13 @@ impl Point {
                 k_f: mix(&gains.k_f, &other.gains.k_f),
                 l_x: mix(&gains.l_x, &other.gains.l_x),
                 l_f: mix(&gains.l_f, &other.gains.l_f),
+                integral: gains.integral.as_ref().zip(other.gains.integral.as_ref()).map(
+                    |(own, next)| IntegralAction {
+                        output: mix(&own.output, &next.output),
+                        gain: mix(&own.gain, &next.gain),
+                        ..own.clone()
+                    },
+                ),
                 ..gains.clone()
             },
         }
@@ -217,7 +228,8 @@ pub(crate) fn coupled(
             let point = Point::of(design)?;
             let filter = design.filter.as_deref();
             let own = complete_controller(&point.model, &point.gains, filter, design.domain)?;
-            let changed = slopes[side].act_on(&own.commands, filter.is_some(), j);
+            let mut changed = slopes[side].act_on(&own.commands, filter.is_some(), j);
+            slopes[side].move_references((design, &mut changed), j);
             let whole = Loop::new(point.physical, changed)?;
             worst = worst.max(instability(&whole.dynamics(), design.domain)?);
         }
@@ -248,8 +260,32 @@ impl Slopes {
         }
     }
 
+    /// Adds the part of references that rest: r - r_op moves against their operating point r_op = H y_op.
+    ///
+    /// ```text
+    /// x_i[k+1] = ... - T H y_op' theta,   u = ... - N_r H y_op' theta
+    /// ```
+    fn move_references(&self, (design, own): (&ControllerDesign, &mut StateSpace), j: usize) {
+        let (Some(tracking), Domain::Sampled { period }) = (&design.tracking, design.domain) else {
+            return;
+        };
+        let moved = &tracking.h * DMatrix::from_column_slice(self.y.len(), 1, &self.y);
+        let t = design.gains.integrals();
+        let first = own.b.nrows() - t;
+        for k in 0..t {
+            own.b[(first + k, j)] -= period * moved[k];
+        }
+        if let Some(n_r) = tracking.feedforward() {
+            let command = n_r * moved;
+            for i in 0..command.nrows() {
+                own.d[(i, j)] -= command[i];
+            }
+        }
+    }
+
     /// `own`, the controller with its filter, scheduled by its measurement `j`. Its states are the
-    /// filtered measurements, if there are any, x_hat, the filtered measurements of the model, f_hat.
+    /// filtered measurements, if there are any, x_hat, the filtered measurements of the model, f_hat,
+    /// and the integrals, which have no operating point.
     fn act_on(&self, own: &StateSpace, is_filtered: bool, j: usize) -> StateSpace {
         let filtered = if is_filtered { &self.y[..] } else { &[] };
         let slopes = [filtered, &self.x, filtered].concat();
@@ -264,4 +300,53 @@ impl Slopes {
         found.d.set_column(j, &(own.d.column(j) + to_u.column(0)));
         found
     }
+}
+
+/// Parts of an interval at which the back-calculation is examined.
+const PARTS: u32 = 20;
+
+/// Checks that the interpolated back-calculation is stable while commands are at their limits.
+///
+/// With S the commands at a limit, x_i[k+1] = (I - L_w S K_i) x_i + ...; L_w and K_i are right for each
+/// other at the points, and between them their product is not the interpolated one. All eigenvalues
+/// must be in the unit circle for all limited commands together and for each alone; those at 1 are integrals
+/// on which these commands do not act.
+pub(crate) fn check_windup(
+    file: &PlantFile<'_>,
+    own: &Scheduled,
+    nominal: &ControllerDesign,
+) -> Result<(), crate::Error> {
+    let all: Vec<_> = own.points(nominal).collect();
+    for pair in all.windows(2) {
+        let [(from, first), (to, second)] = pair else { continue };
+        let parts = |design: &ControllerDesign| {
+            let windup = design.tracking.as_ref()?.windup()?.clone();
+            Some((windup, design.gains.integral.as_ref()?.gain.clone()))
+        };
+        let Some(((l_0, k_0), (l_1, k_1))) = parts(first).zip(parts(second)) else { return Ok(()) };
+        let m = k_0.nrows();
+        let limited = |j: &usize| first.linear.actuators[*j].limits.is_some();
+        let single = (0..m).filter(limited).map(|j| vec![j]);
+        let together = [(0..m).filter(limited).collect::<Vec<_>>()];
+        for set in single.chain(together) {
+            for part in 0..=PARTS {
+                let t = f64::from(part) / f64::from(PARTS);
+                let mix = |from: &DMatrix<f64>, to: &DMatrix<f64>| from * (1.0 - t) + to * t;
+                let (l, k) =
+                    (mix(&l_0, &l_1).select_columns(&set), mix(&k_0, &k_1).select_rows(&set));
+                let follows = DMatrix::identity(l.nrows(), l.nrows()) - l * k;
+                let largest = eigenvalues(&follows)?.iter().map(|v| v.norm()).fold(0.0, f64::max);
+                if largest > 1.0 + NEUTRAL {
+                    let message = format!(
+                        "between {} = {from} and {to} the interpolated back-calculation of the integrals is not \
+                         stable at the limits (eigenvalue of size {largest:.3}), because K_i changes too much; \
+                         expected a longer `windup_time` or more points",
+                        own.variable.name
+                    );
+                    return Err(file.error(&["schedule"], message).into());
+                }
+            }
+        }
+    }
+    Ok(())
 }

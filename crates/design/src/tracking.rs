@@ -6,7 +6,8 @@ use control::controller::complete_controller;
 use control::faults::{ExtendedPlant, FaultEntry};
 use control::stability::instability;
 use control::tracking::{
-    IntegralAction, TrackingRank, extended_pair, feedforward, tracking_rank, windup_gain,
+    IntegralAction, IntegralFeedforward, TrackingRank, extended_pair, feedforward,
+    integral_feedforward, tracking_rank, windup_gain,
 };
 use control::{Domain, Error, StateSpace};
 use files::PlaceError;
@@ -17,6 +18,7 @@ use super::plant_file::PlantFile;
 use super::references::References;
 use super::requirements::Requirement;
 use super::signals::Signal;
+use super::variants::Variant;
 
 /// The references of a design.
 pub(crate) struct Tracking {
@@ -39,6 +41,8 @@ pub(crate) enum TrackingAction {
         windup: Option<DMatrix<f64>>,
         /// Time constant of the back-calculation, s.
         windup_time: f64,
+        /// N_r, m x t, beside the integrals.
+        feedforward: Option<IntegralFeedforward>,
     },
     /// N_r, m x t.
     Feedforward(DMatrix<f64>),
@@ -91,6 +95,29 @@ pub(crate) fn check_references(
         return Err(file.error_at(&file.feedback.place, message));
     }
     Ok(())
+}
+
+/// Checks the same for a member of a family.
+pub(crate) fn check_member(
+    file: &PlantFile<'_>,
+    variant: &Variant,
+    linear: &LinearPlant,
+) -> Result<(), PlaceError> {
+    let Some(References { h, .. }) = &file.references else {
+        return Ok(());
+    };
+    let found = tracking_rank(&linear.a, &linear.b, &(h * &linear.c))
+        .map_err(|error| file.error_at(&variant.place, error.to_string()))?;
+    if found.is_full() {
+        return Ok(());
+    }
+    let message = format!(
+        "no integral action exists for the member `{}`: its commands cannot hold every constant value of \
+         what is to follow (rank [A, B; H C, 0] is {}, expected {}); expected a member without a \
+         zero at s = 0",
+        variant.name, found.rank, found.expected
+    );
+    Err(file.error_at(&variant.place, message))
 }
 
 /// The pair, A and B, of the feedback: the plant, with integral action followed by its integrals.
@@ -147,9 +174,16 @@ impl Tracking {
             let range = |signal: &Signal| signal.limits.map(|[low, high]| high - low);
             let ranges: Vec<_> = linear.actuators.iter().map(range).collect();
             let windup = windup_gain(&integral.gain, &ranges, rate, domain).map_err(refuse)?;
+            let k_x = gains.k_x.columns(0, linear.a.nrows()).into_owned();
+            let k = beside(&k_x, &integral.gain);
+            let own = references.feedforward.then(|| {
+                let found = integral_feedforward(pair, &output, &k, domain).map_err(refuse)?;
+                found.map_err(|reason| references.without_feedforward(file, reason))
+            });
             TrackingAction::Integral {
                 windup: ranges.iter().any(Option::is_some).then_some(windup),
                 windup_time: rate.recip(),
+                feedforward: own.transpose()?,
             }
         } else {
             let k_x = gains.k_x.columns(0, linear.a.nrows()).into_owned();
@@ -163,6 +197,46 @@ impl Tracking {
             output,
             action,
         }))
+    }
+}
+
+/// The columns of `left`, then those of `right`.
+fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+    let (n, t) = (left.ncols(), right.ncols());
+    let mut all = left.clone().resize_horizontally(n + t, 0.0);
+    all.columns_mut(n, t).copy_from(right);
+    all
+}
+
+impl References {
+    /// The refusal of a feedforward beside integrals.
+    fn without_feedforward(&self, file: &PlantFile<'_>, reason: &str) -> PlaceError {
+        let message = format!(
+            "no feedforward beside the integrals leaves the slowest modes of the feedback at rest: {reason}; \
+             or `feedforward = false`"
+        );
+        match &self.feedforward_place {
+            Some(place) => file.error_at(place, message),
+            None => file.error(&["reference"], message),
+        }
+    }
+}
+
+impl Tracking {
+    /// N_r, m x t, if the references act by a feedforward.
+    pub(crate) fn feedforward(&self) -> Option<&DMatrix<f64>> {
+        match &self.action {
+            TrackingAction::Feedforward(n_r) => Some(n_r),
+            TrackingAction::Integral { feedforward, .. } => Some(&feedforward.as_ref()?.gain),
+        }
+    }
+
+    /// L_w, t x m, if there is a back-calculation.
+    pub(crate) fn windup(&self) -> Option<&DMatrix<f64>> {
+        match &self.action {
+            TrackingAction::Feedforward(_) => None,
+            TrackingAction::Integral { windup, .. } => windup.as_ref(),
+        }
     }
 }
 

@@ -85,7 +85,15 @@ impl PlantFile<'_> {
 /// Reads `[[family]]`.
 pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, PlaceError> {
     let Some(entry) = file.get("family") else { return Ok(Vec::new()) };
-    without_references(file, &entry)?;
+    if let Some(reference) = file.get("reference").filter(|own| !own.is_text() && !own.is_list()) {
+        let integral = reference.table()?.get("integral");
+        if let Some(stated) = integral.filter(|entry| entry.flag().is_ok_and(|own| !own)) {
+            return Err(stated.error(
+                "without integral action the other members of the family would miss their references: one \
+                 constant gain N_r fits one plant; expected `integral = true`",
+            ));
+        }
+    }
     if let Some(schedule) = file.get("schedule") {
         return Err(
             schedule.error("expected `family` (one gain) or `schedule` (gains by a variable)")
@@ -118,15 +126,6 @@ pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, Pl
     Ok(found)
 }
 
-fn without_references(file: &Table<'_>, entry: &Entry<'_>) -> Result<(), PlaceError> {
-    match file.get("reference") {
-        Some(_) => Err(entry.error(
-            "a controller for several plants follows no references: expected no `reference`",
-        )),
-        None => Ok(()),
-    }
-}
-
 /// Reads `[schedule]`.
 pub(crate) fn schedule(
     file: &Table<'_>,
@@ -134,11 +133,11 @@ pub(crate) fn schedule(
     measurements: &[Signal],
 ) -> Result<Option<Schedule>, PlaceError> {
     let Some(entry) = file.get("schedule") else { return Ok(None) };
-    without_references(file, &entry)?;
     if file.get("sample_time").is_none() {
         return Err(entry.error(
             "a continuous controller has no schedule: expected `sample_time`; a sampled one holds \
-             its gains from one sample to the next",
+             its gains from one sample to the next, whatever the communication step, so that a \
+             certificate holds for every importer",
         ));
     }
     let table = entry.table()?;

@@ -81,11 +81,7 @@ impl Design {
         if self.sample_time.is_none() {
             return refuse("schedule is stated and sample_time is not".to_owned());
         }
-        let others = [
-            (!self.references.is_empty(), "references"),
-            (self.p_f.is_some(), "P_f"),
-            (self.sliding_mode.is_some(), "sliding_mode"),
-        ];
+        let others = [(self.p_f.is_some(), "P_f"), (self.sliding_mode.is_some(), "sliding_mode")];
         if let Some((_, other)) = others.iter().find(|(stated, _)| *stated) {
             return refuse(format!("schedule and {other} are stated, expected one of them"));
         }
@@ -102,7 +98,23 @@ impl Design {
                 ));
             }
             last = point.at;
-            for ((name, own), (_, expected)) in point.matrices().into_iter().zip(self.matrices()) {
+            let scheduled = |name: &&str| ["K_i", "L_w", "N_r"].contains(name);
+            let names = |all: &mut dyn Iterator<Item = &'static str>| {
+                let mut all: Vec<_> = all.filter(scheduled).collect();
+                all.sort_unstable();
+                all.join(", ")
+            };
+            let found = names(&mut point.matrices().map(|(name, _)| name));
+            let expected = names(&mut self.matrices().map(|(name, _)| name));
+            if found != expected {
+                return refuse(format!(
+                    "{place}: of K_i, L_w, N_r it states [{found}], expected [{expected}] as above"
+                ));
+            }
+            for (name, own) in point.matrices() {
+                let Some((_, expected)) = self.matrices().find(|(other, _)| *other == name) else {
+                    continue;
+                };
                 if (own.rows, own.columns) != (expected.rows, expected.columns) {
                     return refuse(format!(
                         "{place}: {name} is {} x {}, expected {} x {}",
@@ -118,6 +130,7 @@ impl Design {
                 ("x_op", &point.x_op, self.states.len()),
                 ("u_op", &point.u_op, self.actuators.len()),
                 ("y_op", &point.y_op, self.measurements.len()),
+                ("r_op", &point.r_op, self.references.len()),
             ];
             for (name, values, expected) in lists {
                 if values.len() != expected || values.iter().any(|value| !value.is_finite()) {

@@ -10,8 +10,8 @@ use control::response::{
 };
 use control::robustness::Loop;
 use control::tracking::{
-    Action, IntegralAction, extended_pair, feedforward, reference_system, tracking_rank,
-    windup_gain,
+    Action, IntegralAction, extended_pair, feedforward, integral_feedforward, reference_system,
+    tracking_rank, windup_gain,
 };
 use control::{Domain, StateSpace, sampled};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -286,7 +286,7 @@ fn references_are_reached_without_error_by_both_actions() {
     let (a_e, b_e) = extended_pair(&a, &b, &output, Domain::Continuous).unwrap();
     let whole = place(&a_e, &b_e, &real_poles(&[-1.0, -1.2, -1.4, -1.6, -1.8])).unwrap().gain;
     let (k_x, k_i) = (whole.columns(0, 3).into_owned(), whole.columns(3, 2).into_owned());
-    let integral = Action::Integral { output: &output, gain: &k_i };
+    let integral = Action::Integral { output: &output, gain: &k_i, feedforward: None };
     for (k_x, action) in [(&k, Action::Feedforward(&n_r)), (&k_x, integral)] {
         let own = reference_system((&a, &b), k_x, &action, Domain::Continuous).unwrap();
         let found = at_constant_signals(&own);
@@ -339,4 +339,55 @@ fn back_calculation_lets_the_integrals_follow_in_any_units_and_with_any_commands
     assert!((scaled.unwrap() * scale - &l_w).amax() < 1e-12);
     let sampled = windup_gain(&k_i, &ranges, rate, Domain::Sampled { period: 0.1 }).unwrap();
     assert!((sampled * rate - l_w * (1.0 - (-0.4_f64).exp())).amax() < 1e-12);
+}
+
+#[test]
+fn feedforward_beside_integrals_leaves_the_slowest_modes_at_rest_and_the_constant_error_at_zero() {
+    let [a, b, c] = plant();
+    let output = h() * c;
+    for domain in [Domain::Continuous, Domain::Sampled { period: PERIOD }] {
+        let poles = real_poles(&[-1.0, -1.2, -3.0, -3.3, -3.6]);
+        let (own, poles) = match domain {
+            Domain::Continuous => ((a.clone(), b.clone()), poles),
+            Domain::Sampled { period } => (
+                control::hold::zero_order_hold(&a, &b, period).unwrap(),
+                sampled::sampled_poles(&poles, period).unwrap(),
+            ),
+        };
+        let (a_e, b_e) = extended_pair(&own.0, &own.1, &output, domain).unwrap();
+        let assign = if domain == Domain::Continuous { place } else { place_discrete };
+        let k = assign(&a_e, &b_e, &poles).unwrap().gain;
+        let found = integral_feedforward((&own.0, &own.1), &output, &k, domain).unwrap().unwrap();
+        let (k_x, k_i) = (k.columns(0, 3).into_owned(), k.columns(3, 2).into_owned());
+        let action =
+            Action::Integral { output: &output, gain: &k_i, feedforward: Some(&found.gain) };
+        let system = reference_system((&own.0, &own.1), &k_x, &action, domain).unwrap();
+        // The constant response: H C x = r.
+        let at_rest = match domain {
+            Domain::Continuous => -&system.a,
+            Domain::Sampled { .. } => DMatrix::identity(5, 5) - &system.a,
+        };
+        let constant = at_rest.lu().solve(&system.b).unwrap();
+        let error = &output * constant.rows(0, 3) - DMatrix::identity(2, 2);
+        assert!(error.amax() < 1e-9, "{error}");
+        // (A_cl - s_1)(A_cl - s_2) removes the silent modes: the references reach three directions only.
+        let reached = DMatrix::from_fn(5, 10, |i, j| {
+            let power = (0..j / 2).fold(system.b.clone(), |v, _| &system.a * v);
+            power[(i, j % 2)]
+        });
+        let values = reached.clone().svd(false, false).singular_values;
+        assert!(values[3] < 1e-9 * values[0] && values[2] > 1e-6 * values[0], "{values}");
+        let slow: Vec<_> = poles.iter().take(2).map(|value| value.re).collect();
+        for value in &found.silent {
+            assert!(slow.iter().any(|own| (own - value.re).abs() < 1e-7), "{value}");
+        }
+    }
+}
+
+#[test]
+fn half_of_a_pair_is_no_silent_mode() {
+    // One state, one integral, two complex eigenvalues.
+    let k = matrix(1, &[-1.0, 4.0]);
+    let found = integral_feedforward((&one(-1.0), &one(1.0)), &one(1.0), &k, Domain::Continuous);
+    assert!(found.unwrap().unwrap_err().contains("half of a pair"));
 }

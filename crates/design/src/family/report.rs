@@ -22,7 +22,8 @@ use crate::robustness::{Margins, Physical, by_entries, margins};
 pub struct FamilyReport {
     /// The plant of the file, `nominal`, then the others.
     pub members: Vec<MemberReport>,
-    /// One P for the state feedback loops `A_i + B_i K_x` of all members; none if the feedback was
+    /// One P for the state feedback loops `A_i + B_i K_x` of all members, with integral action together with
+    /// their integrals; none if the feedback was
     /// designed for the nominal plant.
     pub feedback: Option<CommonCertificate>,
     /// One P for the loops of all members with the whole controller: the loop is stable while the
@@ -38,7 +39,7 @@ pub struct FamilyReport {
 #[derive(Serialize, JsonSchema)]
 pub struct CommonCertificate {
     /// The matrix P, row by row. For the whole loop in the order: states of the plant, filtered
-    /// measurements, estimates of the states, estimates of the faults.
+    /// measurements, estimates of the states, estimates of the faults, integrals of references.
     pub p: Vec<Vec<f64>>,
     /// Margin of the inequalities of all members, relative; larger than the rounding errors.
     pub margin: f64,

@@ -224,7 +224,11 @@ fn system(
     );
     let k_x = designed.gains.k_x.columns(0, n).into_owned();
     let action = match (&designed.gains.integral, &tracking.action) {
-        (Some(integral), _) => Action::Integral { output: &tracking.output, gain: &integral.gain },
+        (Some(integral), _) => Action::Integral {
+            output: &tracking.output,
+            gain: &integral.gain,
+            feedforward: tracking.feedforward(),
+        },
         (None, TrackingAction::Feedforward(n_r)) => Action::Feedforward(n_r),
         (None, TrackingAction::Integral { .. }) => {
             return Err(Error::Empty { matrix: "K_i", found: (0, 0) });
