@@ -24,12 +24,19 @@
 //! with constant disturbances, Automatica 7 (1971); G. F. Franklin, J. D. Powell and M. Workman, Digital
 //! control of dynamic systems, 3rd edition (1998), sections 8.5 and 9.3 for the sampled form.
 
+mod integral_feedforward;
+mod interpolated_windup;
+mod windup;
+
+pub use integral_feedforward::{IntegralFeedforward, integral_feedforward};
+pub use interpolated_windup::{InterpolatedWindup, interpolated_windup};
+pub use windup::windup_gain;
+
 use crate::aso::Gains;
 use crate::blocks::{block_2x2, stacked};
-use crate::eigen::eigenvalues;
 use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace, check};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::DMatrix;
 
 /// Singular values below this, relative to the largest, count as zero; rows and columns have length one.
 const TOLERANCE: f64 = 1e-12;
@@ -205,182 +212,6 @@ pub fn feedforward(
         return Err(Error::ResidualTooLarge { equation, residual, allowed });
     }
     Ok(found)
-}
-
-/// The feedforward `N_r` beside integral action, and the eigenvalues that references do not excite.
-#[derive(Debug, Clone, PartialEq)]
-pub struct IntegralFeedforward {
-    /// `N_r`, m x t.
-    pub gain: DMatrix<f64>,
-    /// The t slowest eigenvalues of the feedback, which no reference excites.
-    pub silent: Vec<Complex<f64>>,
-}
-
-/// The feedforward `N_r`, m x t, beside integral action: the references do not excite the t slowest modes.
-///
-/// ```text
-/// x_e' = (A_e + B_e K) x_e + [B N_r; I] r,   x_e = [x; x_i]        sampled: T I in place of I
-/// W' (A_e + B_e K) = S W',   W = [W_x; W_i], (n + t) x t
-/// W' [B N_r; I] = 0,   so   N_r = -(W_x' B)^+ W_i'                 sampled: -T (W_x' B)^+ W_i'
-/// ```
-///
-/// S has the t slowest eigenvalues (real ones, and whole pairs of complex ones). With this `N_r` the signal s
-/// = W' `x_e` obeys s' = S s whatever the references do: it stays zero after every change of them, and only
-/// disturbances, faults and errors of the model move it. So references are answered by the other n
-/// modes, without the overshoot that an integral of the distance from them causes, and H y reaches a
-/// constant r for every plant for which the loop is stable, because the integrals are part of it. Faults
-/// and disturbances are answered as without `N_r`: the feedback K is the same.
-///
-/// `a`, `b`, `output`: as in [`extended_pair`]; `k`: K = [`K_x`, `K_i`], m x (n + t), such that `A_e` + `B_e` K
-/// is stable. W is the left null space of the polynomial of `A_e` + `B_e` K with these t roots, from a singular
-/// value decomposition. Of several `N_r` (more commands than references) it is the one of least
-/// norm in the given units. The inner result is the reason why there is none: no set of t slow
-/// eigenvalues without half of a pair; `W_x'` B of a rank below t.
-///
-/// For one reference it is the zero of the classical set-point weight, which cancels the slowest pole: K. J.
-/// Åström and T. Hägglund, PID controllers, 2nd edition (1995), section 3.4; G. F. Franklin, J. D. Powell and
-/// M. Workman (1998), section 8.5.
-///
-/// # Errors
-///
-/// Same as [`extended_pair`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for an unstable feedback;
-/// [`Error::NotConverged`]; [`Error::ResidualTooLarge`] when W is not invariant to 1e-8 or W' [B `N_r`; I]
-/// is above 1e-9, both relative.
-pub fn integral_feedforward(
-    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
-    output: &DMatrix<f64>,
-    k: &DMatrix<f64>,
-    domain: Domain,
-) -> Result<Result<IntegralFeedforward, &'static str>, Error> {
-    let (a_e, b_e) = extended_pair(a, b, output, domain)?;
-    let (n, t) = (a.nrows(), output.nrows());
-    check::shape("K", k, (b.ncols(), n + t))?;
-    let controlled = &a_e + &b_e * k;
-    crate::stability::require_stable("A_e + B_e K", &controlled, domain)?;
-    let Some(silent) = slowest(&eigenvalues(&controlled)?, t, domain) else {
-        return Ok(Err(
-            "the slow eigenvalues of the feedback are complex pairs, and the integrals are an odd \
-                       number: none of them may be half of a pair; expected a slow real eigenvalue",
-        ));
-    };
-    let w = left_invariant(&controlled, &silent)?;
-    let dynamics = w.transpose() * &controlled * &w;
-    let residual =
-        (w.transpose() * &controlled - &dynamics * w.transpose()).norm() / controlled.norm();
-    if residual.is_nan() || residual > 1e-8 {
-        return Err(Error::ResidualTooLarge {
-            equation: "W' (A_e + B_e K) = S W'",
-            residual,
-            allowed: 1e-8,
-        });
-    }
-    let acting = w.rows(0, n).transpose() * b;
-    let svd = Svd::new(&acting.transpose())?;
-    if svd.rank(1e-9) < t {
-        return Ok(Err(
-            "the commands act on the slowest modes of the feedback in fewer independent ways \
-                       than there are integrals",
-        ));
-    }
-    let wanted = w.rows(n, t).transpose() * -integration(domain).0;
-    // (W_x' B)^+ = (B' W_x)^+ transposed.
-    let left = svd.left.columns(0, t);
-    let gain = left * svd.whitening(t).transpose() * &wanted;
-    let residual = (&acting * &gain - &wanted).norm() / wanted.norm();
-    if residual.is_nan() || residual > 1e-9 {
-        return Err(Error::ResidualTooLarge {
-            equation: "W' [B N_r; I] = 0",
-            residual,
-            allowed: 1e-9,
-        });
-    }
-    Ok(Ok(IntegralFeedforward { gain, silent }))
-}
-
-/// The `count` slowest eigenvalues, pairs together, if there are such.
-fn slowest(values: &[Complex<f64>], count: usize, domain: Domain) -> Option<Vec<Complex<f64>>> {
-    let slow = |value: &Complex<f64>| match domain {
-        Domain::Continuous => value.re,
-        Domain::Sampled { .. } => value.norm(),
-    };
-    let mut upper: Vec<_> = values.iter().filter(|value| value.im >= 0.0).copied().collect();
-    upper.sort_by(|x, y| slow(y).total_cmp(&slow(x)));
-    let mut found = Vec::new();
-    for value in upper {
-        let whole = if value.im > 0.0 { vec![value, value.conj()] } else { vec![value] };
-        if found.len() + whole.len() <= count {
-            found.extend(whole);
-        }
-    }
-    (found.len() == count).then_some(found)
-}
-
-/// An orthonormal basis W of the left invariant subspace of `a` for some eigenvalues, pairs together.
-fn left_invariant(a: &DMatrix<f64>, values: &[Complex<f64>]) -> Result<DMatrix<f64>, Error> {
-    let n = a.nrows();
-    let identity = DMatrix::<f64>::identity(n, n);
-    let mut polynomial = identity.clone();
-    for value in values.iter().filter(|value| value.im >= 0.0) {
-        let factor = if value.im > 0.0 {
-            a * a - a * (2.0 * value.re) + &identity * value.norm_sqr()
-        } else {
-            a - &identity * value.re
-        };
-        let product = polynomial * factor;
-        let size = product.norm();
-        polynomial = if size > 0.0 { product / size } else { product };
-    }
-    let svd = Svd::new(&polynomial)?;
-    Ok(svd.left.columns(n - values.len(), values.len()).into_owned())
-}
-
-/// The gain `L_w`, t x m, of the back-calculation that keeps integrals from winding up.
-///
-/// ```text
-/// x_i' = r - H y + L_w (u - v),   L_w = rate K_i^+
-/// x_i[k+1] = x_i[k] + T (r - H y) + L_w (u - v),   L_w = (1 - e^(-rate T)) K_i^+
-/// ```
-///
-/// v is the command before the limits, u the one within them. `k_i`: `K_i`, m x t; `ranges`: for each
-/// command the width of its limits, None if it has none; `rate`: above zero, in 1/s. While the commands are
-/// at their limits, the part of `x_i` that acts on them follows the value for which v = u best fits, with the
-/// rate: -`L_w` S `K_i`, S with ones for the commands at a limit, has eigenvalues between -rate and 0. Only
-/// rows of `K_i` of commands with limits count, in units of their ranges; the columns of the others are zero.
-/// Without a command at a limit u = v, and the term is zero.
-///
-/// Source: K. J. Åström and L. Rundqwist, Integrator windup and how to avoid it, American Control Conference
-/// (1989); it is one of the schemes of M. V. Kothare, P. J. Campo, M. Morari and C. N. Nett, A unified
-/// framework for the study of anti-windup designs, Automatica 30 (1994). The observer needs none of it: it
-/// receives u.
-///
-/// # Errors
-///
-/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad `K_i`; [`Error::OutOfRange`] for a bad
-/// range or rate; [`Error::NotConverged`].
-pub fn windup_gain(
-    k_i: &DMatrix<f64>,
-    ranges: &[Option<f64>],
-    rate: f64,
-    domain: Domain,
-) -> Result<DMatrix<f64>, Error> {
-    check::shape("K_i", k_i, (ranges.len(), k_i.ncols()))?;
-    check::positive("the rate of the back-calculation", rate)?;
-    for range in ranges.iter().flatten() {
-        check::positive("the range of a command", *range)?;
-    }
-    let weights = DMatrix::from_fn(ranges.len(), 1, |j, _| ranges[j].map_or(0.0, f64::recip));
-    let scaled = DMatrix::from_fn(k_i.nrows(), k_i.ncols(), |i, j| weights[i] * k_i[(i, j)]);
-    if scaled.amax() <= 0.0 {
-        return Ok(DMatrix::zeros(k_i.ncols(), k_i.nrows()));
-    }
-    let factor = match domain {
-        Domain::Continuous => rate,
-        Domain::Sampled { period } => -(-rate * period).exp_m1(),
-    };
-    let svd = Svd::new(&scaled)?;
-    let inverse =
-        svd.least_squares(&DMatrix::identity(ranges.len(), ranges.len()), svd.rank(TOLERANCE));
-    Ok(DMatrix::from_fn(k_i.ncols(), k_i.nrows(), |i, j| factor * inverse[(i, j)] * weights[j]))
 }
 
 /// The loop from the references to [x; u], without faults and estimation errors.

@@ -10,7 +10,8 @@ use super::norm_gains::ObserverProblem;
 use super::plant_file::PlantFile;
 use super::plausibility::{check_faults, check_limits};
 use super::requirements::{Request, Requirement};
-use super::schedule::{Scheduled, check_windup};
+use super::schedule::Scheduled;
+use super::schedule::references::examine;
 use super::tracking::{
     DesignLoop, Tracking, check_references, decay, feedback_pair, integral_action,
 };
@@ -131,7 +132,7 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
     let controlled = &pair.0 + &pair.1 * &feedback.gain;
     let tracking = Tracking::of(file, (&linear, (&own.0, &own.1)), (&gains, &controlled), domain)?;
     let schedule = Scheduled::of(file, &linear)?;
-    let found = ControllerDesign {
+    let mut found = ControllerDesign {
         family: (!members.is_empty()).then_some(Family { members, feedback: certificate }),
         schedule,
         cancellation_residual: cancellation_residual(&extended)?,
@@ -160,9 +161,8 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
         feedback_pair: pair,
         whole,
     };
-    if let Some(own) = &found.schedule {
-        check_windup(file, own, &found)?;
-    }
+    let further = examine(file, &found)?;
+    found.warnings.extend(further);
     Ok(found)
 }
 

@@ -34,6 +34,15 @@ pub(crate) struct Member {
     pub(crate) linear: LinearPlant,
 }
 
+/// Checks that the members of a family reach their references.
+pub(crate) fn check_action(file: &PlantFile<'_>) -> Result<(), PlaceError> {
+    let own = file.references.as_ref().filter(|own| !own.integral && !file.family.is_empty());
+    let Some(References { action_places: [place, _], .. }) = own else { return Ok(()) };
+    let message = "without integral action the other members of the family would miss their references, \
+                   because one constant gain N_r fits one plant; expected `integral = true`";
+    Err(file.error_at(place, message))
+}
+
 /// Returns the members that the file states besides its own plant `nominal`; a member that is not at
 /// rest at its operating point is a warning.
 pub(crate) fn members(

@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 
 use super::channel::ChannelSignals;
 use super::estimation::EstimationRequest;
+use super::family::check_action;
 use super::plausibility::check_names;
 use super::references::References;
 use super::requirements::{Request, request};
@@ -219,6 +220,7 @@ impl<'a> PlantFile<'a> {
         };
         found.check_columns(file)?;
         check_names(&found)?;
+        check_action(&found)?;
         Ok(found)
     }
 

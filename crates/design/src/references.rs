@@ -20,10 +20,10 @@ pub(crate) struct References {
     pub(crate) places: Vec<Place>,
     /// Whether the distance from the references is integrated; otherwise they act by a feedforward.
     pub(crate) integral: bool,
-    /// Whether the references act on the commands by a constant gain, too.
+    /// Whether the references act on the commands by a constant gain.
     pub(crate) feedforward: bool,
-    /// Where `feedforward` is stated.
-    pub(crate) feedforward_place: Option<Place>,
+    /// Where `integral` and `feedforward` are stated; the table, where they are not.
+    pub(crate) action_places: [Place; 2],
     /// Time constant, in s, with which the integrals follow a command at its limit.
     pub(crate) windup_time: Option<f64>,
 }
@@ -47,7 +47,8 @@ impl References {
         if members.is_empty() {
             return Err(track.error("expected at least one measurement"));
         }
-        let integral = table.get("integral").map_or(Ok(true), |entry| entry.flag())?;
+        let by_integral = table.get("integral");
+        let integral = by_integral.as_ref().map_or(Ok(true), |entry| entry.flag())?;
         let stated = table.get("feedforward");
         let feedforward = stated.as_ref().map_or(Ok(!integral), |entry| entry.flag())?;
         if let Some(entry) = stated.as_ref().filter(|_| !integral && !feedforward) {
@@ -66,7 +67,8 @@ impl References {
             places: Vec::new(),
             integral,
             feedforward,
-            feedforward_place: stated.map(|entry| entry.place),
+            action_places: [by_integral, stated]
+                .map(|own| own.map_or_else(|| entry.place.clone(), |own| own.place)),
             windup_time: windup_time.map(|entry| entry.positive()).transpose()?,
         };
         for (at, member) in members.iter().enumerate() {

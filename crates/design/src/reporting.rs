@@ -79,6 +79,7 @@ pub(crate) fn report(
     if let Some(found) = &family_report {
         let members: Vec<_> = found.members.iter().skip(1).collect();
         judge(&mut verdict, "member", &members, &file.robustness);
+        found.judge_proof(&mut verdict);
     }
     if let Some(found) = &schedule {
         judge_schedule(&mut verdict, designed, found, &file.robustness);
@@ -411,13 +412,16 @@ fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
     }
     if designed.family.is_some() {
         all.push(
-            "Responses, bounds and certificates of the estimation errors are those of the nominal              plant; the estimation error of another member also depends on its states."
+            "Responses, bounds and certificates of the estimation errors are those of the nominal \
+             plant; the estimation error of another member also depends on its states."
                 .to_owned(),
         );
     }
     if designed.schedule.is_some() {
         all.push(
-            "Gains, responses and bounds are those of the plant of the file; between the points of the              schedule, plant and controller are interpolated linearly. A change of the operating point              acts like a disturbance."
+            "Gains, responses and bounds are those of the plant of the file; between the points of the \
+             schedule, plant and controller are interpolated linearly. A change of the operating point \
+             acts like a disturbance."
                 .to_owned(),
         );
     }

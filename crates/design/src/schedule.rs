@@ -1,10 +1,10 @@
 //! The designs at the points of a schedule, and the loop between them.
 
+pub(crate) mod references;
 pub mod report;
 
 use control::aso::{FaultyPlant, Gains};
 use control::controller::complete_controller;
-use control::eigen::eigenvalues;
 use control::hold::zero_order_hold;
 use control::lmi::{Interval, bernstein};
 use control::robustness::Loop;
@@ -20,8 +20,6 @@ use super::plant_file::PlantFile;
 use super::signals::Signal;
 use super::variants::Variable;
 
-/// An eigenvalue this far beyond the unit circle is on it, with rounding errors.
-const NEUTRAL: f64 = 1e-9;
 /// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p`.
 const DEGREE: u32 = 4;
 
@@ -263,8 +261,10 @@ impl Slopes {
     /// Adds the part of references that rest: r - r_op moves against their operating point r_op = H y_op.
     ///
     /// ```text
-    /// x_i[k+1] = ... - T H y_op' theta,   u = ... - N_r H y_op' theta
+    /// x_i[k+1] = ... - T H y_op' theta,   u = ... - N_r H y_op' theta,   x_hat[k+1] = ... - B N_r H y_op' theta
     /// ```
+    ///
+    /// The observer receives u, and so its next state has the same part of it.
     fn move_references(&self, (design, own): (&ControllerDesign, &mut StateSpace), j: usize) {
         let (Some(tracking), Domain::Sampled { period }) = (&design.tracking, design.domain) else {
             return;
@@ -277,6 +277,11 @@ impl Slopes {
         }
         if let Some(n_r) = tracking.feedforward() {
             let command = n_r * moved;
+            let states = &design.plant.b * &command;
+            let before = design.filter.as_ref().map_or(0, Vec::len);
+            for i in 0..states.nrows() {
+                own.b[(before + i, j)] -= states[i];
+            }
             for i in 0..command.nrows() {
                 own.d[(i, j)] -= command[i];
             }
@@ -300,53 +305,4 @@ impl Slopes {
         found.d.set_column(j, &(own.d.column(j) + to_u.column(0)));
         found
     }
-}
-
-/// Parts of an interval at which the back-calculation is examined.
-const PARTS: u32 = 20;
-
-/// Checks that the interpolated back-calculation is stable while commands are at their limits.
-///
-/// With S the commands at a limit, x_i[k+1] = (I - L_w S K_i) x_i + ...; L_w and K_i are right for each
-/// other at the points, and between them their product is not the interpolated one. All eigenvalues
-/// must be in the unit circle for all limited commands together and for each alone; those at 1 are integrals
-/// on which these commands do not act.
-pub(crate) fn check_windup(
-    file: &PlantFile<'_>,
-    own: &Scheduled,
-    nominal: &ControllerDesign,
-) -> Result<(), crate::Error> {
-    let all: Vec<_> = own.points(nominal).collect();
-    for pair in all.windows(2) {
-        let [(from, first), (to, second)] = pair else { continue };
-        let parts = |design: &ControllerDesign| {
-            let windup = design.tracking.as_ref()?.windup()?.clone();
-            Some((windup, design.gains.integral.as_ref()?.gain.clone()))
-        };
-        let Some(((l_0, k_0), (l_1, k_1))) = parts(first).zip(parts(second)) else { return Ok(()) };
-        let m = k_0.nrows();
-        let limited = |j: &usize| first.linear.actuators[*j].limits.is_some();
-        let single = (0..m).filter(limited).map(|j| vec![j]);
-        let together = [(0..m).filter(limited).collect::<Vec<_>>()];
-        for set in single.chain(together) {
-            for part in 0..=PARTS {
-                let t = f64::from(part) / f64::from(PARTS);
-                let mix = |from: &DMatrix<f64>, to: &DMatrix<f64>| from * (1.0 - t) + to * t;
-                let (l, k) =
-                    (mix(&l_0, &l_1).select_columns(&set), mix(&k_0, &k_1).select_rows(&set));
-                let follows = DMatrix::identity(l.nrows(), l.nrows()) - l * k;
-                let largest = eigenvalues(&follows)?.iter().map(|v| v.norm()).fold(0.0, f64::max);
-                if largest > 1.0 + NEUTRAL {
-                    let message = format!(
-                        "between {} = {from} and {to} the interpolated back-calculation of the integrals is not \
-                         stable at the limits (eigenvalue of size {largest:.3}), because K_i changes too much; \
-                         expected a longer `windup_time` or more points",
-                        own.variable.name
-                    );
-                    return Err(file.error(&["schedule"], message).into());
-                }
-            }
-        }
-    }
-    Ok(())
 }

@@ -212,13 +212,10 @@ impl References {
     /// The refusal of a feedforward beside integrals.
     fn without_feedforward(&self, file: &PlantFile<'_>, reason: &str) -> PlaceError {
         let message = format!(
-            "no feedforward beside the integrals leaves the slowest modes of the feedback at rest: {reason}; \
-             or `feedforward = false`"
+            "no feedforward beside the integrals leaves the slowest modes of the feedback at rest: \
+             {reason}; or `feedforward = false`"
         );
-        match &self.feedforward_place {
-            Some(place) => file.error_at(place, message),
-            None => file.error(&["reference"], message),
-        }
+        file.error_at(&self.action_places[1], message)
     }
 }
 

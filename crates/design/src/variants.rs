@@ -85,15 +85,6 @@ impl PlantFile<'_> {
 /// Reads `[[family]]`.
 pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, PlaceError> {
     let Some(entry) = file.get("family") else { return Ok(Vec::new()) };
-    if let Some(reference) = file.get("reference").filter(|own| !own.is_text() && !own.is_list()) {
-        let integral = reference.table()?.get("integral");
-        if let Some(stated) = integral.filter(|entry| entry.flag().is_ok_and(|own| !own)) {
-            return Err(stated.error(
-                "without integral action the other members of the family would miss their references: one \
-                 constant gain N_r fits one plant; expected `integral = true`",
-            ));
-        }
-    }
     if let Some(schedule) = file.get("schedule") {
         return Err(
             schedule.error("expected `family` (one gain) or `schedule` (gains by a variable)")
@@ -135,9 +126,8 @@ pub(crate) fn schedule(
     let Some(entry) = file.get("schedule") else { return Ok(None) };
     if file.get("sample_time").is_none() {
         return Err(entry.error(
-            "a continuous controller has no schedule: expected `sample_time`; a sampled one holds \
-             its gains from one sample to the next, whatever the communication step, so that a \
-             certificate holds for every importer",
+            "a continuous controller has no schedule, because its exact step would need a matrix \
+             exponential for each value of the variable; expected `sample_time`",
         ));
     }
     let table = entry.table()?;

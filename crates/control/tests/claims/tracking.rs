@@ -10,8 +10,8 @@ use control::response::{
 };
 use control::robustness::Loop;
 use control::tracking::{
-    Action, IntegralAction, extended_pair, feedforward, integral_feedforward, reference_system,
-    tracking_rank, windup_gain,
+    Action, IntegralAction, InterpolatedWindup, extended_pair, feedforward, integral_feedforward,
+    interpolated_windup, reference_system, tracking_rank, windup_gain,
 };
 use control::{Domain, StateSpace, sampled};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -385,9 +385,116 @@ fn feedforward_beside_integrals_leaves_the_slowest_modes_at_rest_and_the_constan
 }
 
 #[test]
-fn half_of_a_pair_is_no_silent_mode() {
+fn half_of_a_pair_is_no_silent_mode_and_a_faster_one_does_not_take_its_place() {
     // One state, one integral, two complex eigenvalues.
     let k = matrix(1, &[-1.0, 4.0]);
     let found = integral_feedforward((&one(-1.0), &one(1.0)), &one(1.0), &k, Domain::Continuous);
-    assert!(found.unwrap().unwrap_err().contains("half of a pair"));
+    assert!(found.unwrap().unwrap_err().contains("half of a complex pair"));
+    // x'' = u with the eigenvalues -1 ± i and -3, of which the real one is the fastest.
+    let [a, b, output] = double_integrator();
+    let k = matrix(1, &[-8.0, -5.0, 6.0]);
+    let found = integral_feedforward((&a, &b), &output, &k, Domain::Continuous);
+    assert!(found.unwrap().unwrap_err().contains("half of a complex pair"));
+    // With -0.5 in place of -3 the real one is the slowest: N_r = -W_i / (W_x' B) by its left eigenvector.
+    let k = matrix(1, &[-3.0, -2.5, 1.0]);
+    let found = integral_feedforward((&a, &b), &output, &k, Domain::Continuous).unwrap().unwrap();
+    // s^3 + 2.5 s^2 + 3 s + 1 over s + 0.5: (s^2 + 2 s + 2); x = y responds by 2 / (s^2 + 2 s + 2).
+    assert!((found.silent[0].re + 0.5).abs() < 1e-12 && found.silent.len() == 1);
+    assert!((found.gain[(0, 0)] - 2.0).abs() < 1e-12, "{}", found.gain);
+}
+
+fn double_integrator() -> [DMatrix<f64>; 3] {
+    [matrix(2, &[0.0, 1.0, 0.0, 0.0]), matrix(2, &[0.0, 1.0]), matrix(1, &[1.0, 0.0])]
+}
+
+/// The back-calculations of two K_i with the same ranges and the factor f.
+fn calculations(
+    k: [&DMatrix<f64>; 2],
+    ranges: &[Option<f64>],
+    f: f64,
+) -> ([DMatrix<f64>; 2], InterpolatedWindup) {
+    let l = k
+        .map(|k| windup_gain(k, ranges, -(1.0 - f).ln(), Domain::Sampled { period: 1.0 }).unwrap());
+    let found = interpolated_windup(k, [&l[0], &l[1]], ranges).unwrap();
+    (l, found)
+}
+
+/// The largest modulus of the eigenvalues of I - L_w S K_i on the way.
+fn radius(k: [&DMatrix<f64>; 2], l: &[DMatrix<f64>; 2], set: &[usize], s: f64) -> f64 {
+    let k = (k[0] * (1.0 - s) + k[1] * s).select_rows(set);
+    let l = (&l[0] * (1.0 - s) + &l[1] * s).select_columns(set);
+    let own = DMatrix::identity(l.nrows(), l.nrows()) - l * k;
+    own.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max)
+}
+
+#[test]
+fn an_interpolated_back_calculation_is_stable_where_the_eigenvalues_are_and_for_no_other() {
+    // 400 random pairs of K_i: 1 to 3 commands with and without limits, 1 or 2 integrals.
+    let mut numbers = Numbers(7);
+    let mut counts = [0; 3];
+    for _ in 0..400 {
+        let m = 1 + (numbers.next() * 2.999) as usize;
+        let t = 1 + (numbers.next() * 1.999) as usize;
+        let k_0 = DMatrix::from_fn(m, t, |_, _| numbers.next() - 0.5);
+        let change = 1.6 * numbers.next();
+        let k_1 = &k_0 + DMatrix::from_fn(m, t, |_, _| change * (numbers.next() - 0.5));
+        let ranges: Vec<_> =
+            (0..m).map(|_| (numbers.next() < 0.8).then(|| 0.2 + 3.0 * numbers.next())).collect();
+        let k = [&k_0, &k_1];
+        let (l, found) = calculations(k, &ranges, 0.05 + 0.9 * numbers.next());
+        match found {
+            InterpolatedWindup::Stable => {
+                let limited: Vec<_> = (0..m).filter(|&j| ranges[j].is_some()).collect();
+                for bits in 1_usize..1 << limited.len() {
+                    let set: Vec<_> = (0..limited.len()).filter(|j| bits >> j & 1 == 1).collect();
+                    let set: Vec<_> = set.into_iter().map(|j| limited[j]).collect();
+                    for step in 0..=50 {
+                        assert!(radius(k, &l, &set, f64::from(step) / 50.0) < 1.0 + 1e-9);
+                    }
+                }
+                counts[0] += 1;
+            }
+            InterpolatedWindup::Unstable { part, limited, radius: stated } => {
+                let own = radius(k, &l, &limited, part);
+                assert!((own - stated).abs() < 1e-9 * own && own > 1.0 + 1e-10);
+                counts[1] += 1;
+            }
+            InterpolatedWindup::Undecided { limited } => {
+                // K_i of these commands passes zero: an eigenvalue is near 1.
+                let steps = (0..=1000).map(|step| radius(k, &l, &limited, f64::from(step) / 1e3));
+                assert!((steps.fold(0.0, f64::max) - 1.0).abs() < 1e-3);
+                counts[2] += 1;
+            }
+        }
+    }
+    assert!(counts[0] > 40 && counts[1] > 40 && counts[2] < 20, "{counts:?}");
+}
+
+#[test]
+fn commands_in_one_direction_and_commands_without_integral_do_not_hinder_the_proof() {
+    // The second command is twice the first, the third has no part of the integrals.
+    let k_0 = matrix(3, &[1.0, 0.5, 2.0, 1.0, 0.0, 0.0]);
+    let k_1 = matrix(3, &[1.2, 0.5, 2.4, 1.0, 0.0, 0.0]);
+    let ranges = [Some(1.0), Some(2.0), Some(1.0)];
+    assert_eq!(calculations([&k_0, &k_1], &ranges, 0.3).1, InterpolatedWindup::Stable);
+    // Half of the way K_i is zero, and L_w is not.
+    let (_, found) = calculations([&one(1.0), &one(-1.0)], &[Some(1.0)], 0.3);
+    assert!(matches!(found, InterpolatedWindup::Undecided { .. }), "{found:?}");
+    // K_i changes by a factor of 100: near the middle L_w K_i = f 101^2 / 400 > 2.
+    let (_, found) = calculations([&one(1.0), &one(100.0)], &[Some(1.0)], 0.3);
+    assert!(matches!(found, InterpolatedWindup::Unstable { .. }), "{found:?}");
+    let many = DMatrix::from_element(11, 1, 1.0);
+    let (_, found) = calculations([&many, &many], &[Some(1.0); 11], 0.3);
+    assert!(matches!(found, InterpolatedWindup::Undecided { limited } if limited.len() == 11));
+}
+
+/// Reproducible numbers between 0 and 1.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
 }

@@ -22,14 +22,14 @@ use crate::robustness::{Margins, Physical, by_entries, margins};
 pub struct FamilyReport {
     /// The plant of the file, `nominal`, then the others.
     pub members: Vec<MemberReport>,
-    /// One P for the state feedback loops `A_i + B_i K_x` of all members, with integral action together with
-    /// their integrals; none if the feedback was
-    /// designed for the nominal plant.
+    /// One P for the state feedback loops `A_i + B_i K_x` of all members, with integral action `A_e,i + B_e,i
+    /// [K_x, K_i]` with the integrals; none if the feedback was designed for the nominal plant.
     pub feedback: Option<CommonCertificate>,
     /// One P for the loops of all members with the whole controller: the loop is stable while the
     /// plant moves between the members, in any way and arbitrarily fast; in a sampled design from one
-    /// sample to the next. Or the reason why there is none; each constant member is judged by its
-    /// eigenvalues.
+    /// sample to the next. Or the reason why there is none: then plants between the members, and plants that
+    /// move, are not proven to be stable, and the verdict is not green; each constant member is judged by
+    /// its eigenvalues.
     #[serde(serialize_with = "or_reason")]
     #[schemars(with = "OrReason<CommonCertificate>")]
     pub whole: Result<CommonCertificate, String>,
@@ -153,6 +153,17 @@ pub(crate) fn common(
 impl CommonCertificate {
     pub(crate) fn of(found: &RegionCertificate) -> Self {
         Self { p: rows(&found.p), margin: found.margin }
+    }
+}
+
+impl FamilyReport {
+    /// Judges what is proven of plants that are no member.
+    pub(crate) fn judge_proof(&self, verdict: &mut Verdict) {
+        if self.whole.is_err() {
+            let text = "stability of plants between the members of the family, and while the plant moves between \
+                        them, is not proven; only the members themselves were checked";
+            verdict.add(Level::Amber, text.to_owned());
+        }
     }
 }
 

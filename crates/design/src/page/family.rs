@@ -43,7 +43,7 @@ fn members_section(report: &Report, found: &FamilyReport) -> Markup {
                 "One P proves the region of the state feedback for all members (margin "
                 (number(certificate.margin)) ")."
             }
-            (p_matrix("family-feedback-P", &state_names(report), certificate))
+            (p_matrix("family-feedback-P", &feedback_names(report), certificate))
         }
     }
 }
@@ -188,6 +188,18 @@ fn state_names(report: &Report) -> Vec<String> {
     report.plant.states.iter().map(|signal| signal.name.clone()).collect()
 }
 
+/// The states that K = [K_x, K_i] feeds back.
+fn feedback_names(report: &Report) -> Vec<String> {
+    state_names(report).into_iter().chain(integral_names(report)).collect()
+}
+
+/// The integrals of the distances from references.
+fn integral_names(report: &Report) -> Vec<String> {
+    let k_i = report.gains.iter().find(|own| own.name == "K_i");
+    let names = k_i.iter().flat_map(|own| &own.columns);
+    names.map(|name| format!("integral of {name}")).collect()
+}
+
 /// The states of plant and controller together.
 fn loop_names(report: &Report) -> Vec<String> {
     let mut names = state_names(report);
@@ -199,6 +211,7 @@ fn loop_names(report: &Report) -> Vec<String> {
     names.extend(k_x.columns.iter().map(|name| format!("estimate of {name}")));
     let faults = report.gains.iter().find(|own| own.name == "L_f");
     names.extend(faults.iter().flat_map(|own| &own.rows).map(|name| format!("estimate of {name}")));
+    names.extend(integral_names(report));
     names
 }
 

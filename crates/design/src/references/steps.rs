@@ -13,7 +13,7 @@ use crate::robustness::report::Number;
 use crate::tracking::{Tracking, TrackingAction};
 
 /// Relative error of a constant reference below which it counts as reached.
-const REACHED: f64 = 1e-9;
+pub(crate) const REACHED: f64 = 1e-9;
 /// The parts of a step between which the rise time is measured.
 const RISE: [f64; 2] = [0.1, 0.9];
 

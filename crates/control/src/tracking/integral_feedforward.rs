@@ -1,0 +1,136 @@
+//! The feedforward of references beside integral action.
+
+use super::{extended_pair, integration};
+use crate::eigen::eigenvalues;
+use crate::svd::Svd;
+use crate::{Domain, Error, check};
+use nalgebra::{Complex, DMatrix};
+
+/// The feedforward `N_r` beside integral action, and the eigenvalues that references do not excite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IntegralFeedforward {
+    /// `N_r`, m x t.
+    pub gain: DMatrix<f64>,
+    /// The t slowest eigenvalues of the feedback, which no reference excites.
+    pub silent: Vec<Complex<f64>>,
+}
+
+/// The feedforward `N_r`, m x t, beside integral action: the references do not excite the t slowest modes.
+///
+/// ```text
+/// x_e' = (A_e + B_e K) x_e + [B N_r; I] r,   x_e = [x; x_i]        sampled: T I in place of I
+/// W' (A_e + B_e K) = S W',   W = [W_x; W_i], (n + t) x t
+/// W' [B N_r; I] = 0,   so   N_r = -(W_x' B)^+ W_i'                 sampled: -T (W_x' B)^+ W_i'
+/// ```
+///
+/// S has the t slowest eigenvalues, by real part or, sampled, by modulus. With this `N_r` the signal s
+/// = W' `x_e` obeys s' = S s whatever the references do: it stays zero after every change of them, and only
+/// disturbances, faults and errors of the model move it. So references are answered by the other n
+/// modes, which are faster, and H y reaches a
+/// constant r for every plant for which the loop is stable, because the integrals are part of it. Faults
+/// and disturbances are answered as without `N_r`: the feedback K is the same.
+///
+/// `a`, `b`, `output`: as in [`extended_pair`]; `k`: K = [`K_x`, `K_i`], m x (n + t), such that `A_e` + `B_e` K
+/// is stable. W is the left null space of the polynomial of `A_e` + `B_e` K with these t roots, from a singular
+/// value decomposition. Of several `N_r` (more commands than references) it is the one of least
+/// norm in the given units. The inner result is the reason why there is none: the t slowest
+/// eigenvalues end with half of a complex pair; `W_x'` B has a rank below t.
+///
+/// For one reference it is the zero of the classical set-point weight, which cancels the slowest pole: K. J.
+/// Åström and T. Hägglund, PID controllers, 2nd edition (1995), section 3.4; G. F. Franklin, J. D. Powell and
+/// M. Workman (1998), section 8.5.
+///
+/// # Errors
+///
+/// Same as [`extended_pair`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for an unstable feedback;
+/// [`Error::NotConverged`]; [`Error::ResidualTooLarge`] when W is not invariant to 1e-8 or W' [B `N_r`; I]
+/// is above 1e-9, both relative.
+pub fn integral_feedforward(
+    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    output: &DMatrix<f64>,
+    k: &DMatrix<f64>,
+    domain: Domain,
+) -> Result<Result<IntegralFeedforward, &'static str>, Error> {
+    let (a_e, b_e) = extended_pair(a, b, output, domain)?;
+    let (n, t) = (a.nrows(), output.nrows());
+    check::shape("K", k, (b.ncols(), n + t))?;
+    let controlled = &a_e + &b_e * k;
+    crate::stability::require_stable("A_e + B_e K", &controlled, domain)?;
+    let Some(silent) = slowest(&eigenvalues(&controlled)?, t, domain) else {
+        return Ok(Err(
+            "the slowest eigenvalues of the feedback, one for each integral, end with half of a complex \
+             pair; expected a real eigenvalue slower than this pair, or as slow",
+        ));
+    };
+    let w = left_invariant(&controlled, &silent)?;
+    let dynamics = w.transpose() * &controlled * &w;
+    let residual =
+        (w.transpose() * &controlled - &dynamics * w.transpose()).norm() / controlled.norm();
+    if residual.is_nan() || residual > 1e-8 {
+        return Err(Error::ResidualTooLarge {
+            equation: "W' (A_e + B_e K) = S W'",
+            residual,
+            allowed: 1e-8,
+        });
+    }
+    let acting = w.rows(0, n).transpose() * b;
+    let svd = Svd::new(&acting.transpose())?;
+    if svd.rank(1e-9) < t {
+        return Ok(Err(
+            "the commands act on the slowest modes of the feedback in fewer independent ways than there \
+             are integrals",
+        ));
+    }
+    let wanted = w.rows(n, t).transpose() * -integration(domain).0;
+    // (W_x' B)^+ = (B' W_x)^+ transposed.
+    let left = svd.left.columns(0, t);
+    let gain = left * svd.whitening(t).transpose() * &wanted;
+    let residual = (&acting * &gain - &wanted).norm() / wanted.norm();
+    if residual.is_nan() || residual > 1e-9 {
+        return Err(Error::ResidualTooLarge {
+            equation: "W' [B N_r; I] = 0",
+            residual,
+            allowed: 1e-9,
+        });
+    }
+    Ok(Ok(IntegralFeedforward { gain, silent }))
+}
+
+/// The `count` slowest eigenvalues; None if half of a complex pair is the last of them.
+fn slowest(values: &[Complex<f64>], count: usize, domain: Domain) -> Option<Vec<Complex<f64>>> {
+    let mut upper: Vec<_> = values.iter().filter(|value| value.im >= 0.0).copied().collect();
+    // Of equally slow ones a real one is before a pair.
+    upper.sort_by(|x, y| {
+        domain.excess(*y).total_cmp(&domain.excess(*x)).then(x.im.total_cmp(&y.im))
+    });
+    let mut found = Vec::new();
+    for value in upper {
+        if found.len() >= count {
+            break;
+        }
+        found.push(value);
+        if value.im > 0.0 {
+            found.push(value.conj());
+        }
+    }
+    (found.len() == count).then_some(found)
+}
+
+/// An orthonormal basis W of the left invariant subspace of `a` for some eigenvalues, pairs together.
+fn left_invariant(a: &DMatrix<f64>, values: &[Complex<f64>]) -> Result<DMatrix<f64>, Error> {
+    let n = a.nrows();
+    let identity = DMatrix::<f64>::identity(n, n);
+    let mut polynomial = identity.clone();
+    for value in values.iter().filter(|value| value.im >= 0.0) {
+        let factor = if value.im > 0.0 {
+            a * a - a * (2.0 * value.re) + &identity * value.norm_sqr()
+        } else {
+            a - &identity * value.re
+        };
+        let product = polynomial * factor;
+        let size = product.norm();
+        polynomial = if size > 0.0 { product / size } else { product };
+    }
+    let svd = Svd::new(&polynomial)?;
+    Ok(svd.left.columns(n - values.len(), values.len()).into_owned())
+}

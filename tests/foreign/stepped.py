@@ -1,0 +1,33 @@
+"""An FMU by FMPy, step by step."""
+
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
+
+
+class Stepped:
+    """An FMU by FMPy, step by step."""
+
+    def __init__(self, fmu, folder, start=()):
+        description = read_model_description(str(fmu))
+        self.names = {variable.name: variable.valueReference for variable in description.modelVariables}
+        self.own = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=extract(str(fmu), str(folder)),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName="own",
+        )
+        self.own.instantiate()
+        for name, value in start:
+            self.set(name, value)
+        self.own.setupExperiment(startTime=0.0)
+        self.own.enterInitializationMode()
+        self.own.exitInitializationMode()
+
+    def set(self, name, value):
+        self.own.setReal([self.names[name]], [value])
+
+    def get(self, name):
+        return self.own.getReal([self.names[name]])[0]
+
+    def step(self, time, size):
+        self.own.doStep(currentCommunicationPoint=time, communicationStepSize=size)

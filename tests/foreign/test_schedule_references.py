@@ -1,0 +1,320 @@
+"""Scheduled controllers with references: gains by numpy, the FMU beside an own recursion, constant errors, refused files."""
+
+import functools
+import json
+import tomllib
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from stepped import Stepped
+
+PERIOD = 0.05
+MATRICES = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f", "K_i", "L_w", "N_r"]
+LISTS = ["x_op", "u_op", "y_op", "r_op"]
+INERTIAS, SPRINGS, FRICTIONS = [1.0, 2.0, 4.0], [1.0, 3.0, 1.5], [0.5, 0.3, 0.2]
+
+# A drive whose inertia, spring and friction are known; the angle that is measured has an operating point.
+DRIVE = f"""sample_time = {PERIOD}
+A = [[0, 1], [-1.0, -0.5]]
+B = [[0], [1]]
+C = [[1, 0]]
+states = ["phi", "w"]
+actuators = [{{ name = "torque", limits = [-3.0, 3.0] }}]
+measurements = [{{ name = "angle", operating = 0.0 }}]
+actuator_faults = "all"
+feedback.eigenvalues = [-1.2, -2.0, -2.5]
+observer.eigenvalues = [-6.0, -7.0, -8.0]
+robustness.cases = 3
+
+[reference]
+track = ["angle"]
+feedforward = true
+
+[schedule]
+variable = "inertia"
+rate_bound = 0.5
+
+[[schedule.points]]
+at = 1.0
+
+[[schedule.points]]
+at = 2.0
+A = [[0, 1], [-1.5, -0.15]]
+B = [[0], [0.5]]
+x_op = [0.4, 0]
+u_op = [1.2]
+y_op = [0.4]
+
+[[schedule.points]]
+at = 4.0
+A = [[0, 1], [-0.375, -0.05]]
+B = [[0], [0.25]]
+x_op = [0.2, 0]
+u_op = [0.3]
+y_op = [0.2]
+"""
+WITHOUT = [
+    ("feedforward = true", "integral = false"),
+    ("feedback.eigenvalues = [-1.2, -2.0, -2.5]", "feedback.eigenvalues = [-1.2, -2.0]"),
+]
+
+
+def held(a, b, time=PERIOD):
+    """The sampled matrices of a plant whose input is held."""
+    n, m = b.shape
+    whole = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * time)
+    return whole[:n, :n], whole[:n, n:]
+
+
+def drive(k):
+    """The sampled plant at a point."""
+    return held(np.array([[0, 1], [-SPRINGS[k] / INERTIAS[k], -FRICTIONS[k] / INERTIAS[k]]]), np.array([[0], [1 / INERTIAS[k]]]))
+
+
+class Schedule:
+    """A scheduled design file with references: interpolation and recursion."""
+
+    def __init__(self, text):
+        self.own = tomllib.loads(text)
+        self.points = self.own["schedule"]["points"]
+        self.at = [point["at"] for point in self.points]
+        self.current = self.own["estimator"] == "current"
+        free = [-np.inf, np.inf]
+        self.limits = np.transpose([actuator.get("limits", free) for actuator in self.own["actuators"]])
+        (self.n, self.q), self.t = np.shape(self.own["F_a"]), len(self.points[0]["r_op"])
+        self.integrals = self.t if "K_i" in self.points[0] else 0
+
+    def numbers(self, value):
+        """Matrices and operating point at a value of the scheduling variable."""
+        value = min(max(value, self.at[0]), self.at[-1])
+        k = min(np.searchsorted(self.at, value, side="right"), len(self.at) - 1) - 1
+        s = (value - self.at[k]) / (self.at[k + 1] - self.at[k])
+        low, high = self.points[k], self.points[k + 1]
+        names = [name for name in MATRICES + LISTS if name in low]
+        return {name: (1 - s) * np.array(low[name]) + s * np.array(high[name]) for name in names}
+
+    def sample(self, z, y, r, own):
+        """The next estimates and integrals, and the command."""
+        x_hat, f_hat, x_i = np.split(z, [self.n, self.n + self.q])
+        x_hat, e = x_hat - own["x_op"], y - own["y_op"]
+        r = r - own["r_op"]
+        innovation = e - own["C"] @ x_hat
+        if self.current:
+            x_hat, f_hat = x_hat + own["L_x"] @ innovation, f_hat + own["L_f"] @ innovation
+            innovation = 0 * innovation
+        v = own["u_op"] + own["K_x"] @ x_hat + own["K_f"] @ f_hat
+        if "N_r" in own:
+            v = v + own["N_r"] @ r
+        if self.integrals:
+            v = v + own["K_i"] @ x_i
+        u = np.clip(v, *self.limits)
+        after = own["x_op"] + own["A"] @ x_hat + own["B"] @ (u - own["u_op"]) + own["F_a"] @ f_hat + own["L_x"] @ innovation
+        if self.integrals:
+            x_i = x_i + PERIOD * (r - np.array(self.own["H"]) @ e)
+            x_i = x_i + (own["L_w"] @ (u - v) if "L_w" in own else 0)
+        return np.concatenate([after, f_hat + own["L_f"] @ innovation, x_i]), u
+
+
+@pytest.fixture(scope="module")
+def made(aso_ftc, packed, tmp_path_factory):
+    """Schedule, report and FMU of the drive after replacements in its text; without certificates if it is so wanted."""
+
+    @functools.cache
+    def make(*replacements, certified=True):
+        folder, text = tmp_path_factory.mktemp("drive"), DRIVE
+        for old, new in replacements:
+            assert old in text, old
+            text = text.replace(old, new)
+        (folder / "drive.toml").write_text(text, encoding="utf-8")
+        out = folder / "design.toml"
+        done = aso_ftc("design", folder / "drive.toml", "--out", out, "--fmu", folder / "Drive.fmu", "--json", *([] if certified else ["--certificate-time", "0"]))
+        assert done.returncode in (0, 1), done.stderr
+        return Schedule(out.read_text(encoding="utf-8")), json.loads(done.stdout), folder / "Drive.fmu"
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def both(made):
+    return made(certified=True)
+
+
+@pytest.fixture(scope="module")
+def without(made):
+    return made(*WITHOUT, certified=True)
+
+
+def test_each_point_has_the_gains_of_its_own_plant(both, without):
+    for k, point in enumerate(both[0].points):
+        a, b = drive(k)
+        extended = np.block([[a, np.zeros((2, 1))], [-PERIOD * np.eye(1, 2), np.eye(1)]])
+        feedback = extended + np.vstack([b, [[0]]]) @ np.hstack([point["K_x"], point["K_i"]])
+        wanted = np.sort(np.exp(np.array([-1.2, -2.0, -2.5]) * PERIOD))
+        assert np.sort(np.linalg.eigvals(feedback).real) == pytest.approx(wanted, abs=1e-9)
+        values, vectors = np.linalg.eig(feedback.T)
+        w = vectors[:, np.argmax(abs(values))].real
+        assert point["N_r"][0][0] == pytest.approx(-PERIOD * w[2] / (w[:2] @ b[:, 0]), rel=1e-8)
+        # One command: the range cancels, and L_w K_i = 1 - e^(-T / windup_time), by default of the slowest eigenvalue.
+        assert point["L_w"][0][0] * point["K_i"][0][0] == pytest.approx(1 - np.exp(-1.2 * PERIOD), rel=1e-7)
+        assert point["r_op"] == point["y_op"]
+        own = without[0].points[k]
+        gain = np.linalg.solve(np.eye(2) - a - b @ own["K_x"], b)[0, 0]
+        assert own["N_r"][0][0] == pytest.approx(1 / gain, rel=1e-8) and "K_i" not in own
+
+
+def run(schedule, fmu, folder, inertia, reference, count, plant, disturbance=0.0):
+    """The FMU and the own recursion with the plant: angles and commands of both."""
+    start = next(point for point in schedule.points if point["at"] == 1.0)
+    own = Stepped(fmu, folder, [("inertia", inertia(0)), ("r_angle", reference(0))])
+    z = np.concatenate([start["x_op"], np.zeros(schedule.q + schedule.integrals)])
+    x, rows = np.zeros(2), []
+    a, b = plant
+    for k in range(count):
+        z, u = schedule.sample(z, x[:1], np.array([reference(k)]), schedule.numbers(inertia(k)))
+        rows.append([x[0], own.get("torque"), u[0]])
+        x = a @ x + b[:, 0] * (rows[-1][1] + disturbance)
+        own.set("angle", x[0])
+        own.set("inertia", inertia(k + 1))
+        own.set("r_angle", reference(k + 1))
+        own.step(k * PERIOD, PERIOD)
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("change", [(), tuple(WITHOUT), (("sample_time", 'estimator = "prediction"\nsample_time'),)], ids=["both", "feedforward", "prediction"])
+def test_the_fmu_follows_the_interpolated_recursion_at_its_limits_too(made, change, tmp_path):
+    schedule, _, fmu = made(*change, certified=change in ((), tuple(WITHOUT)))
+    inertia = lambda k: 0.9 + 0.015 * k
+    reference = lambda k: 1.0 if k % 120 < 60 else -2.0
+    rows = run(schedule, fmu, tmp_path, inertia, reference, 230, drive(1))
+    assert np.allclose(rows[:, 1], rows[:, 2], rtol=1e-8, atol=1e-9)
+    assert np.abs(rows[:, 1]).max() == 3.0 and inertia(229) > 4.0
+
+
+@pytest.mark.parametrize("value", [1.0, 1.37, 2.0, 3.1, 4.0])
+def test_with_integral_action_the_reference_is_reached_at_and_between_the_points(both, value, tmp_path):
+    schedule, _, fmu = both
+    own = schedule.numbers(value)
+    rows = run(schedule, fmu, tmp_path, lambda k: value, lambda k: 0.9, 600, (own["A"], own["B"]), disturbance=0.2)
+    assert rows[-1, 0] == pytest.approx(0.9, abs=1e-7)
+
+
+def constant_error(schedule, value):
+    """What is missing of a step without integral action: 1 - H C (I - A - B K_x)^-1 B N_r."""
+    own = schedule.numbers(value)
+    states = np.linalg.solve(np.eye(2) - own["A"] - own["B"] @ own["K_x"], own["B"] @ own["N_r"])
+    return 1 - (own["C"] @ states)[0, 0]
+
+
+def test_without_it_a_warning_states_the_largest_error_between_the_points(both, without, tmp_path):
+    schedule, report, fmu = without
+    assert not any("reached at the points" in text for text in both[1]["warnings"])
+    (warning,) = [text for text in report["warnings"] if "reached at the points" in text]
+    assert "drive.toml:" in warning or "line " in warning, warning
+    values = np.concatenate([np.linspace(low, high, 21) for low, high in ((1, 2), (2, 4))])
+    errors = np.abs([constant_error(schedule, value) for value in values])
+    assert f"misses up to {100 * errors.max():.2f} % of a step" in warning
+    assert f"inertia = {values[errors.argmax()]:.6f}" in warning
+    for value in schedule.at:
+        assert constant_error(schedule, value) == pytest.approx(0, abs=1e-9)
+    # The FMU misses by the same part.
+    value = values[errors.argmax()]
+    own = schedule.numbers(value)
+    rows = run(schedule, fmu, tmp_path, lambda k: value, lambda k: 0.9, 600, (own["A"], own["B"]))
+    missing = (0.9 - rows[-1, 0]) / (0.9 - own["r_op"][0])
+    assert missing == pytest.approx(constant_error(schedule, value), abs=1e-7)
+
+
+@pytest.mark.parametrize("change", [(), tuple(WITHOUT)], ids=["both", "feedforward"])
+def test_the_certificate_and_the_checked_values_are_about_the_loop_with_its_integrals(made, change):
+    schedule, report, _ = made(*change, certified=True)
+    found = report["schedule"]
+
+    def loop(value):
+        """The loop of interpolated plant and controller, its deviations: [x; x_hat; f_hat; x_i]."""
+        own = schedule.numbers(value)
+        point = {**own, **{name: np.zeros(np.shape(own[name])) for name in LISTS}}
+        schedule.limits, before = np.transpose([[-np.inf, np.inf]]), schedule.limits
+        size = 2 * schedule.n + schedule.q + schedule.integrals
+        columns = []
+        for unit in np.eye(size):
+            after, u = schedule.sample(unit[2:], own["C"] @ unit[:2], np.zeros(1), point)
+            columns.append(np.concatenate([own["A"] @ unit[:2] + own["B"] @ u, after]))
+        schedule.limits = before
+        return np.array(columns).T
+
+    values = np.linspace(1, 4, 61)
+    radii = [abs(np.linalg.eigvals(loop(value))).max() for value in values]
+    assert found["worst_instability"] >= max(radii) - 1 - 1e-6 and max(radii) < 1
+    if "p" in found["any_rate"]:
+        p = np.array(found["any_rate"]["p"])
+        scale = 1 / np.sqrt(np.diag(p))
+        for value in values:
+            left = p - loop(value).T @ p @ loop(value)
+            assert np.linalg.eigvalsh(left * np.outer(scale, scale)).min() > 0
+    else:
+        assert "p" in found["bounded_rate"], found
+
+
+@pytest.mark.parametrize("change", [(), tuple(WITHOUT)], ids=["both", "feedforward"])
+def test_a_measurement_that_schedules_moves_the_references_too(made, change):
+    """The Jacobian of one sample of plant and controller, by differences on each side of a point."""
+    changes = [
+        *change,
+        ('variable = "inertia"', 'variable = "angle"'),
+        ("at = 1.0\n", "at = 0.0\n"), ("at = 2.0\n", "at = 1.0\n"), ("at = 4.0\n", "at = 2.0\n"),
+        ("operating = 0.0", "operating = 0.1"),
+    ]
+    schedule, report, _ = made(*changes, certified=False)
+    schedule.limits = np.transpose([[-np.inf, np.inf]])
+
+    def sample(k, state):
+        """All as deviations from the point, but the operating points move."""
+        point = schedule.points[k]
+        y_op = np.array(point["y_op"])
+        y = y_op + np.array(point["C"]) @ state[:2]
+        theta = schedule.at[k] + (y - y_op)[0]
+        z = state[2:] + np.concatenate([point["x_op"], np.zeros(schedule.q + schedule.integrals)])
+        own = schedule.numbers(theta)
+        after, u = schedule.sample(z, y, np.array(point["r_op"]), own)
+        a, b = drive(k)
+        moved = a @ state[:2] + b @ (u - point["u_op"])
+        return np.concatenate([moved, after - np.concatenate([point["x_op"], np.zeros(schedule.q + schedule.integrals)])])
+
+    for k, own in enumerate(report["schedule"]["points"]):
+        worst = -1.0
+        size = 2 * schedule.n + schedule.q + schedule.integrals
+        for sign in (1, -1):
+            # At an end of the grid the variable is held on the other side.
+            if (k, sign) in ((0, -1), (2, 1)):
+                continue
+            step = 1e-6
+            columns = []
+            for unit in np.eye(size):
+                moves = sign * step * unit
+                columns.append((sample(k, moves) - sample(k, 0 * unit)) / (sign * step))
+            worst = max(worst, abs(np.linalg.eigvals(np.array(columns).T)).max() - 1)
+        assert own["coupled_instability"] == pytest.approx(worst, abs=2e-5), k
+
+
+@pytest.mark.parametrize(
+    "replacements, parts",
+    [
+        # K_i grows with the inertia: half of the way the product with L_w is above 2.
+        ([("B = [[0], [0.25]]", "B = [[0], [0.0005]]"), ("0.25", "0.0005")], ["back-calculation of the integrals is not stable while torque is at the limits", "inertia = "]),
+        ([("sample_time = 0.05\n", "")], ["a continuous controller has no schedule", "matrix exponential", "expected `sample_time`"]),
+        ([("A = [[0, 1], [-0.375, -0.05]]\nB = [[0], [0.25]]", "A = [[0, 1], [-1, -1]]\nB = [[0], [1]]\nC = [[0, 1]]")], ["no integral action exists for r_angle", "schedule with inertia = 4"]),
+    ],
+)
+def test_a_schedule_that_cannot_follow_is_refused_at_its_line(aso_ftc, tmp_path, replacements, parts):
+    text = DRIVE
+    for old, new in replacements[:1]:
+        assert old in text, old
+        text = text.replace(old, new)
+    (tmp_path / "drive.toml").write_text(text, encoding="utf-8")
+    done = aso_ftc("design", tmp_path / "drive.toml", "--out", tmp_path / "design.toml")
+    assert done.returncode == 2 and done.stderr.count("error:") == 1, done
+    assert "drive.toml:" in done.stderr, done.stderr
+    for part in parts:
+        assert part in done.stderr, done.stderr
