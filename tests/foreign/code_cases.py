@@ -62,7 +62,7 @@ CASES = {
     "three-tank": Case(TANKS["plant"], 6e-5, 1e-3),
     "sensor-fault": Case(TANKS["sensor-fault"], 6e-5, 1e-3),
     "loss-of-effectiveness": Case(TANKS["loss-of-effectiveness"], 6e-5, 1e-3),
-    "reference": Case(TANKS["reference"], 6e-5, 1e-3),
+    "reference": Case(TANKS["reference"].replace("[reference]", "[reference]\nfeedforward = true"), 6e-5, 1e-3),
     "ramp-current": Case(masses("current", "false"), 0.5, 1e-3),
     "ramp-prediction": Case(masses("prediction", "true"), 0.5, 1e-3),
     "constant-prediction": Case("sample_time = 1.0\nestimator = 'prediction'\n" + QUADRUPLE, 0.3, 1e-2),

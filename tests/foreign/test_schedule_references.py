@@ -6,8 +6,10 @@ import tomllib
 
 import numpy as np
 import pytest
+from fmpy import extract
 from scipy.linalg import expm
 
+from c_abi import Fmu, Instance
 from stepped import Stepped
 
 PERIOD = 0.05
@@ -198,6 +200,24 @@ def test_with_integral_action_the_reference_is_reached_at_and_between_the_points
     own = schedule.numbers(value)
     rows = run(schedule, fmu, tmp_path, lambda k: value, lambda k: 0.9, 600, (own["A"], own["B"]), disturbance=0.2)
     assert rows[-1, 0] == pytest.approx(0.9, abs=1e-7)
+
+
+def test_the_derivatives_at_the_start_include_references_and_schedule(both, tmp_path):
+    fmu = Fmu(extract(str(both[2]), str(tmp_path)))
+    point, outputs = {"angle": 0.3, "inertia": 1.4, "r_angle": 0.5}, ["torque", "x_hat[2]", "schedule_at"]
+
+    def values(changed):
+        with Instance(fmu) as instance:
+            instance.enter(changed)
+            return np.array(instance.get(*outputs))
+
+    for name, value in point.items():
+        moved = [values({**point, name: value + change}) for change in (1e-6, -1e-6)]
+        with Instance(fmu) as instance:
+            instance.enter(point)
+            instance.get(*outputs)
+            found = instance.directional(outputs, {name: 1.0})
+        assert list(found.values()) == pytest.approx((moved[0] - moved[1]) / 2e-6, rel=1e-5, abs=1e-6), name
 
 
 def constant_error(schedule, value):
