@@ -48,9 +48,9 @@ impl References {
             return Err(track.error("expected at least one measurement"));
         }
         let by_integral = table.get("integral");
-        let integral = by_integral.as_ref().map_or(Ok(true), |entry| entry.flag())?;
+        let integral = by_integral.as_ref().map_or(Ok(true), Entry::flag)?;
         let stated = table.get("feedforward");
-        let feedforward = stated.as_ref().map_or(Ok(!integral), |entry| entry.flag())?;
+        let feedforward = stated.as_ref().map_or(Ok(!integral), Entry::flag)?;
         if let Some(entry) = stated.as_ref().filter(|_| !integral && !feedforward) {
             let message = "`integral` and `feedforward` are false, so that no reference acts on a command; \
                            expected one of them";

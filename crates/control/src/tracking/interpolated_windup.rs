@@ -112,7 +112,7 @@ fn follows(k: &[DMatrix<f64>; 2], l: &[DMatrix<f64>; 2]) -> Result<[DMatrix<f64>
     let rank = if both.amax() > 0.0 { svd.rank(TOLERANCE) } else { 0 };
     let q = svd.left.columns(0, rank);
     let product = |i: usize, j: usize| {
-        if rank <= t { q.transpose() * &k[i] * &l[j] * &q } else { &l[j] * &k[i] }
+        if rank <= t { q.transpose() * &k[i] * &l[j] * q } else { &l[j] * &k[i] }
     };
     let order = rank.min(t);
     let identity = DMatrix::identity(order, order);

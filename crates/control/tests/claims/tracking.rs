@@ -13,7 +13,7 @@ use control::tracking::{
     Action, IntegralAction, InterpolatedWindup, extended_pair, feedforward, integral_feedforward,
     interpolated_windup, reference_system, tracking_rank, windup_gain,
 };
-use control::{Domain, StateSpace, sampled};
+use control::{Domain, Error, StateSpace, sampled};
 use nalgebra::{Complex, DMatrix, DVector};
 
 const PERIOD: f64 = 0.1;
@@ -412,11 +412,11 @@ fn calculations(
     k: [&DMatrix<f64>; 2],
     ranges: &[Option<f64>],
     f: f64,
-) -> ([DMatrix<f64>; 2], InterpolatedWindup) {
-    let l = k
-        .map(|k| windup_gain(k, ranges, -(1.0 - f).ln(), Domain::Sampled { period: 1.0 }).unwrap());
-    let found = interpolated_windup(k, [&l[0], &l[1]], ranges).unwrap();
-    (l, found)
+) -> Result<([DMatrix<f64>; 2], InterpolatedWindup), Error> {
+    let gain = |k| windup_gain(k, ranges, -(1.0 - f).ln(), Domain::Sampled { period: 1.0 });
+    let l = [gain(k[0])?, gain(k[1])?];
+    let found = interpolated_windup(k, [&l[0], &l[1]], ranges)?;
+    Ok((l, found))
 }
 
 /// The largest modulus of the eigenvalues of I - L_w S K_i on the way.
@@ -432,16 +432,15 @@ fn an_interpolated_back_calculation_is_stable_where_the_eigenvalues_are_and_for_
     // 400 random pairs of K_i: 1 to 3 commands with and without limits, 1 or 2 integrals.
     let mut numbers = Numbers(7);
     let mut counts = [0; 3];
-    for _ in 0..400 {
-        let m = 1 + (numbers.next() * 2.999) as usize;
-        let t = 1 + (numbers.next() * 1.999) as usize;
+    for case in 0..400 {
+        let (m, t) = [(1, 1), (2, 1), (2, 2), (3, 1), (3, 2)][case % 5];
         let k_0 = DMatrix::from_fn(m, t, |_, _| numbers.next() - 0.5);
         let change = 1.6 * numbers.next();
         let k_1 = &k_0 + DMatrix::from_fn(m, t, |_, _| change * (numbers.next() - 0.5));
         let ranges: Vec<_> =
             (0..m).map(|_| (numbers.next() < 0.8).then(|| 0.2 + 3.0 * numbers.next())).collect();
         let k = [&k_0, &k_1];
-        let (l, found) = calculations(k, &ranges, 0.05 + 0.9 * numbers.next());
+        let (l, found) = calculations(k, &ranges, 0.05 + 0.9 * numbers.next()).unwrap();
         match found {
             InterpolatedWindup::Stable => {
                 let limited: Vec<_> = (0..m).filter(|&j| ranges[j].is_some()).collect();
@@ -476,15 +475,15 @@ fn commands_in_one_direction_and_commands_without_integral_do_not_hinder_the_pro
     let k_0 = matrix(3, &[1.0, 0.5, 2.0, 1.0, 0.0, 0.0]);
     let k_1 = matrix(3, &[1.2, 0.5, 2.4, 1.0, 0.0, 0.0]);
     let ranges = [Some(1.0), Some(2.0), Some(1.0)];
-    assert_eq!(calculations([&k_0, &k_1], &ranges, 0.3).1, InterpolatedWindup::Stable);
+    assert_eq!(calculations([&k_0, &k_1], &ranges, 0.3).unwrap().1, InterpolatedWindup::Stable);
     // Half of the way K_i is zero, and L_w is not.
-    let (_, found) = calculations([&one(1.0), &one(-1.0)], &[Some(1.0)], 0.3);
+    let (_, found) = calculations([&one(1.0), &one(-1.0)], &[Some(1.0)], 0.3).unwrap();
     assert!(matches!(found, InterpolatedWindup::Undecided { .. }), "{found:?}");
     // K_i changes by a factor of 100: near the middle L_w K_i = f 101^2 / 400 > 2.
-    let (_, found) = calculations([&one(1.0), &one(100.0)], &[Some(1.0)], 0.3);
+    let (_, found) = calculations([&one(1.0), &one(100.0)], &[Some(1.0)], 0.3).unwrap();
     assert!(matches!(found, InterpolatedWindup::Unstable { .. }), "{found:?}");
     let many = DMatrix::from_element(11, 1, 1.0);
-    let (_, found) = calculations([&many, &many], &[Some(1.0); 11], 0.3);
+    let (_, found) = calculations([&many, &many], &[Some(1.0); 11], 0.3).unwrap();
     assert!(matches!(found, InterpolatedWindup::Undecided { limited } if limited.len() == 11));
 }
 
@@ -495,6 +494,6 @@ impl Numbers {
     fn next(&mut self) -> f64 {
         self.0 =
             self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+        u32::try_from(self.0 >> 32).map_or(0.0, f64::from) / f64::from(u32::MAX)
     }
 }
