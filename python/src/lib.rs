@@ -7,6 +7,7 @@ mod configuration;
 mod description;
 mod designed;
 mod error;
+mod live;
 mod logging;
 mod node;
 mod python_slave;
@@ -29,6 +30,8 @@ mod _core {
     use super::description::read_model_description;
     #[pymodule_export]
     use super::designed::{Designed, design_file, design_plant};
+    #[pymodule_export]
+    use super::live::LiveView;
     #[pymodule_export]
     use super::run::{Outcome, Study, clear, open_fmus, set_worker};
     #[pymodule_export]

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use fmu_description::{Causality, Kind, ScalarVariable, Variability};
-use live::{Action, Facts, Phase, Request, Sample, Source, Variable, View};
+use live::{Action, Facts, Phase, Request, Sample, Source, Subject, Variable, View};
 use master::{Port, Probe, Readout, System};
 use study::config::CheckpointSettings;
 use study::{Error, RealTime, Run};
@@ -68,6 +68,7 @@ impl Live {
         let (begin, stop) = (run.simulation.time(), run.plan.stop);
         let system = run.simulation.system();
         let facts = Facts {
+            subject: Subject::Run,
             system: system
                 .slaves
                 .iter()

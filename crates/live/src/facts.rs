@@ -2,9 +2,23 @@
 
 use serde::Serialize;
 
-/// A run, as the page introduces it.
+/// What a page shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Subject {
+    /// A run: a sample is a communication point.
+    #[default]
+    Run,
+    /// A campaign: a sample is a run, its time is the number of finished runs, and a message has the
+    /// status of a run in the place of an FMU.
+    Campaign,
+}
+
+/// A run or a campaign, as the page introduces it.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Facts {
+    /// What the page shows.
+    pub subject: Subject,
     /// The system: the title of the page.
     pub system: String,
     /// Start time in s.

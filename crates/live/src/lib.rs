@@ -20,7 +20,7 @@ mod shared;
 mod store;
 mod view;
 
-pub use facts::{Facts, Source, Variable};
+pub use facts::{Facts, Source, Subject, Variable};
 pub use shared::Phase;
 pub use store::Sample;
 pub use view::{Action, Messages, Request, View};

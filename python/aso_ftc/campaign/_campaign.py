@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
@@ -382,6 +382,7 @@ class Campaign:
         workers: int | None = None,
         scheduler: str | None = None,
         progress: bool = True,
+        live: Callable[[str], None] | None = None,
     ) -> Outcome:
         """Do all runs that the folder does not have yet, and return the results.
 
@@ -392,6 +393,7 @@ class Campaign:
             workers: number of local processes; default: the number of processors.
             scheduler: the address of a Dask scheduler instead of local processes.
             progress: show a line with the progress on a terminal.
+            live: serve a page on this machine that shows the runs while they are done; gets its address.
 
         Raises:
             ConfigurationError: something is wrong that is known before the first run, or the folder has
@@ -400,7 +402,9 @@ class Campaign:
         """
         from ._engine import execute
 
-        return execute(self, Path(folder), workers=workers, scheduler=scheduler, progress=progress)
+        return execute(
+            self, Path(folder), workers=workers, scheduler=scheduler, progress=progress, live=live
+        )
 
     def __repr__(self) -> str:
         return f"Campaign({self.name!r}, {len(self)} runs of {self.system!r})"

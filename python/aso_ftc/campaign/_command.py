@@ -44,6 +44,9 @@ def _parser() -> argparse.ArgumentParser:
         "--scheduler", metavar="ADDRESS", help="address of a Dask scheduler, such as tcp://host:8786"
     )
     parser.add_argument(
+        "--live", action="store_true", help="show the runs on a page on this machine while they are done"
+    )
+    parser.add_argument(
         "--check", action="store_true", help="find what is wrong before the first run, and do not run"
     )
     parser.add_argument(
@@ -85,12 +88,18 @@ def _perform(chosen: argparse.Namespace) -> int:
         campaign.check()
         print(f"{campaign.name}: {len(campaign)} runs")
         return 0
-    outcome = campaign.run(folder, workers=chosen.workers, scheduler=chosen.scheduler)
+    outcome = campaign.run(
+        folder, workers=chosen.workers, scheduler=chosen.scheduler, live=_announce if chosen.live else None
+    )
     page = folder / _REPORT
     outcome.page(page, force=True)
     print(_summary(outcome))
     print(f"report: {shlex.quote(str(page))}")
     return 0 if (outcome.table["status"] == "ok").any() else 1
+
+
+def _announce(address: str) -> None:
+    print(f"live view: {address}", flush=True)
 
 
 def _summary(outcome: Outcome) -> str:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from .._core import LiveView
 from .._errors import ConfigurationError, Error
 from ._analysis import Outcome, load
 from ._campaign import Campaign
@@ -43,7 +44,13 @@ _PAUSE = 0.02
 
 
 def execute(
-    campaign: Campaign, path: Path, *, workers: int | None, scheduler: str | None, progress: bool
+    campaign: Campaign,
+    path: Path,
+    *,
+    workers: int | None,
+    scheduler: str | None,
+    progress: bool,
+    live: Callable[[str], None] | None = None,
 ) -> Outcome:
     """Do the runs of a campaign that its folder lacks; see :meth:`Campaign.run`."""
     campaign.check()
@@ -52,10 +59,49 @@ def execute(
     if not folder.manifest["complete"]:
         work = _Work(campaign, folder, progress)
         if work.open_parts:
-            with _quiet(), _client(workers, scheduler) as client:
+            with _quiet(), _viewed(work, live), _client(workers, scheduler) as client:
                 work.perform(client, scheduler)
         work.close()
     return load(folder.path)
+
+
+class _View:
+    """The page of a campaign, and what it asks for."""
+
+    def __init__(self, work: _Work) -> None:
+        campaign = work.campaign
+        self.names = [*campaign.expressions, *campaign.functions]
+        self.page = LiveView(campaign.name, work.total, work.progress.count, self.names)
+        self.held, self._begin = False, time.monotonic()
+
+    def attend(self) -> None:
+        """Do what the page asks for; to stop is the same as Ctrl-C."""
+        self.held, stopped = self.page.attend(self.held)
+        if stopped:
+            raise KeyboardInterrupt
+
+    def show(self, row: Row, finished: int) -> None:
+        """Publish a run."""
+        values = [float(row.measures.get(name, np.nan)) for name in self.names]
+        shown = ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, values, strict=True))
+        line = f"run {row.run}: {row.status}, {row.reason or shown}"
+        self.page.publish(finished, time.monotonic() - self._begin, values, row.status, line)
+
+
+@contextlib.contextmanager
+def _viewed(work: _Work, live: Callable[[str], None] | None) -> Iterator[None]:
+    """Serve a page while the runs are done; `live` gets its address."""
+    if live is None:
+        yield
+        return
+    work.view = view = _View(work)
+    live(view.page.address)
+    outcome = "The campaign ended early; the same command goes on with it."
+    try:
+        yield
+        outcome = f"All {work.progress.count} runs are done."
+    finally:
+        view.page.end(outcome)
 
 
 @contextlib.contextmanager
@@ -193,10 +239,11 @@ class _Tasks:
         self._futures[future] = numbers
         self._waiting.add(future)
 
-    def next(self) -> tuple[list[int], Any]:
+    def next(self, attend: Callable[[], None]) -> tuple[list[int], Any]:
         """Wait for a task; return its runs and its rows, its exception, or ``None`` if it was lost."""
         while not self._waiting.has_ready():
             self._look()
+            attend()
             time.sleep(_PAUSE)
         future, result = next(self._waiting)
         numbers = self._futures.pop(future)
@@ -225,6 +272,7 @@ class _Work:
         # Rows of parts that are not whole yet, by the first run of the part.
         self.rows: dict[int, dict[int, Row]] = {}
         self.last = self.total
+        self.view: _View | None = None
         self._stopper = _Stopper(campaign) if campaign.stop else None
         self._advance()
 
@@ -250,14 +298,18 @@ class _Work:
             tasks = _Tasks(client, name, self._task)
             left, suspects = iter(self.open_parts), deque[int]()
             while True:
-                while len(tasks) < tasks.wanted() and (first := next(left, self.last)) < self.last:
+                self._attend()
+                if self._is_held() and not tasks:
+                    time.sleep(_PAUSE)
+                    continue
+                while not self._is_held() and len(tasks) < tasks.wanted() and (first := next(left, self.last)) < self.last:
                     tasks.submit(self._numbers(first))
                 # One run of a task may have ended its worker. Each runs alone, so that none is blamed for another.
                 if not tasks and suspects:
                     tasks.submit([suspects.popleft()])
                 if not tasks:
                     break
-                numbers, result = tasks.next()
+                numbers, result = tasks.next(self._attend)
                 if isinstance(result, list):
                     self._accept(result)
                 elif not isinstance(result, distributed.KilledWorker):
@@ -301,6 +353,13 @@ class _Work:
         if self.progress.shown and importlib.util.find_spec("bokeh"):
             print(f"dashboard: {client.dashboard_link}", file=sys.stderr)
 
+    def _attend(self) -> None:
+        if self.view is not None:
+            self.view.attend()
+
+    def _is_held(self) -> bool:
+        return self.view is not None and self.view.held
+
     def _task(self, numbers: Sequence[int]) -> tuple[list[int], dict[str, list[Any]], list[int]]:
         rows = [self.campaign.plan.row(number) for number in numbers]
         names = [parameter.name for parameter in self.campaign.parameters]
@@ -313,11 +372,14 @@ class _Work:
     def _accept(self, rows: Sequence[Row]) -> None:
         first = rows[0].run - rows[0].run % self.size
         part = self.rows.setdefault(first, {})
+        before = len(part)
         for row in rows:
             if row.signals is not None:
                 self.folder.write_signals(row.run, row.signals)
                 row.signals = None
             part[row.run] = row
+            if self.view is not None:
+                self.view.show(row, self.progress.count + len(part) - before)
         self.progress.add(len(rows), sum(row.status != "ok" for row in rows))
         numbers = self._numbers(first)
         if len(part) == len(numbers):

@@ -5,6 +5,7 @@
 mod ahead;
 mod background;
 mod breaks;
+mod changes;
 mod checkpoints;
 mod control;
 mod events;

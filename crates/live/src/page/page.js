@@ -29,6 +29,18 @@
   let phase = "";
   let asked = []; // times of the last questions: wall-clock seconds and simulated time
 
+  const campaign = facts.subject === "campaign";
+  const AXIS = campaign ? "finished runs" : "time in s";
+  if (campaign) {
+    const names = {
+      kind: "Live view of a campaign", "run-title": "Campaign", "time-name": "finished runs", "factor-name": "runs per second, now",
+      "mean-name": "runs per second, mean", "signals-title": "Measures", "messages-title": "Runs",
+      "signals-note": "One point for each run, in the order in which they end. Drag over a plot to zoom, double-click to show all.",
+    };
+    for (const [id, text] of Object.entries(names)) say(id, text);
+    field("progress").setAttribute("aria-label", "Finished runs");
+    for (const id of ["steps-part", "fallbacks-part", "step", "change"]) field(id).hidden = true;
+  }
   document.title = `${facts.system}: live view`;
   say("system", facts.system);
   say("file", facts.file);
@@ -75,16 +87,16 @@
       width: width(),
       height: 220,
       scales: { x: { time: false } },
-      axes: [{ ...axis, label: "time in s", labelSize: 22 }, { ...axis, size: 75, label: unit || undefined }],
+      axes: [{ ...axis, label: AXIS, labelSize: 22 }, { ...axis, size: 75, label: unit || undefined }],
       cursor: { sync: { key: "run" }, drag: { x: true, y: false } },
       series: [
-        { label: "t in s", value: (self, value) => digits(value) },
+        { label: campaign ? "runs" : "t in s", value: (self, value) => digits(value) },
         ...members.map(({ signal }, k) => ({
           label: facts.signals[signal].name,
           stroke: colour(`--ink-${k + 1}`),
           width: 1.5,
-          points: { show: false },
-          paths: facts.signals[signal].kind === "Real" ? uPlot.paths.linear() : uPlot.paths.stepped({ align: 1 }),
+          points: { show: campaign, size: 4, fill: colour(`--ink-${k + 1}`) },
+          paths: campaign ? () => null : facts.signals[signal].kind === "Real" ? uPlot.paths.linear() : uPlot.paths.stepped({ align: 1 }),
           value: (self, value) => digits(value),
         })),
       ],
@@ -136,14 +148,14 @@
     const { time, steps, seconds } = state;
     const length = facts.stop - facts.start;
     field("progress").value = length > 0 ? (time - facts.start) / length : 0;
-    say("time", `${digits(time)} of ${digits(facts.stop)} s`);
+    say("time", campaign ? `${time} of ${facts.stop}` : `${digits(time)} of ${digits(facts.stop)} s`);
     say("steps", String(steps));
     say("mean", seconds > 0 ? ((time - facts.start) / seconds).toPrecision(3) : "–");
     asked.push([seconds, time]);
     asked = asked.slice(-10);
     const [[before, from], [after, to]] = [asked[0], asked.at(-1)];
     say("factor", after > before ? ((to - from) / (after - before)).toPrecision(3) : "–");
-    field("fallbacks-part").hidden = state.fallbacks === null;
+    field("fallbacks-part").hidden = campaign || state.fallbacks === null;
     say("fallbacks", String(state.fallbacks));
     say("late", String(state.late ?? "–"));
     change(state.outcome === null ? state.phase : "ended", state.outcome);
@@ -158,7 +170,8 @@
     if (now === phase) return;
     phase = now;
     document.body.dataset.phase = now;
-    const running = { running: "The run goes on.", paused: "The run is paused.", ended: outcome ?? "The run has ended." };
+    const it = campaign ? "The campaign" : "The run";
+    const running = { running: `${it} goes on.`, paused: `${it} is paused.`, ended: outcome ?? `${it} has ended.` };
     say("status", running[now]);
     say("hold", now === "paused" ? "Go on" : "Pause");
     if (now === "ended") {
@@ -174,14 +187,14 @@
     for (const { fmu, text } of more) {
       const entry = element("li", text);
       entry.dataset.fmu = fmu;
-      list.append(entry);
+      list.prepend(entry); // the newest one is at the top
     }
-    while (list.childElementCount > MESSAGES) list.firstChild.remove();
+    while (list.childElementCount > MESSAGES) list.lastChild.remove();
   }
 
   function lost() {
     if (phase === "ended") return;
-    change("ended", "The run has ended, or the command does not answer any more.");
+    change("ended", "The command has ended, or does not answer any more.");
     field("status").classList.add("failed");
   }
 

@@ -1,0 +1,103 @@
+//! The live view of a campaign.
+
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use live::{Action, Facts, Phase, Sample, Subject, Variable, View};
+use pyo3::prelude::*;
+
+/// Time in which an open page can see the end of the campaign.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// A page on this machine that shows the runs of a campaign.
+#[pyclass(frozen)]
+pub(crate) struct LiveView {
+    /// `None` after the end.
+    view: Mutex<Option<View>>,
+    address: String,
+}
+
+impl LiveView {
+    fn with(&self, act: impl FnOnce(&View)) {
+        if let Some(view) = &*self.view.lock().unwrap_or_else(PoisonError::into_inner) {
+            act(view);
+        }
+    }
+}
+
+#[pymethods]
+impl LiveView {
+    /// Serves the page of the campaign `name` with `total` runs, of which `done` are done already.
+    #[new]
+    fn new(name: String, total: f64, done: f64, measures: Vec<String>) -> PyResult<Self> {
+        let signal = |name| Variable { name, kind: "Real".to_owned(), ..Variable::default() };
+        let facts = Facts {
+            subject: Subject::Campaign,
+            system: name,
+            start: done,
+            stop: total,
+            signals: measures.into_iter().map(signal).collect(),
+            ..Facts::default()
+        };
+        let view = View::open(&facts, Phase::Running)?;
+        let address = view.address().to_owned();
+        Ok(Self { view: Mutex::new(Some(view)), address })
+    }
+
+    /// The address of the page, with its token.
+    #[getter]
+    fn address(&self) -> &str {
+        &self.address
+    }
+
+    /// Publishes a run: its measures, its status with a line on it, the number of finished runs with this
+    /// one, and the time in s so far.
+    fn publish(&self, finished: f64, seconds: f64, measures: Vec<f64>, status: &str, line: String) {
+        self.with(|view| {
+            let values = measures;
+            view.publish(Sample { time: finished, seconds, values, ..Sample::default() });
+            view.messages().send(status, line);
+        });
+    }
+
+    /// Answers the requests of the page. Returns whether the campaign is to be held, which it is now if
+    /// `held`, and whether it is to be stopped.
+    fn attend(&self, mut held: bool) -> (bool, bool) {
+        let mut stopped = false;
+        self.with(|view| {
+            if !view.is_called() {
+                return;
+            }
+            let _ = view.take_calls();
+            while let Some(request) = view.request(None) {
+                let answer = match &request.action {
+                    Action::Pause => Ok("No further run starts."),
+                    Action::Continue => Ok("The campaign goes on."),
+                    Action::Stop => {
+                        Ok("The campaign is stopped; the same command goes on with it.")
+                    }
+                    Action::Step | Action::Intervene(_) => {
+                        Err("a campaign can be paused and stopped only")
+                    }
+                };
+                match &request.action {
+                    Action::Pause => held = true,
+                    Action::Continue => held = false,
+                    Action::Stop => stopped = true,
+                    Action::Step | Action::Intervene(_) => {}
+                }
+                view.set_phase(if held { Phase::Paused } else { Phase::Running });
+                request.answer(answer.map(str::to_owned).map_err(str::to_owned));
+            }
+        });
+        (held, stopped)
+    }
+
+    /// Tells the page how the campaign ended, and closes it.
+    fn end(&self, py: Python<'_>, outcome: &str) {
+        let view = self.view.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(view) = view {
+            py.detach(|| view.end(outcome, PATIENCE));
+        }
+    }
+}
