@@ -125,7 +125,6 @@ ALGORITHMS = {
     "linear": ["--extrapolation", "linear", "--method", "jacobi"],
     "limited": ["--extrapolation", "limited"],
     "newton": ["--coupling", "newton"],
-    "doubling": ["--step-control", "doubling"],
     "multirate": ["--every", "controller=7"],
     "isolated": ["--isolate"],
     "parquet": ["--format", "parquet"],
