@@ -36,8 +36,10 @@ mod plant;
 pub use gains::{Estimator, Gains};
 pub use plant::FaultyPlant;
 
-use crate::placement::{Placement, Quality, place, place_balanced};
-use crate::{Error, check};
+use crate::controller::controller;
+use crate::placement::{Alternatives, Placement, Quality, alternatives, alternatives_balanced};
+use crate::robustness::{Loop, least_sensitive};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
 
 /// A designed controller and the quality of the design.
@@ -58,18 +60,7 @@ pub struct AsoDesign {
 
 /// A function of [`crate::placement`] that assigns eigenvalues.
 pub(crate) type Place =
-    fn(&DMatrix<f64>, &DMatrix<f64>, &[Complex<f64>]) -> Result<Placement, Error>;
-
-/// Computes the observer gain L, (n + q) x p, such that `A_0` - L `C_0` has the eigenvalues
-/// `poles`.
-pub(crate) fn place_observer(
-    (a_0, c_0): (&DMatrix<f64>, &DMatrix<f64>),
-    poles: &[Complex<f64>],
-    place: Place,
-) -> Result<(DMatrix<f64>, Quality), Error> {
-    let placed = place(&a_0.transpose(), &c_0.transpose(), poles)?;
-    Ok((-placed.gain.transpose(), placed.quality))
-}
+    fn(&DMatrix<f64>, &DMatrix<f64>, &[Complex<f64>]) -> Result<Alternatives, Error>;
 
 /// Computes `K_x` for the first `states` states, on which the other states do not act; the columns
 /// of the other states are zero.
@@ -77,11 +68,42 @@ pub(crate) fn place_controller(
     (plant, states): (&FaultyPlant, usize),
     poles: &[Complex<f64>],
     place: Place,
-) -> Result<Placement, Error> {
+) -> Result<Alternatives, Error> {
     let a = plant.a.view((0, 0), (states, states)).into();
-    let mut placed = place(&a, &plant.b.rows(0, states).into(), poles)?;
-    placed.gain = placed.gain.resize_horizontally(plant.a.ncols(), 0.0);
-    Ok(placed)
+    let placed = place(&a, &plant.b.rows(0, states).into(), poles)?;
+    Ok(placed.map(|gain| gain.clone().resize_horizontally(plant.a.ncols(), 0.0)))
+}
+
+/// The pair of a feedback and an observer whose loop [`least_sensitive`] prefers, and its gains.
+///
+/// `feedbacks`: `K_x`; `observers`: L; `given`: gains whose `K_x`, `L_x` and `L_f` are replaced.
+pub(crate) fn best_pair(
+    plant: &FaultyPlant,
+    (feedbacks, observers): (&Alternatives, &Alternatives),
+    given: &Gains,
+    domain: Domain,
+) -> Result<(Gains, [Quality; 2]), Error> {
+    let (n, q) = plant.f_a.shape();
+    let with = |k: &Placement, l: &Placement| Gains {
+        k_x: k.gain.clone(),
+        l_x: l.gain.rows(0, n).into(),
+        l_f: -l.gain.rows(n, q),
+        ..given.clone()
+    };
+    let mut pairs: Vec<_> = feedbacks.pairs(observers).collect();
+    let best = if pairs.len() > 1 {
+        let d = DMatrix::zeros(plant.c.nrows(), plant.b.ncols());
+        let FaultyPlant { a, b, c, .. } = plant.clone();
+        let system = StateSpace { a, b, c, d, domain };
+        let own = |(k, l): &(&Placement, &Placement)| {
+            Loop::new(system.clone(), controller(plant, &with(k, l), domain)?)
+        };
+        least_sensitive(&pairs.iter().map(own).collect::<Result<Vec<_>, _>>()?)?
+    } else {
+        0
+    };
+    let (k, l) = pairs.swap_remove(best);
+    Ok((with(k, l), [k.quality, l.quality]))
 }
 
 /// Designs the controller: assigns the eigenvalues of A + B `K_x` and of `A_0` - L `C_0`.
@@ -89,7 +111,9 @@ pub(crate) fn place_controller(
 /// `controller_poles`: n, `observer_poles`: n + q, in the unit of A, of negative real part for a
 /// stable loop; `k_f`: m x q, or None for [`FaultyPlant::compensation_gain`]. The design exists
 /// when (A, B) is controllable and [`FaultyPlant::check_observer_exists`] succeeds. Method, cost
-/// and tolerance: [`place`] for (A, B), [`place_balanced`] for (`A_0`', `C_0`').
+/// and tolerance: [`alternatives`] for (A, B), [`alternatives_balanced`] for (`A_0`', `C_0`'). Of
+/// their results the pair is chosen whose loop with `plant` has the lowest peaks of S, see
+/// [`least_sensitive`]: at most 22 x 22 loops, 3 x 3 above 24 states.
 ///
 /// # Example
 ///
@@ -116,7 +140,7 @@ pub(crate) fn place_controller(
 ///
 /// # Errors
 ///
-/// Same as [`place`] and [`FaultyPlant::check_observer_exists`]; [`Error::Shape`],
+/// Same as [`alternatives`] and [`FaultyPlant::check_observer_exists`]; [`Error::Shape`],
 /// [`Error::NotFinite`] for a bad `k_f`.
 pub fn design(
     plant: &FaultyPlant,
@@ -143,23 +167,23 @@ pub(crate) fn design_feedback(
     };
     let ((n, q), m) = (plant.f_a.shape(), plant.b.ncols());
     check::shape("K_f", &k_f, (m, q))?;
-    let controller = place_controller((plant, states), controller_poles, place)?;
+    let feedbacks = place_controller((plant, states), controller_poles, alternatives)?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-    let (l, observer) = place_observer((&a_0, &c_0), observer_poles, place_balanced)?;
-    Ok(AsoDesign {
-        cancellation_residual: cancellation_residual(plant, states, &k_f),
-        gains: Gains {
-            estimator: Estimator::Prediction,
-            k_x: controller.gain,
-            k_f,
-            l_x: l.rows(0, n).into(),
-            l_f: -l.rows(n, q),
-            p_f: None,
-            integral: None,
-        },
-        controller: controller.quality,
-        observer,
-    })
+    let observers = alternatives_balanced(&a_0.transpose(), &c_0.transpose(), observer_poles)?;
+    let observers = observers.map(|gain| -gain.transpose());
+    let residual = cancellation_residual(plant, states, &k_f);
+    let given = Gains {
+        estimator: Estimator::Prediction,
+        k_x: DMatrix::zeros(m, n),
+        k_f,
+        l_x: DMatrix::zeros(n, plant.c.nrows()),
+        l_f: DMatrix::zeros(q, plant.c.nrows()),
+        p_f: None,
+        integral: None,
+    };
+    let pairs = (&feedbacks, &observers);
+    let (gains, [controller, observer]) = best_pair(plant, pairs, &given, Domain::Continuous)?;
+    Ok(AsoDesign { gains, cancellation_residual: residual, controller, observer })
 }
 
 /// Norm of B `K_f` + `F_a` relative to the norm of `F_a`, in the rows of the plant; zero if no

@@ -158,6 +158,8 @@ impl ExtendedPlant {
 
     /// Designs the controller as [`crate::aso::design`] does.
     ///
+    /// A measurement filter belongs to the plant of the loop whose peaks of S are compared.
+    ///
     /// `controller_poles`: one per state of the plant itself, the filter's states are not fed back;
     /// `observer_poles`: one per state of the extended plant and per entry of `f_hat`; `k_f`: m x
     /// q, or None for [`FaultyPlant::compensation_gain`], whose columns for sensor faults and for

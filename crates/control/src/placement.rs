@@ -1,5 +1,6 @@
 //! Pole placement: state feedback that assigns the eigenvalues of A + B K.
 
+mod alternatives;
 mod compromise;
 mod deflation;
 mod descent;
@@ -9,12 +10,15 @@ mod pole_block;
 mod pole_error;
 mod subspace;
 
+pub use alternatives::{Alternatives, alternatives, alternatives_balanced, alternatives_discrete};
+
 use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns};
 use crate::rank::require_controllable;
 use crate::svd::Svd;
 use crate::{Error, check};
-use compromise::compromise;
-use eigenvectors::{Directions, best_conditioned, condition, widest_directions};
+use alternatives::most_alternatives;
+use compromise::Search;
+use eigenvectors::{Directions, best_conditioned, condition, more_directions, widest_directions};
 use figures::FeedbackLoop;
 use nalgebra::{Complex, DMatrix, DVector};
 use pole_block::pole_blocks;
@@ -79,6 +83,8 @@ pub fn real_poles(poles: &[f64]) -> Vec<Complex<f64>> {
 /// 3. Otherwise descents minimise the largest of the three figures, each relative to its reference.
 ///
 /// On the systems of the tests each figure is at most 10 % above the better of scipy's two methods.
+/// Which eigenvectors are best in a loop with an observer depends on both: [`alternatives`] has more
+/// to choose from.
 /// With dependent inputs K has the least norm, in units of the inputs for which the columns of B
 /// have length one. The result is deterministic.
 ///
@@ -188,13 +194,31 @@ pub(crate) enum Coordinates<'a> {
 }
 
 /// Assigns the eigenvalues, see [`place`].
-pub(crate) fn place_in(
+fn place_in(
     coordinates: &Coordinates<'_>,
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
     tolerance: &PoleTolerance,
 ) -> Result<Placement, Error> {
+    Ok(alternatives_in(coordinates, (a, b), poles, tolerance, Wanted::One)?.chosen)
+}
+
+/// Whether alternatives are wanted.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Wanted {
+    One,
+    Alternatives,
+}
+
+/// [`place_in`], with alternatives.
+pub(crate) fn alternatives_in(
+    coordinates: &Coordinates<'_>,
+    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    poles: &[Complex<f64>],
+    tolerance: &PoleTolerance,
+    wanted: Wanted,
+) -> Result<Alternatives, Error> {
     let n = check::square("A", a)?;
     check::shape("B", b, (n, b.ncols()))?;
     check_poles(poles, n)?;
@@ -208,35 +232,51 @@ pub(crate) fn place_in(
         let starts = widest_directions(&assignable.problem)?;
         Assignment::new(assignable, &starts)
     };
-    let balance = |assignment: &Assignment| Balance::new(&(a + b * &assignment.gain)).scale;
-    let mut scale = balance(&best);
+    let balance = |gain: &DMatrix<f64>| Balance::new(&(a + b * gain)).scale;
+    let mut scale = balance(&best.gain);
     let other = match coordinates {
         Coordinates::Given => None,
         Coordinates::Balanced => Some(scaled(&scale)?),
         Coordinates::Scaled(units) => Some(scaled(units)?),
     };
     if let (Coordinates::Scaled(_), Some(other)) = (coordinates, &other) {
-        scale = balance(other);
+        scale = balance(&other.gain);
     }
     let Assignable { problem, basis, .. } = &best.assignable;
-    let mut chosen = None;
+    let (mut choice, mut others) = (None, vec![]);
     if problem.inputs() > 1 {
         let feedback = FeedbackLoop::new(problem, basis, b, tolerance.sampled);
-        let other = other.iter().map(|other| problem.directions_of(&other.eigenvectors(&ones)));
+        let other = other.iter().map(|other| {
+            problem.directions_of(&other.assignable.eigenvectors(&other.directions, &ones))
+        });
         let candidates: Vec<_> = other.chain([best.directions.clone()]).collect();
-        chosen = compromise(&feedback, &candidates, &starts)?;
+        let mut search = Search::new(&feedback);
+        choice = search.choose(&candidates, &starts)?;
+        if let (Some(chosen), Wanted::Alternatives) =
+            (choice.as_ref().or(candidates.first()), wanted)
+        {
+            others = search.others(chosen, &more_directions(problem)?)?;
+        }
     }
-    let chosen = match (chosen, other) {
-        (Some(directions), _) => Assignment::with(best.assignable, directions)?,
-        (None, Some(other)) => other,
-        (None, None) => best,
+    let placement = |assignable: &Assignable, directions: &[DVector<f64>], gain| {
+        let quality = Quality {
+            condition: condition(&assignable.eigenvectors(directions, &ones))?,
+            balanced_condition: condition(&assignable.eigenvectors(directions, &scale))?,
+            pole_error: tolerance.pole_error(a, b, &gain, poles)?,
+        };
+        Ok::<_, Error>(Placement { gain, quality })
     };
-    let quality = Quality {
-        condition: condition(&chosen.eigenvectors(&ones))?,
-        balanced_condition: condition(&chosen.eigenvectors(&scale))?,
-        pole_error: tolerance.pole_error(a, b, &chosen.gain, poles)?,
+    let Assignment { assignable, directions, gain } = best;
+    let chosen = match (choice, other) {
+        (Some(best), _) => placement(&assignable, &best, assignable.gain(&best)?)?,
+        (None, Some(other)) => placement(&other.assignable, &other.directions, other.gain)?,
+        (None, None) => placement(&assignable, &directions, gain)?,
     };
-    Ok(Placement { gain: chosen.gain, quality })
+    // Alternatives that rounding spoils are none.
+    let others = others.iter().take(most_alternatives(n)).filter_map(|directions| {
+        placement(&assignable, directions, assignable.gain(directions).ok()?).ok()
+    });
+    Ok(Alternatives { others: others.collect(), chosen })
 }
 
 /// The eigenvectors that can be assigned, in given coordinates.
@@ -265,6 +305,17 @@ impl Assignable {
         let problem = AssignableSubspaces::new(&a, &b, &pole_blocks(poles, basis.ncols())?)?;
         Ok(Self { a, b, basis, problem, units: units.clone() })
     }
+
+    /// K.
+    fn gain(&self, directions: &[DVector<f64>]) -> Result<DMatrix<f64>, Error> {
+        let gain = &self.basis * deflation::gain(&self.a, &self.b, &self.problem, directions)?;
+        check::in_range("K", divide_columns(&gain, &self.units))
+    }
+
+    /// The eigenvectors of length one in the coordinates `scale`.
+    fn eigenvectors(&self, directions: &[DVector<f64>], scale: &DVector<f64>) -> DMatrix<f64> {
+        self.problem.unit_eigenvectors(directions, &scale.component_div(&self.units))
+    }
 }
 
 /// Chosen eigenvectors and their gain.
@@ -278,20 +329,8 @@ impl Assignment {
     /// Eigenvectors of least condition number.
     fn new(assignable: Assignable, starts: &[Directions]) -> Result<Self, Error> {
         let directions = best_conditioned(&assignable.problem, starts)?;
-        Self::with(assignable, directions)
-    }
-
-    fn with(assignable: Assignable, directions: Directions) -> Result<Self, Error> {
-        let Assignable { a, b, basis, problem, units } = &assignable;
-        let gain = basis * deflation::gain(a, b, problem, &directions)?;
-        let gain = check::in_range("K", divide_columns(&gain, units))?;
+        let gain = assignable.gain(&directions)?;
         Ok(Self { assignable, directions, gain })
-    }
-
-    /// The eigenvectors of length one in the coordinates `scale`.
-    fn eigenvectors(&self, scale: &DVector<f64>) -> DMatrix<f64> {
-        let units = scale.component_div(&self.assignable.units);
-        self.assignable.problem.unit_eigenvectors(&self.directions, &units)
     }
 }
 

@@ -20,6 +20,7 @@
 //! | gains for comparison | [`regulator_of_same_speed`] |
 
 mod channel;
+mod choice;
 mod crossing;
 mod delay;
 mod disk;
@@ -35,6 +36,7 @@ mod tolerance;
 mod worst_case;
 
 pub use channel::{ChannelMargins, channel_margins};
+pub use choice::least_sensitive;
 pub use delay::{delay_margin, sampled_delay_margin};
 pub use disk::{DiskMargin, disk_margin, scaled_peak};
 pub use entries::{PeakDerivatives, peak_derivatives};

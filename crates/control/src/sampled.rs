@@ -4,13 +4,15 @@
 //! model. All gains are designed for the sampled plant, so that the loop is stable at every sample
 //! time at which the sampled plant is controllable and observable.
 
-use crate::aso::{Estimator, FaultyPlant, Gains, place_controller};
+use crate::aso::{Estimator, FaultyPlant, Gains, best_pair, place_controller};
 use crate::balance::power_of_two;
 use crate::blocks::{block_2x2, stacked};
 use crate::controller::{closed_loop, controller};
 use crate::faults::ExtendedPlant;
 use crate::hold::FirstOrderHold;
-use crate::placement::{Coordinates, DISCRETE, Quality, place_discrete, place_in};
+use crate::placement::{
+    Alternatives, Coordinates, DISCRETE, Quality, Wanted, alternatives_discrete, alternatives_in,
+};
 use crate::stability::instability;
 use crate::{Domain, Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -166,7 +168,9 @@ fn filter_gain(rate: f64, period: f64) -> f64 {
 /// the modelled fault over the interval, so that the held u cancels a ramp on average. The design
 /// exists when the sampled plant is controllable and its augmented pair observable, for the current
 /// estimator with the output `C_0` `A_0`: `A_0` must not be singular, which very fast filters make
-/// it. Method, cost and tolerance: see [`crate::placement::place`].
+/// it. Method, cost and tolerance: see [`crate::placement::place`]. Of the
+/// [`crate::placement::alternatives`] the pair of feedback and observer is chosen as in
+/// [`crate::aso::design`].
 ///
 /// The estimator is placed in the coordinates of [`place_estimator`], so that the condition number
 /// depends neither on the sample time nor on units.
@@ -207,13 +211,23 @@ pub fn design(
     };
     let ((n, q), m) = (plant.f_a.shape(), plant.b.ncols());
     check::shape("K_f", &k_f, (m, q))?;
-    let feedback = place_controller((&plant, extended.states), controller_poles, place_discrete)?;
+    let states = (&plant, extended.states);
+    let feedbacks = place_controller(states, controller_poles, alternatives_discrete)?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let seen = estimator.output_matrix(&a_0, &c_0);
-    let (l, observer) = place_estimator(&a_0, &seen, observer_poles)?;
-    let (l_x, l_f) = (l.rows(0, n).into(), -l.rows(n, q));
-    let gains = Gains { estimator, k_x: feedback.gain, k_f, l_x, l_f, p_f: None, integral: None };
+    let observers = estimator_alternatives(&a_0, &seen, observer_poles)?;
+    let given = Gains {
+        estimator,
+        k_x: DMatrix::zeros(m, n),
+        k_f,
+        l_x: DMatrix::zeros(n, plant.c.nrows()),
+        l_f: DMatrix::zeros(q, plant.c.nrows()),
+        p_f: None,
+        integral: None,
+    };
     let domain = Domain::Sampled { period };
+    let (gains, [feedback, observer]) =
+        best_pair(&plant, (&feedbacks, &observers), &given, domain)?;
     let controller_system = controller(&plant, &gains, domain)?;
     let dynamics = closed_loop(&plant, &controller_system, &vec![1.0; m])?;
     let radius = 1.0 + instability(&dynamics, domain)?;
@@ -227,7 +241,7 @@ pub fn design(
         plant,
         filter: filter(extended, domain),
         gains,
-        controller: feedback.quality,
+        controller: feedback,
         observer,
         radius,
     })
@@ -248,6 +262,35 @@ pub fn place_estimator(
     output: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<(DMatrix<f64>, Quality), Error> {
+    let (scale, a, b) = dual(a_0, output)?;
+    let placed =
+        alternatives_in(&Coordinates::Scaled(&scale), (&a, &b), poles, &DISCRETE, Wanted::One)?
+            .chosen;
+    Ok((-placed.gain.transpose(), placed.quality))
+}
+
+/// Computes the gain of [`place_estimator`] and alternatives to it, see
+/// [`crate::placement::alternatives`]; the gains are L.
+///
+/// # Errors
+///
+/// Same as [`place_estimator`].
+pub fn estimator_alternatives(
+    a_0: &DMatrix<f64>,
+    output: &DMatrix<f64>,
+    poles: &[Complex<f64>],
+) -> Result<Alternatives, Error> {
+    let (scale, a, b) = dual(a_0, output)?;
+    let coordinates = Coordinates::Scaled(&scale);
+    let found = alternatives_in(&coordinates, (&a, &b), poles, &DISCRETE, Wanted::Alternatives)?;
+    Ok(found.map(|gain| -gain.transpose()))
+}
+
+/// The units of [`place_estimator`], and the dual pair (`a_0`', `output`').
+fn dual(
+    a_0: &DMatrix<f64>,
+    output: &DMatrix<f64>,
+) -> Result<(DVector<f64>, DMatrix<f64>, DMatrix<f64>), Error> {
     let n = check::square("A_0", a_0)?;
     check::shape("C_0", output, (output.nrows(), n))?;
     let mut shown = output.clone();
@@ -260,10 +303,7 @@ pub fn place_estimator(
         let unit = power_of_two(1.0 / energy.sqrt());
         if unit.is_normal() { unit } else { 1.0 }
     });
-    let units = scale.map(|unit| 1.0 / unit);
-    let (a, b) = (a_0.transpose(), output.transpose());
-    let placed = place_in(&Coordinates::Scaled(&units), &a, &b, poles, &DISCRETE)?;
-    Ok((-placed.gain.transpose(), placed.quality))
+    Ok((scale.map(|unit| 1.0 / unit), a_0.transpose(), output.transpose()))
 }
 
 /// The coefficients of the measurement filter in `domain`: the rates w, in sampled time the gains 1

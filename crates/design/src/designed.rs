@@ -7,6 +7,7 @@ use super::gains::{FeedbackProblem, GainResult, Refusal, feedback, observer};
 use super::law::{DesignedLaw, LawProblem};
 use super::linear_plant::LinearPlant;
 use super::norm_gains::ObserverProblem;
+use super::pairing::PairProblem;
 use super::plant_file::PlantFile;
 use super::plausibility::{check_faults, check_limits};
 use super::requirements::{Request, Requirement};
@@ -108,17 +109,27 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
     };
     let (common, certificate) = common.unzip();
     let problem = (&plant, &pair, common);
-    let (feedback, observer) = compute_gains((file, &linear), &extended, problem, domain)?;
+    let found = compute_gains((file, &linear), &extended, problem, domain)?;
     let n = plant.a.nrows();
-    let gains = Gains {
+    let k_f = sampled::compensation_gain(&extended, domain)?;
+    let with = |feedback: &DMatrix<f64>, observer: &DMatrix<f64>| Gains {
         estimator: estimator(file),
-        k_x: feedback.gain.columns(0, states).into_owned().resize_horizontally(n, 0.0),
-        k_f: sampled::compensation_gain(&extended, domain)?,
-        l_x: observer.gain.rows(0, n).into(),
-        l_f: -observer.gain.rows(n, plant.f_a.ncols()),
+        k_x: feedback.columns(0, states).into_owned().resize_horizontally(n, 0.0),
+        k_f: k_f.clone(),
+        l_x: observer.rows(0, n).into(),
+        l_f: -observer.rows(n, plant.f_a.ncols()),
         p_f: None,
-        integral: integral_action(references, (&linear, &extended), &feedback.gain),
+        integral: integral_action(references, (&linear, &extended), feedback),
     };
+    let filter = sampled::filter(&extended, domain);
+    // The gains of a schedule are interpolated, so that each point takes the first of its pairs.
+    let (feedback, observer) = if file.is_scheduled() {
+        found
+    } else {
+        let filter = filter.as_deref();
+        PairProblem { linear: &linear, plant: &plant, filter, domain }.chosen(found, &with)?
+    };
+    let gains = with(&feedback.gain, &observer.gain);
     let problem =
         LawProblem { linear: &linear, extended: &extended, plant: &plant, gains: &gains, domain };
     let law = problem.design(law).map_err(|reason| not_existing(file, law, &reason, &problem))?;
@@ -126,7 +137,6 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
     let required_error_dynamics = gains.error_dynamics(&plant);
     let (gains, own_model) = (law.gains.clone(), law.a_f.clone());
     plant.a_f = own_model.unwrap_or(plant.a_f);
-    let filter = sampled::filter(&extended, domain);
     let whole = DesignLoop::of((&linear, &plant), &gains, filter.as_deref(), domain)?;
     let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
     let controlled = &pair.0 + &pair.1 * &feedback.gain;
@@ -189,6 +199,7 @@ fn by_law(law: &DesignedLaw) -> GainResult {
         required: Vec::new(),
         quality: None,
         norm: None,
+        others: Vec::new(),
     }
 }
 

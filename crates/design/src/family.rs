@@ -107,8 +107,14 @@ pub(crate) fn common_feedback(
                 plants.len(),
                 certificate.margin
             );
-            let found =
-                GainResult { gain, method, required: Vec::new(), quality: None, norm: None };
+            let found = GainResult {
+                gain,
+                method,
+                required: Vec::new(),
+                quality: None,
+                norm: None,
+                others: Vec::new(),
+            };
             Ok((found, certificate))
         }
         Outcome::Infeasible { conflict } => {

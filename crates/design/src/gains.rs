@@ -2,10 +2,12 @@
 
 use control::aso::Estimator;
 use control::lmi::{self, Outcome, Synthesis};
-use control::placement::{Placement, Quality, place, place_balanced, place_discrete};
+use control::placement::{
+    Alternatives, Placement, Quality, alternatives, alternatives_balanced, alternatives_discrete,
+};
 use control::rank::{ControllablePart, Mode, controllable_part, uncontrollable_modes};
 use control::riccati::{Weights, kalman, lqr};
-use control::sampled::{place_estimator, sampled_poles};
+use control::sampled::{estimator_alternatives, sampled_poles};
 use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
@@ -18,6 +20,7 @@ const IN_REGION: &str = "Eigenvalues in the region by linear matrix inequalities
 const SAME: f64 = 1e-4;
 
 /// A gain and the method that found it.
+#[derive(Clone)]
 pub(crate) struct GainResult {
     pub(crate) gain: DMatrix<f64>,
     /// The method, in a sentence.
@@ -28,6 +31,8 @@ pub(crate) struct GainResult {
     pub(crate) quality: Option<Quality>,
     /// The H-infinity norm, of a design by it.
     pub(crate) norm: Option<NormReport>,
+    /// Other results of an eigenvalue assignment.
+    pub(crate) others: Vec<Self>,
 }
 
 /// Why no gain was found.
@@ -68,12 +73,12 @@ pub(crate) fn feedback(
             let part = controllable_part(a, b)?;
             let Assignment { required, movable } = movable(required, &part.fixed, domain)?;
             let sampled = domain != Domain::Continuous;
-            let assign = if sampled { place_discrete } else { place };
+            let assign = if sampled { alternatives_discrete } else { alternatives };
             if part.fixed.is_empty() {
-                return Ok(assigned(assign(a, b, &movable)?, required));
+                return Ok(assigned(&assign(a, b, &movable)?, &required));
             }
-            let gain = part.gain(&assign(&part.a, &part.b, &movable)?.gain);
-            Ok(partly_assigned(gain, required, &part))
+            let found = assign(&part.a, &part.b, &movable)?.map(|gain| part.gain(gain));
+            Ok(partly_assigned(&found, &required, &part))
         }
         Requirement::Weights { states, channels } => {
             let weights = Weights { q: states.clone(), r: channels.clone(), n: None };
@@ -118,21 +123,19 @@ pub(crate) fn observer(
                 [] => (&a_dual, &b_dual),
                 _ => (&part.a, &part.b),
             };
-            let placed = match domain {
+            let found = match domain {
                 Domain::Continuous => {
-                    let placed = place_balanced(a_1, b_1, &movable)?;
-                    Placement { gain: -placed.gain.transpose(), ..placed }
+                    alternatives_balanced(a_1, b_1, &movable)?.map(|gain| -gain.transpose())
                 }
                 Domain::Sampled { .. } => {
-                    let found = place_estimator(&a_1.transpose(), &b_1.transpose(), &movable)?;
-                    Placement { gain: found.0, quality: found.1 }
+                    estimator_alternatives(&a_1.transpose(), &b_1.transpose(), &movable)?
                 }
             };
             if part.fixed.is_empty() {
-                return Ok(assigned(placed, required));
+                return Ok(assigned(&found, &required));
             }
-            let gain = part.gain(&placed.gain.transpose()).transpose();
-            Ok(partly_assigned(gain, required, &part))
+            let found = found.map(|gain| part.gain(&gain.transpose()).transpose());
+            Ok(partly_assigned(&found, &required, &part))
         }
         Requirement::Weights { states, channels } => {
             let found = kalman(a_0, c_0, states, channels, domain)?;
@@ -196,14 +199,23 @@ fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Ass
     Ok(Assignment { required: movable.iter().copied().chain(taken).collect(), movable })
 }
 
-fn assigned(found: Placement, required: Vec<Complex<f64>>) -> GainResult {
-    let method = "Eigenvalues assigned, with well-conditioned eigenvectors.".to_owned();
-    GainResult { gain: found.gain, method, required, quality: Some(found.quality), norm: None }
+fn assigned(found: &Alternatives, required: &[Complex<f64>]) -> GainResult {
+    let method = "Eigenvalues assigned, with well-conditioned eigenvectors.";
+    let result = |placement: &Placement| GainResult {
+        gain: placement.gain.clone(),
+        method: method.to_owned(),
+        required: required.to_vec(),
+        quality: Some(placement.quality),
+        norm: None,
+        others: Vec::new(),
+    };
+    GainResult { others: found.others.iter().map(result).collect(), ..result(&found.chosen) }
 }
 
+/// The quality is that of the movable part, so that it is not stated.
 fn partly_assigned(
-    gain: DMatrix<f64>,
-    required: Vec<Complex<f64>>,
+    found: &Alternatives,
+    required: &[Complex<f64>],
     part: &ControllablePart,
 ) -> GainResult {
     let (movable, all) = (part.a.nrows(), part.coordinates.ncols());
@@ -211,12 +223,15 @@ fn partly_assigned(
         "{movable} of {all} eigenvalues assigned, with well-conditioned eigenvectors; no gain moves \
          the others."
     );
-    GainResult { gain, method, required, quality: None, norm: None }
+    let named = |own: GainResult| GainResult { method: method.clone(), quality: None, ..own };
+    let mut result = named(assigned(found, required));
+    result.others = result.others.into_iter().map(named).collect();
+    result
 }
 
 fn weighted(gain: DMatrix<f64>, method: &str, residual: f64) -> GainResult {
     let method = format!("{method}; relative residual of the Riccati equation {residual:.1e}.");
-    GainResult { gain, method, required: Vec::new(), quality: None, norm: None }
+    GainResult { gain, method, required: Vec::new(), quality: None, norm: None, others: Vec::new() }
 }
 
 pub(crate) fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<GainResult, Refusal> {
@@ -234,6 +249,7 @@ pub(crate) fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<Gai
                 required: Vec::new(),
                 quality: None,
                 norm: None,
+                others: Vec::new(),
             })
         }
         Outcome::Infeasible { conflict } => Err(Refusal::Conflict(contradiction(&conflict))),
@@ -263,6 +279,12 @@ impl GainResult {
     /// The result with another gain.
     fn mapped(self, map: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
         Self { gain: map(&self.gain), ..self }
+    }
+
+    /// The result, then the others.
+    pub(crate) fn with_others(mut self) -> Vec<Self> {
+        let others = std::mem::take(&mut self.others);
+        std::iter::once(self).chain(others).collect()
     }
 }
 

@@ -32,6 +32,7 @@ pub mod losses;
 mod matrix;
 mod norm_gains;
 mod page;
+mod pairing;
 mod parameters;
 mod plant_file;
 mod plausibility;

@@ -52,6 +52,8 @@ pub(crate) struct PlantFile<'a> {
     /// Plants that the same gains serve, besides the one of the file.
     pub(crate) family: Vec<Variant>,
     pub(crate) schedule: Option<Schedule>,
+    /// Whether the plant is a point of the schedule of another file.
+    pub(crate) is_point: bool,
     pub(crate) disturbances: Vec<Disturbance>,
     pub(crate) detection: Option<DetectionRequest>,
     /// What the controller must be able to do without an actuator.
@@ -202,6 +204,7 @@ impl<'a> PlantFile<'a> {
             robustness: RobustnessLimits::read(file, measurements.len())?,
             family: variants::family(file, &model)?,
             schedule: variants::schedule(file, &model, &measurements)?,
+            is_point: false,
             disturbances: disturbances(file, &actuators, &measurements)?,
             detection: DetectionRequest::read(file, (&actuators, measurements.len()), &faults)?,
             reconfiguration: ReconfigurationRequest::read(

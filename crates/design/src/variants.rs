@@ -62,9 +62,15 @@ impl Schedule {
 }
 
 impl PlantFile<'_> {
+    /// Whether the gains are interpolated with those of other points.
+    pub(crate) fn is_scheduled(&self) -> bool {
+        self.schedule.is_some() || self.is_point
+    }
+
     /// The file with another plant, without family and schedule.
     pub(crate) fn with(&self, variant: &Variant) -> Self {
         let mut own = self.clone();
+        own.is_point = self.schedule.is_some();
         (own.family, own.schedule) = (Vec::new(), None);
         own.model = variant.model.clone();
         let [u_op, y_op] = &variant.operating;

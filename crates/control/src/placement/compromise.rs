@@ -19,75 +19,112 @@ const PENALTY: f64 = 10.0;
 /// Relative decrease at which a descent ends.
 const TOLERANCE: f64 = 1e-3;
 
+/// The factor by which condition number and gain of an alternative may exceed the least ones of
+/// largest volume.
+const ALTERNATIVE: f64 = 1.09;
+/// Relative difference below which all figures of the same directions agree.
+const SAME: f64 = 1e-4;
 /// Number of descents of the peak of S.
 const DESCENTS: usize = 5;
 
 type Figures = [f64; COUNT];
 
-/// Chooses directions by three figures: condition number, gain norm, peak of S.
-///
-/// `candidates`: those of least condition number, in the coordinates asked for and in those of A;
-/// `widest`: those of largest volume, which the methods of Kautsky, Nichols and Van Dooren and of
-/// Tits and Yang find. The references of condition number and gain are the least among `widest`, or
-/// up to 10 % lower if a candidate is; that of S is the least peak that descents find with condition
-/// number and gain within 5 % of their references, or as near as possible. The first candidate is kept (None) if it is
-/// within 11 % in condition number and gain and within 2 % in S. Otherwise descents minimise a smooth
-/// maximum of the three relative figures; of all directions that were found, those whose largest
-/// relative figure is least are returned.
-pub(crate) fn compromise(
-    feedback: &FeedbackLoop<'_>,
-    candidates: &[Directions],
-    widest: &[Directions],
-) -> Result<Option<Directions>, Error> {
-    let mut search = Search { feedback, found: vec![] };
-    let (of_candidates, smooth_of_candidates) = search.offer(candidates)?;
-    let own = search.found.first().map(|(figures, _)| *figures);
-    let (of_widest, smooth_of_widest) = search.offer(widest)?;
-    if !of_widest.iter().all(|figure| figure.is_normal()) {
-        return Ok(None);
-    }
-    let mut reference = of_widest;
-    let mut smooth = smooth_of_widest;
-    for figure in 0..COUNT {
-        reference[figure] =
-            of_candidates[figure].clamp(MARGIN * of_widest[figure], of_widest[figure]);
-        let least = smooth_of_widest[figure];
-        smooth[figure] = smooth_of_candidates[figure].clamp(least + MARGIN.ln(), least);
-    }
-    let is_acceptable = |reference: Figures| {
-        let limits = std::array::from_fn(|figure| ACCEPTABLE[figure] * reference[figure]);
-        own.is_some_and(|own| ratio(own, limits) <= 1.0)
-    };
-    // No loop has a lower peak than 1.
-    if is_acceptable([reference[0], reference[1], 1.0]) {
-        return Ok(None);
-    }
-    let mut starts = search.found.clone();
-    starts.sort_by(|x, y| ratio(x.0, reference).total_cmp(&ratio(y.0, reference)));
-    for (_, start) in starts.iter().take(DESCENTS) {
-        search.descend(start, &|figures| least_peak(figures, &smooth))?;
-    }
-    if let Some((figures, directions)) = search.least_peak(reference) {
-        reference[2] = figures[2];
-        smooth[2] = feedback.smooth(directions).unwrap_or(smooth)[2];
-    }
-    if is_acceptable(reference) {
-        return Ok(None);
-    }
-    let best = search.best(reference).cloned();
-    for start in candidates.first().cloned().into_iter().chain(best) {
-        search.descend(&start, &|figures| maximum(figures, &smooth))?;
-    }
-    Ok(search.best(reference).cloned())
-}
-
-/// The directions that were found, with their figures.
-struct Search<'a> {
+/// The search for directions by three figures: condition number, gain norm, peak of S.
+pub(crate) struct Search<'a> {
     feedback: &'a FeedbackLoop<'a>,
+    /// The directions that were found, with their figures.
     found: Vec<(Figures, Directions)>,
+    /// The least figures of the directions of largest volume in [`Self::choose`].
+    widest: Figures,
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    pub(crate) fn new(feedback: &'a FeedbackLoop<'a>) -> Self {
+        Self { feedback, found: vec![], widest: [f64::INFINITY; COUNT] }
+    }
+
+    /// Chooses directions.
+    ///
+    /// `candidates`: those of least condition number, in the coordinates asked for and in those of A;
+    /// `widest`: those of largest volume, which the methods of Kautsky, Nichols and Van Dooren and of
+    /// Tits and Yang find. The references of condition number and gain are the least among `widest`, or
+    /// up to 10 % lower if a candidate is; that of S is the least peak that descents find with condition
+    /// number and gain within 5 % of their references, or as near as possible. The first candidate is kept (None) if it is
+    /// within 11 % in condition number and gain and within 2 % in S. Otherwise descents minimise a smooth
+    /// maximum of the three relative figures; of all directions that were found, those whose largest
+    /// relative figure is least are returned.
+    pub(crate) fn choose(
+        &mut self,
+        candidates: &[Directions],
+        widest: &[Directions],
+    ) -> Result<Option<Directions>, Error> {
+        let (of_candidates, smooth_of_candidates) = self.offer(candidates)?;
+        let own = self.found.first().map(|(figures, _)| *figures);
+        let (of_widest, smooth_of_widest) = self.offer(widest)?;
+        self.widest = of_widest;
+        if !of_widest.iter().all(|figure| figure.is_normal()) {
+            return Ok(None);
+        }
+        let mut reference = of_widest;
+        let mut smooth = smooth_of_widest;
+        for figure in 0..COUNT {
+            reference[figure] =
+                of_candidates[figure].clamp(MARGIN * of_widest[figure], of_widest[figure]);
+            let least = smooth_of_widest[figure];
+            smooth[figure] = smooth_of_candidates[figure].clamp(least + MARGIN.ln(), least);
+        }
+        let is_acceptable = |reference: Figures| {
+            let limits = std::array::from_fn(|figure| ACCEPTABLE[figure] * reference[figure]);
+            own.is_some_and(|own| ratio(own, limits) <= 1.0)
+        };
+        // No loop has a lower peak than 1.
+        if is_acceptable([reference[0], reference[1], 1.0]) {
+            return Ok(None);
+        }
+        let mut starts = self.found.clone();
+        starts.sort_by(|x, y| ratio(x.0, reference).total_cmp(&ratio(y.0, reference)));
+        for (_, start) in starts.iter().take(DESCENTS) {
+            self.descend(start, &|figures| least_peak(figures, &smooth))?;
+        }
+        if let Some((figures, directions)) = self.least_peak(reference) {
+            reference[2] = figures[2];
+            smooth[2] = self.feedback.smooth(directions).unwrap_or(smooth)[2];
+        }
+        if is_acceptable(reference) {
+            return Ok(None);
+        }
+        let best = self.best(reference).cloned();
+        for start in candidates.first().cloned().into_iter().chain(best) {
+            self.descend(&start, &|figures| maximum(figures, &smooth))?;
+        }
+        Ok(self.best(reference).cloned())
+    }
+
+    /// Returns the directions that were found, or are in `more`, which are of largest volume, and
+    /// differ from `chosen` and from each other, the lowest peak of S first.
+    ///
+    /// Their condition number and gain are at most 9 % above the least ones of largest volume.
+    pub(crate) fn others(
+        mut self,
+        chosen: &Directions,
+        more: &[Directions],
+    ) -> Result<Vec<Directions>, Error> {
+        let (of_more, _) = self.offer(more)?;
+        let [condition, gain, _] = least(self.widest, of_more);
+        let is_near = |figures: Figures| ratio(figures, [condition, gain, f64::INFINITY]);
+        self.found.retain(|(figures, _)| is_near(*figures) <= ALTERNATIVE);
+        self.found.sort_by(|x, y| x.0[2].total_cmp(&y.0[2]));
+        let mut known: Vec<Figures> = self.feedback.figures(chosen)?.into_iter().collect();
+        self.found.retain(|(figures, _)| {
+            let is_new = !known.iter().any(|known| is_same(*known, *figures));
+            if is_new {
+                known.push(*figures);
+            }
+            is_new
+        });
+        Ok(self.found.into_iter().map(|(_, directions)| directions).collect())
+    }
+
     /// Adds directions; returns their least figures and the least logarithms of the smooth ones.
     fn offer(&mut self, all: &[Directions]) -> Result<(Figures, Figures), Error> {
         let (mut exact, mut smooth) = ([f64::INFINITY; COUNT], [f64::INFINITY; COUNT]);
@@ -134,6 +171,10 @@ impl Search<'_> {
 
 fn least(a: Figures, b: Figures) -> Figures {
     std::array::from_fn(|figure| a[figure].min(b[figure]))
+}
+
+fn is_same(a: Figures, b: Figures) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME * b)
 }
 
 /// The largest figure relative to its reference.

@@ -16,7 +16,7 @@ const SWEEPS: usize = 20;
 const ROUNDS: usize = 5;
 /// Order up to which the condition number itself is minimised: each step is a singular value
 /// decomposition by Jacobi rotations.
-const LARGEST_DESCENT: usize = 24;
+pub(crate) const LARGEST_DESCENT: usize = 24;
 /// Decrease of ln(condition) at which the descent ends.
 const CONDITION_TOLERANCE: f64 = 1e-6;
 
@@ -27,6 +27,13 @@ pub(crate) type Directions = Vec<DVector<f64>>;
 pub(crate) fn widest_directions(problem: &AssignableSubspaces) -> Result<Vec<Directions>, Error> {
     let starts = if problem.inputs() == 1 { 1 } else { STARTS };
     (0..starts).map(|start| project(problem, spread(problem, start))).collect()
+}
+
+/// Those from further starts; none above the order `LARGEST_DESCENT` and with one input.
+pub(crate) fn more_directions(problem: &AssignableSubspaces) -> Result<Vec<Directions>, Error> {
+    let small = problem.scale.len() <= LARGEST_DESCENT && problem.inputs() > 1;
+    let further = if small { STARTS..2 * STARTS } else { 0..0 };
+    further.map(|start| project(problem, spread(problem, start))).collect()
 }
 
 /// The directions of least condition number that descents from `starts` find; above the order

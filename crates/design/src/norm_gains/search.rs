@@ -71,6 +71,7 @@ impl Search<'_> {
                 required: Vec::new(),
                 quality: None,
                 norm: None,
+                others: Vec::new(),
             },
             _ => self.by_inequalities(channel)?,
         };

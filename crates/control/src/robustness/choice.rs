@@ -1,0 +1,73 @@
+//! The choice among loops by their peaks of S.
+
+use super::{Loop, Point};
+use crate::response::{Transfer, grid};
+use crate::svd::ComplexSvd;
+use crate::{Domain, Error, StateSpace};
+use nalgebra::{Complex, DMatrix};
+
+/// Frequencies for each decade at which the loops are compared.
+const PER_DECADE: u32 = 12;
+/// The first loop is kept unless another one is lower by more than this factor.
+const KEPT: f64 = 1.1;
+
+/// The number, from 0, of the loop with the lowest peaks of S among loops with the same eigenvalues.
+///
+/// Compared is `p_u^2 p_y` of the largest singular values `p_u` at the input and `p_y` at the output:
+/// relative changes of both count, those at the commands twice, because errors of actuators and
+/// delays of the computation act there. The first loop is kept unless another one is lower by more
+/// than 10 %, and if it is not stable. Without loops the result is 0.
+///
+/// Method: Hessenberg form of each loop, 12 frequencies for each decade and the resonances of the
+/// first loop; a peak between them is underestimated by a few per cent at most where no eigenvalue
+/// is. Cost for each loop of order n: about 15 n^3 multiplications and 4 n^2 (1 + m + p) for each
+/// frequency. The result is deterministic.
+///
+/// # Errors
+///
+/// [`Error::Overflow`], [`Error::NotConverged`] when a response cannot be computed.
+pub fn least_sensitive(loops: &[Loop]) -> Result<usize, Error> {
+    let [first, _, ..] = loops else { return Ok(0) };
+    let system = first.sensitivity(Point::Input);
+    let Ok(modes) = system.stable_eigenvalues() else { return Ok(0) };
+    let frequencies = frequencies(&system, &modes);
+    let (mut best, mut least) = (0, f64::INFINITY);
+    for (at, own) in loops.iter().enumerate() {
+        let [input, output] = peaks(own, &frequencies)?;
+        let value = input * input * output * if at == 0 { 1.0 } else { KEPT };
+        if value < least {
+            (best, least) = (at, value);
+        }
+    }
+    Ok(best)
+}
+
+/// The largest singular values of S at input and output over the frequencies.
+fn peaks(own: &Loop, frequencies: &[f64]) -> Result<[f64; 2], Error> {
+    let (at_input, at_output) = (own.sensitivity(Point::Input), own.sensitivity(Point::Output));
+    let (m, p) = (at_input.b.ncols(), at_output.b.ncols());
+    let mut b = at_input.b.resize_horizontally(m + p, 0.0);
+    b.columns_mut(m, p).copy_from(&at_output.b);
+    let mut c = at_input.c.resize_vertically(m + p, 0.0);
+    c.rows_mut(m, p).copy_from(&at_output.c);
+    let d = DMatrix::identity(m + p, m + p);
+    let transfer = Transfer::new(&StateSpace { a: at_input.a, b, c, d, domain: at_input.domain });
+    let mut peaks = [0.0_f64; 2];
+    for frequency in frequencies {
+        let gain = transfer.gain(*frequency)?;
+        for (peak, (first, count)) in peaks.iter_mut().zip([(0, m), (m, p)]) {
+            let s = gain.view((first, first), (count, count)).into_owned();
+            *peak = peak.max(ComplexSvd::new(&s)?.values()[0]);
+        }
+    }
+    Ok(peaks)
+}
+
+/// Zero, a grid and the resonances.
+fn frequencies(system: &StateSpace, modes: &[Complex<f64>]) -> Vec<f64> {
+    let resonances = modes.iter().filter(|mode| mode.im > 0.0).map(|mode| match system.domain {
+        Domain::Continuous => mode.im,
+        Domain::Sampled { period } => mode.arg() / period,
+    });
+    std::iter::once(0.0).chain(grid(system, modes, PER_DECADE)).chain(resonances).collect()
+}
