@@ -114,27 +114,29 @@ fn condition_gain_and_sensitivity_are_at_most_a_tenth_above_the_best_of_scipy_in
     }
 }
 
-/// Of the random systems some have a local optimum.
+/// The alternatives are compared with the starts of this crate, which for one random system are
+/// local optima above those of scipy.
 #[test]
-fn every_alternative_for_a_plant_has_condition_and_gain_at_most_a_tenth_above_the_best_of_scipy() {
-    let mut count = 0;
+fn alternatives_have_condition_and_gain_at_most_a_tenth_above_the_best_of_scipy_with_one_exception()
+{
+    let (mut count, mut exceptions) = (0, vec![]);
     for (system, found) in SYSTEMS.iter() {
-        let allowed = if system.kind.contains("back") || system.kind.contains("observer") {
-            count += found.others.len();
-            ALLOWED
-        } else {
-            1.2
-        };
-        for placement in &found.others {
+        let largest = found.others.iter().map(|placement| {
             let [condition, gain, _] = system.ratios(placement);
-            let within = condition < allowed && gain < allowed;
-            if condition.max(gain) > 1.1 {
-                println!("{} {:?}: {condition:.3} {gain:.3}", system.kind, system.b.shape());
-            }
-            assert!(within, "{} {:?}: {condition:.3} {gain:.3}", system.kind, system.b.shape());
+            condition.max(gain)
+        });
+        let largest = largest.fold(0.0, f64::max);
+        if largest >= ALLOWED {
+            exceptions.push((system.kind, system.b.shape(), largest));
         }
+        count += found.others.len();
     }
-    assert!(count > 100, "{count}");
+    let known = [("real", (9, 4))];
+    let is_known = |kind, shape, largest| known.contains(&(kind, shape)) && largest < 1.25;
+    let unknown =
+        exceptions.iter().filter(|&&(kind, shape, largest)| !is_known(kind, shape, largest));
+    assert_eq!(unknown.count(), 0, "{exceptions:?}");
+    assert!(count > 200, "{count}");
 }
 
 #[test]
