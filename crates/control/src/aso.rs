@@ -98,7 +98,7 @@ pub(crate) fn best_pair(
         let own = |(k, l): &(&Placement, &Placement)| {
             Loop::new(system.clone(), controller(plant, &with(k, l), domain)?)
         };
-        least_sensitive(&pairs.iter().map(own).collect::<Result<Vec<_>, _>>()?)?
+        least_sensitive(&pairs.iter().map(own).collect::<Result<Vec<_>, _>>()?)
     } else {
         0
     };

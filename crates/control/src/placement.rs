@@ -29,6 +29,10 @@ use subspace::AssignableSubspaces;
 /// Inputs count as dependent when a singular value of B, its columns scaled to length one, is below
 /// this.
 const DEPENDENT_INPUTS: f64 = 1e-13;
+/// The eigenvalue error of an alternative is at most that of the chosen gain times the first, or the
+/// second.
+const LESS_EXACT: f64 = 10.0;
+const EXACT: f64 = 1e-9;
 
 /// A state feedback u = K x with assigned eigenvalues.
 #[derive(Debug, Clone, PartialEq)]
@@ -272,9 +276,10 @@ pub(crate) fn alternatives_in(
         (None, Some(other)) => placement(&other.assignable, &other.directions, other.gain)?,
         (None, None) => placement(&assignable, &directions, gain)?,
     };
-    // Alternatives that rounding spoils are none.
+    let allowed = (LESS_EXACT * chosen.quality.pole_error).max(EXACT);
     let others = others.iter().take(most_alternatives(n)).filter_map(|directions| {
-        placement(&assignable, directions, assignable.gain(directions).ok()?).ok()
+        let found = placement(&assignable, directions, assignable.gain(directions).ok()?).ok()?;
+        (found.quality.pole_error <= allowed).then_some(found)
     });
     Ok(Alternatives { others: others.collect(), chosen })
 }

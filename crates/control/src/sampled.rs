@@ -262,11 +262,8 @@ pub fn place_estimator(
     output: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<(DMatrix<f64>, Quality), Error> {
-    let (scale, a, b) = dual(a_0, output)?;
-    let placed =
-        alternatives_in(&Coordinates::Scaled(&scale), (&a, &b), poles, &DISCRETE, Wanted::One)?
-            .chosen;
-    Ok((-placed.gain.transpose(), placed.quality))
+    let placed = place_dual((a_0, output), poles, Wanted::One)?.chosen;
+    Ok((placed.gain, placed.quality))
 }
 
 /// Computes the gain of [`place_estimator`] and alternatives to it, see
@@ -280,17 +277,15 @@ pub fn estimator_alternatives(
     output: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Alternatives, Error> {
-    let (scale, a, b) = dual(a_0, output)?;
-    let coordinates = Coordinates::Scaled(&scale);
-    let found = alternatives_in(&coordinates, (&a, &b), poles, &DISCRETE, Wanted::Alternatives)?;
-    Ok(found.map(|gain| -gain.transpose()))
+    place_dual((a_0, output), poles, Wanted::Alternatives)
 }
 
-/// The units of [`place_estimator`], and the dual pair (`a_0`', `output`').
-fn dual(
-    a_0: &DMatrix<f64>,
-    output: &DMatrix<f64>,
-) -> Result<(DVector<f64>, DMatrix<f64>, DMatrix<f64>), Error> {
+/// See [`place_estimator`] and [`estimator_alternatives`].
+fn place_dual(
+    (a_0, output): (&DMatrix<f64>, &DMatrix<f64>),
+    poles: &[Complex<f64>],
+    wanted: Wanted,
+) -> Result<Alternatives, Error> {
     let n = check::square("A_0", a_0)?;
     check::shape("C_0", output, (output.nrows(), n))?;
     let mut shown = output.clone();
@@ -303,7 +298,10 @@ fn dual(
         let unit = power_of_two(1.0 / energy.sqrt());
         if unit.is_normal() { unit } else { 1.0 }
     });
-    Ok((scale.map(|unit| 1.0 / unit), a_0.transpose(), output.transpose()))
+    let units = scale.map(|unit| 1.0 / unit);
+    let (a, b) = (a_0.transpose(), output.transpose());
+    let found = alternatives_in(&Coordinates::Scaled(&units), (&a, &b), poles, &DISCRETE, wanted)?;
+    Ok(found.map(|gain| -gain.transpose()))
 }
 
 /// The coefficients of the measurement filter in `domain`: the rates w, in sampled time the gains 1

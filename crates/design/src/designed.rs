@@ -127,7 +127,7 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
         found
     } else {
         let filter = filter.as_deref();
-        PairProblem { linear: &linear, plant: &plant, filter, domain }.chosen(found, &with)?
+        PairProblem { linear: &linear, plant: &plant, filter, domain }.chosen(found, with)?
     };
     let gains = with(&feedback.gain, &observer.gain);
     let problem =

@@ -37,7 +37,7 @@ impl PairProblem<'_> {
         };
         let best = match feedbacks.len() * count {
             1 => 0,
-            _ => least_sensitive(&pairs.map(own).collect::<Result<Vec<_>, _>>()?)?,
+            _ => least_sensitive(&pairs.map(own).collect::<Result<Vec<_>, _>>()?),
         };
         Ok((feedbacks[best / count].clone(), observers[best % count].clone()))
     }

@@ -19,27 +19,24 @@ const KEPT: f64 = 1.1;
 /// than 10 %, and if it is not stable. Without loops the result is 0.
 ///
 /// Method: Hessenberg form of each loop, 12 frequencies for each decade and the resonances of the
-/// first loop; a peak between them is underestimated by a few per cent at most where no eigenvalue
-/// is. Cost for each loop of order n: about 15 n^3 multiplications and 4 n^2 (1 + m + p) for each
-/// frequency. The result is deterministic.
-///
-/// # Errors
-///
-/// [`Error::Overflow`], [`Error::NotConverged`] when a response cannot be computed.
-pub fn least_sensitive(loops: &[Loop]) -> Result<usize, Error> {
-    let [first, _, ..] = loops else { return Ok(0) };
+/// first loop. A resonance of S between two of them is possible only near an eigenvalue, of which the
+/// loops have the same. Cost for each loop of order n: about 15 n^3 multiplications and 4 n^2 (1 + m +
+/// p) for each frequency. A loop whose response cannot be computed, or that is not stable, is left
+/// out. The result is deterministic.
+#[must_use]
+pub fn least_sensitive(loops: &[Loop]) -> usize {
+    let [first, _, ..] = loops else { return 0 };
     let system = first.sensitivity(Point::Input);
-    let Ok(modes) = system.stable_eigenvalues() else { return Ok(0) };
+    let Ok(modes) = system.stable_eigenvalues() else { return 0 };
     let frequencies = frequencies(&system, &modes);
-    let (mut best, mut least) = (0, f64::INFINITY);
-    for (at, own) in loops.iter().enumerate() {
-        let [input, output] = peaks(own, &frequencies)?;
-        let value = input * input * output * if at == 0 { 1.0 } else { KEPT };
-        if value < least {
-            (best, least) = (at, value);
-        }
-    }
-    Ok(best)
+    let value = |(at, own): (usize, &Loop)| {
+        let [input, output] = peaks(own, &frequencies).ok()?;
+        Some((input * input * output * if at == 0 { 1.0 } else { KEPT }, at))
+    };
+    let mut all: Vec<_> = loops.iter().enumerate().filter_map(value).collect();
+    all.sort_by(|x, y| x.0.total_cmp(&y.0));
+    let stable = |at: &usize| loops[*at].sensitivity(Point::Input).stable_eigenvalues().is_ok();
+    all.into_iter().map(|(_, at)| at).find(stable).unwrap_or(0)
 }
 
 /// The largest singular values of S at input and output over the frequencies.
