@@ -87,8 +87,7 @@ pub fn real_poles(poles: &[f64]) -> Vec<Complex<f64>> {
 /// 3. Otherwise descents minimise the largest of the three figures, each relative to its reference.
 ///
 /// On the systems of the tests each figure is at most 10 % above the better of scipy's two methods.
-/// Which eigenvectors are best in a loop with an observer depends on both: [`alternatives`] has more
-/// to choose from.
+/// For a loop with an observer [`alternatives`] returns more to choose from.
 /// With dependent inputs K has the least norm, in units of the inputs for which the columns of B
 /// have length one. The result is deterministic.
 ///

@@ -16,6 +16,7 @@
 //! | all of these at one point of a large loop | [`OpenedLoop`] |
 //! | the longest time over which signals may be held | [`longest_hold`], [`longest_period`] |
 //! | effect of measurement noise | [`noise_gains`] |
+//! | which of several loops has the lowest peaks of S | [`least_sensitive`] |
 //! | errors of the plant's parameters | [`EntryFamily`], [`PlantFamily`], [`tolerance_test`] |
 //! | gains for comparison | [`regulator_of_same_speed`] |
 
