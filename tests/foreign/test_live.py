@@ -215,6 +215,23 @@ def test_a_stopped_run_keeps_its_rows(aso_ftc, tmp_path):
     assert own.count(b"\n") == 7 and again.startswith(own) and again.count(b"\n") == 3002
 
 
+def test_a_checkpoint_of_a_stopped_run_has_its_interventions(aso_ftc, tmp_path):
+    saved = tmp_path / "run.state"
+    with live(tmp_path, "--stop-time", 0.3, "--record-every", "step", "--checkpoint", saved) as run:
+        run.do("scenario", SET + FAULTS[2] + FAULTS[0])
+        run.do("step")
+        run.do("step")
+        run.do("scenario", '[[fault]]\nconnection = "plant.u"\nstuck = { until = 0.006 }\n')
+        run.do("step")
+        run.do("step")
+        run.do("stop")
+        run.end()
+    assert aso_ftc("run", "--resume", saved).returncode == 0
+    own, whole = repeated(tmp_path, aso_ftc)
+    (rest,) = tmp_path.glob("results-from-*.csv")
+    assert own + rest.read_bytes().split(b"\n", 1)[1] == whole
+
+
 def test_a_pause_is_no_lateness_of_a_paced_run(tmp_path):
     with live(tmp_path, "--stop-time", 0.3, "--step", 0.01, "--real-time=1") as run:
         time.sleep(0.5)
@@ -473,9 +490,9 @@ def test_the_page_shows_the_run_and_all_controls_work(aso_ftc, tmp_path):
         page.until("document.querySelectorAll('#figures .uplot').length >= 2")
         page.until("document.getElementById('values').textContent.includes('plant.f_fric = ')")
         assert page.evaluate("document.querySelector('canvas').width") > 100
-        page.picture(tmp_path / "live.png")
         page.evaluate(click.format("hold"))
         page.until("document.body.dataset.phase === 'paused'")
+        assert page.violations() == []
         page.evaluate(click.format("stop"))
         page.evaluate(click.format("stop"))
         page.until("document.body.dataset.phase === 'ended'")
