@@ -252,11 +252,11 @@ pub fn design(
 ///
 /// `a_0`: n x n; `output`: p x n, [`Estimator::output_matrix`]; `poles`: n, in the z plane. The
 /// states are first scaled such that each of them alone, over n samples, gives an output with a sum
-/// of squares of about one. Existence, method, cost and tolerance: see [`place_discrete`].
+/// of squares of about one. Existence, method, cost and tolerance: see [`crate::placement::place_discrete`].
 ///
 /// # Errors
 ///
-/// Same as [`place_discrete`].
+/// Same as [`crate::placement::place_discrete`].
 pub fn place_estimator(
     a_0: &DMatrix<f64>,
     output: &DMatrix<f64>,
