@@ -29,7 +29,7 @@ pub(crate) use number::rounded;
 use super::report::Report;
 
 const STYLE: &str = include_str!("page/page.css");
-const SCRIPT: &str = include_str!("page/copy.js");
+const SCRIPTS: [&str; 2] = [include_str!("page/copy.js"), include_str!("page/cursor.js")];
 /// The content security policy: the page loads nothing, even if a text contains markup.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
@@ -66,11 +66,12 @@ pub(crate) fn page(report: &Report, identity: &str) -> String {
                         "Written by aso-ftc " (env!("CARGO_PKG_VERSION")) ". Numbers are shown with \
                          five digits, the pointer shows all. The same numbers, and the points of \
                          the curves, come from "
-                        code { "aso-ftc design --json" } "."
+                        code { "aso-ftc design --json" } ". A pointer over a figure, or the arrow keys \
+                         in it, read values from its curves, to about three digits; a click enlarges it."
                     }
                     p role="status" #copied {}
                 }
-                script { (PreEscaped(SCRIPT)) }
+                @for script in SCRIPTS { script { (PreEscaped(script)) } }
             }
         }
     };

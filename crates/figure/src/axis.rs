@@ -103,6 +103,12 @@ impl Axis {
         self.pixels
     }
 
+    /// Whether all decades have the same length.
+    #[must_use]
+    pub fn is_logarithmic(&self) -> bool {
+        matches!(self.scale, Scale::Logarithmic)
+    }
+
     /// Returns whether a value is in the range.
     #[must_use]
     pub fn contains(&self, value: f64) -> bool {

@@ -51,7 +51,7 @@ impl Chart<'_> {
         let window = format!("{}-window", self.id);
         let ((left, right), (bottom, top)) = (self.x.pixels(), self.y.pixels());
         html! {
-            svg viewBox={ "0 0 " (width) " " (height) } role="img"
+            svg viewBox={ "0 0 " (width) " " (height) } role="img" data-x=(ends(&self.x)) data-y=(ends(&self.y))
                 aria-labelledby={ (title) " " (description) } {
                 title id=(title) { (self.title) }
                 desc id=(description) { (self.description) }
@@ -120,6 +120,12 @@ impl Chart<'_> {
         let ((left, right), y) = (self.x.pixels(), self.y.place(at));
         html! { @if self.y.contains(at) { (line((left, y), (right, y), class)) } }
     }
+}
+
+/// The ends of an axis, for the cursor.
+fn ends(axis: &Axis) -> String {
+    let (low, high) = axis.range();
+    format!("{low:e} {high:e}{}", if axis.is_logarithmic() { " log" } else { "" })
 }
 
 pub(super) fn line((x1, y1): (f64, f64), (x2, y2): (f64, f64), class: &str) -> Markup {
