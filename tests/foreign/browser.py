@@ -16,7 +16,6 @@ from pathlib import Path
 
 from tornado.websocket import websocket_connect
 
-AXE = Path(find_spec("axe_playwright_python").submodule_search_locations[0]) / "axe.min.js"
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 LIMIT = 120  # s for one answer of the browser
 
@@ -74,10 +73,13 @@ class Page:
 
     def violations(self):
         """What axe-core finds serious or critical in the page, light and dark: rule and elements."""
+        package = find_spec("axe_playwright_python")
+        assert package, "axe-core is missing: pip install --no-deps --requirement scripts/axe-requirements.txt"
+        axe = (Path(package.submodule_search_locations[0]) / "axe.min.js").read_text(encoding="utf-8")
         found = []
         for scheme in ("light", "dark"):
             self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
-            self.evaluate(AXE.read_text(encoding="utf-8"))
+            self.evaluate(axe)
             for own in self.evaluate("axe.run(document, {resultTypes: ['violations']}).then((found) => found.violations)"):
                 places = [node["target"][0] for node in own["nodes"]]
                 found += [(scheme, own["id"], places)] if own["impact"] in ("serious", "critical") else []
