@@ -29,7 +29,7 @@ pub(crate) use number::rounded;
 use super::report::Report;
 
 const STYLE: &str = include_str!("page/page.css");
-const SCRIPTS: [&str; 2] = [include_str!("page/copy.js"), include_str!("page/cursor.js")];
+const SCRIPT: &str = concat!(include_str!("page/copy.js"), include_str!("page/cursor.js"));
 /// The content security policy: the page loads nothing, even if a text contains markup.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
@@ -71,7 +71,7 @@ pub(crate) fn page(report: &Report, identity: &str) -> String {
                     }
                     p role="status" #copied {}
                 }
-                @for script in SCRIPTS { script { (PreEscaped(script)) } }
+                script { (PreEscaped(SCRIPT)) }
             }
         }
     };

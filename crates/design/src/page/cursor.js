@@ -1,10 +1,9 @@
-"use strict";
-// A cursor in the figures with curves: shows the values below the pointer, or at the arrow keys, in all figures with
-// the same horizontal axis. A click, or Enter, enlarges a figure.
+/* A cursor in the figures with curves: shows the values below the pointer, or at the arrow keys, in all figures with
+   the same horizontal axis. A click, or Enter, enlarges a figure. */
 (() => {
   const charts = [];
 
-  // The value at a share of an axis, between 0 and 1.
+  /* The value at a share of an axis, between 0 and 1. */
   function valueAt({ low, high, log }, share) {
     return log ? low * (high / low) ** share : low + share * (high - low);
   }
@@ -14,25 +13,25 @@
     return { low: Number(low), high: Number(high), log: log === "log" };
   }
 
-  // The points of a path as the page draws it: strokes of "M" and pairs of coordinates.
+  /* The points of a path as the page draws it: strokes of "M" and pairs of coordinates. */
   function points(path) {
     const numbers = path.getAttribute("d").split(/[M ]+/).filter((part) => part !== "").map(Number);
     return Array.from({ length: numbers.length / 2 }, (_, k) => [numbers[2 * k], numbers[2 * k + 1]]);
   }
 
-  // The height of a curve at `x`; undefined outside of it.
+  /* The height of a curve at `x`; undefined outside of it. */
   function heightAt(curve, x) {
     const after = curve.findIndex((point) => point[0] >= x);
-    if (after < 0) return undefined;
+    if (after === -1) return undefined;
     const [x2, y2] = curve[after];
-    if (after === 0) return x2 - x < 1 ? y2 : undefined;
+    if (after === 0) return 1 > x2 - x ? y2 : undefined;
     const [x1, y1] = curve[after - 1];
     return x2 > x1 ? y1 + ((x - x1) / (x2 - x1)) * (y2 - y1) : y2;
   }
 
   const said = (value) => (value === undefined ? "–" : String(Number(value.toPrecision(3))));
 
-  // Shows the cursor at a share of the horizontal axis `range`; null hides it.
+  /* Shows the cursor at a share of the horizontal axis `range`; null hides it. */
   function show(range, share) {
     for (const { svg, frame, line, text, y, label, curves } of charts) {
       if (svg.dataset.x !== range) continue;
@@ -58,7 +57,7 @@
     const box = svg.querySelector("rect.frame");
     const [left, top, width, height] = ["x", "y", "width", "height"].map((name) => Number(box.getAttribute(name)));
     const frame = { left, top, right: left + width, bottom: top + height };
-    const line = document.createElementNS("http://www.w3.org/2000/svg", "line");
+    const line = document.createElementNS(svg.namespaceURI, "line");
     line.classList.add("cursor");
     line.setAttribute("y1", frame.top);
     line.setAttribute("y2", frame.bottom);
