@@ -76,19 +76,22 @@ pub(crate) fn place_controller(
 
 /// The pair of a feedback and an observer whose loop [`least_sensitive`] prefers, and its gains.
 ///
-/// `feedbacks`: `K_x`; `observers`: L; `given`: gains whose `K_x`, `L_x` and `L_f` are replaced.
+/// `feedbacks`: `K_x`; `observers`: L.
 pub(crate) fn best_pair(
     plant: &FaultyPlant,
     (feedbacks, observers): (&Alternatives, &Alternatives),
-    given: &Gains,
+    (estimator, k_f): (Estimator, &DMatrix<f64>),
     domain: Domain,
 ) -> Result<(Gains, [Quality; 2]), Error> {
     let (n, q) = plant.f_a.shape();
     let with = |k: &Placement, l: &Placement| Gains {
+        estimator,
         k_x: k.gain.clone(),
+        k_f: k_f.clone(),
         l_x: l.gain.rows(0, n).into(),
         l_f: -l.gain.rows(n, q),
-        ..given.clone()
+        p_f: None,
+        integral: None,
     };
     let mut pairs: Vec<_> = feedbacks.pairs(observers).collect();
     let best = if pairs.len() > 1 {
@@ -165,24 +168,14 @@ pub(crate) fn design_feedback(
         Some(given) => given.clone(),
         None => plant.compensation_gain()?,
     };
-    let ((n, q), m) = (plant.f_a.shape(), plant.b.ncols());
-    check::shape("K_f", &k_f, (m, q))?;
+    check::shape("K_f", &k_f, (plant.b.ncols(), plant.f_a.ncols()))?;
     let feedbacks = place_controller((plant, states), controller_poles, alternatives)?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let observers = alternatives_balanced(&a_0.transpose(), &c_0.transpose(), observer_poles)?;
     let observers = observers.map(|gain| -gain.transpose());
     let residual = cancellation_residual(plant, states, &k_f);
-    let given = Gains {
-        estimator: Estimator::Prediction,
-        k_x: DMatrix::zeros(m, n),
-        k_f,
-        l_x: DMatrix::zeros(n, plant.c.nrows()),
-        l_f: DMatrix::zeros(q, plant.c.nrows()),
-        p_f: None,
-        integral: None,
-    };
-    let pairs = (&feedbacks, &observers);
-    let (gains, [controller, observer]) = best_pair(plant, pairs, &given, Domain::Continuous)?;
+    let (pairs, given) = ((&feedbacks, &observers), (Estimator::Prediction, &k_f));
+    let (gains, [controller, observer]) = best_pair(plant, pairs, given, Domain::Continuous)?;
     Ok(AsoDesign { gains, cancellation_residual: residual, controller, observer })
 }
 

@@ -209,25 +209,15 @@ pub fn design(
         Some(given) => given.clone(),
         None => compensation_gain(extended, Domain::Sampled { period })?,
     };
-    let ((n, q), m) = (plant.f_a.shape(), plant.b.ncols());
-    check::shape("K_f", &k_f, (m, q))?;
+    check::shape("K_f", &k_f, (plant.b.ncols(), plant.f_a.ncols()))?;
     let states = (&plant, extended.states);
     let feedbacks = place_controller(states, controller_poles, alternatives_discrete)?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let seen = estimator.output_matrix(&a_0, &c_0);
     let observers = estimator_alternatives(&a_0, &seen, observer_poles)?;
-    let given = Gains {
-        estimator,
-        k_x: DMatrix::zeros(m, n),
-        k_f,
-        l_x: DMatrix::zeros(n, plant.c.nrows()),
-        l_f: DMatrix::zeros(q, plant.c.nrows()),
-        p_f: None,
-        integral: None,
-    };
     let domain = Domain::Sampled { period };
     let (gains, [feedback, observer]) =
-        best_pair(&plant, (&feedbacks, &observers), &given, domain)?;
+        best_pair(&plant, (&feedbacks, &observers), (estimator, &k_f), domain)?;
     let controller_system = controller(&plant, &gains, domain)?;
     let dynamics = closed_loop(&plant, &controller_system, &vec![1.0; m])?;
     let radius = 1.0 + instability(&dynamics, domain)?;
