@@ -13,20 +13,25 @@
     return { low: Number(low), high: Number(high), log: log === "log" };
   }
 
-  /* The points of a path as the page draws it: strokes of "M" and pairs of coordinates. */
-  function points(path) {
-    const numbers = path.getAttribute("d").split(/[M ]+/).filter((part) => part !== "").map(Number);
-    return Array.from({ length: numbers.length / 2 }, (_, k) => [numbers[2 * k], numbers[2 * k + 1]]);
+  /* The strokes of a path as the page draws it, "M" and pairs of coordinates, as lists of points; a gap is between two. */
+  function strokes(path) {
+    return path.getAttribute("d").split("M").slice(1).map((stroke) => {
+      const numbers = stroke.trim().split(" ").map(Number);
+      return Array.from({ length: numbers.length / 2 }, (_, k) => [numbers[2 * k], numbers[2 * k + 1]]);
+    });
   }
 
-  /* The height of a curve at `x`; undefined outside of it. */
+  /* The height of a curve at `x`; undefined outside of it and in its gaps. */
   function heightAt(curve, x) {
-    const after = curve.findIndex((point) => point[0] >= x);
-    if (after === -1) return undefined;
-    const [x2, y2] = curve[after];
-    if (after === 0) return 1 > x2 - x ? y2 : undefined;
-    const [x1, y1] = curve[after - 1];
-    return x2 > x1 ? y1 + ((x - x1) / (x2 - x1)) * (y2 - y1) : y2;
+    for (const points of curve) {
+      const after = points.findIndex((point) => point[0] >= x);
+      if (after === -1) continue;
+      const [x2, y2] = points[after];
+      if (after === 0) return 1 > x2 - x ? y2 : undefined;
+      const [x1, y1] = points[after - 1];
+      return x2 > x1 ? y1 + ((x - x1) / (x2 - x1)) * (y2 - y1) : y2;
+    }
+    return undefined;
   }
 
   const said = (value) => (value === undefined ? "–" : String(Number(value.toPrecision(3))));
@@ -67,7 +72,7 @@
     text.className = "said read";
     svg.after(text);
     const label = svg.querySelector("text.label").textContent;
-    charts.push({ svg, frame, line, text, y: axis(svg.dataset.y), label, curves: paths.map(points) });
+    charts.push({ svg, frame, line, text, y: axis(svg.dataset.y), label, curves: paths.map(strokes) });
     const range = svg.dataset.x;
     let share = 0.5;
     const move = (to) => {

@@ -121,7 +121,7 @@ fn missed(
     Ok(Some(file.error_at(&references.action_places[0], message)))
 }
 
-/// The largest part of a step of a reference that is left.
+/// The largest part of a step of a reference that is missing at rest.
 fn error(point: &Point, h: &DMatrix<f64>, n_r: &DMatrix<f64>) -> Result<f64, Error> {
     let plant = &point.physical;
     let n = plant.a.nrows();
