@@ -211,6 +211,9 @@ impl Started {
                 Ok(live.as_mut().map_or(go_on, |live| live.attend(run, pace.as_mut())))
             }),
         };
+        if let (Some(live), false) = (&mut self.live, matches!(ended, RunEnd::Failed(_))) {
+            live.sample(&mut self.run, self.pace.as_ref());
+        }
         let tally = self.run.tally();
         let time = self.run.simulation.time();
         let mut outcome = summary(tally, start, time);

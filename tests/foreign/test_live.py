@@ -107,14 +107,14 @@ def test_a_watched_run_keeps_its_bits(aso_ftc, tmp_path):
     assert aso_ftc("run", *FMUS, "--out", tmp_path / "free", *options).returncode == 0
     with live(tmp_path / "seen", *options) as run:
         assert run.state()["phase"] == "paused"
-        for name in ["", "page.css", "page.js", "uPlot.css", "uPlot.js", "facts"]:
+        for name in ["", "colours.css", "page.css", "page.js", "uPlot.css", "uPlot.js", "facts"]:
             assert run.ask(name)[0] == 200
         run.do("continue")
         seen = []
         while (state := run.state("show=2,3&rows=0"))["outcome"] is None:
             seen = state["times"] or seen
         out = run.end()
-    assert "reached in 40000 steps" in state["outcome"] and "to repeat it" not in out
+    assert state["time"] == 40 and "reached in 40000 steps" in state["outcome"] and "to repeat it" not in out
     assert seen == sorted(set(seen)) and not (tmp_path / "seen" / "live.toml").exists()
     assert (tmp_path / "seen" / "results.csv").read_bytes() == (tmp_path / "free" / "results.csv").read_bytes()
 
@@ -291,14 +291,16 @@ def test_at_the_end_no_change_is_possible(tmp_path):
         run.end()
 
 
-def test_messages_come_by_fmu(tmp_path):
-    with live(tmp_path, "--stop-time", 0.02, "-v") as run:
-        run.do("scenario", SET)
+def test_the_message_of_an_fmu_that_fails_comes_with_its_name(tmp_path):
+    with live(tmp_path, "--stop-time", 10) as run:
+        run.do("scenario", '[[fault]]\nconnection = "controller.theta"\nstuck = {}\n')
         run.do("continue")
         state = run.until(lambda state: state["outcome"])
-        run.end()
-    assert all(isinstance(count, int) for count in state["counts"].values()) and state["dropped"] == 0
-    assert sum(state["counts"].values()) == state["message"] >= len(state["messages"])
+        run.end(1)
+    said = [message["text"] for message in state["messages"] if message["fmu"] == "plant"]
+    assert state["counts"]["plant"] == len(said) > 0 and state["dropped"] == 0, state
+    assert any("fmi2DoStep" in text for text in said), said
+    assert "the run ended early" in state["outcome"] and "plant" in state["outcome"]
 
 
 def test_a_resumed_run_has_no_live_view(aso_ftc, tmp_path):

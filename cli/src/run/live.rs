@@ -19,7 +19,7 @@ const SIGNALS: usize = 500;
 const SETTINGS: usize = 5000;
 /// Interval between two looks for a signal of the operating system while the run is paused.
 const LOOK: Duration = Duration::from_millis(50);
-/// Time in which an open page can see the end of the run.
+/// How long the command waits at its end until an open page has shown this.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// State of the run at its start, as `--live` gives it.
@@ -225,7 +225,7 @@ impl Live {
     }
 
     /// Publishes the values of the signals.
-    fn sample(&mut self, run: &mut Run, pace: Option<&RealTime>) {
+    pub(super) fn sample(&mut self, run: &mut Run, pace: Option<&RealTime>) {
         let start = Instant::now();
         let time = run.simulation.time();
         let mut values = vec![f64::NAN; self.probe.names().len()];
@@ -278,7 +278,7 @@ fn repeat_command(file: &str) -> String {
     format!("{} run {}", quoted(&command), quoted(file))
 }
 
-/// Returns a probe of the recorded variables that the FMUs let read.
+/// Returns a probe of the recorded variables that can be read.
 fn probe(run: &mut Run, ports: &[Port]) -> anyhow::Result<Probe> {
     let time = run.simulation.time();
     let system = run.simulation.system();

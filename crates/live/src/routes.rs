@@ -50,7 +50,8 @@ impl Site {
             _ => None,
         };
         let is_read =
-            ["", "page.css", "page.js", "uPlot.css", "uPlot.js", "facts", "state"].contains(&path);
+            ["", "colours.css", "page.css", "page.js", "uPlot.css", "uPlot.js", "facts", "state"]
+                .contains(&path);
         match (action, request.method.as_str()) {
             (Some(action), "POST") => self.perform(action, request),
             (Some(_), _) => Answer { allow: Some("POST"), ..Answer::refusal(405, "expected POST") },
@@ -65,6 +66,7 @@ impl Site {
     fn read(&self, path: &str, request: &Parsed) -> Answer {
         match path {
             "" => Answer::file("text/html", HTML),
+            "colours.css" => Answer::file("text/css", report::COLOURS),
             "page.css" => Answer::file("text/css", STYLE),
             "page.js" => Answer::file("text/javascript", SCRIPT),
             "uPlot.css" => Answer::file("text/css", report::UPLOT_STYLE),

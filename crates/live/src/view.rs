@@ -127,7 +127,7 @@ impl View {
         self.shared.call_for_request();
     }
 
-    /// Returns the next request, waiting for one at most the time `wait`.
+    /// Returns the next request; waits for it at most the time `wait`.
     #[must_use]
     pub fn request(&self, wait: Option<Duration>) -> Option<Request> {
         match wait {

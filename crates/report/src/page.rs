@@ -9,6 +9,8 @@ use crate::statistics::Statistics;
 use crate::{Request, Run, graph, identity};
 
 const STYLE: &str = include_str!("page/page.css");
+/// The style sheet of the colours, light and dark.
+pub const COLOURS: &str = include_str!("page/colours.css");
 /// The script of the plots: uPlot 1.6.32, Leon Sorokin, MIT licence (`page/uPlot-LICENSE`).
 pub const UPLOT: &str = include_str!("page/uPlot.iife.min.js");
 /// The style sheet of uPlot.
@@ -91,7 +93,7 @@ fn head(file: &str, request: &Request<'_>) -> Markup {
             meta http-equiv="Content-Security-Policy" content=(POLICY);
             meta name="generator" content=(identity(request.results));
             title { (file) ", report" }
-            style { (PreEscaped(UPLOT_STYLE)) (PreEscaped(STYLE)) }
+            style { (PreEscaped(UPLOT_STYLE)) (PreEscaped(COLOURS)) (PreEscaped(STYLE)) }
         }
     }
 }
