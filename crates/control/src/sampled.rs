@@ -219,7 +219,7 @@ pub fn design(
     let (gains, [feedback, observer]) =
         best_pair(&plant, (&feedbacks, &observers), (estimator, &k_f), domain)?;
     let controller_system = controller(&plant, &gains, domain)?;
-    let dynamics = closed_loop(&plant, &controller_system, &vec![1.0; m])?;
+    let dynamics = closed_loop(&plant, &controller_system, &vec![1.0; plant.b.ncols()])?;
     let radius = 1.0 + instability(&dynamics, domain)?;
     let wanted = controller_poles.iter().chain(observer_poles);
     let largest = wanted.fold(0.0, |largest: f64, pole| largest.max(pole.norm()));
