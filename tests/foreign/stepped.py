@@ -1,7 +1,7 @@
 """An FMU by FMPy, step by step."""
 
 from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 
 
 class Stepped:
@@ -16,7 +16,10 @@ class Stepped:
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName="own",
         )
-        self.own.instantiate()
+        # FMPy's default callbacks pass messages to the logger of the last simulate_fmu, which may be freed.
+        self.callbacks = fmi2CallbackFunctions.from_buffer_copy(defaultCallbacks)
+        self.callbacks.logger = fmi2CallbackLoggerTYPE(lambda *_: None)
+        self.own.instantiate(callbacks=self.callbacks)
         for name, value in start:
             self.set(name, value)
         self.own.setupExperiment(startTime=0.0)
