@@ -1,8 +1,9 @@
 //! The controller as a model: fields, initialisation, steps, events, derivatives.
 
+mod linked;
+
 use std::path::Path;
 
-use control::aso::FaultyPlant;
 use fmu::description::DefaultExperiment;
 use fmu::{About, At, Event, Experiment, Failure, Log, Model, ModelExchange, Step, Variable};
 use num_dual::Dual64;
@@ -13,7 +14,6 @@ use crate::design::detection::DetectionDesign;
 use crate::detection::{Detector, Stretch};
 use crate::equations::Equations;
 use crate::loss::Loss;
-use crate::matrix::Matrix;
 use crate::mode::Mode;
 use crate::observer::{Conditions, Observer};
 use crate::reconfiguration::Reconfigurator;
@@ -321,37 +321,6 @@ fn clock_rounding(time: f64) -> f64 {
 }
 
 impl AsoController {
-    /// The bytes of the design in `text`, the content of `design.toml`, for [`AsoController::from_bytes`]: a
-    /// program that contains its design needs no code that reads TOML.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] if the design is refused.
-    pub fn bytes_of_design(text: &str) -> Result<Vec<u8>, Failure> {
-        let refused = |error: &dyn std::fmt::Display| Failure::Error(error.to_string());
-        let design =
-            Design::parse(text, "design.toml".to_owned()).map_err(|error| refused(&error))?;
-        postcard::to_allocvec(&design).map_err(|error| refused(&error))
-    }
-
-    /// The controller of a design that [`AsoController::bytes_of_design`] has accepted.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] if the bytes are no design.
-    pub fn from_bytes(design: &[u8]) -> Result<Self, Failure> {
-        postcard::from_bytes(design)
-            .map(Self::with)
-            .map_err(|error| Failure::Error(format!("the bytes are no design: {error}")))
-    }
-
-    /// The plant of the design with its fault model.
-    pub fn plant(&self) -> FaultyPlant {
-        let [a, b, c, f_a] =
-            [&self.design.a, &self.design.b, &self.design.c, &self.design.f_a].map(Matrix::dense);
-        FaultyPlant::with_constant_faults(a, b, c, f_a)
-    }
-
     fn with(design: Design) -> Self {
         let operating = design.states.iter().map(|state| state.operating.unwrap_or_default());
         let (mut values, deviations) = (Values::zero(&design), Signals::zero(&design));

@@ -1,0 +1,41 @@
+//! The controller in a program that links it, without files.
+
+use control::aso::FaultyPlant;
+use fmu::Failure;
+
+use super::AsoController;
+use crate::design::Design;
+use crate::matrix::Matrix;
+
+impl AsoController {
+    /// The bytes of the design in `text`, the content of `design.toml`, for [`AsoController::from_bytes`]: a
+    /// program that contains its design needs no code that reads TOML.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] if the design is refused.
+    pub fn bytes_of_design(text: &str) -> Result<Vec<u8>, Failure> {
+        let refused = |error: &dyn std::fmt::Display| Failure::Error(error.to_string());
+        let design =
+            Design::parse(text, "design.toml".to_owned()).map_err(|error| refused(&error))?;
+        postcard::to_allocvec(&design).map_err(|error| refused(&error))
+    }
+
+    /// The controller of a design that [`AsoController::bytes_of_design`] has accepted.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] if the bytes are no design.
+    pub fn from_bytes(design: &[u8]) -> Result<Self, Failure> {
+        postcard::from_bytes(design)
+            .map(Self::with)
+            .map_err(|error| Failure::Error(format!("the bytes are no design: {error}")))
+    }
+
+    /// The plant of the design with its fault model.
+    pub fn plant(&self) -> FaultyPlant {
+        let [a, b, c, f_a] =
+            [&self.design.a, &self.design.b, &self.design.c, &self.design.f_a].map(Matrix::dense);
+        FaultyPlant::with_constant_faults(a, b, c, f_a)
+    }
+}
