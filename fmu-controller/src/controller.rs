@@ -1,6 +1,7 @@
 //! The controller as a model: fields, initialisation, steps, events, derivatives.
 
 mod linked;
+mod scheduled;
 
 use std::path::Path;
 
@@ -67,18 +68,26 @@ pub struct AsoController {
     detector: Option<Detector>,
     /// Whether the clock of the samples ticks. The samples follow from time, and so does the clock.
     pub(crate) sample_clock: bool,
-    /// The design at the scheduling variable of the last sample; `None` without a schedule.
+    /// The design at the scheduling variable of the last sample, or of now in a continuous controller; `None`
+    /// without a schedule.
     current: Option<Box<Design>>,
-    /// The scheduling variable as an input with its slope, and as it was used in the last sample.
+    /// The scheduling variable as an input with its slope; the value that selected `current`, and this value
+    /// held within the grid.
     pub(crate) schedule_input: f64,
     pub(crate) schedule_slope: f64,
+    schedule_value: f64,
     pub(crate) schedule_at: f64,
+    /// Co-simulation of a continuous controller with a schedule: the exporter integrates its equations.
+    is_integrated: bool,
     /// Whether a value outside of the schedule was reported.
     outside_reported: bool,
     log: Log,
     /// Derived from `design` in the first step, also after a state was read from bytes.
     #[serde(skip)]
     observer: Option<Observer>,
+    /// Space for the derivatives of the interpolated design with respect to time, and of the signals.
+    #[serde(skip)]
+    rates: Option<Box<(Design, Signals)>>,
 }
 
 impl AsoController {
@@ -182,13 +191,15 @@ impl AsoController {
         }
         self.values.set_estimate(&self.deviations.z, &self.operating_point);
         self.mode = self.free_mode(self.is_compensating(step.end()));
-        self.evaluate(step.size);
+        self.evaluate(step.end(), step.size);
         Ok(())
     }
 
-    /// Computes e, u and E_hat at the state and time reached, `offset` s after the inputs were set.
-    fn evaluate(&mut self, offset: f64) {
-        let Self { design, values, operating_point, deviations, mode, .. } = self;
+    /// Computes e, u and E_hat at the state reached and at `time`, `offset` s after the inputs were set.
+    fn evaluate(&mut self, time: f64, offset: f64) {
+        self.interpolate(offset, time);
+        let Self { design, current, values, operating_point, deviations, mode, .. } = self;
+        let design = current.as_deref().unwrap_or(design);
         deviations.set(values, operating_point, offset);
         if !self.frozen {
             *mode = mode.limited(design, &deviations.z, [&deviations.y, &deviations.r]);
@@ -212,7 +223,8 @@ impl AsoController {
 
     /// Computes z', u' and E_hat'.
     fn set_slopes(&mut self) {
-        let Self { design, values, deviations, z_slopes, f_slopes, u_slopes, mode, .. } = self;
+        let Self { current, values, deviations, z_slopes, f_slopes, u_slopes, mode, .. } = self;
+        let design = current.as_deref().unwrap_or(&*self.design);
         let input_slopes = [&values.y_slopes[..], &values.r_slopes];
         let equations = Equations::<f64>::new(design, *mode);
         equations.set_slopes(equations.knowns(&deviations), &mut &mut z_slopes[..]);
@@ -223,6 +235,8 @@ impl AsoController {
         for (i, slope) in f_slopes.iter_mut().enumerate() {
             *slope = equations.fault(i, equations.estimate(z_slopes), input_slopes[0]);
         }
+        self.set_scheduled_command_slopes();
+        let Self { design, values, deviations, z_slopes, f_slopes, u_slopes, .. } = self;
         for loss in &mut self.losses {
             let (u, f_hat) = (loss.actuator, design.states.len() + loss.fault);
             let lost = loss.effectiveness_lost(
@@ -243,44 +257,6 @@ impl AsoController {
             let f_hat = *self.deviations.f_hat.get(loss.fault).unwrap_or(&self.values.z[f_hat]);
             loss.estimate = loss.effectiveness_lost(self.values.u[u], f_hat);
         }
-    }
-
-    /// Sets matrices and operating point of a scheduled controller for a sample at `time`, `offset` s
-    /// after the measurements were given.
-    fn interpolate(&mut self, offset: f64, time: f64) {
-        let input = self.schedule_input + self.schedule_slope * offset;
-        let Self { design, current, values, operating_point, .. } = self;
-        let (Some(schedule), Some(current)) = (&design.schedule, current) else { return };
-        let value = schedule.value(design, values, input, offset);
-        self.schedule_at = schedule.interpolate(value, current);
-        current.take_parameters(design);
-        operating_point.read(current);
-        let [first, last] = schedule.range();
-        let inside = (first..=last).contains(&value);
-        if !inside && !self.outside_reported {
-            self.outside_reported = true;
-            self.log.warn(format!(
-                "{} = {value} at {time} s is outside of the schedule from {first} to {last}; the \
-                 controller uses {} (reported once)",
-                schedule.variable, self.schedule_at
-            ));
-        }
-    }
-
-    /// Sets the derivatives of matrices and operating point of a scheduled controller in the direction
-    /// of `direction`, at the first sample.
-    fn differentiate_schedule(&self, direction: &mut Self) {
-        let Self { design, current, values, schedule_input, .. } = direction;
-        let (Some(schedule), Some(current)) = (&self.design.schedule, current) else { return };
-        let value = schedule.value(&self.design, &self.values, self.schedule_input, 0.0);
-        let slope = schedule.value(&self.design, values, *schedule_input, 0.0);
-        direction.schedule_at = schedule.differentiate(value, slope, current);
-        current.take_parameters(design);
-    }
-
-    /// The design of the last sample.
-    fn design_in_force(&self) -> &Design {
-        self.current.as_deref().unwrap_or(&self.design)
     }
 
     /// Takes the samples that are due until `end`, with the measurements given at `start`, in s.
@@ -345,11 +321,14 @@ impl AsoController {
             sample_clock: false,
             schedule_input: start,
             schedule_slope: 0.0,
+            schedule_value: start,
             schedule_at: start,
+            is_integrated: false,
             outside_reported: false,
             log: Log::default(),
             current: design.unscheduled().map(Box::new),
             observer: None,
+            rates: None,
             values,
             operating_point,
             deviations,
@@ -416,19 +395,26 @@ impl Model for AsoController {
         self.observer = None;
         self.frozen = false;
         self.outside_reported = false;
+        self.is_integrated = false;
         self.reconfigurator.start();
         if let Some(sampler) = &mut self.sampler {
             sampler.start(time, &self.values.z);
             return self.sample(time, time);
         }
         self.mode = self.free_mode(self.is_compensating(time));
-        self.evaluate(0.0);
+        self.evaluate(time, 0.0);
         Ok(())
     }
 
+    /// The matrices of a continuous controller with a schedule move during the step, which then has no closed
+    /// form: the exporter integrates the derivatives.
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
         if self.sampler.is_some() {
             return self.sample(step.start, step.end());
+        }
+        if self.design.schedule.is_some() {
+            self.is_integrated = true;
+            return Err(Failure::Unsolved);
         }
         self.integrate(step)
     }
@@ -437,15 +423,15 @@ impl Model for AsoController {
     /// of the next step.
     fn step_to_event(&mut self, step: &Step) -> Result<Option<f64>, Failure> {
         if self.sampler.is_none() {
-            return self.integrate(step).map(|()| None);
+            return self.step(step).map(|()| None);
         }
         self.sample(step.start, step.start)?;
         Ok(self.sampler.as_ref().and_then(|sampler| sampler.next_until(step.end())))
     }
 
-    fn update(&mut self, _time: f64) -> Result<(), Failure> {
+    fn update(&mut self, time: f64) -> Result<(), Failure> {
         if self.sampler.is_none() {
-            self.evaluate(0.0);
+            self.evaluate(time, 0.0);
         }
         Ok(())
     }
@@ -507,7 +493,8 @@ impl Model for AsoController {
     }
 
     fn event_indicators(&self, _time: f64, indicators: &mut [f64]) {
-        let equations = Equations::<f64>::new(&self.design, self.mode);
+        let design = self.design_in_force();
+        let equations = Equations::<f64>::new(design, self.mode);
         let decisive = self.reconfigurator.distances(&self.design, &self.losses);
         let limited = self.design.actuators.iter().filter(|actuator| actuator.limits.is_some());
         let (limits, decisions) = indicators.split_at_mut(2 * limited.count());
@@ -515,11 +502,11 @@ impl Model for AsoController {
             *indicator = distance + if above { -HYSTERESIS } else { HYSTERESIS };
         }
         let mut pairs = limits.chunks_exact_mut(2);
-        for (j, actuator) in self.design.actuators.iter().enumerate() {
+        for (j, actuator) in design.actuators.iter().enumerate() {
             let Some([low, high]) = actuator.range() else { continue };
             let Signals { z, y, r, .. } = &self.deviations;
             let command = equations.free_command(j, equations.estimate(z), [y, r])
-                + self.mode.stuck_part(&self.design, j);
+                + self.mode.stuck_part(design, j);
             let distances = [command - low, high - command];
             for (side, indicator) in pairs.next().into_iter().flatten().enumerate() {
                 let beyond = if self.mode.is_at(side, j) { -HYSTERESIS } else { HYSTERESIS };
@@ -538,12 +525,14 @@ impl Model for AsoController {
             let next_event_time = self.sampler.as_ref().map(Sampler::next_instant);
             return Ok(Event { next_event_time, ..Event::default() });
         }
-        self.frozen = true;
+        // In an integrated step a limit is reached and left where it is, and events only separate the parts.
+        self.frozen = !self.is_integrated;
         let values_of_continuous_states_changed = self.reconfigure(time, None);
+        self.interpolate(0.0, time);
         self.deviations.set(&self.values, &self.operating_point, 0.0);
-        self.mode = self.free_mode(self.is_compensating(time));
+        let mode = self.free_mode(self.is_compensating(time));
         let Signals { z, y, r, .. } = &self.deviations;
-        self.mode = self.mode.limited(&self.design, z, [y, r]);
+        self.mode = mode.limited(self.design_in_force(), z, [y, r]);
         let waiting = self.compensate && !self.mode.compensating;
         let decision = self.reconfigurator.next_decision(&self.design);
         let next_event_time = waiting.then_some(self.design.t_on).into_iter().chain(decision);

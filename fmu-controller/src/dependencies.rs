@@ -5,6 +5,9 @@
 //! time nothing depends on `compensate` or `time`. A command with limits is not linear in what it
 //! depends on.
 //!
+//! In a continuous controller with a schedule everything but y_f' depends on the scheduling variable, too, with
+//! which the factors change.
+//!
 //! A sampled controller changes its outputs at samples only (`fmi2DoStep`, `fmi2NewDiscreteStates`),
 //! so at a point in time they depend on nothing. Its initial values are the values of sample 0.
 
@@ -83,16 +86,24 @@ fn has_limits(design: &Design) -> bool {
 
 /// The dependencies of command `j`.
 pub(crate) fn of_command(design: &Design, j: usize) -> Vec<Group> {
-    of_feedback(design, kinds_of_feedback(design, design.actuators[j].limits.is_some()))
+    let kinds = kinds_of_feedback(design, design.actuators[j].limits.is_some());
+    groups_by_schedule(design, of_feedback(design, kinds))
 }
 
 /// The dependencies of each loss of effectiveness.
 pub(crate) fn of_loss(design: &Design) -> Vec<Group> {
-    of_feedback(design, [Dependent, Dependent])
+    groups_by_schedule(design, of_feedback(design, [Dependent, Dependent]))
 }
 
 /// The dependencies of element `i` of z'.
 pub(crate) fn of_slope(design: &Design, i: usize) -> Vec<Group> {
+    let groups = of_constant_slope(design, i);
+    let filtered = design.filtered_at(0)..design.integral_at(0);
+    if filtered.contains(&i) { groups } else { groups_by_schedule(design, groups) }
+}
+
+/// The dependencies of element `i` of z' while the matrices stay.
+fn of_constant_slope(design: &Design, i: usize) -> Vec<Group> {
     let (n, q) = (design.states.len(), design.faults.len());
     if i < n {
         // A direct term has the measurements among those of the feedback.
@@ -221,6 +232,16 @@ pub(crate) fn of_initial_command(design: &Design, j: usize) -> Vec<String> {
     by_schedule(design, names)
 }
 
+/// `groups` of a controller without a schedule; with one, all names and the scheduling variable in a group of
+/// dependencies that are not linear.
+pub(crate) fn groups_by_schedule(design: &Design, groups: Vec<Group>) -> Vec<Group> {
+    if design.schedule.is_none() {
+        return groups;
+    }
+    let names = groups.into_iter().flat_map(|(_, names)| names).collect();
+    vec![(Dependent, by_schedule(design, names))]
+}
+
 /// `names` of a controller without a schedule; with one, its variable replaces the matrices, which are
 /// no parameters then.
 fn by_schedule(design: &Design, mut names: Vec<String>) -> Vec<String> {
@@ -287,7 +308,7 @@ pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
 /// The dependencies of the initial value of element `i` of z'.
 pub(crate) fn of_initial_slope(design: &Design, i: usize) -> Vec<String> {
     let (n, q) = (design.states.len(), design.faults.len());
-    if i < n {
+    let names = if i < n {
         of_initial_state_slope(design, i)
     } else if i < n + q {
         of_initial_fault_slope(design, i - n)
@@ -295,8 +316,9 @@ pub(crate) fn of_initial_slope(design: &Design, i: usize) -> Vec<String> {
         of_initial_integral_slope(design, i - design.integral_at(0))
     } else {
         // y_f starts at y.
-        Vec::new()
-    }
+        return Vec::new();
+    };
+    by_schedule(design, names)
 }
 
 fn of_initial_state_slope(design: &Design, i: usize) -> Vec<String> {

@@ -446,6 +446,13 @@ impl Design {
         [a, b, c, f_a, k_x, k_f, l_x, l_f].into_iter().chain(stated)
     }
 
+    /// Sets the matrices that do not depend on the scheduling variable to zero: a direction in the space of
+    /// this variable.
+    pub(crate) fn clear_constant(&mut self) {
+        let matrices = [&mut self.a_f, &mut self.h, &mut self.f_i].into_iter().flatten();
+        matrices.flat_map(|own| &mut own.values).for_each(|value| *value = 0.0);
+    }
+
     /// Takes what the importer can change: the limits of the actuators and the filter.
     pub(crate) fn take_parameters(&mut self, other: &Self) {
         for (own, other) in self.actuators.iter_mut().zip(&other.actuators) {

@@ -1,6 +1,6 @@
 //! A controller whose matrices and operating point depend on a scheduling variable.
 //!
-//! At each sample of the controller, with theta held within the grid,
+//! At each sample of the controller, in a continuous one at each instant, with theta held within the grid,
 //!
 //! ```text
 //! M(theta) = (1 - t) M_i + t M_{i+1},  t = (theta - theta_i) / (theta_{i+1} - theta_i)
@@ -8,7 +8,8 @@
 //!
 //! for each of A, B, C, F_a, K_x, K_f, L_x, L_f, x_op, u_op, y_op, and, where the design has them, K_i, L_w,
 //! N_r, r_op. The controller then takes the sample
-//! like one whose design states these numbers. The estimates are those of states, not of deviations,
+//! like one whose design states these numbers; a continuous one has the derivatives and commands of such a
+//! design. The estimates are those of states, not of deviations,
 //! so that a change of the operating point does not change them.
 
 use serde::{Deserialize, Serialize};
@@ -136,12 +137,14 @@ impl Schedule {
 
     /// Writes the derivatives of the interpolated matrices and operating point into `direction`, for
     /// the derivative `slope` of the scheduling variable; zero outside of the grid. At a point of the
-    /// grid they are those of the interval after it.
+    /// grid they are those of the interval after it. The matrices that the schedule leaves constant become
+    /// zero.
     pub(crate) fn differentiate(&self, value: f64, slope: f64, direction: &mut Design) -> f64 {
         let Place { interval, inside, .. } = self.place(value);
         let [from, to] = [0, 1].map(|end| self.points[interval + end].at);
         let slope = if inside { slope } else { 0.0 };
         self.write(interval, |[low, high]| (high - low) / (to - from) * slope, direction);
+        direction.clear_constant();
         slope
     }
 

@@ -93,6 +93,24 @@ impl Signals {
         self.set_inputs(values, point, offset);
     }
 
+    /// Sets z, y and r to the derivatives of their deviations: those of the signals less those of the operating
+    /// point, which `design` has in place of an operating point.
+    pub(crate) fn set_rates(&mut self, (z, values): (&[f64], &Values), design: &Design) {
+        self.z.copy_from_slice(z);
+        self.y.copy_from_slice(&values.y_slopes);
+        self.r.copy_from_slice(&values.r_slopes);
+        let less = |own: &mut [f64], signals: &[Signal]| {
+            for (own, signal) in own.iter_mut().zip(signals) {
+                *own -= signal.operating.unwrap_or_default();
+            }
+        };
+        let [x, _, y_f, _] = design.parts_mut(&mut self.z);
+        less(x, &design.states);
+        less(y_f, &design.measurements);
+        less(&mut self.y, &design.measurements);
+        less(&mut self.r, &design.references);
+    }
+
     /// Sets y and r only, `offset` s after the inputs in `values` were given.
     pub(crate) fn set_inputs(&mut self, values: &Values, point: &OperatingPoint, offset: f64) {
         let measured = values.y.iter().zip(&values.y_slopes).zip(&point.y);

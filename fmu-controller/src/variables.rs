@@ -143,18 +143,20 @@ fn schedule_input(design: &Design) -> Option<Variable<AsoController>> {
     Some(variable.derivative(|model: &mut AsoController| &mut model.schedule_slope))
 }
 
-/// The value of the scheduling variable that the last sample used.
+/// The value of the scheduling variable that the last sample used, or that a continuous controller uses.
 fn schedule_at(design: &Design) -> Option<Variable<AsoController>> {
     let schedule = design.schedule.as_ref()?;
     let unit = match schedule.measurement(design) {
         Some(k) => design.measurements[k].unit.as_ref(),
         None => schedule.unit.as_ref(),
     };
-    let text = format!("{} of the last sample, held within the schedule", schedule.variable);
+    let of = if design.sample_time.is_some() { " of the last sample" } else { "" };
+    let text = format!("{}{of}, held within the schedule", schedule.variable);
     let variable =
         Variable::real("schedule_at", text, |model: &mut AsoController| &mut model.schedule_at);
     let initial = vec![schedule.variable.clone()];
-    Some(output(design, with_unit(variable, unit), Vec::new()).initially(initial))
+    let groups = dependencies::groups_by_schedule(design, Vec::new());
+    Some(output(design, with_unit(variable, unit), groups).initially(initial))
 }
 
 /// The actuator that the controller does without.

@@ -297,7 +297,6 @@ def test_a_measurement_that_moves_its_own_operating_point_leaves_no_equilibrium_
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("sample_time = 0.02\n", "", "a continuous controller has no schedule"),
         ("at = 3.0", "at = 1.5", "expected ascending values"),
         ("at = 1.0\n", "at = 1.0\nA = [[0, 1], [0, -0.5]]\n", "expected one point with nothing but `at`"),
         ('variable = "inertia"', 'variable = "torque"', "is an actuator"),

@@ -15,8 +15,8 @@
 //!   and no filter of any order is.
 //! * [`certify_common`], [`common_feedback`]: the same for a family of systems, with one P and one
 //!   gain for all of them.
-//! * [`certify_schedule`]: proves that a sampled loop that depends on a scheduling variable is
-//!   stable, with a P that depends on it, too.
+//! * [`certify_schedule`]: proves that a loop that depends on a scheduling variable is stable while
+//!   this variable changes at a bounded rate, with a P that depends on it, too.
 //! * [`constant_gain`]: the static gain whose worst error over a family of systems is least.
 //!
 //! Problems are solved by an interior point method (Clarabel) in coordinates in which the data are

@@ -20,7 +20,9 @@ use super::plant_file::PlantFile;
 use super::signals::Signal;
 use super::variants::Variable;
 
-/// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p`.
+/// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p` of a
+/// current estimator. The loop of a continuous controller has degree 2; its coefficients of degree 4 are nearer
+/// to it.
 const DEGREE: u32 = 4;
 
 /// The designs of a scheduled controller.
@@ -37,7 +39,7 @@ pub(crate) struct Scheduled {
 
 /// The matrices at a value of the scheduling variable.
 struct Point {
-    /// The sampled plant without filters.
+    /// The plant without filters, sampled if the controller is.
     physical: StateSpace,
     /// The model in the observer, and the gains.
     model: FaultyPlant,
@@ -207,6 +209,7 @@ impl ScheduledLoop {
 /// ```text
 /// z[k+1] = A z + B y + ((I - A) z_op' - B y_op') theta
 /// u      = C z + D y + (u_op' - C z_op' - D y_op') theta
+/// z'     = A z + B y - (A z_op' + B y_op') theta              the first line in continuous time
 /// ```
 ///
 /// Between two intervals the slopes jump; the worse side counts. Source: W. J. Rugh and J. S. Shamma,
@@ -264,10 +267,12 @@ impl Slopes {
     /// x_i[k+1] = ... - T H y_op' theta,   u = ... - N_r H y_op' theta,   x_hat[k+1] = ... - B N_r H y_op' theta
     /// ```
     ///
-    /// The observer receives u, and so its next state has the same part of it.
+    /// In continuous time these are x_i' without T, and x_hat'. The observer receives u, and so its next state has the same part of it.
     fn move_references(&self, (design, own): (&ControllerDesign, &mut StateSpace), j: usize) {
-        let (Some(tracking), Domain::Sampled { period }) = (&design.tracking, design.domain) else {
-            return;
+        let Some(tracking) = &design.tracking else { return };
+        let period = match design.domain {
+            Domain::Continuous => 1.0,
+            Domain::Sampled { period } => period,
         };
         let moved = &tracking.h * DMatrix::from_column_slice(self.y.len(), 1, &self.y);
         let t = design.gains.integrals();
@@ -299,7 +304,11 @@ impl Slopes {
         let y = DMatrix::from_column_slice(self.y.len(), 1, &self.y);
         let u = DMatrix::from_column_slice(self.u.len(), 1, &self.u);
         let mut found = own.clone();
-        let to_z = &z - &own.a * &z - &own.b * &y;
+        let kept = match own.domain {
+            Domain::Continuous => z.scale(0.0),
+            Domain::Sampled { .. } => z.clone(),
+        };
+        let to_z = kept - &own.a * &z - &own.b * &y;
         let to_u = u - &own.c * &z - &own.d * &y;
         found.b.set_column(j, &(own.b.column(j) + to_z.column(0)));
         found.d.set_column(j, &(own.d.column(j) + to_u.column(0)));

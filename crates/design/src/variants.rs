@@ -130,12 +130,6 @@ pub(crate) fn schedule(
     measurements: &[Signal],
 ) -> Result<Option<Schedule>, PlaceError> {
     let Some(entry) = file.get("schedule") else { return Ok(None) };
-    if file.get("sample_time").is_none() {
-        return Err(entry.error(
-            "a continuous controller has no schedule, because its exact step would need a matrix \
-             exponential for each value of the variable; expected `sample_time`",
-        ));
-    }
     let table = entry.table()?;
     table.allow(&["variable", "unit", "description", "rate_bound", "points"])?;
     let named =

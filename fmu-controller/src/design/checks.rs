@@ -78,9 +78,6 @@ impl Design {
     fn check_schedule(&self, path: &str) -> Result<(), DesignError> {
         let Some(schedule) = &self.schedule else { return Ok(()) };
         let refuse = |what: String| Err(DesignError::Entry { path: path.to_owned(), what });
-        if self.sample_time.is_none() {
-            return refuse("schedule is stated and sample_time is not".to_owned());
-        }
         let others = [(self.p_f.is_some(), "P_f"), (self.sliding_mode.is_some(), "sliding_mode")];
         if let Some((_, other)) = others.iter().find(|(stated, _)| *stated) {
             return refuse(format!("schedule and {other} are stated, expected one of them"));

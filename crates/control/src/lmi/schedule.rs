@@ -1,10 +1,11 @@
-//! The certificate of a sampled loop that depends on a scheduling variable.
+//! The certificate of a loop that depends on a scheduling variable.
 
 use super::coordinates::Coordinates;
 use super::definite::{AccurateProduct, margin};
 use super::region::MARGIN;
 use super::{Affine, Problem};
-use crate::{Error, check};
+use crate::eigen::eigenvalues;
+use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};
 
 /// Factor between the rates that [`largest_change`] tries, their number, and the bisections after them.
@@ -12,7 +13,7 @@ const FACTOR: f64 = 0.25;
 const RATES: usize = 7;
 const BISECTIONS: usize = 3;
 
-/// A sampled loop on an interval of its scheduling variable theta, a polynomial of t = (theta -
+/// A loop on an interval of its scheduling variable theta, a polynomial of t = (theta -
 /// `theta_1`) / length from 0 to 1.
 ///
 /// ```text
@@ -31,7 +32,8 @@ pub struct Interval {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ScheduleCertificate {
-    /// The largest change of theta in a sample, in the unit of theta.
+    /// The largest change of theta in a sample, in the unit of theta; in continuous time its largest
+    /// rate, in this unit per s.
     pub change: f64,
     /// P at each grid point, n x n: one more than intervals.
     pub p: Vec<DMatrix<f64>>,
@@ -81,24 +83,38 @@ pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
     Ok((0..=degree).map(coefficient).collect())
 }
 
-/// Proves that a sampled loop is stable while its scheduling variable changes by at most `change`
-/// from one sample to the next.
+/// Proves that a loop is stable while its scheduling variable changes by at most `change` from one
+/// sample to the next, or in continuous time by at most `change` per s.
+///
+/// Sampled, with V = x' P(theta) x:
 ///
 /// ```text
-/// x[k+1] = A(theta[k]) x[k],  |theta[k+1] - theta[k]| <= change,  V = x' P(theta) x
+/// x[k+1] = A(theta[k]) x[k],  |theta[k+1] - theta[k]| <= change
 /// [P(theta), A(theta)' P+; P+ A(theta), P+] > 0,  P+ = P(theta) + D
 /// for D = change P_i', change P_{i+1}', -change P_i', -change P_{i-1}'
 /// ```
 ///
 /// `P_i`' is the slope of P in interval i. `P(theta[k+1]) - P(theta[k])` is in the convex hull of the
-/// four D, as `change` is at most the length of the shortest interval. The matrices are polynomials
-/// of t in each interval; all their Bernstein coefficients are positive definite, so the proof holds
+/// four D, as `change` is at most the length of the shortest interval.
+///
+/// Continuous:
+///
+/// ```text
+/// x' = A(theta) x,  |theta'| <= change
+/// A(theta)' P(theta) + P(theta) A(theta) + D < 0  for D = change P_i', -change P_i'
+/// ```
+///
+/// There V is continuous, and along every theta(t) its one-sided derivatives at a grid point are those of the
+/// intervals beside it, so that it decreases there, too.
+///
+/// The matrices are polynomials
+/// of t in each interval; all their Bernstein coefficients are definite, so the proof holds
 /// between the grid points, too. It is sufficient, not necessary.
 ///
 /// Returns None if no P was found. The P of the solver is verified by the eigenvalues of all
 /// inequalities in the units of the data, with products in twice the precision. Cost: that of a
-/// program with n (n + 1) / 2 unknowns for each grid point and 4 (d + 2) inequalities of order 2 n
-/// for each interval.
+/// program with n (n + 1) / 2 unknowns for each grid point and, for each interval, 4 (d + 2)
+/// inequalities of order 2 n, in continuous time 2 (d + 2) of order n.
 ///
 /// Source: P. Apkarian, P. Gahinet, G. Becker, Self-scheduled H-infinity control of linear
 /// parameter-varying systems, Automatica 31 (1995); F. Wu, X. H. Yang, A. Packard, G. Becker,
@@ -110,22 +126,26 @@ pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
 /// # Errors
 ///
 /// [`Error::Empty`], [`Error::Shape`], [`Error::NotFinite`] for bad or missing intervals;
-/// [`Error::OutOfRange`] for a length or a change that is not above 0, or a change beyond the
-/// shortest interval; [`Error::NotConverged`].
+/// [`Error::OutOfRange`] for a length or a change that is not above 0, a bad period, or in sampled time
+/// a change beyond the shortest interval; [`Error::NotConverged`].
 pub fn certify_schedule(
     intervals: &[Interval],
     change: f64,
+    domain: Domain,
 ) -> Result<Option<ScheduleCertificate>, Error> {
     let shortest = check(intervals)?;
+    domain.check()?;
     check::positive("change", change)?;
-    if change > shortest {
+    if domain != Domain::Continuous && change > shortest {
         let rule = "at most the length of the shortest interval";
         return Err(Error::OutOfRange { name: "change", value: change, rule });
     }
     let Some(mut coordinates) = Coordinates::of_dynamics(&intervals[0].coefficients[0])? else {
         return Ok(None);
     };
-    coordinates.unit = 1.0;
+    if domain != Domain::Continuous {
+        coordinates.unit = 1.0;
+    }
     let inside: Vec<_> = intervals
         .iter()
         .map(|own| Interval {
@@ -140,43 +160,70 @@ pub fn certify_schedule(
         problem.constrain(own, MARGIN);
         problem.constrain(&(&Affine::identity(n, 1.0) - own), MARGIN);
     }
-    for matrix in inequalities(&inside, &p, change, |p, a| p * a) {
+    // In continuous time the unit of A~ is that of time, too.
+    let scaled = change / coordinates.unit;
+    let claims = match domain {
+        Domain::Continuous => decays(&inside, &p, scaled),
+        Domain::Sampled { .. } => inequalities(&inside, &p, scaled, |p, a| p * a),
+    };
+    for matrix in claims {
         problem.constrain(&matrix, MARGIN);
     }
     let Some(solution) = problem.solve()?.optimal() else { return Ok(None) };
     let p: Vec<_> = p.iter().map(|own| coordinates.certificate(&solution.value(own))).collect();
-    verified(intervals, change, p)
+    verified(intervals, (change, domain), p)
 }
 
-/// The largest change of the scheduling variable in a sample that [`certify_schedule`] proves, to
-/// 10 %, between the shortest interval and 1/4096 of it; None if it proves none of these.
+/// The largest change of the scheduling variable in a sample, or in continuous time its largest rate per s, that
+/// [`certify_schedule`] proves, to 20 %; None if it proves none between an upper limit and 1/4096 of it.
+///
+/// The limit is the length of the shortest interval; in continuous time this length times the largest
+/// modulus of the eigenvalues of the coefficients: a variable that passes the interval as fast as the
+/// fastest mode of the loop decays. Nothing above the limit is tried.
 ///
 /// # Errors
 ///
 /// Same as [`certify_schedule`].
-pub fn largest_change(intervals: &[Interval]) -> Result<Option<ScheduleCertificate>, Error> {
-    let mut change = check(intervals)?;
+pub fn largest_change(
+    intervals: &[Interval],
+    domain: Domain,
+) -> Result<Option<ScheduleCertificate>, Error> {
+    let limit = limit(intervals, domain)?;
+    let mut change = limit;
     let mut found = None;
     for _ in 0..RATES {
-        found = certify_schedule(intervals, change)?;
+        found = certify_schedule(intervals, change, domain)?;
         if found.is_some() {
             break;
         }
         change *= FACTOR;
     }
     let Some(mut best) = found else { return Ok(None) };
-    if change >= check(intervals)? {
+    if change >= limit {
         return Ok(Some(best));
     }
     let mut bad = best.change / FACTOR;
     for _ in 0..BISECTIONS {
         let middle = (best.change * bad).sqrt();
-        match certify_schedule(intervals, middle)? {
+        match certify_schedule(intervals, middle, domain)? {
             Some(better) => best = better,
             None => bad = middle,
         }
     }
     Ok(Some(best))
+}
+
+/// The largest change that [`largest_change`] tries.
+fn limit(intervals: &[Interval], domain: Domain) -> Result<f64, Error> {
+    let shortest = check(intervals)?;
+    if domain != Domain::Continuous {
+        return Ok(shortest);
+    }
+    let mut fastest = f64::MIN_POSITIVE;
+    for a in intervals.iter().flat_map(|own| &own.coefficients) {
+        fastest = eigenvalues(a)?.iter().map(|value| value.norm()).fold(fastest, f64::max);
+    }
+    Ok(shortest * fastest)
 }
 
 /// The length of the shortest interval of a consistent list.
@@ -199,7 +246,7 @@ fn check(intervals: &[Interval]) -> Result<f64, Error> {
     Ok(shortest)
 }
 
-/// The Bernstein coefficients of the inequalities; `times` returns the product P A.
+/// The Bernstein coefficients of the inequalities in sampled time; `times` returns the product P A.
 fn inequalities(
     intervals: &[Interval],
     p: &[Affine],
@@ -214,7 +261,6 @@ fn inequalities(
         let mut moves = vec![(i, change), (i, -change)];
         moves.extend((right != i).then_some((right, change)));
         moves.extend((left != i).then_some((left, -change)));
-        let number = |k: usize| f64::from(u32::try_from(k).unwrap_or(u32::MAX));
         // The degree of P A is that of A and 1 more.
         let degree = a.len();
         for (interval, step) in moves {
@@ -240,18 +286,72 @@ fn inequalities(
     all
 }
 
+fn number(k: usize) -> f64 {
+    f64::from(u32::try_from(k).unwrap_or(u32::MAX))
+}
+
+/// The Bernstein coefficients of -(A' P + P A + D) in continuous time.
+fn decays(intervals: &[Interval], p: &[Affine], rate: f64) -> Vec<Affine> {
+    let mut all = Vec::new();
+    for (i, Interval { coefficients: a, length }) in intervals.iter().enumerate() {
+        let slope = &(&p[i + 1] - &p[i]) * (rate / length);
+        let degree = a.len();
+        for j in 0..=degree {
+            let t = number(j) / number(degree);
+            let (n, _) = slope.shape();
+            let mut product = Affine::zeros(n, n);
+            if j < degree {
+                product = &product + &(&(&p[i] * &a[j]) * (1.0 - t));
+            }
+            if j > 0 {
+                product = &product + &(&(&p[i + 1] * &a[j - 1]) * t);
+            }
+            let sum = &product + &product.transpose();
+            all.extend([-&(&sum + &slope), -&(&sum - &slope)]);
+        }
+    }
+    all
+}
+
+/// [`decays`] for known P, each times d + 1, rounded after the large terms have cancelled.
+fn accurate_decays(intervals: &[Interval], p: &[DMatrix<f64>], rate: f64) -> Vec<DMatrix<f64>> {
+    let mut all = Vec::new();
+    for (i, Interval { coefficients: a, length }) in intervals.iter().enumerate() {
+        let n = p[i].nrows();
+        let degree = a.len();
+        let slope = (&p[i + 1] - &p[i]) * (rate / length * number(degree));
+        for j in 0..=degree {
+            // (d + 1 - j) `P_i` `A_j` + j `P_{i+1}` `A_{j-1}` as one product: a sum of whole terms rounds nothing.
+            let pair = |k: usize| if k < degree - j { (i, j) } else { (i + 1, j - 1) };
+            let left = DMatrix::from_fn(n, n * degree, |row, k| p[pair(k / n).0][(row, k % n)]);
+            let right = DMatrix::from_fn(n * degree, n, |k, col| a[pair(k / n).1][(k % n, col)]);
+            let product = AccurateProduct::new(&left, &right);
+            all.extend([-product.plus_transpose(&slope), -product.plus_transpose(&-&slope)]);
+        }
+    }
+    all
+}
+
 /// The certificate, if P proves the inequalities in the units of the data.
 fn verified(
     intervals: &[Interval],
-    change: f64,
+    (change, domain): (f64, Domain),
     p: Vec<DMatrix<f64>>,
 ) -> Result<Option<ScheduleCertificate>, Error> {
-    let known: Vec<_> = p.iter().map(Affine::constant).collect();
-    let times =
-        |p: &Affine, a: &DMatrix<f64>| Affine::constant(&AccurateProduct::new(&p.constant, a).high);
+    let claims = match domain {
+        Domain::Continuous => accurate_decays(intervals, &p, change),
+        Domain::Sampled { .. } => {
+            let known: Vec<_> = p.iter().map(Affine::constant).collect();
+            let times = |p: &Affine, a: &DMatrix<f64>| {
+                Affine::constant(&AccurateProduct::new(&p.constant, a).high)
+            };
+            let all = inequalities(intervals, &known, change, times);
+            all.iter().map(|matrix| matrix.evaluate(&DVector::zeros(0))).collect()
+        }
+    };
     let mut smallest = f64::INFINITY;
-    for matrix in known.iter().cloned().chain(inequalities(intervals, &known, change, times)) {
-        smallest = smallest.min(margin(&matrix.evaluate(&DVector::zeros(0)))?);
+    for matrix in p.iter().chain(&claims) {
+        smallest = smallest.min(margin(matrix)?);
     }
     Ok((smallest > 0.0).then_some(ScheduleCertificate { change, p, margin: smallest }))
 }

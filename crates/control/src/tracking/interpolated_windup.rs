@@ -1,9 +1,9 @@
 //! The back-calculation between two points of a schedule.
 
-use crate::eigen::eigenvalues;
-use crate::lyapunov::discrete_lyapunov;
+use crate::lyapunov::{definite_range, discrete_lyapunov, lyapunov};
+use crate::stability::instability;
 use crate::svd::{Svd, norm_2};
-use crate::{Error, check};
+use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
 /// The largest number of commands with limits: all sets of them are examined.
@@ -12,9 +12,10 @@ const COMMANDS: usize = 10;
 const BISECTIONS: usize = 12;
 /// Directions of the commands that are shorter than this, relative to the longest, do not count.
 const TOLERANCE: f64 = 1e-9;
-/// An eigenvalue this far beyond the unit circle is on it, with rounding errors.
+/// An eigenvalue this far beyond the stability limit, relative to the rate in continuous time, is on it, with
+/// rounding errors.
 const NEUTRAL: f64 = 1e-9;
-/// What a norm must stay below 1, more than its rounding errors.
+/// What a norm must stay below 1, or a decay above 0, more than its rounding errors.
 const MARGIN: f64 = 1e-10;
 
 /// What is known of an interpolated back-calculation.
@@ -28,8 +29,9 @@ pub enum InterpolatedWindup {
         part: f64,
         /// The commands at their limits, from 0.
         limited: Vec<usize>,
-        /// The largest modulus of the eigenvalues there.
-        radius: f64,
+        /// The instability there: the largest modulus of the eigenvalues less 1; in continuous time the largest
+        /// real part.
+        instability: f64,
     },
     /// Neither was shown for these commands at their limits, from 0.
     Undecided {
@@ -38,37 +40,40 @@ pub enum InterpolatedWindup {
     },
 }
 
-/// Whether a sampled back-calculation is stable while it is interpolated between two points.
+/// Whether a back-calculation is stable while it is interpolated between two points.
 ///
 /// ```text
 /// x_i[k+1] = (I - L_w(s) S K_i(s)) x_i[k] + ...,   K_i(s) = (1 - s) K_i0 + s K_i1,   L_w(s) the same
+/// x_i' = -L_w(s) S K_i(s) x_i + ...                in continuous time
 /// ```
 ///
-/// S selects commands at their limits. At the points `L_w` = (1 - e^(-rate T)) `K_i`^+ by
-/// [`super::windup_gain`], so that the eigenvalues are between 0 and 1 for every S; between them the product
+/// S selects commands at their limits. At the points `L_w` = (1 - e^(-rate T)) `K_i`^+, or rate `K_i`^+, by
+/// [`super::windup_gain`], so that the eigenvalues are between 0 and 1, or -rate and 0, for every S; between them the product
 /// has a term `L_w0` S `K_i1` + `L_w1` S `K_i0`. A result [`InterpolatedWindup::Stable`] is a proof up to
-/// rounding, for each constant s from 0 to 1 and each constant S: no eigenvalue but those at 1 of integrals
-/// on which the commands of S do not act is on or outside of the unit circle. It says nothing of
+/// rounding, for each constant s from 0 to 1 and each constant S: no eigenvalue but those at 1, or 0, of
+/// integrals on which the commands of S do not act is on or beyond the stability limit. It says nothing of
 /// a moving s while commands are at their limits.
 ///
 /// `k_i`: `K_i`, m x t, at the two points; `l_w`: `L_w`, t x m; `ranges`: as in [`super::windup_gain`].
 ///
-/// Method: for each set S the matrix M(s) = I - N(s) on the directions that count, N = Q' `K_i` `L_w` Q with Q
+/// Method: for each set S the matrix M(s) = I - N(s), or -N(s), on the directions that count, N = Q' `K_i` `L_w` Q with Q
 /// an orthonormal basis of the columns of S `K_i0` and S `K_i1` in units of the ranges, or N = `L_w` S `K_i` where that
 /// is smaller; both have the eigenvalues of `L_w` S `K_i` other than 0. M(s) is a polynomial of degree 2, a
 /// convex combination of its Bernstein coefficients; a Lyapunov matrix P of its middle for which all
-/// three have a P norm below 1 proves the interval. Otherwise the interval is bisected, up to 12 times. More
+/// three have a P norm below 1, or decrease x' P x, proves the interval. Otherwise the interval is bisected, up to 12 times. More
 /// than 10 commands with limits are not examined.
 ///
 /// # Errors
 ///
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::OutOfRange`] for a bad
-/// range; [`Error::NotConverged`]; the errors of [`discrete_lyapunov`].
+/// range or period; [`Error::NotConverged`]; the errors of [`discrete_lyapunov`].
 pub fn interpolated_windup(
     k_i: [&DMatrix<f64>; 2],
     l_w: [&DMatrix<f64>; 2],
     ranges: &[Option<f64>],
+    domain: Domain,
 ) -> Result<InterpolatedWindup, Error> {
+    domain.check()?;
     let t = k_i[0].ncols();
     for (k, l) in k_i.into_iter().zip(l_w) {
         check::shape("K_i", k, (ranges.len(), t))?;
@@ -92,10 +97,10 @@ pub fn interpolated_windup(
         let units: Vec<_> = own.iter().filter_map(|&j| ranges[j]).collect();
         let k = k_i.map(|k| DMatrix::from_fn(own.len(), t, |i, j| k[(own[i], j)] / units[i]));
         let l = l_w.map(|l| DMatrix::from_fn(t, own.len(), |i, j| l[(i, own[j])] * units[j]));
-        match examine(&follows(&k, &l)?, [0.0, 1.0], BISECTIONS)? {
+        match examine(&follows(&k, &l, domain)?, [0.0, 1.0], BISECTIONS, domain)? {
             Examined::Stable => {}
-            Examined::Unstable { part, radius } => {
-                return Ok(InterpolatedWindup::Unstable { part, limited: own, radius });
+            Examined::Unstable { part, instability } => {
+                return Ok(InterpolatedWindup::Unstable { part, limited: own, instability });
             }
             Examined::Undecided => undecided = undecided.or(Some(own)),
         }
@@ -105,7 +110,11 @@ pub fn interpolated_windup(
 }
 
 /// The Bernstein coefficients of M(s).
-fn follows(k: &[DMatrix<f64>; 2], l: &[DMatrix<f64>; 2]) -> Result<[DMatrix<f64>; 3], Error> {
+fn follows(
+    k: &[DMatrix<f64>; 2],
+    l: &[DMatrix<f64>; 2],
+    domain: Domain,
+) -> Result<[DMatrix<f64>; 3], Error> {
     let t = k[0].ncols();
     let both = DMatrix::from_fn(k[0].nrows(), 2 * t, |i, j| k[j / t][(i, j % t)]);
     let svd = Svd::new(&both)?;
@@ -115,22 +124,30 @@ fn follows(k: &[DMatrix<f64>; 2], l: &[DMatrix<f64>; 2]) -> Result<[DMatrix<f64>
         if rank <= t { q.transpose() * &k[i] * &l[j] * q } else { &l[j] * &k[i] }
     };
     let order = rank.min(t);
-    let identity = DMatrix::identity(order, order);
+    let kept = match domain {
+        Domain::Continuous => DMatrix::zeros(order, order),
+        Domain::Sampled { .. } => DMatrix::identity(order, order),
+    };
     Ok([
-        &identity - product(0, 0),
-        &identity - (product(0, 1) + product(1, 0)) * 0.5,
-        &identity - product(1, 1),
+        &kept - product(0, 0),
+        &kept - (product(0, 1) + product(1, 0)) * 0.5,
+        &kept - product(1, 1),
     ])
 }
 
 enum Examined {
     Stable,
-    Unstable { part: f64, radius: f64 },
+    Unstable { part: f64, instability: f64 },
     Undecided,
 }
 
 /// Examines M(s) for s between `ends`, from its Bernstein coefficients there.
-fn examine(own: &[DMatrix<f64>; 3], ends: [f64; 2], bisections: usize) -> Result<Examined, Error> {
+fn examine(
+    own: &[DMatrix<f64>; 3],
+    ends: [f64; 2],
+    bisections: usize,
+    domain: Domain,
+) -> Result<Examined, Error> {
     let [first, inner, last] = own;
     if first.is_empty() {
         return Ok(Examined::Stable);
@@ -139,15 +156,23 @@ fn examine(own: &[DMatrix<f64>; 3], ends: [f64; 2], bisections: usize) -> Result
     let middle = (&halves[0] + &halves[1]) * 0.5;
     let centre = (ends[0] + ends[1]) * 0.5;
     for (part, value) in [(ends[0], first), (centre, &middle), (ends[1], last)] {
-        let radius = eigenvalues(value)?.iter().map(|value| value.norm()).fold(0.0, f64::max);
-        if radius > 1.0 + NEUTRAL {
-            return Ok(Examined::Unstable { part, radius });
+        let instability = instability(value, domain)?;
+        let neutral = match domain {
+            Domain::Continuous => NEUTRAL * own.iter().map(DMatrix::amax).fold(0.0, f64::max),
+            Domain::Sampled { .. } => NEUTRAL,
+        };
+        if instability > neutral {
+            return Ok(Examined::Unstable { part, instability });
         }
-        if radius > 1.0 - NEUTRAL {
+        if instability > -neutral {
             return Ok(Examined::Undecided);
         }
     }
-    if contracts(&middle, own)? {
+    let proven = match domain {
+        Domain::Continuous => decreases(&middle, own)?,
+        Domain::Sampled { .. } => contracts(&middle, own)?,
+    };
+    if proven {
         return Ok(Examined::Stable);
     }
     if bisections == 0 {
@@ -160,7 +185,7 @@ fn examine(own: &[DMatrix<f64>; 3], ends: [f64; 2], bisections: usize) -> Result
     ];
     let mut found = Examined::Stable;
     for (own, ends) in parts {
-        match examine(&own, ends, bisections - 1)? {
+        match examine(&own, ends, bisections - 1, domain)? {
             Examined::Stable => {}
             Examined::Undecided => found = Examined::Undecided,
             unstable @ Examined::Unstable { .. } => return Ok(unstable),
@@ -180,6 +205,24 @@ fn contracts(middle: &DMatrix<f64>, own: &[DMatrix<f64>]) -> Result<bool, Error>
     for value in own {
         if norm_2(&(&factor * value * &inverse))? >= 1.0 - MARGIN {
             return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Whether x' P x decreases along all of `own` for P with M' P + P M = -I, M = `middle`, by more than the
+/// rounding errors of the products.
+fn decreases(middle: &DMatrix<f64>, own: &[DMatrix<f64>]) -> Result<bool, Error> {
+    let identity = DMatrix::identity(middle.nrows(), middle.nrows());
+    let p = lyapunov(middle, &identity)?.p;
+    for value in own {
+        let product = &p * value;
+        let decay = -(&product + product.transpose());
+        let rounding = MARGIN * norm_2(&p)? * norm_2(value)?;
+        match definite_range(&(decay - &identity * rounding)) {
+            Ok(_) => {}
+            Err(Error::NotPositiveDefinite { .. }) => return Ok(false),
+            Err(error) => return Err(error),
         }
     }
     Ok(true)

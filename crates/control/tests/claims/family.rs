@@ -131,9 +131,11 @@ fn a_loop_that_a_jump_destabilises_is_stable_while_its_variable_changes_slowly()
     let interval = rotations();
     let jumps = certify_common(&[rotation(0.0), rotation(1.0)], &stable(), SAMPLED).unwrap();
     assert_eq!(jumps, Outcome::Infeasible { conflict: vec![0, 1] });
-    let found = largest_change(std::slice::from_ref(&interval)).unwrap().expect("a certificate");
+    let found =
+        largest_change(std::slice::from_ref(&interval), SAMPLED).unwrap().expect("a certificate");
     assert!(found.change > 0.01 && found.change < 2.0, "{}", found.change);
-    assert!(certify_schedule(std::slice::from_ref(&interval), found.change).unwrap().is_some());
+    let again = certify_schedule(std::slice::from_ref(&interval), found.change, SAMPLED);
+    assert!(again.unwrap().is_some());
     let p = |theta: f64| &found.p[0] * (1.0 - theta / 2.0) + &found.p[1] * (theta / 2.0);
     let a = |theta: f64| {
         let t = theta / 2.0;
@@ -161,7 +163,8 @@ fn a_loop_that_a_jump_destabilises_is_stable_while_its_variable_changes_slowly()
 
 #[test]
 fn every_matrix_between_the_grid_points_is_stable_by_the_certificate() {
-    let found = largest_change(&[rotations(), rotations_back()]).unwrap().expect("a certificate");
+    let found =
+        largest_change(&[rotations(), rotations_back()], SAMPLED).unwrap().expect("a certificate");
     assert_eq!(found.p.len(), 3);
     assert!(found.margin > 0.0);
     for value in eigenvalues(&rotation(0.37)).unwrap() {
@@ -172,4 +175,52 @@ fn every_matrix_between_the_grid_points_is_stable_by_the_certificate() {
 fn rotations_back() -> Interval {
     let values: Vec<_> = (0..=4).map(|k| rotation(1.0 - f64::from(k) / 4.0)).collect();
     Interval { length: 1.0, coefficients: bernstein(&values).expect("values of one shape") }
+}
+
+/// x'' + x' + k x = 0 with k from 1 to 9 on one interval of length 8.
+fn spring() -> Interval {
+    Interval { length: 8.0, coefficients: vec![oscillator(1.0, 1.0), oscillator(9.0, 1.0)] }
+}
+
+/// By the circle criterion no quadratic Lyapunov function serves any rate, as sqrt(9) - sqrt(1) > 1.
+#[test]
+fn a_spring_that_no_common_p_serves_is_stable_while_it_changes_slowly() {
+    let interval = spring();
+    let jumps = certify_common(&interval.coefficients, &stable(), Domain::Continuous).unwrap();
+    assert_eq!(jumps, Outcome::Infeasible { conflict: vec![0, 1] });
+    let found = largest_change(std::slice::from_ref(&interval), Domain::Continuous);
+    let found = found.unwrap().expect("a certificate");
+    // V = x' P(k) x with rates up to this one decreases at each k: the residual at a grid of its own.
+    assert!(found.change > 0.1, "{}", found.change);
+    let slope = (&found.p[1] - &found.p[0]) / 8.0;
+    for step in 0..=400 {
+        let t = f64::from(step) / 400.0;
+        let p = &found.p[0] * (1.0 - t) + &found.p[1] * t;
+        assert!(p.clone().symmetric_eigenvalues().min() > 0.0);
+        let a = oscillator(1.0 + 8.0 * t, 1.0);
+        for rate in [-found.change, 0.0, found.change] {
+            let change = a.transpose() * &p + &p * &a + &slope * rate;
+            assert!(change.symmetric_eigenvalues().max() < 0.0, "{t} {rate}");
+        }
+    }
+}
+
+/// A spring that is soft while the mass moves outwards and stiff while it comes back pumps energy into the
+/// oscillation: the state grows, though every constant k is stable. So no certificate may exist for a
+/// rate at which k follows this law.
+#[test]
+fn no_certificate_exists_for_a_rate_at_which_the_spring_can_be_pumped() {
+    let (rate, step) = (500.0, 1e-4);
+    let (mut x, mut v, mut k) = (1.0_f64, 0.0_f64, 1.0_f64);
+    for _ in 0..200_000 {
+        let aim = if x * v > 0.0 { 1.0 } else { 25.0 };
+        k += (aim - k).clamp(-rate * step, rate * step);
+        v -= step * (v + k * x);
+        x += step * v;
+    }
+    let grown = x.hypot(v);
+    assert!(grown > 1e3, "{grown}");
+    let coefficients = vec![oscillator(1.0, 1.0), oscillator(25.0, 1.0)];
+    let interval = Interval { length: 24.0, coefficients };
+    assert!(certify_schedule(&[interval], rate, Domain::Continuous).unwrap().is_none());
 }

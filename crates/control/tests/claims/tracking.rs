@@ -407,28 +407,52 @@ fn double_integrator() -> [DMatrix<f64>; 3] {
     [matrix(2, &[0.0, 1.0, 0.0, 0.0]), matrix(2, &[0.0, 1.0]), matrix(1, &[1.0, 0.0])]
 }
 
-/// The back-calculations of two K_i with the same ranges and the factor f.
+const SAMPLED: Domain = Domain::Sampled { period: 1.0 };
+
+/// The back-calculations of two K_i with the same ranges and the factor f, in continuous time the rate.
 fn calculations(
     k: [&DMatrix<f64>; 2],
     ranges: &[Option<f64>],
     f: f64,
+    domain: Domain,
 ) -> Result<([DMatrix<f64>; 2], InterpolatedWindup), Error> {
-    let gain = |k| windup_gain(k, ranges, -(1.0 - f).ln(), Domain::Sampled { period: 1.0 });
+    let rate = if domain == SAMPLED { -(1.0 - f).ln() } else { f };
+    let gain = |k| windup_gain(k, ranges, rate, domain);
     let l = [gain(k[0])?, gain(k[1])?];
-    let found = interpolated_windup(k, [&l[0], &l[1]], ranges)?;
+    let found = interpolated_windup(k, [&l[0], &l[1]], ranges, domain)?;
     Ok((l, found))
 }
 
-/// The largest modulus of the eigenvalues of I - L_w S K_i on the way.
-fn radius(k: [&DMatrix<f64>; 2], l: &[DMatrix<f64>; 2], set: &[usize], s: f64) -> f64 {
+/// The largest modulus of the eigenvalues of I - L_w S K_i on the way, less 1; in continuous time the largest
+/// real part of those of -L_w S K_i.
+fn excess(
+    k: [&DMatrix<f64>; 2],
+    l: &[DMatrix<f64>; 2],
+    set: &[usize],
+    (s, domain): (f64, Domain),
+) -> f64 {
     let k = (k[0] * (1.0 - s) + k[1] * s).select_rows(set);
     let l = (&l[0] * (1.0 - s) + &l[1] * s).select_columns(set);
-    let own = DMatrix::identity(l.nrows(), l.nrows()) - l * k;
-    own.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max)
+    let own = -(l * k);
+    if domain == SAMPLED {
+        let own = DMatrix::identity(own.nrows(), own.nrows()) + own;
+        return own.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max)
+            - 1.0;
+    }
+    own.complex_eigenvalues().iter().map(|value| value.re).fold(f64::NEG_INFINITY, f64::max)
 }
 
 #[test]
 fn an_interpolated_back_calculation_is_stable_where_the_eigenvalues_are_and_for_no_other() {
+    stable_where_the_eigenvalues_are(SAMPLED);
+}
+
+#[test]
+fn a_continuous_one_too() {
+    stable_where_the_eigenvalues_are(Domain::Continuous);
+}
+
+fn stable_where_the_eigenvalues_are(domain: Domain) {
     // 400 random pairs of K_i: 1 to 3 commands with and without limits, 1 or 2 integrals.
     let mut numbers = Numbers(7);
     let mut counts = [0; 3];
@@ -440,7 +464,8 @@ fn an_interpolated_back_calculation_is_stable_where_the_eigenvalues_are_and_for_
         let ranges: Vec<_> =
             (0..m).map(|_| (numbers.next() < 0.8).then(|| 0.2 + 3.0 * numbers.next())).collect();
         let k = [&k_0, &k_1];
-        let (l, found) = calculations(k, &ranges, 0.05 + 0.9 * numbers.next()).unwrap();
+        let found = calculations(k, &ranges, 0.05 + 0.9 * numbers.next(), domain);
+        let (l, found) = found.expect("gains of small matrices");
         match found {
             InterpolatedWindup::Stable => {
                 let limited: Vec<_> = (0..m).filter(|&j| ranges[j].is_some()).collect();
@@ -448,20 +473,22 @@ fn an_interpolated_back_calculation_is_stable_where_the_eigenvalues_are_and_for_
                     let set: Vec<_> = (0..limited.len()).filter(|j| bits >> j & 1 == 1).collect();
                     let set: Vec<_> = set.into_iter().map(|j| limited[j]).collect();
                     for step in 0..=50 {
-                        assert!(radius(k, &l, &set, f64::from(step) / 50.0) < 1.0 + 1e-9);
+                        let at = (f64::from(step) / 50.0, domain);
+                        assert!(excess(k, &l, &set, at) < 1e-9);
                     }
                 }
                 counts[0] += 1;
             }
-            InterpolatedWindup::Unstable { part, limited, radius: stated } => {
-                let own = radius(k, &l, &limited, part);
-                assert!((own - stated).abs() < 1e-9 * own && own > 1.0 + 1e-10);
+            InterpolatedWindup::Unstable { part, limited, instability } => {
+                let own = excess(k, &l, &limited, (part, domain));
+                assert!((own - instability).abs() < 1e-9 * (1.0 + own) && own > 1e-10);
                 counts[1] += 1;
             }
             InterpolatedWindup::Undecided { limited } => {
-                // K_i of these commands passes zero: an eigenvalue is near 1.
-                let steps = (0..=1000).map(|step| radius(k, &l, &limited, f64::from(step) / 1e3));
-                assert!((steps.fold(0.0, f64::max) - 1.0).abs() < 1e-3);
+                // K_i of these commands passes zero: an eigenvalue is near the stability limit.
+                let at = |step: i32| (f64::from(step) / 1e3, domain);
+                let steps = (0..=1000).map(|step| excess(k, &l, &limited, at(step)));
+                assert!(steps.fold(f64::NEG_INFINITY, f64::max).abs() < 1e-3);
                 counts[2] += 1;
             }
         }
@@ -475,15 +502,22 @@ fn commands_in_one_direction_and_commands_without_integral_do_not_hinder_the_pro
     let k_0 = matrix(3, &[1.0, 0.5, 2.0, 1.0, 0.0, 0.0]);
     let k_1 = matrix(3, &[1.2, 0.5, 2.4, 1.0, 0.0, 0.0]);
     let ranges = [Some(1.0), Some(2.0), Some(1.0)];
-    assert_eq!(calculations([&k_0, &k_1], &ranges, 0.3).unwrap().1, InterpolatedWindup::Stable);
+    for domain in [SAMPLED, Domain::Continuous] {
+        let (_, found) = calculations([&k_0, &k_1], &ranges, 0.3, domain).unwrap();
+        assert_eq!(found, InterpolatedWindup::Stable);
+    }
     // Half of the way K_i is zero, and L_w is not.
-    let (_, found) = calculations([&one(1.0), &one(-1.0)], &[Some(1.0)], 0.3).unwrap();
+    let (_, found) = calculations([&one(1.0), &one(-1.0)], &[Some(1.0)], 0.3, SAMPLED).unwrap();
     assert!(matches!(found, InterpolatedWindup::Undecided { .. }), "{found:?}");
     // K_i changes by a factor of 100: near the middle L_w K_i = f 101^2 / 400 > 2.
-    let (_, found) = calculations([&one(1.0), &one(100.0)], &[Some(1.0)], 0.3).unwrap();
+    let far = [&one(1.0), &one(100.0)];
+    let (_, found) = calculations(far, &[Some(1.0)], 0.3, SAMPLED).unwrap();
     assert!(matches!(found, InterpolatedWindup::Unstable { .. }), "{found:?}");
+    // In continuous time this is only fast.
+    let (_, found) = calculations(far, &[Some(1.0)], 0.3, Domain::Continuous).unwrap();
+    assert_eq!(found, InterpolatedWindup::Stable);
     let many = DMatrix::from_element(11, 1, 1.0);
-    let (_, found) = calculations([&many, &many], &[Some(1.0); 11], 0.3).unwrap();
+    let (_, found) = calculations([&many, &many], &[Some(1.0); 11], 0.3, SAMPLED).unwrap();
     assert!(matches!(found, InterpolatedWindup::Undecided { limited } if limited.len() == 11));
 }
 

@@ -55,19 +55,23 @@ pub(super) fn schedule(report: &Report) -> Markup {
 fn schedule_section(report: &Report, found: &ScheduleReport) -> Markup {
     let unit = found.unit.as_deref().unwrap_or("1");
     let members: Vec<_> = found.points.iter().map(|point| &point.closed).collect();
+    let (instant, figure, less) = match report.sampling {
+        Some(_) => ("At each sample", "modulus", ", less 1,"),
+        None => ("At each instant", "real part", ", in 1/s,"),
+    };
     html! {
         p {
             "The gains depend on " strong { (found.variable) } ", "
             @if found.measured { "a measurement" } @else { "an input of the controller" }
-            ", in " (unit) ". At each sample plant model, gains and operating point are interpolated \
+            ", in " (unit) ". " (instant) " plant model, gains and operating point are interpolated \
              linearly between the points; values outside of them are held at the ends."
         }
         (margins("Points of the schedule", "point", &members))
         (noise(&members))
         (operating(report, found))
         p {
-            "Between the points: the largest modulus of the eigenvalues of the interpolated loop, less \
-             1, is " (number(found.worst_instability)) " at " (found.variable) " = "
+            "Between the points: the largest " (figure) " of the eigenvalues of the interpolated loop" (less)
+            " is " (number(found.worst_instability)) " at " (found.variable) " = "
             (number(found.worst_at)) ", the worst of " (found.checked) " constant values. "
             strong { "This is a check of these values, not a proof." }
         }

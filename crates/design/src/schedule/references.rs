@@ -1,7 +1,7 @@
 //! The references of a scheduled controller between the points.
 
-use control::Error;
 use control::tracking::{InterpolatedWindup, interpolated_windup};
+use control::{Domain, Error};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
@@ -59,12 +59,16 @@ fn windup(
         format!("while {} {verb} at the limits", names.join(" and "))
     };
     let variable = &own.variable.name;
-    match interpolated_windup([&k_0, &k_1], [&l_0, &l_1], &ranges)? {
+    match interpolated_windup([&k_0, &k_1], [&l_0, &l_1], &ranges, first.domain)? {
         InterpolatedWindup::Stable => Ok(None),
-        InterpolatedWindup::Unstable { part, limited, radius } => {
+        InterpolatedWindup::Unstable { part, limited, instability } => {
+            let found = match first.domain {
+                Domain::Continuous => format!("real part {instability:.3} 1/s"),
+                Domain::Sampled { .. } => format!("modulus {:.3}", 1.0 + instability),
+            };
             let message = format!(
                 "with {variable} = {:.6} the interpolated back-calculation of the integrals is not \
-                 stable {} (eigenvalue of modulus {radius:.3}), because K_i differs too much between \
+                 stable {} (eigenvalue of {found}), because K_i differs too much between \
                  {from} and {to}; expected more points, or another `windup_time`",
                 from * (1.0 - part) + to * part,
                 at_limits(&limited),
@@ -84,7 +88,8 @@ fn windup(
 
 /// The warning that references without integral action are exact at the points only.
 ///
-/// Between them the constant H y is G N_r r, G = H C (I - A - B K_x)^-1 B, with all matrices interpolated.
+/// Between them the constant H y is G N_r r, G = H C (I - A - B K_x)^-1 B, in continuous time H C (-A - B K_x)^-1 B,
+/// with all matrices interpolated.
 fn missed(
     file: &PlantFile<'_>,
     (own, references): (&Scheduled, &References),
@@ -125,9 +130,13 @@ fn missed(
 fn error(point: &Point, h: &DMatrix<f64>, n_r: &DMatrix<f64>) -> Result<f64, Error> {
     let plant = &point.physical;
     let n = plant.a.nrows();
-    let dynamics = DMatrix::identity(n, n) - &plant.a - &plant.b * point.gains.k_x.columns(0, n);
+    let kept = match plant.domain {
+        Domain::Continuous => DMatrix::zeros(n, n),
+        Domain::Sampled { .. } => DMatrix::identity(n, n),
+    };
+    let dynamics = kept - &plant.a - &plant.b * point.gains.k_x.columns(0, n);
     let states = dynamics.lu().solve(&(&plant.b * n_r));
-    let states = states.ok_or(Error::Overflow { what: "the gain at z = 1" })?;
+    let states = states.ok_or(Error::Overflow { what: "the gain at rest" })?;
     let constant = h * &plant.c * states;
     Ok((0..h.nrows()).map(|k| (constant[(k, k)] - 1.0).abs()).fold(0.0, f64::max))
 }

@@ -48,7 +48,7 @@ pub struct ScheduleReport {
     /// Number of values between the first and the last point at which the eigenvalues of the
     /// interpolated loop were computed, for constant values of the variable.
     pub checked: usize,
-    /// The worst of them: largest modulus less 1.
+    /// The worst of them: largest modulus less 1; of a continuous controller the largest real part, 1/s.
     pub worst_instability: f64,
     /// The value of the variable there.
     pub worst_at: f64,
@@ -120,10 +120,9 @@ pub(crate) fn schedule(
         }
     };
     let any_rate = common(&vertices, designed.domain, budget, named)?;
-    let bounded_rate = match (&any_rate, designed.domain) {
-        (Ok(_), _) => Err("one P serves any rate".to_owned()),
-        (Err(_), Domain::Sampled { period }) => bounded(own, &intervals, period, budget)?,
-        (Err(_), Domain::Continuous) => Err("the controller is not sampled".to_owned()),
+    let bounded_rate = match &any_rate {
+        Ok(_) => Err("one P serves any rate".to_owned()),
+        Err(_) => bounded(own, &intervals, designed.domain, budget)?,
     };
     Ok(Some(ScheduleReport {
         variable: variable.name.clone(),
@@ -143,27 +142,32 @@ pub(crate) fn schedule(
 fn bounded(
     own: &Scheduled,
     intervals: &[control::lmi::Interval],
-    period: f64,
+    domain: Domain,
     budget: &Budget,
 ) -> Result<Result<RateCertificate, String>, Error> {
     if budget.is_over() {
         return Ok(Err(format!("it was {}", budget.reason())));
     }
     let shortest = intervals.iter().map(|own| own.length).fold(f64::INFINITY, f64::min);
+    // The time in which the variable changes once: a sample, or a second.
+    let (time, is_sampled) = match domain {
+        Domain::Continuous => (1.0, false),
+        Domain::Sampled { period } => (period, true),
+    };
     let found = match own.rate_bound {
-        Some(rate) if rate * period > shortest => {
+        Some(rate) if is_sampled && rate * time > shortest => {
             return Ok(Err(format!(
                 "at the stated rate the variable passes the shortest interval, {shortest}, in less \
                  than a sample"
             )));
         }
-        Some(rate) => certify_schedule(intervals, rate * period)?,
-        None => largest_change(intervals)?,
+        Some(rate) => certify_schedule(intervals, rate * time, domain)?,
+        None => largest_change(intervals, domain)?,
     };
     Ok(match found {
         Some(ScheduleCertificate { change, p, margin, .. }) => {
             let p = p.iter().map(rows).collect();
-            Ok(RateCertificate { rate: own.rate_bound.unwrap_or(change / period), p, margin })
+            Ok(RateCertificate { rate: own.rate_bound.unwrap_or(change / time), p, margin })
         }
         None => Err(match own.rate_bound {
             Some(rate) => format!("no P was found for the stated rate {rate} per s"),

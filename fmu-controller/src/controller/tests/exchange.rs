@@ -178,3 +178,47 @@ fn evaluations_allocate_nothing() {
     });
     assert_eq!(allocations.count_total, 0);
 }
+
+/// The small design with `limits` between two masses, 1 kg and 2 kg.
+fn scheduled(limits: &str) -> AsoController {
+    let point = |mass: f64, at: f64| {
+        format!(
+            "[[schedule.points]]\nat = {mass:?}\nA = [[0.0, 1.0], [0.0, {:?}]]\nB = [[0.0], [{:?}]]\n\
+             C = [[1.0, 0.0]]\nF_a = [[0.0], [{:?}]]\nK_x = [[{:?}, {:?}]]\nK_f = [[1.0]]\n\
+             L_x = [[9.0], [24.0]]\nL_f = [[-12.0]]\nx_op = [{at:?}, 0.0]\nu_op = [0.1]\ny_op = [{at:?}]\n",
+            -0.2 / mass,
+            2.0 / mass,
+            -2.0 / mass,
+            -3.0 * mass,
+            -2.0 * mass,
+        )
+    };
+    let text =
+        small(limits) + "[schedule]\nvariable = \"mass\"\n" + &point(1.0, 0.2) + &point(2.0, 0.5);
+    ready(with_design(&text).unwrap())
+}
+
+#[test]
+fn evaluations_of_a_scheduled_controller_allocate_nothing() {
+    let mut controller = scheduled("limits = [-1.5, 0.3]");
+    controller.event(0.0).unwrap();
+    let mut values = [0.0; 2];
+    rates(&mut controller, 0.0, [0.0; 3]);
+    let allocations = allocation_counter::measure(|| {
+        for k in 0..100_u32 {
+            controller.schedule_input = 1.0 + 0.01 * f64::from(k);
+            rates(&mut controller, 0.0, [f64::from(k) * 0.01 - 0.5, 0.0, 0.0]);
+            controller.event_indicators(0.0, &mut values);
+            controller.event(0.0).unwrap();
+        }
+    });
+    assert_eq!(allocations.count_total, 0);
+}
+
+#[test]
+fn a_scheduled_controller_leaves_the_step_to_the_exporter() {
+    let mut controller = scheduled("limits = [-1.5, 0.3]");
+    assert_eq!(controller.step(&Step { start: 0.0, size: 0.1 }), Err(Failure::Unsolved));
+    let mut constant = exchanged("").0;
+    assert_eq!(constant.step(&Step { start: 0.0, size: 0.1 }), Ok(()));
+}

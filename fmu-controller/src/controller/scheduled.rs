@@ -1,0 +1,72 @@
+//! The controller at the present value of its scheduling variable.
+
+use num_dual::Dual64;
+
+use super::AsoController;
+use crate::design::Design;
+use crate::equations::Equations;
+use crate::signals::Signals;
+
+impl AsoController {
+    /// Computes u' of a controller with a schedule, whose gains and operating point move, too.
+    pub(super) fn set_scheduled_command_slopes(&mut self) {
+        let Self { design, current, values, deviations, z_slopes, u_slopes, mode, .. } = self;
+        let (Some(schedule), Some(current)) = (&design.schedule, current) else { return };
+        let space = || Box::new(((**current).clone(), Signals::zero(current)));
+        let (rates, moves) = &mut **self.rates.get_or_insert_with(space);
+        let slope = match schedule.measurement(design) {
+            Some(k) => values.y_slopes[k],
+            None => self.schedule_slope,
+        };
+        schedule.differentiate(self.schedule_value, slope, rates);
+        moves.set_rates((z_slopes, values), rates);
+        let equations = Equations::<Dual64>::new([current, rates], *mode);
+        let (z, inputs) = (
+            equations.estimate([&deviations.z, &moves.z]),
+            [[&deviations.y[..], &moves.y], [&deviations.r[..], &moves.r]],
+        );
+        for (j, slope) in u_slopes.iter_mut().enumerate().filter(|(j, _)| !mode.is_limited(*j)) {
+            let own = rates.actuators[j].operating.unwrap_or_default();
+            *slope = own + equations.free_command(j, z, inputs).eps;
+        }
+    }
+
+    /// Sets matrices and operating point of a scheduled controller for `time`, `offset` s after the
+    /// measurements were given.
+    pub(super) fn interpolate(&mut self, offset: f64, time: f64) {
+        let input = self.schedule_input + self.schedule_slope * offset;
+        let Self { design, current, values, operating_point, .. } = self;
+        let (Some(schedule), Some(current)) = (&design.schedule, current) else { return };
+        let value = schedule.value(design, values, input, offset);
+        self.schedule_value = value;
+        self.schedule_at = schedule.interpolate(value, current);
+        current.take_parameters(design);
+        operating_point.read(current);
+        let [first, last] = schedule.range();
+        let inside = (first..=last).contains(&value);
+        if !inside && !self.outside_reported {
+            self.outside_reported = true;
+            self.log.warn(format!(
+                "{} = {value} at {time} s is outside of the schedule from {first} to {last}; the \
+                 controller uses {} (reported once)",
+                schedule.variable, self.schedule_at
+            ));
+        }
+    }
+
+    /// Sets the derivatives of matrices and operating point of a scheduled controller in the direction
+    /// of `direction`, at the value that selected them.
+    pub(super) fn differentiate_schedule(&self, direction: &mut Self) {
+        let Self { design, current, values, schedule_input, .. } = direction;
+        let (Some(schedule), Some(current)) = (&self.design.schedule, current) else { return };
+        let value = self.schedule_value;
+        let slope = schedule.value(&self.design, values, *schedule_input, 0.0);
+        direction.schedule_at = schedule.differentiate(value, slope, current);
+        current.take_parameters(design);
+    }
+
+    /// The design of the last sample, or of now.
+    pub(super) fn design_in_force(&self) -> &Design {
+        self.current.as_deref().unwrap_or(&self.design)
+    }
+}
