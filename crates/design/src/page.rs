@@ -14,6 +14,7 @@ mod matrix;
 mod number;
 mod plane;
 mod plant;
+mod plots;
 mod pole_map;
 mod reconfiguration;
 mod references;
@@ -23,13 +24,16 @@ mod table;
 mod verdict;
 
 pub(crate) use comparison::comparison;
+use figure::interactive::{COLOURS, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, UPLOT_STYLE};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 pub(crate) use number::rounded;
+use plots::Plots;
 
 use super::report::Report;
 
 const STYLE: &str = include_str!("page/page.css");
-const SCRIPT: &str = concat!(include_str!("page/copy.js"), include_str!("page/cursor.js"));
+const COPY: &str = include_str!("page/copy.js");
+const FIGURES: &str = include_str!("page/figures.js");
 /// The content security policy: the page loads nothing, even if a text contains markup.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
@@ -40,7 +44,8 @@ const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 
 pub(crate) fn page(report: &Report, identity: &str) -> String {
     let title =
         if report.description.is_empty() { &report.plant_file } else { &report.description };
-    let sections = sections(report);
+    let mut plots = Plots::default();
+    let sections = sections(report, &mut plots);
     let document = html! {
         (DOCTYPE)
         html lang="en" {
@@ -52,6 +57,15 @@ pub(crate) fn page(report: &Report, identity: &str) -> String {
                     p.file { "Plant file " code { (report.plant_file) } }
                     (verdict::verdict(report))
                     (contents(&sections))
+                    @if !plots.is_empty() {
+                        (about_plots())
+                        noscript {
+                            p.warned {
+                                "The curves over time and frequency need JavaScript; their points come from "
+                                code { "aso-ftc design --json" } ", too. Tables and maps need no JavaScript."
+                            }
+                        }
+                    }
                 }
                 main {
                     @for (index, section) in sections.iter().enumerate() {
@@ -66,16 +80,39 @@ pub(crate) fn page(report: &Report, identity: &str) -> String {
                         "Written by aso-ftc " (env!("CARGO_PKG_VERSION")) ". Numbers are shown with \
                          five digits, the pointer shows all. The same numbers, and the points of \
                          the curves, come from "
-                        code { "aso-ftc design --json" } ". A pointer over a figure, or the arrow keys \
-                         in it, read values from its curves, to about three digits; a click enlarges it."
+                        code { "aso-ftc design --json" } "."
+                    }
+                    @if !plots.is_empty() {
+                        p { "Plots by uPlot." }
+                        details { summary { "Licence of uPlot" } pre { (UPLOT_LICENCE) } }
                     }
                     p role="status" #copied {}
                 }
-                script { (PreEscaped(SCRIPT)) }
+                @if !plots.is_empty() {
+                    script type="application/json" #curves { (PreEscaped(plots.json())) }
+                    @for text in [UPLOT, LINKED, FIGURES] { (script(text)) }
+                }
+                (script(COPY))
             }
         }
     };
     document.into_string().replace(|sign: char| sign.is_control() && sign != '\n', " ")
+}
+
+/// How to use the plots.
+fn about_plots() -> Markup {
+    html! {
+        p.said {
+            "Curves over time or frequency: drag to zoom, double-click to show all. All plots with the same axis \
+             follow, and show their values at the cursor. From the keyboard: arrow keys move the cursor, + and − \
+             zoom, 0 shows all. A click on a name hides its curve."
+        }
+    }
+}
+
+/// A script that is the same in HTML and in XML, where `<` and `&` would otherwise be markup.
+fn script(text: &str) -> Markup {
+    html! { script { "/*" (PreEscaped("<![CDATA[")) "*/\n" (PreEscaped(text)) "\n/*" (PreEscaped("]]>")) "*/" } }
 }
 
 fn head(title: &str, identity: &str) -> Markup {
@@ -87,7 +124,9 @@ fn head(title: &str, identity: &str) -> Markup {
             meta http-equiv="Content-Security-Policy" content=(POLICY);
             meta name="generator" content=(identity);
             title { (title) ", design report" }
-            style { (PreEscaped(STYLE)) }
+            style {
+                @for text in [UPLOT_STYLE, COLOURS, STYLE, LINKED_STYLE] { (PreEscaped(text)) }
+            }
         }
     }
 }
@@ -99,7 +138,7 @@ struct Section {
 }
 
 /// Returns the non-empty sections in reading order.
-fn sections(report: &Report) -> Vec<Section> {
+fn sections<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Vec<Section> {
     let all = [
         (true, "plant", "Plant", plant::plant(&report.plant)),
         (!report.checks.is_empty(), "checks", "Checks", plant::checks(report)),
@@ -112,7 +151,12 @@ fn sections(report: &Report) -> Vec<Section> {
             "Estimation of the faults",
             estimation::estimation(report),
         ),
-        (report.robustness.is_some(), "robustness", "Robustness", robustness::robustness(report)),
+        (
+            report.robustness.is_some(),
+            "robustness",
+            "Robustness",
+            robustness::robustness(report, plots),
+        ),
         (report.family.is_some(), "family", "Family of plants", family::family(report)),
         (report.schedule.is_some(), "schedule", "Schedule", family::schedule(report)),
         (
@@ -121,9 +165,19 @@ fn sections(report: &Report) -> Vec<Section> {
             "Detection of faults",
             report.detection.as_ref().map_or_else(Markup::default, detection::detection),
         ),
-        (!report.frequency.is_empty(), "frequency", "Singular values", curves::frequencies(report)),
-        (!report.references.is_empty(), "references", "References", references::references(report)),
-        (!report.steps.is_empty(), "steps", "Sudden faults", curves::responses(report)),
+        (
+            !report.frequency.is_empty(),
+            "frequency",
+            "Singular values",
+            curves::frequencies(report, plots),
+        ),
+        (
+            !report.references.is_empty(),
+            "references",
+            "References",
+            references::references(report, plots),
+        ),
+        (!report.steps.is_empty(), "steps", "Sudden faults", curves::responses(report, plots)),
         (!report.bounds.is_empty(), "bounds", "Bounds of the errors", certificate::bounds(report)),
         (true, "certificate", "Certificate", certificate::certificate(report)),
         (!report.assumptions.is_empty(), "assumptions", "Assumptions", plant::assumptions(report)),

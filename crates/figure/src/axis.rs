@@ -7,8 +7,6 @@ const HUGE: f64 = 1e300;
 #[derive(Debug, Clone, Copy)]
 enum Scale {
     Linear,
-    /// Logarithmic: all decades have the same length; only positive values have a place.
-    Logarithmic,
     /// Linear up to this magnitude and logarithmic beyond it, on both sides.
     Symmetric(f64),
 }
@@ -17,7 +15,6 @@ impl Scale {
     fn stretch(self, value: f64) -> f64 {
         match self {
             Self::Linear => value,
-            Self::Logarithmic => value.log10(),
             Self::Symmetric(knee) => {
                 let size = (value / knee).abs();
                 value.signum() * if size <= 1.0 { size } else { 1.0 + size.log10() }
@@ -59,15 +56,6 @@ impl Axis {
         Self { scale: Scale::Linear, low, high, pixels, ticks }
     }
 
-    /// Creates a logarithmic axis between two positive values; an invalid range is replaced by a
-    /// usable one.
-    #[must_use]
-    pub fn logarithmic((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
-        let usable = low > 0.0 && low < high && high < HUGE;
-        let (low, high) = if usable { (low, high) } else { (0.1, 10.0) };
-        Self { scale: Scale::Logarithmic, low, high, pixels, ticks }
-    }
-
     /// Creates an axis that is linear between minus and plus `knee` and logarithmic beyond.
     #[must_use]
     pub fn symmetric(ends: (f64, f64), knee: f64, pixels: (f64, f64), ticks: u8) -> Self {
@@ -103,12 +91,6 @@ impl Axis {
         self.pixels
     }
 
-    /// Whether all decades have the same length.
-    #[must_use]
-    pub fn is_logarithmic(&self) -> bool {
-        matches!(self.scale, Scale::Logarithmic)
-    }
-
     /// Returns whether a value is in the range.
     #[must_use]
     pub fn contains(&self, value: f64) -> bool {
@@ -130,21 +112,16 @@ impl Axis {
     pub fn ticks(&self) -> Vec<(f64, String)> {
         match self.scale {
             Scale::Linear => self.multiples(),
-            Scale::Logarithmic => {
-                let decades = (self.high / self.low).log10();
-                let factors: &[f64] = if decades < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-                powers((self.low, self.high), factors, self.stride(decades))
-            }
             Scale::Symmetric(knee) => {
                 let decades = |end: f64| (end / knee).max(1.0).log10();
                 let stride = self.stride(decades(-self.low) + decades(self.high));
-                let negative = powers((knee.max(-self.high), -self.low), &[1.0], stride);
+                let negative = powers((knee.max(-self.high), -self.low), stride);
                 negative
                     .into_iter()
                     .rev()
                     .map(|(value, label)| (-value, format!("\u{2212}{label}")))
                     .chain(self.contains(0.0).then(|| (0.0, "0".to_owned())))
-                    .chain(powers((knee.max(self.low), self.high), &[1.0], stride))
+                    .chain(powers((knee.max(self.low), self.high), stride))
                     .collect()
             }
         }
@@ -170,22 +147,20 @@ impl Axis {
     }
 }
 
-/// Returns each factor times each power of ten from `low` to `high` whose exponent is a multiple of
-/// `stride`, with labels.
-fn powers((low, high): (f64, f64), factors: &[f64], stride: i32) -> Vec<(f64, String)> {
+/// Returns each power of ten from `low` to `high` whose exponent is a multiple of `stride`, with labels.
+fn powers((low, high): (f64, f64), stride: i32) -> Vec<(f64, String)> {
     (-300..=300)
         .filter(|power| power % stride == 0)
-        .flat_map(|power| factors.iter().map(move |factor| (*factor, power)))
-        .map(|(factor, power)| (factor * 10_f64.powi(power), power_label(factor, power)))
+        .map(|power| (10_f64.powi(power), power_label(power)))
         .filter(|(value, _)| (0.999 * low..=1.001 * high).contains(value))
         .collect()
 }
 
-/// Formats a factor times a power of ten: 0.02, 500 or 2·10⁻⁵.
-fn power_label(factor: f64, power: i32) -> String {
+/// Formats a power of ten: 0.01, 1000 or 10⁻⁵.
+fn power_label(power: i32) -> String {
     if (-3..=3).contains(&power) {
         let decimals = usize::try_from(-power).unwrap_or(0);
-        return format!("{:.decimals$}", factor * 10_f64.powi(power));
+        return format!("{:.decimals$}", 10_f64.powi(power));
     }
     let raise = |sign| match sign {
         '-' => '⁻',
@@ -194,8 +169,7 @@ fn power_label(factor: f64, power: i32) -> String {
         '3' => '³',
         digit => char::from_u32(digit as u32 - '0' as u32 + '⁰' as u32).unwrap_or(digit),
     };
-    let raised: String = power.to_string().chars().map(raise).collect();
-    if factor > 1.0 { format!("{factor}·10{raised}") } else { format!("10{raised}") }
+    format!("10{}", power.to_string().chars().map(raise).collect::<String>())
 }
 
 /// Returns the smallest of 1, 2, 5 times a power of ten that is not below `minimum`.
@@ -272,21 +246,6 @@ mod tests {
     }
 
     #[test]
-    fn decades_are_equally_long_and_carry_powers_of_ten() {
-        let axis = Axis::logarithmic((1e-4, 1e2), (0.0, 600.0), 7);
-        for power in -4..=2 {
-            let place = axis.place(10_f64.powi(power));
-            assert!((place - 100.0 * f64::from(power + 4)).abs() < 1e-9, "{power}: {place}");
-        }
-        assert_eq!(texts(&axis), ["10⁻⁴", "0.001", "0.01", "0.1", "1", "10", "100"]);
-        let many = Axis::logarithmic((1e-12, 1e4), (0.0, 1.0), 7);
-        assert_eq!(texts(&many), ["10⁻¹²", "10⁻⁹", "10⁻⁶", "0.001", "1", "1000"]);
-        let few = Axis::logarithmic((3.0, 60.0), (0.0, 1.0), 7);
-        assert_eq!(texts(&few), ["5", "10", "20", "50"]);
-        assert!(axis.place(f64::NAN).is_nan() && axis.place(-1.0).is_nan());
-    }
-
-    #[test]
     fn a_symmetric_axis_is_linear_near_zero_with_decades_on_both_sides() {
         let axis = Axis::symmetric((-1e4, 10.0), 1.0, (0.0, 700.0), 9);
         for (value, place) in
@@ -295,6 +254,9 @@ mod tests {
             assert!((axis.place(value) - place).abs() < 1e-9, "{value}");
         }
         assert_eq!(texts(&axis), ["-10⁴", "-1000", "-100", "-10", "-1", "0", "1", "10"]);
+        assert!(axis.place(f64::NAN).is_nan());
+        let many = Axis::symmetric((-1e12, 0.0), 1e-4, (0.0, 1.0), 7);
+        assert_eq!(texts(&many), ["-10¹²", "-10⁹", "-10⁶", "-1000", "-1", "-0.001", "0"]);
     }
 
     #[test]

@@ -1,16 +1,17 @@
-//! Line plots of time series as SVG and PNG.
+//! Line plots of time series as SVG and PNG, and what pages with [`interactive`] plots have in common.
 //!
 //! The SVG is written here and not by a plotting library, because a panel needs a legend of many
 //! long names outside of its frame, and a curve of millions of samples that keeps every spike; the
-//! report of a design draws its own diagrams with the same [`axis`] and [`trace`]. The PNG is
+//! report of a design draws its own diagrams with the same [`axis`]. The PNG is
 //! rasterised from the SVG with an embedded font, so a figure looks the same on a machine without
 //! fonts.
 
 pub mod axis;
 mod canvas;
+pub mod interactive;
 mod legend;
 mod outline;
-pub mod trace;
+mod trace;
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -7,7 +7,7 @@ use super::axis::Axis;
 /// Of the points in a column of one unit, the first, lowest, highest and last are kept. So no spike
 /// is lost, and the width of the page bounds the length of the path. Takes one pass.
 #[must_use]
-pub fn path(time: &[f64], values: &[f64], horizontal: &Axis, vertical: &Axis) -> String {
+pub(crate) fn path(time: &[f64], values: &[f64], horizontal: &Axis, vertical: &Axis) -> String {
     let points: Vec<(f64, f64)> = time
         .iter()
         .zip(values)

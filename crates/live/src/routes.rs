@@ -66,11 +66,11 @@ impl Site {
     fn read(&self, path: &str, request: &Parsed) -> Answer {
         match path {
             "" => Answer::file("text/html", HTML),
-            "colours.css" => Answer::file("text/css", report::COLOURS),
+            "colours.css" => Answer::file("text/css", figure::interactive::COLOURS),
             "page.css" => Answer::file("text/css", STYLE),
             "page.js" => Answer::file("text/javascript", SCRIPT),
-            "uPlot.css" => Answer::file("text/css", report::UPLOT_STYLE),
-            "uPlot.js" => Answer::file("text/javascript", report::UPLOT),
+            "uPlot.css" => Answer::file("text/css", figure::interactive::UPLOT_STYLE),
+            "uPlot.js" => Answer::file("text/javascript", figure::interactive::UPLOT),
             "facts" => Answer::text_of_json(200, self.facts.clone()),
             _ => match query(&request.query) {
                 Some(query) => self.state(&query),

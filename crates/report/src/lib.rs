@@ -18,7 +18,6 @@ use results::{Column, ColumnKind, ResultsError, Selection, Table};
 use plots::Trace;
 
 pub use difference::Difference;
-pub use page::{COLOURS, UPLOT, UPLOT_STYLE};
 pub use statistics::Statistics;
 
 /// Largest number of variables in a report.

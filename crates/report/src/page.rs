@@ -1,5 +1,6 @@
 //! The HTML document.
 
+use figure::interactive::{COLOURS, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, UPLOT_STYLE};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use results::Column;
 
@@ -9,13 +10,6 @@ use crate::statistics::Statistics;
 use crate::{Request, Run, graph, identity};
 
 const STYLE: &str = include_str!("page/page.css");
-/// The style sheet of the colours, light and dark.
-pub const COLOURS: &str = include_str!("page/colours.css");
-/// The script of the plots: uPlot 1.6.32, Leon Sorokin, MIT licence (`page/uPlot-LICENSE`).
-pub const UPLOT: &str = include_str!("page/uPlot.iife.min.js");
-/// The style sheet of uPlot.
-pub const UPLOT_STYLE: &str = include_str!("page/uPlot.min.css");
-const UPLOT_LICENCE: &str = include_str!("page/uPlot-LICENSE");
 const SCRIPT: &str = include_str!("page/plots.js");
 /// The content security policy: the page loads nothing, even if a text contains markup.
 const POLICY: &str =
@@ -56,7 +50,8 @@ pub(crate) fn render(content: &Content<'_>, plots: &[Plot], compared: Option<&Co
                         div #figures {}
                         p.said {
                             "Drag over a plot to zoom, double-click to show all; all plots have the same time \
-                             axis and cursor. A click on a name hides its curve. Of long runs, a plot keeps the \
+                             axis and cursor. In a plot, arrow keys move the cursor, + and − zoom, 0 shows all. A \
+                             click on a name hides its curve. Of long runs, a plot keeps the \
                              lowest and highest value of each short interval, so that no peak is lost."
                             @if content.left_out > 0 {
                                 " " (content.left_out) " more variables of the file are not shown; "
@@ -76,7 +71,7 @@ pub(crate) fn render(content: &Content<'_>, plots: &[Plot], compared: Option<&Co
                     details { summary { "Licence of uPlot" } pre { (UPLOT_LICENCE) } }
                 }
                 script type="application/json" #data { (PreEscaped(data)) }
-                script { (PreEscaped(UPLOT)) }
+                script { (PreEscaped(UPLOT)) (PreEscaped(LINKED)) }
                 script { (PreEscaped(SCRIPT)) }
             }
         }
@@ -93,7 +88,9 @@ fn head(file: &str, request: &Request<'_>) -> Markup {
             meta http-equiv="Content-Security-Policy" content=(POLICY);
             meta name="generator" content=(identity(request.results));
             title { (file) ", report" }
-            style { (PreEscaped(UPLOT_STYLE)) (PreEscaped(COLOURS)) (PreEscaped(STYLE)) }
+            style {
+                @for text in [UPLOT_STYLE, COLOURS, STYLE, LINKED_STYLE] { (PreEscaped(text)) }
+            }
         }
     }
 }

@@ -3,7 +3,6 @@
 use maud::{Markup, PreEscaped, html};
 
 use figure::axis::Axis;
-use figure::trace;
 
 const LEFT: f64 = 66.0;
 const RIGHT: f64 = 14.0;
@@ -51,7 +50,7 @@ impl Chart<'_> {
         let window = format!("{}-window", self.id);
         let ((left, right), (bottom, top)) = (self.x.pixels(), self.y.pixels());
         html! {
-            svg viewBox={ "0 0 " (width) " " (height) } role="img" data-x=(ends(&self.x)) data-y=(ends(&self.y))
+            svg viewBox={ "0 0 " (width) " " (height) } role="img"
                 aria-labelledby={ (title) " " (description) } {
                 title id=(title) { (self.title) }
                 desc id=(description) { (self.description) }
@@ -85,15 +84,10 @@ impl Chart<'_> {
         let (center, middle) = (f64::midpoint(left, right), f64::midpoint(top, bottom));
         html! {
             text.label.middle x=(center) y=(bottom + 37.0) { (self.x_label) }
-            @if !self.y_label.is_empty() { text.label.middle x="13" y=(middle) transform={ "rotate(-90 13 " (middle) ")" } {
+            text.label.middle x="13" y=(middle) transform={ "rotate(-90 13 " (middle) ")" } {
                 (self.y_label)
-            } }
+            }
         }
-    }
-
-    /// Draws a curve; a value that is not finite leaves a gap.
-    pub(super) fn curve(&self, xs: &[f64], ys: &[f64], class: &str) -> Markup {
-        html! { path.curve.(class) d=(trace::path(xs, ys, &self.x, &self.y)) {} }
     }
 
     /// Draws a line through points in any order; a point that is not finite interrupts it.
@@ -120,12 +114,6 @@ impl Chart<'_> {
         let ((left, right), y) = (self.x.pixels(), self.y.place(at));
         html! { @if self.y.contains(at) { (line((left, y), (right, y), class)) } }
     }
-}
-
-/// The ends of an axis, for the cursor.
-fn ends(axis: &Axis) -> String {
-    let (low, high) = axis.range();
-    format!("{low:e} {high:e}{}", if axis.is_logarithmic() { " log" } else { "" })
 }
 
 pub(super) fn line((x1, y1): (f64, f64), (x2, y2): (f64, f64), class: &str) -> Markup {

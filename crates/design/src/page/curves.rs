@@ -2,21 +2,14 @@
 
 use maud::{Markup, html};
 
-use super::chart::{Chart, Size, legend, line_sample};
+use super::chart::{legend, line_sample};
 use super::number::{number, rounded};
+use super::plots::{Line, Mark, Plot, Plots, Quantity};
 use super::table::{Cell, table};
 use crate::report::{Curve, Frequency, Report, StepResponse};
-use figure::axis::Axis;
-
-const FREQUENCY_SIZE: Size = Size { width: 480.0, height: 310.0 };
-const RESPONSE_SIZE: Size = Size { width: 400.0, height: 220.0 };
-/// Singular values below this fraction of the largest one are rounding errors.
-const SMALLEST: f64 = 1e-16;
-/// Number of line styles; further curves repeat them.
-const STYLES: usize = 6;
 
 /// Shows the singular values on logarithmic axes.
-pub(super) fn frequencies(report: &Report) -> Markup {
+pub(super) fn frequencies<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Markup {
     let limit = report.sampling.as_ref();
     let limit = limit.map(|sampled| std::f64::consts::PI / sampled.sample_time);
     html! {
@@ -29,47 +22,41 @@ pub(super) fn frequencies(report: &Report) -> Markup {
         }
         div.figures {
             @for (index, response) in report.frequency.iter().enumerate() {
-                (frequency(&format!("frequency-{}", index + 1), response, limit))
+                (frequency(format!("frequency-{}", index + 1), response, limit, plots))
             }
         }
     }
 }
 
-pub(super) fn frequency(id: &str, response: &Frequency, limit: Option<f64>) -> Markup {
-    let xs = &response.frequencies;
-    let values = || response.singular_values.iter().flatten().copied();
-    let largest = values().fold(0.0, f64::max);
-    let least = values().filter(|value| *value > SMALLEST * largest).fold(largest, f64::min);
-    let range = ((least / 1.6).min(largest / 20.0), 1.6 * largest);
+/// Shows singular values; `limit`: the largest frequency of a sampled loop.
+pub(super) fn frequency<'a>(
+    id: String,
+    response: &'a Frequency,
+    limit: Option<f64>,
+    plots: &mut Plots<'a>,
+) -> Markup {
     let description = describe(response);
-    let chart = Chart {
+    let name = |index: usize| match index {
+        0 => "largest".to_owned(),
+        _ => format!("no. {}", index + 1),
+    };
+    let lines = response.singular_values.iter().enumerate();
+    let limit = limit.filter(|limit| response.frequencies.iter().any(|own| own >= limit));
+    let place = plots.add(Plot {
         id,
-        title: &response.name,
-        description: &description,
-        size: FREQUENCY_SIZE,
-        x: Axis::logarithmic(positive_ends(xs), FREQUENCY_SIZE.horizontal(), 9),
-        y: Axis::logarithmic(range, FREQUENCY_SIZE.vertical(), 9),
-        x_label: "frequency in rad/s",
-        y_label: "singular value",
-    };
-    let class = |index: usize| format!("line-{}", index % STYLES + 1);
-    let entry = |index: usize| {
-        let ordinal = if index == 0 { "largest".to_owned() } else { format!("no. {}", index + 1) };
-        (line_sample(&format!("curve {}", class(index))), format!("{ordinal} singular value"))
-    };
-    let mut entries: Vec<_> = (0..response.singular_values.len()).map(entry).collect();
-    let limit = limit.filter(|limit| chart.x.contains(*limit));
-    entries.extend(limit.map(|_| (line_sample("mark"), "π/T".to_owned())));
+        quantity: Quantity::Frequency,
+        logarithmic: true,
+        label: "singular value",
+        title: format!("{}, singular values. {description}", response.name),
+        places: &response.frequencies,
+        lines: lines.map(|(index, values)| Line { name: name(index), values }).collect(),
+        marks: limit.map(Mark::At).into_iter().collect(),
+    });
     html! {
         figure {
             figcaption { (response.name) }
-            (chart.draw(&html! {
-                @if let Some(limit) = limit { (chart.upright(limit, "mark")) }
-                @for (index, values) in response.singular_values.iter().enumerate() {
-                    (chart.curve(xs, values, &class(index)))
-                }
-            }))
-            (legend(&entries))
+            (place)
+            @if limit.is_some() { (legend(&[(line_sample("mark"), "π/T".to_owned())])) }
             p.said { (description) }
         }
     }
@@ -91,7 +78,7 @@ fn describe(response: &Frequency) -> String {
 }
 
 /// Shows the responses to a change of each fault on a logarithmic time axis.
-pub(super) fn responses(report: &Report) -> Markup {
+pub(super) fn responses<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Markup {
     html! {
         p {
             "The fault changes at time 0 by the size stated and then stays; the loop was at rest. \
@@ -103,12 +90,12 @@ pub(super) fn responses(report: &Report) -> Markup {
              the amplitude (half of peak to peak) of the motion that is left."
         }
         @for (index, response) in report.steps.iter().enumerate() {
-            (self::response(&format!("step-{}", index + 1), response))
+            (self::response(&format!("step-{}", index + 1), response, plots))
         }
     }
 }
 
-fn response(id: &str, response: &StepResponse) -> Markup {
+fn response<'a>(id: &str, response: &'a StepResponse, plots: &mut Plots<'a>) -> Markup {
     let unit = response.unit.as_deref().unwrap_or_default();
     let title = html! {
         @if response.parts.len() > 1 {
@@ -137,7 +124,7 @@ fn response(id: &str, response: &StepResponse) -> Markup {
         div.figures.small {
             @for (index, curve) in response.curves.iter().enumerate() {
                 @let after = format!("a change of {}", response.fault);
-                (self::curve(&format!("{id}-{}", index + 1), curve, &after, sized(curve).then_some(response.size)))
+                (self::curve(format!("{id}-{}", index + 1), curve, &after, sized(curve).then_some(response.size), plots))
             }
         }
         (legend(&entries))
@@ -162,44 +149,40 @@ pub(super) fn peaks(caption: &str, curves: &[Curve]) -> Markup {
 }
 
 /// Shows a curve; `after`: what changed; `size`: the size of that change in the unit of the curve.
-pub(super) fn curve(id: &str, curve: &Curve, after: &str, size: Option<f64>) -> Markup {
+pub(super) fn curve<'a>(
+    id: String,
+    curve: &'a Curve,
+    after: &str,
+    size: Option<f64>,
+    plots: &mut Plots<'a>,
+) -> Markup {
     let unit = curve.unit.as_deref().unwrap_or_default();
-    let title = format!("{} after {after}", curve.name);
-    let description = format!(
-        "Largest magnitude {} {unit} at {} s, settled after {} s.",
+    let name =
+        if unit.is_empty() { curve.name.clone() } else { format!("{} in {unit}", curve.name) };
+    let title = format!(
+        "{} after {after}. Largest magnitude {} {unit} at {} s, settled after {} s.",
+        curve.name,
         rounded(curve.peak),
         rounded(curve.peak_time),
         rounded(curve.settling_time)
     );
-    let values = curve.values.iter().copied().filter(|value| value.is_finite());
-    let chart = Chart {
+    let place = plots.add(Plot {
         id,
-        title: &title,
-        description: &description,
-        size: RESPONSE_SIZE,
-        x: Axis::logarithmic(positive_ends(&curve.times), RESPONSE_SIZE.horizontal(), 7),
-        y: Axis::around(values.chain([0.0]), None, RESPONSE_SIZE.vertical(), 5),
-        x_label: "time in s",
-        y_label: "",
-    };
+        quantity: Quantity::Time,
+        logarithmic: false,
+        label: "",
+        title,
+        places: &curve.times,
+        lines: vec![Line { name, values: &curve.values }],
+        marks: size.map(Mark::Size).into_iter().chain([Mark::At(curve.settling_time)]).collect(),
+    });
     html! {
         figure {
             figcaption {
                 (curve.name)
                 @if !unit.is_empty() { span.shape { " in " (unit) } }
             }
-            (chart.draw(&html! {
-                (chart.level(0.0, "zero"))
-                @if let Some(size) = size { (chart.level(size, "size")) }
-                (chart.upright(curve.settling_time, "mark"))
-                (chart.curve(&curve.times, &curve.values, "line-1"))
-            }))
+            (place)
         }
     }
-}
-
-/// Returns the smallest positive value and the largest value.
-fn positive_ends(values: &[f64]) -> (f64, f64) {
-    let positive = values.iter().copied().filter(|value| *value > 0.0);
-    positive.fold((f64::INFINITY, 0.0), |(low, high), value| (value.min(low), value.max(high)))
 }

@@ -5,11 +5,12 @@ use maud::{Markup, html};
 use super::chart::{legend, line_sample};
 use super::curves;
 use super::number::number;
+use super::plots::Plots;
 use super::table::{Cell, table};
 use crate::report::{CommandPeak, ReferenceStep, Report};
 
 /// Shows the response to a step of each reference.
-pub(super) fn references(report: &Report) -> Markup {
+pub(super) fn references<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Markup {
     html! {
         p {
             "The reference changes at time 0 by the size stated and then stays; the loop was at rest, \
@@ -17,12 +18,12 @@ pub(super) fn references(report: &Report) -> Markup {
              commands are ignored here: beyond the largest step within the limits the response is slower."
         }
         @for (index, step) in report.references.iter().enumerate() {
-            (self::step(&format!("reference-{}", index + 1), step))
+            (self::step(&format!("reference-{}", index + 1), step, plots))
         }
     }
 }
 
-fn step(id: &str, step: &ReferenceStep) -> Markup {
+fn step<'a>(id: &str, step: &'a ReferenceStep, plots: &mut Plots<'a>) -> Markup {
     let unit = step.unit.as_deref().unwrap_or_default();
     let caption = format!("Response to a step of {}", step.reference);
     let heads = [
@@ -75,7 +76,7 @@ fn step(id: &str, step: &ReferenceStep) -> Markup {
         div.figures.small {
             @for (index, curve) in step.curves.iter().enumerate() {
                 @let after = format!("a step of {}", step.reference);
-                (curves::curve(&format!("{id}-{}", index + 1), curve, &after, sized(index)))
+                (curves::curve(format!("{id}-{}", index + 1), curve, &after, sized(index), plots))
             }
         }
         (legend(&entries))

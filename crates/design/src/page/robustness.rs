@@ -5,6 +5,7 @@ use maud::{Markup, html};
 use super::curves::frequency;
 use super::matrix::matrices;
 use super::number::number;
+use super::plots::Plots;
 use super::table::{Cell, table};
 use crate::report::{Matrix, Report};
 use crate::robustness::report::{Disk, Parameter, PeakSensitivity, Robustness, ToleranceResult};
@@ -12,11 +13,11 @@ use crate::robustness::report::{Disk, Parameter, PeakSensitivity, Robustness, To
 /// Number of parameters in the table of the sensitivities.
 const SHOWN: usize = 12;
 
-pub(super) fn robustness(report: &Report) -> Markup {
-    html! { @if let Some(found) = &report.robustness { (section(report, found)) } }
+pub(super) fn robustness<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Markup {
+    html! { @if let Some(found) = &report.robustness { (section(report, found, plots)) } }
 }
 
-fn section(report: &Report, found: &Robustness) -> Markup {
+fn section<'a>(report: &Report, found: &'a Robustness, plots: &mut Plots<'a>) -> Markup {
     let limit = report.sampling.as_ref();
     let limit = limit.map(|sampled| std::f64::consts::PI / sampled.sample_time);
     html! {
@@ -42,7 +43,7 @@ fn section(report: &Report, found: &Robustness) -> Markup {
         h3 id="s-and-t" { "S and T" }
         div.figures {
             @for (index, curve) in found.curves.iter().enumerate() {
-                (frequency(&format!("sensitivity-{}", index + 1), curve, limit))
+                (frequency(format!("sensitivity-{}", index + 1), curve, limit, plots))
             }
         }
         h3 id="noise" { "Measurement noise" }

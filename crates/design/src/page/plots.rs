@@ -1,0 +1,176 @@
+//! The data of the interactive plots: each curve once, all numbers in one compressed block.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use maud::{Markup, html};
+use miniz_oxide::deflate::compress_to_vec_zlib;
+use serde::Serialize;
+
+/// Largest number of values of a page in double precision. More are in single precision, so that the page of a plant
+/// with 100 states, a million values, has less than 10 MB.
+const DOUBLE: usize = 200_000;
+/// Level of the compression, of 0 to 10.
+const LEVEL: u8 = 6;
+
+/// A horizontal axis. Plots with the same axis are zoomed together and share the cursor.
+#[derive(Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Quantity {
+    Time,
+    Frequency,
+}
+
+/// A line across a plot, which the legend below the plot explains.
+#[derive(Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Mark {
+    /// A vertical line at a time or frequency: from it on the signal has settled, or the sampling has its limit.
+    At(f64),
+    /// A horizontal line at the size of a change.
+    Size(f64),
+}
+
+/// A curve: its name, and its values at the places of its plot, as many as there are places.
+pub(super) struct Line<'a> {
+    pub(super) name: String,
+    pub(super) values: &'a [f64],
+}
+
+/// A plot.
+pub(super) struct Plot<'a> {
+    /// Identifier of its place on the page.
+    pub(super) id: String,
+    pub(super) quantity: Quantity,
+    /// Whether the vertical axis is logarithmic.
+    pub(super) logarithmic: bool,
+    /// Label of the vertical axis.
+    pub(super) label: &'a str,
+    /// What the plot shows, for screen readers.
+    pub(super) title: String,
+    /// Times in s or frequencies in rad/s.
+    pub(super) places: &'a [f64],
+    pub(super) lines: Vec<Line<'a>>,
+    pub(super) marks: Vec<Mark>,
+}
+
+/// All plots of a page.
+#[derive(Default)]
+pub(super) struct Plots<'a>(Vec<Plot<'a>>);
+
+impl<'a> Plots<'a> {
+    /// Adds a plot and returns its place on the page.
+    pub(super) fn add(&mut self, plot: Plot<'a>) -> Markup {
+        let place = html! { div.plot id=(plot.id) {} };
+        self.0.push(plot);
+        place
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Returns the data as JSON without the signs `<` and `&`, for a script element: names and sizes, and the block
+    /// of all numbers, compressed (zlib), in base64.
+    ///
+    /// All plots of an axis are on one grid, the sorted list of all their times or frequencies, since most of them
+    /// have the same ones. The block has four lists: the grid of the times and the grid of the frequencies (64 bits);
+    /// plot after plot, of each point how far its place is from the place of the point before in the grid (32 bits,
+    /// signed); the values of each curve (64 bits, 32 if there are more than [`DOUBLE`]). A list is stored as all
+    /// first bytes, little endian, then all second bytes and so on, since neighbours differ little in most of them.
+    pub(super) fn json(&self) -> String {
+        let grids = [Quantity::Time, Quantity::Frequency].map(|own| self.grid(own));
+        let mut steps = Vec::new();
+        let mut values = Vec::new();
+        for plot in &self.0 {
+            let grid = &grids[plot.quantity as usize];
+            let mut before = 0;
+            for at in plot.shown(plot.places) {
+                let index = grid.partition_point(|other| *other < at);
+                let index = u32::try_from(index).unwrap_or(u32::MAX);
+                steps.push(index.wrapping_sub(before));
+                before = index;
+            }
+            values.extend(plot.lines.iter().flat_map(|line| plot.shown(line.values)));
+        }
+        let bits = if values.len() > DOUBLE { 32 } else { 64 };
+        #[expect(clippy::cast_possible_truncation, reason = "a picture needs seven digits")]
+        let single = |value: &f64| (*value as f32).to_le_bytes();
+        let block = [
+            planes(grids[0].iter().map(|at| at.to_le_bytes())),
+            planes(grids[1].iter().map(|at| at.to_le_bytes())),
+            planes(steps.iter().map(|step| step.to_le_bytes())),
+            if bits == 64 {
+                planes(values.iter().map(|value| value.to_le_bytes()))
+            } else {
+                planes(values.iter().map(single))
+            },
+        ]
+        .concat();
+        let data = Data {
+            grids: grids.map(|grid| grid.len()),
+            bits,
+            plots: self.0.iter().map(Plot::listed).collect(),
+            block: STANDARD.encode(compress_to_vec_zlib(&block, LEVEL)),
+        };
+        let text = serde_json::to_string(&data).unwrap_or_default();
+        text.replace('<', "\\u003c").replace('&', "\\u0026")
+    }
+
+    /// Returns all places of an axis, in order.
+    fn grid(&self, quantity: Quantity) -> Vec<f64> {
+        let plots = self.0.iter().filter(|plot| plot.quantity == quantity);
+        let mut grid: Vec<f64> = plots.flat_map(|plot| plot.shown(plot.places)).collect();
+        grid.sort_by(f64::total_cmp);
+        grid.dedup();
+        grid
+    }
+}
+
+impl Plot<'_> {
+    /// Returns the members of a list at the places that an axis with decades can show.
+    fn shown(&self, list: &[f64]) -> impl Iterator<Item = f64> {
+        let members = self.places.iter().zip(list);
+        members.filter(|(at, _)| **at > 0.0 && at.is_finite()).map(|(_, member)| *member)
+    }
+
+    fn listed(&self) -> Listed<'_> {
+        Listed {
+            id: &self.id,
+            axis: self.quantity,
+            logarithmic: self.logarithmic,
+            label: self.label,
+            title: &self.title,
+            points: self.shown(self.places).count(),
+            curves: self.lines.iter().map(|line| line.name.as_str()).collect(),
+            marks: &self.marks,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Data<'a> {
+    /// The lengths of the grids: time, frequency.
+    grids: [usize; 2],
+    bits: u8,
+    plots: Vec<Listed<'a>>,
+    block: String,
+}
+
+#[derive(Serialize)]
+struct Listed<'a> {
+    id: &'a str,
+    axis: Quantity,
+    logarithmic: bool,
+    label: &'a str,
+    title: &'a str,
+    /// The number of points of each curve.
+    points: usize,
+    curves: Vec<&'a str>,
+    marks: &'a [Mark],
+}
+
+/// Returns the first bytes of all numbers, then the second bytes and so on.
+fn planes<const N: usize>(numbers: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
+    let numbers: Vec<[u8; N]> = numbers.collect();
+    (0..N).flat_map(|byte| numbers.iter().map(move |number| number[byte])).collect()
+}

@@ -1,0 +1,327 @@
+"use strict";
+/* Plots by uPlot with linked horizontal axes: all plots of an axis are zoomed together and share the cursor. */
+
+/* Labels and places of the ticks of an axis. */
+const ticks = (() => {
+  const minus = (text) => text.replaceAll("-", "−");
+
+  /* The multiples of a round step within a range, at most about `most` of them. */
+  function linear(low, high, most) {
+    const least = (high - low) / most;
+    const power = 10 ** Math.floor(Math.log10(least));
+    const step = power * ([1, 2, 5].find((factor) => factor * power >= 0.999 * least) ?? 10);
+    const found = [];
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
+    return found;
+  }
+
+  /* The powers of ten, with multiples between them where there is room. */
+  function logarithmic(low, high, most) {
+    const decades = Math.log10(high / low);
+    if (decades < 0.7) return linear(low, high, most);
+    const factors = decades < 7 ? [1, 2, 3, 4, 5, 6, 7, 8, 9] : [1];
+    const stride = Math.ceil(decades / (2 * most));
+    const found = [];
+    for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
+      if (power % stride !== 0) continue;
+      found.push(...factors.map((factor) => Number(`${factor}e${power}`)).filter((at) => at >= low && high >= at));
+    }
+    return found;
+  }
+
+  /* Texts with the digits that tell each tick from its neighbours. */
+  function linearLabels(places) {
+    const step = places.length > 1 ? places[1] - places[0] : Math.abs(places[0]) || 1;
+    const largest = Math.max(...places.map(Math.abs));
+    return places.map((value) => {
+      if (Math.abs(value) < 0.5 * step) return "0";
+      if (largest >= 1e6 || step < 1e-4) {
+        const digits = Math.floor(Math.log10(Math.abs(value))) - Math.floor(Math.log10(step));
+        return minus(value.toExponential(Math.min(Math.max(digits, 0), 15)));
+      }
+      return minus(value.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9))));
+    });
+  }
+
+  const raised = (power) => [...String(power)].map((sign) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(sign)]).join("");
+
+  /* Texts of powers of ten; those between are empty unless there are few decades. */
+  function logarithmicLabels(places, low, high, most) {
+    const decades = Math.log10(high / low);
+    if (decades < 0.7) return linearLabels(places);
+    const shown = decades < 1.5 ? [1, 2, 5] : [1];
+    const stride = Math.ceil(decades / most);
+    return places.map((value) => {
+      const [factor, power] = value.toExponential().split("e").map(Number);
+      if (!shown.includes(factor) || (factor === 1 && power % stride !== 0)) return "";
+      if (Math.abs(power) > 3) return factor === 1 ? `10${raised(power)}` : `${factor}·10${raised(power)}`;
+      return value.toFixed(Math.max(0, -power));
+    });
+  }
+
+  return {
+    places: (low, high, most, isLogarithmic) => (isLogarithmic ? logarithmic : linear)(low, high, most),
+    labels: (places, low, high, most, isLogarithmic) =>
+      isLogarithmic ? logarithmicLabels(places, low, high, most) : linearLabels(places),
+  };
+})();
+
+/* The value of a custom property of the page: a colour. */
+function colour(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+/* A horizontal axis that several plots have in common. */
+class LinkedAxis {
+  /* `name` tells axes apart; `whole` is the range of all plots, by default each plot shows its own;
+     `changed` is called with a new range. */
+  constructor({ name, label, short, isLogarithmic = false, whole = null, changed = () => undefined }) {
+    Object.assign(this, { name, label, short, isLogarithmic, common: whole, changed });
+    this.range = null;
+    this.plots = new Set();
+  }
+
+  /* Shows a range in all plots; null: everything. */
+  show(range) {
+    if (range !== null && !(range[1] - range[0] > 1e-12 * Math.max(...range.map(Math.abs)))) return;
+    this.range = range;
+    for (const plot of this.plots) this.apply(plot);
+    this.changed(range ?? this.common);
+  }
+
+  /* Zooms a plot to the common range. */
+  apply(plot) {
+    const [min, max] = this.range ?? this.whole(plot);
+    plot.setScale("x", { min, max });
+  }
+
+  /* The range of a plot that shows everything. */
+  whole(plot) {
+    if (this.common !== null) return this.common;
+    const [places] = plot.data;
+    const [low, high] = [places[0] ?? 1, places[places.length - 1] ?? 1];
+    return high > low ? [low, high] : [low, this.isLogarithmic ? 10 * low : low + 1];
+  }
+
+  /* A range that is moved by a part of its length and then scaled about `centre`. */
+  moved(range, by, size, centre = null) {
+    const [to, from] = this.isLogarithmic ? [Math.log10, (value) => 10 ** value] : [Number, Number];
+    const [low, high] = range.map(to);
+    const middle = centre === null ? (low + high) / 2 : to(centre);
+    return [low, high].map((end) => from(middle + (end - middle) * size + by * (high - low)));
+  }
+
+  remove(plot) {
+    this.plots.delete(plot);
+    plot.destroy();
+  }
+
+  /* Draws a plot into an element. `data`: the places, then the values of each curve; null is a gap, undefined is
+     bridged. `curves`: name, colour, and optionally width, dash, `holds`. `marks`: `x` or `y`, colour, dash.
+     `scale` enlarges lines and text, for a picture that is shown smaller. */
+  plot(element, data, { label, height, curves, marks = [], isLogarithmic = false, fromZero = false, write = String,
+    name = "", scale = 1 }) {
+    const text = (size) => `${size * scale}px system-ui, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif`;
+    const grid = { stroke: colour("--grid"), width: scale };
+    const common = { stroke: colour("--text"), grid, ticks: { ...grid, size: 5 * scale }, font: text(12),
+      labelFont: text(12), gap: 4 * scale, filter: (self, places) => places };
+    const axis = (isX, isLog) => {
+      const room = (self) => (isX ? self.bbox.width / (isLog ? 45 : 70) : self.bbox.height / 28);
+      const most = (self) => Math.max(2, Math.floor(room(self) / scale / devicePixelRatio));
+      const ends = (self) => [self.scales[isX ? "x" : "y"].min, self.scales[isX ? "x" : "y"].max];
+      return { ...common,
+        splits: (self, index, low, high) => ticks.places(low, high, most(self), isLog),
+        values: (self, places) => ticks.labels(places, ...ends(self), most(self), isLog) };
+    };
+    const cell = (self, value) => (value === null || value === undefined ? "–" : write(value));
+    const options = {
+      width: (element.clientWidth || 800) * scale,
+      height: height * scale,
+      padding: [8 * scale, 12 * scale, 0, 0],
+      scales: {
+        x: { time: false, distr: this.isLogarithmic ? 3 : 1, range: (self, low, high) => [low, high] },
+        y: { distr: isLogarithmic ? 3 : 1, range: (self, low, high) => this.vertical(low, high, isLogarithmic, fromZero) },
+      },
+      axes: [
+        { ...axis(true, this.isLogarithmic), label: this.label, labelSize: 20 * scale, size: 30 * scale },
+        { ...axis(false, isLogarithmic), label: label || undefined, labelSize: 22 * scale,
+          size: (self, texts, index) => Math.max(58 * scale, this.breadth(self, texts, index)) },
+      ],
+      cursor: {
+        y: false,
+        sync: { key: this.name, setSeries: false, filters: { pub: (kind) => ["mousemove", "mouseleave"].includes(kind) } },
+        drag: { x: true, y: false, setScale: false, dist: 3 },
+        bind: { dblclick: () => () => this.show(null) },
+        move: (self, left, top) => (left > self.over.clientWidth + 1 ? [-10, -10] : [left, top]),
+        dataIdx: closest,
+      },
+      legend: { markers: { dash: (self, k) => (curves[k - 1].dash === undefined ? "solid" : "dashed") } },
+      series: [
+        { label: this.short, value: cell },
+        ...curves.map((curve) => ({
+          label: curve.name,
+          stroke: colour(curve.colour),
+          width: (curve.width ?? 1.6) * scale,
+          dash: curve.dash?.map((length) => length * scale),
+          spanGaps: false,
+          points: { show: false },
+          paths: curve.holds ? uPlot.paths.stepped({ align: 1 }) : uPlot.paths.linear(),
+          value: cell,
+        })),
+      ],
+      hooks: {
+        drawAxes: [(self) => drawMarks(self, marks, scale)],
+        setSelect: [(self) => {
+          const { left, width } = self.select;
+          if (width > 2) this.show([left, left + width].map((place) => self.posToVal(place, "x")));
+          self.setSelect({ left: 0, width: 0 }, false);
+        }],
+      },
+    };
+    const plot = new uPlot(options, data, element);
+    this.plots.add(plot);
+    this.apply(plot);
+    this.keys(plot, name);
+    return plot;
+  }
+
+  /* The range of the vertical axis for visible values between `low` and `high`; with zero while everything is shown. */
+  vertical(low, high, isLogarithmic, fromZero) {
+    if (low === null || low === undefined) return isLogarithmic ? [0.1, 10] : [0, 1];
+    if (isLogarithmic) {
+      /* Below this part of the largest value are rounding errors. */
+      const least = Math.max(low, 1e-16 * high);
+      return [Math.min(least / 1.6, high / 20), 1.6 * high];
+    }
+    const [bottom, top] = fromZero && this.range === null ? [Math.min(low, 0), Math.max(high, 0)] : [low, high];
+    const size = Math.max(Math.abs(bottom), Math.abs(top));
+    const air = top - bottom > 1e-12 * size ? 0.06 * (top - bottom) : 0.1 * size || 1;
+    return [bottom - air, top + air];
+  }
+
+  /* The room that the labels of an axis take. */
+  breadth(self, texts, index) {
+    if (!texts) return 0;
+    const axis = self.axes[index];
+    self.ctx.save();
+    self.ctx.font = axis.font[0];
+    const widest = Math.max(0, ...texts.map((text) => self.ctx.measureText(text).width));
+    self.ctx.restore();
+    return Math.ceil(widest / devicePixelRatio) + axis.ticks.size + axis.gap;
+  }
+
+  /* Arrow keys move the cursor, plus and minus zoom, 0 shows everything. */
+  keys(plot, name) {
+    const { root } = plot;
+    root.tabIndex = 0;
+    root.setAttribute("role", "group");
+    root.setAttribute("aria-label", name);
+    root.setAttribute("aria-keyshortcuts", "ArrowLeft ArrowRight Shift+ArrowLeft Shift+ArrowRight Plus - 0");
+    const legend = root.querySelector(".u-legend");
+    root.addEventListener("blur", () => {
+      legend.removeAttribute("aria-live");
+      plot.setCursor({ left: -10, top: -10 }, true, true);
+    });
+    root.addEventListener("keydown", (event) => {
+      if (event.target !== root || event.ctrlKey || event.altKey || event.metaKey) return;
+      const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+      const size = { "+": 0.5, "=": 0.5, "-": 2 }[event.key];
+      if (way !== undefined) this.step(plot, way * (event.shiftKey ? 0.05 : 0.005));
+      else if (size !== undefined) this.zoomAbout(plot, size);
+      else if (event.key === "0") this.show(null);
+      else return;
+      event.preventDefault();
+      legend.setAttribute("aria-live", "polite");
+    });
+  }
+
+  /* The place of the cursor; the middle if there is none. */
+  cursor(plot) {
+    const { left } = plot.cursor;
+    return plot.posToVal(left >= 0 ? left : plot.over.clientWidth / 2, "x");
+  }
+
+  /* Scales the range about the cursor, at most to everything. */
+  zoomAbout(plot, size) {
+    const at = this.cursor(plot);
+    const next = this.moved([plot.scales.x.min, plot.scales.x.max], 0, size, at);
+    const [low, high] = this.whole(plot);
+    this.show(low >= next[0] && next[1] >= high ? null : next);
+    this.moveCursor(plot, at);
+  }
+
+  /* Moves the cursor by a part of the range, but at least to the next point. */
+  step(plot, by) {
+    const [places] = plot.data;
+    const range = [plot.scales.x.min, plot.scales.x.max];
+    const at = this.cursor(plot);
+    const [low] = this.moved(range, by, 1);
+    const found = plot.valToIdx(this.isLogarithmic ? at * (low / range[0]) : at + (low - range[0]));
+    const here = plot.valToIdx(at);
+    const index = found === here ? here + Math.sign(by) : found;
+    const next = places[Math.min(Math.max(index, 0), places.length - 1)];
+    if (next > range[1] || range[0] > next) {
+      const past = this.isLogarithmic ? Math.log(next / at) / Math.log(range[1] / range[0]) : (next - at) / (range[1] - range[0]);
+      this.show(this.moved(range, past, 1));
+    }
+    this.moveCursor(plot, next);
+  }
+
+  /* Moves the cursor of all plots to a place, after uPlot has drawn a new range. */
+  moveCursor(plot, at) {
+    Promise.resolve().then(() => {
+      plot.setCursor({ left: plot.valToPos(at, "x"), top: plot.over.clientHeight / 2 }, true, true);
+    });
+  }
+}
+
+/* The closest place at which a curve has a value. */
+function closest(self, curve, index) {
+  const values = self.data[curve];
+  for (let away = 0; values.length > away; away++) {
+    if (values[index - away] !== undefined) return index - away;
+    if (values[index + away] !== undefined) return index + away;
+  }
+  return index;
+}
+
+/* Draws vertical lines at `x` and horizontal ones at `y`. */
+function drawMarks({ ctx, bbox, valToPos }, marks, scale) {
+  const ratio = devicePixelRatio * scale;
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  ctx.clip();
+  ctx.lineWidth = 1.4 * ratio;
+  for (const mark of marks) {
+    ctx.strokeStyle = colour(mark.colour);
+    ctx.setLineDash((mark.dash ?? []).map((length) => length * ratio));
+    ctx.beginPath();
+    if (mark.x !== undefined) {
+      const x = valToPos(mark.x, "x", true);
+      ctx.moveTo(x, bbox.top);
+      ctx.lineTo(x, bbox.top + bbox.height);
+    } else {
+      const y = valToPos(mark.y, "y", true);
+      ctx.moveTo(bbox.left, y);
+      ctx.lineTo(bbox.left + bbox.width, y);
+    }
+    ctx.stroke();
+  }
+  ctx.restore();
+}
+
+/* Draws again when colours or pixels change: another scheme of the system, another zoom of the browser, or paper,
+   which is light. */
+function redrawOn(draw) {
+  const { classList } = document.documentElement;
+  const paper = (isPaper) => {
+    classList.toggle("printing", isPaper);
+    draw(isPaper);
+  };
+  const again = () => draw(classList.contains("printing"));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
+  addEventListener("dppxchange", again);
+  addEventListener("beforeprint", () => paper(true));
+  addEventListener("afterprint", () => paper(false));
+}
