@@ -215,7 +215,8 @@ fn states(design: &Design) -> Vec<State> {
         .zip(estimates.chain(filtered).chain(integrals))
         .enumerate()
         .map(|(position, (name, (kind, Label { unit, meaning })))| {
-            let derivative = format!("Derivative of the {} of {meaning}", kind.to_lowercase());
+            let derivative =
+                format!("Derivative of the {} of {meaning}", kind.to_ascii_lowercase());
             let texts = [format!("{kind} of {meaning}"), derivative];
             let units = match kind {
                 "Integral" => [times_second(unit), unit.cloned()],

@@ -19,13 +19,13 @@ pub fn nearest(description: &ModelDescription, name: &str) -> String {
 /// most two, ignoring case.
 #[must_use]
 pub fn among<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str> {
-    let wanted = name.to_lowercase();
+    let wanted = name.to_ascii_lowercase();
     let near = |known: &&str| {
-        let known = known.to_lowercase();
+        let known = known.to_ascii_lowercase();
         known.contains(&wanted) || wanted.contains(&known) || levenshtein(&known, &wanted) <= EDITS
     };
     let mut similar: Vec<_> = names.filter(near).collect();
-    similar.sort_by_key(|known| levenshtein(&known.to_lowercase(), &wanted));
+    similar.sort_by_key(|known| levenshtein(&known.to_ascii_lowercase(), &wanted));
     similar.truncate(5);
     similar
 }

@@ -71,6 +71,10 @@ fn text(payload: &dyn Any) -> &str {
 ///
 /// The message contains the location of the panic while a [`HookGuard`] exists.
 pub(crate) fn guarded<T, E: From<Failure>>(body: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
+    // Where panics abort the process, there is nothing to catch.
+    if !cfg!(panic = "unwind") {
+        return body();
+    }
     FENCE.with(|fence| {
         fence.depth.set(fence.depth.get() + 1);
         let done = catch_unwind(AssertUnwindSafe(body));
@@ -123,7 +127,8 @@ impl Drop for HookGuard {
     fn drop(&mut self) {
         let mut guards = GUARDS.lock().unwrap_or_else(PoisonError::into_inner);
         guards.count -= 1;
-        if guards.count == 0
+        if cfg!(panic = "unwind")
+            && guards.count == 0
             && !thread::panicking()
             && let Some(installed) = guards.installed.take()
         {

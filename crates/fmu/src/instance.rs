@@ -51,6 +51,9 @@ pub(crate) struct Core<M: Model> {
     next_event: Option<f64>,
 }
 
+/// Lays the variables out for values of the structural parameters.
+type LayOut<M> = fn(&mut Instance<M>, Vec<u64>) -> Result<(), Failure>;
+
 /// An instance: the FMU state and the data that is not part of it.
 pub(crate) struct Instance<M: Model> {
     core: Core<M>,
@@ -71,6 +74,8 @@ pub(crate) struct Instance<M: Model> {
     direction: Option<M>,
     /// What an instance of FMI 3.0 has in addition.
     session: Option<Box<Session>>,
+    /// FMI 3.0 only. As a pointer: a program that makes no instance of FMI 3.0 does not contain the function.
+    lay_out: Option<LayOut<M>>,
     hook_guard: HookGuard,
 }
 
@@ -171,6 +176,7 @@ impl<M: Model> Instance<M> {
                 strings: Vec::new(),
                 direction: None,
                 session,
+                lay_out: None,
                 hook_guard,
             })
         })?;

@@ -1,6 +1,7 @@
 //! The variables of a model by value reference, and the model description made from them.
 
 mod clocks;
+mod describe;
 pub(crate) mod fmi3;
 mod general;
 mod sizes;
@@ -10,14 +11,14 @@ mod structure;
 
 use crate::model::{Failure, Model};
 use crate::typed::Slots;
-use crate::variable::{Access, Enumeration, Number, Variable};
+use crate::variable::{Access, Base, Declaration, Enumeration, Fields, Number, Variable};
+use describe::{describe_aliases, describe_variables, keep_derivative};
 use fmu_description::call_order::settable;
 use fmu_description::call_order3;
 use fmu_description::location::NO_FOLDER;
-use fmu_description::unit::Unit;
 use fmu_description::{
     Causality, Guid, Initial, IntegerType, Kind, LogCategory, ModelDescription, Problem, RealType,
-    ScalarVariable, SimpleType, Unknown, Variability,
+    ScalarVariable, Unknown,
 };
 
 pub(crate) use general::WARNING;
@@ -61,12 +62,11 @@ impl<M: Model> Interface<M> {
     /// Assigns slots and value references to the variables of `model` and makes their description with
     /// start values.
     pub(crate) fn new(model: &mut M) -> Result<(Self, ModelDescription), Failure> {
-        let mut variables = model.variables();
-        // FMI 2.0 leaves them out, and the indices of the others must not change.
-        variables.sort_by_key(Variable::is_left_out_of_2);
+        let (variables, fields) = split(model.variables());
         let mut description = general::general::<M>(model);
-        description.log_categories = general::categories::<M>(model.log().is_some());
-        description.structure = structure::structure(&variables)?;
+        description.log_categories = general::categories(model.log().is_some(), M::LOG_CATEGORIES);
+        describe_variables(&variables, &mut description)?;
+        let states = structure::states(&variables)?;
         let mut interface = Self {
             reals: Vec::new(),
             integers: Vec::new(),
@@ -82,14 +82,7 @@ impl<M: Model> Interface<M> {
             sizes: sizes::Sizes::of(&variables),
             clocks: clocks::Clocks::of(&variables),
         };
-        description.variables.push(time());
-        for variable in &variables {
-            define_unit(&mut description.units, variable)?;
-            define_type(&mut description.types, variable)?;
-            description.variables.push(described(&variables, variable)?);
-        }
-        let states = structure::states(&variables)?;
-        interface.assign_references(model, variables, &mut description)?;
+        interface.assign_references(model, variables.into_iter().zip(fields), &mut description)?;
         interface.states = states
             .into_iter()
             .map(|(state, derivative)| continuous_state(&description, state, derivative))
@@ -135,32 +128,24 @@ impl<M: Model> Interface<M> {
     fn assign_references(
         &mut self,
         model: &mut M,
-        variables: Vec<Variable<M>>,
+        variables: impl Iterator<Item = (Declaration, Fields<M>)>,
         description: &mut ModelDescription,
     ) -> Result<(), Failure> {
         let mut aliases = Vec::new();
-        for (position, variable) in variables.into_iter().enumerate() {
-            let name = variable.name.clone();
-            if let Access::Alias(of) = variable.access {
+        for (position, (variable, fields)) in variables.enumerate() {
+            if let Base::Alias(of) = variable.base {
                 aliases.push((position + 1, of));
                 continue;
             }
+            let name = variable.name.clone();
             let (kind, value_reference) = self
-                .assign_reference(model, variable)
+                .assign_reference(model, variable, fields)
                 .map_err(|reason| Failure::Error(format!("variable {name}: {reason}")))?;
             let own = &mut description.variables[position + 1];
             keep_derivative(&mut own.kind, kind);
             own.value_reference = value_reference;
         }
-        for (index, of) in aliases {
-            let target =
-                description.variable(&of).map(|own| (own.kind.clone(), own.value_reference));
-            let Some((kind, value_reference)) = target else { continue };
-            let own = &mut description.variables[index];
-            let constant = own.variability == Variability::Constant;
-            keep_derivative(&mut own.kind, if constant { kind } else { without_start(kind) });
-            own.value_reference = value_reference;
-        }
+        describe_aliases(aliases, description);
         Ok(())
     }
 
@@ -169,16 +154,17 @@ impl<M: Model> Interface<M> {
     fn assign_reference(
         &mut self,
         model: &mut M,
-        variable: Variable<M>,
+        variable: Declaration,
+        Fields { access, derivatives }: Fields<M>,
     ) -> Result<TypedReference, String> {
         let start_given = variable.initial != Some(Initial::Calculated);
         if variable.causality == Causality::Output {
-            let order = u32::try_from(variable.derivatives.len()).unwrap_or(u32::MAX);
+            let order = u32::try_from(derivatives.len()).unwrap_or(u32::MAX);
             self.max_output_derivative_order = self.max_output_derivative_order.max(order);
         }
         let (number, reinit) = (variable.number.clone(), variable.reinit);
         let enumeration = variable.enumeration.clone();
-        let (builder, access) = SlotBuilder::new(variable);
+        let builder = SlotBuilder::new(variable, derivatives);
         Ok(match access {
             Access::Real(field) => {
                 let start = start_given.then(|| *field(model));
@@ -206,9 +192,17 @@ impl<M: Model> Interface<M> {
                 (Kind::String(start), builder.build(&mut self.strings, field))
             }
             Access::Typed(field) => self.typed.add(model, (field, number), start_given, builder)?,
-            Access::Alias(of) => return Err(format!("it is an alias of {of}")),
+            Access::Alias => return Err("it is an alias".to_owned()),
         })
     }
+}
+
+/// Splits the variables into what describes them and their fields. Those that FMI 2.0 leaves out come last:
+/// the indices of the others must not change.
+fn split<M>(variables: Vec<Variable<M>>) -> (Vec<Declaration>, Vec<Fields<M>>) {
+    let (last, first): (Vec<_>, Vec<_>) =
+        variables.into_iter().partition(|own| own.declaration.is_left_out_of_2());
+    first.into_iter().chain(last).map(|own| (own.declaration, own.fields)).unzip()
 }
 
 fn names(categories: &[LogCategory]) -> Vec<String> {
@@ -258,109 +252,6 @@ fn continuous_state(
     };
     let ((state, nominal), (derivative, _)) = (slot(state)?, slot(derivative)?);
     Ok(ContinuousState { state, derivative, nominal: nominal.unwrap_or(1.0) })
-}
-
-/// Replaces the type but keeps the attribute `derivative`, which is set before the type.
-fn keep_derivative(place: &mut Kind, mut kind: Kind) {
-    if let (Kind::Real(RealType { derivative, .. }), Kind::Real(new)) = (&*place, &mut kind) {
-        new.derivative = *derivative;
-    }
-    *place = kind;
-}
-
-fn without_start(kind: Kind) -> Kind {
-    match kind {
-        Kind::Real(own) => Kind::Real(RealType { start: None, reinit: false, ..own }),
-        Kind::Integer(own) => Kind::Integer(IntegerType { start: None, ..own }),
-        Kind::Enumeration(own) => Kind::Enumeration(IntegerType { start: None, ..own }),
-        Kind::Boolean(_) => Kind::Boolean(None),
-        Kind::String(_) => Kind::String(None),
-        mut other => {
-            other.clear_start();
-            other
-        }
-    }
-}
-
-/// Describes the variable; type and value reference are set later.
-fn described<M>(
-    variables: &[Variable<M>],
-    variable: &Variable<M>,
-) -> Result<ScalarVariable, Failure> {
-    let (mut variability, mut initial) = (variable.variability, variable.initial);
-    if let Access::Alias(of) = &variable.access {
-        let target = structure::find(variables, &variable.name, of)?;
-        if let Access::Alias(_) = variables[target].access {
-            let name = &variable.name;
-            return Err(Failure::Error(format!("{name} is an alias of {of}, itself an alias")));
-        }
-        variability = variables[target].variability;
-        if variability == Variability::Constant {
-            initial = Some(Initial::Exact);
-        }
-    }
-    let state = variable.derivative_of.as_ref();
-    let state = state.map(|of| structure::find(variables, &variable.name, of)).transpose()?;
-    Ok(ScalarVariable {
-        name: variable.name.clone(),
-        value_reference: 0,
-        description: Some(variable.description.clone()).filter(|text| !text.is_empty()),
-        causality: variable.causality,
-        variability,
-        initial,
-        kind: Kind::Real(RealType {
-            derivative: state.map(structure::index),
-            ..RealType::default()
-        }),
-        ..ScalarVariable::default()
-    })
-}
-
-/// Returns the independent variable, time, the Real with value reference 0.
-fn time() -> ScalarVariable {
-    ScalarVariable {
-        name: "time".to_owned(),
-        value_reference: 0,
-        description: Some("Simulation time".to_owned()),
-        causality: Causality::Independent,
-        variability: Variability::Continuous,
-        initial: None,
-        kind: Kind::Real(RealType { unit: Some("s".to_owned()), ..RealType::default() }),
-        ..ScalarVariable::default()
-    }
-}
-
-fn define_unit<M>(units: &mut Vec<Unit>, variable: &Variable<M>) -> Result<(), Failure> {
-    let Some(name) = &variable.number.unit else { return Ok(()) };
-    if units.iter().all(|unit| unit.name != *name) {
-        let unit = Unit::parse(name).map_err(|error| {
-            let name = &variable.name;
-            Failure::Error(format!("variable {name}: {error} (FMI 2.0.5, section 2.2.2)"))
-        })?;
-        units.push(unit);
-    }
-    Ok(())
-}
-
-fn define_type<M>(types: &mut Vec<SimpleType>, variable: &Variable<M>) -> Result<(), Failure> {
-    let Some(Enumeration { name, items }) = &variable.enumeration else { return Ok(()) };
-    match types.iter().find(|known| known.name == *name) {
-        Some(known) if known.items == wide(items) => {}
-        Some(_) => {
-            return Err(Failure::Error(format!(
-                "variable {}: its enumeration {name} has other items elsewhere \
-                 (FMI 2.0.5, section 2.2.3)",
-                variable.name
-            )));
-        }
-        None => types.push(SimpleType {
-            name: name.clone(),
-            description: None,
-            kind: Kind::Enumeration(IntegerType::default()),
-            items: wide(items),
-        }),
-    }
-    Ok(())
 }
 
 /// Makes the model description of `M`, with the folder `resources`, as packing writes it to
@@ -506,8 +397,4 @@ pub fn problems<M: Model>(resources: &std::path::Path) -> Result<Vec<Problem>, F
         return Ok(interface.convert(&description)?.1.problems());
     }
     Ok(description.problems())
-}
-
-fn wide(items: &[(String, i32)]) -> Vec<(String, i64)> {
-    items.iter().map(|(name, value)| (name.clone(), (*value).into())).collect()
 }

@@ -150,9 +150,11 @@ impl Stepper {
             return shown.map(|()| Reached::End).map_err(|failure| stopped(failure, time));
         }
         equations.interface.read_states(equations.model, state);
+        // As an object: one copy of the integrator serves all models.
+        let system: &mut dyn System = equations;
         let reached = integrator
-            .start(equations, time, state, target)
-            .and_then(|()| integrator.advance(equations, target));
+            .start(system, time, state, target)
+            .and_then(|()| integrator.advance(system, target));
         let time = integrator.time();
         let shown = equations.show(time, integrator.state());
         let reached = reached.map_err(|failure| stopped(failure, time))?;

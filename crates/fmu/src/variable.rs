@@ -1,7 +1,11 @@
 //! Declaration of a variable: the source of its description, value reference and field access.
 
+mod declaration;
+
 use crate::typed::TypedField;
 use fmu_description::{Causality, DependencyKind, Initial, Variability};
+
+pub(crate) use declaration::{Base, Declaration};
 
 /// A function that borrows one field of a model.
 pub(crate) type Field<M, T> = Box<dyn for<'a> Fn(&'a mut M) -> &'a mut T + Send + Sync>;
@@ -14,8 +18,18 @@ pub(crate) enum Access<M> {
     String(Field<M, String>),
     /// A type that FMI 2.0 does not have.
     Typed(TypedField<M>),
-    /// An alias of the variable with this name.
-    Alias(String),
+    /// An alias has no field of its own; see [`Base::Alias`].
+    Alias,
+}
+
+impl<M> Access<M> {
+    fn base(&self) -> Base {
+        match self {
+            Access::Real(_) => Base::Real,
+            Access::Typed(TypedField::Clock(_)) => Base::Clock,
+            _ => Base::Other,
+        }
+    }
 }
 
 /// An enumeration type: its name and its items.
@@ -57,23 +71,14 @@ pub(crate) struct Number {
 /// [`tunable`](Variable::tunable), [`calculated_parameter`](Variable::calculated_parameter); the
 /// default is a local variable), then unit, limits and dependencies.
 pub struct Variable<M> {
-    pub(crate) name: String,
-    pub(crate) description: String,
-    pub(crate) causality: Causality,
-    pub(crate) variability: Variability,
-    pub(crate) initial: Option<Initial>,
-    pub(crate) number: Number,
-    pub(crate) reinit: bool,
-    pub(crate) enumeration: Option<Enumeration>,
-    pub(crate) derivative_of: Option<String>,
-    pub(crate) direct: Vec<(String, DependencyKind)>,
-    pub(crate) initially: Option<Vec<String>>,
-    pub(crate) derivatives: Vec<Field<M, f64>>,
-    /// The structural parameters that are the extents of the array with this element.
-    pub(crate) sized_by: Vec<String>,
-    /// The clocks of a clocked variable.
-    pub(crate) clocks: Vec<String>,
+    pub(crate) declaration: Declaration,
+    pub(crate) fields: Fields<M>,
+}
+
+/// The fields of the model that belong to a variable.
+pub(crate) struct Fields<M> {
     pub(crate) access: Access<M>,
+    pub(crate) derivatives: Vec<Field<M, f64>>,
 }
 
 impl<M> Variable<M> {
@@ -152,7 +157,9 @@ impl<M> Variable<M> {
     where
         F: for<'a> Fn(&'a mut M) -> &'a mut i32 + Send + Sync + 'static,
     {
-        Self { enumeration: Some(enumeration), ..Self::integer(name, description, field) }
+        let mut variable = Self::integer(name, description, field);
+        variable.declaration.enumeration = Some(enumeration);
+        variable
     }
 
     /// Creates a structural parameter: an extent of arrays ([`Variable::sized_by`]), at least 1, which the
@@ -166,8 +173,9 @@ impl<M> Variable<M> {
     where
         F: for<'a> Fn(&'a mut M) -> &'a mut u64 + Send + Sync + 'static,
     {
-        let variable = Self::uint64(name, description, field).any_parameter(Variability::Fixed);
-        Self { causality: Causality::StructuralParameter, ..variable }.min(1.0)
+        let mut variable = Self::uint64(name, description, field).any_parameter(Variability::Fixed);
+        variable.declaration.causality = Causality::StructuralParameter;
+        variable.min(1.0)
     }
 
     /// Creates an input clock that ticks every `interval` s from the start time on (FMI 3.0.2, section
@@ -187,7 +195,7 @@ impl<M> Variable<M> {
         F: for<'a> Fn(&'a mut M) -> &'a mut bool + Send + Sync + 'static,
     {
         let mut clock = Self::triggered_clock(name, description, field).input();
-        clock.number.interval = Some(interval);
+        clock.declaration.number.interval = Some(interval);
         clock
     }
 
@@ -206,8 +214,9 @@ impl<M> Variable<M> {
         F: for<'a> Fn(&'a mut M) -> &'a mut bool + Send + Sync + 'static,
     {
         let field = TypedField::Clock(Box::new(field));
-        let clock = Self::typed(name, description, Variability::Discrete, field);
-        Self { initial: None, ..clock }
+        let mut clock = Self::typed(name, description, Variability::Discrete, field);
+        clock.declaration.initial = None;
+        clock
     }
 
     /// Creates an alias of the variable `of`, with the same type, unit and value reference. An alias has
@@ -217,13 +226,9 @@ impl<M> Variable<M> {
         description: impl Into<String>,
         of: impl Into<String>,
     ) -> Self {
-        Self::local(name, description, Variability::Continuous, Access::Alias(of.into()))
-    }
-
-    /// Whether descriptions of FMI 2.0 leave the variable out.
-    pub(crate) fn is_left_out_of_2(&self) -> bool {
-        self.causality == Causality::StructuralParameter
-            || matches!(self.access, Access::Typed(TypedField::Clock(_)))
+        let mut alias = Self::local(name, description, Variability::Continuous, Access::Alias);
+        alias.declaration.base = Base::Alias(of.into());
+        alias
     }
 
     pub(crate) fn typed(
@@ -241,38 +246,26 @@ impl<M> Variable<M> {
         variability: Variability,
         access: Access<M>,
     ) -> Self {
-        Self {
-            name: name.into(),
-            description: description.into(),
-            causality: Causality::Local,
-            variability,
-            initial: Some(Initial::Calculated),
-            number: Number::default(),
-            reinit: false,
-            enumeration: None,
-            derivative_of: None,
-            direct: Vec::new(),
-            initially: None,
-            derivatives: Vec::new(),
-            sized_by: Vec::new(),
-            clocks: Vec::new(),
-            access,
-        }
+        let base = access.base();
+        let declaration = Declaration::local(name.into(), description.into(), variability, base);
+        Self { declaration, fields: Fields { access, derivatives: Vec::new() } }
     }
 
     /// Makes the variable an input.
     #[must_use]
-    pub fn input(self) -> Self {
-        Self { causality: Causality::Input, initial: None, ..self }
+    pub fn input(mut self) -> Self {
+        self.declaration.causality = Causality::Input;
+        self.declaration.initial = None;
+        self
     }
 
     /// Makes the variable an output. `direct` names the inputs (and, in a model with continuous states,
     /// states or `time`) on which it depends directly (direct feedthrough; `ModelStructure`, section
     /// 2.2.8). It is empty if only a step changes the output.
     #[must_use]
-    pub fn output(self, direct: &[&str]) -> Self {
-        let output = Self { causality: Causality::Output, ..self };
-        output.depends(DependencyKind::Dependent, direct.iter().copied())
+    pub fn output(mut self, direct: &[&str]) -> Self {
+        self.declaration.causality = Causality::Output;
+        self.depends(DependencyKind::Dependent, direct.iter().copied())
     }
 
     /// Makes the variable a parameter that is fixed after initialization.
@@ -287,20 +280,21 @@ impl<M> Variable<M> {
         self.any_parameter(Variability::Tunable)
     }
 
-    fn any_parameter(self, variability: Variability) -> Self {
-        let initial = Some(Initial::Exact);
-        let causality = match self.causality {
-            Causality::StructuralParameter => Causality::StructuralParameter,
-            _ => Causality::Parameter,
-        };
-        Self { causality, variability, initial, ..self }
+    fn any_parameter(mut self, variability: Variability) -> Self {
+        let own = &mut self.declaration;
+        if own.causality != Causality::StructuralParameter {
+            own.causality = Causality::Parameter;
+        }
+        (own.variability, own.initial) = (variability, Some(Initial::Exact));
+        self
     }
 
     /// States the clocks of a discrete variable: it changes when one of them ticks (FMI 3.0.2, section
     /// 2.2.8.3).
     #[must_use]
-    pub fn clocked_by(self, clocks: &[&str]) -> Self {
-        Self { clocks: clocks.iter().map(|&name| name.to_owned()).collect(), ..self }
+    pub fn clocked_by(mut self, clocks: &[&str]) -> Self {
+        self.declaration.clocks = clocks.iter().map(|&name| name.to_owned()).collect();
+        self
     }
 
     /// States for an element of an array which structural parameters are the extents of the array, one
@@ -321,62 +315,69 @@ impl<M> Variable<M> {
     /// # assert_eq!(count, 3);
     /// ```
     #[must_use]
-    pub fn sized_by(self, structural: &[&str]) -> Self {
-        Self { sized_by: structural.iter().map(|&name| name.to_owned()).collect(), ..self }
+    pub fn sized_by(mut self, structural: &[&str]) -> Self {
+        self.declaration.sized_by = structural.iter().map(|&name| name.to_owned()).collect();
+        self
     }
 
     /// Makes the variable a parameter that [`Model::initialize`](crate::Model::initialize) computes from
     /// other parameters.
     #[must_use]
-    pub fn calculated_parameter(self) -> Self {
-        let variability = Variability::Fixed;
-        Self { causality: Causality::CalculatedParameter, variability, ..self }
+    pub fn calculated_parameter(mut self) -> Self {
+        self.declaration.causality = Causality::CalculatedParameter;
+        self.declaration.variability = Variability::Fixed;
+        self
     }
 
     /// Makes a local variable or output constant.
     #[must_use]
-    pub fn constant(self) -> Self {
-        Self { variability: Variability::Constant, initial: Some(Initial::Exact), ..self }
+    pub fn constant(mut self) -> Self {
+        self.declaration.variability = Variability::Constant;
+        self.declaration.initial = Some(Initial::Exact);
+        self
     }
 
     /// Makes a Real discrete: it changes at events or communication points only.
     #[must_use]
-    pub fn discrete(self) -> Self {
-        Self { variability: Variability::Discrete, ..self }
+    pub fn discrete(mut self) -> Self {
+        self.declaration.variability = Variability::Discrete;
+        self
     }
 
     /// Sets `initial = exact` for a local variable or output: it starts with the value of its field after
     /// [`Model::new`](crate::Model::new), unless the importer sets another value before the first step.
     #[must_use]
-    pub fn exact(self) -> Self {
-        Self { initial: Some(Initial::Exact), ..self }
+    pub fn exact(mut self) -> Self {
+        self.declaration.initial = Some(Initial::Exact);
+        self
     }
 
     /// Sets `initial = approx` for a local variable or output: an iteration computes the initial value
     /// from the value of its field, a guess that the importer may set before initialization mode.
     #[must_use]
-    pub fn approximate(self) -> Self {
-        Self { initial: Some(Initial::Approx), ..self }
+    pub fn approximate(mut self) -> Self {
+        self.declaration.initial = Some(Initial::Approx);
+        self
     }
 
     /// Sets the unit, an expression for [`Unit::parse`](fmu_description::unit::Unit::parse).
     #[must_use]
     pub fn unit(mut self, unit: impl Into<String>) -> Self {
-        self.number.unit = Some(unit.into());
+        self.declaration.number.unit = Some(unit.into());
         self
     }
 
     /// Sets the display unit, one of the display units of the variable's unit.
     #[must_use]
     pub fn display_unit(mut self, unit: impl Into<String>) -> Self {
-        self.number.display_unit = Some(unit.into());
+        self.declaration.number.display_unit = Some(unit.into());
         self
     }
 
     /// Sets `quantity`, the physical quantity, such as `Force`.
     #[must_use]
     pub fn quantity(mut self, quantity: impl Into<String>) -> Self {
-        self.number.quantity = Some(quantity.into());
+        self.declaration.number.quantity = Some(quantity.into());
         self
     }
 
@@ -384,21 +385,21 @@ impl<M> Variable<M> {
     /// `fmi2Discard`.
     #[must_use]
     pub fn range(mut self, min: f64, max: f64) -> Self {
-        (self.number.min, self.number.max) = (Some(min), Some(max));
+        (self.declaration.number.min, self.declaration.number.max) = (Some(min), Some(max));
         self
     }
 
     /// Sets the smallest allowed value. See [`Variable::range`].
     #[must_use]
     pub fn min(mut self, min: f64) -> Self {
-        self.number.min = Some(min);
+        self.declaration.number.min = Some(min);
         self
     }
 
     /// Sets the largest allowed value. See [`Variable::range`].
     #[must_use]
     pub fn max(mut self, max: f64) -> Self {
-        self.number.max = Some(max);
+        self.declaration.number.max = Some(max);
         self
     }
 
@@ -406,7 +407,7 @@ impl<M> Variable<M> {
     /// state with it.
     #[must_use]
     pub fn nominal(mut self, nominal: f64) -> Self {
-        self.number.nominal = Some(nominal);
+        self.declaration.number.nominal = Some(nominal);
         self
     }
 
@@ -414,14 +415,16 @@ impl<M> Variable<M> {
     ///
     /// In model exchange the importer integrates it.
     #[must_use]
-    pub fn derivative_of(self, state: impl Into<String>) -> Self {
-        Self { derivative_of: Some(state.into()), ..self }
+    pub fn derivative_of(mut self, state: impl Into<String>) -> Self {
+        self.declaration.derivative_of = Some(state.into());
+        self
     }
 
     /// Sets `reinit`: an event may change this continuous state.
     #[must_use]
-    pub fn reinit(self) -> Self {
-        Self { reinit: true, ..self }
+    pub fn reinit(mut self) -> Self {
+        self.declaration.reinit = true;
+        self
     }
 
     /// Adds the inputs, states or `time` on which an output or the derivative of a state depends at a
@@ -432,15 +435,16 @@ impl<M> Variable<M> {
         kind: DependencyKind,
         on: impl IntoIterator<Item = S>,
     ) -> Self {
-        self.direct.extend(on.into_iter().map(|name| (name.into(), kind)));
+        self.declaration.direct.extend(on.into_iter().map(|name| (name.into(), kind)));
         self
     }
 
     /// Sets the inputs and variables with exact start values (or `time`) on which the initial value
     /// depends. By default an importer must assume that it depends on all of them.
     #[must_use]
-    pub fn initially<S: Into<String>>(self, names: impl IntoIterator<Item = S>) -> Self {
-        Self { initially: Some(names.into_iter().map(Into::into).collect()), ..self }
+    pub fn initially<S: Into<String>>(mut self, names: impl IntoIterator<Item = S>) -> Self {
+        self.declaration.initially = Some(names.into_iter().map(Into::into).collect());
+        self
     }
 
     /// Adds the field of the next time derivative: the first call adds the first derivative, the second
@@ -454,7 +458,7 @@ impl<M> Variable<M> {
     where
         F: for<'a> Fn(&'a mut M) -> &'a mut f64 + Send + Sync + 'static,
     {
-        self.derivatives.push(Box::new(field));
+        self.fields.derivatives.push(Box::new(field));
         self
     }
 }

@@ -97,6 +97,7 @@ impl<M: Model> Instance<M> {
         instance.debug_logging = true;
         instance.categories = (!made.logging_on).then(Vec::new);
         instance.session_mut()?.structural = instance.structural_parameters();
+        instance.lay_out = Some(Self::lay_out);
         Ok(instance.into_type(made.interface_type))
     }
 

@@ -1,14 +1,14 @@
 //! The clocks of clocked variables.
 
 use crate::model::Failure;
-use crate::variable::Variable;
+use crate::variable::Declaration;
 use fmu_description::{Kind, ModelDescription};
 
 /// The clocked variables of a model, by name, with the names of their clocks.
 pub(super) struct Clocks(Vec<(String, Vec<String>)>);
 
 impl Clocks {
-    pub(super) fn of<M>(variables: &[Variable<M>]) -> Self {
+    pub(super) fn of(variables: &[Declaration]) -> Self {
         let clocked = variables.iter().filter(|own| !own.clocks.is_empty());
         Self(clocked.map(|own| (own.name.clone(), own.clocks.clone())).collect())
     }

@@ -1,6 +1,6 @@
 //! The general part of a model description.
 
-use crate::model::Model;
+use crate::model::{About, Model};
 use fmu_description::unit::Unit;
 use fmu_description::{CoSimulation, LogCategory, ModelDescription, ModelExchange};
 
@@ -15,48 +15,55 @@ const CATEGORIES: [(&str, &str); 4] = [
 /// The category of the warnings of a model.
 pub(crate) const WARNING: &str = "logStatusWarning";
 
-/// Log categories of this FMU; with warnings and the model's own ones if it `logs`.
-pub(super) fn categories<M: Model>(logs: bool) -> Vec<LogCategory> {
+/// Log categories of an FMU with the model's `own` ones; with warnings if it `logs`.
+pub(super) fn categories(logs: bool, own: &[(&str, &str)]) -> Vec<LogCategory> {
     let warning = logs.then_some((WARNING, "Calls that succeeded, with a warning of the model"));
-    let own = M::LOG_CATEGORIES.iter().copied();
     let category = |(name, description): (&str, &str)| LogCategory {
         name: name.to_owned(),
         description: Some(description.to_owned()),
     };
-    CATEGORIES.into_iter().chain(warning).chain(own).map(category).collect()
+    CATEGORIES.into_iter().chain(warning).chain(own.iter().copied()).map(category).collect()
 }
 
 pub(super) fn general<M: Model>(model: &M) -> ModelDescription {
-    let about = model.about();
+    let indicators = model.model_exchange().map(|own| own.event_indicators);
+    description(M::IDENTIFIER, model.about(), indicators, M::PROVIDES_DIRECTIONAL_DERIVATIVE)
+}
+
+/// The general part for a model with this number of event indicators, `None` without model exchange.
+fn description(
+    identifier: &str,
+    about: About,
+    indicators: Option<usize>,
+    provides_directional_derivative: bool,
+) -> ModelDescription {
     let text = |text: String| (!text.is_empty()).then_some(text);
-    let exchange = model.model_exchange();
-    let indicators = exchange.map(|own| u32::try_from(own.event_indicators).unwrap_or(u32::MAX));
     ModelDescription {
         fmi_version: "2.0".to_owned(),
-        model_name: M::IDENTIFIER.to_owned(),
+        model_name: identifier.to_owned(),
         description: text(about.description),
         author: text(about.author),
         version: text(about.version),
         license: text(about.license),
         generation_tool: Some(concat!("aso-ftc ", env!("CARGO_PKG_VERSION")).to_owned()),
         structured_names: true,
-        number_of_event_indicators: indicators,
-        model_exchange: exchange.map(|_| ModelExchange {
-            model_identifier: M::IDENTIFIER.to_owned(),
+        number_of_event_indicators: indicators.map(|own| u32::try_from(own).unwrap_or(u32::MAX)),
+        model_exchange: indicators.map(|_| ModelExchange {
+            model_identifier: identifier.to_owned(),
             completed_integrator_step_not_needed: true,
             can_not_use_memory_management_functions: true,
             can_get_and_set_fmu_state: true,
             can_serialize_fmu_state: true,
-            provides_directional_derivative: M::PROVIDES_DIRECTIONAL_DERIVATIVE,
+            provides_directional_derivative,
             ..ModelExchange::default()
         }),
         co_simulation: Some(CoSimulation {
-            model_identifier: M::IDENTIFIER.to_owned(),
+            model_identifier: identifier.to_owned(),
             can_handle_variable_communication_step_size: true,
             can_not_use_memory_management_functions: true,
             can_get_and_set_fmu_state: true,
             can_serialize_fmu_state: true,
-            provides_directional_derivative: M::PROVIDES_DIRECTIONAL_DERIVATIVE,
+            provides_directional_derivative,
             ..CoSimulation::default()
         }),
         units: Unit::parse("s").into_iter().collect(),

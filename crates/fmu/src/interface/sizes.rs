@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::model::Failure;
-use crate::variable::Variable;
+use crate::variable::Declaration;
 use fmu_description::{Causality, Dimension, Kind, ModelDescription, ScalarVariable};
 
 /// The structural parameters of a model.
@@ -14,7 +14,7 @@ pub(super) struct Sizes {
 }
 
 impl Sizes {
-    pub(super) fn of<M>(variables: &[Variable<M>]) -> Self {
+    pub(super) fn of(variables: &[Declaration]) -> Self {
         let sized = variables.iter().filter(|own| !own.sized_by.is_empty());
         let by_element = sized.map(|own| (own.name.clone(), own.sized_by.clone())).collect();
         Self { by_element }
@@ -114,7 +114,7 @@ mod tests {
     use serde::{Deserialize, Serialize};
 
     use super::*;
-    use crate::{About, Model, describe_3, problems};
+    use crate::{About, Model, Variable, describe_3, problems};
 
     /// A vector of `LENGTH` elements whose extent is said to be n = 2; the last element states `OTHER`.
     #[derive(Clone, Serialize, Deserialize)]

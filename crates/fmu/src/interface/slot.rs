@@ -1,6 +1,6 @@
 //! Run-time data of a variable, indexed by value reference.
 
-use crate::variable::{Access, Field, Variable};
+use crate::variable::{Declaration, Field};
 use fmu_description::{Causality, Initial, Variability};
 use fmu_description::{call_order::settable, call_order3};
 
@@ -44,9 +44,9 @@ pub(crate) struct SlotBuilder<M> {
 }
 
 impl<M> SlotBuilder<M> {
-    pub(super) fn new(variable: Variable<M>) -> (Self, Access<M>) {
+    pub(super) fn new(variable: Declaration, derivatives: Vec<Field<M, f64>>) -> Self {
         let (min, max) = (variable.number.min, variable.number.max);
-        let builder = Self {
+        Self {
             name: variable.name,
             causality: variable.causality,
             variability: variable.variability,
@@ -57,9 +57,8 @@ impl<M> SlotBuilder<M> {
                 .map(|own| own.items.iter().map(|(_, value)| *value).collect())
                 .unwrap_or_default(),
             interval: variable.number.interval,
-            derivatives: variable.derivatives,
-        };
-        (builder, variable.access)
+            derivatives,
+        }
     }
 
     /// Same as [`SlotBuilder::build`] for a type that FMI 2.0 does not have: the rules of FMI 3.0 say when

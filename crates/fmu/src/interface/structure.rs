@@ -1,8 +1,7 @@
 //! `ModelStructure` of a model, from the declared dependencies of its variables.
 
 use crate::model::Failure;
-use crate::typed::TypedField;
-use crate::variable::{Access, Variable};
+use crate::variable::{Base, Declaration};
 use fmu_description::{Causality, DependencyKind, Initial, ModelStructure, Unknown};
 
 /// Returns the 1-based index of the variable at `position`. Index 1 is `time`.
@@ -11,7 +10,7 @@ pub(super) fn index(position: usize) -> u32 {
 }
 
 /// Returns the position of the variable called `name`, to which `of` refers.
-pub(super) fn find<M>(variables: &[Variable<M>], of: &str, name: &str) -> Result<usize, Failure> {
+pub(super) fn find(variables: &[Declaration], of: &str, name: &str) -> Result<usize, Failure> {
     let found = variables.iter().position(|variable| variable.name == name);
     found.ok_or_else(|| {
         Failure::Error(format!("{of} refers to {name}, which is no variable (section 2.2.7)"))
@@ -19,7 +18,7 @@ pub(super) fn find<M>(variables: &[Variable<M>], of: &str, name: &str) -> Result
 }
 
 /// Returns the positions of each continuous state and its derivative, in the order of the derivatives.
-pub(super) fn states<M>(variables: &[Variable<M>]) -> Result<Vec<(usize, usize)>, Failure> {
+pub(super) fn states(variables: &[Declaration]) -> Result<Vec<(usize, usize)>, Failure> {
     let mut states = Vec::new();
     for (derivative, variable) in variables.iter().enumerate() {
         if let Some(state) = &variable.derivative_of {
@@ -31,7 +30,7 @@ pub(super) fn states<M>(variables: &[Variable<M>]) -> Result<Vec<(usize, usize)>
 
 /// Returns `ModelStructure`. `InitialUnknowns` are the outputs, derivatives, states and calculated
 /// parameters without an exact start value.
-pub(super) fn structure<M>(variables: &[Variable<M>]) -> Result<ModelStructure, Failure> {
+pub(super) fn structure(variables: &[Declaration]) -> Result<ModelStructure, Failure> {
     let mut structure = ModelStructure::default();
     let states = states(variables)?;
     let is_state = |position| states.iter().any(|(state, _)| *state == position);
@@ -53,7 +52,7 @@ pub(super) fn structure<M>(variables: &[Variable<M>]) -> Result<ModelStructure, 
             || is_state(position)
             || variable.causality == Causality::CalculatedParameter;
         // An output clock may be listed (section 2.4.8); FMPy demands it.
-        let is_clock = matches!(variable.access, Access::Typed(TypedField::Clock(_)));
+        let is_clock = matches!(variable.base, Base::Clock);
         let computed = matches!(variable.initial, Some(Initial::Calculated | Initial::Approx));
         if exposed && (computed || is_clock) {
             structure.initial_unknowns.push(initial_row(variables, position)?);
@@ -63,19 +62,19 @@ pub(super) fn structure<M>(variables: &[Variable<M>]) -> Result<ModelStructure, 
 }
 
 /// Returns the position of the state, if the variable is a state or an alias of a state.
-fn resolve_alias<M>(variables: &[Variable<M>], position: usize) -> Result<Option<usize>, Failure> {
+fn resolve_alias(variables: &[Declaration], position: usize) -> Result<Option<usize>, Failure> {
     let variable = &variables[position];
-    match &variable.access {
-        Access::Real(_) => Ok(Some(position)),
-        Access::Alias(of) => find(variables, &variable.name, of).map(Some),
+    match &variable.base {
+        Base::Real => Ok(Some(position)),
+        Base::Alias(of) => find(variables, &variable.name, of).map(Some),
         _ => Ok(None),
     }
 }
 
 /// Returns the row of an output or derivative. If the variable is a state or an alias of a state, it
 /// depends on that state.
-fn dependency_row<M>(
-    variables: &[Variable<M>],
+fn dependency_row(
+    variables: &[Declaration],
     position: usize,
     own_state: Option<usize>,
 ) -> Result<Unknown, Failure> {
@@ -98,7 +97,7 @@ fn dependency_row<M>(
 }
 
 /// Returns the row of an initial unknown.
-fn initial_row<M>(variables: &[Variable<M>], position: usize) -> Result<Unknown, Failure> {
+fn initial_row(variables: &[Declaration], position: usize) -> Result<Unknown, Failure> {
     let variable = &variables[position];
     let Some(names) = &variable.initially else {
         return Ok(Unknown { index: index(position), dependencies: None, kinds: None });

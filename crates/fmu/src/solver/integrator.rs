@@ -126,7 +126,7 @@ impl Integrator {
     /// If `state` has not as many components as there are nominal values.
     pub fn start(
         &mut self,
-        system: &mut impl System,
+        system: &mut (impl System + ?Sized),
         time: f64,
         state: &[f64],
         end: f64,
@@ -154,7 +154,11 @@ impl Integrator {
     ///
     /// [`Failure::Incomplete`] with the time reached if the state, its derivative or an indicator is not
     /// finite, or if no step is short enough for the tolerance; the failures of `system`.
-    pub fn advance(&mut self, system: &mut impl System, end: f64) -> Result<Reached, Failure> {
+    pub fn advance(
+        &mut self,
+        system: &mut (impl System + ?Sized),
+        end: f64,
+    ) -> Result<Reached, Failure> {
         for _ in 0..STEP_LIMIT {
             let remaining = end - self.time;
             if remaining <= 0.0 {
@@ -181,7 +185,7 @@ impl Integrator {
     /// step is suggested. A longer one is suggested after it if `grows`.
     fn try_step(
         &mut self,
-        system: &mut impl System,
+        system: &mut (impl System + ?Sized),
         length: f64,
         grows: bool,
     ) -> Result<bool, Failure> {
@@ -211,7 +215,7 @@ impl Integrator {
     }
 
     /// Takes a step of `length` in s, whatever its error.
-    fn take(&mut self, system: &mut impl System, length: f64) -> Result<(), Failure> {
+    fn take(&mut self, system: &mut (impl System + ?Sized), length: f64) -> Result<(), Failure> {
         let done = RefCell::new((system, Ok(())));
         let evaluate = |time: f64, state: &Vec<f64>, slope: &mut Vec<f64>| {
             let (system, done) = &mut *done.borrow_mut();
@@ -249,7 +253,11 @@ impl Integrator {
     ///
     /// The whole interval if the state changes by at most about 1 % in it. Otherwise the method of Hairer,
     /// Norsett and Wanner, section II.4, which costs one evaluation.
-    fn first_length(&mut self, system: &mut impl System, remaining: f64) -> Result<f64, Failure> {
+    fn first_length(
+        &mut self,
+        system: &mut (impl System + ?Sized),
+        remaining: f64,
+    ) -> Result<f64, Failure> {
         let start = |i: usize| self.step.start()[i];
         let size = self.norm(|i| (start(i), start(i).abs()));
         let rate = self.norm(|i| (self.step.first_slope()[i], start(i).abs()));
@@ -274,7 +282,10 @@ impl Integrator {
     }
 
     /// Searches the step for an event and returns the part of the step after which it is expected.
-    fn find_crossing(&mut self, system: &mut impl System) -> Result<Option<f64>, Failure> {
+    fn find_crossing(
+        &mut self,
+        system: &mut (impl System + ?Sized),
+    ) -> Result<Option<f64>, Failure> {
         if self.indicators.is_empty() {
             return Ok(None);
         }
@@ -298,7 +309,7 @@ impl Integrator {
     /// `fraction`. `End` if no event happens in the step.
     fn step_to_event(
         &mut self,
-        system: &mut impl System,
+        system: &mut (impl System + ?Sized),
         fraction: f64,
         length: f64,
     ) -> Result<Reached, Failure> {
@@ -326,7 +337,7 @@ impl Integrator {
     }
 
     /// The distance to an event at the end of a step of `length`.
-    fn margin(&mut self, system: &mut impl System, length: f64) -> Result<f64, Failure> {
+    fn margin(&mut self, system: &mut (impl System + ?Sized), length: f64) -> Result<f64, Failure> {
         self.take(system, length)?;
         system.indicators(self.time + length, self.step.end(), &mut self.values)?;
         Ok(self.indicators.margin(&self.values))

@@ -55,6 +55,7 @@ impl<M: Model> Instance<M> {
 
     /// Lays the variables out again if the structural parameters have other values than before.
     pub(in super::super) fn fit_layout(&mut self) -> Result<(), Failure> {
+        let Some(lay_out) = self.lay_out else { return Ok(()) };
         // In these modes arrays still have the extents of before, and no function accesses them.
         let is_open =
             matches!(self.core.state, State::ConfigurationMode | State::ReconfigurationMode);
@@ -62,9 +63,11 @@ impl<M: Model> Instance<M> {
             return Ok(());
         }
         let structural = self.structural_parameters();
-        if self.session()?.structural == structural {
-            return Ok(());
-        }
+        if self.session()?.structural == structural { Ok(()) } else { lay_out(self, structural) }
+    }
+
+    /// Lays the variables out for these values of the structural parameters.
+    pub(super) fn lay_out(&mut self, structural: Vec<u64>) -> Result<(), Failure> {
         let (mut interface, description) = Interface::new(&mut self.core.model)?;
         let (table, _) = interface.convert(&description)?;
         interface.guid = self.interface.guid;

@@ -1,0 +1,142 @@
+//! The description of the variables, by functions that do not depend on the model.
+
+use super::structure;
+use crate::model::Failure;
+use crate::variable::{Base, Declaration, Enumeration};
+use fmu_description::unit::Unit;
+use fmu_description::{
+    Causality, Initial, IntegerType, Kind, ModelDescription, RealType, ScalarVariable, SimpleType,
+    Variability,
+};
+
+/// Describes time and the variables, with their units, types and dependencies. Types and value references of
+/// the variables are set later.
+pub(super) fn describe_variables(
+    variables: &[Declaration],
+    description: &mut ModelDescription,
+) -> Result<(), Failure> {
+    description.structure = structure::structure(variables)?;
+    description.variables.push(time());
+    for variable in variables {
+        define_unit(&mut description.units, variable)?;
+        define_type(&mut description.types, variable)?;
+        description.variables.push(described(variables, variable)?);
+    }
+    Ok(())
+}
+
+/// Describes the variable; type and value reference are set later.
+fn described(variables: &[Declaration], variable: &Declaration) -> Result<ScalarVariable, Failure> {
+    let (mut variability, mut initial) = (variable.variability, variable.initial);
+    if let Base::Alias(of) = &variable.base {
+        let target = structure::find(variables, &variable.name, of)?;
+        if let Base::Alias(_) = variables[target].base {
+            let name = &variable.name;
+            return Err(Failure::Error(format!("{name} is an alias of {of}, itself an alias")));
+        }
+        variability = variables[target].variability;
+        if variability == Variability::Constant {
+            initial = Some(Initial::Exact);
+        }
+    }
+    let state = variable.derivative_of.as_ref();
+    let state = state.map(|of| structure::find(variables, &variable.name, of)).transpose()?;
+    Ok(ScalarVariable {
+        name: variable.name.clone(),
+        value_reference: 0,
+        description: Some(variable.description.clone()).filter(|text| !text.is_empty()),
+        causality: variable.causality,
+        variability,
+        initial,
+        kind: Kind::Real(RealType {
+            derivative: state.map(structure::index),
+            ..RealType::default()
+        }),
+        ..ScalarVariable::default()
+    })
+}
+
+/// Returns the independent variable, time, the Real with value reference 0.
+fn time() -> ScalarVariable {
+    ScalarVariable {
+        name: "time".to_owned(),
+        value_reference: 0,
+        description: Some("Simulation time".to_owned()),
+        causality: Causality::Independent,
+        variability: Variability::Continuous,
+        initial: None,
+        kind: Kind::Real(RealType { unit: Some("s".to_owned()), ..RealType::default() }),
+        ..ScalarVariable::default()
+    }
+}
+
+fn define_unit(units: &mut Vec<Unit>, variable: &Declaration) -> Result<(), Failure> {
+    let Some(name) = &variable.number.unit else { return Ok(()) };
+    if units.iter().all(|unit| unit.name != *name) {
+        let unit = Unit::parse(name).map_err(|error| {
+            let name = &variable.name;
+            Failure::Error(format!("variable {name}: {error} (FMI 2.0.5, section 2.2.2)"))
+        })?;
+        units.push(unit);
+    }
+    Ok(())
+}
+
+fn define_type(types: &mut Vec<SimpleType>, variable: &Declaration) -> Result<(), Failure> {
+    let Some(Enumeration { name, items }) = &variable.enumeration else { return Ok(()) };
+    match types.iter().find(|known| known.name == *name) {
+        Some(known) if known.items == wide(items) => {}
+        Some(_) => {
+            return Err(Failure::Error(format!(
+                "variable {}: its enumeration {name} has other items elsewhere \
+                 (FMI 2.0.5, section 2.2.3)",
+                variable.name
+            )));
+        }
+        None => types.push(SimpleType {
+            name: name.clone(),
+            description: None,
+            kind: Kind::Enumeration(IntegerType::default()),
+            items: wide(items),
+        }),
+    }
+    Ok(())
+}
+
+fn wide(items: &[(String, i32)]) -> Vec<(String, i64)> {
+    items.iter().map(|(name, value)| (name.clone(), (*value).into())).collect()
+}
+
+/// Gives aliases, by index, the value references and types of their variables, by name.
+pub(super) fn describe_aliases(aliases: Vec<(usize, String)>, description: &mut ModelDescription) {
+    for (index, of) in aliases {
+        let target = description.variable(&of).map(|own| (own.kind.clone(), own.value_reference));
+        let Some((kind, value_reference)) = target else { continue };
+        let own = &mut description.variables[index];
+        let constant = own.variability == Variability::Constant;
+        keep_derivative(&mut own.kind, if constant { kind } else { without_start(kind) });
+        own.value_reference = value_reference;
+    }
+}
+
+/// Replaces the type but keeps the attribute `derivative`, which is set before the type.
+pub(super) fn keep_derivative(place: &mut Kind, mut kind: Kind) {
+    if let (Kind::Real(RealType { derivative, .. }), Kind::Real(new)) = (&*place, &mut kind) {
+        new.derivative = *derivative;
+    }
+    *place = kind;
+}
+
+fn without_start(kind: Kind) -> Kind {
+    match kind {
+        Kind::Real(own) => Kind::Real(RealType { start: None, reinit: false, ..own }),
+        Kind::Integer(own) => Kind::Integer(IntegerType { start: None, ..own }),
+        Kind::Enumeration(own) => Kind::Enumeration(IntegerType { start: None, ..own }),
+        Kind::Boolean(_) => Kind::Boolean(None),
+        Kind::String(_) => Kind::String(None),
+        mut other => {
+            other.clear_start();
+            other
+        }
+    }
+}
