@@ -204,8 +204,10 @@ fn default_coupling(system: &System, reasons: &mut Vec<String>) -> Coupling {
 }
 
 fn default_extrapolation(system: &System, reasons: &mut Vec<String>) -> Extrapolation {
-    let fed: std::collections::BTreeSet<usize> =
+    let mut fed: Vec<usize> =
         system.connections.iter().map(|connection| connection.to.slave).collect();
+    fed.sort_unstable();
+    fed.dedup();
     let unable: Vec<_> = fed
         .into_iter()
         .filter(|&k| {

@@ -52,7 +52,7 @@ pub use grid::EarlyEnd;
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use readout::{Readout, SlowState, SlowValues};
-pub use simulation::{Checkpoint, Simulation};
+pub use simulation::{Checkpoint, KeptState, Simulation};
 pub use slave::{
     Advance, Background, CallError, Failure, Slave, StepResult, Transformation, Value, ValueType,
     to_hex,

@@ -25,8 +25,8 @@ use crate::step_control::{Pace, SizeControl};
 use crate::system::{Port, System};
 use slave::{CallError, Failure};
 
-pub use checkpoint::Checkpoint;
 use checkpoint::Origin;
+pub use checkpoint::{Checkpoint, KeptState};
 
 /// A running co-simulation of a [`System`].
 pub struct Simulation {

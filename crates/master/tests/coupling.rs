@@ -1,6 +1,8 @@
 //! The master algorithms on slaves of a few lines, against answers computed by hand.
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
 
+use std::collections::HashMap;
+
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use fmu_description::abi::Status;
@@ -23,6 +25,7 @@ struct Integrator {
     slope: f64,
     direct: bool,
     fails_at: f64,
+    saved: HashMap<usize, [f64; 3]>,
 }
 
 impl Integrator {
@@ -41,7 +44,8 @@ impl Integrator {
         );
         let description = ModelDescription::parse(xml).unwrap();
         let fails_at = f64::INFINITY;
-        Box::new(Self { description, gain, x, u: 0.0, slope: 0.0, direct, fails_at })
+        let saved = HashMap::new();
+        Box::new(Self { description, gain, x, u: 0.0, slope: 0.0, direct, fails_at, saved })
     }
 }
 
@@ -107,6 +111,14 @@ impl Slave for Integrator {
         self.slope = 0.0;
         Ok(StepResult::Whole)
     }
+    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
+        self.saved.insert(slot, [self.x, self.u, self.slope]);
+        Ok(())
+    }
+    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
+        [self.x, self.u, self.slope] = self.saved[&slot];
+        Ok(())
+    }
 }
 
 /// x' = v, v' = -x: two integrators in a ring, from x = 1, v = 0.5.
@@ -157,6 +169,28 @@ fn gauss_seidel_gives_the_later_slave_the_line_between_both_values() {
     simulation.step().unwrap();
     let x = 1.25 + 0.5 * v + 0.125 * ((v - 0.5) / 0.5);
     assert_eq!(outputs(&mut simulation), [x, v - 0.25 * (1.25 + x)]);
+}
+
+#[test]
+fn a_run_that_returns_to_a_kept_state_repeats_its_steps_bit_for_bit() {
+    let mut simulation = start(ring(), GAUSS_SEIDEL, Some(5.0));
+    let mut kept = Vec::new();
+    for slot in 0..3 {
+        simulation.step().unwrap();
+        let state = simulation.keep(slot).unwrap();
+        assert_eq!(state.slot(), slot);
+        kept.push((state, simulation.time(), outputs(&mut simulation)));
+    }
+    simulation.step().unwrap();
+    let last = outputs(&mut simulation);
+    for (state, time, values) in kept.iter().rev() {
+        simulation.return_to(state).unwrap();
+        assert_eq!((simulation.time(), outputs(&mut simulation)), (*time, *values));
+    }
+    for _ in 0..3 {
+        simulation.step().unwrap();
+    }
+    assert_eq!((simulation.time(), outputs(&mut simulation)), (2.0, last));
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! Threads that step the slaves of a group at the same time, where measurements show that this is
 //! faster: handing a step to another thread costs some microseconds, more than many FMUs need.
 
+#[cfg_attr(target_family = "wasm", path = "threads/no_pool.rs")]
+mod pool;
+
 use std::time::{Duration, Instant};
 
-use rayon::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
-
 use crate::error::SystemError;
+use pool::Pool;
 use slave::{Advance, CallError, Slave, StepResult};
 
 /// Number of steps measured with and without threads.
@@ -24,7 +25,7 @@ pub(crate) struct Task<'a> {
 
 /// The thread pool, and the measured times of each group of slaves.
 pub(super) struct Threads {
-    pool: ThreadPool,
+    pool: Pool,
     groups: Vec<Measured>,
 }
 
@@ -49,9 +50,8 @@ impl Threads {
         if jobs < 2 {
             return Ok(None);
         }
-        let pool = ThreadPoolBuilder::new().num_threads(jobs).build();
-        let pool = pool.map_err(|error| SystemError::Algorithm {
-            what: format!("{jobs} threads cannot be started: {error}"),
+        let pool = Pool::new(jobs).map_err(|reason| SystemError::Algorithm {
+            what: format!("{jobs} threads cannot be started: {reason}"),
         })?;
         Ok(Some(Self { pool, groups: vec![Measured::default(); groups] }))
     }
@@ -81,7 +81,7 @@ impl Threads {
 pub(super) fn run(threads: Option<&Threads>, tasks: &mut [Task<'_>]) {
     let step = |task: &mut Task<'_>| task.done = task.instance.advance(&mut task.step);
     match threads {
-        Some(threads) => threads.pool.install(|| tasks.par_iter_mut().for_each(step)),
+        Some(threads) => threads.pool.for_each(tasks, step),
         None => tasks.iter_mut().for_each(step),
     }
 }

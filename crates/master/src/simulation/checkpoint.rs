@@ -1,4 +1,4 @@
-//! Checkpoints: the state of a simulation as data.
+//! Checkpoints: the state of a simulation as data. Kept states: in memory, for the same simulation.
 
 mod origin;
 
@@ -15,7 +15,12 @@ use crate::exchange::{Values, call};
 use crate::fault::FaultChain;
 use crate::step_control::Controller;
 use crate::system::System;
+use slave::Slave;
+
 pub(super) use origin::Origin;
+
+/// The first slot of the slaves for [`Simulation::keep`], after those of the algorithms.
+const FIRST_SLOT: usize = 3;
 
 /// The complete state of a simulation. A resumed run gives the same results, bit for bit.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -49,6 +54,21 @@ impl Checkpoint {
     }
 }
 
+/// A state of a simulation in memory, see [`Simulation::keep`].
+pub struct KeptState {
+    /// The state of the master; the FMU states are empty.
+    master: Checkpoint,
+    slot: usize,
+}
+
+impl KeptState {
+    /// Returns the slot given to [`Simulation::keep`].
+    #[must_use]
+    pub fn slot(&self) -> usize {
+        self.slot
+    }
+}
+
 impl Simulation {
     /// Returns the current state of the simulation.
     ///
@@ -57,18 +77,58 @@ impl Simulation {
     /// Returns an error if an FMU cannot serialise its state (`canSerializeFMUstate` is false) or
     /// fails to do so.
     pub fn checkpoint(&mut self) -> Result<Checkpoint, SystemError> {
-        let time = self.engine.grid.time;
-        let mut slaves = Vec::new();
-        for (name, slave) in &mut self.engine.system.slaves {
+        self.checkpoint_with(|name, slave, time| {
             let flags = slave.description().co_simulation.as_ref();
             if !flags.is_some_and(|flags| flags.can_serialize_fmu_state) {
                 return Err(SystemError::Capability {
-                    slave: name.clone(),
+                    slave: name.to_owned(),
                     lacks: "canSerializeFMUstate",
                     required_by: "a checkpoint".to_owned(),
                 });
             }
-            let bytes = slave.serialize_state().map_err(|source| call(name, time, source))?;
+            slave.serialize_state().map_err(|source| call(name, time, source))
+        })
+    }
+
+    /// Keeps the current state in memory: the slaves keep their FMU states in `slot` (0, 1, 2, ...), in
+    /// place of an earlier one.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if an FMU cannot save its state (`canGetAndSetFMUstate` is false) or fails to do
+    /// so.
+    pub fn keep(&mut self, slot: usize) -> Result<KeptState, SystemError> {
+        let master = self.checkpoint_with(|name, slave, time| {
+            let saved = slave.save_state(FIRST_SLOT + slot);
+            saved.map(|()| Vec::new()).map_err(|source| call(name, time, source))
+        })?;
+        Ok(KeptState { master, slot })
+    }
+
+    /// Returns to a state that this simulation has kept, if its slot was not used again.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if slaves, connections or faults differ from the kept state, or if an FMU refuses
+    /// its state.
+    pub fn return_to(&mut self, kept: &KeptState) -> Result<(), SystemError> {
+        self.expect_origin_of(&kept.master)?;
+        for (name, slave) in &mut self.engine.system.slaves {
+            let restored = slave.restore_state(FIRST_SLOT + kept.slot);
+            restored.map_err(|source| call(name, kept.master.time, source))?;
+        }
+        self.restore_master(&kept.master)
+    }
+
+    /// The state of the master, and of each slave what `state` returns for its name and the time.
+    fn checkpoint_with(
+        &mut self,
+        state: impl Fn(&str, &mut dyn Slave, f64) -> Result<Vec<u8>, SystemError>,
+    ) -> Result<Checkpoint, SystemError> {
+        let time = self.engine.grid.time;
+        let mut slaves = Vec::new();
+        for (name, slave) in &mut self.engine.system.slaves {
+            let bytes = state(name, slave.as_mut(), time)?;
             slaves.push((name.clone(), slave.description().guid.clone(), bytes));
         }
         let mut values = Values::default();
@@ -124,6 +184,11 @@ impl Simulation {
         for ((name, slave), (_, _, bytes)) in self.engine.system.slaves.iter_mut().zip(states) {
             slave.deserialize_state(bytes).map_err(|source| call(name, checkpoint.time, source))?;
         }
+        self.restore_master(checkpoint)
+    }
+
+    /// Restores everything but the FMU states.
+    fn restore_master(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
         self.engine.exchange.restore(&checkpoint.values);
         for (fault, kept) in self.engine.exchange.faults().zip(&checkpoint.faults) {
             fault.clone_from(kept);
