@@ -88,7 +88,7 @@
     time = 0;
     last = null;
     plots.clear();
-    worker.postMessage({ kind: "start", settings: lines(values), step: values.step, stop: values.stop });
+    worker.postMessage({ kind: "start", settings: lines(values), eigenvalues: placed(values), step: values.step, stop: values.stop });
     if (go) run();
     else stopped("Ready.");
   }

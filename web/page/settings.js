@@ -55,9 +55,13 @@ function lines(values) {
   return [
     `from=${values.from}`,
     ...own.map(({ id, variable }) => `${variable}=${values[id]}`),
-    ...(values.eigenvalues.trim() === DESIGNED ? [] : [`eigenvalues=${values.eigenvalues}`]),
     ...faults(values).map(({ fault, id }) => `${fault}=${values[id]}`),
   ].join("\n");
+}
+
+// The eigenvalues of the observer, if they are not those of the paper.
+function placed(values) {
+  return values.eigenvalues.trim() === DESIGNED ? null : values.eigenvalues;
 }
 
 function permalink(values) {

@@ -10,19 +10,21 @@ let wasm = null;
 let timer = null;
 let run = null; // {step, speed, time, saved, due}
 
-const loaded = WebAssembly.instantiateStreaming(fetch("paper.wasm"), {}).catch(async () =>
+const load = (file) => WebAssembly.instantiateStreaming(fetch(file), {}).catch(async () =>
   // A server that does not name the type of the file.
-  WebAssembly.instantiate(await (await fetch("paper.wasm")).arrayBuffer(), {}));
+  WebAssembly.instantiate(await (await fetch(file)).arrayBuffer(), {}));
+const loaded = load("paper.wasm");
+let observer = null; // the module that places eigenvalues, loaded when they are set
 
-function write(text) {
+function write(text, to = wasm) {
   const bytes = new TextEncoder().encode(text);
-  const place = wasm.text(bytes.length);
-  new Uint8Array(wasm.memory.buffer, place, bytes.length).set(bytes);
+  const place = to.text(bytes.length);
+  new Uint8Array(to.memory.buffer, place, bytes.length).set(bytes);
 }
 
-function read() {
-  const length = wasm.text_length();
-  return new TextDecoder().decode(new Uint8Array(wasm.memory.buffer, wasm.text(length), length));
+function read(from = wasm) {
+  const length = from.text_length();
+  return new TextDecoder().decode(new Uint8Array(from.memory.buffer, from.text(length), length));
 }
 
 function pause() {
@@ -79,17 +81,27 @@ function turn() {
 }
 
 const actions = {
-  start({ settings, step, stop }) {
+  async start({ settings, eigenvalues, step, stop }) {
     pause();
-    write(settings);
+    run = null;
+    let gains = "";
+    if (eigenvalues !== null) {
+      observer ??= (await load("observer.wasm")).instance.exports;
+      write(eigenvalues, observer);
+      const refused = observer.place() !== 0;
+      gains = read(observer);
+      if (refused) {
+        postMessage({ kind: "refused", text: gains });
+        return;
+      }
+    }
+    write(`${settings}\n${gains}`);
     if (wasm.start(step, stop) !== 0) {
-      run = null;
       postMessage({ kind: "refused", text: read() });
       return;
     }
     run = { step, speed: 1, time: 0, saved: 0, due: 0, spent: 0, last: 0 };
-    wasm.gains();
-    postMessage({ kind: "started", gains: read() });
+    postMessage({ kind: "started", gains });
     wasm.save();
   },
   run({ speed }) {
@@ -130,16 +142,23 @@ const actions = {
   },
 };
 
-onmessage = async ({ data }) => {
+async function act(data) {
   try {
     wasm ??= (await loaded).instance.exports;
-    actions[data.kind](data);
+    await actions[data.kind](data);
   } catch (error) {
     pause();
     run = null;
     wasm = null;
+    observer = null;
     postMessage({ kind: "failed", text: `The module stopped: ${error.message}. Reload the page to go on.` });
   }
+}
+
+// One after the other: a start waits for a module.
+let acted = Promise.resolve();
+onmessage = ({ data }) => {
+  acted = acted.then(() => act(data));
 };
 
 loaded.then(() => postMessage({ kind: "ready" }), (error) =>

@@ -4,69 +4,34 @@
 use std::cell::RefCell;
 
 use crate::Paper;
+use crate::text::{answer, read};
 
 thread_local! {
     static RUN: RefCell<Option<Paper>> = const { RefCell::new(None) };
-    static TEXT: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
     static ROWS: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
 }
 
-fn told(done: Result<(), String>) -> i32 {
-    match done {
-        Ok(()) => 0,
-        Err(text) => {
-            TEXT.set(text.into_bytes());
-            1
-        }
-    }
-}
-
-fn with(body: impl FnOnce(&mut Paper) -> Result<(), String>) -> i32 {
-    told(RUN.with_borrow_mut(|run| body(run.as_mut().ok_or("no run is started")?)))
-}
-
-/// Makes the text buffer `length` bytes long; returns its address.
-#[unsafe(no_mangle)]
-pub extern "C" fn text(length: usize) -> *mut u8 {
-    TEXT.with_borrow_mut(|text| {
-        text.resize(length, 0);
-        text.as_mut_ptr()
-    })
-}
-
-/// The length of the text buffer, which holds the sentence after a function returned 1.
-#[unsafe(no_mangle)]
-pub extern "C" fn text_length() -> usize {
-    TEXT.with_borrow(Vec::len)
+fn with(body: &mut dyn FnMut(&mut Paper) -> Result<(), String>) -> i32 {
+    let done = RUN.with_borrow_mut(|run| body(run.as_mut().ok_or("no run is started")?));
+    answer(done.map(|()| None))
 }
 
 /// Starts a run with the settings in the text buffer; returns 1 if it cannot be started.
 #[unsafe(no_mangle)]
 pub extern "C" fn start(step: f64, stop: f64) -> i32 {
-    let settings = TEXT.with_borrow(|text| String::from_utf8_lossy(text).into_owned());
-    told(Paper::new(&settings, step, stop).map(|paper| RUN.set(Some(paper))))
+    let made = Paper::new(&read(), step, stop);
+    answer(made.map(|paper| {
+        RUN.with_borrow_mut(|run| *run = Some(paper));
+        None
+    }))
 }
 
 /// Sets an input or a tunable parameter, `fmu.variable=value` in the text buffer; returns 1 if it is refused.
 #[unsafe(no_mangle)]
 pub extern "C" fn set() -> i32 {
-    let text = TEXT.with_borrow(|text| String::from_utf8_lossy(text).into_owned());
+    let text = read();
     let (name, value) = text.split_once('=').unwrap_or((&text, ""));
-    with(|run| run.set(name.trim(), value.trim()))
-}
-
-/// Puts the gains that were designed into the text buffer; returns 1 if no run is started.
-#[unsafe(no_mangle)]
-pub extern "C" fn gains() -> i32 {
-    let mut found = String::new();
-    let status = with(|run| {
-        found.push_str(run.gains());
-        Ok(())
-    });
-    if status == 0 {
-        TEXT.set(found.into_bytes());
-    }
-    status
+    with(&mut |run| run.set(name.trim(), value.trim()))
 }
 
 /// Makes up to `steps` steps. Keeps a row at each multiple of `every` steps since the start, and one at the
@@ -75,7 +40,7 @@ pub extern "C" fn gains() -> i32 {
 pub extern "C" fn advance(steps: u32, every: u32) -> i32 {
     ROWS.with_borrow_mut(Vec::clear);
     let keep = |row: [f64; 9]| ROWS.with_borrow_mut(|rows| rows.extend(row));
-    with(|run| {
+    with(&mut |run| {
         for _ in 0..steps {
             if run.is_finished() {
                 break;
@@ -119,11 +84,11 @@ pub extern "C" fn rows_length() -> usize {
 /// Saves the state; returns 1 if it cannot be saved.
 #[unsafe(no_mangle)]
 pub extern "C" fn save() -> i32 {
-    with(Paper::save)
+    with(&mut Paper::save)
 }
 
 /// Goes back to the state saved last; returns 1 if none is kept.
 #[unsafe(no_mangle)]
 pub extern "C" fn back() -> i32 {
-    with(Paper::back)
+    with(&mut Paper::back)
 }

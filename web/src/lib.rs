@@ -5,6 +5,7 @@ mod exports;
 mod linked;
 mod paper;
 mod settings;
+mod text;
 
 pub use linked::LinkedSlave;
 pub use paper::{COLUMNS, Paper};

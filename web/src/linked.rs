@@ -1,4 +1,5 @@
-//! A linked model as a [`Slave`] of the master.
+//! A linked model as a [`Slave`] of the master. It saves its state in memory; the functions that serialise
+//! it would be a tenth of the module.
 
 use fmu::description::{Experiment, ModelDescription};
 use fmu::{Linked, Model};
@@ -139,16 +140,5 @@ impl<M: Model + Send> Slave for LinkedSlave<M> {
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
         let status = self.0.restore_state(slot);
         self.done("fmi2SetFMUstate", status)
-    }
-
-    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
-        let mut bytes = Vec::new();
-        let status = self.0.serialize_state(&mut bytes);
-        self.done("fmi2SerializeFMUstate", status).map(|()| bytes)
-    }
-
-    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        let status = self.0.deserialize_state(bytes);
-        self.done("fmi2DeSerializeFMUstate", status)
     }
 }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use controller::AsoController;
 use files::sentence;
 use fmu::description::Experiment;
-use master::{AlgorithmRequest, Checkpoint, Probe, Simulation, System, Value, choose};
+use master::{AlgorithmRequest, KeptState, Probe, Simulation, System, Value, choose};
 use plant::FrictionPendulum;
 
 use crate::LinkedSlave;
@@ -36,11 +36,10 @@ const SAVED: usize = 240;
 pub struct Paper {
     simulation: Simulation,
     probe: Probe,
-    saved: VecDeque<(Checkpoint, u64)>,
+    /// From the oldest to the newest, in slots that follow one another, modulo [`SAVED`].
+    saved: VecDeque<(KeptState, u64)>,
     /// Number of steps made.
     steps: u64,
-    /// The gains that were designed for the run, as settings of the controller FMU.
-    gains: String,
 }
 
 impl Paper {
@@ -49,8 +48,8 @@ impl Paper {
     ///
     /// # Errors
     ///
-    /// The reason, as a sentence: a setting that is unknown or out of its range, eigenvalues that make no observer, or a
-    /// failure of a model.
+    /// The reason, as a sentence: a setting that is unknown or out of its range, or a failure of a
+    /// model.
     pub fn new(settings: &str, step: f64, stop: f64) -> Result<Self, String> {
         if !(step > 0.0 && stop > 0.0 && stop / step < MOST_STEPS) {
             return Err(format!(
@@ -63,12 +62,11 @@ impl Paper {
         let controller =
             AsoController::from_bytes(DESIGN).map_err(|failure| failure.to_string())?;
         let settings = Settings::parse(settings)?;
-        let gains = settings.gains(&controller.plant())?;
         let controller = LinkedSlave::new(controller).map_err(|failure| failure.to_string())?;
         system.add("plant", Box::new(plant)).map_err(told)?;
         system.add("controller", Box::new(controller)).map_err(told)?;
         system.connect_equal_names().map_err(told)?;
-        for (name, value) in settings.values.iter().chain(&gains) {
+        for (name, value) in &settings.values {
             let port = system.port(name).map_err(told)?;
             system.set_port(port, value).map_err(told)?;
         }
@@ -79,14 +77,8 @@ impl Paper {
         let scenario = settings.scenario(&system, step)?;
         let experiment = Experiment { start_time: 0.0, stop_time: Some(stop), tolerance: None };
         let simulation = Simulation::with_scenario(system, &algorithm, &experiment, scenario);
-        let gains = gains.iter().map(|(name, value)| format!("{name}={value}\n")).collect();
         let simulation = simulation.map_err(told)?;
-        Ok(Self { simulation, probe, saved: VecDeque::new(), steps: 0, gains })
-    }
-
-    /// The gains that were designed for this run: lines `fmu.variable=value`, none for those of the paper.
-    pub fn gains(&self) -> &str {
-        &self.gains
+        Ok(Self { simulation, probe, saved: VecDeque::new(), steps: 0 })
     }
 
     /// The time in s.
@@ -145,12 +137,13 @@ impl Paper {
     ///
     /// # Errors
     ///
-    /// The reason, as a sentence: a model cannot serialise its state.
+    /// The reason, as a sentence: a model cannot save its state.
     pub fn save(&mut self) -> Result<(), String> {
         if self.saved.len() == SAVED {
             self.saved.pop_front();
         }
-        self.saved.push_back((self.simulation.checkpoint().map_err(told)?, self.steps));
+        let slot = self.saved.back().map_or(0, |(newest, _)| (newest.slot() + 1) % SAVED);
+        self.saved.push_back((self.simulation.keep(slot).map_err(told)?, self.steps));
         Ok(())
     }
 
@@ -161,7 +154,7 @@ impl Paper {
     /// The reason, as a sentence: no state is saved, or a model refuses it.
     pub fn back(&mut self) -> Result<(), String> {
         let (saved, steps) = self.saved.pop_back().ok_or("no earlier state is kept")?;
-        self.simulation.restore(&saved).map_err(told)?;
+        self.simulation.return_to(&saved).map_err(told)?;
         self.steps = steps;
         Ok(())
     }

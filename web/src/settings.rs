@@ -1,9 +1,5 @@
-//! What the page sets before a run: values of variables, eigenvalues of the observer, faults.
+//! What the page sets before a run: values of variables, faults.
 
-use std::collections::BTreeSet;
-
-use control::aso::FaultyPlant;
-use control::placement::{place_balanced, real_poles};
 use master::fault::{Fault, FaultChain, NoiseDistribution, RandomSeries, Window};
 use master::{Scenario, System};
 
@@ -14,8 +10,6 @@ use crate::paper::told;
 pub(crate) struct Settings {
     /// Variables and their values, as text.
     pub(crate) values: Vec<(String, String)>,
-    /// Eigenvalues of the observer in 1/s, if they are not those of the paper.
-    eigenvalues: Option<Vec<f64>>,
     /// Inputs and the faults on their connections, in this order.
     faults: Vec<(String, FaultKind, f64)>,
     /// Time in s from which bias and gain act.
@@ -35,7 +29,6 @@ impl Settings {
     ///
     /// ```text
     /// plant.F_c=20                     a variable
-    /// eigenvalues=-900 -1000 -1100 ..  of the observer, real, in 1/s
     /// bias controller.theta=0.01       on the connection to this input, from the time `from` on
     /// gain plant.u=0.5                 the same
     /// delay controller.theta=0.001     in s, always
@@ -63,46 +56,11 @@ impl Settings {
                 settings.faults.push((input, *kind, number(line, value)?));
             } else if name == "from" {
                 settings.from = number(line, value)?;
-            } else if name == "eigenvalues" {
-                let parts = value.split([' ', ',']).filter(|part| !part.is_empty());
-                let parsed: Result<Vec<_>, _> = parts.map(|part| number(line, part)).collect();
-                settings.eigenvalues = Some(parsed?);
             } else {
                 settings.values.push((name.to_owned(), value.to_owned()));
             }
         }
         Ok(settings)
-    }
-
-    /// `L_x` and `L_f` for the eigenvalues, as settings of the controller FMU; none for those of the paper.
-    ///
-    /// # Errors
-    ///
-    /// The reason, as a sentence: eigenvalues that no observer has, or too many or too few.
-    pub(crate) fn gains(&self, plant: &FaultyPlant) -> Result<Vec<(String, String)>, String> {
-        let Some(eigenvalues) = &self.eigenvalues else { return Ok(Vec::new()) };
-        if let Some(slow) = eigenvalues.iter().find(|value| **value >= 0.0) {
-            return Err(format!("eigenvalue {slow} 1/s of the observer: expected below 0"));
-        }
-        plant.check_observer_exists().map_err(told)?;
-        let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-        let poles = real_poles(eigenvalues);
-        let placed = place_balanced(&a_0.transpose(), &c_0.transpose(), &poles).map_err(told)?;
-        // A_0 - L C_0 has the eigenvalues, L = [L_x; -L_f].
-        let l = -placed.gain.transpose();
-        let (n, q) = plant.f_a.shape();
-        let named = [("L_x", l.rows(0, n).into_owned()), ("L_f", -l.rows(n, q))];
-        Ok(named
-            .iter()
-            .flat_map(|(name, matrix)| {
-                let places =
-                    (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| (i, j)));
-                places.map(move |(i, j)| {
-                    let variable = format!("controller.{name}[{},{}]", i + 1, j + 1);
-                    (variable, format!("{:?}", matrix[(i, j)]))
-                })
-            })
-            .collect())
     }
 
     /// The faults, each at the connection to its input.
@@ -112,7 +70,9 @@ impl Settings {
     /// The reason, as a sentence: an unknown input, or a delay of too many steps.
     pub(crate) fn scenario(&self, system: &System, step: f64) -> Result<Scenario, String> {
         let mut scenario = Scenario::default();
-        let inputs: BTreeSet<&String> = self.faults.iter().map(|(input, ..)| input).collect();
+        let mut inputs: Vec<&String> = self.faults.iter().map(|(input, ..)| input).collect();
+        inputs.sort_unstable();
+        inputs.dedup();
         for input in inputs {
             let port = system.port(input).map_err(told)?;
             let own = self.faults.iter().filter(|(name, ..)| name == input).enumerate();

@@ -1,0 +1,40 @@
+//! The buffer through which a module and the page pass texts.
+#![allow(unsafe_code, reason = "exported names")]
+
+use std::cell::RefCell;
+
+thread_local! {
+    static TEXT: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Makes the text buffer `length` bytes long; returns its address.
+#[unsafe(no_mangle)]
+pub extern "C" fn text(length: usize) -> *mut u8 {
+    TEXT.with_borrow_mut(|text| {
+        text.resize(length, 0);
+        text.as_mut_ptr()
+    })
+}
+
+/// The length of the text buffer, which holds the sentence after a function returned 1.
+#[unsafe(no_mangle)]
+pub extern "C" fn text_length() -> usize {
+    TEXT.with_borrow(Vec::len)
+}
+
+/// The text in the buffer.
+pub(crate) fn read() -> String {
+    TEXT.with_borrow(|text| String::from_utf8_lossy(text).into_owned())
+}
+
+/// The status of a function, 0 or 1; puts its text or its failure into the buffer.
+pub(crate) fn answer(done: Result<Option<String>, String>) -> i32 {
+    let (status, text) = match done {
+        Ok(text) => (0, text),
+        Err(text) => (1, Some(text)),
+    };
+    if let Some(text) = text {
+        TEXT.with_borrow_mut(|buffer| *buffer = text.into_bytes());
+    }
+    status
+}
