@@ -1,6 +1,6 @@
 # Recipes for daily work; `just --list` prints them. scripts/test runs all tests.
 
-features := "tests/fmi,aso-control/lmi"
+features := "tests/fmi,aso-control/lmi,aso-ftc/sbom"
 
 # Format, lints and unit tests: under two minutes once everything is built.
 quick:
@@ -23,7 +23,6 @@ bless:
 # The benchmarks of the book; they need a machine without other load.
 bench:
     .venv/bin/python scripts/benchmark-peers
-    cargo bench --package cosim-master --bench step
     cargo bench --package cosim-results --bench results
     cargo bench --package tests
 

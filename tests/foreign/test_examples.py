@@ -283,7 +283,7 @@ def test_a_new_crate_is_tested_packed_and_simulated_outside_of_the_workspace(
     assert done.returncode == 0, done.stderr
     # The dependency versions of this workspace, so that nothing is downloaded.
     shutil.copy(root / "Cargo.lock", crate)
-    shared = {**os.environ, "CARGO_TARGET_DIR": str(root / "target" / "author")}
+    shared = {**os.environ, "CARGO_TARGET_DIR": str(root / "target" / "author"), "CARGO_PROFILE_DEV_DEBUG": "false"}
     done = subprocess.run(["cargo", "test"], cwd=crate, env=shared, capture_output=True, text=True)
     assert done.returncode == 0 and "2 passed" in done.stdout, done.stdout + done.stderr
     done = aso_ftc("pack", crate, "--out", tmp_path, env=shared)

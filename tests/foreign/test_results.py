@@ -5,7 +5,9 @@ generator is here in Python: every number must be read with the same bits.
 """
 
 import json
+import os
 import subprocess
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -42,10 +44,13 @@ def expected(rows=ROWS):
 
 @pytest.fixture(scope="module")
 def write_results(root):
-    """Runs the example; returns its exit status."""
-    cargo = ["cargo", "build", "--release", "--locked", "--package", "cosim-results"]
-    subprocess.run([*cargo, "--example", "write_results"], cwd=root, check=True)
-    program = root / "target" / "release" / "examples" / "write_results"
+    """Runs the example, which is built unless scripts/test has built it; returns its exit status."""
+    folder = os.environ.get("BUILT_PROGRAMS")
+    if folder is None:
+        cargo = ["cargo", "build", "--release", "--locked", "--package", "cosim-results"]
+        subprocess.run([*cargo, "--example", "write_results"], cwd=root, check=True)
+        folder = root / "target" / "release"
+    program = Path(folder) / "examples" / "write_results"
     return lambda *arguments: subprocess.run([program, *arguments], capture_output=True).returncode
 
 

@@ -31,24 +31,34 @@ pub fn root() -> PathBuf {
     tests.parent().unwrap_or(tests).to_owned()
 }
 
-/// The built command `aso-ftc`; builds it if necessary.
+/// The program of the package `name`, built if the environment variable `BUILT_PROGRAMS` does not name
+/// the folder of the built programs. `scripts/test` sets it: a package built alone would give the crates
+/// that it shares with the others other features, and all of them would be compiled once more.
 ///
 /// # Panics
 ///
 /// If it cannot be built.
 #[must_use]
+pub fn program(name: &str) -> PathBuf {
+    let file = format!("{name}{}", std::env::consts::EXE_SUFFIX);
+    if let Some(folder) = std::env::var_os("BUILT_PROGRAMS") {
+        return Path::new(&folder).join(file);
+    }
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let status = Command::new(cargo)
+        .current_dir(root())
+        .env_remove("CARGO_TARGET_DIR")
+        .args(["build", "--release", "--package", name, "--locked"])
+        .status();
+    assert!(status.is_ok_and(|status| status.success()), "{name} cannot be built");
+    root().join("target/release").join(file)
+}
+
+/// The command `aso-ftc`, see [`program`].
+#[must_use]
 pub fn command() -> &'static Path {
     static COMMAND: OnceLock<PathBuf> = OnceLock::new();
-    COMMAND.get_or_init(|| {
-        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let status = Command::new(cargo)
-            .current_dir(root())
-            .env_remove("CARGO_TARGET_DIR")
-            .args(["build", "--release", "--package", "aso-ftc", "--locked"])
-            .status();
-        assert!(status.is_ok_and(|status| status.success()), "aso-ftc cannot be built");
-        root().join("target/release").join(format!("aso-ftc{}", std::env::consts::EXE_SUFFIX))
-    })
+    COMMAND.get_or_init(|| program("aso-ftc"))
 }
 
 /// Runs the command in the workspace; returns its status and output.

@@ -20,10 +20,12 @@ pub(crate) struct Balance {
 impl Balance {
     pub(crate) fn new(a: &DMatrix<f64>) -> Self {
         let mut balance = Self { matrix: a.clone(), scale: DVector::from_element(a.nrows(), 1.0) };
+        // Its columns are the rows of the matrix, so that their sums read neighbours in memory.
+        let mut transposed = a.transpose();
         for _ in 0..SWEEPS {
             let mut changed = false;
             for state in 0..a.nrows() {
-                changed |= balance.level(state);
+                changed |= balance.level(&mut transposed, state);
             }
             if !changed {
                 break;
@@ -32,16 +34,18 @@ impl Balance {
         balance
     }
 
-    fn level(&mut self, state: usize) -> bool {
+    fn level(&mut self, transposed: &mut DMatrix<f64>, state: usize) -> bool {
         let own = self.matrix[(state, state)].abs();
-        let column = self.matrix.column(state).iter().map(|x| x.abs()).sum::<f64>() - own;
-        let row = self.matrix.row(state).iter().map(|x| x.abs()).sum::<f64>() - own;
+        let sum = |m: &DMatrix<f64>| m.column(state).iter().map(|x| x.abs()).sum::<f64>() - own;
+        let (column, row) = (sum(&self.matrix), sum(transposed));
         let factor = power_of_two((row / column).sqrt());
         if !factor.is_normal() || column * factor + row / factor >= WORTHWHILE * (column + row) {
             return false;
         }
         self.matrix.column_mut(state).scale_mut(factor);
         self.matrix.row_mut(state).unscale_mut(factor);
+        transposed.row_mut(state).scale_mut(factor);
+        transposed.column_mut(state).unscale_mut(factor);
         self.scale[state] *= factor;
         true
     }

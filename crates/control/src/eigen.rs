@@ -2,11 +2,13 @@
 
 mod francis;
 mod hamiltonian;
+mod rank_one;
 
 use crate::balance::Balance;
 use crate::{Error, check};
 pub(crate) use hamiltonian::Hamiltonian;
 use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, Schur};
+pub(crate) use rank_one::RankOne;
 
 /// Largest number of QR iterations per row of the matrix; two or three are usual.
 const ITERATIONS_PER_ROW: usize = 100;

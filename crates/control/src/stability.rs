@@ -56,7 +56,7 @@ pub fn is_clearly_stable(
 }
 
 /// The largest [`Domain::excess`] of the eigenvalues.
-fn largest_excess(eigenvalues: &[Complex<f64>], domain: Domain) -> f64 {
+pub(crate) fn largest_excess(eigenvalues: &[Complex<f64>], domain: Domain) -> f64 {
     eigenvalues.iter().map(|&value| domain.excess(value)).fold(f64::NEG_INFINITY, f64::max)
 }
 

@@ -139,8 +139,8 @@ fn packs_the_files_of_the_author(place: &Path) {
 #[test]
 fn another_table_gives_the_same_library_other_variables() {
     let folder = tempfile::tempdir().unwrap();
-    let example = root().join("examples/lookup-table").display().to_string();
-    let output = run_in(folder.path(), &["pack", &example, "--out", "."]);
+    let out = folder.path().display().to_string();
+    let output = tests::run(&["pack", "examples/lookup-table", "--out", &out]);
     assert!(output.status.success(), "{}", message(&output));
     let fmu = Unpacked::open(&folder.path().join("LookupTable.fmu")).unwrap();
     let library = fmu.library("LookupTable").unwrap();
@@ -174,6 +174,7 @@ fn rules_that_the_variables_break_are_named_with_their_section_by_the_first_test
     let output = Command::new("cargo")
         .current_dir(folder.path().join("broken-table"))
         .env("CARGO_TARGET_DIR", root().join("target/author"))
+        .env("CARGO_PROFILE_DEV_DEBUG", "false")
         .args(["test", "--quiet"])
         .output()
         .unwrap();

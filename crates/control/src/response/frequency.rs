@@ -7,6 +7,7 @@ use crate::svd::ComplexSvd;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// The response at one frequency.
 #[derive(Debug, Clone, PartialEq)]
@@ -179,36 +180,68 @@ impl Transfer {
     fn states(&self, s: Complex<f64>) -> DMatrix<Complex<f64>> {
         let n = self.transposed.nrows();
         // Column k is row k of s I - A.
-        let mut rows = self.transposed.map(|entry| Complex::new(-entry, 0.0));
-        let mut states = self.b.clone();
+        let mut rows = Parts { re: -&self.transposed, im: DMatrix::zeros(n, n) };
         for k in 0..n {
-            rows[(k, k)] += s;
-        }
-        for k in 1..n {
-            let (mut done, mut open) = rows.columns_range_pair_mut(k - 1, k);
-            if open[k - 1].norm_sqr() > done[k - 1].norm_sqr() {
-                done.iter_mut().zip(open.iter_mut()).for_each(|(x, y)| std::mem::swap(x, y));
-                states.swap_rows(k - 1, k);
-            }
-            let factor = open[k - 1] / done[k - 1];
-            for column in k..n {
-                open[column] -= factor * done[column];
-            }
-            for input in 0..states.ncols() {
-                let above = states[(k - 1, input)];
-                states[(k, input)] -= factor * above;
-            }
+            rows.re[(k, k)] += s.re;
+            rows.im[(k, k)] = s.im;
         }
         // All inputs of a state are neighbours, so that their sums are formed at the same time.
-        let mut by_state = states.transpose();
-        for k in (0..n).rev() {
-            let (mut sums, known) = by_state.columns_range_pair_mut(k, k + 1..);
-            for (entry, state) in rows.column(k).iter().skip(k + 1).zip(known.column_iter()) {
-                sums.iter_mut().zip(state.iter()).for_each(|(sum, state)| *sum -= entry * state);
+        let inputs = self.b.transpose();
+        let mut states = Parts { re: inputs.map(|x| x.re), im: inputs.map(|x| x.im) };
+        for k in 1..n {
+            if rows.at(k - 1, k).norm_sqr() > rows.at(k - 1, k - 1).norm_sqr() {
+                rows.exchange(k - 1, k);
+                states.exchange(k - 1, k);
             }
-            let pivot = rows[(k, k)];
-            sums.iter_mut().for_each(|sum| *sum /= pivot);
+            let factor = rows.at(k - 1, k) / rows.at(k - 1, k - 1);
+            rows.subtract(k, factor, k - 1, k..n);
+            states.subtract(k, factor, k - 1, 0..self.b.ncols());
         }
-        by_state.transpose()
+        for k in (0..n).rev() {
+            for other in k + 1..n {
+                states.subtract(k, rows.at(other, k), other, 0..self.b.ncols());
+            }
+            states.divide(k, rows.at(k, k));
+        }
+        states.re.zip_map(&states.im, Complex::new).transpose()
+    }
+}
+
+/// A complex matrix as two real ones, on whose columns the compiler uses vector instructions.
+struct Parts {
+    re: DMatrix<f64>,
+    im: DMatrix<f64>,
+}
+
+impl Parts {
+    fn at(&self, row: usize, column: usize) -> Complex<f64> {
+        Complex::new(self.re[(row, column)], self.im[(row, column)])
+    }
+
+    fn exchange(&mut self, one: usize, other: usize) {
+        self.re.swap_columns(one, other);
+        self.im.swap_columns(one, other);
+    }
+
+    /// Subtracts `factor` times the column `from` from the column `of`, in these rows.
+    fn subtract(&mut self, of: usize, factor: Complex<f64>, from: usize, rows: Range<usize>) {
+        let Complex { re, im } = factor;
+        let (mut to_re, from_re) = self.re.columns_range_pair_mut(of, from);
+        let (mut to_im, from_im) = self.im.columns_range_pair_mut(of, from);
+        let to = to_re.as_mut_slice()[rows.clone()]
+            .iter_mut()
+            .zip(&mut to_im.as_mut_slice()[rows.clone()]);
+        let from = from_re.as_slice()[rows.clone()].iter().zip(&from_im.as_slice()[rows]);
+        for ((x, y), (u, v)) in to.zip(from) {
+            *x -= re * u - im * v;
+            *y -= re * v + im * u;
+        }
+    }
+
+    fn divide(&mut self, column: usize, divisor: Complex<f64>) {
+        for row in 0..self.re.nrows() {
+            let quotient = self.at(row, column) / divisor;
+            (self.re[(row, column)], self.im[(row, column)]) = (quotient.re, quotient.im);
+        }
     }
 }

@@ -4,9 +4,10 @@ use super::crossing::narrowed;
 use super::disk::single;
 use super::sweep::Sweep;
 use super::{Loop, Point};
+use crate::eigen::RankOne;
 use crate::response::KnownResponse;
-use crate::stability::instability;
-use crate::{Error, StateSpace};
+use crate::stability::largest_excess;
+use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
 
@@ -68,7 +69,7 @@ pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins
             limits.push(limit);
         }
     }
-    let gain = Gains { system: &complementary.system }.limits(&limits)?;
+    let gain = Gains::new(&complementary.system).limits(&limits)?;
     let (mut phase, mut phase_frequency, mut delay) = (f64::INFINITY, 0.0, f64::INFINITY);
     for frequency in sweep.crossings(|t| transfer(t).norm() - 1.0)? {
         let lag = (-transfer(&sweep.at(frequency)?)).arg();
@@ -85,16 +86,23 @@ fn open(t: Complex<f64>) -> Complex<f64> {
     t / (Complex::new(1.0, 0.0) - t)
 }
 
-/// The loop with one channel multiplied by a gain; `system` is T of the channel.
-struct Gains<'a> {
-    system: &'a StateSpace,
+/// The loop with one channel multiplied by a gain.
+struct Gains {
+    /// A - (g - 1) b c with T = c (s I - A)^-1 b of the channel: c is the negative of what comes back.
+    family: RankOne,
+    order: usize,
+    domain: Domain,
 }
 
-impl Gains<'_> {
+impl Gains {
+    /// `system`: T of the channel.
+    fn new(system: &StateSpace) -> Self {
+        let StateSpace { a, b, c, domain, .. } = system;
+        Self { family: RankOne::new(a, b, c), order: a.nrows(), domain: *domain }
+    }
+
     fn instability(&self, gain: f64) -> Result<f64, Error> {
-        let StateSpace { a, b, c, domain, .. } = self.system;
-        // c is the negative of what comes back.
-        instability(&(a - b * c * (gain - 1.0)), *domain)
+        Ok(largest_excess(&self.family.eigenvalues(1.0 - gain)?, self.domain))
     }
 
     /// The limits on both sides of 1: the nearest of `candidates`, or one that the tests find.
@@ -109,7 +117,7 @@ impl Gains<'_> {
     fn confirmed(&self, end: f64) -> Result<f64, Error> {
         let far = end.clamp(1.0 / LARGEST_GAIN, LARGEST_GAIN);
         let mut good = (1.0, f64::NAN);
-        let large = self.system.a.nrows() > LARGE;
+        let large = self.order > LARGE;
         let count = if large { TESTED_GAINS_IF_LARGE } else { TESTED_GAINS };
         for step in 1..count {
             let gain = far.powf(f64::from(step) / f64::from(count));

@@ -5,7 +5,9 @@ use study::{AssemblyOptions, LoadedConfig, PreparedRun, RunEnd};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).ok_or("expected a system.toml")?;
-    let mut run = PreparedRun::new(LoadedConfig::read(path.as_ref())?, &AssemblyOptions::default())?.start(None)?;
+    let mut run =
+        PreparedRun::new(LoadedConfig::read(path.as_ref())?, &AssemblyOptions::default())?
+            .start(None)?;
     if let RunEnd::Failed(error) = run.advance(|_| Ok(ControlFlow::Continue(()))) {
         return Err(error.into());
     }

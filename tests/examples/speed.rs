@@ -32,7 +32,7 @@ use master::{Readout, Simulation, System};
 use results::{Column, ColumnKind, Row, create};
 use rustix::time::{ClockId, clock_gettime};
 
-#[path = "../../../tests/speed/lag.rs"]
+#[path = "../speed/lag.rs"]
 #[expect(dead_code, reason = "the rings are for the benchmark beside this")]
 mod lag;
 

@@ -1,42 +1,15 @@
-//! Crates outside of the workspace that use one library each, as a user would write them.
+//! Programs that use one library each, as a user would write them.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
-use std::sync::OnceLock;
 
-use tests::{dist, root, run};
+use tests::{dist, program, root, run};
 
-/// Builds the crates of `tests/outside` with the dependency versions of this workspace; returns the
-/// folder of their programs.
-fn built() -> &'static Path {
-    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(|| {
-        let crates = root().join("target/outside/crates");
-        let source = root().join("tests/outside");
-        for name in ["import", "couple", "study", "design"] {
-            fs::create_dir_all(crates.join(name).join("src")).unwrap();
-            let main = format!("{name}/src/main.rs");
-            fs::copy(source.join(&main), crates.join(&main)).unwrap();
-            // The paths of the dependencies start one folder deeper.
-            let manifest = fs::read_to_string(source.join(name).join("Cargo.toml")).unwrap();
-            let manifest = manifest.replace("\"../../../crates", "\"../../../../crates");
-            fs::write(crates.join(name).join("Cargo.toml"), manifest).unwrap();
-        }
-        fs::copy(source.join("Cargo.toml"), crates.join("Cargo.toml")).unwrap();
-        fs::copy(root().join("Cargo.lock"), crates.join("Cargo.lock")).unwrap();
-        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        cargo.current_dir(&crates).args(["build", "--release", "--quiet", "--target-dir"]);
-        let output = cargo.arg(root().join("target")).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        root().join("target/release")
-    })
-}
-
-/// What the program `name` prints.
+/// What the program `name` of `tests/programs` prints.
 fn printed(name: &str, arguments: &[&Path]) -> String {
-    let output = Command::new(built().join(name)).args(arguments).output().unwrap();
+    let output = Command::new(program(name)).args(arguments).output().unwrap();
     assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap().trim().to_owned()
 }

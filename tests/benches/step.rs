@@ -16,7 +16,7 @@ use fmu_import::Fmu;
 use master::algorithm::{Algorithm, Extrapolation, Method};
 use master::{Simulation, Slave, System};
 
-#[path = "../../../tests/speed/lag.rs"]
+#[path = "../speed/lag.rs"]
 mod lag;
 
 /// Communication step in s.

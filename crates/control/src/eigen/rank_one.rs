@@ -1,0 +1,103 @@
+//! Eigenvalues of a matrix with a feedback of one channel, for many gains.
+
+use super::{eigenvalues, francis};
+use crate::Error;
+use crate::balance::{Balance, divide_rows, multiply_columns};
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// A + g b c with a column b, a row c and any gain g, in coordinates in which it is a Hessenberg matrix.
+///
+/// A is balanced; an orthogonal transformation makes b a multiple of the first axis and A a Hessenberg
+/// matrix. The feedback changes the first row only, so that each gain needs the QR algorithm alone, 6 n^3
+/// operations, and no reduction.
+///
+/// Source: C. C. Paige, Properties of numerical algorithms related to computing controllability, IEEE
+/// Trans. Autom. Control 26 (1981): the controller-Hessenberg form.
+pub(crate) struct RankOne {
+    /// A.
+    hessenberg: DMatrix<f64>,
+    /// What g = 1 adds to the first row.
+    row: DMatrix<f64>,
+}
+
+impl RankOne {
+    /// `a`: n x n, `b`: n x 1, `c`: 1 x n.
+    pub(crate) fn new(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Self {
+        let Balance { mut matrix, scale } = Balance::new(a);
+        let (b, mut row) = (divide_rows(b, &scale), multiply_columns(c, &scale));
+        let mut v: DVector<f64> = b.column(0).into_owned();
+        let size = v.norm();
+        let mut image = 0.0;
+        if size.is_normal() {
+            image = -size.copysign(v[0]);
+            v[0] -= image;
+            let v = v.normalize();
+            // P = I - 2 v v': A becomes P A P, c becomes c P.
+            let along = matrix.tr_mul(&v);
+            matrix.ger(-2.0, &v, &along, 1.0);
+            let along = &matrix * &v;
+            matrix.ger(-2.0, &along, &v, 1.0);
+            let along = &row * &v;
+            row.ger(-2.0, &along, &v, 1.0);
+        }
+        // The reduction leaves the first axis where it is.
+        let (q, hessenberg) = matrix.hessenberg().unpack();
+        Self { hessenberg, row: row * q * image }
+    }
+
+    /// The eigenvalues of A + g b c, in no particular order.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`eigenvalues`].
+    pub(crate) fn eigenvalues(&self, gain: f64) -> Result<Vec<Complex<f64>>, Error> {
+        let mut matrix = self.hessenberg.clone();
+        let added = &self.row * gain;
+        let dominates = added.norm() > matrix.norm();
+        let mut first = matrix.row_mut(0);
+        first += added;
+        // A is balanced; the feedback disturbs that only if it is larger.
+        let balanced = if dominates { Balance::new(&matrix).matrix } else { matrix.clone() };
+        match francis::eigenvalues(balanced) {
+            Some(found) => Ok(found),
+            None => eigenvalues(&matrix),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_eigenvalues_are_those_of_the_matrix_with_the_feedback() {
+        let mut seed = 0.3_f64;
+        let mut random = || {
+            seed = (seed * 997.0 + 0.123).fract();
+            seed - 0.5
+        };
+        for n in [1, 2, 3, 8, 60] {
+            let a = DMatrix::from_fn(n, n, |i, j| random() * [1.0, 50.0, 0.02][(i + 2 * j) % 3]);
+            let b = DMatrix::from_fn(n, 1, |_, _| random());
+            let c = DMatrix::from_fn(1, n, |_, _| random());
+            let family = RankOne::new(&a, &b, &c);
+            for gain in [0.0, -1.0, 3.5, 1e4] {
+                let whole = &a + &b * &c * gain;
+                let mut expected = eigenvalues(&whole).unwrap();
+                for value in family.eigenvalues(gain).unwrap() {
+                    let distance = |other: &Complex<f64>| (other - value).norm();
+                    let nearest = (0..expected.len())
+                        .min_by(|x, y| distance(&expected[*x]).total_cmp(&distance(&expected[*y])))
+                        .unwrap();
+                    let error = distance(&expected.swap_remove(nearest));
+                    assert!(error < 1e-11 * whole.norm(), "{n}, {gain}: {value} {error}");
+                }
+            }
+            let none = RankOne::new(&a, &DMatrix::zeros(n, 1), &c);
+            assert!(
+                (none.eigenvalues(5.0).unwrap()[0] - none.eigenvalues(0.0).unwrap()[0]).norm()
+                    == 0.0
+            );
+        }
+    }
+}
