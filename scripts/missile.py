@@ -10,7 +10,8 @@ Transactions on Control Systems Technology 1 (1993). With alpha and delta in deg
     q'      = Q S d C_m / I_y                            C_m = a_m alpha^3 + b_m alpha |alpha| + c_m (-7 + 8 M/3) alpha + d_m delta
     delta'' = omega^2 (u - delta) - 2 zeta omega delta'  eta = Q S C_n / m
 
-with v = M v_s and the dynamic pressure Q = 0.7 p M^2; p and v_s are those of the standard atmosphere (ISO 2533). Needs Python 3.11 with
+with v = M v_s and the dynamic pressure Q = 0.7 p M^2; p and v_s are those of the standard atmosphere (ISO 2533), not the rounded ones
+of the paper. The accelerometer is at the centre of mass. Needs Python 3.11 with
 numpy and scipy.
 """
 

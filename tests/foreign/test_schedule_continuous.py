@@ -1,24 +1,16 @@
-"""Continuous scheduled controllers: the FMU beside equations in numpy and scipy's integrator, the report's certificates computed again.
-
-The published example is the missile of examples/plants/schedule, whose nonlinear equations are those of scripts/missile.py.
-"""
+"""Continuous scheduled controllers: the FMU beside equations in numpy and scipy's integrator, the report's certificates computed again."""
 
 import functools
 import json
-import tomllib
-from ctypes import byref
 
 import numpy as np
 import pytest
 from fmpy import extract
 from scipy.integrate import solve_ivp
 
-import missile
-from c_abi import MODEL_EXCHANGE, OK, WARNING, EventInfo, Fmu, Instance, reals
+from c_abi import OK, WARNING, Fmu, Instance
+from continuous_schedule import Exchanged, Schedule, check_certificate, states_of
 from excitation import restore, serialized
-
-MATRICES = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f", "K_i", "L_w", "N_r"]
-LISTS = ["x_op", "u_op", "y_op", "r_op"]
 
 # A drive whose inertia, spring and friction are known; the operating point depends on them, too.
 DRIVE = """A = [[0, 1], [-1.0, -0.5]]
@@ -107,81 +99,13 @@ def rate(bound):
     return 'variable = "k"\n', f'variable = "k"\nrate_bound = {bound}\n'
 
 
-class Schedule:
-    """A continuous scheduled design file: interpolation and equations."""
-
-    def __init__(self, text):
-        self.own = tomllib.loads(text)
-        assert "sample_time" not in self.own
-        self.points = self.own["schedule"]["points"]
-        self.at = [point["at"] for point in self.points]
-        free = [-np.inf, np.inf]
-        self.limits = np.transpose([actuator.get("limits", free) for actuator in self.own["actuators"]])
-        (self.n, self.q), self.t = np.shape(self.own["F_a"]), len(self.points[0].get("r_op", []))
-        self.p = len(self.own["measurements"])
-        self.filter = np.array(self.own["filter"]) if "filter" in self.own else None
-        self.integrals = self.t if "K_i" in self.points[0] else 0
-
-    def numbers(self, value):
-        """Matrices and operating point at a value of the scheduling variable."""
-        value = min(max(value, self.at[0]), self.at[-1])
-        k = min(np.searchsorted(self.at, value, side="right"), len(self.at) - 1) - 1
-        s = (value - self.at[k]) / (self.at[k + 1] - self.at[k])
-        low, high = self.points[k], self.points[k + 1]
-        names = [name for name in MATRICES + LISTS if name in low]
-        return {name: (1 - s) * np.array(low[name]) + s * np.array(high[name]) for name in names}
-
-    def start(self, at):
-        """z at the operating point of a point, in the order of the FMU's states."""
-        point = self.points[self.at.index(at)]
-        filtered = [] if self.filter is None else point["y_op"]
-        return np.concatenate([point["x_op"], np.zeros(self.q), filtered, np.zeros(self.integrals)])
-
-    def equations(self, z, y, r, value, limited=True):
-        """z' and the commands."""
-        own = self.numbers(value)
-        filters = 0 if self.filter is None else self.p
-        x_hat, f_hat, y_f, x_i = np.split(z, np.cumsum([self.n, self.q, filters]))
-        seen = y if self.filter is None else y_f
-        x, e, r = x_hat - own["x_op"], seen - own["y_op"], r - own.get("r_op", np.zeros(0))
-        e = e - own["C"] @ x
-        v = own["u_op"] + own["K_x"] @ x + own["K_f"] @ f_hat
-        if "N_r" in own:
-            v = v + own["N_r"] @ r
-        if self.integrals:
-            v = v + own["K_i"] @ x_i
-        u = np.clip(v, *self.limits) if limited else v
-        parts = [own["A"] @ x + own["B"] @ (u - own["u_op"]) + own["F_a"] @ f_hat + own["L_x"] @ e, own["L_f"] @ e]
-        if self.filter is not None:
-            parts.append(self.filter * (y - y_f))
-        if self.integrals:
-            slope = r - np.array(self.own["H"]) @ (y - own["y_op"])
-            if "F_i" in self.own:
-                slope = slope + np.array(self.own["F_i"]) @ f_hat
-            parts.append(slope + (own["L_w"] @ (u - v) if "L_w" in own else 0))
-        return np.concatenate(parts), u
-
-    def loop(self, value):
-        """The dynamics of the interpolated plant with the controller without a filter, of [x; z]."""
-        own, size = self.numbers(value), self.n + len(self.start(self.at[0]))
-        rest = np.concatenate([own["x_op"], own["x_op"], np.zeros(self.q + self.integrals)])
-        columns = []
-        for unit in np.eye(size):
-            x, z = np.split(rest + unit, [self.n])
-            y = own["y_op"] + own["C"] @ unit[: self.n]
-            slope, u = self.equations(z, y, own.get("r_op", np.zeros(0)), value, limited=False)
-            columns.append(np.concatenate([own["A"] @ unit[: self.n] + own["B"] @ (u - own["u_op"]), slope]))
-        return np.array(columns).T
-
-
 @pytest.fixture(scope="module")
-def designed(aso_ftc, root, packed, tmp_path_factory):
+def designed(aso_ftc, packed, tmp_path_factory):
     """Schedule, report and FMU of a plant file after replacements in its text."""
 
     @functools.cache
-    def make(*replacements, certified=True, file=None, text=DRIVE):
+    def make(*replacements, certified=True, text=DRIVE):
         folder = tmp_path_factory.mktemp("plant")
-        text = text if file is None else (root / file).read_text(encoding="utf-8")
         for old, new in replacements:
             assert old in text, old
             text = text.replace(old, new)
@@ -199,49 +123,6 @@ def designed(aso_ftc, root, packed, tmp_path_factory):
 @pytest.fixture(scope="module")
 def drive(designed):
     return designed(*FILTERED)
-
-
-@pytest.fixture(scope="module")
-def airframe(designed):
-    return designed(file="examples/plants/schedule/missile.toml")
-
-
-def states_of(schedule):
-    """Names of the FMU's continuous states, in the order of z."""
-    names = [f"x_hat[{i + 1}]" for i in range(schedule.n)]
-    names += ["f_hat"] if schedule.q == 1 else [f"f_hat[{i + 1}]" for i in range(schedule.q)]
-    if schedule.filter is not None:
-        names += ["y_f"] if schedule.p == 1 else [f"y_f[{k + 1}]" for k in range(schedule.p)]
-    if schedule.integrals:
-        names += ["x_i"] if schedule.integrals == 1 else [f"x_i[{k + 1}]" for k in range(schedule.integrals)]
-    return names
-
-
-class Exchanged:
-    """An FMU in model exchange as a function of time, states and inputs."""
-
-    def __init__(self, fmu, values):
-        self.instance = Instance(fmu, kind=MODEL_EXCHANGE)
-        self.instance.start_exchange(values)
-
-    def at(self, time, z, inputs):
-        """The derivatives of the states."""
-        own = self.instance
-        own.must("SetTime", time)
-        own.must("SetContinuousStates", reals(*z), len(z))
-        own.set(inputs)
-        slopes = reals(*([0.0] * len(z)))
-        # The first value outside of the points is a warning.
-        assert own.call("GetDerivatives", slopes, len(z)) in (OK, WARNING)
-        return np.array(slopes)
-
-    def event(self, time):
-        """Handles an event."""
-        info = EventInfo(new_discrete_states_needed=1)
-        self.instance.must("EnterEventMode")
-        while info.new_discrete_states_needed:
-            self.instance.must("NewDiscreteStates", byref(info))
-        self.instance.must("EnterContinuousTimeMode")
 
 
 def test_in_model_exchange_derivatives_and_commands_are_those_of_the_interpolated_equations(drive):
@@ -276,7 +157,7 @@ def course(time):
 def test_in_co_simulation_the_fmu_follows_scipys_integration_of_the_equations_through_limits_and_points(drive, size):
     schedule, _, fmu = drive
     names = states_of(schedule)
-    z, time, at_limit = schedule.start(1.0), 0.0, 0
+    z, at_limit = schedule.start(1.0), 0
     z[schedule.n + schedule.q] = course(0)[0]
     with Instance(fmu) as own:
         own.start(dict(zip(["angle", "r_angle", "inertia"], course(0.0))))
@@ -382,97 +263,36 @@ def test_directional_derivatives_are_the_difference_quotients(designed, case):
             assert name in stated[unknown] or abs(slope) < 1e-9, (unknown, name)
 
 
-def test_the_missile_flown_by_the_fmu_is_the_missile_flown_by_the_interpolated_equations(airframe):
-    """The nonlinear missile slows down from Mach 3.9 to 2.4 while the acceleration follows steps."""
-    schedule, _, fmu = airframe
-    mach = lambda t: 3.9 - 0.5 * t
-    rest = lambda t: np.interp(mach(t), schedule.at, [point["r_op"][0] for point in schedule.points])
-    wanted = lambda t: rest(t) + (0 if t < 0.5 else 60 if t < 1.6 else -40)
-    x_0, u_0 = missile.rest(mach(0))
-    y_0 = missile.outputs(x_0, mach(0))
-    z_0 = np.concatenate([x_0, [0.0, 0.0]])
-    start = {"eta": y_0[0], "rate": y_0[1], "r_eta": wanted(0), "mach": mach(0)}
-    own = Exchanged(fmu, start | {f"x_hat_0[{i + 1}]": value for i, value in enumerate(x_0)})
-    size = len(x_0)
-
-    def by_numpy(t, state):
-        x, z = np.split(state, [size])
-        slope, u = schedule.equations(z, missile.outputs(x, mach(t)), np.array([wanted(t)]), mach(t))
-        return np.concatenate([missile.derivatives(x, u[0], mach(t)), slope])
-
-    def by_fmu(t, state):
-        x, z = np.split(state, [size])
-        y = missile.outputs(x, mach(t))
-        slope = own.at(t, z, {"eta": y[0], "rate": y[1], "r_eta": wanted(t), "mach": mach(t)})
-        return np.concatenate([missile.derivatives(x, own.instance.get("fin")[0], mach(t)), slope])
-
-    runs = []
-    for right in (by_numpy, by_fmu):
-        state, rows = np.concatenate([x_0, z_0]), []
-        for a, b in ((0, 0.5), (0.5, 1.6), (1.6, 3.0)):
-            times = np.linspace(a, b, 101)
-            if right is by_fmu:
-                right(a, state)
-                own.event(a)
-            done = solve_ivp(right, (a, b - 1e-12), state, t_eval=np.minimum(times, b - 1e-12), rtol=1e-9, atol=1e-11)
-            state, rows = done.y[:, -1], [*rows, *done.y.T]
-        runs.append(np.array(rows))
-    difference = abs(runs[0] - runs[1]).max(axis=0)
-    assert (difference < 1e-6 * (1 + abs(runs[0]).max(axis=0))).all(), difference
-    # The command is within its limits, and the acceleration follows: at the end of each part within 2 m/s^2.
-    for part, (a, b) in enumerate(((0, 0.5), (0.5, 1.6), (1.6, 3.0))):
-        x = runs[1][101 * part + 100][:size]
-        assert missile.outputs(x, mach(b))[0] == pytest.approx(wanted(b - 1e-12), abs=2.0), part
-    assert abs(runs[1][:, 2]).max() < 0.5
-
-
-def test_the_points_of_the_missile_are_the_linearisations_of_its_equations(root):
-    own = tomllib.loads((root / "examples/plants/schedule/missile.toml").read_text(encoding="utf-8"))
-    assert tuple(point["at"] for point in own["schedule"]["points"]) == missile.MACH
-    operating = lambda name: [signal.get("operating", 0) for signal in own[name]]
-    for point in own["schedule"]["points"]:
-        a, b, c, x, u, y = missile.linearised(point["at"])
-        for name, matrix in (("A", a), ("B", b), ("C", c)):
-            stated = np.array(point.get(name, own[name]), float)
-            assert stated == pytest.approx(matrix, rel=1e-8, abs=1e-6)
-        for name, signals, values in (("x_op", "states", x), ("u_op", "actuators", [u]), ("y_op", "measurements", y)):
-            assert point.get(name, operating(signals)) == pytest.approx(list(values), rel=1e-8, abs=1e-12)
-        assert missile.derivatives(x, u, point["at"]) == pytest.approx(np.zeros(4), abs=1e-10)
-    # The published atmosphere: 973.3 lb/ft^2 and 1036.4 ft/s.
-    assert missile.PRESSURE / 47.88026 == pytest.approx(973.3, rel=1e-3)
-    assert missile.SOUND / missile.FOOT == pytest.approx(1036.4, rel=1e-3)
-
-
-@pytest.mark.parametrize("case", ["missile", "drive", "spring", "slow spring"])
-def test_the_certificate_holds_between_the_points_at_the_stated_rate(airframe, designed, case):
+@pytest.mark.parametrize("case", ["drive", "spring", "slow spring"])
+def test_the_certificate_holds_between_the_points_at_the_stated_rate(designed, case):
     springs = {"spring": (), "slow spring": (rate("0.1"),)}
+    schedule, report, _ = designed(*springs[case], text=SPRING) if case in springs else designed()
+    fastest = check_certificate(schedule, report["schedule"])
     if case in springs:
-        schedule, report, _ = designed(*springs[case], text=SPRING)
-    else:
-        schedule, report, _ = airframe if case == "missile" else designed()
-    found = report["schedule"]
-    values = np.linspace(schedule.at[0], schedule.at[-1], 201)
-    loops = [schedule.loop(value) for value in values]
-    worst = max(np.linalg.eigvals(a).real.max() for a in loops)
-    assert found["worst_instability"] >= worst - 1e-6 and worst < 0
-    if "p" in found["any_rate"]:
-        p = np.array(found["any_rate"]["p"])
-        grid, fastest = [p] * len(schedule.at), 0.0
-    else:
-        grid, fastest = [np.array(p) for p in found["bounded_rate"]["p"]], found["bounded_rate"]["rate"]
         assert fastest == 0.1 if case == "slow spring" else fastest > 0.5
-    assert fastest > 0 or "spring" not in case, "no P serves any rate"
-    for value, a in zip(values, loops):
-        k = min(np.searchsorted(schedule.at, value, side="right"), len(schedule.at) - 1) - 1
-        length = schedule.at[k + 1] - schedule.at[k]
-        t = (value - schedule.at[k]) / length
-        p = (1 - t) * grid[k] + t * grid[k + 1]
-        slope = (grid[k + 1] - grid[k]) / length
-        assert np.linalg.eigvalsh(p).min() > 0
-        for move in (-fastest, fastest):
-            left = -(a.T @ p + p @ a + move * slope)
-            scale = 1 / np.sqrt(np.diag(left))
-            assert np.linalg.eigvalsh(left * np.outer(scale, scale)).min() > 0, (value, move)
+
+
+def test_the_energy_falls_while_the_spring_changes_at_the_proven_rate(designed):
+    schedule, report, _ = designed(text=SPRING)
+    found = report["schedule"]["bounded_rate"]
+    low, high = (np.array(p) for p in found["p"])
+    # From 1 to 9 and back, again and again.
+    spring = lambda t: 1 + abs((found["rate"] * t + 8) % 16 - 8)
+    corners = np.arange(0, 4) * 8 / found["rate"]
+    # The loop is a polynomial of degree 2.
+    first, middle, last = (schedule.loop(value) for value in (1, 5, 9))
+    along = lambda s: (1 - s) * (1 - 2 * s) * first + 4 * s * (1 - s) * middle + s * (2 * s - 1) * last
+    assert along(0.3) == pytest.approx(schedule.loop(1 + 8 * 0.3), rel=1e-9, abs=1e-9)
+    state, before = np.arange(1.0, 1.0 + len(low)), np.inf
+    for a, b in zip(corners, corners[1:]):
+        done = solve_ivp(lambda t, x: along((spring(t) - 1) / 8) @ x, (a, b), state, t_eval=np.linspace(a, b, 80), rtol=1e-9, atol=1e-13)
+        for t, x in zip(done.t, done.y.T):
+            part = (spring(t) - 1) / 8
+            energy = x @ ((1 - part) * low + part * high) @ x
+            # At a corner the first value is the last one of the part before.
+            assert energy < before * (1 if t > a else 1 + 1e-9)
+            before = energy
+        state = done.y[:, -1]
 
 
 def test_a_rate_that_is_not_proven_makes_the_verdict_amber_and_says_so(designed):
@@ -551,12 +371,3 @@ def test_a_restored_state_continues_with_the_same_bits(drive):
             one.step(4.0, 0.1)
             runs.append(one.outputs())
         assert runs[0] == runs[1]
-
-
-def test_the_command_line_says_what_is_proven(aso_ftc, root, tmp_path):
-    done = aso_ftc("design", root / "examples/plants/schedule/missile.toml", "--out", tmp_path / "design.toml", "--report", tmp_path / "report.html")
-    assert done.returncode in (0, 1), done.stderr
-    assert "schedule: proven between the points" in done.stdout
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "At each instant plant model, gains and operating point are interpolated" in " ".join(page.split())
-    assert "largest real part of the eigenvalues" in " ".join(page.split())

@@ -1,0 +1,141 @@
+"""The equations of continuous scheduled controllers in numpy, an FMU in model exchange, and the certificates computed again."""
+
+import tomllib
+from ctypes import byref
+
+import numpy as np
+
+from c_abi import MODEL_EXCHANGE, OK, WARNING, EventInfo, Instance, reals
+
+MATRICES = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f", "K_i", "L_w", "N_r"]
+LISTS = ["x_op", "u_op", "y_op", "r_op"]
+
+
+
+class Schedule:
+    """A continuous scheduled design file: interpolation and equations."""
+
+    def __init__(self, text):
+        self.own = tomllib.loads(text)
+        assert "sample_time" not in self.own
+        self.points = self.own["schedule"]["points"]
+        self.at = [point["at"] for point in self.points]
+        free = [-np.inf, np.inf]
+        self.limits = np.transpose([actuator.get("limits", free) for actuator in self.own["actuators"]])
+        (self.n, self.q), self.t = np.shape(self.own["F_a"]), len(self.points[0].get("r_op", []))
+        self.p = len(self.own["measurements"])
+        self.filter = np.array(self.own["filter"]) if "filter" in self.own else None
+        self.integrals = self.t if "K_i" in self.points[0] else 0
+
+    def numbers(self, value):
+        """Matrices and operating point at a value of the scheduling variable."""
+        value = min(max(value, self.at[0]), self.at[-1])
+        k = min(np.searchsorted(self.at, value, side="right"), len(self.at) - 1) - 1
+        s = (value - self.at[k]) / (self.at[k + 1] - self.at[k])
+        low, high = self.points[k], self.points[k + 1]
+        names = [name for name in MATRICES + LISTS if name in low]
+        return {name: (1 - s) * np.array(low[name]) + s * np.array(high[name]) for name in names}
+
+    def start(self, at):
+        """z at the operating point of a point, in the order of the FMU's states."""
+        point = self.points[self.at.index(at)]
+        filtered = [] if self.filter is None else point["y_op"]
+        return np.concatenate([point["x_op"], np.zeros(self.q), filtered, np.zeros(self.integrals)])
+
+    def equations(self, z, y, r, value, limited=True):
+        """z' and the commands."""
+        own = self.numbers(value)
+        filters = 0 if self.filter is None else self.p
+        x_hat, f_hat, y_f, x_i = np.split(z, np.cumsum([self.n, self.q, filters]))
+        seen = y if self.filter is None else y_f
+        x, e, r = x_hat - own["x_op"], seen - own["y_op"], r - own.get("r_op", np.zeros(0))
+        e = e - own["C"] @ x
+        v = own["u_op"] + own["K_x"] @ x + own["K_f"] @ f_hat
+        if "N_r" in own:
+            v = v + own["N_r"] @ r
+        if self.integrals:
+            v = v + own["K_i"] @ x_i
+        u = np.clip(v, *self.limits) if limited else v
+        parts = [own["A"] @ x + own["B"] @ (u - own["u_op"]) + own["F_a"] @ f_hat + own["L_x"] @ e, own["L_f"] @ e]
+        if self.filter is not None:
+            parts.append(self.filter * (y - y_f))
+        if self.integrals:
+            slope = r - np.array(self.own["H"]) @ (y - own["y_op"])
+            if "F_i" in self.own:
+                slope = slope + np.array(self.own["F_i"]) @ f_hat
+            parts.append(slope + (own["L_w"] @ (u - v) if "L_w" in own else 0))
+        return np.concatenate(parts), u
+
+    def loop(self, value):
+        """The dynamics of the interpolated plant with the controller without a filter, of [x; z]."""
+        own, size = self.numbers(value), self.n + len(self.start(self.at[0]))
+        rest = np.concatenate([own["x_op"], own["x_op"], np.zeros(self.q + self.integrals)])
+        columns = []
+        for unit in np.eye(size):
+            x, z = np.split(rest + unit, [self.n])
+            y = own["y_op"] + own["C"] @ unit[: self.n]
+            slope, u = self.equations(z, y, own.get("r_op", np.zeros(0)), value, limited=False)
+            columns.append(np.concatenate([own["A"] @ unit[: self.n] + own["B"] @ (u - own["u_op"]), slope]))
+        return np.array(columns).T
+
+
+def states_of(schedule):
+    """Names of the FMU's continuous states, in the order of z."""
+    names = [f"x_hat[{i + 1}]" for i in range(schedule.n)]
+    names += ["f_hat"] if schedule.q == 1 else [f"f_hat[{i + 1}]" for i in range(schedule.q)]
+    if schedule.filter is not None:
+        names += ["y_f"] if schedule.p == 1 else [f"y_f[{k + 1}]" for k in range(schedule.p)]
+    if schedule.integrals:
+        names += ["x_i"] if schedule.integrals == 1 else [f"x_i[{k + 1}]" for k in range(schedule.integrals)]
+    return names
+
+
+class Exchanged:
+    """An FMU in model exchange as a function of time, states and inputs."""
+
+    def __init__(self, fmu, values):
+        self.instance = Instance(fmu, kind=MODEL_EXCHANGE)
+        self.instance.start_exchange(values)
+
+    def at(self, time, z, inputs):
+        """The derivatives of the states."""
+        own = self.instance
+        own.must("SetTime", time)
+        own.must("SetContinuousStates", reals(*z), len(z))
+        own.set(inputs)
+        slopes = reals(*([0.0] * len(z)))
+        # The first value outside of the points is a warning.
+        assert own.call("GetDerivatives", slopes, len(z)) in (OK, WARNING)
+        return np.array(slopes)
+
+    def event(self, time):
+        """Handles an event."""
+        info = EventInfo(new_discrete_states_needed=1)
+        self.instance.must("EnterEventMode")
+        while info.new_discrete_states_needed:
+            self.instance.must("NewDiscreteStates", byref(info))
+        self.instance.must("EnterContinuousTimeMode")
+
+
+def check_certificate(schedule, found):
+    """Checks the inequalities of a report's schedule at 201 values between the points; returns the proven rate, 0 for any rate."""
+    values = np.linspace(schedule.at[0], schedule.at[-1], 201)
+    loops = [schedule.loop(value) for value in values]
+    worst = max(np.linalg.eigvals(a).real.max() for a in loops)
+    assert found["worst_instability"] >= worst - 1e-6 and worst < 0
+    if "p" in found["any_rate"]:
+        grid, fastest = [np.array(found["any_rate"]["p"])] * len(schedule.at), 0.0
+    else:
+        grid, fastest = [np.array(p) for p in found["bounded_rate"]["p"]], found["bounded_rate"]["rate"]
+        assert fastest > 0
+    for value, a in zip(values, loops):
+        k = min(np.searchsorted(schedule.at, value, side="right"), len(schedule.at) - 1) - 1
+        length = schedule.at[k + 1] - schedule.at[k]
+        t = (value - schedule.at[k]) / length
+        p, slope = (1 - t) * grid[k] + t * grid[k + 1], (grid[k + 1] - grid[k]) / length
+        assert np.linalg.eigvalsh(p).min() > 0
+        for move in (-fastest, fastest):
+            left = -(a.T @ p + p @ a + move * slope)
+            scale = 1 / np.sqrt(np.diag(left))
+            assert np.linalg.eigvalsh(left * np.outer(scale, scale)).min() > 0, (value, move)
+    return fastest
