@@ -10,9 +10,23 @@ let wasm = null;
 let timer = null;
 let run = null; // {step, speed, time, saved, due}
 
-const load = (file) => WebAssembly.instantiateStreaming(fetch(file), {}).catch(async () =>
-  // A server that does not name the type of the file.
-  WebAssembly.instantiate(await (await fetch(file)).arrayBuffer(), {}));
+const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
+
+// The functions of a module. It reads numbers by the imported one.
+async function load(file) {
+  let memory = null;
+  const number = (place, length) => {
+    const text = new TextDecoder().decode(new Uint8Array(memory.buffer, place, length)).trim();
+    return NUMBER.test(text) ? Number(text) : NaN;
+  };
+  const imports = { page: { number } };
+  const { instance } = await WebAssembly.instantiateStreaming(fetch(file), imports).catch(async () =>
+    // A server that does not name the type of the file.
+    WebAssembly.instantiate(await (await fetch(file)).arrayBuffer(), imports));
+  memory = instance.exports.memory;
+  return instance.exports;
+}
+
 const loaded = load("paper.wasm");
 let observer = null; // the module that places eigenvalues, loaded when they are set
 
@@ -86,7 +100,7 @@ const actions = {
     run = null;
     let gains = "";
     if (eigenvalues !== null) {
-      observer ??= (await load("observer.wasm")).instance.exports;
+      observer ??= await load("observer.wasm");
       write(eigenvalues, observer);
       const refused = observer.place() !== 0;
       gains = read(observer);
@@ -144,7 +158,7 @@ const actions = {
 
 async function act(data) {
   try {
-    wasm ??= (await loaded).instance.exports;
+    wasm ??= await loaded;
     await actions[data.kind](data);
   } catch (error) {
     pause();

@@ -4,12 +4,13 @@ use std::collections::VecDeque;
 
 use controller::AsoController;
 use files::sentence;
-use fmu::description::Experiment;
-use master::{AlgorithmRequest, KeptState, Probe, Simulation, System, Value, choose};
+use fmu::description::{Experiment, Kind};
+use master::{AlgorithmRequest, KeptState, Port, Probe, Simulation, System, Value, choose};
 use plant::FrictionPendulum;
 
 use crate::LinkedSlave;
 use crate::settings::Settings;
+use crate::text;
 
 /// The design that the controller FMU contains.
 const DESIGN: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/design"));
@@ -68,7 +69,8 @@ impl Paper {
         system.connect_equal_names().map_err(told)?;
         for (name, value) in &settings.values {
             let port = system.port(name).map_err(told)?;
-            system.set_port(port, value).map_err(told)?;
+            let parsed = parsed(&system, port, name, value)?;
+            system.set_port_value(port, parsed, value).map_err(told)?;
         }
         let request = AlgorithmRequest { step: Some(step), ..AlgorithmRequest::default() };
         let algorithm = choose(&system, &request, stop).map_err(told)?.algorithm;
@@ -99,8 +101,7 @@ impl Paper {
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
         let system = self.simulation.system();
         let port = system.port(name).map_err(told)?;
-        let parsed = Value::parse(&system.variable(port).kind, &[], value);
-        let parsed = parsed.map_err(|expected| format!("{name}={value}: expected {expected}"))?;
+        let parsed = parsed(system, port, name, value)?;
         system.set_value(port, &parsed).map_err(told)
     }
 
@@ -158,6 +159,16 @@ impl Paper {
         self.steps = steps;
         Ok(())
     }
+}
+
+/// Reads a value of the variable `name` at `port`.
+fn parsed(system: &System, port: Port, name: &str, text: &str) -> Result<Value, String> {
+    let (value, expected) = match system.variable(port).kind {
+        Kind::Real(_) => (text::number(text).map(Value::Real), "a number"),
+        Kind::Boolean(_) => (text.parse().ok().map(Value::Boolean), "true or false"),
+        _ => (text.parse().ok().map(Value::Integer), "an integer"),
+    };
+    value.ok_or_else(|| format!("{name}={text}: expected {expected}"))
 }
 
 /// An error and its causes as a sentence.

@@ -4,6 +4,7 @@ use master::fault::{Fault, FaultChain, NoiseDistribution, RandomSeries, Window};
 use master::{Scenario, System};
 
 use crate::paper::told;
+use crate::text;
 
 /// The settings of a run.
 #[derive(Default)]
@@ -99,7 +100,6 @@ impl Settings {
     }
 }
 
-fn number(line: &str, text: &str) -> Result<f64, String> {
-    let parsed = text.parse::<f64>().ok().filter(|value| value.is_finite());
-    parsed.ok_or_else(|| format!("{line}: expected a number, found {text:?}"))
+fn number(line: &str, found: &str) -> Result<f64, String> {
+    text::number(found).ok_or_else(|| format!("{line}: expected a number, found {found:?}"))
 }

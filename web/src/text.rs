@@ -1,4 +1,4 @@
-//! The buffer through which a module and the page pass texts.
+//! The buffer through which a module and the page pass texts, and numbers in texts.
 #![allow(unsafe_code, reason = "exported names")]
 
 use std::cell::RefCell;
@@ -25,6 +25,23 @@ pub extern "C" fn text_length() -> usize {
 /// The text in the buffer.
 pub(crate) fn read() -> String {
     TEXT.with_borrow(|text| String::from_utf8_lossy(text).into_owned())
+}
+
+/// The finite number that `text` states. The page reads it: the tables of `f64::from_str` have 10 kB.
+#[cfg(target_family = "wasm")]
+pub(crate) fn number(text: &str) -> Option<f64> {
+    #[link(wasm_import_module = "page")]
+    unsafe extern "C" {
+        fn number(text: *const u8, length: usize) -> f64;
+    }
+    // SAFETY: the page reads these bytes during the call.
+    Some(unsafe { number(text.as_ptr(), text.len()) }).filter(|value| value.is_finite())
+}
+
+/// The finite number that `text` states.
+#[cfg(not(target_family = "wasm"))]
+pub(crate) fn number(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|value: &f64| value.is_finite())
 }
 
 /// The status of a function, 0 or 1; puts its text or its failure into the buffer.

@@ -23,8 +23,8 @@ pub extern "C" fn place() -> i32 {
 fn gains(eigenvalues: &str) -> Result<String, String> {
     let parts = eigenvalues.split([' ', ',']).filter(|part| !part.is_empty());
     let number = |part: &str| {
-        let value = part.parse::<f64>().ok().filter(|value| value.is_finite());
-        value.ok_or_else(|| format!("eigenvalues={eigenvalues}: expected a number, found {part:?}"))
+        text::number(part)
+            .ok_or_else(|| format!("eigenvalues={eigenvalues}: expected a number, found {part:?}"))
     };
     let eigenvalues = parts.map(number).collect::<Result<Vec<_>, _>>()?;
     if let Some(slow) = eigenvalues.iter().find(|value| **value >= 0.0) {

@@ -27,6 +27,20 @@ impl System {
     /// of a structural parameter.
     pub fn set_port(&mut self, port: Port, text: &str) -> Result<(), SystemError> {
         let value = self.value(port, text)?;
+        self.set_port_value(port, value, text)
+    }
+
+    /// As [`System::set_port`], with the value that `text` states, for a caller that reads numbers itself.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the FMU refuses the value of a structural parameter.
+    pub fn set_port_value(
+        &mut self,
+        port: Port,
+        value: Value,
+        text: &str,
+    ) -> Result<(), SystemError> {
         if self.variable(port).causality == Causality::StructuralParameter {
             return self.configure(port, &value, text);
         }
