@@ -14,7 +14,7 @@ use fmu_description::package::{Package, platforms};
 /// If there is no C compiler (`cc`, or the program that `CC` names), or a file cannot be written.
 pub(crate) fn pack(folder: &Path, ports: usize) -> anyhow::Result<PathBuf> {
     let (name, guid) = (format!("Lag{ports}"), format!("{{lag-{ports}}}"));
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/speed/lag.c");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("speed/lag.c");
     let built = folder.join(format!("{name}{}", std::env::consts::DLL_SUFFIX));
     let compiler = std::env::var_os("CC").unwrap_or_else(|| "cc".into());
     let status = Command::new(compiler)
