@@ -2,6 +2,7 @@
 
 use super::{extended_pair, integration};
 use crate::eigen::eigenvalues;
+use crate::rank::controllable_part;
 use crate::svd::Svd;
 use crate::{Domain, Error, check};
 use nalgebra::{Complex, DMatrix};
@@ -23,7 +24,8 @@ pub struct IntegralFeedforward {
 /// W' [B N_r; I] = 0,   so   N_r = -(W_x' B)^+ W_i'                 sampled: -T (W_x' B)^+ W_i'
 /// ```
 ///
-/// S has the t slowest eigenvalues, by real part or, sampled, by modulus. With this `N_r` the signal s
+/// S has the t slowest eigenvalues that the feedback moves, by real part or, sampled, by modulus; the
+/// uncontrollable modes of A have no part in the answer to references and are left out first. With this `N_r` the signal s
 /// = W' `x_e` obeys s' = S s whatever the references do: it stays zero after every change of them, and only
 /// disturbances, faults and errors of the model move it. So references are answered by the other n
 /// modes, which are faster, and H y reaches a
@@ -56,6 +58,30 @@ pub fn integral_feedforward(
     check::shape("K", k, (b.ncols(), n + t))?;
     let controlled = &a_e + &b_e * k;
     crate::stability::require_stable("A_e + B_e K", &controlled, domain)?;
+    let part = controllable_part(a, b)?;
+    if part.fixed.is_empty() {
+        return of_controllable((a, b), output, k, domain);
+    }
+    let k_x = k.columns(0, n) * &part.basis;
+    let k = DMatrix::from_columns(
+        &k_x.column_iter()
+            .chain(k.columns(n, t).column_iter())
+            .map(|x| x.into_owned())
+            .collect::<Vec<_>>(),
+    );
+    of_controllable((&part.a, &part.b), &(output * &part.basis), &k, domain)
+}
+
+/// The same for a controllable (A, B).
+fn of_controllable(
+    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    output: &DMatrix<f64>,
+    k: &DMatrix<f64>,
+    domain: Domain,
+) -> Result<Result<IntegralFeedforward, &'static str>, Error> {
+    let (a_e, b_e) = extended_pair(a, b, output, domain)?;
+    let (n, t) = (a.nrows(), output.nrows());
+    let controlled = &a_e + &b_e * k;
     let Some(silent) = slowest(&eigenvalues(&controlled)?, t, domain) else {
         return Ok(Err(
             "the slowest eigenvalues of the feedback, one for each integral, end with half of a complex \

@@ -385,6 +385,34 @@ fn feedforward_beside_integrals_leaves_the_slowest_modes_at_rest_and_the_constan
 }
 
 #[test]
+fn a_slow_mode_that_no_command_moves_leaves_the_feedforward_beside_integrals_as_it_is() {
+    let [a, b, c] = plant();
+    let poles = real_poles(&[-1.0, -1.2, -3.0, -3.3, -3.6]);
+    let output = h() * c;
+    let (a_e, b_e) = extended_pair(&a, &b, &output, Domain::Continuous).unwrap();
+    let k = place(&a_e, &b_e, &poles).unwrap().gain;
+    let alone = integral_feedforward((&a, &b), &output, &k, Domain::Continuous).unwrap().unwrap();
+    // A fourth state x_4' = -0.1 x_4 moves the others, the controlled outputs and the commands.
+    let mut wide = a.resize(4, 4, 0.0);
+    wide.view_mut((0, 3), (3, 1)).copy_from(&matrix(3, &[1.0, -2.0, 0.5]));
+    wide[(3, 3)] = -0.1;
+    let commands = b.ncols();
+    let b = b.resize(4, commands, 0.0);
+    let output = output.insert_column(3, 0.7);
+    let k = k.insert_column(3, -0.4);
+    // Other coordinates x = M z, so that the mode is in every state.
+    let m = matrix(4, &[2., 1., 0., 1., 0., 1., 1., 0., 1., 0., 3., 1., 1., 0., 0., 1.]);
+    let inverse = m.clone().try_inverse().unwrap();
+    let (wide, b, output) = (&inverse * wide * &m, &inverse * b, output * &m);
+    let k_x = k.columns(0, 4) * &m;
+    let k = DMatrix::from_fn(k.nrows(), 6, |i, j| if j < 4 { k_x[(i, j)] } else { k[(i, j)] });
+    let found =
+        integral_feedforward((&wide, &b), &output, &k, Domain::Continuous).unwrap().unwrap();
+    assert!((&found.gain - &alone.gain).amax() < 1e-9 * alone.gain.amax(), "{}", found.gain);
+    assert!(found.silent.iter().all(|value| value.re < -0.9), "{:?}", found.silent);
+}
+
+#[test]
 fn half_of_a_pair_is_no_silent_mode_and_a_faster_one_does_not_take_its_place() {
     // One state, one integral, two complex eigenvalues.
     let k = matrix(1, &[-1.0, 4.0]);
