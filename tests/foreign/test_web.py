@@ -1,4 +1,4 @@
-"""The paper in the browser: the page of `scripts/web` in Chromium, against the command."""
+"""The paper in the browser: the page of `scripts/web` in Chromium, in the book if that is built, against the command."""
 
 import base64
 import csv
@@ -13,7 +13,8 @@ import pytest
 from browser import CHROMIUM, browser, served
 from conftest import ROOT
 
-PAGE = ROOT / "target" / "web" / "page"
+IN_BOOK = ROOT / "target" / "book" / "paper"
+PAGE = IN_BOOK if IN_BOOK.exists() else ROOT / "target" / "web" / "page"
 pytestmark = [
     pytest.mark.skipif(not CHROMIUM, reason="no Chromium is installed"),
     pytest.mark.skipif(not (PAGE / "paper.wasm").exists(), reason="scripts/web has not built the page"),
