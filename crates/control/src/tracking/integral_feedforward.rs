@@ -62,14 +62,11 @@ pub fn integral_feedforward(
     if part.fixed.is_empty() {
         return of_controllable((a, b), output, k, domain);
     }
-    let k_x = k.columns(0, n) * &part.basis;
-    let k = DMatrix::from_columns(
-        &k_x.column_iter()
-            .chain(k.columns(n, t).column_iter())
-            .map(|x| x.into_owned())
-            .collect::<Vec<_>>(),
-    );
-    of_controllable((&part.a, &part.b), &(output * &part.basis), &k, domain)
+    let reached = part.a.nrows();
+    let mut of_part = DMatrix::zeros(b.ncols(), reached + t);
+    of_part.columns_mut(0, reached).copy_from(&(k.columns(0, n) * &part.basis));
+    of_part.columns_mut(reached, t).copy_from(&k.columns(n, t));
+    of_controllable((&part.a, &part.b), &(output * &part.basis), &of_part, domain)
 }
 
 /// The same for a controllable (A, B).
