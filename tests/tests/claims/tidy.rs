@@ -151,6 +151,7 @@ fn unsafe_code_is_at_foreign_boundaries_only() {
         // The functions of the WebAssembly modules.
         "web/observer/src/lib.rs",
         "web/src/exports.rs",
+        "web/src/text.rs",
     ];
     for file in files(&root(), "rs") {
         let path = name(&file);
