@@ -18,10 +18,13 @@ numpy and scipy.
 import numpy as np
 from scipy.optimize import brentq
 
+# In m and kg: reference area, diameter, mass and moment of inertia.
 FOOT, SLUG = 0.3048, 14.59390294
 AREA, LENGTH, MASS, INERTIA = 0.44 * FOOT**2, 0.75 * FOOT, 13.98 * SLUG, 182.5 * SLUG * FOOT**2
+# The coefficients of C_n and C_m, for angles in degrees.
 A_N, B_N, C_N, D_N = 0.000103, -0.00945, -0.1696, -0.034
 A_M, B_M, C_M, D_M = 0.000215, -0.0195, 0.051, -0.206
+# The fin, and the air at 20,000 ft.
 OMEGA, ZETA = 150.0, 0.7
 GRAVITY = 9.80665
 TEMPERATURE = 288.15 - 0.0065 * 20000 * FOOT

@@ -1,16 +1,16 @@
 //! A controller whose matrices and operating point depend on a scheduling variable.
 //!
-//! At each sample of the controller, in a continuous one at each instant, with theta held within the grid,
+//! A sampled controller interpolates at each sample, a continuous one at each instant. Theta is held within the
+//! grid:
 //!
 //! ```text
 //! M(theta) = (1 - t) M_i + t M_{i+1},  t = (theta - theta_i) / (theta_{i+1} - theta_i)
 //! ```
 //!
 //! for each of A, B, C, F_a, K_x, K_f, L_x, L_f, x_op, u_op, y_op, and, where the design has them, K_i, L_w,
-//! N_r, r_op. The controller then takes the sample
-//! like one whose design states these numbers; a continuous one has the derivatives and commands of such a
-//! design. The estimates are those of states, not of deviations,
-//! so that a change of the operating point does not change them.
+//! N_r, r_op. The controller then acts like one whose design states these numbers: it takes the sample, or has
+//! the derivatives and commands. The estimates are those of states, not of deviations, so that a change of the
+//! operating point does not change them.
 
 use serde::{Deserialize, Serialize};
 

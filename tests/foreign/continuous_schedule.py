@@ -1,40 +1,21 @@
 """The equations of continuous scheduled controllers in numpy, an FMU in model exchange, and the certificates computed again."""
 
-import tomllib
 from ctypes import byref
 
 import numpy as np
 
 from c_abi import MODEL_EXCHANGE, OK, WARNING, EventInfo, Instance, reals
-
-MATRICES = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f", "K_i", "L_w", "N_r"]
-LISTS = ["x_op", "u_op", "y_op", "r_op"]
+from scheduled_design import ScheduledDesign
 
 
-
-class Schedule:
-    """A continuous scheduled design file: interpolation and equations."""
+class Schedule(ScheduledDesign):
+    """The equations of a continuous controller."""
 
     def __init__(self, text):
-        self.own = tomllib.loads(text)
+        super().__init__(text)
         assert "sample_time" not in self.own
-        self.points = self.own["schedule"]["points"]
-        self.at = [point["at"] for point in self.points]
-        free = [-np.inf, np.inf]
-        self.limits = np.transpose([actuator.get("limits", free) for actuator in self.own["actuators"]])
-        (self.n, self.q), self.t = np.shape(self.own["F_a"]), len(self.points[0].get("r_op", []))
         self.p = len(self.own["measurements"])
         self.filter = np.array(self.own["filter"]) if "filter" in self.own else None
-        self.integrals = self.t if "K_i" in self.points[0] else 0
-
-    def numbers(self, value):
-        """Matrices and operating point at a value of the scheduling variable."""
-        value = min(max(value, self.at[0]), self.at[-1])
-        k = min(np.searchsorted(self.at, value, side="right"), len(self.at) - 1) - 1
-        s = (value - self.at[k]) / (self.at[k + 1] - self.at[k])
-        low, high = self.points[k], self.points[k + 1]
-        names = [name for name in MATRICES + LISTS if name in low]
-        return {name: (1 - s) * np.array(low[name]) + s * np.array(high[name]) for name in names}
 
     def start(self, at):
         """z at the operating point of a point, in the order of the FMU's states."""

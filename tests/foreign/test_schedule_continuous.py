@@ -8,48 +8,12 @@ import pytest
 from fmpy import extract
 from scipy.integrate import solve_ivp
 
+import scheduled_design
 from c_abi import OK, WARNING, Fmu, Instance
 from continuous_schedule import Exchanged, Schedule, check_certificate, states_of
 from excitation import restore, serialized
 
-# A drive whose inertia, spring and friction are known; the operating point depends on them, too.
-DRIVE = """A = [[0, 1], [-1.0, -0.5]]
-B = [[0], [1]]
-C = [[1, 0]]
-states = ["phi", "w"]
-actuators = [{ name = "torque", limits = [-3.0, 3.0] }]
-measurements = [{ name = "angle", operating = 0.0 }]
-actuator_faults = "all"
-feedback.eigenvalues = [-1.2, -2.0, -2.5]
-observer.eigenvalues = [-6.0, -7.0, -8.0]
-robustness.cases = 3
-
-[reference]
-track = ["angle"]
-feedforward = true
-
-[schedule]
-variable = "inertia"
-
-[[schedule.points]]
-at = 1.0
-
-[[schedule.points]]
-at = 2.0
-A = [[0, 1], [-1.5, -0.15]]
-B = [[0], [0.5]]
-x_op = [0.4, 0]
-u_op = [1.2]
-y_op = [0.4]
-
-[[schedule.points]]
-at = 4.0
-A = [[0, 1], [-0.375, -0.05]]
-B = [[0], [0.25]]
-x_op = [0.2, 0]
-u_op = [0.3]
-y_op = [0.2]
-
+DRIVE = scheduled_design.DRIVE + """
 [experiment]
 stop_time = 10.0
 step_size = 0.01

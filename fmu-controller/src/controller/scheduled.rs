@@ -8,7 +8,8 @@ use crate::equations::Equations;
 use crate::signals::Signals;
 
 impl AsoController {
-    /// Computes u' of a controller with a schedule, whose gains and operating point move, too.
+    /// Computes u' of a controller with a schedule: a part of it comes from gains and operating point, which move
+    /// with the scheduling variable.
     pub(super) fn set_scheduled_command_slopes(&mut self) {
         let Self { design, current, values, deviations, z_slopes, u_slopes, mode, .. } = self;
         let (Some(schedule), Some(current)) = (&design.schedule, current) else { return };

@@ -80,10 +80,11 @@ mod tests {
             let a = DMatrix::from_fn(n, n, |i, j| random() * [1.0, 50.0, 0.02][(i + 2 * j) % 3]);
             let b = DMatrix::from_fn(n, 1, |_, _| random());
             let c = DMatrix::from_fn(1, n, |_, _| random());
-            let family = RankOne::new(&a, &b, &c);
-            for gain in [0.0, -1.0, 3.5, 1e4] {
-                let whole = &a + &b * &c * gain;
-                let mut expected = eigenvalues(&whole).unwrap();
+            for (b, gain) in [(&b, 0.0), (&b, -1.0), (&b, 3.5), (&b, 1e4), (&(&b * 0.0), 1.0)] {
+                let family = RankOne::new(&a, b, &c);
+                let whole = &a + b * &c * gain;
+                // By nalgebra's Schur form.
+                let mut expected = whole.complex_eigenvalues().as_slice().to_vec();
                 for value in family.eigenvalues(gain).unwrap() {
                     let distance = |other: &Complex<f64>| (other - value).norm();
                     let nearest = (0..expected.len())
@@ -93,11 +94,6 @@ mod tests {
                     assert!(error < 1e-11 * whole.norm(), "{n}, {gain}: {value} {error}");
                 }
             }
-            let none = RankOne::new(&a, &DMatrix::zeros(n, 1), &c);
-            assert!(
-                (none.eigenvalues(5.0).unwrap()[0] - none.eigenvalues(0.0).unwrap()[0]).norm()
-                    == 0.0
-            );
         }
     }
 }

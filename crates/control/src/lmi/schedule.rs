@@ -13,8 +13,9 @@ const FACTOR: f64 = 0.25;
 const RATES: usize = 7;
 const BISECTIONS: usize = 3;
 
-/// A loop on an interval of its scheduling variable theta, a polynomial of t = (theta -
-/// `theta_1`) / length from 0 to 1.
+/// A loop on an interval of its scheduling variable theta.
+///
+/// The loop is a polynomial of t = (theta - `theta_1`) / length, which goes from 0 to 1:
 ///
 /// ```text
 /// A(t) = sum over j of C(d, j) t^j (1 - t)^(d - j) A_j

@@ -53,32 +53,40 @@ pub fn integral_feedforward(
     k: &DMatrix<f64>,
     domain: Domain,
 ) -> Result<Result<IntegralFeedforward, &'static str>, Error> {
-    let (a_e, b_e) = extended_pair(a, b, output, domain)?;
-    let (n, t) = (a.nrows(), output.nrows());
-    check::shape("K", k, (b.ncols(), n + t))?;
-    let controlled = &a_e + &b_e * k;
+    let controlled = closed_loop((a, b), output, k, domain)?;
     crate::stability::require_stable("A_e + B_e K", &controlled, domain)?;
     let part = controllable_part(a, b)?;
     if part.fixed.is_empty() {
         return of_controllable((a, b), output, k, domain);
     }
-    let reached = part.a.nrows();
+    let (n, t, reached) = (a.nrows(), output.nrows(), part.a.nrows());
     let mut of_part = DMatrix::zeros(b.ncols(), reached + t);
     of_part.columns_mut(0, reached).copy_from(&(k.columns(0, n) * &part.basis));
     of_part.columns_mut(reached, t).copy_from(&k.columns(n, t));
     of_controllable((&part.a, &part.b), &(output * &part.basis), &of_part, domain)
 }
 
-/// The same for a controllable (A, B).
+/// `A_e` + `B_e` K.
+fn closed_loop(
+    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    output: &DMatrix<f64>,
+    k: &DMatrix<f64>,
+    domain: Domain,
+) -> Result<DMatrix<f64>, Error> {
+    let (a_e, b_e) = extended_pair(a, b, output, domain)?;
+    check::shape("K", k, (b.ncols(), a_e.nrows()))?;
+    Ok(a_e + b_e * k)
+}
+
+/// [`integral_feedforward`] of a controllable (A, B).
 fn of_controllable(
     (a, b): (&DMatrix<f64>, &DMatrix<f64>),
     output: &DMatrix<f64>,
     k: &DMatrix<f64>,
     domain: Domain,
 ) -> Result<Result<IntegralFeedforward, &'static str>, Error> {
-    let (a_e, b_e) = extended_pair(a, b, output, domain)?;
+    let controlled = closed_loop((a, b), output, k, domain)?;
     let (n, t) = (a.nrows(), output.nrows());
-    let controlled = &a_e + &b_e * k;
     let Some(silent) = slowest(&eigenvalues(&controlled)?, t, domain) else {
         return Ok(Err(
             "the slowest eigenvalues of the feedback, one for each integral, end with half of a complex \

@@ -105,7 +105,8 @@ impl Simulation {
         Ok(KeptState { master, slot })
     }
 
-    /// Returns to a state that this simulation has kept, if its slot was not used again.
+    /// Returns to a kept state of this simulation. `kept` is the last result of [`Simulation::keep`] with its
+    /// slot: an older one has lost its FMU states.
     ///
     /// # Errors
     ///
@@ -120,7 +121,8 @@ impl Simulation {
         self.restore_master(&kept.master)
     }
 
-    /// The state of the master, and of each slave what `state` returns for its name and the time.
+    /// A checkpoint whose FMU states are the bytes that `state` returns; it gets the name of each slave, the slave,
+    /// and the time.
     fn checkpoint_with(
         &mut self,
         state: impl Fn(&str, &mut dyn Slave, f64) -> Result<Vec<u8>, SystemError>,
