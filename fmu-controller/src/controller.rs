@@ -235,7 +235,7 @@ impl AsoController {
         for (i, slope) in f_slopes.iter_mut().enumerate() {
             *slope = equations.fault(i, equations.estimate(z_slopes), input_slopes[0]);
         }
-        self.set_scheduled_command_slopes();
+        self.set_scheduled_slopes();
         let Self { design, values, deviations, z_slopes, f_slopes, u_slopes, .. } = self;
         for loss in &mut self.losses {
             let (u, f_hat) = (loss.actuator, design.states.len() + loss.fault);

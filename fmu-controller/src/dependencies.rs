@@ -77,7 +77,8 @@ fn direct(design: &Design, kind: DependencyKind) -> Option<Group> {
 pub(crate) fn of_fault(design: &Design, i: usize) -> Vec<Group> {
     let integral = names::fault_states(design).nth(i).into_iter().collect();
     let groups = [(Discrete, x_hat(design)), (Constant, integral)];
-    groups.into_iter().chain(direct(design, Discrete)).collect()
+    let groups = groups.into_iter().chain(direct(design, Discrete)).collect();
+    groups_by_schedule(design, groups)
 }
 
 fn has_limits(design: &Design) -> bool {
@@ -277,7 +278,7 @@ pub(crate) fn of_initial_fault(design: &Design, i: usize) -> Vec<String> {
         names.extend(whole("L_x", &design.l_x));
         names.extend(row("L_f", &design.l_f, i));
     }
-    names
+    by_schedule(design, names)
 }
 
 /// The dependencies of the initial value of element `i` of z.

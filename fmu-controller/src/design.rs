@@ -441,8 +441,8 @@ impl Design {
 
     /// The matrices that depend on the scheduling variable; the last ones where they are stated.
     pub(crate) fn scheduled_mut(&mut self) -> impl Iterator<Item = &mut Matrix> {
-        let Self { a, b, c, f_a, k_x, k_f, l_x, l_f, k_i, l_w, n_r, .. } = self;
-        let stated = [k_i, l_w, n_r].into_iter().flatten();
+        let Self { a, b, c, f_a, k_x, k_f, l_x, l_f, p_f, k_i, l_w, n_r, .. } = self;
+        let stated = [p_f, k_i, l_w, n_r].into_iter().flatten();
         [a, b, c, f_a, k_x, k_f, l_x, l_f].into_iter().chain(stated)
     }
 

@@ -7,8 +7,8 @@
 //! M(theta) = (1 - t) M_i + t M_{i+1},  t = (theta - theta_i) / (theta_{i+1} - theta_i)
 //! ```
 //!
-//! for each of A, B, C, F_a, K_x, K_f, L_x, L_f, x_op, u_op, y_op, and, where the design has them, K_i, L_w,
-//! N_r, r_op. The controller then acts like one whose design states these numbers: it takes the sample, or has
+//! for each of A, B, C, F_a, K_x, K_f, L_x, L_f, x_op, u_op, y_op, and, where the design has them, P_f, K_i,
+//! L_w, N_r, r_op. The controller then acts like one whose design states these numbers: it takes the sample, or has
 //! the derivatives and commands. The estimates are those of states, not of deviations, so that a change of the
 //! operating point does not change them.
 
@@ -57,6 +57,8 @@ pub(crate) struct Point {
     l_x: Matrix,
     #[serde(rename = "L_f")]
     l_f: Matrix,
+    #[serde(rename = "P_f", default)]
+    p_f: Option<Matrix>,
     #[serde(rename = "K_i", default)]
     k_i: Option<Matrix>,
     #[serde(rename = "L_w", default)]
@@ -81,8 +83,10 @@ impl Point {
             ("L_x", &self.l_x),
             ("L_f", &self.l_f),
         ];
-        let stated = [("K_i", &self.k_i), ("L_w", &self.l_w), ("N_r", &self.n_r)].into_iter();
-        always.into_iter().chain(stated.filter_map(|(name, own)| Some((name, own.as_ref()?))))
+        let stated =
+            [("P_f", &self.p_f), ("K_i", &self.k_i), ("L_w", &self.l_w), ("N_r", &self.n_r)];
+        let stated = stated.into_iter().filter_map(|(name, own)| Some((name, own.as_ref()?)));
+        always.into_iter().chain(stated)
     }
 }
 

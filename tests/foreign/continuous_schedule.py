@@ -31,7 +31,9 @@ class Schedule(ScheduledDesign):
         seen = y if self.filter is None else y_f
         x, e, r = x_hat - own["x_op"], seen - own["y_op"], r - own.get("r_op", np.zeros(0))
         e = e - own["C"] @ x
-        v = own["u_op"] + own["K_x"] @ x + own["K_f"] @ f_hat
+        # With a direct term the state is the integral part of the estimate.
+        fault = f_hat + own["P_f"] @ e if "P_f" in own else f_hat
+        v = own["u_op"] + own["K_x"] @ x + own["K_f"] @ fault
         if "N_r" in own:
             v = v + own["N_r"] @ r
         if self.integrals:
@@ -43,7 +45,7 @@ class Schedule(ScheduledDesign):
         if self.integrals:
             slope = r - np.array(self.own["H"]) @ (y - own["y_op"])
             if "F_i" in self.own:
-                slope = slope + np.array(self.own["F_i"]) @ f_hat
+                slope = slope + np.array(self.own["F_i"]) @ fault
             parts.append(slope + (own["L_w"] @ (u - v) if "L_w" in own else 0))
         return np.concatenate(parts), u
 
@@ -63,7 +65,8 @@ class Schedule(ScheduledDesign):
 def states_of(schedule):
     """Names of the FMU's continuous states, in the order of z."""
     names = [f"x_hat[{i + 1}]" for i in range(schedule.n)]
-    names += ["f_hat"] if schedule.q == 1 else [f"f_hat[{i + 1}]" for i in range(schedule.q)]
+    fault = "f_hat_i" if "P_f" in schedule.points[0] else "f_hat"
+    names += [fault] if schedule.q == 1 else [f"{fault}[{i + 1}]" for i in range(schedule.q)]
     if schedule.filter is not None:
         names += ["y_f"] if schedule.p == 1 else [f"y_f[{k + 1}]" for k in range(schedule.p)]
     if schedule.integrals:

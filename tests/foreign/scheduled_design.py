@@ -4,7 +4,7 @@ import tomllib
 
 import numpy as np
 
-MATRICES = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f", "K_i", "L_w", "N_r"]
+MATRICES = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f", "P_f", "K_i", "L_w", "N_r"]
 LISTS = ["x_op", "u_op", "y_op", "r_op"]
 
 # A drive whose inertia, spring and friction are known; the angle that is measured has an operating point.

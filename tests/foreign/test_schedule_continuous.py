@@ -58,6 +58,11 @@ FEEDFORWARD = (
 )
 
 
+def by(law):
+    """The replacement that states an estimation law."""
+    return (("[schedule]", f'[estimation]\nlaw = "{law}"\n\n[schedule]'),)
+
+
 def rate(bound):
     """The replacement that states a bound of the rate of the spring."""
     return 'variable = "k"\n', f'variable = "k"\nrate_bound = {bound}\n'
@@ -84,9 +89,9 @@ def designed(aso_ftc, packed, tmp_path_factory):
     return make
 
 
-@pytest.fixture(scope="module")
-def drive(designed):
-    return designed(*FILTERED)
+@pytest.fixture(scope="module", params=["augmented", "proportional-integral"])
+def drive(designed, request):
+    return designed(*FILTERED, *(by(request.param) if request.param != "augmented" else ()))
 
 
 def test_in_model_exchange_derivatives_and_commands_are_those_of_the_interpolated_equations(drive):
@@ -141,7 +146,7 @@ def test_in_co_simulation_the_fmu_follows_scipys_integration_of_the_equations_th
             u = schedule.equations(z, np.array(after[:1]), np.array([after[1]]), after[2])[1]
             at_limit += abs(u[0]) == 3
             assert own.get(*names) == pytest.approx(z, rel=2e-7, abs=2e-7), k
-            assert own.get("torque", "schedule_at") == pytest.approx([u[0], min(max(after[2], 1), 4)], rel=5e-6, abs=5e-6)
+            assert own.get("torque", "schedule_at") == pytest.approx([u[0], min(max(after[2], 1), 4)], rel=1e-5, abs=1e-5)
     assert at_limit * size > 0.2, "the command is at a limit for a while"
 
 
@@ -184,6 +189,7 @@ def test_slopes_of_the_command_include_the_moving_gains(drive):
             own.set(inputs)
             own.set_slopes(**rates)
             (found,) = own.slopes_of("torque")
+            (instance_slope,) = own.slopes_of("f_hat")
             z = np.array(own.get(*states_of(schedule)))
 
             def command(t):
@@ -191,24 +197,37 @@ def test_slopes_of_the_command_include_the_moving_gains(drive):
                 slope, _ = schedule.equations(z, np.array([inputs["angle"]]), np.array([inputs["r_angle"]]), inputs["inertia"])
                 return schedule.equations(z + slope * t, np.array([values["angle"]]), np.array([values["r_angle"]]), values["inertia"])[1][0]
 
+            if "P_f" in schedule.points[0]:
+
+                def fault(t):
+                    slope, _ = schedule.equations(z, np.array([inputs["angle"]]), np.array([inputs["r_angle"]]), inputs["inertia"])
+                    moved, own = z + slope * t, schedule.numbers(inputs["inertia"] + rates["inertia"] * t)
+                    # The filtered measurement is the state after the one of the fault.
+                    e = moved[schedule.n + 1] - own["y_op"][0] - own["C"][0] @ (moved[: schedule.n] - own["x_op"])
+                    return moved[schedule.n] + own["P_f"][0, 0] * e
+
+                assert instance_slope == pytest.approx((fault(1e-6) - fault(-1e-6)) / 2e-6, rel=1e-5, abs=1e-6)
             if abs(command(0)) < 2.9:
                 assert found == pytest.approx((command(1e-6) - command(-1e-6)) / 2e-6, rel=1e-5, abs=1e-6)
 
 
-@pytest.mark.parametrize("case", [FILTERED, MEASURED], ids=["input", "measurement"])
+@pytest.mark.parametrize(
+    "case", [FILTERED, MEASURED, (*MEASURED, *by("proportional-integral"))], ids=["input", "measurement", "direct term"],
+)
 def test_directional_derivatives_are_the_difference_quotients(designed, case):
     schedule, _, fmu = designed(*case, certified=case is FILTERED)
     inputs = {"angle": 0.45, "r_angle": 0.3} | ({"inertia": 2.7} if case is FILTERED else {})
     names = states_of(schedule)
     own = Exchanged(fmu, inputs)
     z = schedule.start(schedule.at[0]) + 0.05 * np.arange(1, len(names) + 1)
-    unknowns = [f"der({name})" for name in names] + ["torque"]
+    faults = ["f_hat"] if "P_f" in schedule.points[0] else []
+    unknowns = [f"der({name})" for name in names] + ["torque", *faults]
     structure = [*fmu.description.derivatives, *fmu.description.outputs]
     stated = {item.variable.name: {own.name for own in item.dependencies} for item in structure}
 
     def values(z, inputs):
         slopes = own.at(0.0, z, inputs)
-        return np.array([*slopes, *own.instance.get("torque")])
+        return np.array([*slopes, *own.instance.get("torque", *faults)])
 
     values(z, inputs)
     own.event(0.0)
@@ -227,10 +246,11 @@ def test_directional_derivatives_are_the_difference_quotients(designed, case):
             assert name in stated[unknown] or abs(slope) < 1e-9, (unknown, name)
 
 
-@pytest.mark.parametrize("case", ["drive", "spring", "slow spring"])
+@pytest.mark.parametrize("case", ["drive", "direct term", "spring", "slow spring"])
 def test_the_certificate_holds_between_the_points_at_the_stated_rate(designed, case):
     springs = {"spring": (), "slow spring": (rate("0.1"),)}
-    schedule, report, _ = designed(*springs[case], text=SPRING) if case in springs else designed()
+    law = by("proportional-integral") if case == "direct term" else ()
+    schedule, report, _ = designed(*springs[case], text=SPRING) if case in springs else designed(*law)
     fastest = check_certificate(schedule, report["schedule"])
     if case in springs:
         assert fastest == 0.1 if case == "slow spring" else fastest > 0.5
@@ -268,8 +288,9 @@ def test_a_rate_that_is_not_proven_makes_the_verdict_amber_and_says_so(designed)
     assert report["verdict"]["level"] == "amber"
 
 
-def test_a_measurement_that_schedules_moves_its_own_operating_point(designed):
-    schedule, report, _ = designed(*MEASURED, certified=False)
+@pytest.mark.parametrize("law", [(), by("proportional-integral")], ids=["augmented", "direct term"])
+def test_a_measurement_that_schedules_moves_its_own_operating_point(designed, law):
+    schedule, report, _ = designed(*MEASURED, *law, certified=False)
 
     def right(k, state):
         """The plant of a point, whose controller interpolates by the angle."""

@@ -17,6 +17,7 @@ PERIOD = 0.05
 INERTIAS, SPRINGS, FRICTIONS = [1.0, 2.0, 4.0], [1.0, 3.0, 1.5], [0.5, 0.3, 0.2]
 
 DRIVE = f"sample_time = {PERIOD}\n" + scheduled_design.DRIVE.replace('"inertia"\n', '"inertia"\nrate_bound = 0.5\n')
+LAWS = ["proportional-integral", "fast-adaptive", "learning"]
 WITHOUT = [
     ("feedforward = true", "integral = false"),
     ("feedback.eigenvalues = [-1.2, -2.0, -2.5]", "feedback.eigenvalues = [-1.2, -2.0]"),
@@ -35,6 +36,19 @@ def drive(k):
     return held(np.array([[0, 1], [-SPRINGS[k] / INERTIAS[k], -FRICTIONS[k] / INERTIAS[k]]]), np.array([[0], [1 / INERTIAS[k]]]))
 
 
+def by(law):
+    """The replacements for an estimation law; all but one need a fault that acts on a measurement directly: the speed."""
+    stated = ("[schedule]", f'[estimation]\nlaw = "{law}"\n\n[schedule]')
+    if law == "proportional-integral":
+        return (stated,)
+    return (
+        stated,
+        ("C = [[1, 0]]", "C = [[1, 0], [0, 1]]"),
+        ('{ name = "angle", operating = 0.0 }', '{ name = "angle", operating = 0.0 }, "speed"'),
+        ("y_op = [0.4]", "y_op = [0.4, 0]"), ("y_op = [0.2]", "y_op = [0.2, 0]"),
+    )
+
+
 class Schedule(ScheduledDesign):
     """The recursion of a sampled controller."""
 
@@ -51,7 +65,9 @@ class Schedule(ScheduledDesign):
         if self.current:
             x_hat, f_hat = x_hat + own["L_x"] @ innovation, f_hat + own["L_f"] @ innovation
             innovation = 0 * innovation
-        v = own["u_op"] + own["K_x"] @ x_hat + own["K_f"] @ f_hat
+        # With a direct term f_hat is the integral part of the estimate.
+        fault = f_hat + own["P_f"] @ (e - own["C"] @ x_hat) if "P_f" in own else f_hat
+        v = own["u_op"] + own["K_x"] @ x_hat + own["K_f"] @ fault
         if "N_r" in own:
             v = v + own["N_r"] @ r
         if self.integrals:
@@ -61,7 +77,8 @@ class Schedule(ScheduledDesign):
         if self.integrals:
             x_i = x_i + PERIOD * (r - np.array(self.own["H"]) @ e)
             x_i = x_i + (own["L_w"] @ (u - v) if "L_w" in own else 0)
-        return np.concatenate([after, f_hat + own["L_f"] @ innovation, x_i]), u
+        kept = np.array(self.own.get("A_f", np.eye(self.q)))
+        return np.concatenate([after, kept @ f_hat + own["L_f"] @ innovation, x_i]), u
 
 
 @pytest.fixture(scope="module")
@@ -118,11 +135,13 @@ def run(schedule, fmu, folder, inertia, reference, count, plant, disturbance=0.0
     z = np.concatenate([start["x_op"], np.zeros(schedule.q + schedule.integrals)])
     x, rows = np.zeros(2), []
     a, b = plant
+    measured = len(schedule.own["measurements"])
     for k in range(count):
-        z, u = schedule.sample(z, x[:1], np.array([reference(k)]), schedule.numbers(inertia(k)))
+        z, u = schedule.sample(z, x[:measured], np.array([reference(k)]), schedule.numbers(inertia(k)))
         rows.append([x[0], own.get("torque"), u[0]])
         x = a @ x + b[:, 0] * (rows[-1][1] + disturbance)
-        own.set("angle", x[0])
+        for name, value in zip(["angle", "speed"][:measured], x):
+            own.set(name, value)
         own.set("inertia", inertia(k + 1))
         own.set("r_angle", reference(k + 1))
         own.step(k * PERIOD, PERIOD)
@@ -135,6 +154,17 @@ def test_the_fmu_follows_the_interpolated_recursion_at_its_limits_too(made, chan
     inertia = lambda k: 0.9 + 0.015 * k
     reference = lambda k: 1.0 if k % 120 < 60 else -2.0
     rows = run(schedule, fmu, tmp_path, inertia, reference, 230, drive(1))
+    assert np.allclose(rows[:, 1], rows[:, 2], rtol=1e-8, atol=1e-9)
+    assert np.abs(rows[:, 1]).max() == 3.0 and inertia(229) > 4.0
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_fmu_follows_the_recursion_of_other_laws(made, law, tmp_path):
+    schedule, _, fmu = made(*by(law))
+    assert ("P_f" in schedule.points[0]) == (law != "learning") and ("A_f" in schedule.own) == (law == "learning")
+    inertia = lambda k: 0.9 + 0.015 * k
+    reference = lambda k: 1.0 if k % 120 < 60 else -2.0
+    rows = run(schedule, fmu, tmp_path, inertia, reference, 230, drive(1), disturbance=0.3)
     assert np.allclose(rows[:, 1], rows[:, 2], rtol=1e-8, atol=1e-9)
     assert np.abs(rows[:, 1]).max() == 3.0 and inertia(229) > 4.0
 
@@ -191,7 +221,7 @@ def test_without_it_a_warning_states_the_largest_error_between_the_points(both, 
     assert missing == pytest.approx(constant_error(schedule, value), abs=1e-7)
 
 
-@pytest.mark.parametrize("change", [(), tuple(WITHOUT)], ids=["both", "feedforward"])
+@pytest.mark.parametrize("change", [(), tuple(WITHOUT), *map(by, LAWS)], ids=["both", "feedforward", *LAWS])
 def test_the_certificate_and_the_checked_values_are_about_the_loop_with_its_integrals(made, change):
     schedule, report, _ = made(*change, certified=True)
     found = report["schedule"]
@@ -222,7 +252,7 @@ def test_the_certificate_and_the_checked_values_are_about_the_loop_with_its_inte
         assert "p" in found["bounded_rate"], found
 
 
-@pytest.mark.parametrize("change", [(), tuple(WITHOUT)], ids=["both", "feedforward"])
+@pytest.mark.parametrize("change", [(), tuple(WITHOUT), by(LAWS[0])], ids=["both", "feedforward", LAWS[0]])
 def test_a_measurement_that_schedules_moves_the_references_too(made, change):
     """The Jacobian of one sample of plant and controller, by differences on each side of a point."""
     changes = [
@@ -268,6 +298,7 @@ def test_a_measurement_that_schedules_moves_the_references_too(made, change):
     [
         # K_i grows with the inertia: half of the way the product with L_w is above 2.
         ([("B = [[0], [0.25]]", "B = [[0], [0.0005]]"), ("0.25", "0.0005")], ["back-calculation of the integrals is not stable while torque is at the limits", "inertia = "]),
+        ([("[schedule]", '[estimation]\nlaw = "sliding-mode"\n\n[schedule]')], ["with `schedule` expected one of augmented, proportional-integral, fast-adaptive, learning, found \"sliding-mode\""]),
         ([("A = [[0, 1], [-0.375, -0.05]]\nB = [[0], [0.25]]", "A = [[0, 1], [-1, -1]]\nB = [[0], [1]]\nC = [[0, 1]]")], ["no integral action exists for r_angle", "schedule with inertia = 4"]),
     ],
 )

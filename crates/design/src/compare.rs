@@ -84,8 +84,19 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
             reason: problem.design(&law).err(),
             result: None,
         };
+        if file.schedule.is_some() && !law.allows("schedule") {
+            found.reason = Some("it is not possible with a schedule".to_owned());
+        }
         if found.reason.is_none() {
-            let designed = design_by(&file, &law)?;
+            let designed = match design_by(&file, &law) {
+                // The law may exist for the plant of the file and not at another point.
+                Err(error) if file.schedule.is_some() => {
+                    found.reason = Some(files::sentence(&error));
+                    laws.push(found);
+                    continue;
+                }
+                designed => designed?,
+            };
             let whole = (&file, family.as_ref());
             let designed = (&designed, None, None);
             let quietly = (Duration::ZERO, &Steps::new(&|_| {}));

@@ -244,9 +244,10 @@ impl ControllerDesign {
                 text.extend([name, " = [", &values.join(", "), "]\n"]);
             }
             let FaultyPlant { a, b, c, f_a, .. } = &design.plant;
-            let Gains { k_x, k_f, l_x, l_f, .. } = &design.gains;
+            let Gains { k_x, k_f, l_x, l_f, p_f, .. } = &design.gains;
             let mut matrices = vec![("A", a), ("B", b), ("C", c), ("F_a", f_a)];
             matrices.extend([("K_x", k_x), ("K_f", k_f), ("L_x", l_x), ("L_f", l_f)]);
+            matrices.extend(p_f.as_ref().map(|p_f| ("P_f", p_f)));
             matrices.extend(design.gains.integral.as_ref().map(|own| ("K_i", &own.gain)));
             if let Some(tracking) = &design.tracking {
                 matrices.extend(tracking.windup().map(|l_w| ("L_w", l_w)));

@@ -132,16 +132,18 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
     let gains = with(&feedback.gain, &observer.gain);
     let problem =
         LawProblem { linear: &linear, extended: &extended, plant: &plant, gains: &gains, domain };
-    let law = problem.design(law).map_err(|reason| not_existing(file, law, &reason, &problem))?;
-    let observer = if law.keeps_error_dynamics() { observer } else { by_law(&law) };
+    let designed_law =
+        problem.design(law).map_err(|reason| not_existing(file, law, &reason, &problem))?;
+    let observer =
+        if designed_law.keeps_error_dynamics() { observer } else { by_law(&designed_law) };
     let required_error_dynamics = gains.error_dynamics(&plant);
-    let (gains, own_model) = (law.gains.clone(), law.a_f.clone());
+    let (gains, own_model) = (designed_law.gains.clone(), designed_law.a_f.clone());
     plant.a_f = own_model.unwrap_or(plant.a_f);
     let whole = DesignLoop::of((&linear, &plant), &gains, filter.as_deref(), domain)?;
     let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
     let controlled = &pair.0 + &pair.1 * &feedback.gain;
     let tracking = Tracking::of(file, (&linear, (&own.0, &own.1)), (&gains, &controlled), domain)?;
-    let schedule = Scheduled::of(file, &linear)?;
+    let schedule = Scheduled::of(file, law, &linear)?;
     let mut found = ControllerDesign {
         family: (!members.is_empty()).then_some(Family { members, feedback: certificate }),
         schedule,
@@ -160,7 +162,7 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
         domain,
         plant,
         gains,
-        law,
+        law: designed_law,
         required_error_dynamics,
         feedback,
         observer,

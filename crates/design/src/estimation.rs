@@ -98,6 +98,20 @@ impl Law {
     }
 }
 
+impl Law {
+    /// Whether a plant file with this law may have the table `key`.
+    pub(crate) fn allows(&self, key: &str) -> bool {
+        match self {
+            Self::Augmented => true,
+            // Stability between the points is that of linear equations, which a sliding-mode law does not have.
+            Self::SlidingMode { .. } => false,
+            Self::ProportionalIntegral { .. }
+            | Self::FastAdaptive { .. }
+            | Self::Learning { .. } => key == "schedule",
+        }
+    }
+}
+
 impl EstimationRequest {
     /// Reads the table; without it the law is the augmented observer. `faults`: their number.
     pub(crate) fn read(file: &Table<'_>, faults: usize) -> Result<Self, PlaceError> {
@@ -113,10 +127,10 @@ impl EstimationRequest {
             return Err(stated.error(message));
         };
         for key in ["family", "schedule", "reconfiguration", "fallback"] {
-            if law != Law::Augmented && file.get(key).is_some() {
-                let message = format!(
-                    "with `{key}` the law is the augmented observer: expected \"augmented\""
-                );
+            if !law.allows(key) && file.get(key).is_some() {
+                let all = Law::ALL.iter().filter(|law| law.allows(key)).map(Law::name);
+                let all = all.collect::<Vec<_>>().join(", ");
+                let message = format!("with `{key}` expected one of {all}, found {found:?}");
                 return Err(stated.error(message));
             }
         }

@@ -3,7 +3,7 @@
 pub(crate) mod references;
 pub mod report;
 
-use control::aso::{FaultyPlant, Gains};
+use control::aso::{Estimator, FaultyPlant, Gains};
 use control::controller::complete_controller;
 use control::hold::zero_order_hold;
 use control::lmi::{Interval, bernstein};
@@ -14,6 +14,7 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 use super::designed::{self, ControllerDesign};
+use super::estimation::Law;
 use super::family::check_states;
 use super::linear_plant::LinearPlant;
 use super::plant_file::PlantFile;
@@ -21,9 +22,11 @@ use super::signals::Signal;
 use super::variants::Variable;
 
 /// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p` of a
-/// current estimator. The loop of a continuous controller has degree 2; its coefficients of degree 4 are nearer
-/// to it.
+/// current estimator. The loop of a continuous controller has degree 2, with a direct term 4; its coefficients of
+/// degree 4 are nearer to it.
 const DEGREE: u32 = 4;
+/// The same for a current estimator with a direct term: B `K_f` `P_f` C L C.
+const DEGREE_OF_DIRECT_TERM: u32 = 6;
 
 /// The designs of a scheduled controller.
 pub(crate) struct Scheduled {
@@ -47,9 +50,10 @@ struct Point {
 }
 
 impl Scheduled {
-    /// Designs the controller at each point of the schedule of `file`.
+    /// Designs the controller with `law` at each point of the schedule of `file`.
     pub(crate) fn of(
         file: &PlantFile<'_>,
+        law: &Law,
         nominal: &LinearPlant,
     ) -> Result<Option<Self>, crate::Error> {
         let Some(schedule) = &file.schedule else { return Ok(None) };
@@ -60,14 +64,10 @@ impl Scheduled {
                 points.push((point.at, None));
                 continue;
             }
-            let own = designed::design(&file.with(&point.plant)).map_err(|error| {
+            let own = designed::design_by(&file.with(&point.plant), law).map_err(|error| {
                 error.within(format!("schedule with {} = {}", variable.name, point.at))
             })?;
             check_states(file, &point.plant, (nominal, &own.linear))?;
-            if own.gains.p_f.is_some() {
-                let message = "a schedule is for the augmented observer, without a direct term P_f";
-                return Err(file.error_at(&point.plant.place, message).into());
-            }
             points.push((point.at, Some(own)));
         }
         Ok(Some(Self {
@@ -131,6 +131,11 @@ impl Point {
                 k_f: mix(&gains.k_f, &other.gains.k_f),
                 l_x: mix(&gains.l_x, &other.gains.l_x),
                 l_f: mix(&gains.l_f, &other.gains.l_f),
+                p_f: gains
+                    .p_f
+                    .as_ref()
+                    .zip(other.gains.p_f.as_ref())
+                    .map(|(own, next)| mix(own, next)),
                 integral: gains.integral.as_ref().zip(other.gains.integral.as_ref()).map(
                     |(own, next)| IntegralAction {
                         output: mix(&own.output, &next.output),
@@ -169,11 +174,16 @@ impl ScheduledLoop {
     }
 
     /// The intervals between the points. All plants and gains on them are interpolated linearly, so
-    /// that the loop is a polynomial of degree 4.
+    /// that the loop is a polynomial, of degree 4 or 6.
     pub(crate) fn intervals(&self) -> Result<Vec<Interval>, Error> {
+        let Gains { p_f, estimator, .. } = &self.points[0].gains;
+        let degree = match (p_f, estimator) {
+            (Some(_), Estimator::Current) => DEGREE_OF_DIRECT_TERM,
+            _ => DEGREE,
+        };
         let interval = |k: usize| {
-            let at = |j: u32| self.dynamics(k, f64::from(j) / f64::from(DEGREE));
-            let values = (0..=DEGREE).map(at).collect::<Result<Vec<_>, _>>()?;
+            let at = |j: u32| self.dynamics(k, f64::from(j) / f64::from(degree));
+            let values = (0..=degree).map(at).collect::<Result<Vec<_>, _>>()?;
             let length = self.at[k + 1] - self.at[k];
             Ok(Interval { length, coefficients: bernstein(&values)? })
         };

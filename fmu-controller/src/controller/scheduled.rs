@@ -8,10 +8,12 @@ use crate::equations::Equations;
 use crate::signals::Signals;
 
 impl AsoController {
-    /// Computes u' of a controller with a schedule: a part of it comes from gains and operating point, which move
-    /// with the scheduling variable.
-    pub(super) fn set_scheduled_command_slopes(&mut self) {
-        let Self { design, current, values, deviations, z_slopes, u_slopes, mode, .. } = self;
+    /// Computes u', and f_hat' with a direct term, of a controller with a schedule: a part of them comes from gains
+    /// and operating point, which move with the scheduling variable.
+    pub(super) fn set_scheduled_slopes(&mut self) {
+        let Self {
+            design, current, values, deviations, z_slopes, f_slopes, u_slopes, mode, ..
+        } = self;
         let (Some(schedule), Some(current)) = (&design.schedule, current) else { return };
         let space = || Box::new(((**current).clone(), Signals::zero(current)));
         let (rates, moves) = &mut **self.rates.get_or_insert_with(space);
@@ -29,6 +31,9 @@ impl AsoController {
         for (j, slope) in u_slopes.iter_mut().enumerate().filter(|(j, _)| !mode.is_limited(*j)) {
             let own = rates.actuators[j].operating.unwrap_or_default();
             *slope = own + equations.free_command(j, z, inputs).eps;
+        }
+        for (i, slope) in f_slopes.iter_mut().enumerate() {
+            *slope = equations.fault(i, z, inputs[0]).eps;
         }
     }
 

@@ -78,9 +78,9 @@ impl Design {
     fn check_schedule(&self, path: &str) -> Result<(), DesignError> {
         let Some(schedule) = &self.schedule else { return Ok(()) };
         let refuse = |what: String| Err(DesignError::Entry { path: path.to_owned(), what });
-        let others = [(self.p_f.is_some(), "P_f"), (self.sliding_mode.is_some(), "sliding_mode")];
-        if let Some((_, other)) = others.iter().find(|(stated, _)| *stated) {
-            return refuse(format!("schedule and {other} are stated, expected one of them"));
+        if self.sliding_mode.is_some() {
+            let text = "schedule and sliding_mode are stated, expected one of them";
+            return refuse(text.to_owned());
         }
         if schedule.points.len() < 2 {
             return refuse("schedule: expected at least two points".to_owned());
@@ -95,7 +95,7 @@ impl Design {
                 ));
             }
             last = point.at;
-            let scheduled = |name: &&str| ["K_i", "L_w", "N_r"].contains(name);
+            let scheduled = |name: &&str| ["P_f", "K_i", "L_w", "N_r"].contains(name);
             let names = |all: &mut dyn Iterator<Item = &'static str>| {
                 let mut all: Vec<_> = all.filter(scheduled).collect();
                 all.sort_unstable();
@@ -105,7 +105,7 @@ impl Design {
             let expected = names(&mut self.matrices().map(|(name, _)| name));
             if found != expected {
                 return refuse(format!(
-                    "{place}: of K_i, L_w, N_r it states [{found}], expected [{expected}] as above"
+                    "{place}: of P_f, K_i, L_w, N_r it states [{found}], expected [{expected}] as above"
                 ));
             }
             for (name, own) in point.matrices() {
