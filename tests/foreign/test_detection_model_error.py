@@ -13,6 +13,7 @@ from fmpy.fmi2 import FMU2Slave
 
 from conftest import ROOT
 from design_loop import packed_plant
+from split_mix import uniform
 from test_detection import COMMAND, DETECTION, PLANT, Filter, T, designed, noise
 
 SIZE = np.array([0.5, 0.4])
@@ -152,8 +153,11 @@ def test_tanks_with_other_pipes_stay_below_the_bound_though_their_levels_at_rest
     report, file = designed(tmp_path, TANK.format(fmu=fmu, levels=list(start)))
     own = Filter(file["detection"])
     largest = np.zeros(2)
-    for signs in itertools.product([-1, 1], repeat=3):
-        mu = nominal * (1 + 0.02 * np.array(signs))
+    # The corners of the limits, and random cases within: the first ones of those that the report counts.
+    number = uniform(report["parameter_cases"]["seed"])
+    within = [[2 * next(number) - 1 for _ in range(3)] for _ in range(15)]
+    for part in [*itertools.product([-1, 1], repeat=3), *within]:
+        mu = nominal * (1 + 0.02 * np.array(part))
         for command in ([-2e-6, 2e-6], [2e-6, 2e-6], [-2e-6, -2e-6]):
             h, x_r, u = start.copy(), np.zeros(len(own.a)), np.array(command)
             for _ in range(700):
@@ -166,6 +170,10 @@ def test_tanks_with_other_pipes_stay_below_the_bound_though_their_levels_at_rest
                 largest = np.maximum(largest, np.abs(r))
     stated = np.array([test["model_error"] for test in report["tests"]])
     assert (largest <= stated).all() and (stated < 1.2 * 1.1 * largest).all(), (largest, stated)
+    # Of 200 cases all miss a part of the box with probability 0.01.
+    missed = report["parameter_cases"]["uncovered"]
+    assert report["parameter_cases"]["cases"] == 200 and (1 - missed) ** 200 == pytest.approx(0.01)
+    assert all(test["interior_excess"] == pytest.approx(0, abs=0.01) for test in report["tests"])
 
 
 FAMILY = """

@@ -47,7 +47,8 @@ pub use opened::OpenedLoop;
 pub use scaling::ScaledPeak;
 pub use speed::regulator_of_same_speed;
 pub use tolerance::{
-    Deviated, EntryFamily, PlantFamily, ToleranceSearch, ToleranceTest, Tolerances, tolerance_test,
+    Deviated, EntryFamily, PlantFamily, ToleranceSearch, ToleranceTest, Tolerances,
+    random_deviations, tolerance_test,
 };
 
 use crate::blocks::{block_2x2, stacked};

@@ -16,11 +16,13 @@ use super::designed::ControllerDesign;
 use super::parameters::ParameterFamily;
 use super::plant_file::PlantFile;
 use super::report::{Matrix, rows};
-use crate::detection::report::{DecoupledInput, DetectedFault, Detection as Report, Test};
+use crate::detection::report::{
+    DecoupledInput, DetectedFault, Detection as Report, ParameterCases, Test,
+};
 use crate::detection::request::{DetectionRequest, Method};
 use decoupling::Decoupling;
 pub(crate) use file::Section;
-use model_error::ModelErrors;
+use model_error::{LargestMean, ModelErrors};
 use prediction::{Prediction, TestKind};
 use problem::Problem;
 
@@ -29,6 +31,9 @@ use problem::Problem;
 const INSENSITIVE: f64 = 1e-6;
 /// Time constants of the slowest filter after which its initial error is a thousandth.
 const SETTLING: f64 = 7.0;
+/// An excess of the interior of the limits of parameters above this part is a warning: the brackets of the
+/// means have a relative width of 0.01.
+const NOTICEABLE: f64 = 0.02;
 /// The largest drift: with it a fault of four standard deviations is mostly found in its first sample.
 const LARGEST_DRIFT: f64 = 2.0;
 
@@ -53,6 +58,8 @@ struct PlannedTest {
     kind: TestKind,
     /// The largest mean of the residuals that errors of the model give them.
     bias: f64,
+    /// By which part the largest of these means within the limits of parameters exceeds that at the corners.
+    interior_excess: Option<f64>,
     /// Whether it reacts to each fault.
     reacts: Vec<bool>,
 }
@@ -73,9 +80,12 @@ pub(crate) fn detection(
         .model_error
         .as_ref()
         .map(|own| ModelErrors::new(file, own, (&designed.linear, designed), family));
-    let parts = parts(file, request, &problem, errors.transpose()?.as_ref())?;
+    let errors = errors.transpose()?;
+    let parts = parts(file, request, &problem, errors.as_ref())?;
     let mut warnings = Vec::new();
-    let report = report(request, &problem, &parts, &mut warnings).map_err(refuse)?;
+    let mut report = report(request, &problem, &parts, &mut warnings).map_err(refuse)?;
+    let cases = errors.as_ref().and_then(ModelErrors::random_cases);
+    report.parameter_cases = cases.map(|cases| ParameterCases::new(cases, file.robustness.seed));
     let section = Section::new(&problem, &parts, report.from, designed);
     Ok(Some(Detection { section, report, warnings }))
 }
@@ -83,7 +93,9 @@ pub(crate) fn detection(
 /// Refuses several plants that the tests cannot allow for.
 fn check_plants(file: &PlantFile<'_>, request: &DetectionRequest) -> Result<(), crate::Error> {
     let message = if file.schedule.is_some() {
-        "the residuals are those of one plant: expected no [schedule] with [detection]"
+        "the thresholds rely on residuals that are white with variance 1, which interpolated filters give at the \
+         points of the schedule only: between them false alarms and delays would not be those stated; \
+         expected no [schedule] with [detection]"
     } else if file.family.is_empty() || (request.model_error.is_some() && file.fmu().is_none()) {
         return Ok(());
     } else if file.fmu().is_some() {
@@ -142,7 +154,7 @@ fn plan(
     let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
     let bias = |rows: &DMatrix<f64>| match errors {
         Some(errors) => errors.largest_mean(problem, (decoupling, rows)),
-        None => Ok(0.0),
+        None => Ok(LargestMean { mean: 0.0, interior_excess: None }),
     };
     #[expect(clippy::cast_precision_loss, reason = "a number of faults")]
     let samples = request.false_alarm_interval * count as f64 / problem.period;
@@ -160,10 +172,11 @@ fn plan(
             let mut test = Cusum::with_false_alarms(drift, samples).map_err(refuse)?;
             let direction = mean.normalize().transpose();
             let rows = DMatrix::from_row_slice(1, direction.len(), direction.as_slice());
-            let bias = bias(&rows)?;
+            let LargestMean { mean: bias, interior_excess } = bias(&rows)?;
             // A mean of up to the bias adds to no sum, so that there are no more false alarms.
             test.drift += bias;
-            Ok(PlannedTest { name, rows, kind: TestKind::Cusum(test), bias, reacts })
+            let kind = TestKind::Cusum(test);
+            Ok(PlannedTest { name, rows, kind, bias, interior_excess, reacts })
         }
         Method::ChiSquare { window } => {
             let means = faults
@@ -173,7 +186,7 @@ fn plan(
                 .map_err(refuse)?;
             let count = u32::try_from(rows).unwrap_or(u32::MAX);
             let rows = DMatrix::identity(rows, rows);
-            let bias = bias(&rows)?;
+            let LargestMean { mean: bias, interior_excess } = bias(&rows)?;
             let test = match window {
                 Some(window) => {
                     let samples_of_window = prediction::whole(window / problem.period).max(1);
@@ -182,7 +195,7 @@ fn plan(
                 None => prediction::best_window(count, (samples, bias), &means),
             };
             let kind = TestKind::Window(test.map_err(refuse)?);
-            Ok(PlannedTest { name, rows, kind, bias, reacts })
+            Ok(PlannedTest { name, rows, kind, bias, interior_excess, reacts })
         }
     }
 }
@@ -265,6 +278,7 @@ fn report(
         faults,
         reacts,
         confused,
+        parameter_cases: None,
     })
 }
 
@@ -288,6 +302,7 @@ fn test_report(
         drift: test.kind.drift(),
         window: test.kind.window(),
         model_error: test.bias,
+        interior_excess: test.interior_excess,
         threshold: test.kind.threshold(),
         false_alarm_interval: test.kind.between_false_alarms(test.bias) * problem.period,
         decoupled: decoupling
@@ -340,6 +355,14 @@ fn warn(tests: &[Test], confused: &[Vec<String>], warnings: &mut Vec<String>) {
         ));
     }
     for test in tests {
+        if let Some(excess) = test.interior_excess.filter(|excess| *excess > NOTICEABLE) {
+            warnings.push(format!(
+                "parameters within their limits give the test {} means that are up to {:.1} % larger than at the \
+                 corners of the limits; its threshold allows for the largest that was found",
+                test.name,
+                100.0 * excess
+            ));
+        }
         for input in test.decoupled.iter().filter(|input| !input.exact) {
             warnings.push(format!(
                 "{} acts on the residual of the test {} while it changes: its step of {} moves the mean by \

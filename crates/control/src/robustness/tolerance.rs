@@ -136,10 +136,7 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
     /// The deviations of the random cases.
     #[must_use]
     pub fn cases(&self, cases: u32, seed: u64) -> Vec<Vec<f64>> {
-        let mut random = seed;
-        let mut case =
-            || (0..self.family.count()).map(|_| 2.0 * uniform(&mut random) - 1.0).collect();
-        (0..cases).map(|_| case()).collect()
+        random_deviations(self.family.count(), cases, seed)
     }
 
     /// The [`instability`] of the loop with a plant of the family.
@@ -202,6 +199,15 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
     fn loops(&self) -> Loops<'_, F> {
         Loops { family: self.family, controller: self.controller }
     }
+}
+
+/// `cases` points of a box of `count` deviations from -1 to 1, uniform and independent, drawn by the generator
+/// `SplitMix64` from `seed`.
+#[must_use]
+pub fn random_deviations(count: usize, cases: u32, seed: u64) -> Vec<Vec<f64>> {
+    let mut random = seed;
+    let mut case = || (0..count).map(|_| 2.0 * uniform(&mut random) - 1.0).collect();
+    (0..cases).map(|_| case()).collect()
 }
 
 /// The next number of `SplitMix64` (G. L. Steele, D. Lea and C. H. Flood, OOPSLA 2014), in 0 to 1.

@@ -1,7 +1,13 @@
 //! The residuals that errors of the model cause without a fault.
 
+mod parameter_box;
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
 use control::detection::UncertainPlant;
-use control::robustness::{PlantFamily, Tolerances};
+use control::robustness::{PlantFamily, Tolerances, random_deviations};
 use control::{Domain, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
@@ -14,10 +20,17 @@ use crate::parameters::ParameterFamily;
 use crate::plant_file::PlantFile;
 use crate::signals::Signal;
 
-/// With so many parameters or fewer, all corners of their limits are tried.
-const ALL_CORNERS: usize = 6;
-/// With more, each parameter in turn goes to its worse limit, so many times at most.
-const ROUNDS: usize = 10;
+/// A plant, and the bounds of its inputs.
+type Case = Rc<(UncertainPlant, DVector<f64>)>;
+
+/// A bound of the means of residuals that errors of the model cause.
+#[derive(Clone, Copy)]
+pub(super) struct LargestMean {
+    /// As a length in standard deviations, times the factor of the plant file.
+    pub(super) mean: f64,
+    /// For parameters of an FMU: by which part the largest mean of the interior exceeds that of the corners.
+    pub(super) interior_excess: Option<f64>,
+}
 
 /// The plants within the tolerances of `[robustness]`, and the bounds of the commands.
 pub(super) struct ModelErrors<'a> {
@@ -27,6 +40,11 @@ pub(super) struct ModelErrors<'a> {
     plants: Vec<UncertainPlant>,
     /// The FMU whose parameters are wrong; then the entries are exact.
     parameters: Option<&'a ParameterFamily<'a>>,
+    /// The random cases of these parameters, as deviations from -1 to 1.
+    random: Vec<Vec<f64>>,
+    /// The plants of parameters that were linearised, by the bits of their deviations: each test has the same
+    /// ones.
+    cases: RefCell<HashMap<Vec<u64>, Case>>,
     /// The values of the measurements at the operating point.
     measured: DVector<f64>,
     domain: Domain,
@@ -63,6 +81,11 @@ impl<'a> ModelErrors<'a> {
             request,
             plants: plants.map(|plant| uncertain(plant, file.robustness.tolerance)).collect(),
             parameters,
+            random: parameters.map_or_else(Vec::new, |family| {
+                let limits = &file.robustness;
+                random_deviations(family.count(), limits.cases, u64::from(limits.seed))
+            }),
+            cases: RefCell::default(),
             measured: DVector::from_iterator(
                 linear.measurements.len(),
                 linear.measurements.iter().map(|signal| signal.operating.unwrap_or(0.0)),
@@ -74,27 +97,45 @@ impl<'a> ModelErrors<'a> {
 
     /// The largest mean of combinations of residuals, as a length in standard deviations, times the factor
     /// of the plant file: a bound for all plants whose entries are within their tolerances; for parameters
-    /// of an FMU the largest bound of the plants that were tried.
+    /// of an FMU the largest bound of the plants that were tried at the corners and within.
     pub(super) fn largest_mean(
         &self,
         problem: &Problem,
         of: (&Decoupling, &DMatrix<f64>),
-    ) -> Result<f64, crate::Error> {
+    ) -> Result<LargestMean, crate::Error> {
         let scale = match self.domain {
             Domain::Sampled { .. } => 1.0,
             Domain::Continuous => problem.period.sqrt(),
         };
-        let found: Result<f64, crate::Error> = match self.parameters {
-            None => {
-                let bound = |plant| self.bound_of(plant, &self.bounds, of);
-                self.plants.iter().try_fold(0.0, |most: f64, plant| Ok(most.max(bound(plant)?)))
-            }
-            Some(family) => worst(family.count(), |deviations| {
-                let (plant, bounds) = self.with_parameters(family, deviations)?;
-                self.bound_of(&plant, &bounds, of)
-            }),
+        let scale = scale * self.request.margin;
+        let Some(family) = self.parameters else {
+            let bound = |plant| self.bound_of(plant, &self.bounds, of);
+            let most = |most: f64, plant| Ok::<_, crate::Error>(most.max(bound(plant)?));
+            let mean = scale * self.plants.iter().try_fold(0.0, most)?;
+            return Ok(LargestMean { mean, interior_excess: None });
         };
-        Ok(found? * scale * self.request.margin)
+        let found = parameter_box::largest(family.count(), &self.random, |deviations| {
+            let case = self.case(family, deviations)?;
+            self.bound_of(&case.0, &case.1, of)
+        })?;
+        let excess = if found.corners > 0.0 { found.everywhere / found.corners - 1.0 } else { 0.0 };
+        Ok(LargestMean { mean: scale * found.everywhere, interior_excess: Some(excess) })
+    }
+
+    /// The number of random cases of the parameters of an FMU.
+    pub(super) fn random_cases(&self) -> Option<usize> {
+        self.parameters.map(|_| self.random.len())
+    }
+
+    /// [`Self::with_parameters`], computed once for each point.
+    fn case(&self, family: &ParameterFamily<'_>, deviations: &[f64]) -> Result<Case, crate::Error> {
+        let key: Vec<u64> = deviations.iter().map(|deviation| deviation.to_bits()).collect();
+        if let Some(case) = self.cases.borrow().get(&key) {
+            return Ok(Rc::clone(case));
+        }
+        let case = Rc::new(self.with_parameters(family, deviations)?);
+        self.cases.borrow_mut().insert(key, Rc::clone(&case));
+        Ok(case)
     }
 
     /// The FMU with other parameters. At the operating point of the plant file it is not at rest: what
@@ -161,37 +202,4 @@ fn uncertain(linear: &LinearPlant, tolerance: [f64; 3]) -> UncertainPlant {
         c.component_mul(&nominal.c.abs()),
     ];
     UncertainPlant { nominal, sizes }
-}
-
-/// The largest value at corners of the box of deviations -1 to 1, at its centre and at the centres of its
-/// faces.
-fn worst(
-    count: usize,
-    value: impl Fn(&[f64]) -> Result<f64, crate::Error>,
-) -> Result<f64, crate::Error> {
-    let mut best = vec![0.0; count];
-    let mut largest = value(&best)?;
-    if count <= ALL_CORNERS {
-        for corner in 0..1_u32 << count {
-            let sign = |at: usize| if corner >> at & 1 == 1 { 1.0 } else { -1.0 };
-            largest = largest.max(value(&(0..count).map(sign).collect::<Vec<_>>())?);
-        }
-    }
-    for _ in 0..ROUNDS {
-        let before = largest;
-        for at in 0..count {
-            for end in [-1.0, 1.0] {
-                let mut other = best.clone();
-                other[at] = end;
-                let found = value(&other)?;
-                if found > largest {
-                    (largest, best) = (found, other);
-                }
-            }
-        }
-        if count <= ALL_CORNERS || largest <= before {
-            break;
-        }
-    }
-    Ok(largest)
 }

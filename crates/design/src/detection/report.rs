@@ -33,6 +33,30 @@ pub struct Detection {
     pub reacts: Vec<Vec<bool>>,
     /// Groups of faults that cannot be told apart.
     pub confused: Vec<Vec<String>>,
+    /// The random plants by which `model_error` was examined; none without parameters of an FMU.
+    pub parameter_cases: Option<ParameterCases>,
+}
+
+/// Random parameters of an FMU within their limits.
+#[derive(Serialize, JsonSchema)]
+pub struct ParameterCases {
+    /// Their number.
+    pub cases: usize,
+    /// The seed of the random numbers.
+    pub seed: u32,
+    /// With a confidence of 99 % no larger part of the box of the parameters gives a test a larger mean than
+    /// `model_error` without its factor: 1 - 0.01^(1 / cases).
+    pub uncovered: f64,
+}
+
+impl ParameterCases {
+    /// The cases are uniform and independent: a part `uncovered` of the box is missed by all of them with
+    /// probability (1 - uncovered)^cases.
+    pub(crate) fn new(cases: usize, seed: u32) -> Self {
+        #[expect(clippy::cast_precision_loss, reason = "a number of cases")]
+        let number = cases as f64;
+        Self { cases, seed, uncovered: 1.0 - 0.01_f64.powf(1.0 / number) }
+    }
 }
 
 /// A test of the residuals.
@@ -49,6 +73,9 @@ pub struct Test {
     /// The largest mean of the residuals, in standard deviations, that errors of the model give them without a
     /// fault; 0 if they are not considered. Drift or threshold allow for it.
     pub model_error: f64,
+    /// For parameters of an FMU: by which part the largest mean that was found within their limits exceeds the
+    /// largest at the corners, the centre and the centres of the faces. `model_error` allows for it.
+    pub interior_excess: Option<f64>,
     /// Threshold of the statistic.
     pub threshold: f64,
     /// Predicted mean time between its false alarms, in s.

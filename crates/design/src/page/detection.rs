@@ -17,6 +17,7 @@ pub(super) fn detection(found: &Detection) -> Markup {
              the stated noise. Process noise: " (found.process_noise)
         }
         (tests(&found.tests))
+        (examined(found))
         (faults(&found.faults))
         p {
             "The largest mean of the residuals after a step of each fault by its size, in standard \
@@ -62,6 +63,21 @@ fn tests(tests: &[Test]) -> Markup {
         "insensitive to",
     ];
     table("Tests", &heads, &tests.iter().map(row).collect::<Vec<_>>())
+}
+
+/// Says which parameters of an FMU the means by model errors are for.
+fn examined(found: &Detection) -> Markup {
+    let Some(own) = &found.parameter_cases else { return html! {} };
+    let excess = found.tests.iter().filter_map(|test| test.interior_excess).fold(0.0, f64::max);
+    html! {
+        p {
+            "The means by model errors are the largest at the corners of the limits of the parameters and of "
+            (own.cases) " random parameters within (seed " (own.seed) "), times the factor of the plant file. The \
+             largest mean within exceeds that of the corners by " (number(100.0 * excess)) " %. With a confidence \
+             of 99 %, at most " (number(100.0 * own.uncovered)) " % of the parameters within their limits give a \
+             test a larger mean, before the factor."
+        }
+    }
 }
 
 fn faults(faults: &[DetectedFault]) -> Markup {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::detection::report::{DecoupledInput, DetectedFault, Detection, Test};
+use crate::detection::report::{DecoupledInput, DetectedFault, Detection, ParameterCases, Test};
 use crate::fallback::report::{FallbackCase, FallbackReport};
 use crate::family::report::CommonCertificate;
 use crate::losses::report::{
@@ -360,6 +360,7 @@ fn detection(numbers: &mut Numbers) -> Detection {
             drift: Some(0.5),
             window: None,
             model_error: 0.25,
+            interior_excess: Some(0.125),
             threshold: 5.5,
             false_alarm_interval: 3600.0,
             decoupled: vec![DecoupledInput {
@@ -383,6 +384,7 @@ fn detection(numbers: &mut Numbers) -> Detection {
         structure: numbers.matrix("structure", 1, 1),
         reacts: vec![vec![true]],
         confused: vec![vec![MARKUP.to_owned(), QUOTES.to_owned()]],
+        parameter_cases: Some(ParameterCases::new(200, 1)),
     }
 }
 

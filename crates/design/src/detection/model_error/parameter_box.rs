@@ -1,0 +1,120 @@
+//! The largest value of a function of parameters within their limits: corners and interior.
+
+use std::cell::RefCell;
+
+/// With so many parameters or fewer, all corners are tried.
+const ALL_CORNERS: usize = 6;
+/// With more, each parameter in turn goes to its worse limit, so many times at most.
+const ROUNDS: usize = 10;
+/// The steps of the search about the largest value, as parts of the distance from the centre to a limit.
+const STEPS: [f64; 4] = [0.5, 0.25, 0.125, 0.0625];
+
+/// The largest values that were found in the box of deviations -1 to 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LargestValue {
+    /// At the corners, at the centre and at the centres of the faces.
+    pub(super) corners: f64,
+    /// At these and at all points of the interior that were tried.
+    pub(super) everywhere: f64,
+}
+
+/// Searches the largest value of a function of `count` deviations.
+///
+/// Tried are the centre, the centres of the faces, all corners (with more than six parameters the one that is
+/// reached by moving one parameter after the other), the points `random` of the interior, and from the largest of
+/// all a search along the axes. The result is a lower bound of the largest value: all values in between were not
+/// tried.
+///
+/// # Errors
+///
+/// Those of `value`.
+pub(super) fn largest<E>(
+    count: usize,
+    random: &[Vec<f64>],
+    value: impl Fn(&[f64]) -> Result<f64, E>,
+) -> Result<LargestValue, E> {
+    let best = RefCell::new((f64::NEG_INFINITY, vec![0.0; count]));
+    let rises = |at: Vec<f64>| {
+        let found = value(&at)?;
+        let mut best = best.borrow_mut();
+        let rises = found > best.0;
+        if rises {
+            *best = (found, at);
+        }
+        Ok(rises)
+    };
+    rises(vec![0.0; count])?;
+    if count <= ALL_CORNERS {
+        for axis in 0..count {
+            for end in [-1.0, 1.0] {
+                let mut face = vec![0.0; count];
+                face[axis] = end;
+                rises(face)?;
+            }
+        }
+        for corner in 0..1_u32 << count {
+            let sign = |axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
+            rises((0..count).map(sign).collect())?;
+        }
+    } else {
+        for _ in 0..ROUNDS {
+            let mut rose = false;
+            for (axis, end) in (0..count).flat_map(|axis| [(axis, -1.0), (axis, 1.0)]) {
+                let mut other = best.borrow().1.clone();
+                other[axis] = end;
+                rose |= rises(other)?;
+            }
+            if !rose {
+                break;
+            }
+        }
+    }
+    let corners = best.borrow().0;
+    for case in random {
+        rises(case.clone())?;
+    }
+    for step in STEPS {
+        for (axis, step) in (0..count).flat_map(|axis| [(axis, -step), (axis, step)]) {
+            let mut other = best.borrow().1.clone();
+            other[axis] = (other[axis] + step).clamp(-1.0, 1.0);
+            rises(other)?;
+        }
+    }
+    Ok(LargestValue { corners, everywhere: best.into_inner().0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Found = Result<LargestValue, control::Error>;
+
+    #[test]
+    fn a_maximum_between_the_corners_is_found_and_told_from_the_corners() {
+        // 2 at (0.3, -0.6), less along both axes; at the corner (1, -1) it is 1.35.
+        let hill = |at: &[f64]| Ok(2.0 - (at[0] - 0.3).powi(2) - (at[1] + 0.6).powi(2));
+        let found: Found = largest(2, &[], hill);
+        let found = found.unwrap();
+        assert!(found.everywhere > 1.99 && found.everywhere <= 2.0, "{found:?}");
+        // The centre of a face, (0, -1), is above all corners: 2 - 0.09 - 0.16.
+        assert!((found.corners - 1.75).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn a_narrow_maximum_is_found_by_a_random_case_alone() {
+        let narrow =
+            |at: &[f64]| Ok(at[0] + 10.0 * f64::from(u8::from((at[0] - 0.3).abs() < 1e-3)));
+        let found: Found = largest(1, &[vec![-0.8], vec![0.3005]], narrow);
+        assert_eq!(found.unwrap(), LargestValue { corners: 1.0, everywhere: 10.3005 });
+        let found: Found = largest(1, &[vec![-0.8]], narrow);
+        assert_eq!(found.unwrap(), LargestValue { corners: 1.0, everywhere: 1.0 });
+    }
+
+    #[test]
+    fn a_linear_function_of_eight_parameters_is_largest_at_a_corner() {
+        let slopes = [1.0, -2.0, 3.0, -4.0, 5.0, -6.0, 7.0, -8.0];
+        let linear = |at: &[f64]| Ok(at.iter().zip(slopes).map(|(at, slope)| at * slope).sum());
+        let found: Found = largest(8, &[vec![0.5; 8]], linear);
+        assert_eq!(found.unwrap(), LargestValue { corners: 36.0, everywhere: 36.0 });
+    }
+}
