@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from conftest import ROOT
+from scheduled_design import DRIVE
 
 HERE = Path(__file__).parent
 WARNINGS = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -Werror -ffp-contract=off".split()
@@ -38,13 +39,22 @@ stop_time = 20.0
 QUADRUPLE = (ROOT / "examples" / "plants" / "quadruple-tank.toml").read_text(encoding="utf-8")
 TANKS = {
     name: (ROOT / "examples" / "three-tank" / f"{name}.toml").read_text(encoding="utf-8").replace("../..", str(ROOT))
-    for name in ("plant", "sensor-fault", "loss-of-effectiveness", "reference")
+    for name in ("plant", "sensor-fault", "loss-of-effectiveness", "reference", "schedule")
 }
 
 
 def masses(estimator, monitor):
     """The two masses with this estimator."""
     return MASSES.replace("ESTIMATOR", estimator).replace("MONITOR", monitor)
+
+
+def measured(text):
+    """The tanks, scheduled by a measured level, with a fault of another sensor and so a filter."""
+    head, points = text.split("[schedule]")
+    head = head.replace("sample_time = 1.0", "sample_time = 1.0\nfilter = 0.5")
+    head = head.replace("[-0.2, -0.22, -0.25, -0.28, -0.3]", "[-0.06, -0.07, -0.08, -0.1, -0.12, -0.14, -0.16, -0.2, -0.25]")
+    fault = '[[faults]]\nname = "b_2"\nsensor = "y_2"\nbound = 0.1\n\n'
+    return f'{head}{fault}[schedule]\nvariable = "y_1"\n' + points[points.index("\n[[schedule.points]]") :]
 
 
 @dataclass
@@ -65,6 +75,8 @@ CASES = {
     "reference": Case(TANKS["reference"].replace("[reference]", "[reference]\nfeedforward = true"), 6e-5, 1e-3),
     "ramp-current": Case(masses("current", "false"), 0.5, 1e-3),
     "ramp-prediction": Case(masses("prediction", "true"), 0.5, 1e-3),
+    "scheduled-drive": Case("sample_time = 0.1\nt_on = 2.0\n" + DRIVE, 0.3, 1e-3),
+    "scheduled-by-measurement": Case(measured(TANKS["schedule"]), 6e-5, 1e-3),
     "constant-prediction": Case("sample_time = 1.0\nestimator = 'prediction'\n" + QUADRUPLE, 0.3, 1e-2),
 }
 
@@ -90,7 +102,7 @@ class Built:
         unit = program.with_suffix(".o")
         run(compiler, *WARNINGS, *options, "-c", source, "-o", unit)
         macros = [f"-DNAME={self.name}", f"-DREAL={'float' if self.single else 'double'}"]
-        macros += ["-DREFERENCES"] if self.design.get("references") else []
+        macros += [f"-D{name.upper()}" for name in ("references", "schedule") if self.has(name)]
         run(compiler, *options, "-include", header, *macros, HERE / "controller_loop.c", unit, "-o", program)
         return program
 
@@ -100,11 +112,19 @@ class Built:
         always = ["rustc", "--edition", "2021", "-O", "-D", "warnings"]
         source = self.folder / "rust" / "src" / "lib.rs"
         run(*always, "--crate-type", "rlib", "--crate-name", "controller", source, "-o", library)
-        switches = [("single", self.single), ("references", self.design.get("references"))]
-        known = ["--check-cfg", "cfg(single, references)"]
+        switches = [("single", self.single), ("outside", "schedule" in self.design)]
+        switches += [(name, self.has(name)) for name in ("references", "schedule")]
+        known = ["--check-cfg", "cfg(single, references, schedule, outside)"]
         known += [word for name, is_set in switches if is_set for word in ("--cfg", name)] + ["--extern", f"controller={library}"]
         run(*always, *known, HERE / "controller_loop.rs", "-o", program)
         return program
+
+    def has(self, name):
+        """Whether the controller has references, or a scheduling variable that is no measurement, as inputs."""
+        own = self.design.get(name)
+        if name == "schedule" and own:
+            return own["variable"] not in [signal["name"] for signal in self.design["measurements"]]
+        return bool(own)
 
     @property
     def sizes(self):

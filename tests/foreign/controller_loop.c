@@ -1,7 +1,7 @@
 /* Feeds measurements from standard input to a controller that `aso-ftc design --c-code` has written, and writes
- * commands, estimates and status to standard output. Each sample has the measurements, the references and whether to
- * compensate, all as doubles. Macros: NAME (of the controller), REAL (double or float), REFERENCES if it has any; the
- * header comes by -include. */
+ * commands, estimates and status to standard output. Each sample has the measurements, the references, the
+ * scheduling variable and whether to compensate, all as doubles. Macros: NAME (of the controller), REAL (double or
+ * float), REFERENCES and SCHEDULE if it has them as inputs; the header comes by -include. */
 #include <stdio.h>
 #include <string.h>
 
@@ -12,11 +12,19 @@
 static JOIN(NAME, Measurements) measurements;
 #ifdef REFERENCES
 static JOIN(NAME, References) references;
-#define ALL (COUNT(measurements) + COUNT(references))
-#define SIGNALS &measurements, &references
+#define REFERENCE_COUNT COUNT(references)
+#define REFERENCE_ARGUMENT &references,
 #else
-#define ALL COUNT(measurements)
-#define SIGNALS &measurements
+#define REFERENCE_COUNT 0
+#define REFERENCE_ARGUMENT
+#endif
+#ifdef SCHEDULE
+static JOIN(NAME, Schedule) schedule;
+#define SCHEDULE_ARGUMENT &schedule,
+#define ALL (COUNT(measurements) + REFERENCE_COUNT + 1)
+#else
+#define SCHEDULE_ARGUMENT
+#define ALL (COUNT(measurements) + REFERENCE_COUNT)
 #endif
 static JOIN(NAME, Commands) commands;
 static JOIN(NAME, Estimates) estimates;
@@ -50,7 +58,11 @@ int main(void)
 #ifdef REFERENCES
         memcpy(&references, received + COUNT(measurements), sizeof(references));
 #endif
-        uint32_t bits = JOIN(NAME, step)(&state, SIGNALS, values[ALL] > 0.5, &commands, &estimates);
+#ifdef SCHEDULE
+        memcpy(&schedule, received + ALL - 1, sizeof(schedule));
+#endif
+        uint32_t bits = JOIN(NAME, step)(&state, &measurements, REFERENCE_ARGUMENT SCHEDULE_ARGUMENT values[ALL] > 0.5,
+                                         &commands, &estimates);
         put(&commands, COUNT(commands));
         put(&estimates, COUNT(estimates));
         double status = (double)bits;

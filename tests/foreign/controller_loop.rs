@@ -9,6 +9,7 @@ type Real = f64;
 
 #[cfg(not(references))]
 const REFERENCES: usize = 0;
+const SCHEDULED: usize = cfg!(schedule) as usize;
 
 fn main() {
     let mut input = Vec::new();
@@ -17,18 +18,28 @@ fn main() {
     let mut controller = Controller::new();
     eprintln!("{}", size_of_val(&controller));
     let mut output = Vec::new();
-    for sample in values.chunks_exact(MEASUREMENTS + REFERENCES + 1) {
+    for sample in values.chunks_exact(MEASUREMENTS + REFERENCES + SCHEDULED + 1) {
         let measured: [Real; MEASUREMENTS] = core::array::from_fn(|k| sample[k] as Real);
         let referred: [Real; REFERENCES] = core::array::from_fn(|k| sample[MEASUREMENTS + k] as Real);
-        let compensate = sample[MEASUREMENTS + REFERENCES] > 0.5;
-        #[cfg(references)]
-        let found = controller.step(&measured.into(), &referred.into(), compensate);
-        #[cfg(not(references))]
-        let (found, _) = (controller.step(&measured.into(), compensate), referred);
+        let compensate = sample[MEASUREMENTS + REFERENCES + SCHEDULED] > 0.5;
+        let scheduled = [sample[MEASUREMENTS + REFERENCES] as Real];
+        #[cfg(all(references, schedule))]
+        let found = controller.step(&measured.into(), &referred.into(), &scheduled.into(), compensate);
+        #[cfg(all(references, not(schedule)))]
+        let (found, _) = (controller.step(&measured.into(), &referred.into(), compensate), scheduled);
+        #[cfg(all(not(references), schedule))]
+        let (found, _) = (controller.step(&measured.into(), &scheduled.into(), compensate), referred);
+        #[cfg(not(any(references, schedule)))]
+        let (found, _) = (controller.step(&measured.into(), compensate), (referred, scheduled));
         let commands: [Real; ACTUATORS] = found.commands.into();
         let estimates: [Real; ESTIMATES] = found.estimates.into();
-        let Status { held, at_limit, overflow } = found.status;
-        let status = u8::from(held) + 2 * u8::from(at_limit) + 4 * u8::from(overflow);
+        let Status { held, at_limit, overflow, .. } = found.status;
+        #[cfg(outside)]
+        let outside = found.status.outside;
+        #[cfg(not(outside))]
+        let outside = false;
+        let bits = [held, at_limit, overflow, outside];
+        let status: u8 = bits.iter().enumerate().map(|(k, bit)| u8::from(*bit) << k).sum();
         let all = commands.iter().chain(&estimates).map(|value| f64::from(*value)).chain([f64::from(status)]);
         all.for_each(|value| output.extend(value.to_le_bytes()));
     }

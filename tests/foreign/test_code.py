@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fmpy import extract
 
-from c_abi import Fmu, Instance
+from c_abi import OK, Fmu, Instance
 from code_cases import CASES, Built, Plant, bound_of, fed, masses, run
 from conftest import ROOT
 from design_file import vector
@@ -44,6 +44,8 @@ def in_the_loop(own, case):
     names += vector("x_i", len(references)) if "H" in design else []
     outputs = [signal["name"] for signal in design["actuators"]] + names
     inputs = [signal["name"] for signal in [*design["measurements"], *references]]
+    schedule = design.get("schedule")
+    inputs += [schedule["variable"]] if own.has("schedule") else []
     operating = np.array([signal.get("operating", 0.0) for signal in references])
     period, fault = design["sample_time"], np.zeros(q)
     samples, expected = [], []
@@ -53,16 +55,29 @@ def in_the_loop(own, case):
                 fault = case.fault * chance.uniform(-1, 1, q)
             y = plant.measured(fault) + case.noise * chance.normal(size=p) * (k > 50)
             y = np.append(y, operating * (1 + 0.1 * (k // 700 % 2)))
+            if schedule:
+                value = swept(schedule, k)
+                y = np.append(y, value) if own.has("schedule") else np.where(np.array(inputs) == schedule["variable"], value, y)
             compensate = not 1700 < k < 1800
             if k == 0:
                 instance.start(dict(zip(inputs, y)))
             else:
                 instance.set({**dict(zip(inputs, y)), "compensate": compensate})
-                instance.step((k - 1) * period, period)
+                # A scheduling variable outside of the schedule gives a warning.
+                known = (OK, OK + 1) if schedule else (OK,)
+                assert instance.call("DoStep", (k - 1) * period, period, 1) in known
             samples.append([*y, compensate])
             expected.append(instance.get(*outputs))
             plant.step(np.array(expected[-1][:m]), fault)
     return np.array(samples, dtype=float), np.array(expected)
+
+
+def swept(schedule, k):
+    """The scheduling variable in sample k: it moves over the grid and beyond both ends, and stays at each point for a while."""
+    grid = [point["at"] for point in schedule["points"]]
+    if k % 500 < 50:
+        return grid[k // 500 % len(grid)]
+    return 0.5 * (grid[0] + grid[-1]) + 0.6 * (grid[-1] - grid[0]) * np.sin(k / 130)
 
 
 def bits(values):
@@ -78,7 +93,9 @@ def test_c_has_the_bits_of_the_fmu_at_each_optimisation(designed, name):
         assert (bits(found[:, :-1]) == bits(own.expected)).all(), options
         assert f"Memory: {size} bytes for an instance" in own.header
     limited = any("limits" in actuator for actuator in own.design["actuators"])
-    assert set(found[:, -1]) == ({0.0, 2.0} if limited else {0.0}), "the limits are reached and left"
+    known = {0.0, 2.0} if limited else {0.0}
+    known |= {8.0 + status for status in known} if "schedule" in own.design else set()
+    assert set(found[:, -1]) == known, "the limits and the ends of the schedule are reached and left"
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -105,6 +122,45 @@ def test_the_stated_arithmetic_is_that_of_the_equations(designed):
     comparisons = 2 * (p + m + n + q + n + q + p) + 2 * m
     wanted = f"{products} multiplications, {products - p + others} additions, {comparisons} comparisons, 0 divisions."
     assert wanted in own.header.replace("\n *", "")
+
+
+def test_the_stated_arithmetic_of_a_schedule_is_that_of_its_interpolation(designed):
+    own = designed("scheduled-drive")
+    (n, m, p, q), t = own.sizes, len(own.design["references"])
+    # A, B, C, F_a, K_x, K_f, L_x, L_f, K_i, L_w, N_r are interpolated, H is not.
+    moving = n * n + n * m + p * n + n * q + m * n + m * q + n * p + q * p + m * t + t * m + m * t
+    vectors = n + m + p + t
+    products = 3 * moving + t * p + 2 * vectors + t
+    # As without a schedule: deviations, e, values, u, x_hat[k+1], f_hat[k+1], x_i[k+1].
+    others = (p + p + n + t + t) + p + (n + q + m) + 3 * m + 3 * n + q + (t + m + t + t)
+    # The operating point, theta + 0 and its weights, the limits.
+    others += vectors + 4 + 2 * m
+    comparisons = 2 * (p + t + m + n + q + n + q + t) + 2 * m + len(own.design["schedule"]["points"]) + 2
+    wanted = f"{products} multiplications, {2 * moving + t * p + others} additions, {comparisons} comparisons, 1 divisions."
+    assert wanted in own.header.replace("\n *", ""), wanted
+
+
+def test_a_scheduled_controller_in_float_states_that_it_has_no_bound(aso_ftc, tmp_path, designed):
+    own = designed("scheduled-drive")
+    single = Built(aso_ftc, CASES["scheduled-drive"].text, tmp_path, "--float")
+    reason = "matrices and operating point change with the scheduling variable"
+    assert f"No bound of the difference: {reason}." in single.header.replace("\n *", "")
+    assert f"warning: float: no bound of the rounding errors: {reason}" in single.done.stderr
+    (in_c, _), (in_rust, _) = (fed(program, own.samples) for program in (single.compiled("-O2"), single.crate()))
+    assert (bits(in_c) == bits(in_rust)).all()
+    assert abs(in_c[:, :-1] - own.expected).max() < 1e-4 * abs(own.expected).max()
+
+
+def test_a_scheduling_input_that_is_no_number_keeps_its_last_value(designed):
+    own = designed("scheduled-drive")
+    samples = own.samples[:400].copy()
+    samples[0, -2], samples[200:210, -2] = np.nan, np.inf
+    held = samples.copy()
+    held[0, -2], held[200:210, -2] = own.design["schedule"]["points"][0]["at"], samples[199, -2]
+    for program in (own.compiled("-O2"), own.crate()):
+        found, wanted = fed(program, samples)[0], fed(program, held)[0]
+        assert (bits(found[:, :-1]) == bits(wanted[:, :-1])).all()
+        assert (np.flatnonzero(found[:, -1].astype(int) & 1) == [0, *range(200, 210)]).all()
 
 
 def test_nan_and_infinite_measurements_are_replaced_by_the_last_finite_ones(designed):

@@ -11,6 +11,7 @@ mod names;
 mod recursion;
 mod rounding;
 mod rust;
+mod schedule;
 mod summary;
 mod symbols;
 mod tables;
@@ -48,6 +49,15 @@ impl Precision {
         match self {
             Self::Double => 8,
             Self::Single => 4,
+        }
+    }
+
+    /// The nearest number of this precision.
+    fn rounded(self, value: f64) -> f64 {
+        match self {
+            Self::Double => value,
+            #[expect(clippy::cast_possible_truncation, reason = "the nearest number")]
+            Self::Single => f64::from(value as f32),
         }
     }
 

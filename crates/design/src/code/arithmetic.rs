@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::Precision;
 use super::controller::Controller;
 use super::recursion::{Operation, Recursion, Statement, Term, When};
+use super::schedule::operating_vectors;
 use super::symbols::{Kind, Matrix, Vector};
 use super::tables::{Constants, locals, stored, tables};
 
@@ -27,6 +28,7 @@ impl Arithmetic {
         }
         let [n, q, p, m, t, integrals] = Kind::ALL.map(|kind| kind.count(controller));
         let filtered = if controller.filter.is_some() { p } else { 0 };
+        all.add_schedule(controller, [n, p, m, t]);
         // Finite or not: the inputs, the commands and estimates, the state for the next sample.
         all.comparisons += 2 * (p + t + m + n + q + n + q + filtered + integrals);
         if controller.is_limited() {
@@ -38,6 +40,20 @@ impl Arithmetic {
         all.additions += losses;
         all.divisions += losses;
         all
+    }
+
+    /// The place in the grid, the operating point there, the limits as deviations from it.
+    fn add_schedule(&mut self, controller: &Controller, [n, p, m, t]: [usize; 4]) {
+        let Some(schedule) = &controller.schedule else { return };
+        let vectors = n + p + m + t;
+        self.multiplications += 2 * vectors;
+        // theta + 0, two differences and their quotient, 1 - part.
+        self.additions += vectors + 4;
+        self.divisions += 1;
+        self.comparisons += schedule.points.len() + 2 * controller.schedule_inputs().len();
+        if controller.is_limited() {
+            self.additions += 2 * m;
+        }
     }
 
     fn add_statement(&mut self, controller: &Controller, statement: &Statement) {
@@ -70,6 +86,10 @@ impl Arithmetic {
         let count = rows * matrix.of(controller).map_or(0, DMatrix::ncols);
         self.multiplications += count;
         self.additions += count;
+        if controller.scheduled(matrix).is_some() {
+            self.multiplications += 2 * count;
+            self.additions += count;
+        }
     }
 }
 
@@ -89,10 +109,16 @@ impl Memory {
         let count = |vector: Vector| vector.kind().count(controller);
         let stored: usize = stored(controller).into_iter().map(count).sum();
         // The commands of the sample before.
-        let stored = stored + Kind::Actuator.count(controller);
+        let stored = stored + Kind::Actuator.count(controller) + controller.schedule_inputs().len();
         let flags = usize::from(controller.filter.is_some());
         let counter = if controller.first_compensated > 0 { 4 } else { 0 };
-        let stack: usize = locals(recursion).into_iter().map(count).sum();
+        let mut stack: usize = locals(recursion).into_iter().map(count).sum();
+        if controller.schedule.is_some() {
+            let operating = operating_vectors(controller);
+            stack += operating.into_iter().map(|(vector, _)| count(vector)).sum::<usize>() + 2;
+            let limits = if controller.is_limited() { 2 } else { 0 };
+            stack += limits * Kind::Actuator.count(controller);
+        }
         let tables: usize = tables(controller, recursion).iter().map(Constants::count).sum();
         Self {
             state: (stored * size + counter + flags).next_multiple_of(size),

@@ -2,6 +2,7 @@
 
 mod header;
 mod sample;
+mod schedule;
 
 use std::path::PathBuf;
 
@@ -11,7 +12,7 @@ use super::recursion::Recursion;
 use super::rounding::RoundingBound;
 use super::summary::{Fields, Vocabulary};
 use super::symbols::Kind;
-use super::tables::{Constants, tables};
+use super::tables::{Constants, has_constant_matrix, starts, tables};
 use super::{Precision, Request};
 
 /// The longest line of a table.
@@ -58,6 +59,7 @@ impl Source<'_> {
             held: flag("HELD"),
             at_limit: flag("AT_LIMIT"),
             overflow: flag("OVERFLOW"),
+            outside: flag("OUTSIDE"),
             real: self.real,
             compiler: "-std=c99 -ffp-contract=off without -ffast-math (gcc, clang); on 32-bit x86 also \
                        -msse2 -mfpmath=sse.",
@@ -81,13 +83,15 @@ impl Source<'_> {
     /// The head of the function that takes a sample.
     fn signature(&self) -> String {
         let name = &self.request.prefix;
-        let references = match self.fields.references.as_slice() {
+        let pointer = |owner: &str, parameter: &str, fields: &[String]| match fields {
             [] => String::new(),
-            _ => format!("const {name}_References *references, "),
+            _ => format!("const {name}_{owner} *{parameter}, "),
         };
+        let references = pointer("References", "references", &self.fields.references);
+        let schedule = pointer("Schedule", "schedule", &self.fields.schedule);
         format!(
             "uint32_t {name}_step({name}_State *state, const {name}_Measurements *measurements,\n    \
-             {references}bool compensate,\n    {name}_Commands *commands, {name}_Estimates *estimates)"
+             {references}{schedule}bool compensate,\n    {name}_Commands *commands, {name}_Estimates *estimates)"
         )
     }
 
@@ -123,36 +127,53 @@ impl Source<'_> {
     }
 
     fn table(&self, lines: &mut Vec<String>, table: &Constants) {
-        let Constants { name, meaning, rows, columns, values } = table;
+        let Constants { name, meaning, rows, columns, is_scheduled, values } = table;
         if !meaning.is_empty() {
             lines.extend([String::new(), format!("/* The {meaning}. */")]);
         }
+        let count = rows.count(self.controller);
         let rows = self.count(*rows);
+        let points =
+            if *is_scheduled { format!("[{}]", self.count(Kind::Point)) } else { String::new() };
         let sizes = match columns {
-            Some(columns) => format!("[{rows}][{}]", self.count(*columns)),
+            Some(columns) => format!("{points}[{rows}][{}]", self.count(*columns)),
             None => format!("[{rows}]"),
         };
         lines.push(format!("static const {} {name}{sizes} =", self.real));
         lines.push("{".to_owned());
-        for row in values {
+        if *is_scheduled {
+            for rows in values.chunks(count) {
+                lines.push("    {".to_owned());
+                self.rows(lines, rows, ("        ", columns.is_some()));
+                lines.push("    },".to_owned());
+            }
+            end_list(lines);
+        } else {
+            self.rows(lines, values, ("    ", columns.is_some()));
+        }
+        lines.push("};".to_owned());
+    }
+
+    /// The rows of a matrix, or the one of a vector.
+    fn rows(&self, lines: &mut Vec<String>, rows: &[Vec<f64>], (indent, is_matrix): (&str, bool)) {
+        for row in rows {
             let numbers = row.iter().map(|value| self.literal(*value));
-            let indent = if columns.is_some() { "        " } else { "    " };
-            let wrapped = wrapped(numbers, indent);
-            match (columns, wrapped.as_slice()) {
-                (None, _) => lines.extend(wrapped),
-                (Some(_), [only]) => lines.push(format!("    {{{}}},", only.trim())),
-                (Some(_), _) => {
-                    lines.push("    {".to_owned());
+            let inner = if is_matrix { format!("{indent}    ") } else { indent.to_owned() };
+            let mut wrapped = wrapped(numbers, &inner);
+            if is_matrix {
+                end_list(&mut wrapped);
+            }
+            match (is_matrix, wrapped.as_slice()) {
+                (false, _) => lines.extend(wrapped),
+                (true, [only]) => lines.push(format!("{indent}{{{}}},", only.trim())),
+                (true, _) => {
+                    lines.push(format!("{indent}{{"));
                     lines.extend(wrapped);
-                    lines.push("    },".to_owned());
+                    lines.push(format!("{indent}}},"));
                 }
             }
         }
-        if let Some(last) = lines.last_mut() {
-            let trimmed = last.trim_end_matches(',').len();
-            last.truncate(trimmed);
-        }
-        lines.push("};".to_owned());
+        end_list(lines);
     }
 
     fn helpers(&self, lines: &mut Vec<String>) {
@@ -178,8 +199,11 @@ static uint32_t take({real} *kept, {real} value, uint32_t flag)
         status = 0U;
     }}
     return status;
-}}
-
+}}"
+        ));
+        if has_constant_matrix(self.controller, self.recursion) {
+            lines.push(format!(
+                "
 /* Adds a row times a vector to a sum, one product after the other. */
 static {real} accumulate({real} start, const {real} row[], const {real} vector[], uint32_t count)
 {{
@@ -198,7 +222,9 @@ static {real} product(const {real} row[], const {real} vector[], uint32_t count)
 {{
     return accumulate(-{zero}, row, vector, count);
 }}"
-        ));
+            ));
+        }
+        self.schedule_helpers(lines);
         if !self.controller.losses.is_empty() {
             lines.push(format!(
                 "
@@ -217,6 +243,7 @@ static {real} lost_effectiveness({real} u, {real} f_hat, {real} squared_least_co
         let Self { request, controller, real, .. } = self;
         let name = &request.prefix;
         let (n, q) = (self.count(Kind::State), self.count(Kind::Fault));
+        let [x, u, y, r] = starts(controller).map(|(name, _)| name);
         let zeros = vec![self.literal(0.0); controller.faults.len()];
         let zeros = wrapped(zeros.into_iter(), "        ").join("\n");
         let zeros = zeros.trim_end_matches(',');
@@ -229,7 +256,7 @@ void {name}_init({name}_State *state)
 {zeros}
     }};
 
-    {name}_init_at(state, x_op, no_faults);
+    {name}_init_at(state, {x}, no_faults);
 }}
 
 void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
@@ -238,19 +265,24 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
     uint32_t i;
 "
         ));
-        let filtered =
-            if controller.filter.is_some() { "        state->y_f[i] = y_op[i];\n" } else { "" };
+        let filtered = match controller.filter {
+            Some(_) => format!("        state->y_f[i] = {y}[i];\n"),
+            None => String::new(),
+        };
         for (kind, body) in [
             (Kind::State, "        state->x_hat[i] = x_hat_0[i];".to_owned()),
             (Kind::Fault, "        state->f_hat[i] = f_hat_0[i];".to_owned()),
-            (Kind::Measurement, format!("{filtered}        state->y[i] = y_op[i];")),
-            (Kind::Actuator, "        state->u[i] = u_op[i];".to_owned()),
-            (Kind::Reference, "        state->r[i] = r_op[i];".to_owned()),
+            (Kind::Measurement, format!("{filtered}        state->y[i] = {y}[i];")),
+            (Kind::Actuator, format!("        state->u[i] = {u}[i];")),
+            (Kind::Reference, format!("        state->r[i] = {r}[i];")),
             (Kind::Integral, format!("        state->x_i[i] = {};", self.literal(0.0))),
         ] {
             if kind.count(controller) > 0 {
                 self.loop_over(lines, 1, kind, &[&body]);
             }
+        }
+        if let [input] = controller.schedule_inputs() {
+            lines.push(format!("    state->theta = {};", self.literal(input.operating)));
         }
         if controller.first_compensated > 0 {
             lines.push("    state->sample = 0U;".to_owned());
@@ -268,6 +300,14 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
         lines.push(format!("{indent}{{"));
         lines.extend(body.iter().map(|line| (*line).to_owned()));
         lines.push(format!("{indent}}}"));
+    }
+}
+
+/// Removes the comma after the last entry of a list.
+fn end_list(lines: &mut [String]) {
+    if let Some(last) = lines.last_mut() {
+        let trimmed = last.trim_end_matches(',').len();
+        last.truncate(trimmed);
     }
 }
 

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use serde::Deserialize;
 
 use super::Precision;
+use super::schedule::{Schedule, ScheduleFile};
 use super::symbols::Matrix;
 use crate::Error;
 
@@ -43,6 +44,8 @@ pub(super) struct Controller {
     pub(super) faults: Vec<Signal>,
     pub(super) references: Vec<Signal>,
     pub(super) losses: Vec<Loss>,
+    /// Matrices and operating points that follow a variable, in place of those above.
+    pub(super) schedule: Option<Schedule>,
 }
 
 /// The measurements that the command is computed from.
@@ -71,6 +74,18 @@ pub(super) struct Signal {
     loss_of: Option<String>,
     #[serde(default)]
     least_command: Option<f64>,
+}
+
+impl Signal {
+    pub(super) fn new(
+        name: String,
+        unit: Option<String>,
+        description: String,
+        operating: f64,
+    ) -> Self {
+        let (limits, loss_of, least_command) = (None, None, None);
+        Self { name, unit, description, operating, limits, loss_of, least_command }
+    }
 }
 
 /// A fault that is a loss of effectiveness, with its position and that of its actuator.
@@ -129,14 +144,16 @@ struct File {
     n_r: Option<Rows>,
     #[serde(default)]
     references: Vec<Signal>,
+    #[serde(default)]
+    schedule: Option<ScheduleFile>,
 }
 
 /// A matrix as the design file has it.
 #[derive(Deserialize)]
-struct Rows(Vec<Vec<f64>>);
+pub(super) struct Rows(Vec<Vec<f64>>);
 
 impl Rows {
-    fn dense(self) -> DMatrix<f64> {
+    pub(super) fn dense(self) -> DMatrix<f64> {
         let columns = self.0.first().map_or(0, Vec::len);
         DMatrix::from_row_slice(self.0.len(), columns, &self.0.concat())
     }
@@ -166,7 +183,10 @@ impl Controller {
             ))
         })?;
         let faults = file.faults.len();
+        let schedule =
+            file.schedule.map(|own| Schedule::of(own, &file.measurements)).transpose()?;
         Ok(Self {
+            schedule,
             losses: losses(&file.faults, &file.actuators),
             description: file.description,
             sample_time,
@@ -203,6 +223,16 @@ impl Controller {
         signals.iter().map(|signal| signal.operating).collect()
     }
 
+    /// The scheduling variable where it is an input of its own; else none.
+    pub(super) fn schedule_inputs(&self) -> &[Signal] {
+        self.schedule.as_ref().and_then(Schedule::input).map_or(&[], std::slice::from_ref)
+    }
+
+    /// A matrix at each point of the schedule; `None` if it is constant.
+    pub(super) fn scheduled(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
+        self.schedule.as_ref().and_then(|own| own.matrices(matrix))
+    }
+
     /// Whether any actuator has limits.
     pub(super) fn is_limited(&self) -> bool {
         self.actuators.iter().any(|actuator| actuator.limits.is_some())
@@ -226,6 +256,9 @@ impl Controller {
             if largest > LARGEST_SINGLE {
                 return Err(too_large(&signal.name, largest));
             }
+        }
+        if let Some(schedule) = &self.schedule {
+            schedule.check_range(precision, LARGEST_SINGLE)?;
         }
         match self.losses.iter().find(|loss| !COMMANDS.contains(&loss.least_command)) {
             None => Ok(()),

@@ -17,7 +17,8 @@
 //!
 //! so that G kappa s bounds the differences of the outputs, with the peak-to-peak gains G of that system.
 //! The bound holds in the loop of the design, while faults are compensated and no command is at a limit.
-//! It takes the worst case of every rounding; errors of both signs cancel in practice.
+//! It takes the worst case of every rounding; errors of both signs cancel in practice. A scheduled loop is
+//! not such a system, and has no bound.
 
 use std::ops::AddAssign as _;
 
@@ -51,6 +52,10 @@ pub(super) struct RoundingBound {
 
 impl RoundingBound {
     pub(super) fn of(controller: &Controller, recursion: &Recursion) -> Self {
+        if controller.schedule.is_some() {
+            let reason = "matrices and operating point change with the scheduling variable";
+            return Self { bound: Err(reason.to_owned()), slowest: f64::NAN };
+        }
         let mut analysis = Analysis::new(controller);
         let statements = recursion.statements();
         for statement in statements.filter(|own| own.when != When::NotCompensating) {

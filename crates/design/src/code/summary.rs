@@ -15,6 +15,7 @@ pub(super) struct Vocabulary {
     pub(super) held: String,
     pub(super) at_limit: String,
     pub(super) overflow: String,
+    pub(super) outside: String,
     pub(super) real: &'static str,
     /// How the compiler keeps the order of operations.
     pub(super) compiler: &'static str,
@@ -27,6 +28,8 @@ pub(super) struct Fields {
     pub(super) actuators: Vec<String>,
     pub(super) measurements: Vec<String>,
     pub(super) references: Vec<String>,
+    /// The scheduling variable, if it is an input of its own.
+    pub(super) schedule: Vec<String>,
     /// The integrals, named like their references.
     pub(super) integrals: Vec<String>,
 }
@@ -44,6 +47,7 @@ impl Fields {
                 None => Vec::new(),
             },
             references: own(&controller.references),
+            schedule: own(controller.schedule_inputs()),
         }
     }
 
@@ -101,9 +105,10 @@ pub(super) fn summary(
     section(&mut lines, "USE", &[usage(controller, vocabulary)]);
     section(&mut lines, "TIMING", &timing(request, controller, vocabulary));
     section(&mut lines, "COMPENSATION AND LIMITS", &modes(controller));
-    section(&mut lines, "SIGNALS", &[]);
+    section(&mut lines, "SCHEDULE", &schedule(controller, vocabulary));
+    lines.extend([String::new(), "SIGNALS".to_owned()]);
     lines.extend(signals(controller, fields));
-    section(&mut lines, "STATUS", &status(vocabulary));
+    section(&mut lines, "STATUS", &status(controller, vocabulary));
     section(&mut lines, "COST", &costs(request, controller, recursion));
     section(&mut lines, "PRECISION", &precision(request, vocabulary));
     if let Some(bound) = bound {
@@ -118,8 +123,11 @@ pub(super) fn summary(
 /// The longest line of a paragraph.
 const WIDTH: usize = 92;
 
-/// Adds a title and paragraphs, broken into lines.
+/// Adds a title and paragraphs, broken into lines; nothing without paragraphs.
 fn section(lines: &mut Vec<String>, title: &str, paragraphs: &[String]) {
+    if paragraphs.is_empty() {
+        return;
+    }
     lines.extend([String::new(), title.to_owned()]);
     for paragraph in paragraphs {
         lines.extend(filled(paragraph));
@@ -144,9 +152,13 @@ fn usage(controller: &Controller, vocabulary: &Vocabulary) -> String {
         Some(_) => ", the filtered measurements at the first measurements",
         None => "",
     };
+    let start = match controller.schedule {
+        None => "the operating point",
+        Some(_) => "the values of the column `start`",
+    };
     format!(
         "Call {init} once for each instance, then {step} once in every sample. The estimates of \
-         the states start at the operating point, those of the faults at 0{filtered}; {init_at} starts \
+         the states start at {start}, those of the faults at 0{filtered}; {init_at} starts \
          them elsewhere. A call uses no heap, no global variable and no library, and ends after a \
          bounded number of operations. Instances are independent. Signals are values, as in the plant \
          file, not deviations from the operating point."
@@ -213,13 +225,14 @@ fn modes(controller: &Controller) -> Vec<String> {
 
 /// The table of the signals and their fields.
 fn signals(controller: &Controller, fields: &Fields) -> Vec<String> {
+    let operating = if controller.schedule.is_some() { "start" } else { "operating point" };
     let mut rows = vec![
-        ["field", "name in the plant file", "unit", "operating point", "description"]
-            .map(str::to_owned),
+        ["field", "name in the plant file", "unit", operating, "description"].map(str::to_owned),
     ];
     let groups = [
-        ("Measurements", "", &controller.measurements, &fields.measurements),
+        ("Measurements", "", &controller.measurements[..], &fields.measurements),
         ("References", "", &controller.references, &fields.references),
+        ("Schedule", "", controller.schedule_inputs(), &fields.schedule),
         ("Commands", "", &controller.actuators, &fields.actuators),
         ("Estimates", "x_hat_", &controller.states, &fields.states),
         ("Estimates", "f_hat_", &controller.faults, &fields.faults),
@@ -274,19 +287,51 @@ fn signals(controller: &Controller, fields: &Fields) -> Vec<String> {
     lines
 }
 
-fn status(vocabulary: &Vocabulary) -> [String; 3] {
-    let Vocabulary { held, at_limit, overflow, real, .. } = vocabulary;
-    [
+/// What follows the scheduling variable, and where it is held.
+fn schedule(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
+    let Some(schedule) = &controller.schedule else { return Vec::new() };
+    let ([first, last], count) = (schedule.range(), schedule.points.len());
+    let name = one_line(&schedule.variable.name);
+    let owner = match schedule.measurement {
+        Some(_) => "a measurement",
+        None => "an input of its own",
+    };
+    vec![format!(
+        "The matrices and the operating point follow `{name}`, {owner}: they have the values of the design at \
+         its {count} points from {first:?} to {last:?}, and change linearly between them. Beyond, those of the \
+         nearest point are used, and {} says so.",
+        vocabulary.outside
+    )]
+}
+
+fn status(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
+    let Vocabulary { held, at_limit, overflow, outside, real, .. } = vocabulary;
+    let inputs = match controller.schedule_inputs() {
+        [] => "measurement or reference",
+        _ => "measurement, a reference or the scheduling variable",
+    };
+    let place = match controller.schedule {
+        None => "at the operating point",
+        Some(_) => "in the column `start`",
+    };
+    let mut all = vec![
         format!(
-            "{held}: a measurement or reference was NaN or infinite; its last finite value was used, before the first \
-             one its value at the operating point."
+            "{held}: a {inputs} was NaN or infinite; its last finite value was used, before the first \
+             one its value {place}."
         ),
         format!("{at_limit}: a command is at a limit."),
         format!(
             "{overflow}: a sum was beyond the range of {real}; commands and estimates keep their values. \
              So every output is a finite number in every sample."
         ),
-    ]
+    ];
+    all.extend(
+        controller
+            .schedule
+            .is_some()
+            .then(|| format!("{outside}: the scheduling variable is outside of the schedule.")),
+    );
+    all
 }
 
 fn costs(request: &Request<'_>, controller: &Controller, recursion: &Recursion) -> [String; 2] {

@@ -196,9 +196,12 @@ pub(super) enum Kind {
     Reference,
     /// The integral of the distance from a reference.
     Integral,
+    /// A point of the schedule: no signal.
+    Point,
 }
 
 impl Kind {
+    /// All kinds of signals.
     pub(super) const ALL: [Self; 6] = [
         Self::State,
         Self::Fault,
@@ -216,6 +219,7 @@ impl Kind {
             Self::Measurement => controller.measurements.len(),
             Self::Reference => controller.references.len(),
             Self::Integral => controller.h.as_ref().map_or(0, DMatrix::nrows),
+            Self::Point => controller.schedule.as_ref().map_or(0, |own| own.points.len()),
         }
     }
 
@@ -227,6 +231,7 @@ impl Kind {
             Self::Actuator => "ACTUATORS",
             Self::Measurement => "MEASUREMENTS",
             Self::Reference | Self::Integral => "REFERENCES",
+            Self::Point => "POINTS",
         }
     }
 }

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use super::controller::{Controller, Signal};
 use super::recursion::{Operation, Recursion, Term};
+use super::schedule::operating_vectors;
 use super::symbols::{Kind, Matrix, Vector};
 
 /// The vectors that are kept from sample to sample.
@@ -51,6 +52,8 @@ pub(super) struct Constants {
     /// The signals of the rows and, of a matrix, of the columns.
     pub(super) rows: Kind,
     pub(super) columns: Option<Kind>,
+    /// Whether the rows of a matrix follow each other for each point of the schedule.
+    pub(super) is_scheduled: bool,
     pub(super) values: Vec<Vec<f64>>,
 }
 
@@ -60,7 +63,7 @@ impl Constants {
     }
 
     fn vector(name: &'static str, meaning: &'static str, rows: Kind, values: Vec<f64>) -> Self {
-        Self { name, meaning, rows, columns: None, values: vec![values] }
+        Self { name, meaning, rows, columns: None, is_scheduled: false, values: vec![values] }
     }
 }
 
@@ -72,35 +75,58 @@ pub(super) const LIMITS: [(&str, &str); 4] = [
     ("u_max", ""),
 ];
 
+/// The scheduled matrices that the statements use.
+pub(super) fn scheduled(controller: &Controller, recursion: &Recursion) -> Vec<Matrix> {
+    let all = matrices(recursion).into_iter().map(|(matrix, ..)| matrix);
+    all.filter(|matrix| controller.scheduled(*matrix).is_some()).collect()
+}
+
+/// Whether the statements use a matrix that is not scheduled.
+pub(super) fn has_constant_matrix(controller: &Controller, recursion: &Recursion) -> bool {
+    matrices(recursion).iter().any(|(matrix, ..)| controller.scheduled(*matrix).is_none())
+}
+
 /// All constants of a controller.
 pub(super) fn tables(controller: &Controller, recursion: &Recursion) -> Vec<Constants> {
     let mut all = Vec::new();
     for (matrix, vector, rows) in matrices(recursion) {
-        let values = matrix.of(controller).into_iter().flat_map(DMatrix::row_iter);
+        let points = controller.scheduled(matrix);
+        let is_scheduled = points.is_some();
+        let points = points.unwrap_or_else(|| matrix.of(controller).into_iter().collect());
+        let values = points.into_iter().flat_map(DMatrix::row_iter);
         all.push(Constants {
             name: matrix.name(),
             meaning: "",
             rows,
             columns: Some(vector.kind()),
+            is_scheduled,
             values: values.map(|row| row.iter().copied().collect()).collect(),
         });
     }
     all.extend(controller.filter.clone().map(|filter| {
         Constants::vector("filter", "gains of the measurement filter", Kind::Measurement, filter)
     }));
-    for (name, meaning, kind, signals) in [
-        ("x_op", "operating point", Kind::State, &controller.states),
-        ("u_op", "", Kind::Actuator, &controller.actuators),
-        ("y_op", "", Kind::Measurement, &controller.measurements),
-        ("r_op", "", Kind::Reference, &controller.references),
-    ] {
-        if signals.is_empty() {
-            continue;
+    all.extend(schedule(controller));
+    let meanings = if controller.schedule.is_some() {
+        ["values at the start", "", "", ""]
+    } else {
+        ["operating point", "", "", ""]
+    };
+    for ((start, meaning), signals) in starts(controller).into_iter().zip(meanings).zip([
+        &controller.states,
+        &controller.actuators,
+        &controller.measurements,
+        &controller.references,
+    ]) {
+        if !signals.is_empty() {
+            let (name, kind) = start;
+            all.push(Constants::vector(name, meaning, kind, Controller::operating(signals)));
         }
-        all.push(Constants::vector(name, meaning, kind, Controller::operating(signals)));
     }
     if controller.is_limited() {
-        for (position, (name, meaning)) in LIMITS.into_iter().enumerate() {
+        // With a schedule the limits as deviations are no constants.
+        let constant = if controller.schedule.is_some() { 2 } else { 0 };
+        for (position, (name, meaning)) in LIMITS.into_iter().enumerate().skip(constant) {
             let limit = |actuator: &Signal| {
                 let side = position % 2;
                 let none = [f64::NEG_INFINITY, f64::INFINITY][side];
@@ -110,6 +136,40 @@ pub(super) fn tables(controller: &Controller, recursion: &Recursion) -> Vec<Cons
             let values = controller.actuators.iter().map(limit).collect();
             all.push(Constants::vector(name, meaning, Kind::Actuator, values));
         }
+    }
+    all
+}
+
+/// The names of the tables that an instance starts from, of states, actuators, measurements, references:
+/// the operating point, which with a schedule has these values at the start only.
+pub(super) fn starts(controller: &Controller) -> [(&'static str, Kind); 4] {
+    let names = match controller.schedule {
+        None => ["x_op", "u_op", "y_op", "r_op"],
+        Some(_) => ["x_start", "u_start", "y_start", "r_start"],
+    };
+    let [x, u, y, r] = names;
+    [(x, Kind::State), (u, Kind::Actuator), (y, Kind::Measurement), (r, Kind::Reference)]
+}
+
+/// The grid of a schedule, and the operating point at each of its values.
+fn schedule(controller: &Controller) -> Vec<Constants> {
+    let Some(schedule) = &controller.schedule else { return Vec::new() };
+    let grid = schedule.points.iter().map(|point| point.at).collect();
+    let mut all = vec![Constants::vector(
+        "grid",
+        "values of the scheduling variable, and the operating points at them",
+        Kind::Point,
+        grid,
+    )];
+    for (vector, name) in operating_vectors(controller) {
+        all.push(Constants {
+            name,
+            meaning: "",
+            rows: Kind::Point,
+            columns: Some(vector.kind()),
+            is_scheduled: false,
+            values: schedule.operating(vector),
+        });
     }
     all
 }

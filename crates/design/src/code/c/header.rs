@@ -30,6 +30,7 @@ impl Source<'_> {
             "/* Numbers of signals. */".to_owned(),
         ]);
         let kinds = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Integral);
+        let kinds = kinds.chain([Kind::Point]);
         for kind in kinds.filter(|kind| kind.count(controller) > 0) {
             lines.push(format!("#define {} {}U", self.count(kind), kind.count(controller)));
         }
@@ -51,11 +52,17 @@ impl Source<'_> {
             format!("#define {capital}_HELD 1U"),
             format!("#define {capital}_AT_LIMIT 2U"),
             format!("#define {capital}_OVERFLOW 4U"),
-            String::new(),
         ]);
+        if controller.schedule.is_some() {
+            lines.push(format!("#define {capital}_OUTSIDE 8U"));
+        }
+        lines.push(String::new());
         self.structure(&mut lines, "Measurements", &fields.measurements);
         if !fields.references.is_empty() {
             self.structure(&mut lines, "References", &fields.references);
+        }
+        if !fields.schedule.is_empty() {
+            self.structure(&mut lines, "Schedule", &fields.schedule);
         }
         self.structure(&mut lines, "Commands", &fields.actuators);
         self.structure(&mut lines, "Estimates", &fields.estimates(controller));
@@ -64,6 +71,9 @@ impl Source<'_> {
         for vector in stored(controller).into_iter().chain([Vector::U]) {
             let count = self.count(vector.kind());
             lines.push(format!("    {real} {}[{count}];", vector.name()));
+        }
+        if !fields.schedule.is_empty() {
+            lines.push(format!("    {real} theta;"));
         }
         if controller.first_compensated > 0 {
             lines.push("    uint32_t sample;".to_owned());

@@ -2,7 +2,7 @@
 
 use super::Source;
 use crate::code::recursion::{Operation, Statement, Term, When};
-use crate::code::symbols::{Kind, Vector};
+use crate::code::symbols::{Kind, Matrix, Vector};
 use crate::code::tables::{kept, locals, shown};
 
 impl Source<'_> {
@@ -12,6 +12,7 @@ impl Source<'_> {
         for vector in locals(recursion) {
             lines.push(format!("    {real} {}[{}];", vector.name(), self.count(vector.kind())));
         }
+        self.schedule_locals(lines);
         let compensating = match controller.first_compensated {
             0 => "compensate".to_owned(),
             _ => format!("compensate && (state->sample >= {capital}_FIRST_COMPENSATED)"),
@@ -25,6 +26,7 @@ impl Source<'_> {
             String::new(),
         ]);
         self.inputs(lines);
+        self.interpolation(lines);
         if controller.filter.is_some() {
             lines.extend(["    if (!state->started)".to_owned(), "    {".to_owned()]);
             self.loop_over(
@@ -58,9 +60,14 @@ impl Source<'_> {
         for (owner, fields, vector) in [
             ("measurements", &self.fields.measurements, "y"),
             ("references", &self.fields.references, "r"),
+            ("schedule", &self.fields.schedule, "theta"),
         ] {
             for (k, field) in fields.iter().enumerate() {
-                let (kept, capital) = (format!("state->{vector}[{k}]"), &self.capital);
+                let capital = &self.capital;
+                let kept = match owner {
+                    "schedule" => format!("state->{vector}"),
+                    _ => format!("state->{vector}[{k}]"),
+                };
                 lines.push(format!(
                     "    status = status | take(&{kept}, {owner}->{field}, {capital}_HELD);"
                 ));
@@ -118,7 +125,12 @@ impl Source<'_> {
         }
         let capital = &self.capital;
         lines.extend([
-            format!("        status = (status & {capital}_HELD) | {capital}_OVERFLOW;"),
+            match self.controller.schedule {
+                None => format!("        status = (status & {capital}_HELD) | {capital}_OVERFLOW;"),
+                Some(_) => format!(
+                    "        status = (status & ({capital}_HELD | {capital}_OUTSIDE)) | {capital}_OVERFLOW;"
+                ),
+            },
             "    }".to_owned(),
         ]);
         if self.controller.first_compensated > 0 {
@@ -184,12 +196,9 @@ impl Source<'_> {
                         Operation::Add(term) => format!("sum + {}", self.term(term)),
                         Operation::Subtract(term) => format!("sum - {}", self.term(term)),
                         Operation::TimesPeriod => format!("sum * {}_SAMPLE_TIME", self.capital),
-                        Operation::Accumulate(matrix, vector) => format!(
-                            "accumulate(sum, {}[i], {}, {})",
-                            matrix.name(),
-                            variable(vector),
-                            self.count(vector.kind())
-                        ),
+                        Operation::Accumulate(matrix, vector) => {
+                            self.row_product("accumulate", "sum, ", (matrix, vector))
+                        }
                     }
                 ));
             }
@@ -202,16 +211,27 @@ impl Source<'_> {
         }
     }
 
+    /// A call of a function that multiplies row i of a matrix by a vector.
+    fn row_product(
+        &self,
+        function: &str,
+        start: &str,
+        (matrix, vector): (Matrix, Vector),
+    ) -> String {
+        let (name, vector, count) = (matrix.name(), variable(vector), self.count(vector.kind()));
+        match self.controller.scheduled(matrix) {
+            None => format!("{function}({start}{name}[i], {vector}, {count})"),
+            Some(_) => format!(
+                "{function}_between({start}{name}[at][i], {name}[at + 1U][i], weights, {vector}, {count})"
+            ),
+        }
+    }
+
     fn term(&self, term: Term) -> String {
         match term {
             Term::Zero => self.literal(0.0),
             Term::Element(vector) => element(vector),
-            Term::Product(matrix, vector) => format!(
-                "product({}[i], {}, {})",
-                matrix.name(),
-                variable(vector),
-                self.count(vector.kind())
-            ),
+            Term::Product(matrix, vector) => self.row_product("product", "", (matrix, vector)),
             Term::FilterStep => "filter[i] * (y[i] - y_f[i])".to_owned(),
         }
     }

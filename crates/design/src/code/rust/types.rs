@@ -1,0 +1,146 @@
+//! The types of the crate, and how an instance starts.
+
+use super::Source;
+use crate::code::summary::{descriptions, descriptions_of_estimates};
+use crate::code::symbols::Vector;
+use crate::code::tables::{starts, stored};
+
+impl Source<'_> {
+    pub(super) fn structures(&self, lines: &mut Vec<String>) {
+        let Self { controller, recursion: _, fields, real, .. } = self;
+        let estimates = fields.estimates(controller);
+        let described = [
+            descriptions(&controller.measurements),
+            descriptions(&controller.references),
+            descriptions(controller.schedule_inputs()),
+            descriptions(&controller.actuators),
+            descriptions_of_estimates(controller),
+        ];
+        let groups = [
+            ("Measurements", "The measurements of a sample.", "MEASUREMENTS", &fields.measurements),
+            ("References", "The references of a sample.", "REFERENCES", &fields.references),
+            ("Schedule", "The scheduling variable of a sample.", "1", &fields.schedule),
+            ("Commands", "The commands of a sample.", "ACTUATORS", &fields.actuators),
+            ("Estimates", "The estimates of a sample.", "ESTIMATES", &estimates),
+        ];
+        for ((name, text, count, fields), described) in groups.into_iter().zip(&described) {
+            if fields.is_empty() {
+                continue;
+            }
+            lines.push(format!("\n/// {text}"));
+            lines.push("#[derive(Clone, Copy, Debug, Default, PartialEq)]".to_owned());
+            lines.push(format!("pub struct {name} {{"));
+            for (field, text) in fields.iter().zip(described) {
+                lines.push(format!("    /// {text}.\n    pub {field}: {real},"));
+            }
+            lines.push("}".to_owned());
+            let values: Vec<_> = (1..=fields.len()).map(|k| format!("v{k}")).collect();
+            let pairs =
+                fields.iter().zip(&values).map(|(field, value)| format!("{field}: {value}"));
+            lines.push(format!("\nimpl From<[{real}; {count}]> for {name} {{"));
+            lines.push(format!(
+                "    fn from([{}]: [{real}; {count}]) -> Self {{",
+                values.join(", ")
+            ));
+            lines.push(format!("        Self {{ {} }}", pairs.collect::<Vec<_>>().join(", ")));
+            lines.push("    }\n}".to_owned());
+            let reads: Vec<_> = fields.iter().map(|field| format!("own.{field}")).collect();
+            lines.push(format!("\nimpl From<{name}> for [{real}; {count}] {{"));
+            lines.push(format!("    fn from(own: {name}) -> Self {{"));
+            lines.push(format!("        [{}]", reads.join(", ")));
+            lines.push("    }\n}".to_owned());
+        }
+        let outside = match controller.schedule {
+            None => "",
+            Some(_) => {
+                "
+    /// The scheduling variable is outside of the schedule; the nearest point was used.
+    pub outside: bool,"
+            }
+        };
+        lines.push(format!(
+            "
+/// What was unusual in a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Status {{
+    /// A measurement or reference was NaN or infinite; its last finite value was used.
+    pub held: bool,
+    /// A command is at a limit.
+    pub at_limit: bool,
+    /// A sum was beyond the range of the numbers; commands and estimates keep their values.
+    pub overflow: bool,{outside}
+}}
+
+/// The results of a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Outputs {{
+    /// The commands.
+    pub commands: Commands,
+    /// The estimates.
+    pub estimates: Estimates,
+    /// What was unusual.
+    pub status: Status,
+}}
+
+/// One instance of the controller.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Controller {{"
+        ));
+        for vector in stored(controller).into_iter().chain([Vector::U]) {
+            lines.push(format!("    {}: [{real}; {}],", vector.name(), vector.kind().plural()));
+        }
+        if !controller.schedule_inputs().is_empty() {
+            lines.push(format!("    theta: [{real}; 1],"));
+        }
+        if controller.first_compensated > 0 {
+            lines.push("    sample: u32,".to_owned());
+        }
+        if controller.filter.is_some() {
+            lines.push("    started: bool,".to_owned());
+        }
+        lines.push("}".to_owned());
+    }
+
+    pub(super) fn start(&self, lines: &mut Vec<String>) {
+        let Self { controller, real, .. } = self;
+        let [x, u, y, r] = starts(controller).map(|(name, _)| name.to_ascii_uppercase());
+        lines.push(format!(
+            "
+impl Default for Controller {{
+    fn default() -> Self {{
+        Self::new()
+    }}
+}}
+
+impl Controller {{
+    /// Starts at the operating point, without faults.
+    #[must_use]
+    pub fn new() -> Self {{
+        Self::starting_at({x}, [0.0; FAULTS])
+    }}
+
+    /// Starts at these estimates of states and faults.
+    #[must_use]
+    pub fn starting_at(x_hat: [{real}; STATES], f_hat: [{real}; FAULTS]) -> Self {{
+        Self {{
+            x_hat,
+            f_hat,"
+        ));
+        if controller.filter.is_some() {
+            lines.push(format!("            y_f: {y},\n            started: false,"));
+        }
+        if controller.first_compensated > 0 {
+            lines.push("            sample: 0,".to_owned());
+        }
+        if !controller.references.is_empty() {
+            lines.push(format!("            r: {r},"));
+        }
+        if controller.h.is_some() {
+            lines.push("            x_i: [0.0; REFERENCES],".to_owned());
+        }
+        if let [input] = controller.schedule_inputs() {
+            lines.push(format!("            theta: [{}],", self.literal(input.operating)));
+        }
+        lines.push(format!("            y: {y},\n            u: {u},\n        }}\n    }}"));
+    }
+}
