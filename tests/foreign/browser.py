@@ -122,14 +122,19 @@ async def _connected(address):
 
 
 class _Quiet(SimpleHTTPRequestHandler):
+    def log_request(self, *_):
+        """Keeps the path."""
+        self.server.requested.append(self.path)
+
     def log_message(self, *_):
         """Nothing."""
 
 
 @contextmanager
-def served(folder):
-    """The address of a file server of a folder."""
+def served(folder, requested=None):
+    """The address of a file server of a folder; `requested` gets the paths asked for."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=folder))
+    server.requested = [] if requested is None else requested
     threading.Thread(target=server.serve_forever, daemon=True).start()
     try:
         yield f"http://127.0.0.1:{server.server_address[1]}"

@@ -2,6 +2,7 @@
 
 import base64
 import csv
+import gzip
 import json
 import tomllib
 
@@ -81,6 +82,17 @@ def test_100_s_of_the_page_are_those_of_the_command_bit_for_bit(aso_ftc, open_pa
     print("100 s were computed in", page.evaluate("document.body.dataset.spent"), "ms")
 
 
+def test_the_page_loads_at_most_300_kb_at_first(tmp_path):
+    requested = []
+    with served(PAGE, requested) as address, browser(tmp_path / "profile") as page:
+        page.open(f"{address}/index.html")
+        page.until("document.body.dataset.ready === 'true'")
+    names = {path.removeprefix("/") for path in requested}
+    assert {"index.html", "worker.js", "paper.wasm"} <= names and "observer.wasm" not in names
+    sizes = {name: len(gzip.compress((PAGE / name).read_bytes())) for name in names}
+    assert sum(sizes.values()) <= 300_000, sizes
+
+
 def test_faults_noise_and_an_observer_designed_in_the_page_are_those_of_the_command(aso_ftc, open_page, tmp_path):
     link = "#stop=12&t_on=4&F_s=28&M=3.3&eigenvalues=-900+-1000+-1100+-1200+-1300&noise_theta=1e-6&bias_x=0.001&gain_u=0.95&from=6"
     page = open_page(link)
@@ -107,6 +119,22 @@ def test_changes_during_the_run_are_in_the_system_toml(aso_ftc, open_page, tmp_p
     own = rows(at_the_end(page))
     text = page.evaluate("document.getElementById('native').textContent")
     assert text.count("[[scenario.set]]") == 2 and "plant.F_c" in text
+    equal(own, of_the_command(aso_ftc, page, tmp_path))
+
+
+def test_a_change_at_the_time_of_a_row_after_a_step_back_is_that_of_the_command(aso_ftc, open_page, tmp_path):
+    page = open_page("#stop=2&t_on=1")
+    step = "for (let k = 0; k < {}; k += 1) document.getElementById('step').click()"
+    newest = "window.paper.rows[0].at(-1)"
+    page.evaluate(step.format(55))
+    page.until(f"{newest} > 0.545")
+    page.evaluate("document.getElementById('back').click()")
+    page.until(f"{newest} < 0.505")
+    page.evaluate("const f = document.getElementById('set-F_c'); f.value = '15'; f.dispatchEvent(new Event('change'));")
+    own = rows(run_to_the_end(page))
+    text = page.evaluate("document.getElementById('native').textContent")
+    assert text.count("[[scenario.set]]") == 1 and "at = 0.5\n" in text
+    assert len(own["time"]) == 201
     equal(own, of_the_command(aso_ftc, page, tmp_path))
 
 

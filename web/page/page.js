@@ -173,6 +173,12 @@
     id("marks").append(mark);
   }
 
+  function showRow(row) {
+    last = row;
+    time = row[0];
+    fresh = true;
+  }
+
   const REGIMES = { 0: "sticks" };
   function draw() {
     if (fresh && last) {
@@ -218,13 +224,12 @@
       },
       started() {
         gains = data.gains;
+        plots.clear(); // of rows of the run before that came late
         told();
       },
       rows() {
         plots.add(data.rows);
-        last = data.rows.slice(-ROW.length);
-        time = last[0];
-        fresh = true;
+        showRow(data.rows.slice(-ROW.length));
       },
       set() {
         const [variable, value] = data.line.split("=");
@@ -232,6 +237,7 @@
         told();
       },
       back() {
+        showRow(plots.cut(data.at));
         changes = changes.filter(({ at }) => at < data.at);
         for (const field of FIELDS.filter((known) => known.at === "now" && known.variable)) {
           if (had(field) !== values[field.id]) set(field.variable, values[field.id]);

@@ -48,13 +48,13 @@ function runPlots() {
       for (const column of rows) column.length = 0;
       this.show();
     },
-    // Drops the rows from `time` on.
+    // Drops the rows after `time`; returns the last one that stays.
     cut(time) {
-      const first = rows[0].findIndex((value) => value >= time - 1e-12);
+      const first = rows[0].findIndex((value) => value > time);
       if (first >= 0) for (const column of rows) column.length = first;
+      return rows.map((column) => column.at(-1));
     },
     add(numbers) {
-      if (rows[0].length > 0) this.cut(numbers[0]);
       for (let k = 0; k < numbers.length; k += 1) rows[k % ROW.length].push(numbers[k]);
     },
     show() {

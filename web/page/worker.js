@@ -1,14 +1,13 @@
 "use strict";
 // Runs the WebAssembly module. Messages in: {kind: "start" | "run" | "pause" | "step" | "back" | "set", ..}.
 // Messages out: {kind: "ready" | "started" | "rows" | "set" | "back" | "refused" | "failed" | "stopped", ..}.
-const COLUMNS = 9; // of a row: the time and eight variables
 const EVERY = 10; // steps between two rows
 const FRAME = 16; // ms between two turns
 const SAVE_EVERY = 0.5; // s of simulated time between two kept states
 
 let wasm = null;
 let timer = null;
-let run = null; // {step, speed, time, saved, due}
+let run = null; // {step, speed, saved, due, spent, last}
 
 const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
 
@@ -46,14 +45,16 @@ function pause() {
   timer = null;
 }
 
+// Sends the rows that the module keeps.
+function send() {
+  const rows = new Float64Array(wasm.memory.buffer, wasm.rows(), wasm.rows_length()).slice();
+  if (rows.length > 0) postMessage({ kind: "rows", rows }, [rows.buffer]);
+}
+
 // Makes `count` steps and sends their rows.
 function advance(count) {
   const status = wasm.advance(count, EVERY);
-  const rows = new Float64Array(wasm.memory.buffer, wasm.rows(), wasm.rows_length()).slice();
-  if (rows.length > 0) {
-    run.time = rows[rows.length - COLUMNS];
-    postMessage({ kind: "rows", rows }, [rows.buffer]);
-  }
+  send();
   if (status !== 0) {
     pause();
     postMessage({ kind: "failed", text: read() });
@@ -64,8 +65,8 @@ function advance(count) {
 }
 
 function save() {
-  if (run.time >= run.saved + SAVE_EVERY) {
-    run.saved = run.time;
+  if (wasm.time() >= run.saved + SAVE_EVERY) {
+    run.saved = wasm.time();
     if (wasm.save() !== 0) postMessage({ kind: "refused", text: read() });
   }
 }
@@ -114,8 +115,9 @@ const actions = {
       postMessage({ kind: "refused", text: read() });
       return;
     }
-    run = { step, speed: 1, time: 0, saved: 0, due: 0, spent: 0, last: 0 };
+    run = { step, speed: 1, saved: 0, due: 0, spent: 0, last: 0 };
     postMessage({ kind: "started", gains });
+    send();
     wasm.save();
   },
   run({ speed }) {
@@ -140,11 +142,8 @@ const actions = {
       postMessage({ kind: "refused", text: read() });
       return;
     }
-    run.time = 0;
     run.saved = -Infinity;
     postMessage({ kind: "back", at: wasm.time() });
-    advance(1);
-    run.saved = run.time;
   },
   set({ settings }) {
     if (!run) return;

@@ -3,7 +3,7 @@
 
 use std::cell::RefCell;
 
-use crate::Paper;
+use crate::paper::Paper;
 use crate::text::{answer, read};
 
 thread_local! {
@@ -11,16 +11,23 @@ thread_local! {
     static ROWS: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
 }
 
+fn keep(row: [f64; 9]) {
+    ROWS.with_borrow_mut(|rows| rows.extend(row));
+}
+
 fn with(body: &mut dyn FnMut(&mut Paper) -> Result<(), String>) -> i32 {
     let done = RUN.with_borrow_mut(|run| body(run.as_mut().ok_or("no run is started")?));
     answer(done.map(|()| None))
 }
 
-/// Starts a run with the settings in the text buffer; returns 1 if it cannot be started.
+/// Starts a run with the settings in the text buffer and keeps its first row; returns 1 if it cannot be
+/// started.
 #[unsafe(no_mangle)]
 pub extern "C" fn start(step: f64, stop: f64) -> i32 {
-    let made = Paper::new(&read(), step, stop);
-    answer(made.map(|paper| {
+    ROWS.with_borrow_mut(Vec::clear);
+    let made = Paper::new(&read(), step, stop).and_then(|mut paper| Ok((paper.row()?, paper)));
+    answer(made.map(|(row, paper)| {
+        keep(row);
         RUN.with_borrow_mut(|run| *run = Some(paper));
         None
     }))
@@ -34,22 +41,19 @@ pub extern "C" fn set() -> i32 {
     with(&mut |run| run.set(name.trim(), value.trim()))
 }
 
-/// Makes up to `steps` steps. Keeps a row at each multiple of `every` steps since the start, and one at the
-/// end; returns 1 if a step failed.
+/// Makes up to `steps` steps. Keeps a row after each step whose number since the start is a multiple of `every`,
+/// and after the last one; returns 1 if a step failed. So a row is older than a change that is made at its
+/// time, as in the results of the command.
 #[unsafe(no_mangle)]
 pub extern "C" fn advance(steps: u32, every: u32) -> i32 {
     ROWS.with_borrow_mut(Vec::clear);
-    let keep = |row: [f64; 9]| ROWS.with_borrow_mut(|rows| rows.extend(row));
     with(&mut |run| {
         for _ in 0..steps {
             if run.is_finished() {
                 break;
             }
-            if run.steps() % u64::from(every.max(1)) == 0 {
-                keep(run.row()?);
-            }
             run.step()?;
-            if run.is_finished() {
+            if run.steps() % u64::from(every.max(1)) == 0 || run.is_finished() {
                 keep(run.row()?);
             }
         }
@@ -69,7 +73,7 @@ pub extern "C" fn is_finished() -> i32 {
     RUN.with_borrow(|run| run.as_ref().is_none_or(Paper::is_finished).into())
 }
 
-/// The address of the rows of the last [`advance`]: time and values, nine numbers each.
+/// The address of the rows of the last [`start`] or [`advance`]: time and values, nine numbers each.
 #[unsafe(no_mangle)]
 pub extern "C" fn rows() -> *const f64 {
     ROWS.with_borrow(|rows| rows.as_ptr())

@@ -6,6 +6,3 @@ mod linked;
 mod paper;
 mod settings;
 mod text;
-
-pub use linked::LinkedSlave;
-pub use paper::{COLUMNS, Paper};

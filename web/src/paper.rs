@@ -8,7 +8,7 @@ use fmu::description::{Experiment, Kind};
 use master::{AlgorithmRequest, KeptState, Port, Probe, Simulation, System, Value, choose};
 use plant::FrictionPendulum;
 
-use crate::LinkedSlave;
+use crate::linked::LinkedSlave;
 use crate::settings::Settings;
 use crate::text;
 
