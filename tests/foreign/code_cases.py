@@ -39,7 +39,7 @@ stop_time = 20.0
 QUADRUPLE = (ROOT / "examples" / "plants" / "quadruple-tank.toml").read_text(encoding="utf-8")
 TANKS = {
     name: (ROOT / "examples" / "three-tank" / f"{name}.toml").read_text(encoding="utf-8").replace("../..", str(ROOT))
-    for name in ("plant", "sensor-fault", "loss-of-effectiveness", "reference", "schedule")
+    for name in ("plant", "sensor-fault", "loss-of-effectiveness", "reference", "schedule", "detection")
 }
 
 
@@ -55,6 +55,15 @@ def measured(text):
     head = head.replace("[-0.2, -0.22, -0.25, -0.28, -0.3]", "[-0.06, -0.07, -0.08, -0.1, -0.12, -0.14, -0.16, -0.2, -0.25]")
     fault = '[[faults]]\nname = "b_2"\nsensor = "y_2"\nbound = 0.1\n\n'
     return f'{head}{fault}[schedule]\nvariable = "y_1"\n' + points[points.index("\n[[schedule.points]]") :]
+
+
+def windows(isolation):
+    """The two masses with faults of the motor and of a sensor, tested by sums of squares from 2 s on."""
+    head, tail = masses("prediction", "true").replace(', -13]', ', -13, -14, -15]').split("[experiment]")
+    head = head.replace("sample_time", "filter = 0.2\nsample_time").replace('kind = "ramp"', "step = 0.1")
+    sensor = '[[faults]]\nname = "b"\nsensor = "Q_1"\nstep = 0.1\n'
+    detection = f'[detection]\nmethod = "chi-square"\nisolation = {isolation}\nfalse_alarm_interval = 20.0\nfrom = 2.0\n'
+    return f"{head}{sensor}{detection}noise = 2e-2\nprocess_noise = 1e-2\n[experiment]{tail}"
 
 
 @dataclass
@@ -77,6 +86,9 @@ CASES = {
     "ramp-prediction": Case(masses("prediction", "true"), 0.5, 1e-3),
     "scheduled-drive": Case("sample_time = 0.1\nt_on = 2.0\n" + DRIVE, 0.3, 1e-3),
     "scheduled-by-measurement": Case(measured(TANKS["schedule"]), 6e-5, 1e-3),
+    "detection-cusum": Case(TANKS["detection"], 6e-5, 2e-3),
+    "detection-window": Case(windows("false"), 0.2, 2e-2),
+    "detection-isolation": Case(windows("true"), 0.2, 2e-2),
     "constant-prediction": Case("sample_time = 1.0\nestimator = 'prediction'\n" + QUADRUPLE, 0.3, 1e-2),
 }
 
@@ -102,7 +114,7 @@ class Built:
         unit = program.with_suffix(".o")
         run(compiler, *WARNINGS, *options, "-c", source, "-o", unit)
         macros = [f"-DNAME={self.name}", f"-DREAL={'float' if self.single else 'double'}"]
-        macros += [f"-D{name.upper()}" for name in ("references", "schedule") if self.has(name)]
+        macros += [f"-D{name.upper()}" for name in ("references", "schedule", "detection") if self.has(name)]
         run(compiler, *options, "-include", header, *macros, HERE / "controller_loop.c", unit, "-o", program)
         return program
 
@@ -113,14 +125,14 @@ class Built:
         source = self.folder / "rust" / "src" / "lib.rs"
         run(*always, "--crate-type", "rlib", "--crate-name", "controller", source, "-o", library)
         switches = [("single", self.single), ("outside", "schedule" in self.design)]
-        switches += [(name, self.has(name)) for name in ("references", "schedule")]
-        known = ["--check-cfg", "cfg(single, references, schedule, outside)"]
+        switches += [(name, self.has(name)) for name in ("references", "schedule", "detection")]
+        known = ["--check-cfg", "cfg(single, references, schedule, outside, detection)"]
         known += [word for name, is_set in switches if is_set for word in ("--cfg", name)] + ["--extern", f"controller={library}"]
         run(*always, *known, HERE / "controller_loop.rs", "-o", program)
         return program
 
     def has(self, name):
-        """Whether the controller has references, or a scheduling variable that is no measurement, as inputs."""
+        """Whether the controller has references, a scheduling variable that is no measurement, or a detection."""
         own = self.design.get(name)
         if name == "schedule" and own:
             return own["variable"] not in [signal["name"] for signal in self.design["measurements"]]

@@ -1,7 +1,7 @@
 /* Feeds measurements from standard input to a controller that `aso-ftc design --c-code` has written, and writes
  * commands, estimates and status to standard output. Each sample has the measurements, the references, the
- * scheduling variable and whether to compensate, all as doubles. Macros: NAME (of the controller), REAL (double or
- * float), REFERENCES and SCHEDULE if it has them as inputs; the header comes by -include. */
+ * scheduling variable, whether to compensate and, of a detection, whether to reset it, all as doubles. Macros: NAME (of the controller), REAL (double or
+ * float), REFERENCES and SCHEDULE if it has them as inputs, DETECTION if it has one; the header comes by -include. */
 #include <stdio.h>
 #include <string.h>
 
@@ -26,6 +26,16 @@ static JOIN(NAME, Schedule) schedule;
 #define SCHEDULE_ARGUMENT
 #define ALL (COUNT(measurements) + REFERENCE_COUNT)
 #endif
+#ifdef DETECTION
+static JOIN(NAME, Detection) detection;
+#define FLAGS 2
+#define RESET_ARGUMENT , values[ALL + 1] > 0.5
+#define DETECTION_ARGUMENT , &detection
+#else
+#define FLAGS 1
+#define RESET_ARGUMENT
+#define DETECTION_ARGUMENT
+#endif
 static JOIN(NAME, Commands) commands;
 static JOIN(NAME, Estimates) estimates;
 
@@ -44,7 +54,7 @@ static void put(const void *signals, size_t count)
 int main(void)
 {
     JOIN(NAME, State) state;
-    double values[ALL + 1];
+    double values[ALL + FLAGS];
     JOIN(NAME, init)(&state);
     fprintf(stderr, "%zu\n", sizeof(state));
     while (fread(values, sizeof(values), 1, stdin) == 1)
@@ -61,10 +71,16 @@ int main(void)
 #ifdef SCHEDULE
         memcpy(&schedule, received + ALL - 1, sizeof(schedule));
 #endif
-        uint32_t bits = JOIN(NAME, step)(&state, &measurements, REFERENCE_ARGUMENT SCHEDULE_ARGUMENT values[ALL] > 0.5,
-                                         &commands, &estimates);
+        uint32_t bits = JOIN(NAME, step)(&state, &measurements, REFERENCE_ARGUMENT SCHEDULE_ARGUMENT values[ALL] > 0.5 RESET_ARGUMENT,
+                                         &commands, &estimates DETECTION_ARGUMENT);
         put(&commands, COUNT(commands));
         put(&estimates, COUNT(estimates));
+#ifdef DETECTION
+        double decision[] = {detection.detected, detection.isolated, (double)detection.t_detected, (double)detection.t_onset};
+        fwrite(decision, sizeof(decision), 1, stdout);
+        put(detection.residual, COUNT(detection.residual));
+        put(detection.statistic, COUNT(detection.statistic));
+#endif
         double status = (double)bits;
         fwrite(&status, sizeof(status), 1, stdout);
     }

@@ -10,6 +10,7 @@ type Real = f64;
 #[cfg(not(references))]
 const REFERENCES: usize = 0;
 const SCHEDULED: usize = cfg!(schedule) as usize;
+const FLAGS: usize = 1 + cfg!(detection) as usize;
 
 fn main() {
     let mut input = Vec::new();
@@ -18,7 +19,7 @@ fn main() {
     let mut controller = Controller::new();
     eprintln!("{}", size_of_val(&controller));
     let mut output = Vec::new();
-    for sample in values.chunks_exact(MEASUREMENTS + REFERENCES + SCHEDULED + 1) {
+    for sample in values.chunks_exact(MEASUREMENTS + REFERENCES + SCHEDULED + FLAGS) {
         let measured: [Real; MEASUREMENTS] = core::array::from_fn(|k| sample[k] as Real);
         let referred: [Real; REFERENCES] = core::array::from_fn(|k| sample[MEASUREMENTS + k] as Real);
         let compensate = sample[MEASUREMENTS + REFERENCES + SCHEDULED] > 0.5;
@@ -29,8 +30,12 @@ fn main() {
         let (found, _) = (controller.step(&measured.into(), &referred.into(), compensate), scheduled);
         #[cfg(all(not(references), schedule))]
         let (found, _) = (controller.step(&measured.into(), &scheduled.into(), compensate), referred);
-        #[cfg(not(any(references, schedule)))]
+        #[cfg(not(any(references, schedule, detection)))]
         let (found, _) = (controller.step(&measured.into(), compensate), (referred, scheduled));
+        #[cfg(detection)]
+        let reset = sample[MEASUREMENTS + REFERENCES + SCHEDULED + 1] > 0.5;
+        #[cfg(detection)]
+        let (found, _) = (controller.step(&measured.into(), compensate, reset), (referred, scheduled));
         let commands: [Real; ACTUATORS] = found.commands.into();
         let estimates: [Real; ESTIMATES] = found.estimates.into();
         let Status { held, at_limit, overflow, .. } = found.status;
@@ -40,8 +45,15 @@ fn main() {
         let outside = false;
         let bits = [held, at_limit, overflow, outside];
         let status: u8 = bits.iter().enumerate().map(|(k, bit)| u8::from(*bit) << k).sum();
-        let all = commands.iter().chain(&estimates).map(|value| f64::from(*value)).chain([f64::from(status)]);
-        all.for_each(|value| output.extend(value.to_le_bytes()));
+        let mut all: Vec<f64> = commands.iter().chain(&estimates).map(|value| f64::from(*value)).collect();
+        #[cfg(detection)]
+        {
+            let Detection { detected, isolated, t_detected, t_onset, residual, statistic } = found.detection;
+            all.extend([f64::from(u8::from(detected)), f64::from(isolated)]);
+            all.extend([t_detected, t_onset].iter().chain(&residual).chain(&statistic).map(|value| f64::from(*value)));
+        }
+        all.push(f64::from(status));
+        all.iter().for_each(|value| output.extend(value.to_le_bytes()));
     }
     std::io::stdout().write_all(&output).unwrap();
 }

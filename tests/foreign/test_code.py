@@ -47,7 +47,7 @@ def in_the_loop(own, case):
     schedule = design.get("schedule")
     inputs += [schedule["variable"]] if own.has("schedule") else []
     operating = np.array([signal.get("operating", 0.0) for signal in references])
-    period, fault = design["sample_time"], np.zeros(q)
+    period, fault, detection = design["sample_time"], np.zeros(q), design.get("detection")
     samples, expected = [], []
     with Instance(own.fmu) as instance:
         for k in range(case.samples):
@@ -58,18 +58,28 @@ def in_the_loop(own, case):
             if schedule:
                 value = swept(schedule, k)
                 y = np.append(y, value) if own.has("schedule") else np.where(np.array(inputs) == schedule["variable"], value, y)
-            compensate = not 1700 < k < 1800
+            compensate, reset = not 1700 < k < 1800, k % 700 in (640, 641)
             if k == 0:
                 instance.start(dict(zip(inputs, y)))
             else:
-                instance.set({**dict(zip(inputs, y)), "compensate": compensate})
+                switches = {"compensate": compensate, **({"detection_reset": reset} if detection else {})}
+                instance.set({**dict(zip(inputs, y)), **switches})
                 # A scheduling variable outside of the schedule gives a warning.
                 known = (OK, OK + 1) if schedule else (OK,)
                 assert instance.call("DoStep", (k - 1) * period, period, 1) in known
-            samples.append([*y, compensate])
-            expected.append(instance.get(*outputs))
+            samples.append([*y, compensate, *([reset] if detection else [])])
+            expected.append(instance.get(*outputs) + decided(instance, detection))
             plant.step(np.array(expected[-1][:m]), fault)
     return np.array(samples, dtype=float), np.array(expected)
+
+
+def decided(instance, detection):
+    """Decision, residuals and statistics of the FMU of a design with this detection."""
+    if not detection:
+        return []
+    lists = [vector("residual", len(detection["C"])), vector("statistic", len(detection["tests"]))]
+    decision = instance.get("fault_detected") + instance.get("fault_isolated") + instance.get("t_detected", "t_onset")
+    return [float(value) for value in decision] + instance.get(*lists[0], *lists[1])
 
 
 def swept(schedule, k):
@@ -140,6 +150,73 @@ def test_the_stated_arithmetic_of_a_schedule_is_that_of_its_interpolation(design
     assert wanted in own.header.replace("\n *", ""), wanted
 
 
+@pytest.mark.parametrize("name", ["detection-cusum", "detection-window", "detection-isolation"])
+def test_the_stated_arithmetic_of_a_detection_is_that_of_its_filter_and_tests(designed, name):
+    own = designed(name)
+    (n, m, p, q), detection = own.sizes, own.design["detection"]
+    k, rows, tests = len(detection["A"]), len(detection["C"]), len(detection["tests"])
+    count = lambda wanted: int(re.search(rf"(\d+) {wanted}", own.header.replace("\n *", "")).group(1))
+    products = p * n + n * p + q * p + m * n + m * q + n * n + n * m + n * q + p + (k + rows) * (k + m + p)
+    # A comparison for each end of the range, for the sign of a sum, for the larger sum, for the threshold; times in s.
+    windows = "window" in detection["tests"][0]
+    others = 2 * (p + m + n + q + n + q + p + k + rows) + 2 * m * any("limits" in own for own in own.design["actuators"])
+    assert count("multiplications") == products + 2 + (rows if windows else 0)
+    assert count("comparisons") == others + (2 * rows + 3 * tests if windows else 10 * tests)
+    assert count("divisions") == (tests if windows else 0)
+
+
+@pytest.mark.parametrize("name", ["detection-cusum", "detection-window", "detection-isolation"])
+def test_the_samples_of_a_detection_have_alarms_resets_and_decisions(designed, name):
+    """What the comparison of bits would miss if it never happened."""
+    own = designed(name)
+    m, n, q = own.sizes[1], own.sizes[0], own.sizes[3]
+    detected, isolated, t_detected, t_onset = own.expected[:, m + n + q : m + n + q + 4].T
+    first = round(own.design["detection"]["from"] / own.design["sample_time"])
+    assert not detected[:first].any() and set(detected) == {0.0, 1.0}
+    assert (np.diff(t_detected) != 0).sum() > 3, "alarms after resets"
+    faults = len(own.design["detection"]["faults"])
+    assert {0.0, -1.0} < set(isolated) <= set(range(-1, faults + 1)) if name != "detection-window" else len(set(isolated)) > 1
+    assert (t_onset[detected > 0] <= t_detected[detected > 0]).all() and (t_onset[detected == 0] == -1).all()
+
+
+def test_a_start_at_other_estimates_has_the_bits_of_the_fmu(designed):
+    own, count = designed("detection-cusum"), 200
+    (n, m, p, q), k = own.sizes, len(own.design["detection"]["C"])
+    x_0 = np.array([state["operating"] for state in own.design["states"]]) + 0.01 * np.arange(1, n + 1)
+    inputs = [signal["name"] for signal in own.design["measurements"]]
+    names = [actuator["name"] for actuator in own.design["actuators"]] + vector("x_hat", n) + vector("f_hat", q)
+    with Instance(own.fmu) as instance:
+        expected = []
+        for at, y in enumerate(own.samples[:count, :p]):
+            if at == 0:
+                instance.start({**dict(zip(inputs, y)), **dict(zip(vector("x_hat_0", n), x_0))})
+            else:
+                instance.set(dict(zip(inputs, y)))
+                instance.step((at - 1) * own.design["sample_time"], own.design["sample_time"])
+            expected.append(instance.get(*names) + instance.get(*vector("residual", k)))
+    found, _ = looped(own, own.samples[:count, :p], x_0)
+    assert (bits(found) == bits(np.array(expected))).all()
+
+
+def test_after_an_overflow_the_detection_is_that_of_the_sample_before(designed):
+    own = designed("detection-cusum")
+    samples, first = own.samples[:150].copy(), sum(own.sizes) - own.sizes[2]
+    samples[140, :3] = 1.7e308 * np.array([1, -1, 1])
+    for program in (own.compiled("-O2"), own.crate()):
+        found = fed(program, samples)[0]
+        assert np.isfinite(found).all() and found[140, -1] == 4
+        assert (found[140, first:-1] == found[139, first:-1]).all()
+
+
+def test_a_statistic_beyond_the_range_of_float_is_its_largest_number(aso_ftc, tmp_path, designed):
+    own = Built(aso_ftc, CASES["detection-window"].text, tmp_path, "--float")
+    samples = designed("detection-window").samples[:400].copy()
+    samples[390:, 0] = 1e30
+    for program in (own.compiled("-O2"), own.crate()):
+        found = fed(program, samples)[0]
+        assert np.isfinite(found).all() and (found[390:, -2] <= np.finfo(np.float32).max).all()
+
+
 def test_a_scheduled_controller_in_float_states_that_it_has_no_bound(aso_ftc, tmp_path, designed):
     own = designed("scheduled-drive")
     single = Built(aso_ftc, CASES["scheduled-drive"].text, tmp_path, "--float")
@@ -192,8 +269,9 @@ def test_after_an_overflow_commands_and_estimates_are_those_of_the_sample_before
 
 
 @pytest.mark.parametrize(
-    "text", [CASES["three-tank"].text, CASES["sensor-fault"].text, CASES["constant-prediction"].text, masses("current", "true")],
-    ids=["three-tank", "sensor-fault", "constant-prediction", "ramp"],
+    "text",
+    [*(CASES[name].text for name in ("three-tank", "sensor-fault", "constant-prediction", "detection-cusum")), masses("current", "true")],
+    ids=["three-tank", "sensor-fault", "constant-prediction", "detection-cusum", "ramp"],
 )
 def test_float_stays_within_its_bound_of_double_in_the_loop(aso_ftc, tmp_path, text):
     """The bound is for a loop without limits; it may be up to 200 times the largest difference that occurs."""
@@ -212,16 +290,17 @@ def test_float_stays_within_its_bound_of_double_in_the_loop(aso_ftc, tmp_path, t
     signals = [largest(x_hat, plant.x_op), largest(f_hat, 0), largest(y, plant.y_op), largest(commands, plant.u_op), [1]]
     bound = bound_of(own.header) @ np.concatenate(signals)
     difference = abs(found - exact).max(axis=0)
-    difference = np.concatenate([difference[:m], difference[m + n : m + n + q]])
+    residuals = len(bound) - m - q
+    difference = np.concatenate([difference[:m], difference[m + n : m + n + q], difference[len(difference) - residuals :]])
     assert (difference < bound).all(), difference / bound
     faults = [k for k, fault in enumerate(own.design["faults"]) if not fault["name"].endswith("_rate")]
-    checked = [*range(m), *(m + k for k in faults)]
+    checked = [*range(m), *(m + k for k in faults), *range(m + q, m + q + residuals)]
     assert (difference[checked] > bound[checked] / 200).all(), bound / difference
     assert "warning" not in own.done.stderr
 
 
-def looped(own):
-    """Outputs and measurements in the loop of the compiled code with the plant."""
+def looped(own, given=None, x_0=None):
+    """Outputs and measurements in the loop of the compiled code with the plant, or outputs for given measurements."""
     source = own.folder / "c" / f"{own.name}.c"
     run("gcc", "-std=c99", "-O2", "-shared", "-fPIC", source, "-o", own.folder / "own.so")
     import ctypes
@@ -233,15 +312,22 @@ def looped(own):
     commands, estimates = (real * m)(), (real * (n + q + losses))()
     getattr(library, f"{own.name}_init")(state)
     step, plant = getattr(library, f"{own.name}_step"), Plant(own.design)
+    residuals, tests = (len(own.design.get("detection", {}).get(name, [])) for name in ("C", "tests"))
+    fields = [("detected", ctypes.c_bool), ("isolated", ctypes.c_int32), ("times", real * 2), ("residual", real * residuals)]
+    detection = type("Detection", (ctypes.Structure,), {"_fields_": [*fields, ("statistic", real * tests)]})()
+    more = ([ctypes.c_bool(False)], [ctypes.byref(detection)]) if residuals else ([], [])
     chance, rows, measured = np.random.default_rng(5), [], []
     scale = 1e-5 if "Q_1" in own.header and "Q_2" in own.header else 0.3
-    for k in range(4000):
+    if x_0 is not None:
+        getattr(library, f"{own.name}_init_at")(state, (real * n)(*x_0), (real * q)())
+    for k in range(4000 if given is None else len(given)):
         if k % 1000 == 100:
             fault = scale * chance.uniform(-1, 1, q)
             fault[[own_fault["name"].endswith("_rate") for own_fault in own.design["faults"]]] = 0
         y = plant.measured(fault if k >= 100 else np.zeros(q)) + 1e-3 * chance.normal(size=p)
-        step(state, (real * p)(*y), ctypes.c_bool(True), commands, estimates)
-        rows.append([*commands, *estimates])
+        y = y if given is None else given[k]
+        step(state, (real * p)(*y), ctypes.c_bool(True), *more[0], commands, estimates, *more[1])
+        rows.append([*commands, *estimates, *detection.residual])
         measured.append(y)
         plant.step(np.array(commands), fault if k >= 100 else np.zeros(q))
     return np.array(rows), np.array(measured)

@@ -7,6 +7,7 @@
 mod arithmetic;
 mod c;
 mod controller;
+mod detection;
 mod names;
 mod recursion;
 mod rounding;

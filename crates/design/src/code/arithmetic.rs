@@ -4,7 +4,8 @@ use nalgebra::DMatrix;
 
 use super::Precision;
 use super::controller::Controller;
-use super::recursion::{Operation, Recursion, Statement, Term, When};
+use super::detection::{Detection, Method};
+use super::recursion::{Operation, Recursion, Statement, Term};
 use super::schedule::operating_vectors;
 use super::symbols::{Kind, Matrix, Vector};
 use super::tables::{Constants, locals, stored, tables};
@@ -22,8 +23,7 @@ pub(super) struct Arithmetic {
 impl Arithmetic {
     pub(super) fn of(controller: &Controller, recursion: &Recursion) -> Self {
         let mut all = Self::default();
-        let statements = recursion.statements();
-        for statement in statements.filter(|own| own.when != When::NotCompensating) {
+        for statement in recursion.longest() {
             all.add_statement(controller, statement);
         }
         let [n, q, p, m, t, integrals] = Kind::ALL.map(|kind| kind.count(controller));
@@ -34,6 +34,7 @@ impl Arithmetic {
         if controller.is_limited() {
             all.comparisons += 2 * m;
         }
+        all.add_detection(controller);
         // E_hat = -(u scale) f_hat, scale = 1 / (u u + u_e^2).
         let losses = controller.losses.len();
         all.multiplications += 3 * losses;
@@ -54,6 +55,30 @@ impl Arithmetic {
         if controller.is_limited() {
             self.additions += 2 * m;
         }
+    }
+
+    /// The tests, each with an alarm at the end of its window.
+    fn add_detection(&mut self, controller: &Controller) {
+        let Some(own) = &controller.detection else { return };
+        let (residuals, tests) = (own.c.nrows(), own.tests.len());
+        // Finite or not: the residuals and the next state of their filter.
+        self.comparisons += 2 * (residuals + own.a.nrows());
+        match own.method {
+            // Two sums of three terms; each from 0 on, finite or not, above 0; the larger one; the threshold.
+            Method::Cusum => {
+                self.additions += 4 * tests;
+                self.comparisons += 10 * tests;
+            }
+            // Sums of two terms, finite or not; their squares; s, finite or not; the threshold.
+            Method::Window => {
+                self.additions += 2 * residuals;
+                self.multiplications += residuals;
+                self.divisions += tests;
+                self.comparisons += 2 * residuals + 3 * tests;
+            }
+        }
+        // Two times in s.
+        self.multiplications += 2;
     }
 
     fn add_statement(&mut self, controller: &Controller, statement: &Statement) {
@@ -107,11 +132,16 @@ impl Memory {
     pub(super) fn of(controller: &Controller, recursion: &Recursion, precision: Precision) -> Self {
         let size = precision.size();
         let count = |vector: Vector| vector.kind().count(controller);
-        let stored: usize = stored(controller).into_iter().map(count).sum();
+        let mut stored: usize = stored(controller).into_iter().map(count).sum();
         // The commands of the sample before.
-        let stored = stored + Kind::Actuator.count(controller) + controller.schedule_inputs().len();
-        let flags = usize::from(controller.filter.is_some());
-        let counter = if controller.first_compensated > 0 { 4 } else { 0 };
+        stored += Kind::Actuator.count(controller) + controller.schedule_inputs().len();
+        let mut counters = usize::from(controller.has_counter());
+        let mut flags = usize::from(controller.filter.is_some());
+        if let Some(own) = &controller.detection {
+            stored += own.stored();
+            counters += own.counters();
+            flags += own.flags();
+        }
         let mut stack: usize = locals(recursion).into_iter().map(count).sum();
         if controller.schedule.is_some() {
             let operating = operating_vectors(controller);
@@ -119,11 +149,12 @@ impl Memory {
             let limits = if controller.is_limited() { 2 } else { 0 };
             stack += limits * Kind::Actuator.count(controller);
         }
+        let integers = controller.detection.as_ref().map_or(0, Detection::integer_bytes);
         let tables: usize = tables(controller, recursion).iter().map(Constants::count).sum();
         Self {
-            state: (stored * size + counter + flags).next_multiple_of(size),
+            state: (stored * size + 4 * counters + flags).next_multiple_of(size),
             stack: stack * size,
-            constants: tables * size,
+            constants: tables * size + integers,
         }
     }
 }

@@ -1,8 +1,11 @@
 //! The controller in C99: a header and a source file.
 
+mod detection;
 mod header;
 mod sample;
 mod schedule;
+
+pub(super) use detection::reactions;
 
 use std::path::PathBuf;
 
@@ -89,9 +92,13 @@ impl Source<'_> {
         };
         let references = pointer("References", "references", &self.fields.references);
         let schedule = pointer("Schedule", "schedule", &self.fields.schedule);
+        let (reset, detection) = match self.controller.detection {
+            None => ("", String::new()),
+            Some(_) => (", bool detection_reset", format!(",\n    {name}_Detection *detection")),
+        };
         format!(
             "uint32_t {name}_step({name}_State *state, const {name}_Measurements *measurements,\n    \
-             {references}{schedule}bool compensate,\n    {name}_Commands *commands, {name}_Estimates *estimates)"
+             {references}{schedule}bool compensate{reset},\n    {name}_Commands *commands, {name}_Estimates *estimates{detection})"
         )
     }
 
@@ -120,6 +127,7 @@ impl Source<'_> {
         for table in tables(controller, recursion) {
             self.table(&mut lines, &table);
         }
+        self.detection_tables(&mut lines);
         self.helpers(&mut lines);
         self.initialisation(&mut lines);
         self.step(&mut lines);
@@ -225,6 +233,7 @@ static {real} product(const {real} row[], const {real} vector[], uint32_t count)
             ));
         }
         self.schedule_helpers(lines);
+        self.detection_helpers(lines);
         if !self.controller.losses.is_empty() {
             lines.push(format!(
                 "
@@ -243,7 +252,11 @@ static {real} lost_effectiveness({real} u, {real} f_hat, {real} squared_least_co
         let Self { request, controller, real, .. } = self;
         let name = &request.prefix;
         let (n, q) = (self.count(Kind::State), self.count(Kind::Fault));
-        let [x, u, y, r] = starts(controller).map(|(name, _)| name);
+        let [x_op, u, y, r] = starts(controller).map(|(name, _)| name);
+        let x = match controller.detection {
+            Some(_) => format!("\n    {real} x[{n}];"),
+            None => String::new(),
+        };
         let zeros = vec![self.literal(0.0); controller.faults.len()];
         let zeros = wrapped(zeros.into_iter(), "        ").join("\n");
         let zeros = zeros.trim_end_matches(',');
@@ -256,13 +269,13 @@ void {name}_init({name}_State *state)
 {zeros}
     }};
 
-    {name}_init_at(state, {x}, no_faults);
+    {name}_init_at(state, {x_op}, no_faults);
 }}
 
 void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
     const {real} f_hat_0[{q}])
 {{
-    uint32_t i;
+    uint32_t i;{x}
 "
         ));
         let filtered = match controller.filter {
@@ -284,12 +297,13 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
         if let [input] = controller.schedule_inputs() {
             lines.push(format!("    state->theta = {};", self.literal(input.operating)));
         }
-        if controller.first_compensated > 0 {
+        if controller.has_counter() {
             lines.push("    state->sample = 0U;".to_owned());
         }
         if controller.filter.is_some() {
             lines.push("    state->started = false;".to_owned());
         }
+        self.detection_start(lines, x_op);
         lines.push("}".to_owned());
     }
 

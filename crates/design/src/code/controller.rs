@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use serde::Deserialize;
 
 use super::Precision;
+use super::detection::{Detection, DetectionFile};
 use super::schedule::{Schedule, ScheduleFile};
 use super::symbols::Matrix;
 use crate::Error;
@@ -46,6 +47,7 @@ pub(super) struct Controller {
     pub(super) losses: Vec<Loss>,
     /// Matrices and operating points that follow a variable, in place of those above.
     pub(super) schedule: Option<Schedule>,
+    pub(super) detection: Option<Detection>,
 }
 
 /// The measurements that the command is computed from.
@@ -146,6 +148,8 @@ struct File {
     references: Vec<Signal>,
     #[serde(default)]
     schedule: Option<ScheduleFile>,
+    #[serde(default)]
+    detection: Option<DetectionFile>,
 }
 
 /// A matrix as the design file has it.
@@ -183,10 +187,12 @@ impl Controller {
             ))
         })?;
         let faults = file.faults.len();
+        let detection = file.detection.map(|own| Detection::of(own, sample_time)).transpose()?;
         let schedule =
             file.schedule.map(|own| Schedule::of(own, &file.measurements)).transpose()?;
         Ok(Self {
             schedule,
+            detection,
             losses: losses(&file.faults, &file.actuators),
             description: file.description,
             sample_time,
@@ -233,6 +239,11 @@ impl Controller {
         self.schedule.as_ref().and_then(|own| own.matrices(matrix))
     }
 
+    /// Whether an instance counts its samples.
+    pub(super) fn has_counter(&self) -> bool {
+        self.first_compensated > 0 || self.detection.is_some()
+    }
+
     /// Whether any actuator has limits.
     pub(super) fn is_limited(&self) -> bool {
         self.actuators.iter().any(|actuator| actuator.limits.is_some())
@@ -256,6 +267,10 @@ impl Controller {
             if largest > LARGEST_SINGLE {
                 return Err(too_large(&signal.name, largest));
             }
+        }
+        let of_tests = self.detection.iter().flat_map(Detection::numbers);
+        if let Some(value) = of_tests.into_iter().find(|value| value.abs() > LARGEST_SINGLE) {
+            return Err(too_large("[detection]", value));
         }
         if let Some(schedule) = &self.schedule {
             schedule.check_range(precision, LARGEST_SINGLE)?;
@@ -286,7 +301,7 @@ fn too_large(name: &str, value: f64) -> Error {
 
 /// The number of the first sample at which the FMU compensates, from a start at time 0; `None` if it
 /// does not fit into 32 bits.
-fn first_at(t_on: f64, period: f64) -> Option<u32> {
+pub(super) fn first_at(t_on: f64, period: f64) -> Option<u32> {
     let is_on = |sample: f64| {
         let time = sample * period;
         time >= t_on - 8.0 * f64::EPSILON * time

@@ -38,6 +38,9 @@ pub(super) enum When {
     Always,
     Compensating,
     NotCompensating,
+    /// In the sample at the start, and in all others.
+    First,
+    Later,
 }
 
 /// `target[i]` = `start`, then the operations in order, for all i.
@@ -62,6 +65,11 @@ impl Recursion {
         before_limits.extend(estimates(controller));
         before_limits.extend(commands(controller));
         Self { before_limits, after_limits: predictions(controller) }
+    }
+
+    /// The statements of a sample that is not the first one and compensates: the most that a sample has.
+    pub(super) fn longest(&self) -> impl Iterator<Item = &Statement> {
+        self.statements().filter(|own| !matches!(own.when, When::NotCompensating | When::First))
     }
 
     /// All statements in order.
@@ -204,7 +212,30 @@ fn predictions(controller: &Controller) -> Vec<Statement> {
         ));
     }
     all.extend(integrals(controller));
+    if controller.detection.is_some() {
+        all.extend(residuals());
+    }
     all
+}
+
+/// The residuals, which follow the commands that are really applied, and their filter. The sample at the
+/// start has none.
+fn residuals() -> [Statement; 3] {
+    use Operation::Add;
+    use Term::{Product, Zero};
+    let sum = |equation, target, matrices: [Matrix; 3]| {
+        let vectors = [Vector::StoredXR, Vector::U, Vector::Y];
+        let terms = matrices.into_iter().zip(vectors);
+        let operations = terms.map(|(matrix, vector)| Add(Product(matrix, vector))).collect();
+        Statement { operations, ..statement(equation, target, Zero, []) }
+    };
+    let r = [Matrix::ResidualC, Matrix::ResidualDu, Matrix::ResidualDy];
+    let x_r = [Matrix::ResidualA, Matrix::ResidualBu, Matrix::ResidualBy];
+    [
+        Statement { when: When::Later, ..sum("r = C x_r + D_u u + D_y y", Vector::Residual, r) },
+        Statement { when: When::First, ..statement("", Vector::Residual, Zero, []) },
+        sum("x_r[k+1] = A x_r + B_u u + B_y y", Vector::NextXR, x_r),
+    ]
 }
 
 /// The integrals of the distances from the references. The FMU adds `L_w` (u - v) for the commands at a

@@ -17,7 +17,8 @@
 //!
 //! so that G kappa s bounds the differences of the outputs, with the peak-to-peak gains G of that system.
 //! The bound holds in the loop of the design, while faults are compensated and no command is at a limit.
-//! It takes the worst case of every rounding; errors of both signs cancel in practice. A scheduled loop is
+//! The residuals r of a detection are further outputs, and x_r is part of d; their size follows from those of y
+//! and u. The bound takes the worst case of every rounding; errors of both signs cancel in practice. A scheduled loop is
 //! not such a system, and has no bound.
 
 use std::ops::AddAssign as _;
@@ -27,7 +28,7 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::controller::Controller;
-use super::recursion::{Operation, Recursion, Statement, Term, When};
+use super::recursion::{Operation, Recursion, Statement, Term};
 use super::summary::{Fields, aligned, filled};
 use super::symbols::{Kind, Matrix, Vector};
 
@@ -44,7 +45,7 @@ const COARSE: f64 = 0.01;
 
 /// The bound, or the reason why there is none.
 pub(super) struct RoundingBound {
-    /// Outputs (commands, then faults) x signals (as [`Kind::ALL`], then 1).
+    /// Outputs (commands, faults, residuals) x signals (as [`Kind::ALL`], then 1).
     bound: Result<DMatrix<f64>, String>,
     /// 1 - |lambda| of the slowest eigenvalue of the loop.
     slowest: f64,
@@ -56,9 +57,12 @@ impl RoundingBound {
             let reason = "matrices and operating point change with the scheduling variable";
             return Self { bound: Err(reason.to_owned()), slowest: f64::NAN };
         }
-        let mut analysis = Analysis::new(controller);
-        let statements = recursion.statements();
-        for statement in statements.filter(|own| own.when != When::NotCompensating) {
+        let state_of_filter = match residual_states(controller) {
+            Ok(gains) => gains,
+            Err(error) => return Self { bound: Err(error.to_string()), slowest: f64::NAN },
+        };
+        let mut analysis = Analysis::new(controller, state_of_filter);
+        for statement in recursion.longest() {
             analysis.follow(statement);
         }
         let order = analysis.order();
@@ -113,6 +117,8 @@ impl RoundingBound {
         let mut outputs: Vec<_> =
             fields.actuators.iter().map(|field| format!("Commands.{field}")).collect();
         outputs.extend(fields.faults.iter().map(|field| format!("Estimates.f_hat_{field}")));
+        let residuals = bound.nrows() - outputs.len();
+        outputs.extend((0..residuals).map(|k| format!("Detection.residual[{k}]")));
         let mut signals = named("x_hat_", &fields.states);
         signals.extend(named("f_hat_", &fields.faults));
         signals.extend(named("", &fields.measurements));
@@ -134,6 +140,27 @@ impl RoundingBound {
         }
         lines
     }
+}
+
+/// A bound of the elements of `x_r` in a run from the operating point, states x signals: the peak-to-peak
+/// gains of the filter from the commands and the measurements.
+fn residual_states(controller: &Controller) -> Result<DMatrix<f64>, Error> {
+    let signals: usize = Kind::ALL.map(|kind| kind.count(controller)).iter().sum();
+    let k = Kind::ResidualState.count(controller);
+    let mut all = DMatrix::zeros(k, signals + 1);
+    let Some(own) = &controller.detection else { return Ok(all) };
+    for (kind, b) in [(Kind::Actuator, &own.b_u), (Kind::Measurement, &own.b_y)] {
+        let system = StateSpace {
+            a: own.a.clone(),
+            b: b.clone(),
+            c: DMatrix::identity(k, k),
+            d: DMatrix::zeros(k, b.ncols()),
+            domain: Domain::Sampled { period: controller.sample_time },
+        };
+        let gain = peak_gain(&system, WIDTH)?.upper;
+        all.columns_mut(first_signal(kind, controller), b.ncols()).copy_from(&gain);
+    }
+    Ok(all)
 }
 
 /// The place of the signals of a kind among all signals.
@@ -218,14 +245,17 @@ fn constant_error(value: f64) -> f64 {
 /// Follows the statements of a sample.
 struct Analysis<'a> {
     controller: &'a Controller,
+    /// A bound of the elements of `x_r`, states x signals; see [`residual_states`].
+    state_of_filter: DMatrix<f64>,
     known: Vec<(Vector, Elements)>,
     /// kappa: a row over the signals for each error.
     errors: Vec<RowDVector<f64>>,
 }
 
 impl<'a> Analysis<'a> {
-    fn new(controller: &'a Controller) -> Self {
-        let mut own = Self { controller, known: Vec::new(), errors: Vec::new() };
+    fn new(controller: &'a Controller, state_of_filter: DMatrix<f64>) -> Self {
+        let (known, errors) = (Vec::new(), Vec::new());
+        let mut own = Self { controller, state_of_filter, known, errors };
         let [n, p] = [Kind::State, Kind::Measurement].map(|kind| own.count(kind));
         own.start(Vector::StoredXHat, |form| form.columns_mut(n, n).fill_with_identity());
         let q = own.count(Kind::Fault);
@@ -253,6 +283,10 @@ impl<'a> Analysis<'a> {
         own.start(Vector::StoredXI, |form| {
             form.columns_mut(2 * n + q, integrals).fill_with_identity();
         });
+        let k = own.count(Kind::ResidualState);
+        own.start(Vector::StoredXR, |form| {
+            form.columns_mut(2 * n + q + integrals, k).fill_with_identity();
+        });
         own.start(Vector::Referred, |_| {});
         for vector in [Vector::Measured, Vector::Referred] {
             let mut rounded = own.get(vector);
@@ -266,15 +300,18 @@ impl<'a> Analysis<'a> {
         kind.count(self.controller)
     }
 
-    /// States of the loop: plant, stored `x_hat`, stored `f_hat`, `x_i`.
+    /// States of the loop: plant, stored `x_hat`, stored `f_hat`, `x_i`, `x_r`.
     fn order(&self) -> usize {
-        2 * self.count(Kind::State) + self.count(Kind::Fault) + self.count(Kind::Integral)
+        let [n, q, t, k] = [Kind::State, Kind::Fault, Kind::Integral, Kind::ResidualState]
+            .map(|kind| self.count(kind));
+        2 * n + q + t + k
     }
 
     /// The columns of forms, with room for the errors of 6 vectors of each kind, and the signals.
     fn widths(&self) -> (usize, usize) {
         let signals: usize = Kind::ALL.map(|kind| self.count(kind)).iter().sum();
-        (self.order() + 6 * signals, signals + 1)
+        let detection = self.count(Kind::ResidualState) + self.count(Kind::Residual);
+        (self.order() + 6 * signals + detection, signals + 1)
     }
 
     /// Sets the exact elements of a vector at the start of a sample.
@@ -311,6 +348,11 @@ impl<'a> Analysis<'a> {
     /// A bound of the elements of a vector, from the largest deviations of the signals.
     fn magnitude(&self, vector: Vector) -> DMatrix<f64> {
         let (rows, signals) = (self.count(vector.kind()), self.widths().1);
+        match vector {
+            Vector::StoredXR | Vector::NextXR => return self.state_of_filter.clone(),
+            Vector::Residual => return self.residual_magnitude(),
+            _ => {}
+        }
         let mut own = DMatrix::zeros(rows, signals);
         own.columns_mut(first_signal(vector.kind(), self.controller), rows).fill_with_identity();
         let operating = match vector {
@@ -329,6 +371,19 @@ impl<'a> Analysis<'a> {
             own[(i, signals - 1)] = signal.operating.abs();
         }
         own
+    }
+
+    /// |r| <= |C| |x_r| + |D_u| |u| + |D_y| |y|, residuals x signals.
+    fn residual_magnitude(&self) -> DMatrix<f64> {
+        let Some(own) = &self.controller.detection else {
+            return DMatrix::zeros(0, self.widths().1);
+        };
+        let mut all = own.c.abs() * &self.state_of_filter;
+        for (kind, matrix) in [(Kind::Actuator, &own.d_u), (Kind::Measurement, &own.d_y)] {
+            let first = first_signal(kind, self.controller);
+            all.columns_mut(first, matrix.ncols()).add_assign(&matrix.abs());
+        }
+        all
     }
 
     /// Takes the elements that a statement computes; their errors become elements of w.
@@ -395,7 +450,7 @@ impl<'a> Analysis<'a> {
         own
     }
 
-    /// The loop from the errors w to [u; `f_hat`].
+    /// The loop from the errors w to [u; `f_hat`; r].
     fn system(&self) -> StateSpace {
         let ([n, q, p, m, _, integrals], order) =
             (Kind::ALL.map(|kind| self.count(kind)), self.order());
@@ -410,9 +465,12 @@ impl<'a> Analysis<'a> {
         next.rows_mut(n, n).copy_from(&self.get(Vector::NextXHat).form);
         next.rows_mut(2 * n, q).copy_from(&self.get(Vector::NextFHat).form);
         next.rows_mut(2 * n + q, integrals).copy_from(&self.get(Vector::NextXI).form);
-        let mut outputs = DMatrix::zeros(m + q, self.widths().0);
+        let [k, residuals] = [Kind::ResidualState, Kind::Residual].map(|kind| self.count(kind));
+        next.rows_mut(order - k, k).copy_from(&self.get(Vector::NextXR).form);
+        let mut outputs = DMatrix::zeros(m + q + residuals, self.widths().0);
         outputs.rows_mut(0, m).copy_from(&command);
         outputs.rows_mut(m, q).copy_from(&self.get(Vector::FValue).form);
+        outputs.rows_mut(m + q, residuals).copy_from(&self.get(Vector::Residual).form);
         StateSpace {
             a: next.columns(0, order).into_owned(),
             b: next.columns(order, inputs).into_owned(),

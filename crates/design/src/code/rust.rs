@@ -1,5 +1,6 @@
 //! The controller as a Rust crate without the standard library.
 
+mod detection;
 mod sample;
 mod schedule;
 mod types;
@@ -97,6 +98,10 @@ impl Source<'_> {
             (Kind::Measurement, "measurements"),
             (Kind::Reference, "references"),
             (Kind::Point, "points of the schedule"),
+            (Kind::ResidualState, "states of the filter of the residuals"),
+            (Kind::Residual, "residuals"),
+            (Kind::Test, "tests of the residuals"),
+            (Kind::Suspect, "faults that the detection knows"),
         ] {
             if kind.count(controller) == 0 {
                 continue;
@@ -115,12 +120,18 @@ impl Source<'_> {
             let first = controller.first_compensated;
             lines.push(format!("const FIRST_COMPENSATED: u32 = {first};"));
         }
+        if let Some(own) = &controller.detection {
+            lines.push("/// The first sample whose residuals are tested.".to_owned());
+            lines.push(format!("const FIRST_TESTED: u32 = {};", own.first_tested));
+        }
         for table in tables(controller, recursion) {
             self.table(&mut lines, &table);
         }
+        self.detection_tables(&mut lines);
         self.structures(&mut lines);
         self.start(&mut lines);
         self.step(&mut lines);
+        self.detection_methods(&mut lines);
         self.helpers(&mut lines);
         let mut text = lines.join("\n");
         text.push('\n');
@@ -199,6 +210,7 @@ fn product(row: &[{real}], vector: &[{real}]) -> {real} {{
             ));
         }
         self.schedule_helpers(lines);
+        self.detection_helpers(lines);
         if !self.controller.losses.is_empty() {
             lines.push(format!(
                 "

@@ -2,6 +2,7 @@
 
 use super::arithmetic::{Arithmetic, Memory};
 use super::controller::{Controller, Estimator, Loss, Signal};
+use super::detection::Method;
 use super::names::fields;
 use super::recursion::Recursion;
 use super::rounding::RoundingBound;
@@ -106,6 +107,7 @@ pub(super) fn summary(
     section(&mut lines, "TIMING", &timing(request, controller, vocabulary));
     section(&mut lines, "COMPENSATION AND LIMITS", &modes(controller));
     section(&mut lines, "SCHEDULE", &schedule(controller, vocabulary));
+    section(&mut lines, "DETECTION", &detection(controller, request.precision));
     lines.extend([String::new(), "SIGNALS".to_owned()]);
     lines.extend(signals(controller, fields));
     section(&mut lines, "STATUS", &status(controller, vocabulary));
@@ -287,6 +289,69 @@ fn signals(controller: &Controller, fields: &Fields) -> Vec<String> {
     lines
 }
 
+/// The tests, and the meaning of the outputs of a detection.
+fn detection(controller: &Controller, precision: Precision) -> Vec<String> {
+    let Some(own) = &controller.detection else { return Vec::new() };
+    let faults: Vec<_> = own
+        .faults
+        .iter()
+        .enumerate()
+        .map(|(k, name)| format!("{} {}", k + 1, one_line(name)))
+        .collect();
+    let method = match own.method {
+        Method::Cusum => {
+            "cumulative sums of a residual, S+ = max(0, S+ + r - drift) and S- = max(0, S- - r - drift); the \
+             statistic is the larger one"
+        }
+        Method::Window => {
+            "the mean of residuals over a window of N samples; the statistic is s = |sum of r|^2 / N of the last \
+             whole window"
+        }
+    };
+    let mut all = vec![
+        format!(
+            "Residuals r, white with variance 1 without faults, are computed in each sample but the first one, \
+             whether faults are compensated or not, and tested from sample {} on by {method}. A statistic above \
+             its threshold is an alarm.",
+            own.first_tested
+        ),
+        format!(
+            "Detection.detected: there was an alarm since the last sample with `detection_reset`, which clears \
+             statistics and decision. Detection.isolated: the fault that the alarms fit ({}); 0 without an alarm, \
+             -1 if they fit none or several. Detection.t_detected and Detection.t_onset: times of the first alarm \
+             and of the estimated start of the fault, in s after the start; -1 before. After 2^32 samples these \
+             times no longer increase.",
+            faults.join(", ")
+        ),
+    ];
+    let mut first = 0;
+    for (k, test) in own.tests.iter().enumerate() {
+        let last = first + test.residuals;
+        let residuals = if test.residuals == 1 { "" } else { "s" };
+        let range: Vec<_> = (first..last).map(|row| row.to_string()).collect();
+        let window = match own.method {
+            Method::Cusum => format!(", drift {:?}", test.drift),
+            Method::Window => format!(", N = {}", test.window),
+        };
+        all.push(format!(
+            "Test {k}, {}: residual{residuals} {}{window}, threshold {:?}",
+            one_line(&test.name),
+            range.join(", "),
+            test.threshold
+        ));
+        first = last;
+    }
+    if precision == Precision::Single {
+        all.push(
+            "In `float` the residuals have the bound below, in a run from the operating point; the statistics add \
+             up their errors and have none, so that an alarm may be given one or more samples earlier or later \
+             than in `double`."
+                .to_owned(),
+        );
+    }
+    all
+}
+
 /// What follows the scheduling variable, and where it is held.
 fn schedule(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
     let Some(schedule) = &controller.schedule else { return Vec::new() };
@@ -314,6 +379,10 @@ fn status(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
         None => "at the operating point",
         Some(_) => "in the column `start`",
     };
+    let kept = match controller.detection {
+        None => " and estimates",
+        Some(_) => ", estimates, residuals, statistics and decision",
+    };
     let mut all = vec![
         format!(
             "{held}: a {inputs} was NaN or infinite; its last finite value was used, before the first \
@@ -321,7 +390,7 @@ fn status(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
         ),
         format!("{at_limit}: a command is at a limit."),
         format!(
-            "{overflow}: a sum was beyond the range of {real}; commands and estimates keep their values. \
+            "{overflow}: a sum was beyond the range of {real}; commands{kept} keep their values. \
              So every output is a finite number in every sample."
         ),
     ];

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::controller::Controller;
+use super::detection;
 
 /// A vector of the recursion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +18,9 @@ pub(super) enum Vector {
     Referred,
     /// The integrals of the distances from the references.
     StoredXI,
+    /// The state of the filter of the residuals, and the residuals of the last sample.
+    StoredXR,
+    StoredResidual,
     /// The operating point.
     XOp,
     UOp,
@@ -43,6 +47,9 @@ pub(super) enum Vector {
     NextFHat,
     NextYF,
     NextXI,
+    /// The residuals of this sample, and the state of their filter for the next one.
+    Residual,
+    NextXR,
 }
 
 /// A matrix of the controller.
@@ -62,10 +69,17 @@ pub(super) enum Matrix {
     FI,
     LW,
     NR,
+    /// A, `B_u`, `B_y`, C, `D_u`, `D_y` of the detection.
+    ResidualA,
+    ResidualBu,
+    ResidualBy,
+    ResidualC,
+    ResidualDu,
+    ResidualDy,
 }
 
 impl Matrix {
-    pub(super) const ALL: [Self; 14] = [
+    pub(super) const ALL: [Self; 20] = [
         Self::A,
         Self::B,
         Self::C,
@@ -80,6 +94,12 @@ impl Matrix {
         Self::FI,
         Self::LW,
         Self::NR,
+        Self::ResidualA,
+        Self::ResidualBu,
+        Self::ResidualBy,
+        Self::ResidualC,
+        Self::ResidualDu,
+        Self::ResidualDy,
     ];
 
     /// The matrix of a controller, if it has it.
@@ -99,6 +119,22 @@ impl Matrix {
             Self::FI => return controller.f_i.as_ref(),
             Self::LW => return controller.l_w.as_ref(),
             Self::NR => return controller.n_r.as_ref(),
+            Self::ResidualA
+            | Self::ResidualBu
+            | Self::ResidualBy
+            | Self::ResidualC
+            | Self::ResidualDu
+            | Self::ResidualDy => {
+                let own = controller.detection.as_ref()?;
+                match self {
+                    Self::ResidualA => &own.a,
+                    Self::ResidualBu => &own.b_u,
+                    Self::ResidualBy => &own.b_y,
+                    Self::ResidualC => &own.c,
+                    Self::ResidualDu => &own.d_u,
+                    _ => &own.d_y,
+                }
+            }
         })
     }
 
@@ -119,6 +155,12 @@ impl Matrix {
             Self::FI => "F_i",
             Self::LW => "L_w",
             Self::NR => "N_r",
+            Self::ResidualA => "A_r",
+            Self::ResidualBu => "B_ru",
+            Self::ResidualBy => "B_ry",
+            Self::ResidualC => "C_r",
+            Self::ResidualDu => "D_ru",
+            Self::ResidualDy => "D_ry",
         }
     }
 }
@@ -149,6 +191,10 @@ impl Vector {
             Self::Excess => "excess",
             Self::XIValue => "x_i_value",
             Self::NextXI => "next_x_i",
+            Self::StoredXR => "x_r",
+            Self::StoredResidual => "residual",
+            Self::Residual => "next_residual",
+            Self::NextXR => "next_x_r",
         }
     }
 
@@ -160,6 +206,8 @@ impl Vector {
                 | Self::StoredFHat
                 | Self::StoredYF
                 | Self::StoredXI
+                | Self::StoredXR
+                | Self::StoredResidual
                 | Self::Measured
                 | Self::Referred
         )
@@ -175,6 +223,8 @@ impl Vector {
             Self::UOp | Self::U | Self::V | Self::Excess | Self::Command => Kind::Actuator,
             Self::Referred | Self::ROp | Self::R => Kind::Reference,
             Self::StoredXI | Self::XIValue | Self::NextXI => Kind::Integral,
+            Self::StoredXR | Self::NextXR => Kind::ResidualState,
+            Self::StoredResidual | Self::Residual => Kind::Residual,
             Self::StoredYF
             | Self::Measured
             | Self::YOp
@@ -196,8 +246,13 @@ pub(super) enum Kind {
     Reference,
     /// The integral of the distance from a reference.
     Integral,
-    /// A point of the schedule: no signal.
+    /// No signals: a point of the schedule; of the detection a state of its filter, a residual, a test, a fault
+    /// that it can isolate.
     Point,
+    ResidualState,
+    Residual,
+    Test,
+    Suspect,
 }
 
 impl Kind {
@@ -220,8 +275,15 @@ impl Kind {
             Self::Reference => controller.references.len(),
             Self::Integral => controller.h.as_ref().map_or(0, DMatrix::nrows),
             Self::Point => controller.schedule.as_ref().map_or(0, |own| own.points.len()),
+            Self::ResidualState | Self::Residual | Self::Test | Self::Suspect => {
+                detection::count(self, controller)
+            }
         }
     }
+
+    /// The kinds that are no signals.
+    pub(super) const OTHERS: [Self; 5] =
+        [Self::Point, Self::ResidualState, Self::Residual, Self::Test, Self::Suspect];
 
     /// The name of their number.
     pub(super) fn plural(self) -> &'static str {
@@ -232,6 +294,10 @@ impl Kind {
             Self::Measurement => "MEASUREMENTS",
             Self::Reference | Self::Integral => "REFERENCES",
             Self::Point => "POINTS",
+            Self::ResidualState => "RESIDUAL_STATES",
+            Self::Residual => "RESIDUALS",
+            Self::Test => "TESTS",
+            Self::Suspect => "SUSPECTS",
         }
     }
 }

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::controller::{Controller, Signal};
+use super::detection::{self, Detection};
 use super::recursion::{Operation, Recursion, Term};
 use super::schedule::operating_vectors;
 use super::symbols::{Kind, Matrix, Vector};
@@ -14,6 +15,9 @@ pub(super) fn stored(controller: &Controller) -> Vec<Vector> {
     all.push(Vector::Measured);
     all.extend((!controller.references.is_empty()).then_some(Vector::Referred));
     all.extend(controller.h.is_some().then_some(Vector::StoredXI));
+    if controller.detection.is_some() {
+        all.extend(detection::STORED);
+    }
     all
 }
 
@@ -24,6 +28,10 @@ pub(super) fn kept(controller: &Controller) -> Vec<(Vector, Vector)> {
     let filtered = (Vector::NextYF, Vector::StoredYF);
     all.extend(controller.filter.is_some().then_some(filtered));
     all.extend(controller.h.is_some().then_some((Vector::NextXI, Vector::StoredXI)));
+    if controller.detection.is_some() {
+        let next = [Vector::NextXR, Vector::Residual];
+        all.extend(next.into_iter().zip(detection::STORED));
+    }
     all
 }
 
@@ -62,7 +70,12 @@ impl Constants {
         self.values.iter().map(Vec::len).sum()
     }
 
-    fn vector(name: &'static str, meaning: &'static str, rows: Kind, values: Vec<f64>) -> Self {
+    pub(super) fn vector(
+        name: &'static str,
+        meaning: &'static str,
+        rows: Kind,
+        values: Vec<f64>,
+    ) -> Self {
         Self { name, meaning, rows, columns: None, is_scheduled: false, values: vec![values] }
     }
 }
@@ -107,6 +120,7 @@ pub(super) fn tables(controller: &Controller, recursion: &Recursion) -> Vec<Cons
         Constants::vector("filter", "gains of the measurement filter", Kind::Measurement, filter)
     }));
     all.extend(schedule(controller));
+    all.extend(controller.detection.iter().flat_map(Detection::tables));
     let meanings = if controller.schedule.is_some() {
         ["values at the start", "", "", ""]
     } else {

@@ -30,7 +30,7 @@ impl Source<'_> {
             "/* Numbers of signals. */".to_owned(),
         ]);
         let kinds = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Integral);
-        let kinds = kinds.chain([Kind::Point]);
+        let kinds = kinds.chain(Kind::OTHERS);
         for kind in kinds.filter(|kind| kind.count(controller) > 0) {
             lines.push(format!("#define {} {}U", self.count(kind), kind.count(controller)));
         }
@@ -44,6 +44,13 @@ impl Source<'_> {
                 String::new(),
                 "/* The first sample at which faults are compensated. */".to_owned(),
                 format!("#define {capital}_FIRST_COMPENSATED {}U", controller.first_compensated),
+            ]);
+        }
+        if let Some(own) = &controller.detection {
+            lines.extend([
+                String::new(),
+                "/* The first sample whose residuals are tested. */".to_owned(),
+                format!("#define {capital}_FIRST_TESTED {}U", own.first_tested),
             ]);
         }
         lines.extend([
@@ -66,6 +73,7 @@ impl Source<'_> {
         }
         self.structure(&mut lines, "Commands", &fields.actuators);
         self.structure(&mut lines, "Estimates", &fields.estimates(controller));
+        self.detection_structure(&mut lines);
         lines.push("/* One instance; its fields belong to the functions below. */".to_owned());
         lines.extend(["typedef struct".to_owned(), "{".to_owned()]);
         for vector in stored(controller).into_iter().chain([Vector::U]) {
@@ -75,9 +83,11 @@ impl Source<'_> {
         if !fields.schedule.is_empty() {
             lines.push(format!("    {real} theta;"));
         }
-        if controller.first_compensated > 0 {
+        self.detection_state(&mut lines, true);
+        if controller.has_counter() {
             lines.push("    uint32_t sample;".to_owned());
         }
+        self.detection_state(&mut lines, false);
         if controller.filter.is_some() {
             lines.push("    bool started;".to_owned());
         }

@@ -118,6 +118,14 @@ impl Source<'_> {
             self.loop_over(lines, 2, next.kind(), &[&body]);
         }
         self.loop_over(lines, 2, Kind::Actuator, &["            state->u[i] = command[i];"]);
+        if self.controller.detection.is_some() {
+            lines.extend([
+                "        if (state->sample > 0U)".to_owned(),
+                "        {".to_owned(),
+                "            detect(state, detection_reset);".to_owned(),
+                "        }".to_owned(),
+            ]);
+        }
         lines.extend(["    }".to_owned(), "    else".to_owned(), "    {".to_owned()]);
         for (value, stored) in shown(self.controller) {
             let body = format!("            {}[i] = {};", value.name(), element(stored));
@@ -133,9 +141,14 @@ impl Source<'_> {
             },
             "    }".to_owned(),
         ]);
-        if self.controller.first_compensated > 0 {
+        if self.controller.has_counter() {
+            // The times of a detection follow from the number of samples.
+            let last = match self.controller.detection {
+                None => format!("{capital}_FIRST_COMPENSATED"),
+                Some(_) => "UINT32_MAX".to_owned(),
+            };
             lines.extend([
-                format!("    if (state->sample < {capital}_FIRST_COMPENSATED)"),
+                format!("    if (state->sample < {last})"),
                 "    {".to_owned(),
                 "        state->sample++;".to_owned(),
                 "    }".to_owned(),
@@ -167,6 +180,7 @@ impl Source<'_> {
         for (i, field) in fields.integrals.iter().enumerate() {
             lines.push(format!("    estimates->x_i_{field} = x_i_value[{i}];"));
         }
+        self.detection_outputs(lines);
     }
 
     fn statement(&self, lines: &mut Vec<String>, statement: &Statement) {
@@ -179,6 +193,8 @@ impl Source<'_> {
             When::Always => {}
             When::Compensating => lines.push("    if (compensating)".to_owned()),
             When::NotCompensating => lines.push("    if (!compensating)".to_owned()),
+            When::First => lines.push("    if (state->sample == 0U)".to_owned()),
+            When::Later => lines.push("    if (state->sample > 0U)".to_owned()),
         }
         if depth > 0 {
             lines.push("    {".to_owned());

@@ -22,11 +22,12 @@ impl Source<'_> {
                 taken.push_str(&held);
             }
         }
+        let reset = if controller.detection.is_some() { ", detection_reset: bool" } else { "" };
         lines.push(format!(
             "
     /// Takes a sample.
     #[must_use]
-    pub fn step(&mut self, measurements: &Measurements,{parameters} compensate: bool) -> Outputs {{
+    pub fn step(&mut self, measurements: &Measurements,{parameters} compensate: bool{reset}) -> Outputs {{
         let mut status = Status::default();
         // The last finite inputs.
         let measured: [{real}; MEASUREMENTS] = (*measurements).into();{pairs}
@@ -86,7 +87,11 @@ impl Source<'_> {
         lines.extend(kept.iter().map(|(next, own)| {
             format!("            {} = {};", owned(controller, *own), next.name())
         }));
-        lines.push("            self.u = command;\n        } else {".to_owned());
+        lines.push("            self.u = command;".to_owned());
+        if controller.detection.is_some() {
+            lines.push("            if self.sample > 0 {\n                self.detect(detection_reset);\n            }".to_owned());
+        }
+        lines.push("        } else {".to_owned());
         for (value, stored) in shown(controller) {
             lines.push(format!("            {} = {};", value.name(), owned(controller, stored)));
         }
@@ -94,7 +99,10 @@ impl Source<'_> {
             "            status.at_limit = false;\n            status.overflow = true;\n        }"
                 .to_owned(),
         );
-        if controller.first_compensated > 0 {
+        if controller.detection.is_some() {
+            // The times of a detection follow from the number of samples.
+            lines.push("        self.sample = self.sample.saturating_add(1);".to_owned());
+        } else if controller.first_compensated > 0 {
             lines.push(
                 "        self.sample = FIRST_COMPENSATED.min(self.sample.saturating_add(1));"
                     .to_owned(),
@@ -123,12 +131,17 @@ impl Source<'_> {
             )
         });
         let values = states.iter().chain(&faults).cloned().chain(losses).chain(integrals);
+        let detection = match controller.detection {
+            None => "",
+            Some(_) => ", detection: self.detection()",
+        };
         lines.push("        let estimates = Estimates {".to_owned());
         for (field, value) in fields.estimates(controller).iter().zip(values) {
             lines.push(format!("            {field}: {value},"));
         }
         lines.push(
-            "        };\n        Outputs { commands, estimates, status }\n    }\n}".to_owned(),
+            "        };\n        Outputs { commands, estimates, status, DETECTION }\n    }\n}"
+                .replace(", DETECTION", detection),
         );
     }
 }
@@ -158,6 +171,8 @@ fn write_statement(lines: &mut Vec<String>, controller: &Controller, statement: 
         When::Always => {}
         When::Compensating => lines.push("        if compensating {".to_owned()),
         When::NotCompensating => lines.push("        if !compensating {".to_owned()),
+        When::First => lines.push("        if self.sample == 0 {".to_owned()),
+        When::Later => lines.push("        if self.sample > 0 {".to_owned()),
     }
     lines.push(format!("{indent}for {} in {} {{", zipped.pattern, zipped.iterator));
     let last = sums.pop().unwrap_or_default();

@@ -50,6 +50,13 @@ impl Source<'_> {
             lines.push(format!("        [{}]", reads.join(", ")));
             lines.push("    }\n}".to_owned());
         }
+        self.detection_structure(lines);
+        let detection = match controller.detection {
+            None => "",
+            Some(_) => {
+                "\n    /// Decision, residuals and statistics.\n    pub detection: Detection,"
+            }
+        };
         let outside = match controller.schedule {
             None => "",
             Some(_) => {
@@ -77,7 +84,7 @@ pub struct Outputs {{
     /// The commands.
     pub commands: Commands,
     /// The estimates.
-    pub estimates: Estimates,
+    pub estimates: Estimates,{detection}
     /// What was unusual.
     pub status: Status,
 }}
@@ -92,7 +99,8 @@ pub struct Controller {{"
         if !controller.schedule_inputs().is_empty() {
             lines.push(format!("    theta: [{real}; 1],"));
         }
-        if controller.first_compensated > 0 {
+        self.detection_state(lines);
+        if controller.has_counter() {
             lines.push("    sample: u32,".to_owned());
         }
         if controller.filter.is_some() {
@@ -104,6 +112,19 @@ pub struct Controller {{"
     pub(super) fn start(&self, lines: &mut Vec<String>) {
         let Self { controller, real, .. } = self;
         let [x, u, y, r] = starts(controller).map(|(name, _)| name.to_ascii_uppercase());
+        let filter = match controller.detection {
+            None => String::new(),
+            Some(_) => format!(
+                "
+        let (mut deviations, mut x_r) = (x_hat, [0.0; RESIDUAL_STATES]);
+        for (own, x_op) in deviations.iter_mut().zip(&{x}) {{
+            *own -= *x_op;
+        }}
+        for (own, row) in x_r.iter_mut().zip(&START_R) {{
+            *own = 0.0 + product(row, &deviations);
+        }}"
+            ),
+        };
         lines.push(format!(
             "
 impl Default for Controller {{
@@ -121,7 +142,7 @@ impl Controller {{
 
     /// Starts at these estimates of states and faults.
     #[must_use]
-    pub fn starting_at(x_hat: [{real}; STATES], f_hat: [{real}; FAULTS]) -> Self {{
+    pub fn starting_at(x_hat: [{real}; STATES], f_hat: [{real}; FAULTS]) -> Self {{{filter}
         Self {{
             x_hat,
             f_hat,"
@@ -129,8 +150,12 @@ impl Controller {{
         if controller.filter.is_some() {
             lines.push(format!("            y_f: {y},\n            started: false,"));
         }
-        if controller.first_compensated > 0 {
+        self.detection_start(lines);
+        if controller.has_counter() {
             lines.push("            sample: 0,".to_owned());
+        }
+        if controller.detection.is_some() {
+            lines.push("            x_r,\n            residual: [0.0; RESIDUALS],".to_owned());
         }
         if !controller.references.is_empty() {
             lines.push(format!("            r: {r},"));

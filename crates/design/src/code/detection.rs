@@ -1,0 +1,195 @@
+//! The detection of a controller: the filter of the residuals is part of the recursion, the tests and the
+//! decision are here as data. `fmu-controller/src/detection.rs` has the equations.
+
+use nalgebra::DMatrix;
+use serde::Deserialize;
+
+use super::controller::{Controller, Rows, first_at};
+use super::symbols::{Kind, Vector};
+use super::tables::Constants;
+use crate::Error;
+
+/// The detection of a design.
+pub(super) struct Detection {
+    /// The first sample whose residuals are tested; at least 1, as the sample at the start has none.
+    pub(super) first_tested: u32,
+    /// A, k x k, of the filter x_r[k+1] = A x_r[k] + B_u u[k] + B_y y[k].
+    pub(super) a: DMatrix<f64>,
+    pub(super) b_u: DMatrix<f64>,
+    pub(super) b_y: DMatrix<f64>,
+    /// C, rows x k, of the residuals r[k] = C x_r[k] + D_u u[k] + D_y y[k].
+    pub(super) c: DMatrix<f64>,
+    pub(super) d_u: DMatrix<f64>,
+    pub(super) d_y: DMatrix<f64>,
+    /// The initial x_r is this matrix times the initial deviations of the states; k x n.
+    pub(super) start: DMatrix<f64>,
+    /// The faults that a decision counts from 1.
+    pub(super) faults: Vec<String>,
+    pub(super) method: Method,
+    pub(super) tests: Vec<Test>,
+}
+
+/// What all tests of a detection do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Method {
+    /// Two cumulative sums of one residual.
+    Cusum,
+    /// The squared mean of several residuals over a window.
+    Window,
+}
+
+/// A test of some rows of r in turn.
+pub(super) struct Test {
+    pub(super) name: String,
+    pub(super) residuals: usize,
+    /// kappa of the cumulative sums, or 0.
+    pub(super) drift: f64,
+    /// The samples of a window, or 0.
+    pub(super) window: u32,
+    pub(super) threshold: f64,
+    /// For each fault whether this test reacts to it.
+    pub(super) reacts: Vec<bool>,
+}
+
+/// The table `[detection]` of a design file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DetectionFile {
+    from: f64,
+    #[serde(rename = "A")]
+    a: Rows,
+    #[serde(rename = "B_u")]
+    b_u: Rows,
+    #[serde(rename = "B_y")]
+    b_y: Rows,
+    #[serde(rename = "C")]
+    c: Rows,
+    #[serde(rename = "D_u")]
+    d_u: Rows,
+    #[serde(rename = "D_y")]
+    d_y: Rows,
+    start: Rows,
+    faults: Vec<String>,
+    tests: Vec<TestFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TestFile {
+    name: String,
+    residuals: usize,
+    #[serde(default)]
+    drift: Option<f64>,
+    #[serde(default)]
+    window: Option<u32>,
+    threshold: f64,
+    reacts: Vec<bool>,
+}
+
+impl Detection {
+    /// The detection of a design file with this sample time in s.
+    pub(super) fn of(file: DetectionFile, sample_time: f64) -> Result<Self, Error> {
+        let first_tested = first_at(file.from, sample_time).ok_or_else(|| {
+            Error::Invalid(format!(
+                "detection.from = {} s is more than 2^32 samples of {sample_time} s after the start; a \
+                 counter of the code has 32 bits",
+                file.from
+            ))
+        })?;
+        let cusums = file.tests.iter().filter(|test| test.drift.is_some()).count();
+        let method = match file.tests.len() - cusums {
+            0 => Method::Cusum,
+            windows if windows == file.tests.len() => Method::Window,
+            _ => {
+                let text = "only the FMU has this controller: its detection has cumulative sums and windows";
+                return Err(Error::Invalid(text.to_owned()));
+            }
+        };
+        let test = |own: TestFile| Test {
+            name: own.name,
+            residuals: own.residuals,
+            drift: own.drift.unwrap_or_default(),
+            window: own.window.unwrap_or_default(),
+            threshold: own.threshold,
+            reacts: own.reacts,
+        };
+        Ok(Self {
+            first_tested: first_tested.max(1),
+            a: file.a.dense(),
+            b_u: file.b_u.dense(),
+            b_y: file.b_y.dense(),
+            c: file.c.dense(),
+            d_u: file.d_u.dense(),
+            d_y: file.d_y.dense(),
+            start: file.start.dense(),
+            faults: file.faults,
+            method,
+            tests: file.tests.into_iter().map(test).collect(),
+        })
+    }
+
+    /// The numbers of the tests and of the start of the filter, for a check of their range.
+    pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
+        let tests = self.tests.iter().flat_map(|test| [test.drift, test.threshold]);
+        self.start.iter().copied().chain(tests)
+    }
+
+    /// The constants of the tests in real numbers, and the start of the filter.
+    pub(super) fn tables(&self) -> Vec<Constants> {
+        let of_tests = |name, meaning, value: fn(&Test) -> f64| {
+            Constants::vector(name, meaning, Kind::Test, self.tests.iter().map(value).collect())
+        };
+        let start = Constants {
+            name: "start_r",
+            meaning: "start of x_r, times the deviations of the states",
+            rows: Kind::ResidualState,
+            columns: Some(Kind::State),
+            is_scheduled: false,
+            values: self.start.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        };
+        let mut all = vec![start];
+        if self.method == Method::Cusum {
+            all.push(of_tests("drift", "tests", |test| test.drift));
+        }
+        let meaning = if self.method == Method::Cusum { "" } else { "tests" };
+        all.push(of_tests("threshold", meaning, |test| test.threshold));
+        all
+    }
+
+    /// The real numbers of an instance besides the vectors of the recursion: statistics and sums.
+    pub(super) fn stored(&self) -> usize {
+        self.tests.len()
+            + if self.method == Method::Cusum { 2 * self.tests.len() } else { self.c.nrows() }
+    }
+
+    /// The 32-bit counters of an instance besides that of the samples: the starts of sums or windows, the
+    /// samples in windows, alarm and onset, the isolated fault.
+    pub(super) fn counters(&self) -> usize {
+        2 * self.tests.len() + 3
+    }
+
+    /// The bytes of the constants that are no real numbers: reactions and windows.
+    pub(super) fn integer_bytes(&self) -> usize {
+        let windows = if self.method == Method::Window { 8 * self.tests.len() } else { 0 };
+        windows + self.tests.len() * self.faults.len()
+    }
+
+    /// The flags of an instance: the alarms of tests, and whether there is one.
+    pub(super) fn flags(&self) -> usize {
+        self.tests.len() + 1
+    }
+}
+
+/// The number of a kind of [`Kind::Residual`], [`Kind::ResidualState`], [`Kind::Test`] or
+/// [`Kind::Suspect`].
+pub(super) fn count(kind: Kind, controller: &Controller) -> usize {
+    controller.detection.as_ref().map_or(0, |own| match kind {
+        Kind::Residual => own.c.nrows(),
+        Kind::ResidualState => own.a.nrows(),
+        Kind::Test => own.tests.len(),
+        _ => own.faults.len(),
+    })
+}
+
+/// The vectors that the filter stores.
+pub(super) const STORED: [Vector; 2] = [Vector::StoredXR, Vector::StoredResidual];
