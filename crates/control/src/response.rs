@@ -23,13 +23,14 @@ mod fault;
 mod fault_loop;
 mod frequency;
 mod h_infinity;
+mod impulse_sum;
 mod interval;
 mod known;
 mod peak_gain;
 mod trace;
 mod transient;
 
-pub use between_samples::{GainsBetweenSamples, gains_between_samples};
+pub use between_samples::gains_between_samples;
 pub use energy::{Energy, energy};
 pub use fault::{FaultBounds, Reversal, fault_bounds, reversal};
 pub use fault_loop::{fault_gains, fault_rate_system, fault_system};

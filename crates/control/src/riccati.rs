@@ -47,7 +47,7 @@ pub struct Regulator {
     /// Eigenvalues of A + B K.
     pub eigenvalues: Vec<Complex<f64>>,
     /// Largest entry of the left side of the equation relative to the same entry of the sum of its
-    /// absolute terms, products included.
+    /// absolute terms, products included. Here `|P|[i,j]` is at least the root of `P[i,i] P[j,j]`.
     pub residual: f64,
 }
 

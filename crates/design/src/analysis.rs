@@ -18,7 +18,7 @@ const WIDTH: f64 = 1e-3;
 /// The parts of a sampling interval in which a fault may change and at which the states are read.
 const PARTS: u32 = 16;
 const POINTS_PER_DECADE: u32 = 20;
-/// Number of outputs for each thread between two looks at the clock.
+/// Number of outputs for each thread between two looks at the clock, in continuous time.
 const OUTPUTS_AT_ONCE: usize = 16;
 
 /// The outputs of the loop: states, state estimation errors, fault estimation errors.
@@ -93,29 +93,33 @@ impl<'a> Loops<'a> {
     /// Returns the peak-to-peak gains of the outputs from faults, from their rates, and from the part of
     /// them that the compensation leaves. Those of a sampled loop hold between its samples, too.
     ///
-    /// An output is None if the time of `budget` was over before; the errors of the faults come first.
+    /// An output is None if the time of `budget` was over before, or if the loop amplifies rounding so much
+    /// that there is no bound; the errors of the faults come first.
     fn peak_gains(&self, budget: &Budget) -> Result<Vec<Option<[RowDVector<f64>; 3]>>, Error> {
         let ControllerDesign { extended, plant, gains, domain, .. } = self.designed;
         let positions = &self.outputs.positions;
+        let gains_of = |rows: &[usize]| match *domain {
+            Domain::Continuous => fault_gains(plant, gains, *domain, (rows, WIDTH)),
+            Domain::Sampled { period } => {
+                gains_between_samples(extended, plant, gains, (period, PARTS), (rows, WIDTH))
+            }
+        };
+        let outputs_at_once = match domain {
+            Domain::Continuous => OUTPUTS_AT_ONCE,
+            // Each state is read at all parts: about as many rows as the loop has states.
+            Domain::Sampled { .. } => 1 + self.of_faults.a.nrows() / PARTS as usize,
+        };
         let mut found = vec![None; positions.len()];
-        if let Domain::Sampled { period } = *domain {
-            if budget.is_over() {
-                return Ok(found);
-            }
-            let all = gains_between_samples(extended, plant, gains, period, (PARTS, WIDTH))?;
-            let all = [all.of_faults, all.of_rates, all.uncancelled];
-            for (place, row) in found.iter_mut().zip(positions) {
-                *place = Some(all.each_ref().map(|gains| gains.row(*row).into_owned()));
-            }
-            return Ok(found);
-        }
         let mut rest = positions.len();
         while rest > 0 && !budget.is_over() {
-            let first = rest.saturating_sub(OUTPUTS_AT_ONCE * rayon::current_num_threads());
-            let at_once = found[first..rest].par_chunks_mut(OUTPUTS_AT_ONCE);
-            let rows = positions[first..rest].par_chunks(OUTPUTS_AT_ONCE);
+            let first = rest.saturating_sub(outputs_at_once * rayon::current_num_threads());
+            let at_once = found[first..rest].par_chunks_mut(outputs_at_once);
+            let rows = positions[first..rest].par_chunks(outputs_at_once);
             at_once.zip(rows).try_for_each(|(places, rows)| {
-                let all = fault_gains(plant, gains, *domain, (rows, WIDTH))?;
+                let all = match gains_of(rows) {
+                    Err(Error::NotConverged { .. }) => return Ok(()),
+                    found => found?,
+                };
                 for (row, place) in places.iter_mut().enumerate() {
                     *place = Some(all.each_ref().map(|gains| gains.row(row).into_owned()));
                 }
@@ -126,9 +130,9 @@ impl<'a> Loops<'a> {
         Ok(found)
     }
 
-    /// Returns the peak-to-peak gains from each fault to each output, and the resulting bounds; and the
-    /// number of outputs that were left out because the time of `budget` was over.
-    pub(crate) fn bounds(&self, budget: &Budget) -> Result<(Vec<Bound>, usize), Error> {
+    /// Returns the peak-to-peak gains from each fault to each output, and the resulting bounds; and a
+    /// sentence if there are outputs without them.
+    pub(crate) fn bounds(&self, budget: &Budget) -> Result<(Vec<Bound>, Option<String>), Error> {
         let gains = self.peak_gains(budget)?;
         let mut found = Vec::new();
         for (column, fault) in self.faults() {
@@ -155,7 +159,16 @@ impl<'a> Loops<'a> {
                 });
             }
         }
-        Ok((found, gains.iter().filter(|gains| gains.is_none()).count()))
+        let missing = gains.iter().filter(|gains| gains.is_none()).count();
+        let reason = if budget.is_over() {
+            format!("were {}", budget.reason())
+        } else {
+            "cannot be computed: the loop hardly contracts beside its fastest modes, or rounding \
+             errors grow in it, as with eigenvectors that are almost parallel"
+                .to_owned()
+        };
+        let warning = format!("the bounds of {missing} states and errors {reason}");
+        Ok((found, (missing > 0).then_some(warning)))
     }
 
     /// Returns the transfer function from the faults, as `system` has them, to their estimation

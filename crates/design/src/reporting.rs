@@ -65,7 +65,7 @@ pub(crate) fn report(
     let (estimation, norms) = (estimation?, norms?);
     let budget = Budget::start(certificate_time);
     let certificate = steps.run(Step::Certificates, || certificate(designed, norms, &budget));
-    let (bounds, left_out) = steps.run(Step::Bounds, || loops.bounds(&budget))?;
+    let (bounds, without_bound) = steps.run(Step::Bounds, || loops.bounds(&budget))?;
     let losses = losses(designed, &budget)?;
     let of_losses = losses.iter().flat_map(LossReport::reasons);
     let further = of_losses.chain(reconfiguration.iter().flat_map(ReconfigurationReport::reasons));
@@ -89,10 +89,7 @@ pub(crate) fn report(
     let mut warnings: Vec<_> =
         designed.warnings.iter().map(|warning| line(file, warning)).collect();
     warnings.extend(references.iter().filter_map(beyond_limits));
-    if left_out > 0 {
-        warnings
-            .push(format!("the bounds of {left_out} states and errors were {}", budget.reason()));
-    }
+    warnings.extend(without_bound);
     Ok(Report {
         description,
         plant_file: file.name(),

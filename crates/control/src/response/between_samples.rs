@@ -1,75 +1,51 @@
 //! Bounds of a sampled loop at all times, between the samples too.
 
-use super::fault_loop::{loop_dynamics, outputs};
+use super::fault_loop::{loop_dynamics, outputs, require_rows};
+use super::peak_gain;
 use crate::aso::{Estimator, FaultyPlant, Gains};
-use crate::balance::{Balance, divide_rows, multiply_columns};
 use crate::faults::ExtendedPlant;
 use crate::hold::zero_order_hold;
-use crate::svd::norm_2;
-use crate::{Domain, Error, check, stability};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// The largest power of two of samples over which the loop must contract.
-const LONGEST: u32 = 24;
-/// The part of the first state that is left where a sum counts as complete.
-const NEGLIGIBLE: f64 = 1e-9;
-
-/// Peak gains of a sampled loop whose faults change at any time; rows: [x; e; eps], columns: faults.
-///
-/// x: the plant's states at all times; e and eps: at the samples, where the estimates are made.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct GainsBetweenSamples {
-    /// From faults of any course.
-    pub of_faults: DMatrix<f64>,
-    /// From f' of faults without jumps.
-    pub of_rates: DMatrix<f64>,
-    /// From the part of such faults that the compensation leaves.
-    pub uncancelled: DMatrix<f64>,
-}
-
-/// Computes the peak gains of a sampled loop over all times, not over the samples only.
+/// Computes the peak gains of a sampled loop over all times, not over the samples only: from faults of
+/// any course, from f' of faults without jumps, and from the part of such faults that the compensation
+/// leaves.
 ///
 /// ```text
 /// x(kT + t) = Phi(t) x[k] + Gamma(t) u[k] + integral of e^(A (t - s)) F_a f(kT + s) ds over s from 0 to t
 /// ```
 ///
 /// `extended`: in continuous time; `plant`: the same sampled by [`crate::sampled::sample`]; `gains`:
-/// for `plant`; `period`: T in s; `parts`: N, into how many parts each interval is divided; `width`:
-/// relative error of the sums, 1e-3 for example. The fault is taken constant over each part, with
+/// for `plant`; `period`: T in s; `parts`: N, into how many parts each interval is divided; `rows`: the
+/// positions in [x; e; eps] of the outputs, where x has the plant's states at all times, and e and eps
+/// those at the samples, where the estimates are made; each result has a row for each of them and q
+/// columns; `width`: see [`peak_gain`]. The fault is taken constant over each part, with
 /// any sequence of values, and x is read at the start of each part; with growing N the gains
 /// approach those of arbitrary faults, with an error of the order of 1/N. The gains of the
 /// [`super::peak_gain`] of [`super::fault_system`] are those of N = 1: a fault that changes at the
 /// samples only, seen at the samples only. Every (i, j) is the sum of |`h_ij`| over all parts and
-/// samples. The sums end where the contraction of the loop bounds the rest, which is added.
+/// samples, from above.
 ///
 /// Source: lifting of a sampled loop, T. Chen and B. A. Francis, Optimal Sampled-Data Control
 /// Systems, Springer (1995), chapter 10.
 ///
 /// # Errors
 ///
-/// Same as [`Gains::check`] and [`zero_order_hold`]; [`Error::OutOfRange`] for `parts` and `width`;
-/// [`Error::NotSchur`]; [`Error::NotConverged`] when the loop hardly contracts.
+/// Same as [`Gains::check`], [`zero_order_hold`] and [`peak_gain`]; [`Error::OutOfRange`] for `parts`, and
+/// for a row beyond [x; e; eps].
 pub fn gains_between_samples(
     extended: &ExtendedPlant,
     plant: &FaultyPlant,
     gains: &Gains,
-    period: f64,
-    (parts, width): (u32, f64),
-) -> Result<GainsBetweenSamples, Error> {
+    (period, parts): (f64, u32),
+    (rows, width): (&[usize], f64),
+) -> Result<[DMatrix<f64>; 3], Error> {
     gains.check(plant)?;
+    require_rows(plant, rows)?;
     check::positive("parts", f64::from(parts))?;
-    check::positive("width", width)?;
-    let domain = Domain::Sampled { period };
-    let a = loop_dynamics(plant, gains, domain);
-    stability::require_stable("A", &a, domain)?;
     let lifted = Lifted::new(extended, plant, gains, (period, parts))?;
-    let sums = |inputs: &Effects| lifted.sums(&a, inputs, width);
-    Ok(GainsBetweenSamples {
-        of_faults: sums(&lifted.faults())?,
-        of_rates: sums(&lifted.rates())?,
-        uncancelled: sums(&lifted.uncancelled())?,
-    })
+    lifted.gains(rows, width)
 }
 
 /// The loop over one interval of length T, divided into parts of length h.
@@ -233,95 +209,62 @@ impl<'a> Lifted<'a> {
         column
     }
 
-    /// The sum of |h| over all parts and samples; of x the largest over the parts of an interval.
-    fn sums(&self, a: &DMatrix<f64>, inputs: &Effects, width: f64) -> Result<DMatrix<f64>, Error> {
+    /// See [`gains_between_samples`].
+    fn gains(&self, rows: &[usize], width: f64) -> Result<[DMatrix<f64>; 3], Error> {
         let (n, q) = self.plant.f_a.shape();
-        let (own, rows, count) = (self.states, 2 * n + q, inputs.states_after.len());
-        let order = a.nrows();
-        let reads = inputs.outputs.len();
-        // All columns at once, and all rows: x at the start of each part, then [x; e; eps].
-        let mut b = DMatrix::zeros(order, count * q);
-        let mut c = DMatrix::zeros(reads * own + rows, order);
-        let mut sums = DMatrix::zeros(reads * own + rows, q);
-        for j in 0..count {
-            b.columns_mut(j * q, q).copy_from(&self.input(inputs, j));
-            for (i, effects) in inputs.outputs.iter().enumerate() {
-                let mut at_part = sums.rows_mut(i * own, own);
-                at_part += effects[j].abs();
+        let inputs = [self.faults(), self.rates(), self.uncancelled()];
+        let columns = inputs.iter().map(|inputs| inputs.states_after.len() * q).sum();
+        // A state is read at the start of each part, e and eps once.
+        let reads = |row: usize| if row < self.states { 0..self.parts() } else { 0..1 };
+        let all: Vec<_> = rows.iter().flat_map(|&row| reads(row).map(move |i| (row, i))).collect();
+        let domain = Domain::Sampled { period: self.period };
+        let a = loop_dynamics(self.plant, self.gains, domain);
+        let mut system = StateSpace {
+            b: DMatrix::zeros(a.nrows(), columns),
+            c: DMatrix::zeros(all.len(), a.nrows()),
+            d: DMatrix::zeros(all.len(), columns),
+            a,
+            domain,
+        };
+        let errors = outputs(self.plant, self.gains);
+        let states: Vec<_> = (0..self.parts()).map(|i| self.output(i)).collect();
+        for (at, &(row, i)) in all.iter().enumerate() {
+            let source = if row < self.states { &states[i] } else { &errors };
+            system.c.row_mut(at).copy_from(&source.row(row));
+        }
+        let mut column = 0;
+        for inputs in &inputs {
+            for j in 0..inputs.states_after.len() {
+                system.b.columns_mut(column, q).copy_from(&self.input(inputs, j));
+                for (at, &(row, i)) in all.iter().enumerate() {
+                    if row < self.states {
+                        let effect = inputs.outputs[i][j].row(row);
+                        system.d.view_mut((at, column), (1, q)).copy_from(&effect);
+                    } else if row >= 2 * n {
+                        system.d[(at, column + row - 2 * n)] = inputs.present_error[j];
+                    }
+                }
+                column += q;
             }
-            let present = inputs.present_error[j].abs();
-            for fault in 0..q {
-                sums[(reads * own + 2 * n + fault, fault)] += present;
+        }
+        let sums = peak_gain(&system, width)?.upper;
+        let mut first = 0;
+        Ok(inputs.map(|inputs| {
+            let count = inputs.states_after.len();
+            let mut found = DMatrix::zeros(rows.len(), q);
+            let mut at = 0;
+            for (mut gains, &row) in found.row_iter_mut().zip(rows) {
+                for read in at..at + reads(row).len() {
+                    for fault in 0..q {
+                        // The parts of a fault act together; of x the largest value counts.
+                        let own = (0..count).map(|j| sums[(read, first + j * q + fault)]);
+                        gains[fault] = own.sum::<f64>().max(gains[fault]);
+                    }
+                }
+                at += reads(row).len();
             }
-        }
-        for i in 0..reads {
-            c.rows_mut(i * own, own).copy_from(&self.output(i));
-        }
-        c.rows_mut(reads * own, rows).copy_from(&outputs(self.plant, self.gains));
-        add_impulses(a, &b, &c, (&mut sums, width))?;
-        let mut found = sums.rows(reads * own, rows).into_owned();
-        for i in 0..reads {
-            let largest = found.rows(0, own).sup(&sums.rows(i * own, own));
-            found.rows_mut(0, own).copy_from(&largest);
-        }
-        Ok(found)
-    }
-}
-
-/// Adds the sums over k of |C A^k B|, those of the columns of each input together, from above.
-fn add_impulses(
-    a: &DMatrix<f64>,
-    b: &DMatrix<f64>,
-    c: &DMatrix<f64>,
-    (sums, width): (&mut DMatrix<f64>, f64),
-) -> Result<(), Error> {
-    let Balance { matrix: a, scale } = Balance::new(a);
-    let (mut states, c) = (divide_rows(b, &scale), multiply_columns(c, &scale));
-    let q = sums.ncols();
-    // After `block` samples the state has at most half of its norm.
-    let (mut block, mut power, mut doublings) = (1_usize, a.clone(), 0);
-    while norm_2(&power)? > 0.5 {
-        (block, doublings) = (2 * block, doublings + 1);
-        if doublings > LONGEST {
-            return Err(Error::NotConverged {
-                what: "the sum of the impulse response",
-                iterations: block,
-            });
-        }
-        power = &power * &power;
-    }
-    let mut rest = vec![0.0; c.nrows()];
-    let mut rows = c.clone();
-    for _ in 0..block {
-        rest.iter_mut().zip(rows.row_iter()).for_each(|(rest, row)| *rest += 2.0 * row.norm());
-        rows *= &a;
-    }
-    let lengths = |states: &DMatrix<f64>| -> Vec<f64> {
-        let of =
-            |fault| (fault..states.ncols()).step_by(q).map(|at| states.column(at).norm()).sum();
-        (0..q).map(of).collect()
-    };
-    let begin = lengths(&states);
-    loop {
-        for _ in 0..block {
-            for (at, column) in (&c * &states).column_iter().enumerate() {
-                let mut sum = sums.column_mut(at % q);
-                sum += column.abs();
-            }
-            states = &a * states;
-        }
-        let left = lengths(&states);
-        // An output that an input does not reach has a sum of zero, which no remainder is small against.
-        let is_short = |fault: usize| left[fault] <= NEGLIGIBLE * width * begin[fault];
-        let is_small =
-            |row: usize, fault: usize| rest[row] * left[fault] <= width * sums[(row, fault)];
-        if (0..q).all(|fault| is_short(fault) || (0..rest.len()).all(|row| is_small(row, fault))) {
-            for (row, fault) in
-                (0..rest.len()).flat_map(|row| (0..q).map(move |fault| (row, fault)))
-            {
-                sums[(row, fault)] += rest[row] * left[fault];
-            }
-            return Ok(());
-        }
+            first += count * q;
+            found
+        }))
     }
 }

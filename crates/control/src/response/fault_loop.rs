@@ -100,13 +100,8 @@ pub fn fault_gains(
     domain: Domain,
     (rows, width): (&[usize], f64),
 ) -> Result<[DMatrix<f64>; 3], Error> {
+    require_rows(plant, rows)?;
     let mut all = fault_system(plant, gains, domain)?;
-    if let Some(row) = rows.iter().find(|row| **row >= all.c.nrows()) {
-        #[expect(clippy::cast_precision_loss, reason = "an index for a message")]
-        let value = *row as f64;
-        let rule = "an index below the number of states and errors";
-        return Err(Error::OutOfRange { name: "rows", value, rule });
-    }
     let of_rates = fault_rate_system(plant, gains, domain)?;
     let q = plant.f_a.ncols();
     all.b = all.b.resize_horizontally(3 * q, 0.0);
@@ -116,6 +111,16 @@ pub fn fault_gains(
     (all.c, all.d) = (all.c.select_rows(rows), all.d.select_rows(rows));
     let found = peak_gain(&all, width)?.upper;
     Ok([0, 1, 2].map(|part| found.columns(part * q, q).into_owned()))
+}
+
+/// Checks that `rows` are positions in [x; e; eps].
+pub(super) fn require_rows(plant: &FaultyPlant, rows: &[usize]) -> Result<(), Error> {
+    let (n, q) = plant.f_a.shape();
+    let Some(row) = rows.iter().find(|row| **row >= 2 * n + q) else { return Ok(()) };
+    #[expect(clippy::cast_precision_loss, reason = "an index for a message")]
+    let value = *row as f64;
+    let rule = "an index below the number of states and errors";
+    Err(Error::OutOfRange { name: "rows", value, rule })
 }
 
 /// [x; e; eps] of the state of both systems: the identity without a direct term and integrals.

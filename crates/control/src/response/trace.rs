@@ -10,7 +10,9 @@ use std::f64::consts::SQRT_2;
 const FOLLOWED: f64 = 25.0;
 /// Steps per time constant, and per radian of an oscillation; the second for `LARGE` systems.
 const STEPS: [f64; 2] = [10.0, 4.0];
-const MOST_SAMPLES: f64 = 200_000.0;
+/// Points of one response, and those kept for each mode that has not been followed yet.
+const MOST_POINTS: f64 = 200_000.0;
+const RESERVED: f64 = 500.0;
 /// From this order on the outputs of all times are computed together, at fewer points.
 const LARGE: usize = 48;
 
@@ -24,7 +26,8 @@ pub struct TimeResponse {
     pub output: DMatrix<f64>,
     /// The limit of z for large times, p.
     pub final_value: DVector<f64>,
-    /// The derivative of z, p x length of `time`; without columns in sampled time.
+    /// The derivative of z, p x length of `time`; without columns in sampled time, and where the points
+    /// do not follow every oscillation.
     pub(super) slope: DMatrix<f64>,
 }
 
@@ -46,15 +49,15 @@ impl TimeResponse {
 /// on) per time constant or radian of the fastest mode that has not yet decayed; a mode counts as decayed
 /// after 25 time constants. A real mode adds about 250 points. Each point is exact up to rounding for every step
 /// size: it is computed by matrix exponentials, in sampled time by powers of A, with steps of whole
-/// samples. Rates 1e5 apart cost about four digits. Cost: about 20 (n + 2 m)^3 multiplications per
+/// samples. A response has at most about 200000 points: an oscillation damped so lightly that it needs more
+/// gets fewer per radian, and a peak between them is missed. Rates 1e5 apart cost about four digits. Cost: about 20 (n + 2 m)^3 multiplications per
 /// mode, n (n + p) per point; from 48 states on the outputs are products of large matrices, whose last
 /// bits depend on the processor.
 ///
 /// # Errors
 ///
 /// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for `input`; [`Error::NotHurwitz`],
-/// [`Error::NotSchur`]; [`Error::NotConverged`] for an oscillation damped so lightly that it needs
-/// more than 200000 points; [`Error::Overflow`].
+/// [`Error::NotSchur`]; [`Error::Overflow`].
 pub fn step_response(system: &StateSpace, input: usize) -> Result<TimeResponse, Error> {
     response(system, input, None)
 }
@@ -118,16 +121,16 @@ fn response(system: &StateSpace, input: usize, rise: Option<f64>) -> Result<Time
         let (whole, rest) = modes.samples_in(rise);
         simulation.slope[input] = 1.0 / rise;
         if whole > 0.0 {
-            simulation.follow(&modes.segments(whole)?)?;
+            simulation.follow(&modes.segments(whole))?;
         }
         if rest > 0.0 {
             simulation.slope[input] = (1.0 - whole / rise) / rest;
-            simulation.follow(&[Segment { step: rest, count: 1 }])?;
+            simulation.follow(&[Segment { step: rest, count: 1, is_coarse: false }])?;
         }
         simulation.slope[input] = 0.0;
     }
     simulation.input[input] = 1.0;
-    simulation.follow(&modes.segments(f64::INFINITY)?)?;
+    simulation.follow(&modes.segments(f64::INFINITY))?;
     simulation.finished()
 }
 
@@ -146,6 +149,8 @@ struct Modes {
 struct Segment {
     step: f64,
     count: usize,
+    /// Whether the steps are too long to follow the fastest oscillation.
+    is_coarse: bool,
 }
 
 impl Modes {
@@ -190,13 +195,10 @@ impl Modes {
     }
 
     /// Steps from 0 to the end of the slowest mode, or to `end` if that is earlier.
-    fn segments(&self, end: f64) -> Result<Vec<Segment>, Error> {
+    fn segments(&self, end: f64) -> Vec<Segment> {
         let mut segments = Vec::new();
-        let (mut from, mut samples) = (0.0, 0.0);
+        let (mut from, mut left) = (0.0, MOST_POINTS);
         for first in 0..self.lives.len() {
-            if samples > MOST_SAMPLES {
-                break;
-            }
             let last = first + 1 == self.lives.len();
             let until = if last && end.is_finite() { end } else { self.lives[first].0.min(end) };
             let until = self.whole(until);
@@ -204,14 +206,18 @@ impl Modes {
                 continue;
             }
             let rate = self.lives[first..].iter().fold(0.0_f64, |most, life| most.max(life.1));
-            let wanted = 1.0 / (STEPS[usize::from(self.lives.len() >= LARGE)] * rate);
+            let resolving = 1.0 / (STEPS[usize::from(self.lives.len() >= LARGE)] * rate);
+            #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+            let reserved = RESERVED * (self.lives.len() - first) as f64;
+            let wanted = resolving.max((until - from) / (left - reserved).max(RESERVED));
+            let is_coarse = wanted > resolving;
             if self.period == 0.0 && until < end {
                 // Powers of two, so that neighbouring segments share a step and its propagator.
                 let step = power_of_two(wanted / SQRT_2);
                 let count = ((until - from) / step).ceil();
-                samples += count;
+                left -= count;
                 from += count * step;
-                segments.push(Segment { step, count: whole(count) });
+                segments.push(Segment { step, count: whole(count), is_coarse });
                 continue;
             }
             let count = if self.period > 0.0 {
@@ -220,31 +226,27 @@ impl Modes {
             } else {
                 ((until - from) / wanted).ceil()
             };
-            samples += count;
-            from = Self::push(&mut segments, self.period, from, until, count);
+            left -= count;
+            self.push(&mut segments, until - from, count, is_coarse);
+            from = until;
         }
-        if samples > MOST_SAMPLES {
-            return Err(Error::NotConverged { what: "the response", iterations: 200_000 });
-        }
-        Ok(segments)
+        segments
     }
 
-    /// Adds `count` steps from `from` to `until`; in sampled time of whole samples, the last one
-    /// shorter.
-    fn push(list: &mut Vec<Segment>, period: f64, from: f64, until: f64, count: f64) -> f64 {
-        if period == 0.0 {
-            list.push(Segment { step: (until - from) / count, count: whole(count) });
-            return until;
+    /// Adds `count` steps that take `time`; in sampled time of whole samples, the last one shorter.
+    fn push(&self, list: &mut Vec<Segment>, time: f64, count: f64, is_coarse: bool) {
+        if self.period == 0.0 {
+            list.push(Segment { step: time / count, count: whole(count), is_coarse });
+            return;
         }
-        let samples = ((until - from) / period).round();
+        let samples = (time / self.period).round();
         let stride = (samples / count).ceil();
         let full = (samples / stride).floor();
         let rest = samples - full * stride;
-        list.push(Segment { step: stride * period, count: whole(full) });
+        list.push(Segment { step: stride * self.period, count: whole(full), is_coarse });
         if rest > 0.0 {
-            list.push(Segment { step: rest * period, count: 1 });
+            list.push(Segment { step: rest * self.period, count: 1, is_coarse });
         }
-        until
     }
 }
 
@@ -264,6 +266,8 @@ struct GridSimulation<'a> {
     states: Vec<f64>,
     inputs: Vec<f64>,
     slopes: Vec<f64>,
+    /// Whether the points follow every oscillation.
+    is_resolved: bool,
 }
 
 impl<'a> GridSimulation<'a> {
@@ -278,6 +282,7 @@ impl<'a> GridSimulation<'a> {
             states: Vec::new(),
             inputs: Vec::new(),
             slopes: Vec::new(),
+            is_resolved: true,
         }
     }
 
@@ -295,6 +300,7 @@ impl<'a> GridSimulation<'a> {
         }
         let mut known: Option<(f64, FirstOrderHold)> = None;
         for segment in segments {
+            self.is_resolved &= !segment.is_coarse;
             let begin = self.time[self.time.len() - 1];
             // Neighbouring segments often have the same step.
             let hold =
@@ -313,7 +319,7 @@ impl<'a> GridSimulation<'a> {
                 )?;
                 self.state.copy_from(&next);
                 self.input.axpy(segment.step, &self.slope, 1.0);
-                #[expect(clippy::cast_precision_loss, reason = "at most 200000")]
+                #[expect(clippy::cast_precision_loss, reason = "about 200000 at most")]
                 self.record(begin + segment.step * k as f64);
             }
             known = Some((segment.step, hold));
@@ -341,8 +347,10 @@ impl<'a> GridSimulation<'a> {
         };
         let output = check::in_range("the response", sum([c, d], (&states, &inputs)))?;
         let slope = match domain {
-            Domain::Continuous => sum([c, d], (&sum([a, b], (&states, &inputs)), &slopes)),
-            Domain::Sampled { .. } => DMatrix::zeros(output.nrows(), 0),
+            Domain::Continuous if self.is_resolved => {
+                sum([c, d], (&sum([a, b], (&states, &inputs)), &slopes))
+            }
+            _ => DMatrix::zeros(output.nrows(), 0),
         };
         let final_value = settled(self.system, &self.input)?;
         Ok(TimeResponse { time: self.time, output, final_value, slope })

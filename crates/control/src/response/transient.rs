@@ -23,7 +23,7 @@ impl TimeResponse {
     /// `output`: its index, from 0. The band is `fraction` times the largest distance of z from its
     /// final value. In continuous time peaks between grid points are those of the cubic through
     /// both values and slopes (error 1e-6 of the peak, 1e-5 from 48 states on), settling times are interpolated linearly.
-    /// In sampled time both are at grid points.
+    /// In sampled time, and where the points do not follow every oscillation, both are at grid points.
     ///
     /// # Panics
     ///

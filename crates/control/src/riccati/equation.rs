@@ -2,7 +2,7 @@
 
 use crate::Domain;
 use crate::blocks::symmetric_part;
-use crate::lyapunov::{self, Equation, relative};
+use crate::lyapunov::{self, Equation, relative, sizes};
 use nalgebra::DMatrix;
 
 /// A Riccati equation of continuous or sampled time, with the weights Q, N and R = I.
@@ -46,14 +46,15 @@ impl RiccatiEquation {
         })
     }
 
-    /// Largest entry of the left side relative to the sum of its absolute terms.
+    /// Largest entry of the left side relative to the sum of its absolute terms, of P as in
+    /// [`lyapunov::Solution::residual`].
     pub(super) fn residual(&self, p: &DMatrix<f64>) -> f64 {
         let Some(gain) = self.gain(p) else { return f64::INFINITY };
         let left = self.left_side(p, &gain);
         if left.iter().any(|entry| !entry.is_finite()) {
             return f64::INFINITY;
         }
-        let (a, b, n, size) = (self.a.abs(), self.b.abs(), self.n.abs(), p.abs());
+        let (a, b, n, size) = (self.a.abs(), self.b.abs(), self.n.abs(), sizes(p));
         let effect = b.tr_mul(&size);
         let terms = match self.domain {
             Domain::Continuous => {

@@ -2,7 +2,7 @@
 
 use control::estimation::mean_rate;
 use control::response::{
-    fault_gains, fault_rate_system, fault_system, frequency_response, settled_output, step_response,
+    fault_rate_system, fault_system, frequency_response, peak_gain, settled_output, step_response,
 };
 use control::{Domain, Error, StateSpace};
 use rayon::prelude::*;
@@ -91,7 +91,7 @@ impl<'a> Errors<'a> {
     }
 
     fn of_fault(&self, at: usize) -> Result<EstimationErrors, Error> {
-        let ControllerDesign { plant, gains, domain, extended, law, .. } = self.designed;
+        let ControllerDesign { plant, extended, law, .. } = self.designed;
         let channel = extended.channels[at];
         let row = 2 * plant.a.nrows() + channel.estimate;
         let to_error = |system: &StateSpace| StateSpace {
@@ -110,7 +110,7 @@ impl<'a> Errors<'a> {
             (false, None) => Some(settled_output(&to_error(&self.of_rates), 0)?[0].abs()),
         };
         let point = frequency_response(&of_fault, &[self.frequency])?;
-        let [peak, ..] = fault_gains(plant, gains, *domain, (&[row], WIDTH))?;
+        let gain = peak_gain(&of_fault, WIDTH)?;
         Ok(EstimationErrors {
             fault: String::new(),
             unit: None,
@@ -120,7 +120,7 @@ impl<'a> Errors<'a> {
             ramp,
             sine: point[0].singular_values[0],
             sine_frequency: self.frequency,
-            peak_gain: peak[(0, channel.estimate)],
+            peak_gain: gain.upper[0],
             noise: None,
             noise_peak: None,
         })

@@ -12,6 +12,8 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
 const WIDTH: f64 = 1e-3;
+/// All of [x; e; eps].
+const ALL: [usize; 9] = [0, 1, 2, 3, 4, 5, 6, 7, 8];
 
 /// The pendulum of the paper, and its controller sampled at `period`.
 fn sampled(
@@ -66,7 +68,8 @@ fn gains_between_samples_are_those_of_a_simulation_in_small_steps() {
         let (extended, plant, gains) = sampled(period, estimator).unwrap();
         let domain = Domain::Sampled { period };
         let own = controller(&plant, &gains, domain).unwrap();
-        let found = gains_between_samples(&extended, &plant, &gains, period, (8, WIDTH)).unwrap();
+        let [of_faults, of_rates, _] =
+            gains_between_samples(&extended, &plant, &gains, (period, 8), (&ALL, WIDTH)).unwrap();
         let samples = 4000 / milliseconds;
         let pulse = |at: u32| f64::from(u8::from(at == 0));
         let same = simulated(&extended, (&own, period), (8, samples), pulse).unwrap();
@@ -75,14 +78,14 @@ fn gains_between_samples_are_those_of_a_simulation_in_small_steps() {
         let ramp = |at: u32| if at == 0 { 0.0 } else { part };
         let rates = simulated(&extended, (&own, period), (8, samples), ramp).unwrap();
         for state in 0..4 {
-            let gain = found.of_faults[(state, 0)];
+            let gain = of_faults[(state, 0)];
             assert!(
                 (gain / same[state] - 1.0).abs() < 2.0 * WIDTH,
                 "{state}: {gain} {}",
                 same[state]
             );
             assert!((finer[state] / gain - 1.0).abs() < 0.05, "{state}: {gain} {}", finer[state]);
-            let of_rate = found.of_rates[(state, 0)];
+            let of_rate = of_rates[(state, 0)];
             assert!(
                 (of_rate / rates[state] - 1.0).abs() < 2.0 * WIDTH,
                 "{state}: {of_rate} {}",
@@ -98,14 +101,15 @@ fn with_one_part_the_gains_are_those_at_the_samples() {
         let period = 0.005;
         let (extended, plant, gains) = sampled(period, estimator).unwrap();
         let domain = Domain::Sampled { period };
-        let found = gains_between_samples(&extended, &plant, &gains, period, (1, WIDTH)).unwrap();
-        let of_faults = peak_gain(&fault_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
-        let of_rates =
+        let [of_faults, of_rates, _] =
+            gains_between_samples(&extended, &plant, &gains, (period, 1), (&ALL, WIDTH)).unwrap();
+        let expected = peak_gain(&fault_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
+        let expected_of_rates =
             peak_gain(&fault_rate_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
         for row in 0..9 {
-            let [own, other] = [found.of_faults[(row, 0)], of_faults.upper[(row, 0)]];
+            let [own, other] = [of_faults[(row, 0)], expected.upper[(row, 0)]];
             assert!((own / other - 1.0).abs() < 3.0 * WIDTH, "{row}: {own} {other}");
-            let [own, other] = [found.of_rates[(row, 0)], period * of_rates.upper[(row, 0)]];
+            let [own, other] = [of_rates[(row, 0)], period * expected_of_rates.upper[(row, 0)]];
             assert!((own / other - 1.0).abs() < 3.0 * WIDTH, "{row}: {own} {other}");
         }
     }
@@ -115,10 +119,32 @@ fn with_one_part_the_gains_are_those_at_the_samples() {
 fn a_slow_sampled_loop_is_farther_from_rest_between_its_samples_than_at_them() {
     let period = 0.01;
     let (extended, plant, gains) = sampled(period, Estimator::Prediction).unwrap();
-    let found = gains_between_samples(&extended, &plant, &gains, period, (16, WIDTH)).unwrap();
+    let [of_faults, ..] =
+        gains_between_samples(&extended, &plant, &gains, (period, 16), (&ALL, WIDTH)).unwrap();
     let domain = Domain::Sampled { period };
     let at_samples = peak_gain(&fault_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
     for state in 2..4 {
-        assert!(found.of_faults[(state, 0)] > 1.02 * at_samples.lower[(state, 0)]);
+        assert!(of_faults[(state, 0)] > 1.02 * at_samples.lower[(state, 0)]);
     }
+}
+
+#[test]
+fn a_slow_sampled_loop_has_the_gains_that_adding_all_samples_gives() {
+    // Sampled so fast that adding the samples would take longer than intervals of many samples.
+    let pole = (-1e-5_f64).exp();
+    let system = StateSpace {
+        a: DMatrix::from_row_slice(2, 2, &[pole, 1e-4, 0.0, 0.5]),
+        b: DMatrix::from_row_slice(2, 1, &[1.0, -2.0]),
+        c: DMatrix::from_row_slice(1, 2, &[1.0, 3.0]),
+        d: DMatrix::from_element(1, 1, 0.25),
+        domain: Domain::Sampled { period: 1.0 },
+    };
+    let found = peak_gain(&system, WIDTH).unwrap();
+    let (mut sum, mut x) = (0.25, system.b.clone());
+    for _ in 0..4_000_000 {
+        sum += (&system.c * &x)[0].abs();
+        x = &system.a * x;
+    }
+    assert!(found.lower[0] <= sum * (1.0 + 1e-9), "{found:?} {sum}");
+    assert!(sum <= found.upper[0] && found.upper[0] < sum * (1.0 + 2.0 * WIDTH), "{found:?} {sum}");
 }

@@ -109,6 +109,21 @@ fn bad_arguments_are_named() {
     assert!(matches!(refused, Err(Error::OutOfRange { name: "duration", .. })), "{refused:?}");
     let unstable = StateSpace { a: -good.a.clone(), ..good };
     assert!(matches!(step_response(&unstable, 0), Err(Error::NotHurwitz { .. })));
-    let light = oscillator(1.0, 1e-6);
-    assert!(matches!(step_response(&light, 0), Err(Error::NotConverged { .. })));
+}
+
+#[test]
+fn an_oscillation_that_hardly_decays_has_exact_points_that_do_not_follow_it() {
+    // y'' + 2 zeta y' + y = 1: 1 - e^(-zeta t) (cos(w t) + zeta / w sin(w t)), w^2 = 1 - zeta^2.
+    let zeta = 1e-6;
+    let trace = step_response(&oscillator(1.0, zeta), 0).unwrap();
+    let w = (1.0 - zeta * zeta).sqrt();
+    assert!((100_000..500_000).contains(&trace.time.len()), "{}", trace.time.len());
+    for (time, y) in trace.time.iter().zip(trace.output.row(0).iter()) {
+        let (sin, cos) = (w * time).sin_cos();
+        let exact = 1.0 - (-zeta * time).exp() * (cos + zeta / w * sin);
+        assert!((y - exact).abs() < 1e-6, "{time}: {y} {exact}");
+    }
+    let found = trace.transient(0, 0.02);
+    assert!((1.99..2.0).contains(&found.peak), "{found:?}");
+    assert!((found.settling_time * zeta / 50_f64.ln() - 1.0).abs() < 0.01, "{found:?}");
 }

@@ -1,0 +1,89 @@
+//! Peak gains of a sampled system by adding every sample of its impulse responses.
+
+use super::peak_gain::Bracket;
+use crate::balance::{Balance, divide_rows, multiply_columns};
+use crate::svd::norm_2;
+use crate::{Error, StateSpace};
+use nalgebra::{Complex, DMatrix};
+use std::f64::consts::TAU;
+
+/// The longest power of two of samples over which the system must contract.
+const LONGEST: u32 = 24;
+/// Periods of contraction by half that a sum needs, about.
+const HALVINGS: f64 = 12.0;
+/// Intervals that [`super::peak_gain`] needs for an impulse response, and for each of its oscillations.
+const INTERVALS: [f64; 2] = [500.0, 50.0];
+/// Lengths of its intervals.
+const LENGTHS: f64 = 30.0;
+/// The part of the first state that is left where a sum counts as complete.
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// |D| and the sums over k of |C A^k B|, entry by entry: the lower bound without the samples after the
+/// last one, the upper bound with all that the contraction of A leaves of them.
+///
+/// `eigenvalues`: of A. None if A contracts so slowly that intervals of many samples need fewer
+/// operations.
+pub(super) fn impulse_sums(
+    system: &StateSpace,
+    eigenvalues: &[Complex<f64>],
+    width: f64,
+) -> Result<Option<Bracket>, Error> {
+    let Balance { matrix: a, scale } = Balance::new(&system.a);
+    let (mut states, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
+    // After `block` samples the state has at most half of its norm.
+    let (mut block, mut power) = (1_u32, a.clone());
+    while norm_2(&power)? > 0.5 {
+        if block == 1 << LONGEST || f64::from(block) > affordable(system, eigenvalues) {
+            return Ok(None);
+        }
+        block *= 2;
+        power = &power * &power;
+    }
+    let mut rest = vec![0.0; c.nrows()];
+    let mut rows = c.clone();
+    for _ in 0..block {
+        rest.iter_mut().zip(rows.row_iter()).for_each(|(rest, row)| *rest += 2.0 * row.norm());
+        rows *= &a;
+    }
+    let lengths = |states: &DMatrix<f64>| -> Vec<f64> {
+        states.column_iter().map(|column| column.norm()).collect()
+    };
+    let begin = lengths(&states);
+    let mut lower = system.d.abs();
+    let mut response = DMatrix::zeros(c.nrows(), states.ncols());
+    let mut next = states.clone();
+    loop {
+        for _ in 0..block {
+            response.gemm(1.0, &c, &states, 0.0);
+            lower.zip_apply(&response, |sum, value| *sum += value.abs());
+            next.gemm(1.0, &a, &states, 0.0);
+            std::mem::swap(&mut states, &mut next);
+        }
+        let left = lengths(&states);
+        // An output that an input does not reach has a sum of zero, which no remainder is small against.
+        let is_short = |input: usize| left[input] <= NEGLIGIBLE * width * begin[input];
+        let is_small =
+            |row: usize, input: usize| rest[row] * left[input] <= width * lower[(row, input)];
+        let is_complete =
+            |input| is_short(input) || (0..rest.len()).all(|row| is_small(row, input));
+        if (0..left.len()).all(is_complete) {
+            let tail = |row: usize, input: usize| lower[(row, input)] + rest[row] * left[input];
+            let upper = DMatrix::from_fn(rest.len(), left.len(), tail);
+            return Ok(Some(Bracket { lower, upper }));
+        }
+    }
+}
+
+/// The largest number of samples of contraction by half for which adding all samples needs fewer
+/// operations than intervals do.
+fn affordable(system: &StateSpace, eigenvalues: &[Complex<f64>]) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+    let [order, inputs] = [system.a.nrows(), system.b.ncols()].map(|count| count as f64);
+    let oscillations = |value: &Complex<f64>| {
+        let decay = -value.norm().max(f64::MIN_POSITIVE).ln();
+        value.arg().abs() / TAU * HALVINGS / decay
+    };
+    let oscillations = eigenvalues.iter().filter(|value| value.im != 0.0).map(oscillations);
+    let intervals = INTERVALS[0] + INTERVALS[1] * oscillations.fold(0.0, f64::max);
+    (3.0 * order * intervals + 2.0 * order * order * LENGTHS / inputs.max(1.0)) / HALVINGS
+}
