@@ -1,8 +1,10 @@
 """The source code of sampled controllers: compiled, with the bits of the FMU in double, within its bound in float."""
 
+import os
 import re
 import shutil
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -384,3 +386,41 @@ def test_it_compiles_for_a_cortex_m(aso_ftc, tmp_path, options):
     undefined = subprocess.run(["arm-none-eabi-nm", "-u", tmp_path / "m4.o"], capture_output=True, text=True).stdout
     needed = {line.split()[-1] for line in undefined.splitlines()}
     assert not needed if options else all(name.startswith("__aeabi_d") for name in needed), needed
+
+
+DEBIAN = [Path("/usr/bin/cargo"), Path("/usr/bin/rustc"), Path("/usr/lib/rustlib/src/rust")]
+
+
+@pytest.mark.skipif(
+    not all(path.exists() for path in DEBIAN) or not shutil.which("arm-none-eabi-nm"),
+    reason="no Rust compiler with the sources of core: rustc-web, cargo-web, rust-web-src, gcc-arm-none-eabi",
+)
+def test_the_crate_is_built_for_a_cortex_m_and_nothing_in_it_panics(aso_ftc, tmp_path):
+    """The crates of several designs, with `core` from its sources, for a Cortex-M4 or M7 with a floating-point unit."""
+    packed_plant(aso_ftc, "ThreeTank")
+    members = {}
+    for name, options in [
+        ("constant-prediction", []),
+        ("sensor-fault", ["--float"]),
+        ("scheduled-drive", ["--float"]),
+        ("scheduled-by-measurement", []),
+        ("detection-cusum", []),
+        ("detection-window", ["--float"]),
+    ]:
+        (folder := tmp_path / name).mkdir()
+        members[name] = Built(aso_ftc, CASES[name].text, folder, *options, name=name.replace("-", "_"))
+    listed = ", ".join(f'"{name}/rust"' for name in members)
+    (tmp_path / "Cargo.toml").write_text(f'[workspace]\nresolver = "2"\nmembers = [{listed}]\n', encoding="utf-8")
+    cargo, rustc, _ = map(str, DEBIAN)
+    options = ["--release", "--workspace", "--offline", "--target", "thumbv7em-none-eabihf", "-Z", "build-std=core"]
+    kept = {name: os.environ[name] for name in ("HOME", "CARGO_HOME") if name in os.environ}
+    tools = {"PATH": "/usr/bin:/bin", "RUSTC": rustc, "RUSTC_BOOTSTRAP": "1", "RUSTFLAGS": "-D warnings", **kept}
+    done = subprocess.run([cargo, "build", *options], cwd=tmp_path, env=tools, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    for own in members.values():
+        library = tmp_path / "target" / "thumbv7em-none-eabihf" / "release" / f"lib{own.name}.rlib"
+        listed = subprocess.run(["arm-none-eabi-nm", "-u", library], capture_output=True, text=True).stdout
+        needed = {line.split()[-1] for line in listed.splitlines() if " U " in line}
+        numbers = () if own.single else ("__aeabi_d", "__aeabi_ui2d")
+        memory = ("__aeabi_mem", "memcpy", "memset", "memcmp", "bcmp")
+        assert (own.single or needed) and all(name.startswith((*numbers, *memory)) for name in needed), needed
