@@ -71,6 +71,38 @@ class Page:
         self.call("Page.navigate", url=address)
         self.until("document.readyState === 'complete'")
 
+    def places(self, selector, parts):
+        """Where parts of the width of an element are on the screen, in the middle of its height."""
+        box = self.evaluate(f"document.querySelector({json.dumps(selector)}).getBoundingClientRect().toJSON()")
+        return [(box["left"] + part * box["width"], box["top"] + box["height"] / 2) for part in parts]
+
+    def _touch(self, kind, points):
+        points = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
+        self.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+
+    def pinch(self, selector, start, end, turns=5):
+        """Puts fingers on parts of the width of an element and moves them to others."""
+        start, end = self.places(selector, start), self.places(selector, end)
+        self._touch("touchStart", start)
+        for k in range(1, turns + 1):
+            share = k / turns
+            self._touch("touchMove", [(x + share * (to - x), y) for (x, y), (to, _) in zip(start, end, strict=True)])
+        self._touch("touchEnd", [])
+
+    def double_tap(self, selector):
+        """Taps twice on the middle of an element."""
+        for _ in range(2):
+            self._touch("touchStart", self.places(selector, [0.5]))
+            self._touch("touchEnd", [])
+
+    def swipe_up(self, selector, distance):
+        """Moves one finger upwards from the middle of an element."""
+        ((x, y),) = self.places(selector, [0.5])
+        self._touch("touchStart", [(x, y)])
+        for k in range(1, 16):
+            self._touch("touchMove", [(x, y - k * distance / 15)])
+        self._touch("touchEnd", [])
+
     def violations(self):
         """What axe-core finds serious or critical in the page, light and dark: rule and elements."""
         package = find_spec("axe_playwright_python")

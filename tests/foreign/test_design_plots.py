@@ -149,6 +149,42 @@ def test_a_drag_zooms_all_plots_of_the_axis_and_a_double_click_shows_all(designe
     assert legend(opened, "step-3-2")[0] > 0.98 * places[-1]
 
 
+def test_two_fingers_zoom_all_plots_of_the_axis_and_a_double_tap_shows_all(designed, opened):
+    _, numbers = designed
+    show(opened, "step-1-1")
+    places, _ = curve(numbers, "step-1-1")
+    first, last = places[0], places[-1]
+    # What is below the fingers moves with them: of the axis, shares 0.4 and 0.6 become its ends.
+    opened.pinch("#step-1-1 .u-over", (0.4, 0.6), (0.0, 1.0))
+    low, high = (first * (last / first) ** share for share in (0.4, 0.6))
+    for identifier in ("step-1-1", "step-1-2"):
+        for share, end in ((0.01, low), (0.99, high)):
+            mouse(opened, "mouseMoved", place(opened, identifier, share))
+            at = assert_reads_the_numbers(opened, numbers, identifier, share, (low, high))
+            assert abs(math.log(at / end)) < 0.1 * math.log(high / low)
+    # Both fingers to the right: what was at the left edge moves to the middle.
+    opened.pinch("#step-1-1 .u-over", (0.1, 0.3), (0.6, 0.8))
+    mouse(opened, "mouseMoved", place(opened, "step-1-1", 0.5))
+    assert abs(math.log(legend(opened, "step-1-1")[0] / low)) < 0.1 * math.log(high / low)
+    opened.double_tap("#step-1-1 .u-over")
+    mouse(opened, "mouseMoved", place(opened, "step-1-1", 0.999))
+    assert legend(opened, "step-1-1")[0] > 0.98 * last
+    # Zoomed out, there is not more than everything.
+    opened.pinch("#step-1-1 .u-over", (0.1, 0.9), (0.45, 0.55))
+    mouse(opened, "mouseMoved", place(opened, "step-1-1", 0.999))
+    assert legend(opened, "step-1-1")[0] > 0.98 * last
+
+
+def test_one_finger_on_a_plot_scrolls_the_page_and_does_not_zoom(opened):
+    show(opened, "step-1-1")
+    mouse(opened, "mouseMoved", place(opened, "step-1-1", 0.999))
+    before, right = opened.evaluate("scrollY"), legend(opened, "step-1-1")[0]
+    opened.swipe_up("#step-1-1 .u-over", 200)
+    opened.until(f"scrollY > {before} + 100", limit=10)
+    mouse(opened, "mouseMoved", place(opened, "step-1-1", 0.999))
+    assert legend(opened, "step-1-1")[0] == right
+
+
 def test_the_keyboard_moves_the_cursor_and_zooms(designed, opened):
     _, numbers = designed
     places, (values,) = curve(numbers, "step-1-2")

@@ -107,7 +107,7 @@ def test_a_watched_run_keeps_its_bits(aso_ftc, tmp_path):
     assert aso_ftc("run", *FMUS, "--out", tmp_path / "free", *options).returncode == 0
     with live(tmp_path / "seen", *options) as run:
         assert run.state()["phase"] == "paused"
-        for name in ["", "colours.css", "page.css", "page.js", "uPlot.css", "uPlot.js", "facts"]:
+        for name in ["", "colours.css", "page.css", "page.js", "uPlot.css", "uPlot.js", "zoom.js", "facts"]:
             assert run.ask(name)[0] == 200
         run.do("continue")
         seen = []
@@ -460,6 +460,34 @@ def test_the_server_listens_on_this_machine_only_and_its_tokens_differ(tmp_path)
 # --- the page
 
 
+def two_fingers_zoom_until_a_double_tap(page):
+    """All plots are zoomed by touch, and stay so while the run goes on."""
+    first, last = "#figures .figure:first-child .u-over", "#figures .figure:last-child .u-over"
+    page.until("Number(document.body.dataset.time) > 2")  # until then, the plots find their size
+    page.evaluate(f"document.querySelector('{first}').scrollIntoView({{block: 'center'}})")
+
+    def at_the_right(selector):
+        """The time at the right edge of a plot."""
+        shown = f"document.querySelector('{selector}').closest('.uplot').querySelector('.u-value').textContent"
+        (x, y), (away, _) = page.places(selector, [0.999, -0.05])
+        page.call("Input.dispatchMouseEvent", type="mouseMoved", x=away, y=y)
+        page.until(f"Number.isNaN(Number({shown}))")
+        page.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+        page.until(f"Number.isFinite(Number({shown}))")
+        return page.evaluate(f"Number({shown})")
+
+    whole = at_the_right(first)
+    page.pinch(first, (0.4, 0.5), (0.1, 0.9))
+    zoomed = at_the_right(first)
+    assert zoomed < 0.7 * whole
+    page.until(f"Number(document.body.dataset.time) > {2 * whole}")
+    assert at_the_right(first) == pytest.approx(zoomed, rel=0.1)
+    page.evaluate(f"document.querySelector('{last}').scrollIntoView({{block: 'center'}})")
+    assert at_the_right(last) == pytest.approx(zoomed, rel=0.1)
+    page.double_tap(last)
+    assert at_the_right(last) > 1.5 * whole
+
+
 @pytest.mark.skipif(not CHROMIUM, reason="no Chromium is installed")
 def test_the_page_shows_the_run_and_all_controls_work(aso_ftc, tmp_path):
     with live(tmp_path / "run", "--stop-time", 60, "--real-time=2", "--record-every", "step") as run, browser(tmp_path / "profile") as page:
@@ -492,6 +520,7 @@ def test_the_page_shows_the_run_and_all_controls_work(aso_ftc, tmp_path):
         page.until("document.querySelectorAll('#figures .uplot').length >= 2")
         page.until("document.getElementById('values').textContent.includes('plant.f_fric = ')")
         assert page.evaluate("document.querySelector('canvas').width") > 100
+        two_fingers_zoom_until_a_double_tap(page)
         page.evaluate(click.format("hold"))
         page.until("document.body.dataset.phase === 'paused'")
         assert page.violations() == []

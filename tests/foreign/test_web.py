@@ -169,6 +169,30 @@ def test_every_control_answers_and_settings_without_a_design_are_refused(open_pa
     page.until(f"{state} === 'Ready.'")
 
 
+def test_two_fingers_zoom_the_figures_until_a_double_tap_and_one_finger_scrolls_the_page(open_page):
+    page = open_page("#stop=5")
+    run_to_the_end(page)
+    frame = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+    def at_the_right(identifier):
+        """The time at the right edge of a figure."""
+        page.evaluate(f"document.getElementById('{identifier}').scrollIntoView({{block: 'center'}})")
+        ((x, y),) = page.places(f"#{identifier} .u-over", [0.999])
+        page.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+        return page.evaluate(f"{frame}.then(() => Number(document.querySelector('#{identifier} .u-value').textContent))")
+
+    assert at_the_right("motion") > 4.9
+    page.pinch("#motion .u-over", (0.4, 0.6), (0.0, 1.0))
+    for identifier in ("motion", "force", "command"):
+        assert at_the_right(identifier) == pytest.approx(3, abs=0.05)
+    before = page.evaluate("scrollY")
+    page.swipe_up("#command .u-over", 150)
+    page.until(f"scrollY > {before} + 100", limit=10)
+    assert at_the_right("command") == pytest.approx(3, abs=0.05)
+    page.double_tap("#command .u-over")
+    assert at_the_right("motion") > 4.9
+
+
 def drop(page, name, content):
     """Drops a file on the page."""
     page.evaluate(

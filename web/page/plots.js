@@ -5,8 +5,8 @@ function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
-// A plot of `curves` ({label, stroke}) over time; its `setData` takes [times, ...values].
-function linePlot(place, unit, curves, data) {
+// A plot of `curves` ({label, ink}) over time, with the horizontal axis `horizontal`; `data`: [times, ...values].
+function linePlot(horizontal, place, unit, curves, data) {
   const axis = { stroke: colour("--text"), grid: { stroke: colour("--grid") }, ticks: { stroke: colour("--grid") } };
   const digits = (self, value) => (value === null || value === undefined ? "–" : Number(value.toPrecision(6)).toString());
   const options = {
@@ -14,13 +14,12 @@ function linePlot(place, unit, curves, data) {
     height: 220,
     scales: { x: { time: false } },
     axes: [{ ...axis, label: "time in s", labelSize: 22 }, { ...axis, size: 70, label: unit || undefined }],
-    cursor: { sync: { key: "run" }, drag: { x: true, y: false } },
     series: [
       { label: "t in s", value: digits },
       ...curves.map(({ label, ink }) => ({ label, stroke: colour(`--ink-${ink}`), width: 1.5, points: { show: false }, value: digits })),
     ],
   };
-  const plot = new uPlot(options, data, place);
+  const plot = horizontal.plot(options, data, place);
   new ResizeObserver(() => plot.setSize({ width: Math.max(place.clientWidth, 200), height: 220 })).observe(place);
   return plot;
 }
@@ -35,11 +34,12 @@ function runPlots() {
     ["command", "N", [["u", "command u in N"]]],
   ];
   const rows = ROW.map(() => []);
+  const horizontal = new GrowingAxis("run");
   const draw = () => kinds.map(([id, unit, curves]) => {
     const place = document.getElementById(id);
     place.replaceChildren();
     const data = [rows[0], ...curves.map(([name]) => rows[ROW.indexOf(name)])];
-    return linePlot(place, unit, curves.map(([, label], k) => ({ label, ink: k + 1 })), data);
+    return linePlot(horizontal, place, unit, curves.map(([, label], k) => ({ label, ink: k + 1 })), data);
   });
   let plots = draw();
   return {
@@ -59,10 +59,11 @@ function runPlots() {
     },
     show() {
       for (const [k, [, , curves]] of kinds.entries()) {
-        plots[k].setData([rows[0], ...curves.map(([name]) => rows[ROW.indexOf(name)])]);
+        horizontal.update(plots[k], [rows[0], ...curves.map(([name]) => rows[ROW.indexOf(name)])]);
       }
     },
     redraw() {
+      for (const plot of plots) horizontal.remove(plot);
       plots = draw();
     },
   };
@@ -111,13 +112,14 @@ async function showFile(file, place) {
   }
   const most = 12;
   const shown = table.names.slice(1, 1 + most);
+  const horizontal = new GrowingAxis("file");
   shown.forEach((name, k) => {
     const figure = document.createElement("div");
     figure.className = "figure";
     figure.setAttribute("role", "img");
     figure.setAttribute("aria-label", `${name} over time`);
     place.append(figure);
-    linePlot(figure, "", [{ label: name, ink: 1 }], [table.columns[0], table.columns[k + 1]]);
+    linePlot(horizontal, figure, "", [{ label: name, ink: 1 }], [table.columns[0], table.columns[k + 1]]);
   });
   const left = table.names.length - 1 - shown.length;
   return `${file.name}: ${table.columns[0].length} rows${left > 0 ? `; ${left} more variables are not drawn` : ""}.`;

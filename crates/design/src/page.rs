@@ -104,7 +104,7 @@ fn about_plots() -> Markup {
     html! {
         p.said {
             "Curves over time or frequency: drag to zoom, double-click to show all. All plots with the same axis \
-             follow, and show their values at the cursor. From the keyboard: arrow keys move the cursor, + and − \
+             follow, and show their values at the cursor. On a touch screen: two fingers zoom, a double tap shows all. From the keyboard: arrow keys move the cursor, + and − \
              zoom, 0 shows all. A click on a name hides its curve."
         }
     }

@@ -49,9 +49,18 @@ impl Site {
             "scenario" => Some(Action::Intervene(request.body.clone())),
             _ => None,
         };
-        let is_read =
-            ["", "colours.css", "page.css", "page.js", "uPlot.css", "uPlot.js", "facts", "state"]
-                .contains(&path);
+        let is_read = [
+            "",
+            "colours.css",
+            "page.css",
+            "page.js",
+            "uPlot.css",
+            "uPlot.js",
+            "zoom.js",
+            "facts",
+            "state",
+        ]
+        .contains(&path);
         match (action, request.method.as_str()) {
             (Some(action), "POST") => self.perform(action, request),
             (Some(_), _) => Answer { allow: Some("POST"), ..Answer::refusal(405, "expected POST") },
@@ -71,6 +80,7 @@ impl Site {
             "page.js" => Answer::file("text/javascript", SCRIPT),
             "uPlot.css" => Answer::file("text/css", figure::interactive::UPLOT_STYLE),
             "uPlot.js" => Answer::file("text/javascript", figure::interactive::UPLOT),
+            "zoom.js" => Answer::file("text/javascript", figure::interactive::ZOOM),
             "facts" => Answer::text_of_json(200, self.facts.clone()),
             _ => match query(&request.query) {
                 Some(query) => self.state(&query),

@@ -50,7 +50,7 @@ pub(crate) fn render(content: &Content<'_>, plots: &[Plot], compared: Option<&Co
                         div #figures {}
                         p.said {
                             "Drag over a plot to zoom, double-click to show all; all plots have the same time \
-                             axis and cursor. In a plot, arrow keys move the cursor, + and − zoom, 0 shows all. A \
+                             axis and cursor. On a touch screen two fingers zoom, a double tap shows all. In a plot, arrow keys move the cursor, + and − zoom, 0 shows all. A \
                              click on a name hides its curve. Of long runs, a plot keeps the \
                              lowest and highest value of each short interval, so that no peak is lost."
                             @if content.left_out > 0 {

@@ -103,9 +103,14 @@ class LinkedAxis {
     return high > low ? [low, high] : [low, this.isLogarithmic ? 10 * low : low + 1];
   }
 
+  /* The functions from values to a scale on which all pixels are equally long, and back. */
+  scale() {
+    return this.isLogarithmic ? [Math.log10, (value) => 10 ** value] : [Number, Number];
+  }
+
   /* A range that is moved by a part of its length and then scaled about `centre`. */
   moved(range, by, size, centre = null) {
-    const [to, from] = this.isLogarithmic ? [Math.log10, (value) => 10 ** value] : [Number, Number];
+    const [to, from] = this.scale();
     const [low, high] = range.map(to);
     const middle = centre === null ? (low + high) / 2 : to(centre);
     return [low, high].map((end) => from(middle + (end - middle) * size + by * (high - low)));
@@ -182,6 +187,12 @@ class LinkedAxis {
     this.plots.add(plot);
     this.apply(plot);
     this.keys(plot, name);
+    const [to, from] = this.scale();
+    zoomByTouch(plot.over, {
+      ends: () => [plot.scales.x.min, plot.scales.x.max].map(to),
+      whole: () => this.whole(plot).map(to),
+      show: (ends) => this.show(ends === null ? null : ends.map(from)),
+    });
     return plot;
   }
 

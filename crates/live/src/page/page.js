@@ -25,6 +25,7 @@
   let data = []; // times, then the values of each shown signal
   let rows = 0; // number of the last row
   let messages = 0;
+  const horizontal = new GrowingAxis("run");
   let plots = [];
   let phase = "";
   let asked = []; // times of the last questions: wall-clock seconds and simulated time
@@ -62,7 +63,7 @@
   function draw() {
     for (const { plot, observer } of plots) {
       observer.disconnect();
-      plot.destroy();
+      horizontal.remove(plot);
     }
     const groups = new Map();
     shown.forEach((signal, place) => {
@@ -88,7 +89,6 @@
       height: 220,
       scales: { x: { time: false } },
       axes: [{ ...axis, label: AXIS, labelSize: 22 }, { ...axis, size: 75, label: unit || undefined }],
-      cursor: { sync: { key: "run" }, drag: { x: true, y: false } },
       series: [
         { label: campaign ? "runs" : "t in s", value: (self, value) => digits(value) },
         ...members.map(({ signal }, k) => ({
@@ -101,14 +101,14 @@
         })),
       ],
     };
-    const plot = new uPlot(options, [[], ...members.map(() => [])], figure);
+    const plot = horizontal.plot(options, [[], ...members.map(() => [])], figure);
     const observer = new ResizeObserver(() => plot.setSize({ width: width(), height: 220 }));
     observer.observe(figure);
     return { plot, members, observer };
   }
 
   function refresh() {
-    for (const { plot, members } of plots) plot.setData([data[0], ...members.map(({ place }) => data[place + 1])]);
+    for (const { plot, members } of plots) horizontal.update(plot, [data[0], ...members.map(({ place }) => data[place + 1])]);
     const last = shown.map((signal, place) => {
       const { name, unit } = facts.signals[signal];
       return `${name} = ${digits(data[place + 1].at(-1))}${unit ? ` ${unit}` : ""}`;
