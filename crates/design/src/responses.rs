@@ -17,10 +17,10 @@ use crate::robustness::report::Number;
 pub(crate) const SETTLED: f64 = 0.02;
 /// Points shown within a sample time, besides the samples.
 pub(crate) const BETWEEN: u32 = 4;
-/// From this number of states of the loop on a curve is thinned to at most four points for each of
-/// `PARTS` parts.
+/// A curve has at most four points for each of so many parts of the logarithmic time axis; the second
+/// number for loops from `LARGE` states on.
+const PARTS: [usize; 2] = [1000, 250];
 const LARGE: usize = 48;
-const PARTS: usize = 250;
 
 /// Returns the responses to a change of each fault, as a step and as a ramp at the bound of its rate,
 /// and to steps of all faults together.
@@ -203,7 +203,7 @@ impl<'a> ShownLoop<'a> {
             Domain::Continuous => (at_points.peak, at_points.peak_time, at_points.settling_time),
             Domain::Sampled { .. } => transient(points, trace.final_value[row]),
         };
-        let shown = if self.system.a.nrows() < LARGE { points } else { &thinned(points) };
+        let shown = thinned(points, PARTS[usize::from(self.system.a.nrows() >= LARGE)]);
         Curve {
             name,
             unit,
@@ -216,13 +216,17 @@ impl<'a> ShownLoop<'a> {
     }
 }
 
-/// Returns the first, the lowest, the highest and the last point of each of `PARTS` parts of a curve; all
-/// points of a short one.
-fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let count = points.len().div_ceil(PARTS);
-    if count <= 4 {
+/// Returns the first, the lowest, the highest and the last point of each of `parts` parts of the logarithmic
+/// time axis, and the points before it; all points if there are no more than that.
+fn thinned(points: &[(f64, f64)], parts: usize) -> Vec<(f64, f64)> {
+    if points.len() <= 4 * parts {
         return points.to_vec();
     }
+    let begin = points.partition_point(|point| point.0 <= 0.0);
+    let (before, rest) = points.split_at(begin);
+    #[expect(clippy::cast_precision_loss, reason = "at most 1000")]
+    let width = (rest[rest.len() - 1].0 / rest[0].0).ln() / parts as f64;
+    let part = |point: &(f64, f64)| ((point.0 / rest[0].0).ln() / width).floor();
     let shown = |part: &[(f64, f64)]| {
         let by_height = |i: &usize, j: &usize| part[*i].1.total_cmp(&part[*j].1);
         let (lowest, highest) =
@@ -233,7 +237,8 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
         kept.dedup();
         kept.into_iter().map(|at| part[at]).collect::<Vec<_>>()
     };
-    points.chunks(count).flat_map(shown).collect()
+    let parts = rest.chunk_by(|one, next| part(one).total_cmp(&part(next)).is_eq());
+    before.iter().copied().chain(parts.flat_map(shown)).collect()
 }
 
 /// Appends outputs to a system.
@@ -269,10 +274,13 @@ mod tests {
         let point =
             |k: u32| (f64::from(k), if k == 12_345 { 9.0 } else { (0.1 * f64::from(k)).sin() });
         let all: Vec<_> = (0..50_000).map(point).collect();
-        let kept = thinned(&all);
-        assert!(kept.len() <= 4 * PARTS && kept.is_sorted_by(|x, y| x.0 < y.0), "{}", kept.len());
+        let kept = thinned(&all, 250);
+        assert!(kept.len() <= 1005 && kept.is_sorted_by(|x, y| x.0 < y.0), "{}", kept.len());
         assert_eq!((kept[0], kept[kept.len() - 1]), (all[0], all[49_999]));
         assert!(kept.contains(&(12_345.0, 9.0)));
-        assert_eq!(thinned(&all[..1000]), all[..1000]);
+        assert_eq!(thinned(&all[..1000], 250), all[..1000]);
+        // By index the decade to 10^4 would have a fifth of what is kept.
+        let shown = kept.iter().filter(|point| (1e3..1e4).contains(&point.0)).count();
+        assert!((150..=220).contains(&shown), "{shown}");
     }
 }
