@@ -73,9 +73,9 @@ fn examined(found: &Detection) -> Markup {
         p {
             "The means by model errors are the largest at the corners of the limits of the parameters and of "
             (own.cases) " random parameters within (seed " (own.seed) "), times the factor of the plant file. The \
-             largest mean within exceeds that of the corners by " (number(100.0 * excess)) " %. With a confidence \
-             of 99 %, at most " (number(100.0 * own.uncovered)) " % of the parameters within their limits give a \
-             test a larger mean, before the factor."
+             largest mean within exceeds that of the corners by a fraction of " (number(excess)) ". With a \
+             confidence of 99 %, at most a fraction of " (number(own.uncovered)) " of the parameters within their \
+             limits gives a test a larger mean, before the factor."
         }
     }
 }
