@@ -13,6 +13,8 @@
 //!   [`weight_of_table`]: the weight whose magnitude is nearest to a table.
 //! * [`observer_norm_lower_bound`], [`feedback_norm_lower_bound`]: the H-infinity norm below which no gain
 //!   and no filter of any order is.
+//! * [`noiseless_norm_lower_bound`], [`disc_norm_lower_bound`]: the same for measurements without noise, and for
+//!   gains whose eigenvalues are in a disc.
 //! * [`certify_common`], [`common_feedback`]: the same for a family of systems, with one P and one
 //!   gain for all of them.
 //! * [`certify_schedule`]: proves that a loop that depends on a scheduling variable is stable while
@@ -28,8 +30,10 @@ mod constant_gain;
 mod coordinates;
 pub(crate) mod definite;
 mod descent;
+mod disc_bound;
 mod gain;
 mod lower_bound;
+mod noiseless;
 mod observer;
 mod problem;
 mod reachable;
@@ -43,8 +47,10 @@ mod weighted;
 
 pub use affine::Affine;
 pub use constant_gain::{ConstantGain, constant_gain};
+pub use disc_bound::disc_norm_lower_bound;
 pub use gain::{GainBound, Norm, certify_gain};
 pub use lower_bound::{feedback_norm_lower_bound, observer_norm_lower_bound};
+pub use noiseless::noiseless_norm_lower_bound;
 pub use problem::Problem;
 pub use reachable::{ReachableSet, common_reachable_set};
 pub use region::{Disc, Region, RegionCertificate, certify_region};

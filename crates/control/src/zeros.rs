@@ -1,5 +1,11 @@
 //! Invariant zeros of a linear system.
 
+#[cfg(feature = "lmi")]
+mod nulling;
+
+#[cfg(feature = "lmi")]
+pub(crate) use nulling::{Nulling, output_nulling};
+
 use crate::balance::{Balance, divide_rows, multiply_columns, unit_columns};
 use crate::blocks::stacked;
 use crate::eigen::eigenvalues;
@@ -66,7 +72,10 @@ pub fn zeros(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Zer
     let all = n + b.ncols() + c.nrows();
     #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
     let zero = TOLERANCE_PER_STATE * all as f64 * size;
-    let square = reduced(reduced(system, zero)?.dual(), zero)?.dual();
+    let (system, _) = reduced(system, DMatrix::zeros(0, n), zero)?;
+    let dual = system.dual();
+    let none = DMatrix::zeros(0, dual.a.nrows());
+    let square = reduced(dual, none, zero)?.0.dual();
     let rank = square.d.nrows();
     if square.a.is_empty() {
         return Ok(Zeros { finite: Vec::new(), rank });
@@ -94,7 +103,7 @@ fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
     }
 }
 
-/// The subsystem with the same zeros whose D has full row rank.
+/// The subsystem with the same zeros whose D has full row rank, and further outputs z = `seen` x of its states.
 ///
 /// One pass of the reduction, with `zero` the threshold of the ranks:
 ///
@@ -106,7 +115,11 @@ fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
 ///    become outputs of the free states.
 ///
 /// The passes end when C2 fixes no further state.
-fn reduced(mut system: StateSpace, zero: f64) -> Result<StateSpace, Error> {
+fn reduced(
+    mut system: StateSpace,
+    mut seen: DMatrix<f64>,
+    zero: f64,
+) -> Result<(StateSpace, DMatrix<f64>), Error> {
     loop {
         let StateSpace { a, b, c, d, domain } = system;
         let outputs = Svd::new(&d.transpose())?;
@@ -116,11 +129,12 @@ fn reduced(mut system: StateSpace, zero: f64) -> Result<StateSpace, Error> {
         let states = Svd::new(&c.rows(reached, c.nrows() - reached).into_owned())?;
         let fixed = states.rank_above(zero);
         if fixed == 0 {
-            return Ok(StateSpace { a, b, c: c1, d: d1, domain });
+            return Ok((StateSpace { a, b, c: c1, d: d1, domain }, seen));
         }
         let free = a.nrows() - fixed;
         let v = &states.right;
         let (a, b, c) = (v.tr_mul(&a) * v, v.tr_mul(&b), c1 * v);
+        seen = (seen * v).columns(fixed, free).into();
         system = StateSpace {
             c: stacked(&c.columns(fixed, free).into(), &a.view((0, fixed), (fixed, free)).into()),
             d: stacked(&d1, &b.rows(0, fixed).into()),

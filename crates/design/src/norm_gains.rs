@@ -5,8 +5,9 @@ pub(crate) mod search;
 use control::aso::Estimator;
 use control::faults::FaultChannel;
 use control::lmi::{
-    self, ChannelWeights, Norm, Performance, feedback_norm_lower_bound, observer_norm_lower_bound,
-    weighted_observer_gain, weighted_state_feedback,
+    self, ChannelWeights, Norm, Performance, disc_norm_lower_bound, feedback_norm_lower_bound,
+    noiseless_norm_lower_bound, observer_norm_lower_bound, weighted_observer_gain,
+    weighted_state_feedback,
 };
 use control::response::h_infinity;
 use control::riccati::{NormFilterProblem, kalman, norm_filter};
@@ -17,7 +18,8 @@ use nalgebra::{DMatrix, DVector};
 use super::channel::{Channel, ChannelWeight};
 use super::gains::{FeedbackProblem, GainResult, Refusal};
 use super::requirements::Region;
-use crate::norm_gains::search::{LARGEST_ORDER, Search, WIDTH};
+use crate::norm_gains::search::{LARGEST_ORDER, LowerBound, Search, WIDTH};
+use crate::report::LowerBoundFor;
 
 /// Ratio of the bounds between which the least norm of any filter is searched, and at which the search
 /// ends.
@@ -163,17 +165,53 @@ impl ObserverProblem<'_> {
         Ok(solve(RELAXED * high))
     }
 
-    /// Computes a norm below which no filter is, of any order, from the unfiltered measurements; None
-    /// without noise.
+    /// Computes a norm below which no gain is, and without a noise channel, if it is larger, one for the disc of
+    /// the region.
+    fn lower_bound(
+        &self,
+        required: NormRequirement<'_>,
+        domain: Domain,
+    ) -> Result<Option<LowerBound>, Error> {
+        if !required.channel.noise.is_empty() {
+            return Ok(self.noisy_lower_bound(required, domain)?.map(LowerBound::for_filters));
+        }
+        let seen = self.estimator.output_matrix(self.a_0, self.c_0);
+        let performance = self.performance(required, domain);
+        let of_filters = match self.weights(required.channel, domain)? {
+            None => noiseless_norm_lower_bound(self.a_0, &seen, &performance, domain),
+            Some(weights) => {
+                let (a, c, performance) = weights.extend(self.a_0, &seen, &performance);
+                noiseless_norm_lower_bound(&a, &c, &performance, domain)
+            }
+        };
+        // A bound whose computation fails is not known; the gain does not depend on it.
+        let of_filters = of_filters.unwrap_or(None);
+        let Region { decay, disc, .. } = required.region;
+        let of_disc = match disc.filter(|_| !required.channel.has_states()) {
+            Some((center, radius)) => {
+                let region = (center, radius, decay.unwrap_or(0.0));
+                disc_norm_lower_bound(self.a_0, &seen, &performance, region).unwrap_or(None)
+            }
+            None => None,
+        };
+        Ok(match (of_filters, of_disc) {
+            (found, Some(norm)) if found.is_none_or(|found| found < norm) => {
+                Some(LowerBound { norm, holds_for: LowerBoundFor::Disc })
+            }
+            (found, _) => found.map(LowerBound::for_filters),
+        })
+    }
+
+    /// Computes a norm below which no filter is, of any order, from the unfiltered measurements with noise.
     ///
     /// The states of a measurement filter contain the measurements before the present sample.
-    fn lower_bound(
+    fn noisy_lower_bound(
         &self,
         required: NormRequirement<'_>,
         domain: Domain,
     ) -> Result<Option<f64>, Error> {
         let order = self.a_0.nrows();
-        if required.channel.noise.is_empty() || order > LARGEST_ORDER {
+        if order > LARGEST_ORDER {
             return Ok(None);
         }
         let Some(filter) = self.filter else {
@@ -200,7 +238,7 @@ impl ObserverProblem<'_> {
             filter: None,
             estimator: Estimator::Prediction,
         };
-        unfiltered.lower_bound(required, domain)
+        unfiltered.noisy_lower_bound(required, domain)
     }
 
     /// Computes L; for a current estimator the gain of the correction.
@@ -319,7 +357,7 @@ impl FeedbackProblem<'_> {
             required,
             domain,
             filter: None,
-            lower_bound,
+            lower_bound: lower_bound.map(LowerBound::for_filters),
         };
         search.result("H-infinity norm from the faults to measurements and commands")
     }

@@ -169,10 +169,13 @@ pub struct NormReport {
     /// A bound of the norm that the bounded real lemma proves, verified by eigenvalues; none if that
     /// fails in double precision, or for more than 30 states.
     pub certified: Option<f64>,
-    /// A proven lower bound: no gain, within a region or not, has a smaller norm, nor has a filter of any
-    /// order. None if none is known, as for an observer without noise.
+    /// A proven lower bound of the norm, for the gains and filters of `lower_bound_for`. 0 if larger and larger
+    /// gains make the norm as small as one likes; none if none is known.
     pub lower_bound: Option<f64>,
-    /// The relative distance of the norm from its lower bound.
+    /// For what the lower bound holds: for all gains, within a region or not, and filters of any order, or for the
+    /// gains that place all eigenvalues in the disc of the region.
+    pub lower_bound_for: Option<LowerBoundFor>,
+    /// The relative distance of the norm from its lower bound; none if that is 0.
     pub gap: Option<f64>,
     /// The norm without weights and noise; none if there are neither.
     pub unweighted: Option<f64>,
@@ -180,6 +183,16 @@ pub struct NormReport {
     pub gain: f64,
     /// The weights over frequency.
     pub weights: Vec<NormWeight>,
+}
+
+/// For what a lower bound of the norm holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum LowerBoundFor {
+    /// Every gain, and every filter of any order.
+    Filters,
+    /// Every gain with all eigenvalues in the disc of the required region.
+    Disc,
 }
 
 /// A weight over frequency.

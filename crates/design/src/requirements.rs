@@ -97,7 +97,9 @@ pub(crate) fn request(
     if one.name.ends_with(".h_infinity") {
         let region = region.as_ref().map(self::region).transpose()?.unwrap_or_default();
         let channel = Channel::read(table, signals, domain)?;
-        let bound = bound(&one, region, !channel.noise.is_empty())?;
+        // A sampled observer cannot lower the norm without end: it knows no disturbance of the last sample.
+        let limited = !channel.noise.is_empty() || (sampled && weights[0] == "W");
+        let bound = bound(&one, region, limited)?;
         let requirement = Requirement::HInfinity { bound, region, channel };
         return Ok(Request { requirement, place: one.place, other: None });
     }
@@ -222,12 +224,12 @@ fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
 }
 
 /// Reads a bound of the norm, or the text "least" (`None`).
-fn bound(entry: &Entry<'_>, region: Region, noisy: bool) -> Result<Option<f64>, PlaceError> {
+fn bound(entry: &Entry<'_>, region: Region, limited: bool) -> Result<Option<f64>, PlaceError> {
     if !entry.is_text() {
         return entry.positive().map(Some);
     }
     match entry.text()? {
-        "least" if region.disc.is_some() || noisy => Ok(None),
+        "least" if region.disc.is_some() || limited => Ok(None),
         "least" => Err(entry.error(
             "\"least\" needs a `region` with a disc, or for the observer `noise`: without either, ever \
              larger gains lower the norm without end",

@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 
 use crate::gains::{GainResult, Refusal, synthesised};
 use crate::norm_gains::NormRequirement;
-use crate::report::NormReport;
+use crate::report::{LowerBoundFor, NormReport};
 use crate::requirements::Region;
 
 /// Relative width of a norm.
@@ -37,7 +37,20 @@ pub(crate) struct Search<'a> {
     /// The gain of a filter by a Riccati equation.
     pub(crate) filter: Option<DMatrix<f64>>,
     /// A norm below which no gain is.
-    pub(crate) lower_bound: Option<f64>,
+    pub(crate) lower_bound: Option<LowerBound>,
+}
+
+/// A proven lower bound of the norm.
+#[derive(Clone, Copy)]
+pub(crate) struct LowerBound {
+    pub(crate) norm: f64,
+    pub(crate) holds_for: LowerBoundFor,
+}
+
+impl LowerBound {
+    pub(crate) fn for_filters(norm: f64) -> Self {
+        Self { norm, holds_for: LowerBoundFor::Filters }
+    }
 }
 
 impl Search<'_> {
@@ -57,11 +70,17 @@ impl Search<'_> {
     /// Riccati equation is used if its eigenvalues are in the region and its norm keeps the bound.
     pub(crate) fn result(&self, channel: &str) -> Result<GainResult, Refusal> {
         if let (Some(bound), Some(least)) = (self.required.bound, self.lower_bound)
-            && least > bound
+            && least.norm > bound
         {
+            let which = match least.holds_for {
+                LowerBoundFor::Filters => {
+                    "no gain keeps this bound, nor does a filter of any order"
+                }
+                LowerBoundFor::Disc => "no gain with all eigenvalues in the disc keeps this bound",
+            };
             return Err(Refusal::Conflict(format!(
-                "no gain keeps this bound, nor does a filter of any order: expected a bound above \
-                 {least:.4e}, which is a proven lower bound of the {channel}"
+                "{which}: expected a bound above {:.4e}, which is a proven lower bound of the {channel}",
+                least.norm
             )));
         }
         let mut chosen = match &self.filter {
@@ -136,8 +155,12 @@ impl Search<'_> {
             channel: channel.to_owned(),
             norm,
             certified,
-            lower_bound: self.lower_bound,
-            gap: self.lower_bound.map(|least| norm / least - 1.0),
+            lower_bound: self.lower_bound.map(|least| least.norm),
+            lower_bound_for: self.lower_bound.map(|least| least.holds_for),
+            gap: self
+                .lower_bound
+                .filter(|least| least.norm > 0.0)
+                .map(|least| norm / least.norm - 1.0),
             unweighted: if plain {
                 None
             } else {
@@ -171,18 +194,25 @@ impl Search<'_> {
 
 /// Says the norm and its bounds.
 fn sentence(report: &NormReport) -> String {
-    let NormReport { norm, unweighted, gain, lower_bound, .. } = report;
+    let NormReport { norm, unweighted, gain, lower_bound, lower_bound_for, gap, .. } = report;
     let plain = unweighted
         .map_or(String::new(), |plain| format!(" with weights and noise, {plain:.4e} without"));
-    let bound = lower_bound.zip(report.gap).map_or_else(
-        || "A lower bound is not known.".to_owned(),
-        |(least, gap)| {
-            format!(
-                "No gain and no filter of any order has a norm below {least:.4e}: the gap is {:.2} %.",
-                100.0 * gap
-            )
-        },
-    );
+    let which = match lower_bound_for {
+        Some(LowerBoundFor::Disc) => "No gain with all eigenvalues in the disc",
+        _ => "No gain and no filter of any order",
+    };
+    let bound = match (lower_bound, gap) {
+        (Some(least), Some(gap)) => {
+            let percent = 100.0 * gap;
+            format!("{which} has a norm below {least:.4e}: the gap is {percent:.2} %.")
+        }
+        (Some(_), None) => {
+            "The measurements have no noise, and there is no lower bound above 0: ever \
+                            larger gains lower the norm without end."
+                .to_owned()
+        }
+        (None, _) => "A lower bound is not known.".to_owned(),
+    };
     let fits: Vec<_> = report
         .weights
         .iter()

@@ -47,6 +47,7 @@ fn tests(tests: &[Test]) -> Markup {
             Cell::from(test.drift),
             Cell::from(test.window.map(f64::from)),
             Cell::from(Some(test.model_error).filter(|error| *error > 0.0)),
+            Cell::from(test.interior_excess),
             Cell::from(test.threshold),
             Cell::from(test.false_alarm_interval),
             Cell::from(decoupled(&test.decoupled).as_str()),
@@ -58,6 +59,7 @@ fn tests(tests: &[Test]) -> Markup {
         "drift",
         "window, samples",
         "mean by model errors",
+        "of it above the corners, relative",
         "threshold",
         "between false alarms, s",
         "insensitive to",
@@ -68,13 +70,11 @@ fn tests(tests: &[Test]) -> Markup {
 /// Says which parameters of an FMU the means by model errors are for.
 fn examined(found: &Detection) -> Markup {
     let Some(own) = &found.parameter_cases else { return html! {} };
-    let excess = found.tests.iter().filter_map(|test| test.interior_excess).fold(0.0, f64::max);
     html! {
         p {
             "The means by model errors are the largest at the corners of the limits of the parameters and of "
-            (own.cases) " random parameters within (seed " (own.seed) "), times the factor of the plant file. The \
-             largest mean within exceeds that of the corners by a fraction of " (number(excess)) ". With a \
-             confidence of 99 %, at most a fraction of " (number(own.uncovered)) " of the parameters within their \
+            (own.cases) " random parameters within (seed " (own.seed) "), times the factor of the plant file. With a \
+             confidence of 99 %, at most the part " (number(own.uncovered)) " of the parameters within their \
              limits gives a test a larger mean, before the factor."
         }
     }

@@ -6,7 +6,7 @@ use super::number::{number, rounded};
 use super::plane::{Plane, Pole};
 use super::pole_map::{Group, Map, Sign};
 use super::table::{Cell, table};
-use crate::report::{Loop, Region, Report};
+use crate::report::{Loop, LowerBoundFor, Region, Report};
 
 /// Returns the required and the actual eigenvalues of a loop, mapped by `place`.
 fn groups(system: &Loop, place: impl Fn(Pole) -> Pole) -> Vec<Group> {
@@ -203,6 +203,14 @@ fn weights(report: &Report) -> Markup {
     html! { @if !rows.is_empty() { (table("Weights over frequency", &heads, &rows)) } }
 }
 
+/// What a lower bound holds for, in the table.
+fn bound_for(all: LowerBoundFor) -> &'static str {
+    match all {
+        LowerBoundFor::Filters => "all filters",
+        LowerBoundFor::Disc => "disc",
+    }
+}
+
 /// Shows the norms of gains that were designed by them, with their bounds.
 fn norms(report: &Report) -> Markup {
     let loops = [("feedback", &report.feedback), ("observer", &report.observer)];
@@ -216,6 +224,7 @@ fn norms(report: &Report) -> Markup {
                 Some(found.norm).into(),
                 found.certified.into(),
                 found.lower_bound.into(),
+                found.lower_bound_for.map_or("", bound_for).into(),
                 found.gap.map(|gap| 100.0 * gap).into(),
                 found.unweighted.into(),
                 Some(found.gain).into(),
@@ -228,6 +237,7 @@ fn norms(report: &Report) -> Markup {
         "norm",
         "proven bound",
         "lower bound",
+        "lower bound for",
         "gap (%)",
         "without weights and noise",
         "norm of the gain",
@@ -237,8 +247,10 @@ fn norms(report: &Report) -> Markup {
             (table("H-infinity norms", &heads, &rows))
             p {
                 "No gain has a norm below the lower bound, nor has a filter of any order: growing \
-                 disturbances that the measurements do not show prove it. The gap is the relative \
-                 distance from it. Without noise on each measurement no lower bound is known."
+                 disturbances that the measurements do not show prove it. A lower bound marked \"disc\" holds \
+                 for gains that place all eigenvalues in the disc of the region. The gap is the relative \
+                 distance from the lower bound; with a lower bound of 0, ever larger gains lower the norm \
+                 without end."
             }
             (weights(report))
         }

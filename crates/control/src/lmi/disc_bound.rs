@@ -1,0 +1,287 @@
+//! A lower bound of the H-infinity norm for gains whose eigenvalues are in a disc.
+
+use super::Performance;
+use super::noiseless::{ROUNDING, checked};
+use crate::Error;
+use crate::svd::Svd;
+use crate::zeros::{Zeros, zeros};
+use nalgebra::{Complex, DMatrix};
+
+/// The points s > 0 at which det H is considered: up to so many on each side of R, so many in a decade.
+const POINTS: i32 = 60;
+const PER_DECADE: f64 = 20.0;
+/// Bisections for the sum of the inverse eigenvalues.
+const BISECTIONS: usize = 30;
+
+/// A lower bound of the H-infinity norm of z = E x, x' = (A - L C) x + B w, for every L that places all eigenvalues
+/// in a disc of the left half plane, in continuous time.
+///
+/// `center`, `radius`, `decay`: all eigenvalues have |s - center| <= radius and a real part of at most -`decay`
+/// <= 0; R = radius - center is the largest distance from 0. E B, q x q, must have an inverse; w enters y through
+/// the states only (D = 0). With T(s) = E (s I - A + L C)^-1 B, the first bound is
+///
+/// ```text
+/// gamma >= (|det E B| (n - q)^(n - q) q^q / n^n)^(1/q) / R
+/// ```
+///
+/// det T = det(E B) N(s) / det(s I - A + L C) has N of degree n - q with leading coefficient 1. With its zeros
+/// mirrored into the left half plane, det T is nowhere on s > 0 larger than its maximum on the imaginary axis;
+/// s = (n - q) R / q is the best point.
+///
+/// If C is q x n and E A = 0 (constant faults), H = I - s (E B)^-1 T has H(0) = I, and det H(s) / det H(0) is the
+/// product of (1 - s / `z_j`) over the invariant zeros of (A, B, C) by the product of (1 + s `v_i`), `v_i` = -1 / `s_i` of the
+/// eigenvalues: L acts on both conditions
+///
+/// ```text
+/// gamma >= |sum of v_i - zeta| / sum of 1 / sigma_i(E B),     zeta = sum of -1 / z_j           (the trace at s = 0)
+/// gamma >= sigma_min(E B) (1 - |det H(s)|^(1/q)) / s                                           at each s > 0
+/// ```
+///
+/// by its eigenvalues only. The larger their sum of Re `v_i`, the larger the second one, whose least value for a sum
+/// has as many `v_i` at the ends of their range as possible. So min(first at a sum, second at this sum) is a bound for
+/// each sum below zeta; the best one is searched.
+///
+/// The largest of these bounds, less 1e-6 for rounding errors; None if none is above 0. For a plant with slow zeros
+/// beside the disc they may be far below the least norm. All are our own.
+///
+/// # Errors
+///
+/// Same as [`super::noiseless_norm_lower_bound`]; [`Error::OutOfRange`] for a disc that does not reach the left half
+/// plane.
+pub fn disc_norm_lower_bound(
+    a: &DMatrix<f64>,
+    c: &DMatrix<f64>,
+    performance: &Performance,
+    (center, radius, decay): (f64, f64, f64),
+) -> Result<Option<f64>, Error> {
+    let (n, k, r) = checked(a, c, performance)?;
+    let Performance { disturbance: b, output: e, feedthrough, .. } = performance;
+    let reach = radius - center;
+    if !(reach > 0.0 && radius > 0.0 && reach.is_finite()) {
+        let rule = "a disc that reaches the left half plane";
+        return Err(Error::OutOfRange { name: "the radius", value: radius, rule });
+    }
+    let product = e * b;
+    let sizes = Svd::new(&product)?.values;
+    let size = e.norm() * b.norm();
+    let regular = r == k && sizes.iter().all(|value| *value > f64::EPSILON.sqrt() * size);
+    if !regular || feedthrough.amax() > 0.0 {
+        return Ok(None);
+    }
+    let (order, inputs) = (number(n), number(k));
+    let power = |base: f64| if base > 0.0 { base * base.ln() } else { 0.0 };
+    let shape = power(order - inputs) + power(inputs) - power(order);
+    let determinant = sizes.iter().map(|value| value.ln()).sum::<f64>();
+    let mut bound = ((determinant + shape) / inputs).exp() / reach;
+    let constant = (e * a).norm() <= f64::EPSILON * e.norm() * a.norm();
+    if c.nrows() == k && constant {
+        let Zeros { finite, rank } = zeros(a, b, c)?;
+        let eigenvalues = Inverses {
+            count: n,
+            least: slowest_rate((center, radius), decay),
+            largest: 1.0 / (-center - radius).max(decay).max(0.0),
+        };
+        if rank == k && finite.iter().all(|zero| zero.norm() > 0.0) {
+            bound = bound.max(by_zeros(
+                &eigenvalues,
+                &finite,
+                (sizes.min(), sizes.map(f64::recip).sum()),
+                inputs,
+            ));
+        }
+    }
+    let bound = bound * (1.0 - ROUNDING);
+    Ok((bound > 0.0).then_some(bound))
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+fn number(count: usize) -> f64 {
+    count as f64
+}
+
+/// The range of Re(-1 / s) of the eigenvalues s; the upper end may be infinite.
+struct Inverses {
+    count: usize,
+    least: f64,
+    largest: f64,
+}
+
+impl Inverses {
+    /// The logarithm of the largest product of 1 / (1 + a v) over all v with this sum.
+    fn largest_log(&self, sum: f64, a: f64) -> f64 {
+        let free = (sum - number(self.count) * self.least).max(0.0);
+        let width = self.largest - self.least;
+        let of = |v: f64| -(a * v).ln_1p();
+        let at_end = if width.is_finite() && width > 0.0 { (free / width).floor() } else { 0.0 };
+        if at_end >= number(self.count) {
+            return number(self.count) * of(self.largest);
+        }
+        let ends = if at_end > 0.0 { at_end * of(self.largest) } else { 0.0 };
+        let left = if at_end > 0.0 { free - at_end * width } else { free };
+        ends + of(self.least + left) + (number(self.count) - at_end - 1.0) * of(self.least)
+    }
+}
+
+/// The bound by the trace at 0 and det H at points s > 0; `sizes`: the least singular value of E B, and the sum of their
+/// inverses.
+fn by_zeros(
+    eigenvalues: &Inverses,
+    zeros: &[Complex<f64>],
+    (least, inverses): (f64, f64),
+    inputs: f64,
+) -> f64 {
+    let zeta = zeros.iter().map(|zero| (-1.0 / zero).re).sum::<f64>();
+    let by_trace = |sum: f64| (zeta - sum) / inverses;
+    let by_points = |sum: f64| {
+        let at = |a: f64| {
+            let of_zeros =
+                zeros.iter().fold(Complex::new(1.0, 0.0), |all, zero| all * (1.0 - a / zero));
+            let log = of_zeros.re.max(0.0).ln() + eigenvalues.largest_log(sum, a);
+            least * (1.0 - (log / inputs).exp()) / a
+        };
+        let rate = 1.0 / eigenvalues.least.max(f64::MIN_POSITIVE);
+        (-POINTS..=POINTS)
+            .map(|point| at(rate * 10.0_f64.powf(f64::from(point) / PER_DECADE)))
+            .fold(0.0, f64::max)
+    };
+    let count = number(eigenvalues.count);
+    let [mut low, mut high] = [eigenvalues.least, eigenvalues.largest].map(|end| count * end);
+    if low <= 0.0 {
+        return 0.0;
+    }
+    if low >= zeta {
+        return by_points(low).max(-by_trace(low));
+    }
+    let mut best = if high < zeta { by_trace(high) } else { 0.0 };
+    high = high.min(zeta);
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        let (first, second) = (by_trace(middle), by_points(middle));
+        best = best.max(first.min(second));
+        if second < first { low = middle } else { high = middle }
+    }
+    best
+}
+
+/// The least Re(-1 / s) of all s in the disc with a real part of at most -`decay`.
+///
+/// On the circle, with a = -Re s, |s|^2 = radius^2 - center^2 - 2 a center, so that the minimum is at an end of the
+/// range of a.
+fn slowest_rate((center, radius): (f64, f64), decay: f64) -> f64 {
+    let first = (-center - radius).max(decay).max(0.0);
+    let square = radius * radius - center * center - 2.0 * first * center;
+    let at_first = if square > 0.0 { first / square } else { 0.0 };
+    let at_last = 1.0 / (radius - center);
+    if first <= 0.0 { 0.0 } else { at_first.min(at_last) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Norm;
+    use super::super::noiseless::tests::{behind, matrix};
+    use super::*;
+    use crate::response::h_infinity;
+    use crate::robustness::random_deviations;
+    use crate::{Domain, StateSpace};
+
+    /// The gain of Ackermann's formula.
+    fn placed(a: &DMatrix<f64>, c: &DMatrix<f64>, poles: &[Complex<f64>]) -> DMatrix<f64> {
+        let n = a.nrows();
+        let mut polynomial = DMatrix::<f64>::identity(n, n);
+        for pole in poles.iter().filter(|pole| pole.im >= 0.0) {
+            let factor = if pole.im > 0.0 {
+                a * a - a * (2.0 * pole.re) + DMatrix::identity(n, n) * pole.norm_sqr()
+            } else {
+                a - DMatrix::identity(n, n) * pole.re
+            };
+            polynomial *= factor;
+        }
+        let rows: Vec<_> = (0..n)
+            .map(|power| (c * a.pow(u32::try_from(power).unwrap())).row(0).into_owned())
+            .collect();
+        let last = DMatrix::from_fn(n, 1, |row, _| f64::from(u8::from(row + 1 == n)));
+        polynomial * DMatrix::from_rows(&rows).lu().solve(&last).unwrap()
+    }
+
+    fn norm(a: DMatrix<f64>, performance: &Performance) -> f64 {
+        let (b, c) = (performance.disturbance.clone(), performance.output.clone());
+        let d = DMatrix::zeros(c.nrows(), b.ncols());
+        let system = StateSpace { a, b, c, d, domain: Domain::Continuous };
+        h_infinity(&system, 1e-4).unwrap().lower
+    }
+
+    /// Random eigenvalues in a disc; the nearest norm is that of eigenvalues at the far end of the disc.
+    #[test]
+    fn no_gain_with_its_eigenvalues_in_the_disc_has_a_smaller_norm() {
+        let (center, radius) = (-6.0, 4.0);
+        let mut cases = random_deviations(4, 300, 7);
+        cases.push(vec![1.0, 0.0, 0.999, 0.0]);
+        // Near the zeros -2 and -3, and the far end.
+        cases.push(vec![1.0, 1.0, 1.0, 0.0]);
+        // Beside zeros that are slow for the disc, -2 and -3, the bound is far below.
+        for (numerator, gap) in
+            [([1.0, 0.0, 0.0], 1.5), ([6.0, 5.0, 1.0], 5.0), ([1.0, -0.5, 0.0], 1.5)]
+        {
+            let (a, c, performance) = behind(numerator);
+            let disc = (center, radius, 0.0);
+            let least = disc_norm_lower_bound(&a, &c, &performance, disc).unwrap().unwrap();
+            let mut nearest = f64::INFINITY;
+            for case in &cases {
+                let pole = |at: usize| {
+                    let angle = std::f64::consts::PI * (1.0 - case[at + 1].abs());
+                    let size = case[at].abs().sqrt() * radius;
+                    Complex::new(center, 0.0) + Complex::from_polar(size, angle)
+                };
+                let poles: Vec<_> = [0, 2]
+                    .into_iter()
+                    .flat_map(|at| {
+                        let pole = pole(at);
+                        if pole.im.abs() < 1e-9 {
+                            [Complex::new(pole.re, 0.0); 2]
+                        } else {
+                            [pole, pole.conj()]
+                        }
+                    })
+                    .collect();
+                let found = norm(&a - placed(&a, &c, &poles) * &c, &performance);
+                assert!(found > least, "{poles:?}: {found} {least}");
+                nearest = nearest.min(found);
+            }
+            assert!(nearest < gap * least, "{numerator:?}: {nearest} {least}");
+        }
+    }
+
+    /// A fault that two measurements show, f itself and its integral: the first bound alone.
+    #[test]
+    fn with_more_measurements_than_faults_the_bound_is_that_of_the_determinant() {
+        let a = matrix(2, 2, &[0.0, 1.0, 0.0, 0.0]);
+        let performance = Performance {
+            disturbance: matrix(2, 1, &[0.0, 1.0]),
+            output: matrix(1, 2, &[0.0, 1.0]),
+            feedthrough: DMatrix::zeros(2, 1),
+            norm: Norm::HInfinity,
+            gamma: None,
+        };
+        let c = DMatrix::identity(2, 2);
+        let found = disc_norm_lower_bound(&a, &c, &performance, (-3.0, 2.0, 0.0)).unwrap().unwrap();
+        assert!((found / (0.25 / 5.0) - 1.0).abs() < 1e-5, "{found}");
+        // With A - L C = diag(-5, -5) the norm is 1 / 5.
+        assert!(norm(matrix(2, 2, &[-5.0, 0.0, 0.0, -5.0]), &performance) > found);
+    }
+
+    #[test]
+    fn the_slowest_rate_is_that_of_a_grid_over_the_region() {
+        for (center, radius, decay) in [(-6.0, 4.0, 0.0), (-6.0, 8.0, 1.0), (-6.0, 6.5, 3.0)] {
+            let mut least = f64::INFINITY;
+            for step in 0..100_000_u32 {
+                let angle = f64::from(step) * std::f64::consts::TAU / 1e5;
+                let s = Complex::new(center, 0.0) + Complex::from_polar(radius, angle);
+                if s.re <= -decay {
+                    least = least.min((-1.0 / s).re);
+                }
+            }
+            let found = slowest_rate((center, radius), decay);
+            assert!(found <= least && found > 0.99 * least, "{center} {radius}: {found} {least}");
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! The motions that the outputs of a system do not show.
+
+use super::{TOLERANCE_PER_STATE, reduced};
+use crate::balance::{Balance, divide_rows, multiply_columns};
+use crate::blocks::stacked;
+use crate::svd::Svd;
+use crate::{Error, StateSpace, check};
+use nalgebra::{DMatrix, DVector};
+
+/// The motions x' = A x with w = W x for which y = C x + D w = 0: A has the invariant zeros as eigenvalues.
+pub(crate) struct Nulling {
+    /// r x r, the dynamics.
+    pub(crate) dynamics: DMatrix<f64>,
+    /// k x r: w of a state.
+    pub(crate) input: DMatrix<f64>,
+    /// z = E x + G w of a state.
+    pub(crate) output: DMatrix<f64>,
+}
+
+/// The motions of x' = A x + B w that y = C x + D w does not show, with z = E x + G w.
+///
+/// `system`: A to D; `output`: E, r x n; `direct`: G, r x k. None if w is not determined by y: D of the reduced
+/// system is not square then, and some w has no effect on y. Method: [`super::zeros()`], with D; states are
+/// balanced, columns of [B; D] and rows of [C, D] scaled to the norm of A.
+///
+/// # Errors
+///
+/// [`Error::NotConverged`]; [`Error::Overflow`].
+pub(crate) fn output_nulling(
+    system: &StateSpace,
+    (output, direct): (&DMatrix<f64>, &DMatrix<f64>),
+) -> Result<Option<Nulling>, Error> {
+    let Balance { matrix: a, scale } = Balance::new(&system.a);
+    let size = if a.norm().is_normal() { a.norm() } else { 1.0 };
+    let (b, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
+    let columns = lengths(&stacked(&b, &system.d)).map(|length| size / length);
+    let rows = stacked(&c.transpose(), &system.d.transpose());
+    let rows = lengths(&rows).map(|length| size / length);
+    let all = a.nrows() + b.ncols() + c.nrows();
+    let scaled = StateSpace {
+        b: multiply_columns(&b, &columns),
+        c: DMatrix::from_diagonal(&rows) * c,
+        d: DMatrix::from_diagonal(&rows) * multiply_columns(&system.d, &columns),
+        a,
+        domain: system.domain,
+    };
+    let norms = [&scaled.a, &scaled.b, &scaled.c, &scaled.d].map(DMatrix::norm);
+    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+    let zero = TOLERANCE_PER_STATE * all as f64 * norms.into_iter().fold(0.0, f64::hypot);
+    let (found, seen) = reduced(scaled, multiply_columns(output, &scale), zero)?;
+    let inputs = found.b.ncols();
+    if found.d.nrows() != inputs || Svd::new(&found.d)?.rank_above(zero) < inputs {
+        return Ok(None);
+    }
+    let through = found.d.lu().solve(&found.c).ok_or(Error::Overflow { what: "D^-1 C" })?;
+    let dynamics = check::in_range("A - B D^-1 C", found.a - found.b * &through)?;
+    let input = -(DMatrix::from_diagonal(&columns) * through);
+    Ok(Some(Nulling { dynamics, output: seen + direct * &input, input }))
+}
+
+/// The length of each column; 1 for a column of zeros.
+fn lengths(m: &DMatrix<f64>) -> DVector<f64> {
+    let length = |column: nalgebra::DVectorView<'_, f64>| match column.norm() {
+        length if length > 0.0 => length,
+        _ => 1.0,
+    };
+    DVector::from_iterator(m.ncols(), m.column_iter().map(length))
+}
