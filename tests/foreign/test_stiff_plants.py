@@ -117,3 +117,31 @@ def test_bounds_of_a_slow_sampled_loop_are_sums_of_its_impulse_response(aso_ftc,
     gains = {bound["error"]: bound["gain_of_fault"] for bound in report["bounds"]}
     for row, name in enumerate(["x1", "x2", "x3", "x4"]):
         assert 0.999 * sums[row, 0] <= gains[name] <= 1.5 * sums[row, 0], name
+
+
+def test_a_design_whose_responses_overflow_is_written_and_red(aso_ftc, tmp_path):
+    """BDT1, a binary distillation tower: the observer that is asked for has eigenvectors with a condition of 1e16."""
+    own = [-0.014, -0.0138, -0.0141, -0.0158, -0.0312, -0.0352, -0.0422, -0.0482, -0.0572, -0.0483, -0.0185]
+    above = [0.0043, 0.0046, 0.0063, 0.011, 0.015, 0.022, 0.028, 0.037, 0.042, 0.0005]
+    below = [0.0095, 0.0095, 0.0095, 0.0095, 0.0202, 0.0202, 0.0202, 0.0202, 0.0202, 0.0255]
+    a = np.diag(own) + np.diag(above, 1) + np.diag(below, -1)
+    a[[1, 2, 7, 8, 10], [10, 10, 10, 10, 0]] = 0.0005, 0.0002, 0.0002, 0.0005, 0.0255
+    b = 1e-6 * np.array(
+        [
+            [0, 5, 2, 1, 0, 0, -5, -10, -40, -20, 460],
+            [0, -40, -20, -10, 0, 0, 10, 30, 5, 2, 460],
+            [0, 2500, 5000, 5000, 5000, 5000, 5000, 5000, 2500, 2500, 0],
+        ]
+    )
+    plant = ("A", a), ("B", b.T), ("C", np.eye(11)[[9, 0, 10]])
+    text = "".join(f"{name} = {matrix.tolist()}\n" for name, matrix in plant)
+    text += 'actuator_faults = "all"\nrobustness.cases = 0\n'
+    text += f"feedback.eigenvalues = {[-0.3 - 0.045 * i for i in range(11)]}\n"
+    text += f"observer.eigenvalues = {[-1.2 - 0.18 * i for i in range(14)]}\n"
+    (tmp_path / "plant.toml").write_text(text, encoding="utf-8")
+    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml", "--json")
+    assert done.returncode == 1, done.stderr
+    report = json.loads(done.stdout)
+    assert report["verdict"]["level"] == "red" and report["steps"] == []
+    assert any("responses to faults cannot be computed" in reason for reason in report["verdict"]["reasons"])
+    assert (tmp_path / "design.toml").exists()

@@ -263,3 +263,14 @@ fn also_decoupled(faults: &[usize]) -> String {
 fn development(s: Complex<f64>) -> String {
     format!("s = {}", shown(s))
 }
+
+impl Error {
+    /// Whether rounding errors or the number of iterations prevented a result that exists in theory.
+    #[must_use]
+    pub fn is_numerical(&self) -> bool {
+        matches!(
+            self,
+            Self::NotConverged { .. } | Self::ResidualTooLarge { .. } | Self::Overflow { .. }
+        )
+    }
+}

@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 use triangular::Triangular;
 
 /// Largest residual of a solution that is returned, see [`Solution::residual`].
-const ALLOWED_RESIDUAL: f64 = 1e-10;
+const ALLOWED_RESIDUAL: f64 = 1e-9;
 const REFINEMENTS: usize = 2;
 /// From this order on the equations are solved by doubling first.
 const LARGE: usize = 48;
@@ -42,7 +42,7 @@ pub struct Solution {
 /// doubling (R. A. Smith, SIAM J. Appl. Math. 16, 1968) come first, about 3 n^3 multiplications of the
 /// fastest kind for each of some 15 doublings. A result with a residual above 1e-12 is compared with that
 /// of the other method. Every entry of the residual is at most
-/// 1e-10 of the sum of the absolute terms it is made of.
+/// 1e-9 of the sum of the absolute terms it is made of.
 ///
 /// Source: R. H. Bartels and G. W. Stewart, Solution of the matrix equation A X + X B = C, Comm.
 /// ACM 15 (1972), algorithm 432.
@@ -73,7 +73,7 @@ pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<Solution, Error> {
 /// The solution exists and is unique, and is symmetric positive definite when Q is: the sum of A'^k
 /// Q A^k over k from 0 on. Method: balancing of A, complex Schur form, substitution, refinement;
 /// about 100 n^3 multiplications; from 48 states on doubling first, as in [`lyapunov`]. Every entry of the
-/// residual is at most 1e-10 of the sum of the absolute terms it is made of.
+/// residual is at most 1e-9 of the sum of the absolute terms it is made of.
 ///
 /// Source: G. Kitagawa, An algorithm for solving the matrix equation X = F X F' + S, Int. J.
 /// Control 25 (1977).

@@ -200,7 +200,7 @@ fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Ass
 }
 
 fn assigned(found: &Alternatives, required: &[Complex<f64>]) -> GainResult {
-    let method = "Eigenvalues assigned, with well-conditioned eigenvectors.";
+    let method = "Eigenvalues assigned, with eigenvectors as well-conditioned as was found.";
     let result = |placement: &Placement| GainResult {
         gain: placement.gain.clone(),
         method: method.to_owned(),
@@ -220,7 +220,7 @@ fn partly_assigned(
 ) -> GainResult {
     let (movable, all) = (part.a.nrows(), part.coordinates.ncols());
     let method = format!(
-        "{movable} of {all} eigenvalues assigned, with well-conditioned eigenvectors; no gain moves \
+        "{movable} of {all} eigenvalues assigned, with eigenvectors as well-conditioned as was found; no gain moves \
          the others."
     );
     let named = |own: GainResult| GainResult { method: method.clone(), quality: None, ..own };

@@ -33,11 +33,12 @@ use super::responses::responses;
 use super::robustness::{robustness, verdict};
 use super::signals::{self, EntryPoint, Fault, FaultDynamics};
 use super::tracking::{DesignLoop, TrackingAction};
-use crate::estimation::report::estimation;
+use crate::estimation::report as estimation;
 use crate::family::report::{self as family_report, judge};
 use crate::losses::report::LossReport;
 use crate::reconfiguration::report::ReconfigurationReport;
 use crate::references::steps::{beyond_limits, reached, reference_steps};
+use crate::robustness::report::Level;
 use crate::schedule::report::{self as schedule_report, judge_schedule};
 
 /// Returns the report on `designed`.
@@ -58,11 +59,13 @@ pub(crate) fn report(
     let mut checks = checks(designed);
     checks.extend(reached(&references));
     let robustness = robustness(designed, &file.robustness, family, steps)?;
-    let (estimation, norms) = rayon::join(
-        || estimation(designed, robustness.as_ref(), &file.robustness),
+    let (errors, norms) = rayon::join(
+        || estimation::errors(designed, robustness.as_ref(), &file.robustness),
         || loops.norms(),
     );
-    let (estimation, norms) = (estimation?, norms?);
+    let mut missing = Vec::new();
+    let errors = unless_numerical("the errors of the estimates", errors, &mut missing)?;
+    let norms = unless_numerical("the norms of the estimation errors", norms, &mut missing)?;
     let budget = Budget::start(certificate_time);
     let certificate = steps.run(Step::Certificates, || certificate(designed, norms, &budget));
     let (bounds, without_bound) = steps.run(Step::Bounds, || loops.bounds(&budget))?;
@@ -70,6 +73,12 @@ pub(crate) fn report(
     let of_losses = losses.iter().flat_map(LossReport::reasons);
     let further = of_losses.chain(reconfiguration.iter().flat_map(ReconfigurationReport::reasons));
     let mut further: Vec<_> = further.collect();
+    let (responses, frequency) =
+        rayon::join(|| steps.run(Step::Responses, || responses(designed)), || loops.frequency());
+    let responses = unless_numerical("the responses to faults", responses, &mut missing)?;
+    let frequency =
+        unless_numerical("the gains from faults over frequency", frequency, &mut missing)?;
+    further.extend(missing.into_iter().map(|reason| (Level::Amber, reason)));
     let fallback = fallback.map(|own| fallback::report(file, designed, own, &budget));
     let fallback = fallback.transpose()?.flatten();
     further.extend(fallback.iter().flat_map(|own| own.reasons(file.robustness.red)));
@@ -84,8 +93,6 @@ pub(crate) fn report(
     if let Some(found) = &schedule {
         judge_schedule(&mut verdict, designed, found, &file.robustness);
     }
-    let (responses, frequency) =
-        rayon::join(|| steps.run(Step::Responses, || responses(designed)), || loops.frequency());
     let mut warnings: Vec<_> =
         designed.warnings.iter().map(|warning| line(file, warning)).collect();
     warnings.extend(references.iter().filter_map(beyond_limits));
@@ -111,7 +118,7 @@ pub(crate) fn report(
             &designed.observer,
             Some(&file.observer.requirement).filter(|_| designed.law.keeps_error_dynamics()),
         )?,
-        estimation,
+        estimation: estimation::estimation(designed, errors),
         sampling: match designed.domain {
             Domain::Continuous => None,
             Domain::Sampled { period } => Some(Sampled {
@@ -124,9 +131,9 @@ pub(crate) fn report(
         detection: None,
         certificate,
         bounds,
-        steps: responses?,
+        steps: responses,
         references,
-        frequency: frequency?,
+        frequency,
         effectiveness: effectiveness(designed)?,
         losses,
         reconfiguration,
@@ -134,6 +141,21 @@ pub(crate) fn report(
         assumptions: assumptions(designed, &linear.faults),
         interface: Vec::new(),
     })
+}
+
+/// Returns a part of the report; an empty one, with a reason in `missing`, if rounding errors prevent it.
+fn unless_numerical<T>(
+    part: &str,
+    found: Result<Vec<T>, Error>,
+    missing: &mut Vec<String>,
+) -> Result<Vec<T>, Error> {
+    match found {
+        Err(error) if error.is_numerical() => {
+            missing.push(format!("{part} cannot be computed: {error}"));
+            Ok(Vec::new())
+        }
+        found => found,
+    }
 }
 
 /// Returns the name of an estimator in the design file.

@@ -20,13 +20,26 @@ const SETTLED: f64 = 0.02;
 /// The frequency of the sinusoidal fault relative to the mean rate of the observer.
 const SLOW: f64 = 0.1;
 
-/// Returns law, conditions and errors of the estimates; the noise only for a stable loop.
-pub(crate) fn estimation(
+/// Returns law and conditions of the estimates, with their errors.
+pub(crate) fn estimation(designed: &ControllerDesign, errors: Vec<EstimationErrors>) -> Estimation {
+    let law = &designed.law;
+    let sampled = designed.domain != Domain::Continuous;
+    Estimation {
+        law: law.law.name().to_owned(),
+        sources: law.law.sources().to_owned(),
+        equations: law.law.equations(sampled).iter().map(|&line| line.to_owned()).collect(),
+        parameters: law.parameters.clone(),
+        conditions: law.conditions.clone(),
+        errors,
+    }
+}
+
+/// Returns the errors of the estimates; the noise only for a stable loop.
+pub(crate) fn errors(
     designed: &ControllerDesign,
     robustness: Option<&Robustness>,
     limits: &RobustnessLimits,
-) -> Result<Estimation, Error> {
-    let law = &designed.law;
+) -> Result<Vec<EstimationErrors>, Error> {
     let peaks = robustness.map(|_| noise_peaks(designed, &limits.noise)).transpose()?;
     let noise = robustness.map(|found| {
         let commands = designed.linear.actuators.len();
@@ -42,16 +55,7 @@ pub(crate) fn estimation(
             ..own.of_fault(at)?
         })
     });
-    let errors = errors.collect::<Result<_, _>>()?;
-    let sampled = designed.domain != Domain::Continuous;
-    Ok(Estimation {
-        law: law.law.name().to_owned(),
-        sources: law.law.sources().to_owned(),
-        equations: law.law.equations(sampled).iter().map(|&line| line.to_owned()).collect(),
-        parameters: law.parameters.clone(),
-        conditions: law.conditions.clone(),
-        errors,
-    })
+    errors.collect()
 }
 
 /// The error dynamics, from the faults to the errors of their estimates.
