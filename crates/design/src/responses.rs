@@ -283,4 +283,19 @@ mod tests {
         let shown = kept.iter().filter(|point| (1e3..1e4).contains(&point.0)).count();
         assert!((150..=220).contains(&shown), "{shown}");
     }
+
+    #[test]
+    fn a_thinned_curve_drawn_over_the_logarithm_of_time_is_the_curve_in_every_decade() {
+        // Two modes, 1e-2 s and 10 s.
+        let value = |time: f64| 2.0 - (-100.0 * time).exp() - (-0.1 * time).exp();
+        let all: Vec<_> = (0..50_000).map(|k| 1e-3 * f64::from(k)).map(|t| (t, value(t))).collect();
+        let kept = thinned(&all, 250);
+        for (time, exact) in &all[1..] {
+            let next = kept.partition_point(|point| point.0 < *time);
+            let ((from, low), (to, high)) = (kept[next.max(2) - 1], kept[next.max(2)]);
+            let share = (time / from).ln() / (to / from).ln();
+            let drawn = low + share * (high - low);
+            assert!((drawn - exact).abs() < 2e-3, "{time}: {drawn}, expected {exact}");
+        }
+    }
 }
