@@ -85,7 +85,7 @@ class Live:
 @contextmanager
 def live(out, *options, start="--live=paused", fmus=FMUS):
     """A run of the pendulum."""
-    command = [COMMAND, "run", *fmus, "--out", out, start, *options]
+    command = [COMMAND, "run", *fmus, *options, start, *(["--out", out] if out else [])]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     process = subprocess.Popen(list(map(str, command)), cwd=ROOT, **pipes)
     try:
@@ -303,9 +303,57 @@ def test_the_message_of_an_fmu_that_fails_comes_with_its_name(tmp_path):
     assert "the run ended early" in state["outcome"] and "plant" in state["outcome"]
 
 
-def test_a_resumed_run_has_no_live_view(aso_ftc, tmp_path):
-    done = aso_ftc("run", "--live", "--resume", tmp_path / "none")
-    assert done.returncode == 2 and "cannot be used with" in done.stderr
+# Of steps that vary, rejected ones have touched times after the checkpoint.
+VARYING = ["--step-control", "doubling", "--relative-tolerance", 1e-2]
+
+
+def stopped_after(steps, out, options):
+    """The checkpoint of a run with an intervention that is stopped after some steps."""
+    saved = out / "run.state"
+    with live(out, "--stop-time", 0.5, "--record-every", "step", "--checkpoint", saved, *options) as run:
+        run.do("scenario", SET)
+        for _ in range(steps):
+            run.do("step")
+        run.until(lambda state: state["phase"] == "paused" and state["steps"] == steps)
+        run.do("stop")
+        run.end()
+    return saved
+
+
+@pytest.mark.parametrize("options", [[], ["--every", "controller=7"], VARYING], ids=["fixed", "multirate", "varying"])
+def test_a_resumed_run_with_interventions_is_repeated_bit_for_bit_from_its_start(aso_ftc, tmp_path, options):
+    saved = stopped_after(25, tmp_path, options)
+    first = (tmp_path / "live.toml").read_bytes()
+    with live(None, fmus=["--resume", saved]) as run:
+        facts = json.loads(run.ask("facts")[2])
+        assert 0 < facts["start"] == run.state()["time"] < facts["stop"] == 0.5
+        run.do("scenario", '[[set]]\nvariable = "plant.F_c"\nvalue = 9\n' + FAULTS[2])
+        for _ in range(3):
+            run.do("step")
+        run.until(lambda state: state["phase"] == "paused" and state["steps"] == 3)
+        run.do("scenario", FAULTS[0])
+        run.do("continue")
+        out = run.end()
+    file = tmp_path / f"live-from-{facts['start']}.toml"
+    assert re.search(rf"to repeat it: \S+ run \S+/{re.escape(file.name)}\n", out)
+    assert (tmp_path / "live.toml").read_bytes() == first
+    done = aso_ftc("run", file)
+    assert done.returncode == 0, done.stderr
+    own, rest = (path.read_bytes() for path in (tmp_path / "results.csv", *tmp_path.glob("results-from-*.csv")))
+    assert own + rest.split(b"\n", 1)[1] == (tmp_path / "repeat.csv").read_bytes()
+
+
+def test_a_resumed_run_that_is_watched_keeps_its_bits(aso_ftc, tmp_path):
+    saved = stopped_after(25, tmp_path, [])
+    free, seen = tmp_path / "free.csv", tmp_path / "seen.csv"
+    options = ["--resume", saved, "--checkpoint", tmp_path / "other.state", "--results"]
+    assert aso_ftc("run", *options, free).returncode == 0
+    with live(None, seen, start="--live", fmus=options) as run:
+        assert "to repeat it" not in run.end()
+    assert seen.read_bytes() == free.read_bytes() and seen.read_bytes().count(b"\n") > 400
+
+
+def test_an_unknown_start_of_the_live_view_is_refused(aso_ftc):
     done = aso_ftc("run", "--live=now", *FMUS)
     assert done.returncode == 2 and "running, paused" in done.stderr
 

@@ -43,8 +43,9 @@ pub(super) struct Live {
     start: Instant,
     /// Time of all pauses.
     paused: Duration,
-    /// Lines of the file that repeats the run: interventions, and the stop.
+    /// Lines of the file that repeats the run: what it is, the interventions, and the stop.
     remarks: Vec<String>,
+    /// Beside the results. The file that repeats the run before a checkpoint keeps its name.
     file: PathBuf,
     /// Whether the page has stopped the run.
     pub(super) stopped: bool,
@@ -61,11 +62,20 @@ impl Live {
         here: &Path,
     ) -> anyhow::Result<Self> {
         let results = run.config.results.file.clone().unwrap_or_default();
-        let file = results.with_file_name("live.toml");
+        let (begin, stop) = (run.simulation.time(), run.plan.stop);
+        let resumed = begin > run.plan.experiment.start_time;
+        let first =
+            "A run with --live, with its interventions. `aso-ftc run` with this file repeats it";
+        let (file, first) = if resumed {
+            let name = format!("live-from-{begin}.toml");
+            (name, format!("{first} from its start, not from the checkpoint at t = {begin} s."))
+        } else {
+            ("live.toml".to_owned(), format!("{first}."))
+        };
+        let file = results.with_file_name(file);
         let shown = shown(&file, here);
         let repeat = repeat_command(&shown);
         let probe = probe(run, ports)?;
-        let (begin, stop) = (run.simulation.time(), run.plan.stop);
         let system = run.simulation.system();
         let facts = Facts {
             subject: Subject::Run,
@@ -99,7 +109,7 @@ impl Live {
             pauses_again: false,
             start: Instant::now(),
             paused: Duration::ZERO,
-            remarks: Vec::new(),
+            remarks: vec![first],
             file,
             stopped: false,
         })
@@ -217,9 +227,7 @@ impl Live {
             }
         }
         config.checkpoint = CheckpointSettings::default();
-        let first =
-            "A run with --live, with its interventions. `aso-ftc run` with this file repeats it.";
-        let remarks = std::iter::once(first).chain(self.remarks.iter().map(String::as_str));
+        let remarks = self.remarks.iter().map(String::as_str);
         let remarks: String = remarks.flat_map(|line| ["# ", line, "\n"]).collect();
         Ok(remarks + &config.render()?)
     }
@@ -262,7 +270,7 @@ impl Live {
     /// Prints how the run is repeated, tells the page how it ended, and closes the page. `here` is the
     /// current folder.
     pub(super) fn end(self, outcome: &str, here: &Path) {
-        if !self.remarks.is_empty() {
+        if self.remarks.len() > 1 {
             println!("to repeat it: {}", repeat_command(&shown(&self.file, here)));
         }
         self.view.end(outcome, PATIENCE);

@@ -148,7 +148,7 @@ pub(crate) struct Options {
     /// Show the run on a page on this machine, which can pause, change and stop it; --live=paused waits for
     /// the page at the start
     #[arg(long, value_name = "START", num_args = 0..=1, require_equals = true)]
-    #[arg(default_missing_value = "running", conflicts_with = "resume")]
+    #[arg(default_missing_value = "running")]
     pub(super) live: Option<LiveStart>,
     /// Run each FMU in a separate process
     #[arg(long)]

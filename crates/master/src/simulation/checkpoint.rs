@@ -27,6 +27,8 @@ const FIRST_SLOT: usize = 3;
 pub struct Checkpoint {
     origin: Origin,
     time: f64,
+    /// The latest end in s of a step that was attempted.
+    attempted: f64,
     count: u64,
     size: f64,
     controller: Controller,
@@ -138,6 +140,7 @@ impl Simulation {
         Ok(Checkpoint {
             origin: self.origin.clone(),
             time,
+            attempted: self.attempted,
             count: self.engine.grid.count,
             size: self.control.size,
             controller: self.control.controller.clone(),
@@ -200,7 +203,7 @@ impl Simulation {
             .restore(checkpoint.drives.clone())
             .map_err(|error| SystemError::Algorithm { what: error.to_string() })?;
         self.engine.grid.resume(checkpoint.time, checkpoint.count);
-        self.attempted = checkpoint.time;
+        self.attempted = checkpoint.attempted;
         self.ended = checkpoint.ended;
         self.control.size = checkpoint.size;
         self.control.controller = checkpoint.controller.clone();
