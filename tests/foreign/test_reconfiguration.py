@@ -9,6 +9,7 @@ from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 from scipy.linalg import expm
 from scipy.optimize import minimize
+from scipy.signal import place_poles
 
 from conftest import ROOT
 
@@ -254,3 +255,43 @@ def test_a_bad_entry_is_refused_at_its_line(aso_ftc, tmp_path, old, new, message
     assert old in SMALL
     done = designed(aso_ftc, tmp_path, SMALL.replace(old, new))
     assert done.returncode == 2 and message in done.stderr and "plant.toml:1" in done.stderr
+
+
+def sensitivity(a, b, c, k, g, l):
+    """p_u^2 p_y of the peaks of S at commands and measurements; the controller has the dynamics g and the gains k and l."""
+    points = 1j * np.logspace(-3, 3, 2000)[:, None, None]
+    plant = c @ np.linalg.solve(points * np.eye(len(a)) - a, b.astype(complex))
+    controller = k @ np.linalg.solve(points * np.eye(len(g)) - g, l.astype(complex))
+    peak = lambda loop: np.linalg.norm(np.linalg.inv(np.eye(loop.shape[1]) - loop), 2, axis=(1, 2)).max()
+    return peak(controller @ plant) ** 2 * peak(plant @ controller)
+
+
+@pytest.mark.parametrize("seed", [4, 6])
+def test_of_the_feedbacks_with_the_required_eigenvalues_the_least_sensitive_is_used(aso_ftc, tmp_path, seed):
+    random = np.random.default_rng(seed)
+    a, b, c = np.round(random.standard_normal((5, 5)), 2), np.round(random.standard_normal((5, 4)), 2), np.eye(5)[:4]
+    poles = [-1, -1.5, -2, -2.5, -3]
+    done = designed(aso_ftc, tmp_path, f"""A = {a.tolist()}
+B = {b.tolist()}
+C = {c.tolist()}
+actuators = ["u1", "u2", "u3", "u4"]
+faults = [{{ name = "f", actuator = "u1" }}]
+feedback.eigenvalues = {poles}
+observer.eigenvalues = [-5, -6, -7, -8, -9, -10]
+robustness.cases = 0
+[reconfiguration]
+actuators = ["u4"]
+""")
+    assert done.returncode in (0, 1), done.stderr
+    design = tomllib.loads((tmp_path / "design.toml").read_text())
+    own, l = design["reconfigurations"][0], np.vstack([matrix(design, "L_x"), matrix(design, "L_f")])
+    rest, f_a, k_f = np.hstack([b[:, :3], np.zeros((5, 1))]), matrix(design, "F_a"), matrix(own, "K_f")
+
+    def value(k_x):
+        g = np.block([[a + rest @ k_x, f_a + rest @ k_f], [np.zeros((1, 6))]]) - l @ np.hstack([c, np.zeros((4, 1))])
+        return sensitivity(a, rest, c, np.hstack([k_x, k_f]), g, l)
+
+    placed = [place_poles(a, b[:, :3], poles, method=method).gain_matrix for method in ("YT", "KNV0")]
+    others = [value(np.vstack([-gain, np.zeros((1, 5))])) for gain in placed]
+    assert np.sort(np.linalg.eigvals(a + rest @ matrix(own, "K_x")).real) == pytest.approx(np.sort(poles), abs=1e-6)
+    assert value(matrix(own, "K_x")) < 1.01 * min(others)

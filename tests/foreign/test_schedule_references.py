@@ -298,7 +298,7 @@ def test_a_measurement_that_schedules_moves_the_references_too(made, change):
     [
         # K_i grows with the inertia: half of the way the product with L_w is above 2.
         ([("B = [[0], [0.25]]", "B = [[0], [0.0005]]"), ("0.25", "0.0005")], ["back-calculation of the integrals is not stable while torque is at the limits", "inertia = "]),
-        ([("[schedule]", '[estimation]\nlaw = "sliding-mode"\n\n[schedule]')], ["with `schedule` expected one of augmented, proportional-integral, fast-adaptive, learning, found \"sliding-mode\""]),
+        ([("[schedule]", '[estimation]\nlaw = "sliding-mode"\n\n[schedule]')], ["with `schedule` the law is one of augmented, proportional-integral, fast-adaptive, learning; found \"sliding-mode\""]),
         ([("A = [[0, 1], [-0.375, -0.05]]\nB = [[0], [0.25]]", "A = [[0, 1], [-1, -1]]\nB = [[0], [1]]\nC = [[0, 1]]")], ["no integral action exists for r_angle", "schedule with inertia = 4"]),
     ],
 )

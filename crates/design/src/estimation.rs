@@ -130,7 +130,7 @@ impl EstimationRequest {
             if !law.allows(key) && file.get(key).is_some() {
                 let all = Law::ALL.iter().filter(|law| law.allows(key)).map(Law::name);
                 let all = all.collect::<Vec<_>>().join(", ");
-                let message = format!("with `{key}` expected one of {all}, found {found:?}");
+                let message = format!("with `{key}` the law is one of {all}; found {found:?}");
                 return Err(stated.error(message));
             }
         }

@@ -4,12 +4,13 @@ pub(crate) mod limits;
 pub mod report;
 
 use control::allocation::{allocate, equilibrium};
-use control::aso::Gains;
-use control::controller::{closed_loop, controller};
+use control::aso::{FaultyPlant, Gains};
+use control::controller::controller;
 use control::eigen::eigenvalues;
 use control::faults::FaultChannel;
+use control::robustness::{Loop, least_sensitive};
 use control::stability::instability;
-use control::{Error, sampled};
+use control::{Error, StateSpace, sampled};
 use nalgebra::{DMatrix, DVector};
 
 use super::designed::ControllerDesign;
@@ -146,21 +147,20 @@ impl Without<'_> {
         }
         let authority = self.authority();
         let allocation = allocate(&linear.b, &self.gone, &authority)?;
-        let (k_x, method) = if allocation.residual < EXACT {
+        let (feedbacks, method) = if allocation.residual < EXACT {
             let method = "Control allocation: the other actuators have the effect of all, with the least \
                           effort relative to their limits; the loop keeps its eigenvalues.";
-            (&allocation.matrix * gains.k_x.columns(0, n), method.to_owned())
+            (vec![&allocation.matrix * gains.k_x.columns(0, n)], method.to_owned())
         } else {
             match self.redesigned(requirement) {
-                Ok((gain, method)) => {
-                    (gain, format!("Designed again for the other actuators. {method}"))
+                Ok((feedbacks, method)) => {
+                    (feedbacks, format!("Designed again for the other actuators. {method}"))
                 }
                 Err(reason) => return Ok(Err(reason)),
             }
         };
-        let (k_f, k_s, rest) = self.static_commands(&k_x, &authority)?;
-        let k_x = k_x.resize_horizontally(plant.a.nrows(), 0.0);
-        let instability = instability(&self.known_loop(&k_x, &k_f)?, *domain)?;
+        let (ReconfiguredGains { k_x, k_f, k_s }, rest) = self.chosen(&feedbacks, &authority)?;
+        let instability = instability(&self.known_loop(&k_x, &k_f)?.dynamics(), *domain)?;
         if instability >= 0.0 {
             return Ok(Err(format!(
                 "the loop without it is not stable: {instability:.3e} beyond the limit"
@@ -186,21 +186,43 @@ impl Without<'_> {
         Ok(Ok((ReconfiguredGains { k_x, k_f, k_s }, report)))
     }
 
+    /// The gains of the feedback whose loop has the lowest peaks of S, with the commands at rest. The observer is that
+    /// of the intact plant.
+    fn chosen(
+        &self,
+        feedbacks: &[DMatrix<f64>],
+        authority: &[f64],
+    ) -> Result<(ReconfiguredGains, Rest), Error> {
+        let order = self.designed.plant.a.nrows();
+        let (mut all, mut loops) = (Vec::new(), Vec::new());
+        for feedback in feedbacks {
+            let (k_f, k_s, rest) = self.static_commands(feedback, authority)?;
+            let k_x = feedback.clone().resize_horizontally(order, 0.0);
+            if feedbacks.len() > 1 {
+                loops.push(self.known_loop(&k_x, &k_f)?);
+            }
+            all.push((ReconfiguredGains { k_x, k_f, k_s }, rest));
+        }
+        Ok(all.swap_remove(least_sensitive(&loops)))
+    }
+
     /// The loop in which the observer knows that the actuators are gone.
-    fn known_loop(&self, k_x: &DMatrix<f64>, k_f: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+    fn known_loop(&self, k_x: &DMatrix<f64>, k_f: &DMatrix<f64>) -> Result<Loop, Error> {
         let ControllerDesign { plant, gains, domain, .. } = self.designed;
         let mut reduced = plant.clone();
         reduced.b = self.without_columns(&plant.b);
         let own = Gains { k_x: k_x.clone(), k_f: k_f.clone(), ..gains.clone() };
-        let ones = vec![1.0; plant.b.ncols()];
-        closed_loop(&reduced, &controller(&reduced, &own, *domain)?, &ones)
+        let controller = controller(&reduced, &own, *domain)?;
+        let FaultyPlant { a, b, c, .. } = reduced;
+        let d = DMatrix::zeros(c.nrows(), b.ncols());
+        Loop::new(StateSpace { a, b, c, d, domain: *domain }, controller)
     }
 
     /// What the fall-back does in this case, for which there are no other gains.
     fn served(&self, fallback: &Fallback) -> Result<ServedByFallback, Error> {
         let none = DMatrix::zeros(fallback.k_x.nrows(), self.designed.gains.k_f.ncols());
         let whole = self.known_loop(&fallback.k_x, fallback.k_f.as_ref().unwrap_or(&none))?;
-        let decay = decay(&whole, self.designed.domain)?;
+        let decay = decay(&whole.dynamics(), self.designed.domain)?;
         let linear = &self.designed.linear;
         let reached = unreachable_mode(linear, &self.without_columns(&linear.b))?.is_none();
         let stable = reached && decay > 0.0;
@@ -239,8 +261,8 @@ impl Without<'_> {
         distances.iter().flatten().map(|own| (own / largest).max(1e-3)).collect()
     }
 
-    /// A feedback of the other actuators that meets the requirement of the plant file.
-    fn redesigned(&self, requirement: &Requirement) -> Result<(DMatrix<f64>, String), String> {
+    /// Feedbacks of the other actuators that meet the requirement of the plant file, at least one.
+    fn redesigned(&self, requirement: &Requirement) -> Result<(Vec<DMatrix<f64>>, String), String> {
         let ControllerDesign { linear, plant, extended, domain, .. } = self.designed;
         let n = extended.states;
         let gone = &self.gone;
@@ -269,7 +291,9 @@ impl Without<'_> {
         match feedback(&requirement, &problem, *domain) {
             Ok(found) => {
                 let with_zeros = |gain: DMatrix<f64>, at: &usize| gain.insert_row(*at, 0.0);
-                Ok((gone.iter().fold(found.gain, with_zeros), found.method))
+                let method = found.method.clone();
+                let all = found.with_others().into_iter();
+                Ok((all.map(|own| gone.iter().fold(own.gain, with_zeros)).collect(), method))
             }
             Err(Refusal::Control(error)) => Err(not_met(&error.to_string())),
             Err(Refusal::Conflict(message)) => Err(not_met(&message)),
