@@ -10,8 +10,11 @@ import numpy as np
 
 from conftest import ROOT
 from scheduled_design import DRIVE
+from test_fallback import SAMPLED, VEHICLE
 
 HERE = Path(__file__).parent
+# What adds inputs to a controller.
+INPUTS = ("references", "schedule", "detection", "reconfigurations")
 WARNINGS = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -Werror -ffp-contract=off".split()
 
 # Two masses with a spring; the motor's force has limits, its fault is a ramp.
@@ -66,6 +69,23 @@ def windows(isolation):
     return f"{head}{sensor}{detection}noise = 2e-2\nprocess_noise = 1e-2\n[experiment]{tail}"
 
 
+def vehicle(head, has_fallback=True):
+    """The underwater vehicle, sampled; its lost thrusters are found by their estimates or reported."""
+    text = VEHICLE.read_text(encoding="utf-8").replace("up_to = 0.6\n", "")
+    text = text if has_fallback else text[: text.index("# One feedback for all of this")]
+    return f"sample_time = 0.05\n{head}{text}[robustness]\ncases = 0\n"
+
+
+VEHICLE_DETECTION = """
+[detection]
+method = "cusum"
+false_alarm_interval = 100.0
+noise = 1e-3
+process_noise = 1e-3
+from = 1.0
+"""
+
+
 @dataclass
 class Case:
     """A plant file; the largest faults, the standard deviation of the measurements, numbers of samples."""
@@ -89,6 +109,9 @@ CASES = {
     "detection-cusum": Case(TANKS["detection"], 6e-5, 2e-3),
     "detection-window": Case(windows("false"), 0.2, 2e-2),
     "detection-isolation": Case(windows("true"), 0.2, 2e-2),
+    "fall-back": Case("t_on = 3.0\n" + SAMPLED, 0.3, 1e-2),
+    "reconfiguration": Case(vehicle("t_on = 3.0\n", has_fallback=False), 1.0, 1e-3),
+    "reconfiguration-detection": Case(vehicle("estimator = \"prediction\"\nmonitor = true\n") + VEHICLE_DETECTION, 1.0, 1e-3),
     "constant-prediction": Case("sample_time = 1.0\nestimator = 'prediction'\n" + QUADRUPLE, 0.3, 1e-2),
 }
 
@@ -114,7 +137,7 @@ class Built:
         unit = program.with_suffix(".o")
         run(compiler, *WARNINGS, *options, "-c", source, "-o", unit)
         macros = [f"-DNAME={self.name}", f"-DREAL={'float' if self.single else 'double'}"]
-        macros += [f"-D{name.upper()}" for name in ("references", "schedule", "detection") if self.has(name)]
+        macros += [f"-D{name.upper()}" for name in INPUTS if self.has(name)]
         run(compiler, *options, "-include", header, *macros, HERE / "controller_loop.c", unit, "-o", program)
         return program
 
@@ -125,15 +148,17 @@ class Built:
         source = self.folder / "rust" / "src" / "lib.rs"
         run(*always, "--crate-type", "rlib", "--crate-name", "controller", source, "-o", library)
         switches = [("single", self.single), ("outside", "schedule" in self.design)]
-        switches += [(name, self.has(name)) for name in ("references", "schedule", "detection")]
-        known = ["--check-cfg", "cfg(single, references, schedule, outside, detection)"]
+        switches += [(name, self.has(name)) for name in INPUTS]
+        known = ["--check-cfg", f"cfg(single, outside, {', '.join(INPUTS)})"]
         known += [word for name, is_set in switches if is_set for word in ("--cfg", name)] + ["--extern", f"controller={library}"]
         run(*always, *known, HERE / "controller_loop.rs", "-o", program)
         return program
 
     def has(self, name):
-        """Whether the controller has references, a scheduling variable that is no measurement, or a detection."""
+        """Whether the controller has references, a scheduling variable that is no measurement, a detection, or others gains."""
         own = self.design.get(name)
+        if name == "reconfigurations":
+            return bool(own or "fallback" in self.design)
         if name == "schedule" and own:
             return own["variable"] not in [signal["name"] for signal in self.design["measurements"]]
         return bool(own)

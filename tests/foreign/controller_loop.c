@@ -1,7 +1,8 @@
 /* Feeds measurements from standard input to a controller that `aso-ftc design --c-code` has written, and writes
  * commands, estimates and status to standard output. Each sample has the measurements, the references, the
- * scheduling variable, whether to compensate and, of a detection, whether to reset it, all as doubles. Macros: NAME (of the controller), REAL (double or
- * float), REFERENCES and SCHEDULE if it has them as inputs, DETECTION if it has one; the header comes by -include. */
+ * scheduling variable, whether to compensate, of a detection whether to reset it, and of a reconfiguration what is known about the actuators,
+ * all as doubles. Macros: NAME (of the controller), REAL (double or
+ * float), REFERENCES and SCHEDULE if it has them as inputs, DETECTION and RECONFIGURATIONS if it has them; the header comes by -include. */
 #include <stdio.h>
 #include <string.h>
 
@@ -36,6 +37,17 @@ static JOIN(NAME, Detection) detection;
 #define RESET_ARGUMENT
 #define DETECTION_ARGUMENT
 #endif
+#ifdef RECONFIGURATIONS
+static JOIN(NAME, Actuators) actuators;
+static int32_t reconfiguration;
+#define SWITCHES sizeof(actuators)
+#define ACTUATORS_ARGUMENT &actuators,
+#define RECONFIGURATION_ARGUMENT , &reconfiguration
+#else
+#define SWITCHES 0
+#define ACTUATORS_ARGUMENT
+#define RECONFIGURATION_ARGUMENT
+#endif
 static JOIN(NAME, Commands) commands;
 static JOIN(NAME, Estimates) estimates;
 
@@ -54,7 +66,7 @@ static void put(const void *signals, size_t count)
 int main(void)
 {
     JOIN(NAME, State) state;
-    double values[ALL + FLAGS];
+    double values[ALL + FLAGS + SWITCHES];
     JOIN(NAME, init)(&state);
     fprintf(stderr, "%zu\n", sizeof(state));
     while (fread(values, sizeof(values), 1, stdin) == 1)
@@ -71,8 +83,15 @@ int main(void)
 #ifdef SCHEDULE
         memcpy(&schedule, received + ALL - 1, sizeof(schedule));
 #endif
-        uint32_t bits = JOIN(NAME, step)(&state, &measurements, REFERENCE_ARGUMENT SCHEDULE_ARGUMENT values[ALL] > 0.5 RESET_ARGUMENT,
-                                         &commands, &estimates DETECTION_ARGUMENT);
+#ifdef RECONFIGURATIONS
+        for (size_t k = 0; k < SWITCHES; k++)
+        {
+            ((bool *)&actuators)[k] = values[ALL + FLAGS + k] > 0.5;
+        }
+#endif
+        uint32_t bits = JOIN(NAME, step)(&state, &measurements, REFERENCE_ARGUMENT SCHEDULE_ARGUMENT ACTUATORS_ARGUMENT
+                                         values[ALL] > 0.5 RESET_ARGUMENT,
+                                         &commands, &estimates DETECTION_ARGUMENT RECONFIGURATION_ARGUMENT);
         put(&commands, COUNT(commands));
         put(&estimates, COUNT(estimates));
 #ifdef DETECTION
@@ -80,6 +99,10 @@ int main(void)
         fwrite(decision, sizeof(decision), 1, stdout);
         put(detection.residual, COUNT(detection.residual));
         put(detection.statistic, COUNT(detection.statistic));
+#endif
+#ifdef RECONFIGURATIONS
+        double number = (double)reconfiguration;
+        fwrite(&number, sizeof(number), 1, stdout);
 #endif
         double status = (double)bits;
         fwrite(&status, sizeof(status), 1, stdout);

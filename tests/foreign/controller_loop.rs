@@ -11,6 +11,8 @@ type Real = f64;
 const REFERENCES: usize = 0;
 const SCHEDULED: usize = cfg!(schedule) as usize;
 const FLAGS: usize = 1 + cfg!(detection) as usize;
+#[cfg(not(reconfigurations))]
+const SWITCHES: usize = 0;
 
 fn main() {
     let mut input = Vec::new();
@@ -19,7 +21,7 @@ fn main() {
     let mut controller = Controller::new();
     eprintln!("{}", size_of_val(&controller));
     let mut output = Vec::new();
-    for sample in values.chunks_exact(MEASUREMENTS + REFERENCES + SCHEDULED + FLAGS) {
+    for sample in values.chunks_exact(MEASUREMENTS + REFERENCES + SCHEDULED + FLAGS + SWITCHES) {
         let measured: [Real; MEASUREMENTS] = core::array::from_fn(|k| sample[k] as Real);
         let referred: [Real; REFERENCES] = core::array::from_fn(|k| sample[MEASUREMENTS + k] as Real);
         let compensate = sample[MEASUREMENTS + REFERENCES + SCHEDULED] > 0.5;
@@ -30,11 +32,18 @@ fn main() {
         let (found, _) = (controller.step(&measured.into(), &referred.into(), compensate), scheduled);
         #[cfg(all(not(references), schedule))]
         let (found, _) = (controller.step(&measured.into(), &scheduled.into(), compensate), referred);
-        #[cfg(not(any(references, schedule, detection)))]
+        let first = MEASUREMENTS + REFERENCES + SCHEDULED + FLAGS;
+        let switches: [bool; SWITCHES] = core::array::from_fn(|k| sample[first + k] > 0.5);
+        #[cfg(all(reconfigurations, not(detection)))]
+        let found = controller.step(&measured.into(), &switches.into(), compensate);
+        #[cfg(all(reconfigurations, detection))]
+        let found = controller.step(&measured.into(), &switches.into(), compensate, sample[first - 1] > 0.5);
+        let _ = (referred, scheduled, switches);
+        #[cfg(not(any(references, schedule, detection, reconfigurations)))]
         let (found, _) = (controller.step(&measured.into(), compensate), (referred, scheduled));
-        #[cfg(detection)]
+        #[cfg(all(detection, not(reconfigurations)))]
         let reset = sample[MEASUREMENTS + REFERENCES + SCHEDULED + 1] > 0.5;
-        #[cfg(detection)]
+        #[cfg(all(detection, not(reconfigurations)))]
         let (found, _) = (controller.step(&measured.into(), compensate, reset), (referred, scheduled));
         let commands: [Real; ACTUATORS] = found.commands.into();
         let estimates: [Real; ESTIMATES] = found.estimates.into();
@@ -52,6 +61,8 @@ fn main() {
             all.extend([f64::from(u8::from(detected)), f64::from(isolated)]);
             all.extend([t_detected, t_onset].iter().chain(&residual).chain(&statistic).map(|value| f64::from(*value)));
         }
+        #[cfg(reconfigurations)]
+        all.push(f64::from(found.reconfiguration));
         all.push(f64::from(status));
         all.iter().for_each(|value| output.extend(value.to_le_bytes()));
     }

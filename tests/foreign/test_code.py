@@ -51,6 +51,11 @@ def in_the_loop(own, case):
     operating = np.array([signal.get("operating", 0.0) for signal in references])
     period, fault, detection = design["sample_time"], np.zeros(q), design.get("detection")
     samples, expected = [], []
+    switched, shares, known = switches_of(design)
+    # Decisive losses of effectiveness occur at last.
+    reconfigured = [entry["gone"] for entry in design.get("reconfigurations", []) if "loss" in entry]
+    lost = [k for k, entry in enumerate(design["faults"]) if entry.get("loss_of") in reconfigured]
+    of_lost = [outputs.index(design["faults"][k]["loss_of"]) for k in lost]
     with Instance(own.fmu) as instance:
         for k in range(case.samples):
             if k % 500 == 100:
@@ -60,19 +65,33 @@ def in_the_loop(own, case):
             if schedule:
                 value = swept(schedule, k)
                 y = np.append(y, value) if own.has("schedule") else np.where(np.array(inputs) == schedule["variable"], value, y)
+            known = [k < 2000 and chance.random() < share for share in shares] if k % 100 == 70 else known
             compensate, reset = not 1700 < k < 1800, k % 700 in (640, 641)
             if k == 0:
                 instance.start(dict(zip(inputs, y)))
             else:
-                switches = {"compensate": compensate, **({"detection_reset": reset} if detection else {})}
+                switches = {"compensate": compensate, **({"detection_reset": reset} if detection else {}), **dict(zip(switched, known))}
                 instance.set({**dict(zip(inputs, y)), **switches})
                 # A scheduling variable outside of the schedule gives a warning.
-                known = (OK, OK + 1) if schedule else (OK,)
-                assert instance.call("DoStep", (k - 1) * period, period, 1) in known
-            samples.append([*y, compensate, *([reset] if detection else [])])
+                accepted = (OK, OK + 1) if schedule else (OK,)
+                assert instance.call("DoStep", (k - 1) * period, period, 1) in accepted
+            samples.append([*y, compensate, *([reset] if detection else []), *known])
             expected.append(instance.get(*outputs) + decided(instance, detection))
+            expected[-1] += instance.get("reconfiguration") if own.has("reconfigurations") else []
+            if k > 2300 and lost:
+                fault[lost[0]] = -expected[-1][of_lost[0]]
             plant.step(np.array(expected[-1][:m]), fault)
     return np.array(samples, dtype=float), np.array(expected)
+
+
+def switches_of(design):
+    """Names of the inputs on actuators, the parts of time in which they are true, their first values."""
+    names = [actuator["name"] for actuator in design["actuators"]]
+    places = [names.index(entry["gone"]) for entry in design.get("reconfigurations", [])]
+    inputs, shares = [vector("actuator_gone", len(names))[place] for place in places], [0.25] * len(places)
+    if "fallback" in design:
+        inputs, shares = [*inputs, "fall_back"], [*shares, 0.15]
+    return inputs, shares, [False] * len(inputs)
 
 
 def decided(instance, detection):
@@ -198,6 +217,37 @@ def test_a_start_at_other_estimates_has_the_bits_of_the_fmu(designed):
             expected.append(instance.get(*names) + instance.get(*vector("residual", k)))
     found, _ = looped(own, own.samples[:count, :p], x_0)
     assert (bits(found) == bits(np.array(expected))).all()
+
+
+@pytest.mark.parametrize("name", ["fall-back", "reconfiguration", "reconfiguration-detection"])
+def test_the_samples_of_a_reconfiguration_have_each_kind_of_gains(designed, name):
+    """What the comparison of bits would miss if it never happened."""
+    own = designed(name)
+    actuators, cases = len(own.design["actuators"]), len(own.design["reconfigurations"])
+    switches = own.samples[:, -cases - 1 : -1] if "fallback" in own.design else own.samples[:, -cases:]
+    number = own.expected[:, -1]
+    assert {0, 1, 3, *([-1] if "fallback" in own.design else [])} <= set(number) <= set(range(-1, actuators + 1))
+    assert set(switches.sum(axis=1)) >= {0, 1, 2, 3}, "several actuators are gone"
+    stuck = {own.design["actuators"].index(actuator): entry["stuck_at"] for entry in own.design["reconfigurations"]
+             for actuator in own.design["actuators"] if actuator["name"] == entry["gone"]}
+    for place, value in stuck.items():
+        assert (own.expected[number == place + 1, place] == value).all()
+    if any("loss" in entry for entry in own.design["reconfigurations"]):
+        assert ((number > 0) & ~switches.any(axis=1)).any(), "an estimated loss decides"
+
+
+@pytest.mark.parametrize("name", ["fall-back", "reconfiguration"])
+def test_the_stated_arithmetic_of_a_reconfiguration_has_the_commands_of_stuck_actuators(designed, name):
+    own = designed(name)
+    n, m, p, q = own.sizes
+    losses = sum("loss_of" in fault for fault in own.design["faults"])
+    gone = max([1, *(len(entry["gone"]) for entry in own.design.get("combinations", []))])
+    count = lambda wanted: int(re.search(rf"(\d+) {wanted}", own.header.replace("\n *", "")).group(1))
+    products = p * n + n * p + q * p + m * n + m * q + n * n + n * m + n * q
+    assert count("multiplications") == products + m * gone + 3 * losses
+    limited = 2 * m * any("limits" in actuator for actuator in own.design["actuators"])
+    assert count("comparisons") == 2 * (p + m + n + q + n + q) + limited + len(own.design["reconfigurations"])
+    assert f"Memory: {fed(own.crate(), own.samples[:1])[1]} bytes for an instance" in own.header
 
 
 def test_after_an_overflow_the_detection_is_that_of_the_sample_before(designed):
@@ -406,6 +456,8 @@ def test_the_crate_is_built_for_a_cortex_m_and_nothing_in_it_panics(aso_ftc, tmp
         ("scheduled-by-measurement", []),
         ("detection-cusum", []),
         ("detection-window", ["--float"]),
+        ("fall-back", ["--float"]),
+        ("reconfiguration-detection", []),
     ]:
         (folder := tmp_path / name).mkdir()
         members[name] = Built(aso_ftc, CASES[name].text, folder, *options, name=name.replace("-", "_"))

@@ -221,9 +221,8 @@ def test_what_detection_does_not_allow_for_is_refused_at_its_line(tmp_path, extr
 
 
 @pytest.mark.parametrize("option", ["--c-code", "--no-std"])
-@pytest.mark.parametrize(("extra", "entry"), [('[reconfiguration]\nactuators = "all"\n', "reconfigurations")])
-def test_code_for_a_microcontroller_is_refused_with_the_entry_that_it_has_not(tmp_path, option, extra, entry):
-    own = f"sample_time = {T}\n" + PLANT + extra
+def test_code_for_a_microcontroller_is_refused_with_the_entry_that_it_has_not(tmp_path, option):
+    own, entry = f"sample_time = {T}\nestimation.law = \"proportional-integral\"\n" + PLANT, "P_f"
     (tmp_path / "plant.toml").write_text(own, encoding="utf-8")
     command = [COMMAND, "design", "plant.toml", option, "code", "--certificate-time", "0"]
     run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)

@@ -9,6 +9,7 @@ mod c;
 mod controller;
 mod detection;
 mod names;
+mod reconfiguration;
 mod recursion;
 mod rounding;
 mod rust;

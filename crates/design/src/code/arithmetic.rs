@@ -35,6 +35,12 @@ impl Arithmetic {
             all.comparisons += 2 * m;
         }
         all.add_detection(controller);
+        if let Some(own) = &controller.reconfiguration {
+            // K_s times the commands of stuck actuators, the commands with that sum; the losses.
+            all.multiplications += m * own.most_gone();
+            all.additions += m * own.most_gone() + 2 * m;
+            all.comparisons += own.cases.len();
+        }
         // E_hat = -(u scale) f_hat, scale = 1 / (u u + u_e^2).
         let losses = controller.losses.len();
         all.multiplications += 3 * losses;
@@ -142,6 +148,12 @@ impl Memory {
             counters += own.counters();
             flags += own.flags();
         }
+        if let Some(own) = &controller.reconfiguration {
+            let cases = own.cases.len();
+            stored += cases;
+            counters += cases + 2;
+            flags += Kind::Actuator.count(controller) + 2 * cases;
+        }
         let mut stack: usize = locals(recursion).into_iter().map(count).sum();
         if controller.schedule.is_some() {
             let operating = operating_vectors(controller);
@@ -150,11 +162,13 @@ impl Memory {
             stack += limits * Kind::Actuator.count(controller);
         }
         let integers = controller.detection.as_ref().map_or(0, Detection::integer_bytes);
+        let of_cases =
+            controller.reconfiguration.as_ref().map_or(0, |own| own.integer_bytes(controller));
         let tables: usize = tables(controller, recursion).iter().map(Constants::count).sum();
         Self {
             state: (stored * size + 4 * counters + flags).next_multiple_of(size),
             stack: stack * size,
-            constants: tables * size + integers,
+            constants: tables * size + integers + of_cases,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod detection;
 mod header;
+mod reconfiguration;
 mod sample;
 mod schedule;
 
@@ -92,13 +93,19 @@ impl Source<'_> {
         };
         let references = pointer("References", "references", &self.fields.references);
         let schedule = pointer("Schedule", "schedule", &self.fields.schedule);
+        let (actuators, reconfiguration) = match self.controller.reconfiguration {
+            None => (String::new(), ""),
+            Some(_) => {
+                (format!("const {name}_Actuators *actuators, "), ",\n    int32_t *reconfiguration")
+            }
+        };
         let (reset, detection) = match self.controller.detection {
             None => ("", String::new()),
             Some(_) => (", bool detection_reset", format!(",\n    {name}_Detection *detection")),
         };
         format!(
             "uint32_t {name}_step({name}_State *state, const {name}_Measurements *measurements,\n    \
-             {references}{schedule}bool compensate{reset},\n    {name}_Commands *commands, {name}_Estimates *estimates{detection})"
+             {references}{schedule}{actuators}bool compensate{reset},\n    {name}_Commands *commands, {name}_Estimates *estimates{detection}{reconfiguration})"
         )
     }
 
@@ -128,6 +135,7 @@ impl Source<'_> {
             self.table(&mut lines, &table);
         }
         self.detection_tables(&mut lines);
+        self.reconfiguration_tables(&mut lines);
         self.helpers(&mut lines);
         self.initialisation(&mut lines);
         self.step(&mut lines);
@@ -135,21 +143,20 @@ impl Source<'_> {
     }
 
     fn table(&self, lines: &mut Vec<String>, table: &Constants) {
-        let Constants { name, meaning, rows, columns, is_scheduled, values } = table;
+        let Constants { name, meaning, rows, columns, layers, values } = table;
         if !meaning.is_empty() {
             lines.extend([String::new(), format!("/* The {meaning}. */")]);
         }
         let count = rows.count(self.controller);
         let rows = self.count(*rows);
-        let points =
-            if *is_scheduled { format!("[{}]", self.count(Kind::Point)) } else { String::new() };
+        let points = layers.map_or_else(String::new, |kind| format!("[{}]", self.count(kind)));
         let sizes = match columns {
             Some(columns) => format!("{points}[{rows}][{}]", self.count(*columns)),
             None => format!("[{rows}]"),
         };
         lines.push(format!("static const {} {name}{sizes} =", self.real));
         lines.push("{".to_owned());
-        if *is_scheduled {
+        if layers.is_some() {
             for rows in values.chunks(count) {
                 lines.push("    {".to_owned());
                 self.rows(lines, rows, ("        ", columns.is_some()));
@@ -234,6 +241,7 @@ static {real} product(const {real} row[], const {real} vector[], uint32_t count)
         }
         self.schedule_helpers(lines);
         self.detection_helpers(lines);
+        self.reconfiguration_helpers(lines);
         if !self.controller.losses.is_empty() {
             lines.push(format!(
                 "
@@ -304,6 +312,7 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
             lines.push("    state->started = false;".to_owned());
         }
         self.detection_start(lines, x_op);
+        self.reconfiguration_start(lines);
         lines.push("}".to_owned());
     }
 

@@ -5,6 +5,7 @@ use serde::Deserialize;
 
 use super::Precision;
 use super::detection::{Detection, DetectionFile};
+use super::reconfiguration::{CaseFile, CombinationFile, FallbackFile, Plant, Reconfiguration};
 use super::schedule::{Schedule, ScheduleFile};
 use super::symbols::Matrix;
 use crate::Error;
@@ -48,6 +49,7 @@ pub(super) struct Controller {
     /// Matrices and operating points that follow a variable, in place of those above.
     pub(super) schedule: Option<Schedule>,
     pub(super) detection: Option<Detection>,
+    pub(super) reconfiguration: Option<Reconfiguration>,
 }
 
 /// The measurements that the command is computed from.
@@ -150,6 +152,12 @@ struct File {
     schedule: Option<ScheduleFile>,
     #[serde(default)]
     detection: Option<DetectionFile>,
+    #[serde(default)]
+    reconfigurations: Vec<CaseFile>,
+    #[serde(default)]
+    combinations: Vec<CombinationFile>,
+    #[serde(default)]
+    fallback: Option<FallbackFile>,
 }
 
 /// A matrix as the design file has it.
@@ -190,10 +198,22 @@ impl Controller {
         let detection = file.detection.map(|own| Detection::of(own, sample_time)).transpose()?;
         let schedule =
             file.schedule.map(|own| Schedule::of(own, &file.measurements)).transpose()?;
+        let (k_x, k_f) = (file.k_x.dense(), file.k_f.dense());
+        let losses = losses(&file.faults, &file.actuators);
+        let plant = Plant {
+            sample_time,
+            actuators: &file.actuators,
+            faults: &file.faults,
+            losses: &losses,
+            gains: [&k_x, &k_f],
+        };
+        let reconfiguration =
+            Reconfiguration::of(file.reconfigurations, file.combinations, file.fallback, &plant)?;
         Ok(Self {
+            reconfiguration,
             schedule,
             detection,
-            losses: losses(&file.faults, &file.actuators),
+            losses,
             description: file.description,
             sample_time,
             estimator,
@@ -207,8 +227,8 @@ impl Controller {
             f_a: file.f_a.dense(),
             constant_faults: file.a_f.is_none(),
             a_f: file.a_f.map_or_else(|| DMatrix::identity(faults, faults), Rows::dense),
-            k_x: file.k_x.dense(),
-            k_f: file.k_f.dense(),
+            k_x,
+            k_f,
             l_x: file.l_x.dense(),
             l_f: file.l_f.dense(),
             h: file.h.map(Rows::dense),
@@ -241,7 +261,22 @@ impl Controller {
 
     /// Whether an instance counts its samples.
     pub(super) fn has_counter(&self) -> bool {
-        self.first_compensated > 0 || self.detection.is_some()
+        self.first_compensated > 0 || self.counts_all()
+    }
+
+    /// Whether it counts all of them: times of a detection and of a reconfiguration follow from their number.
+    pub(super) fn counts_all(&self) -> bool {
+        self.detection.is_some() || self.reconfiguration.is_some()
+    }
+
+    /// A matrix in each set of gains; `None` if it is the same in all.
+    pub(super) fn chosen(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
+        self.reconfiguration.as_ref().and_then(|own| own.matrices(matrix))
+    }
+
+    /// Whether faults are estimated while compensation is off because the fall-back is in force.
+    pub(super) fn estimates_in_fallback(&self) -> bool {
+        !self.monitor && self.reconfiguration.as_ref().is_some_and(|own| own.fallback.is_some())
     }
 
     /// Whether any actuator has limits.
@@ -271,6 +306,10 @@ impl Controller {
         let of_tests = self.detection.iter().flat_map(Detection::numbers);
         if let Some(value) = of_tests.into_iter().find(|value| value.abs() > LARGEST_SINGLE) {
             return Err(too_large("[detection]", value));
+        }
+        let of_gains = self.reconfiguration.iter().flat_map(Reconfiguration::numbers);
+        if let Some(value) = of_gains.into_iter().find(|value| value.abs() > LARGEST_SINGLE) {
+            return Err(too_large("[reconfiguration]", value));
         }
         if let Some(schedule) = &self.schedule {
             schedule.check_range(precision, LARGEST_SINGLE)?;

@@ -144,7 +144,7 @@ impl Detection {
             meaning: "start of x_r, times the deviations of the states",
             rows: Kind::ResidualState,
             columns: Some(Kind::State),
-            is_scheduled: false,
+            layers: None,
             values: self.start.row_iter().map(|row| row.iter().copied().collect()).collect(),
         };
         let mut all = vec![start];

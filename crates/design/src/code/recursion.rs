@@ -37,7 +37,9 @@ pub(super) enum Operation {
 pub(super) enum When {
     Always,
     Compensating,
-    NotCompensating,
+    /// While faults are estimated, and otherwise.
+    Estimating,
+    NotEstimating,
     /// In the sample at the start, and in all others.
     First,
     Later,
@@ -69,7 +71,7 @@ impl Recursion {
 
     /// The statements of a sample that is not the first one and compensates: the most that a sample has.
     pub(super) fn longest(&self) -> impl Iterator<Item = &Statement> {
-        self.statements().filter(|own| !matches!(own.when, When::NotCompensating | When::First))
+        self.statements().filter(|own| !matches!(own.when, When::NotEstimating | When::First))
     }
 
     /// All statements in order.
@@ -293,11 +295,11 @@ fn fault_predictions(controller: &Controller) -> Vec<Statement> {
     };
     match estimating {
         When::Always => vec![next],
-        _ => vec![next, Statement { when: When::NotCompensating, ..kept }],
+        _ => vec![next, Statement { when: When::NotEstimating, ..kept }],
     }
 }
 
 /// Faults are estimated while they are compensated; with `monitor`, always.
 fn while_estimating(controller: &Controller) -> When {
-    if controller.monitor { When::Always } else { When::Compensating }
+    if controller.monitor { When::Always } else { When::Estimating }
 }

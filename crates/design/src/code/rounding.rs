@@ -109,7 +109,7 @@ impl RoundingBound {
     }
 
     /// The lines of the header.
-    pub(super) fn lines(&self, fields: &Fields) -> Vec<String> {
+    pub(super) fn lines(&self, controller: &Controller, fields: &Fields) -> Vec<String> {
         let bound = match &self.bound {
             Ok(bound) => bound,
             Err(reason) => return filled(&format!("No bound of the difference: {reason}.")),
@@ -126,11 +126,15 @@ impl RoundingBound {
         signals.extend(named("", &fields.references));
         signals.extend(named("x_i_", &fields.integrals));
         signals.push("1".to_owned());
-        let mut lines = filled(
-            "In the loop with the plant of the design, while compensating and with no command at a limit, \
+        let intact = match controller.reconfiguration {
+            None => "",
+            Some(_) => " and no actuator gone",
+        };
+        let mut lines = filled(&format!(
+            "In the loop with the plant of the design, while compensating and with no command at a limit{intact}, \
              an output differs by at most the sum over the signals of coefficient times largest \
-             deviation from the operating point (last row: a constant):",
-        );
+             deviation from the operating point (last row: a constant):"
+        ));
         for (output, row) in outputs.into_iter().zip(bound.row_iter()) {
             lines.extend([String::new(), output]);
             let rows = signals.iter().zip(row.iter());

@@ -1,6 +1,7 @@
 //! The controller as a Rust crate without the standard library.
 
 mod detection;
+mod reconfiguration;
 mod sample;
 mod schedule;
 mod types;
@@ -102,6 +103,8 @@ impl Source<'_> {
             (Kind::Residual, "residuals"),
             (Kind::Test, "tests of the residuals"),
             (Kind::Suspect, "faults that the detection knows"),
+            (Kind::GainSet, "sets of gains"),
+            (Kind::Case, "actuators that may be gone"),
         ] {
             if kind.count(controller) == 0 {
                 continue;
@@ -128,10 +131,12 @@ impl Source<'_> {
             self.table(&mut lines, &table);
         }
         self.detection_tables(&mut lines);
+        self.reconfiguration_tables(&mut lines);
         self.structures(&mut lines);
         self.start(&mut lines);
         self.step(&mut lines);
         self.detection_methods(&mut lines);
+        self.reconfiguration_methods(&mut lines);
         self.helpers(&mut lines);
         let mut text = lines.join("\n");
         text.push('\n');
@@ -139,16 +144,19 @@ impl Source<'_> {
     }
 
     fn table(&self, lines: &mut Vec<String>, table: &Constants) {
-        let Constants { name, rows, columns, is_scheduled, values, .. } = table;
+        let Constants { name, rows, columns, layers, values, .. } = table;
         let count = rows.count(self.controller);
         let (real, rows) = (self.real, rows.plural());
         let kind = match columns {
             Some(columns) => format!("[[{real}; {}]; {rows}]", columns.plural()),
             None => format!("[{real}; {rows}]"),
         };
-        let kind = if *is_scheduled { format!("[{kind}; POINTS]") } else { kind };
+        let kind = match layers {
+            Some(layers) => format!("[{kind}; {}]", layers.plural()),
+            None => kind,
+        };
         lines.push(format!("\nstatic {}: {kind} = [", name.to_ascii_uppercase()));
-        if *is_scheduled {
+        if layers.is_some() {
             for rows in values.chunks(count) {
                 lines.push("    [".to_owned());
                 self.rows(lines, rows, ("        ", columns.is_some()));

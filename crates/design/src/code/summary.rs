@@ -1,8 +1,9 @@
 //! What the user of the code must know: the same sentences for C and Rust.
 
+mod options;
+
 use super::arithmetic::{Arithmetic, Memory};
 use super::controller::{Controller, Estimator, Loss, Signal};
-use super::detection::Method;
 use super::names::fields;
 use super::recursion::Recursion;
 use super::rounding::RoundingBound;
@@ -50,6 +51,13 @@ impl Fields {
             references: own(&controller.references),
             schedule: own(controller.schedule_inputs()),
         }
+    }
+
+    /// The fields of what is known about the actuators: those that may be gone, and the fall-back.
+    pub(super) fn switches(&self, controller: &Controller) -> Vec<String> {
+        let Some(own) = &controller.reconfiguration else { return Vec::new() };
+        let gone = own.cases.iter().map(|case| format!("gone_{}", self.actuators[case.actuator]));
+        gone.chain(own.fallback.map(|_| "fall_back".to_owned())).collect()
     }
 
     /// The fields of the estimates, in order: states, faults, losses, integrals.
@@ -106,15 +114,16 @@ pub(super) fn summary(
     section(&mut lines, "USE", &[usage(controller, vocabulary)]);
     section(&mut lines, "TIMING", &timing(request, controller, vocabulary));
     section(&mut lines, "COMPENSATION AND LIMITS", &modes(controller));
-    section(&mut lines, "SCHEDULE", &schedule(controller, vocabulary));
-    section(&mut lines, "DETECTION", &detection(controller, request.precision));
+    section(&mut lines, "SCHEDULE", &options::schedule(controller, vocabulary));
+    section(&mut lines, "DETECTION", &options::detection(controller, request.precision));
+    section(&mut lines, "RECONFIGURATION", &options::reconfiguration(controller, fields));
     lines.extend([String::new(), "SIGNALS".to_owned()]);
     lines.extend(signals(controller, fields));
     section(&mut lines, "STATUS", &status(controller, vocabulary));
     section(&mut lines, "COST", &costs(request, controller, recursion));
     section(&mut lines, "PRECISION", &precision(request, vocabulary));
     if let Some(bound) = bound {
-        lines.extend(bound.lines(fields));
+        lines.extend(bound.lines(controller, fields));
     }
     for line in &mut lines {
         *line = ascii(line);
@@ -289,86 +298,6 @@ fn signals(controller: &Controller, fields: &Fields) -> Vec<String> {
     lines
 }
 
-/// The tests, and the meaning of the outputs of a detection.
-fn detection(controller: &Controller, precision: Precision) -> Vec<String> {
-    let Some(own) = &controller.detection else { return Vec::new() };
-    let faults: Vec<_> = own
-        .faults
-        .iter()
-        .enumerate()
-        .map(|(k, name)| format!("{} {}", k + 1, one_line(name)))
-        .collect();
-    let method = match own.method {
-        Method::Cusum => {
-            "cumulative sums of a residual, S+ = max(0, S+ + r - drift) and S- = max(0, S- - r - drift); the \
-             statistic is the larger one"
-        }
-        Method::Window => {
-            "the mean of residuals over a window of N samples; the statistic is s = |sum of r|^2 / N of the last \
-             whole window"
-        }
-    };
-    let mut all = vec![
-        format!(
-            "Residuals r, white with variance 1 without faults, are computed in each sample but the first one, \
-             whether faults are compensated or not, and tested from sample {} on by {method}. A statistic above \
-             its threshold is an alarm.",
-            own.first_tested
-        ),
-        format!(
-            "Detection.detected: there was an alarm since the last sample with `detection_reset`, which clears \
-             statistics and decision. Detection.isolated: the fault that the alarms fit ({}); 0 without an alarm, \
-             -1 if they fit none or several. Detection.t_detected and Detection.t_onset: times of the first alarm \
-             and of the estimated start of the fault, in s after the start; -1 before. After 2^32 samples these \
-             times no longer increase.",
-            faults.join(", ")
-        ),
-    ];
-    let mut first = 0;
-    for (k, test) in own.tests.iter().enumerate() {
-        let last = first + test.residuals;
-        let residuals = if test.residuals == 1 { "" } else { "s" };
-        let range: Vec<_> = (first..last).map(|row| row.to_string()).collect();
-        let window = match own.method {
-            Method::Cusum => format!(", drift {:?}", test.drift),
-            Method::Window => format!(", N = {}", test.window),
-        };
-        all.push(format!(
-            "Test {k}, {}: residual{residuals} {}{window}, threshold {:?}",
-            one_line(&test.name),
-            range.join(", "),
-            test.threshold
-        ));
-        first = last;
-    }
-    if precision == Precision::Single {
-        all.push(
-            "In `float` the residuals have the bound below, in a run from the operating point; the statistics add \
-             up their errors and have none, so that an alarm may be given one or more samples earlier or later \
-             than in `double`."
-                .to_owned(),
-        );
-    }
-    all
-}
-
-/// What follows the scheduling variable, and where it is held.
-fn schedule(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
-    let Some(schedule) = &controller.schedule else { return Vec::new() };
-    let ([first, last], count) = (schedule.range(), schedule.points.len());
-    let name = one_line(&schedule.variable.name);
-    let owner = match schedule.measurement {
-        Some(_) => "a measurement",
-        None => "an input of its own",
-    };
-    vec![format!(
-        "The matrices and the operating point follow `{name}`, {owner}: they have the values of the design at \
-         its {count} points from {first:?} to {last:?}, and change linearly between them. Beyond, those of the \
-         nearest point are used, and {} says so.",
-        vocabulary.outside
-    )]
-}
-
 fn status(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
     let Vocabulary { held, at_limit, overflow, outside, real, .. } = vocabulary;
     let inputs = match controller.schedule_inputs() {
@@ -446,7 +375,7 @@ pub(super) fn aligned<const N: usize>(rows: &[[String; N]]) -> Vec<String> {
 }
 
 /// The text without line breaks.
-fn one_line(text: &str) -> String {
+pub(super) fn one_line(text: &str) -> String {
     text.replace(|sign: char| sign.is_control(), " ")
 }
 

@@ -253,6 +253,9 @@ pub(super) enum Kind {
     Residual,
     Test,
     Suspect,
+    /// Of a reconfiguration: a set of gains, an actuator that may be gone.
+    GainSet,
+    Case,
 }
 
 impl Kind {
@@ -275,6 +278,8 @@ impl Kind {
             Self::Reference => controller.references.len(),
             Self::Integral => controller.h.as_ref().map_or(0, DMatrix::nrows),
             Self::Point => controller.schedule.as_ref().map_or(0, |own| own.points.len()),
+            Self::GainSet => controller.reconfiguration.as_ref().map_or(0, |own| own.sets.len()),
+            Self::Case => controller.reconfiguration.as_ref().map_or(0, |own| own.cases.len()),
             Self::ResidualState | Self::Residual | Self::Test | Self::Suspect => {
                 detection::count(self, controller)
             }
@@ -282,8 +287,15 @@ impl Kind {
     }
 
     /// The kinds that are no signals.
-    pub(super) const OTHERS: [Self; 5] =
-        [Self::Point, Self::ResidualState, Self::Residual, Self::Test, Self::Suspect];
+    pub(super) const OTHERS: [Self; 7] = [
+        Self::Point,
+        Self::ResidualState,
+        Self::Residual,
+        Self::Test,
+        Self::Suspect,
+        Self::GainSet,
+        Self::Case,
+    ];
 
     /// The name of their number.
     pub(super) fn plural(self) -> &'static str {
@@ -298,6 +310,8 @@ impl Kind {
             Self::Residual => "RESIDUALS",
             Self::Test => "TESTS",
             Self::Suspect => "SUSPECTS",
+            Self::GainSet => "GAIN_SETS",
+            Self::Case => "CASES",
         }
     }
 }

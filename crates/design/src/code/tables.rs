@@ -60,8 +60,8 @@ pub(super) struct Constants {
     /// The signals of the rows and, of a matrix, of the columns.
     pub(super) rows: Kind,
     pub(super) columns: Option<Kind>,
-    /// Whether the rows of a matrix follow each other for each point of the schedule.
-    pub(super) is_scheduled: bool,
+    /// What the rows of a matrix are repeated for: each point of a schedule, each set of gains.
+    pub(super) layers: Option<Kind>,
     pub(super) values: Vec<Vec<f64>>,
 }
 
@@ -76,7 +76,7 @@ impl Constants {
         rows: Kind,
         values: Vec<f64>,
     ) -> Self {
-        Self { name, meaning, rows, columns: None, is_scheduled: false, values: vec![values] }
+        Self { name, meaning, rows, columns: None, layers: None, values: vec![values] }
     }
 }
 
@@ -103,16 +103,17 @@ pub(super) fn has_constant_matrix(controller: &Controller, recursion: &Recursion
 pub(super) fn tables(controller: &Controller, recursion: &Recursion) -> Vec<Constants> {
     let mut all = Vec::new();
     for (matrix, vector, rows) in matrices(recursion) {
-        let points = controller.scheduled(matrix);
-        let is_scheduled = points.is_some();
-        let points = points.unwrap_or_else(|| matrix.of(controller).into_iter().collect());
-        let values = points.into_iter().flat_map(DMatrix::row_iter);
+        let points = controller.scheduled(matrix).map(|own| (Some(Kind::Point), own));
+        let sets = controller.chosen(matrix).map(|own| (Some(Kind::GainSet), own));
+        let one = || (None, matrix.of(controller).into_iter().collect());
+        let (layers, all_of_it): (_, Vec<_>) = points.or(sets).unwrap_or_else(one);
+        let values = all_of_it.into_iter().flat_map(DMatrix::row_iter);
         all.push(Constants {
             name: matrix.name(),
             meaning: "",
             rows,
             columns: Some(vector.kind()),
-            is_scheduled,
+            layers,
             values: values.map(|row| row.iter().copied().collect()).collect(),
         });
     }
@@ -121,6 +122,8 @@ pub(super) fn tables(controller: &Controller, recursion: &Recursion) -> Vec<Cons
     }));
     all.extend(schedule(controller));
     all.extend(controller.detection.iter().flat_map(Detection::tables));
+    let reconfiguration = controller.reconfiguration.iter();
+    all.extend(reconfiguration.flat_map(|own| own.tables(&controller.actuators)));
     let meanings = if controller.schedule.is_some() {
         ["values at the start", "", "", ""]
     } else {
@@ -181,7 +184,7 @@ fn schedule(controller: &Controller) -> Vec<Constants> {
             meaning: "",
             rows: Kind::Point,
             columns: Some(vector.kind()),
-            is_scheduled: false,
+            layers: None,
             values: schedule.operating(vector),
         });
     }

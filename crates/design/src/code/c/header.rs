@@ -29,6 +29,63 @@ impl Source<'_> {
             String::new(),
             "/* Numbers of signals. */".to_owned(),
         ]);
+        self.macros(&mut lines);
+        self.structure(&mut lines, "Measurements", &fields.measurements);
+        if !fields.references.is_empty() {
+            self.structure(&mut lines, "References", &fields.references);
+        }
+        if !fields.schedule.is_empty() {
+            self.structure(&mut lines, "Schedule", &fields.schedule);
+        }
+        self.actuators_structure(&mut lines);
+        self.structure(&mut lines, "Commands", &fields.actuators);
+        self.structure(&mut lines, "Estimates", &fields.estimates(controller));
+        self.detection_structure(&mut lines);
+        lines.push("/* One instance; its fields belong to the functions below. */".to_owned());
+        lines.extend(["typedef struct".to_owned(), "{".to_owned()]);
+        for vector in stored(controller).into_iter().chain([Vector::U]) {
+            let count = self.count(vector.kind());
+            lines.push(format!("    {real} {}[{count}];", vector.name()));
+        }
+        if !fields.schedule.is_empty() {
+            lines.push(format!("    {real} theta;"));
+        }
+        self.detection_state(&mut lines, true);
+        self.reconfiguration_state(&mut lines, true);
+        if controller.has_counter() {
+            lines.push("    uint32_t sample;".to_owned());
+        }
+        self.reconfiguration_state(&mut lines, false);
+        self.detection_state(&mut lines, false);
+        if controller.filter.is_some() {
+            lines.push("    bool started;".to_owned());
+        }
+        let (n, q) = (self.count(Kind::State), self.count(Kind::Fault));
+        lines.extend([
+            format!("}} {name}_State;"),
+            String::new(),
+            "/* Starts at the operating point, without faults. */".to_owned(),
+            format!("void {name}_init({name}_State *state);"),
+            String::new(),
+            "/* Starts at these estimates of states and faults. */".to_owned(),
+            format!("void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],"),
+            format!("    const {real} f_hat_0[{q}]);"),
+            String::new(),
+            "/* Takes a sample; returns the bits of the status. */".to_owned(),
+            format!("{};", self.signature()),
+            String::new(),
+            "#ifdef __cplusplus".to_owned(),
+            "}".to_owned(),
+            "#endif".to_owned(),
+            String::new(),
+            format!("#endif /* {capital}_H */"),
+        ]);
+        finished(&lines)
+    }
+
+    /// Numbers of signals, the sample time, bits of the status.
+    fn macros(&self, lines: &mut Vec<String>) {
+        let Self { controller, capital, .. } = self;
         let kinds = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Integral);
         let kinds = kinds.chain(Kind::OTHERS);
         for kind in kinds.filter(|kind| kind.count(controller) > 0) {
@@ -64,54 +121,6 @@ impl Source<'_> {
             lines.push(format!("#define {capital}_OUTSIDE 8U"));
         }
         lines.push(String::new());
-        self.structure(&mut lines, "Measurements", &fields.measurements);
-        if !fields.references.is_empty() {
-            self.structure(&mut lines, "References", &fields.references);
-        }
-        if !fields.schedule.is_empty() {
-            self.structure(&mut lines, "Schedule", &fields.schedule);
-        }
-        self.structure(&mut lines, "Commands", &fields.actuators);
-        self.structure(&mut lines, "Estimates", &fields.estimates(controller));
-        self.detection_structure(&mut lines);
-        lines.push("/* One instance; its fields belong to the functions below. */".to_owned());
-        lines.extend(["typedef struct".to_owned(), "{".to_owned()]);
-        for vector in stored(controller).into_iter().chain([Vector::U]) {
-            let count = self.count(vector.kind());
-            lines.push(format!("    {real} {}[{count}];", vector.name()));
-        }
-        if !fields.schedule.is_empty() {
-            lines.push(format!("    {real} theta;"));
-        }
-        self.detection_state(&mut lines, true);
-        if controller.has_counter() {
-            lines.push("    uint32_t sample;".to_owned());
-        }
-        self.detection_state(&mut lines, false);
-        if controller.filter.is_some() {
-            lines.push("    bool started;".to_owned());
-        }
-        let (n, q) = (self.count(Kind::State), self.count(Kind::Fault));
-        lines.extend([
-            format!("}} {name}_State;"),
-            String::new(),
-            "/* Starts at the operating point, without faults. */".to_owned(),
-            format!("void {name}_init({name}_State *state);"),
-            String::new(),
-            "/* Starts at these estimates of states and faults. */".to_owned(),
-            format!("void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],"),
-            format!("    const {real} f_hat_0[{q}]);"),
-            String::new(),
-            "/* Takes a sample; returns the bits of the status. */".to_owned(),
-            format!("{};", self.signature()),
-            String::new(),
-            "#ifdef __cplusplus".to_owned(),
-            "}".to_owned(),
-            "#endif".to_owned(),
-            String::new(),
-            format!("#endif /* {capital}_H */"),
-        ]);
-        finished(&lines)
     }
 
     fn structure(&self, lines: &mut Vec<String>, what: &str, fields: &[String]) {

@@ -17,15 +17,25 @@ impl Source<'_> {
             0 => "compensate".to_owned(),
             _ => format!("compensate && (state->sample >= {capital}_FIRST_COMPENSATED)"),
         };
+        let reconfiguration = controller.reconfiguration.as_ref();
+        let changes = reconfiguration.is_some_and(|own| own.fallback == Some(false));
+        let constant = if changes { "" } else { "const " };
         lines.extend([
             format!("    {real} sum;"),
             "    uint32_t i;".to_owned(),
             "    uint32_t status = 0U;".to_owned(),
             "    bool finite = true;".to_owned(),
-            format!("    const bool compensating = {compensating};"),
-            String::new(),
+            format!("    {constant}bool compensating = {compensating};"),
         ]);
+        if controller.estimates_in_fallback() {
+            lines.push("    bool estimating;".to_owned());
+        }
+        if controller.reconfiguration.is_some() {
+            lines.push("    uint32_t set;\n    uint32_t k;".to_owned());
+        }
+        lines.push(String::new());
         self.inputs(lines);
+        self.reconfigure(lines);
         self.interpolation(lines);
         if controller.filter.is_some() {
             lines.extend(["    if (!state->started)".to_owned(), "    {".to_owned()]);
@@ -40,6 +50,7 @@ impl Source<'_> {
         for statement in &recursion.before_limits {
             self.statement(lines, statement);
         }
+        self.stuck_commands(lines);
         lines.extend([String::new(), "    /* Is every output a number? */".to_owned()]);
         self.check(lines, &[Vector::Command, Vector::XValue, Vector::FValue]);
         self.limits(lines);
@@ -90,12 +101,17 @@ impl Source<'_> {
             String::new(),
             "    /* The observer uses the limited commands. */".to_owned(),
         ]);
+        // A stuck actuator has no limits.
+        let (free, close) = match self.controller.reconfiguration {
+            None => ("", ""),
+            Some(_) => ("(!state->gone[i]) && (", ")"),
+        };
         let mut body = Vec::new();
         for (start, sign, own, value) in
             [("if", '<', "u_low", "u_min"), ("else if", '>', "u_high", "u_max")]
         {
             body.extend([
-                format!("        {start} (u[i] {sign} {own}[i])"),
+                format!("        {start} ({free}u[i] {sign} {own}[i]{close})"),
                 "        {".to_owned(),
                 format!("            u[i] = {own}[i];"),
                 format!("            command[i] = {value}[i];"),
@@ -143,9 +159,10 @@ impl Source<'_> {
         ]);
         if self.controller.has_counter() {
             // The times of a detection follow from the number of samples.
-            let last = match self.controller.detection {
-                None => format!("{capital}_FIRST_COMPENSATED"),
-                Some(_) => "UINT32_MAX".to_owned(),
+            let last = if self.controller.counts_all() {
+                "UINT32_MAX".to_owned()
+            } else {
+                format!("{capital}_FIRST_COMPENSATED")
             };
             lines.extend([
                 format!("    if (state->sample < {last})"),
@@ -177,6 +194,16 @@ impl Source<'_> {
                 self.literal(loss.least_command * loss.least_command)
             ));
         }
+        let cases = controller.reconfiguration.iter().flat_map(|own| &own.cases);
+        for (i, case) in cases.enumerate() {
+            lines.extend(case.decision.map(|(loss, ..)| {
+                let fault = &fields.faults[controller.losses[loss].fault];
+                format!("    state->lost[{i}] = estimates->E_hat_{fault};")
+            }));
+        }
+        if controller.reconfiguration.is_some() {
+            lines.push("    *reconfiguration = state->reconfiguration;".to_owned());
+        }
         for (i, field) in fields.integrals.iter().enumerate() {
             lines.push(format!("    estimates->x_i_{field} = x_i_value[{i}];"));
         }
@@ -192,7 +219,15 @@ impl Source<'_> {
         match when {
             When::Always => {}
             When::Compensating => lines.push("    if (compensating)".to_owned()),
-            When::NotCompensating => lines.push("    if (!compensating)".to_owned()),
+            When::Estimating | When::NotEstimating => {
+                let name = if self.controller.estimates_in_fallback() {
+                    "estimating"
+                } else {
+                    "compensating"
+                };
+                let not = if *when == When::Estimating { "" } else { "!" };
+                lines.push(format!("    if ({not}{name})"));
+            }
             When::First => lines.push("    if (state->sample == 0U)".to_owned()),
             When::Later => lines.push("    if (state->sample > 0U)".to_owned()),
         }
@@ -236,6 +271,9 @@ impl Source<'_> {
     ) -> String {
         let (name, vector, count) = (matrix.name(), variable(vector), self.count(vector.kind()));
         match self.controller.scheduled(matrix) {
+            None if self.controller.chosen(matrix).is_some() => {
+                format!("{function}({start}{name}[set][i], {vector}, {count})")
+            }
             None => format!("{function}({start}{name}[i], {vector}, {count})"),
             Some(_) => format!(
                 "{function}_between({start}{name}[at][i], {name}[at + 1U][i], weights, {vector}, {count})"

@@ -2,6 +2,7 @@
 
 use super::Source;
 use crate::code::controller::Controller;
+use crate::code::reconfiguration::Case;
 use crate::code::recursion::{Operation, Statement, Term, When};
 use crate::code::symbols::{Matrix, Vector};
 use crate::code::tables::{kept, locals, shown};
@@ -21,6 +22,9 @@ impl Source<'_> {
                 let held = format!("\n        status.held |= take(&mut self.{kept}, &{own});");
                 taken.push_str(&held);
             }
+        }
+        if controller.reconfiguration.is_some() {
+            parameters.push_str(" actuators: &Actuators,");
         }
         let reset = if controller.detection.is_some() { ", detection_reset: bool" } else { "" };
         lines.push(format!(
@@ -42,6 +46,7 @@ impl Source<'_> {
             let (name, count) = (vector.name(), vector.kind().plural());
             lines.push(format!("        let mut {name} = [0.0; {count}];"));
         }
+        self.reconfigure(lines);
         self.interpolation(lines);
         if controller.filter.is_some() {
             lines.push(
@@ -55,31 +60,51 @@ impl Source<'_> {
         for statement in &recursion.before_limits {
             write_statement(lines, controller, statement);
         }
+        self.stuck_commands(lines);
         lines.push("        let mut finite = all_finite(&command) && all_finite(&x_value) && all_finite(&f_value);".to_owned());
         if controller.is_limited() {
             let [low, high] = match controller.schedule {
                 None => ["U_LOW", "U_HIGH"],
                 Some(_) => ["u_low", "u_high"],
             };
+            // A stuck actuator has no limits.
+            let [free, zipped, pattern] = match controller.reconfiguration {
+                None => ["", ".zip(limits) {", "((low, high), (min, max))) in"],
+                Some(_) => [
+                    "!*gone && ",
+                    ".zip(limits.zip(&self.gone)) {",
+                    "(((low, high), (min, max)), gone)) in",
+                ],
+            };
             lines.push(
                 "        // The observer uses the limited commands.
         let limits = LOW.iter().zip(&HIGH).zip(U_MIN.iter().zip(&U_MAX));
         for ((u, command), ((low, high), (min, max))) in u.iter_mut().zip(&mut command).zip(limits) {
-            if *u < *low {
+            if FREE*u < *low {
                 (*u, *command) = (*low, *min);
                 status.at_limit = true;
-            } else if *u > *high {
+            } else if FREE*u > *high {
                 (*u, *command) = (*high, *max);
                 status.at_limit = true;
             }
         }"
                 .replace("LOW.", &format!("{low}."))
-                .replace("&HIGH", &format!("&{high}")),
+                .replace("&HIGH", &format!("&{high}"))
+                .replace("FREE", free)
+                .replace(".zip(limits) {", zipped)
+                .replace("((low, high), (min, max))) in", pattern),
             );
         }
         for statement in &recursion.after_limits {
             write_statement(lines, controller, statement);
         }
+        self.keep(lines);
+        self.outputs(lines);
+    }
+
+    /// Keeps the results, if all of them are numbers, and counts the sample.
+    fn keep(&self, lines: &mut Vec<String>) {
+        let Self { controller, .. } = self;
         let kept = kept(controller);
         let checks = kept.iter().map(|(next, _)| format!(" && all_finite(&{})", next.name()));
         lines.push(format!("        finite = finite{};", checks.collect::<String>()));
@@ -99,7 +124,7 @@ impl Source<'_> {
             "            status.at_limit = false;\n            status.overflow = true;\n        }"
                 .to_owned(),
         );
-        if controller.detection.is_some() {
+        if controller.counts_all() {
             // The times of a detection follow from the number of samples.
             lines.push("        self.sample = self.sample.saturating_add(1);".to_owned());
         } else if controller.first_compensated > 0 {
@@ -108,7 +133,6 @@ impl Source<'_> {
                     .to_owned(),
             );
         }
-        self.outputs(lines);
     }
 
     fn outputs(&self, lines: &mut Vec<String>) {
@@ -135,13 +159,28 @@ impl Source<'_> {
             None => "",
             Some(_) => ", detection: self.detection()",
         };
+        let reconfiguration = match controller.reconfiguration {
+            None => "",
+            Some(_) => ", reconfiguration: self.reconfiguration",
+        };
         lines.push("        let estimates = Estimates {".to_owned());
         for (field, value) in fields.estimates(controller).iter().zip(values) {
             lines.push(format!("            {field}: {value},"));
         }
+        lines.push("        };".to_owned());
+        if let Some(own) = controller.reconfiguration.as_ref().filter(|own| !own.cases.is_empty()) {
+            let lost = |case: &Case| match case.decision {
+                None => "0.0".to_owned(),
+                Some((loss, ..)) => {
+                    format!("estimates.E_hat_{}", fields.faults[controller.losses[loss].fault])
+                }
+            };
+            let lost: Vec<_> = own.cases.iter().map(lost).collect();
+            lines.push(format!("        self.lost = [{}];", lost.join(", ")));
+        }
         lines.push(
-            "        };\n        Outputs { commands, estimates, status, DETECTION }\n    }\n}"
-                .replace(", DETECTION", detection),
+            "        Outputs { commands, estimates, status, DETECTION }\n    }\n}"
+                .replace(", DETECTION", &format!("{detection}{reconfiguration}")),
         );
     }
 }
@@ -170,7 +209,12 @@ fn write_statement(lines: &mut Vec<String>, controller: &Controller, statement: 
     match when {
         When::Always => {}
         When::Compensating => lines.push("        if compensating {".to_owned()),
-        When::NotCompensating => lines.push("        if !compensating {".to_owned()),
+        When::Estimating | When::NotEstimating => {
+            let name =
+                if controller.estimates_in_fallback() { "estimating" } else { "compensating" };
+            let not = if *when == When::Estimating { "" } else { "!" };
+            lines.push(format!("        if {not}{name} {{"));
+        }
         When::First => lines.push("        if self.sample == 0 {".to_owned()),
         When::Later => lines.push("        if self.sample > 0 {".to_owned()),
     }
@@ -220,6 +264,10 @@ impl<'a> Zipped<'a> {
         (matrix, vector): (Matrix, Vector),
     ) -> String {
         let (name, vector) = (matrix.name(), owned(self.controller, vector));
+        if self.controller.chosen(matrix).is_some() {
+            let row = self.row(&super::reconfiguration::chosen(matrix));
+            return format!("{function}({start}{row}, &{vector})");
+        }
         if self.controller.scheduled(matrix).is_none() {
             let row = self.row(&format!("&{}", name.to_ascii_uppercase()));
             return format!("{function}({start}{row}, &{vector})");

@@ -50,7 +50,17 @@ impl Source<'_> {
             lines.push(format!("        [{}]", reads.join(", ")));
             lines.push("    }\n}".to_owned());
         }
+        self.actuators_structure(lines);
         self.detection_structure(lines);
+        let reconfiguration = match controller.reconfiguration {
+            None => "",
+            Some(_) => {
+                "
+    /// The position from 1 of the first actuator that the controller does without; 0 if there is none, -1 in the
+    /// fall-back.
+    pub reconfiguration: i32,"
+            }
+        };
         let detection = match controller.detection {
             None => "",
             Some(_) => {
@@ -84,7 +94,7 @@ pub struct Outputs {{
     /// The commands.
     pub commands: Commands,
     /// The estimates.
-    pub estimates: Estimates,{detection}
+    pub estimates: Estimates,{detection}{reconfiguration}
     /// What was unusual.
     pub status: Status,
 }}
@@ -100,6 +110,7 @@ pub struct Controller {{"
             lines.push(format!("    theta: [{real}; 1],"));
         }
         self.detection_state(lines);
+        self.reconfiguration_state(lines);
         if controller.has_counter() {
             lines.push("    sample: u32,".to_owned());
         }
@@ -151,6 +162,7 @@ impl Controller {{
             lines.push(format!("            y_f: {y},\n            started: false,"));
         }
         self.detection_start(lines);
+        self.reconfiguration_start(lines);
         if controller.has_counter() {
             lines.push("            sample: 0,".to_owned());
         }
