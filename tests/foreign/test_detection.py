@@ -251,6 +251,43 @@ def test_a_disturbance_that_the_measurements_show_late_is_a_random_walk_with_its
     assert largest == pytest.approx(stated, rel=1e-6)
 
 
+
+# Two positions; the command, and its fault, act on the second mass only.
+INTEGRATORS = """
+A = [[0, 0, 0], [0, 0, 1], [0, 0, 0]]
+B = [[1, 0], [0, 0], [0, 1]]
+C = [[1, 0, 0], [0, 1, 0]]
+feedback.eigenvalues = [-1.0, -1.2, -1.4]
+observer.eigenvalues = [-3.0, -3.2, -3.4, -3.6]
+robustness.cases = 0
+[[faults]]
+name = "f"
+actuator = "u2"
+bound = 1.0
+[detection]
+method = "chi-square"
+false_alarm_interval = 2000.0
+noise = 0.01
+from = 0.0
+"""
+
+
+@pytest.mark.parametrize("sampled", [False, True], ids=["continuous", "sampled"])
+def test_integrators_that_no_fault_moves_get_noise_and_their_filter_is_stable(tmp_path, sampled):
+    report, file = designed(tmp_path, (f"sample_time = {T}\n" if sampled else "") + INTEGRATORS)
+    assert "commands by one" in report["process_noise"]
+    eigenvalues = np.linalg.eigvals(np.array(file["detection"]["A"]))
+    assert np.abs(eigenvalues).max() < 0.99 if sampled else eigenvalues.real.max() < -0.1
+
+
+def test_no_noise_for_an_integrator_is_refused_at_the_number(tmp_path):
+    (tmp_path / "plant.toml").write_text(INTEGRATORS + "process_noise = [0, 0, 0.1]\n", encoding="utf-8")
+    run = subprocess.run([COMMAND, "design", "plant.toml"], cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == 2
+    assert "plant.toml:17:17: the residuals need a filter that corrects every state" in run.stderr, run.stderr
+    assert "(0 1/s)" in run.stderr and not (tmp_path / "plant-design.toml").exists()
+
+
 @pytest.mark.parametrize(("change", "place"), [
     (('method = "cusum"', 'method = "t-test"'), 'expected "cusum" or "chi-square", found "t-test"'),
     (("false_alarm_interval = 200.0", ""), "`detection.false_alarm_interval` is missing"),

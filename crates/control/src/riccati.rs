@@ -47,7 +47,8 @@ pub struct Regulator {
     /// Eigenvalues of A + B K.
     pub eigenvalues: Vec<Complex<f64>>,
     /// Largest entry of the left side of the equation relative to the same entry of the sum of its
-    /// absolute terms, products included. Here `|P|[i,j]` is at least the root of `P[i,i] P[j,j]`.
+    /// absolute terms, products included, in balanced coordinates. Here `|P|[i,j]` is at least the root of
+    /// `P[i,i] P[j,j]`, and every sum at least 1e-6 of the largest one.
     pub residual: f64,
 }
 

@@ -5,6 +5,9 @@ use crate::blocks::symmetric_part;
 use crate::lyapunov::{self, Equation, relative, sizes};
 use nalgebra::DMatrix;
 
+/// Terms below this fraction of the largest ones hold their rounding.
+const FLOOR: f64 = 1e-6;
+
 /// A Riccati equation of continuous or sampled time, with the weights Q, N and R = I.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RiccatiEquation {
@@ -47,7 +50,7 @@ impl RiccatiEquation {
     }
 
     /// Largest entry of the left side relative to the sum of its absolute terms, of P as in
-    /// [`lyapunov::Solution::residual`].
+    /// [`lyapunov::Solution::residual`], and the rounding that the largest terms leave in others.
     pub(super) fn residual(&self, p: &DMatrix<f64>) -> f64 {
         let Some(gain) = self.gain(p) else { return f64::INFINITY };
         let left = self.left_side(p, &gain);
@@ -71,7 +74,9 @@ impl RiccatiEquation {
                     + gain.abs().tr_mul(&gain.abs())
             }
         };
-        relative(&left, &(terms + self.q.abs()))
+        let terms = terms + self.q.abs();
+        let rounding = FLOOR * terms.amax();
+        relative(&left, &terms.add_scalar(rounding))
     }
 
     /// One step of Newton's method; None when A + B K is not stable or the step cannot be computed.

@@ -14,6 +14,7 @@ use super::prediction::whole;
 use crate::design_file::round;
 use crate::designed::ControllerDesign;
 use crate::detection::request::DetectionRequest;
+use crate::fixed_mode::shown;
 use crate::plant_file::PlantFile;
 
 /// Time constants of the slowest mode after which a mean has settled.
@@ -131,28 +132,19 @@ impl Problem {
             "The plant file states it.".clone_into(&mut self.origin_of_process_noise);
             return Ok(());
         }
-        let unit = self.unit_process_noise();
-        let decay = |factor: f64| {
-            let plant = NoisyPlant { w: &unit * factor, ..self.plant.clone() };
-            let filter = detection_filter(&plant, &[]).ok().flatten()?;
-            self.decay(&filter.generator.a).ok()
-        };
-        let enough = match decay(4f64.powi(12)) {
-            Some(fastest) => self.rate.min(NEARLY * fastest) * NEARLY,
-            None => self.rate,
-        };
-        let factors = std::iter::once(0.0).chain((-16..=12).map(|power| 4f64.powi(power)));
-        let found =
-            factors.into_iter().find(|factor| decay(*factor).is_some_and(|own| own >= enough));
-        let Some(factor) = found else {
+        let found = self.unit_process_noises().into_iter().find_map(|(source, unit)| {
+            let factor = self.least_factor(&unit)?;
+            Some((source, factor, unit * factor))
+        });
+        let Some((source, factor, noise)) = found else {
             let message = "no process noise was found with which a filter exists: expected `process_noise`, \
                            one number for each state";
             return Err(file.error_at(&request.place, message).into());
         };
-        self.plant.w = unit * factor;
+        self.plant.w = noise;
         self.origin_of_process_noise = if factor > 0.0 {
             format!(
-                "The plant file states none. Faults that vary as noise, with {factor} times the variance of \
+                "The plant file states none. {source} that vary as noise, with {factor} times the variance of \
                  their sizes within one time constant of the loop, make the filter as fast as the loop; \
                  with less noise in the plant there are fewer false alarms."
             )
@@ -162,29 +154,67 @@ impl Problem {
         Ok(())
     }
 
+    /// The least factor of `unit` with which the filter without unknown inputs forgets as fast as the loop, or
+    /// as it can.
+    fn least_factor(&self, unit: &DMatrix<f64>) -> Option<f64> {
+        let decay = |factor: f64| {
+            let plant = NoisyPlant { w: unit * factor, ..self.plant.clone() };
+            let filter = detection_filter(&plant, &[]).ok().flatten()?;
+            self.decay(&filter.generator.a).ok()
+        };
+        let factors = std::iter::once(0.0).chain((-16..=12).map(|power| 4f64.powi(power)));
+        let decays: Vec<_> = factors.filter_map(|factor| Some((factor, decay(factor)?))).collect();
+        // More noise can make a sampled filter slower: it approaches the zeros of the sampled plant.
+        let fastest = decays.iter().map(|(_, own)| *own).fold(0.0, f64::max);
+        let enough = self.rate.min(NEARLY * fastest) * NEARLY;
+        decays.into_iter().find(|(_, own)| *own >= enough).map(|(factor, _)| factor)
+    }
+
     /// Process noise by which each fault that acts on the states varies by its size within a time
-    /// constant of the loop.
-    fn unit_process_noise(&self) -> DMatrix<f64> {
+    /// constant of the loop; if there is none, or it leaves a mode at rest that does not decay, the commands by
+    /// one too; then all states by the mean of that.
+    fn unit_process_noises(&self) -> [(&'static str, DMatrix<f64>); 3] {
         let n = self.plant.a.nrows();
-        let mut w = DMatrix::zeros(n, n);
+        let mut faults = DMatrix::zeros(n, n);
         for fault in self.faults.clone() {
             let at = self.fault_at(fault);
             let column = &self.inputs[at].on_states * self.sizes[at].unwrap_or(1.0);
-            w += &column * column.transpose();
+            faults += &column * column.transpose();
         }
-        if w.amax() <= 0.0 {
-            w = &self.plant.b * self.plant.b.transpose();
-        }
-        match self.plant.domain {
-            Domain::Continuous => w / self.rate,
-            Domain::Sampled { period } => w / (self.rate * period),
-        }
+        let commands = &faults + &self.plant.b * self.plant.b.transpose();
+        #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+        let mean = commands.trace() / n as f64;
+        let states = &commands + DMatrix::from_diagonal_element(n, n, mean);
+        let time = match self.plant.domain {
+            Domain::Continuous => self.rate,
+            Domain::Sampled { period } => self.rate * period,
+        };
+        [
+            ("Faults", faults / time),
+            ("Faults, and commands by one,", commands / time),
+            ("Faults, commands by one, and all states by the mean of both,", states / time),
+        ]
     }
 
     /// The filter for all faults: the disturbances are decoupled.
     pub(super) fn base(&self, file: &PlantFile<'_>) -> Result<Decoupling, crate::Error> {
         let refuse = |error: Error| {
-            let place = file.detection.as_ref().map_or(0..0, |request| request.place.clone());
+            let request = file.detection.as_ref();
+            let stated = request.and_then(|request| request.process_noise.as_ref());
+            if let (Error::Unweighted { eigenvalue, .. }, Some(stated)) = (&error, stated) {
+                let value = match self.plant.domain {
+                    Domain::Continuous => *eigenvalue,
+                    Domain::Sampled { period } => eigenvalue.ln() / period,
+                };
+                let message = format!(
+                    "the residuals need a filter that corrects every state, and a mode of the plant at the \
+                     limit of stability ({} 1/s) gets no noise: expected numbers above 0 for the states in \
+                     which it shows, or no `process_noise`, which finds enough",
+                    shown(value)
+                );
+                return file.error_at(&stated.place, message);
+            }
+            let place = request.map_or(0..0, |request| request.place.clone());
             file.error_at(&place, error.to_string())
         };
         let mut found = Decoupling::without(self).map_err(refuse)?;
