@@ -136,6 +136,7 @@ FAULTS = [
     '[[fault]]\nconnection = "controller.x_p"\nnoise = { deviation = 1e-5, seed = 3 }\n',
     '[[fault]]\nconnection = "plant.u"\nstuck = { until = @0.008 }\n[[set]]\nvariable = "plant.F_c"\nvalue = 9\nat = @0.1\n',
     '[[fault]]\nconnection = "controller.theta"\ndrift = { rate = 1e-4, from = @0.2 }\n',
+    '[[fault]]\nconnection = "controller.x_p"\ndelay = { seconds = 0.0123 }\n',
 ]
 
 
@@ -152,7 +153,7 @@ def test_a_run_with_interventions_is_repeated_bit_for_bit(aso_ftc, tmp_path, alg
             reached = run.until(lambda state, steps=steps: state["phase"] == "paused" and state["steps"] == steps)["time"]
             text = re.sub(r"@(\S+)", lambda found, reached=reached: repr(reached + float(found[1])), fault)
             assert run.do("scenario", text).startswith("Accepted: it takes effect at t = ")
-        assert len(run.until(lambda state: len(state["interventions"]) == 6)["interventions"]) == 6
+        assert len(run.until(lambda state: len(state["interventions"]) == 7)["interventions"]) == 7
         run.do("continue")
         out = run.end()
     assert re.search(r"to repeat it: \S+ run \S+/live.toml\n", out)
@@ -263,7 +264,8 @@ BAD = {
     '[[set]]\nvariable = "plant.u"\nvalue = 1': "scenario.set[1]: plant.u is connected to controller.u",
     '[[set]]\nvariable = "plant.x_p"\nvalue = 1': "scenario.set[1]: plant.x_p is a continuous output, expected an input",
     '[[set]]\nvariable = "plant.F_c"\nvalue = 1\nat = 0': "at is 0, expected a time of 0.001 s or later",
-    '[[fault]]\nconnection = "plant.u"\ndelay = { seconds = 0.1 }': "a delay needs the values from before its start",
+    '[[fault]]\nconnection = "plant.u"\ndelay = { seconds = 0.01, from = 0.005 }': "from is 0.005, expected a time of 0.01 s or later, when the delayed values are known",
+    '[[fault]]\nconnection = "plant.u"\ndelay = { seconds = "long" }': "invalid type",
     '[[fault]]\nconnection = "plant.u"\nbias = { value = 1, until = 0 }': "scenario.fault[1]: until is 0",
     '[[fault]]\nconnection = "plant.f_a"\nbias = { value = 1 }': "scenario.fault[1]: plant.f_a is an input without a source",
     '[[fault]]\nconnection = "plant.u"\nbias = { worth = 1 }': "unknown field `worth`",
@@ -341,6 +343,14 @@ def test_a_resumed_run_with_interventions_is_repeated_bit_for_bit_from_its_start
     assert done.returncode == 0, done.stderr
     own, rest = (path.read_bytes() for path in (tmp_path / "results.csv", *tmp_path.glob("results-from-*.csv")))
     assert own + rest.split(b"\n", 1)[1] == (tmp_path / "repeat.csv").read_bytes()
+
+
+def test_a_delay_is_refused_where_steps_vary(tmp_path):
+    with live(tmp_path, "--stop-time", 0.5, *VARYING) as run:
+        error = run.do("scenario", '[[fault]]\nconnection = "plant.u"\ndelay = { seconds = 0.01 }', status=422)
+        assert "where the steps vary" in error
+        run.do("stop")
+        run.end()
 
 
 def test_a_resumed_run_that_is_watched_keeps_its_bits(aso_ftc, tmp_path):

@@ -201,7 +201,7 @@ impl Live {
         let entries = done.text.lines().map(|line| format!("  {line}"));
         self.remarks.extend(std::iter::once(line).chain(entries));
         self.write(run)?;
-        Ok(format!("Accepted: it takes effect at t = {from} s, or at the time stated."))
+        Ok(format!("Accepted: it takes effect at t = {from} s, or at the later time of an entry."))
     }
 
     /// Writes the file that repeats the run.

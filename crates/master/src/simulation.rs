@@ -122,6 +122,12 @@ impl Simulation {
         self.engine.grid.time
     }
 
+    /// Whether step control or events choose the ends of steps.
+    #[must_use]
+    pub fn has_varying_steps(&self) -> bool {
+        self.pace.is_some()
+    }
+
     /// Whether the stop time is reached or an FMU requested the end.
     #[must_use]
     pub fn is_finished(&self) -> bool {

@@ -9,8 +9,8 @@
   const SHOWN = 32;
   // Kinds of faults: members that they usually have, and whether these are needed.
   const KINDS = {
-    bias: "value = 0.1", gain: "factor = 0.5", drift: "rate = 0.01", stuck: "", dropout: "", noise: "deviation = 0.01",
-    quantisation: "step = 0.1", saturation: "min = -1, max = 1", inversion: "",
+    bias: "value = 0.1", gain: "factor = 0.5", drift: "rate = 0.01", delay: "seconds = 0.01", stuck: "", dropout: "",
+    noise: "deviation = 0.01", quantisation: "step = 0.1", saturation: "min = -1, max = 1", inversion: "",
   };
   const field = (id) => document.getElementById(id);
   const say = (id, text) => {

@@ -26,7 +26,7 @@ impl Simulation {
     /// Replaces the scenario by one that adds to it: further driven variables, further points of
     /// signals, and faults after those that a connection has. What is added takes effect at
     /// [`Simulation::next_change`] or later. A [`crate::fault::Fault::Delay`] that is added has no
-    /// values from before now.
+    /// values from before now: it starts after its delay, or gives the value of now until then.
     ///
     /// # Errors
     ///
