@@ -33,7 +33,7 @@ mod transient;
 pub use between_samples::gains_between_samples;
 pub use energy::{Energy, energy};
 pub use fault::{FaultBounds, Reversal, fault_bounds, reversal};
-pub use fault_loop::{fault_gains, fault_rate_system, fault_system};
+pub use fault_loop::{error_part, fault_gains, fault_rate_system, fault_system};
 pub use frequency::{FrequencyPoint, frequency_grid, frequency_response};
 pub(crate) use frequency::{Transfer, grid};
 pub(crate) use h_infinity::norm_of;

@@ -1,8 +1,8 @@
 //! Analyses the closed loop of a design: the numbers of the report.
 
 use control::response::{
-    energy, fault_gains, fault_rate_system, fault_system, frequency_grid, frequency_response,
-    gains_between_samples, h_infinity,
+    energy, error_part, fault_gains, fault_rate_system, fault_system, frequency_grid,
+    frequency_response, gains_between_samples, h_infinity,
 };
 use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, RowDVector};
@@ -220,13 +220,7 @@ impl<'a> Loops<'a> {
         if self.designed.law.leaks() {
             return Ok(Vec::new());
         }
-        // The plant's states do not influence the estimation errors.
-        let mut rates = self.to_fault_errors(&self.of_rates);
-        let all = self.designed.plant.a.nrows();
-        let order = all + self.designed.plant.f_a.ncols();
-        rates.a = rates.a.view((all, all), (order, order)).into();
-        rates.b = rates.b.rows(all, order).into();
-        rates.c = rates.c.columns(all, order).into();
+        let rates = error_part(&self.designed.plant, &self.to_fault_errors(&self.of_rates));
         let norm = |name: &str, value: f64, method: &str| Norm {
             name: name.to_owned(),
             from: "rates of the faults".to_owned(),

@@ -1,6 +1,6 @@
 //! Bounds of a sampled loop at all times, between the samples too.
 
-use super::fault_loop::{loop_dynamics, outputs, require_rows};
+use super::fault_loop::{error_part, loop_dynamics, outputs, require_rows};
 use super::peak_gain;
 use crate::aso::{Estimator, FaultyPlant, Gains};
 use crate::faults::ExtendedPlant;
@@ -246,6 +246,9 @@ impl<'a> Lifted<'a> {
                 }
                 column += q;
             }
+        }
+        if rows.iter().all(|row| *row >= n) {
+            system = error_part(self.plant, &system);
         }
         let sums = peak_gain(&system, width)?.upper;
         let mut first = 0;

@@ -84,6 +84,22 @@ pub fn fault_rate_system(
     Ok(StateSpace { a: loop_dynamics(plant, gains, domain), b, c, d, domain })
 }
 
+/// The part of [`fault_system`] or [`fault_rate_system`] on which e and eps depend: its states are
+/// [e; `f_hat`] or [e; eps], n + q. The states of the plant and integrals do not act on them, so that rows of e
+/// and eps keep their transfer functions; those of x lose theirs.
+#[must_use]
+pub fn error_part(plant: &FaultyPlant, system: &StateSpace) -> StateSpace {
+    let (n, q) = plant.f_a.shape();
+    let order = n + q;
+    StateSpace {
+        a: system.a.view((n, n), (order, order)).into(),
+        b: system.b.rows(n, order).into(),
+        c: system.c.columns(n, order).into(),
+        d: system.d.clone(),
+        domain: system.domain,
+    }
+}
+
 /// Computes upper bounds of the peak gains to [x; e; eps]: from faults, from their rates, and from
 /// the part of them that the compensation leaves.
 ///
@@ -109,6 +125,9 @@ pub fn fault_gains(
     all.b.columns_mut(q, 2 * q).copy_from(&of_rates.b);
     all.d.columns_mut(q, 2 * q).copy_from(&of_rates.d);
     (all.c, all.d) = (all.c.select_rows(rows), all.d.select_rows(rows));
+    if rows.iter().all(|row| *row >= plant.a.nrows()) {
+        all = error_part(plant, &all);
+    }
     let found = peak_gain(&all, width)?.upper;
     Ok([0, 1, 2].map(|part| found.columns(part * q, q).into_owned()))
 }

@@ -2,7 +2,8 @@
 
 use control::estimation::mean_rate;
 use control::response::{
-    fault_rate_system, fault_system, frequency_response, peak_gain, settled_output, step_response,
+    error_part, fault_rate_system, fault_system, frequency_response, peak_gain, settled_output,
+    step_response,
 };
 use control::{Domain, Error, StateSpace};
 use rayon::prelude::*;
@@ -75,23 +76,11 @@ impl<'a> Errors<'a> {
             of_rates.b.scale_mut(*period);
         }
         Ok(Self {
-            of_faults: Self::error_dynamics(designed, fault_system(plant, gains, *domain)?),
-            of_rates: Self::error_dynamics(designed, of_rates),
+            of_faults: error_part(plant, &fault_system(plant, gains, *domain)?),
+            of_rates: error_part(plant, &of_rates),
             frequency: SLOW * mean_rate(&designed.required_error_dynamics, *domain)?,
             designed,
         })
-    }
-
-    /// The part of the loop without the plant's states and integrals, which do not influence the errors.
-    fn error_dynamics(designed: &ControllerDesign, system: StateSpace) -> StateSpace {
-        let all = designed.plant.a.nrows();
-        let order = all + designed.plant.f_a.ncols();
-        StateSpace {
-            a: system.a.view((all, all), (order, order)).into(),
-            b: system.b.rows(all, order).into(),
-            c: system.c.columns(all, order).into(),
-            ..system
-        }
     }
 
     fn of_fault(&self, at: usize) -> Result<EstimationErrors, Error> {
