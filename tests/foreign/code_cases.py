@@ -112,6 +112,7 @@ CASES = {
     "fall-back": Case("t_on = 3.0\n" + SAMPLED, 0.3, 1e-2),
     "reconfiguration": Case(vehicle("t_on = 3.0\n", has_fallback=False), 1.0, 1e-3),
     "reconfiguration-detection": Case(vehicle("estimator = \"prediction\"\nmonitor = true\n") + VEHICLE_DETECTION, 1.0, 1e-3),
+    "learning": Case(f"sample_time = 1.0\n{QUADRUPLE}\n[estimation]\nlaw = 'learning'\n", 0.3, 1e-2),
     "constant-prediction": Case("sample_time = 1.0\nestimator = 'prediction'\n" + QUADRUPLE, 0.3, 1e-2),
 }
 
