@@ -35,10 +35,9 @@ pub struct Bracket {
 /// times the integral of h^2, both exact from matrix exponentials; intervals of dyadic length are
 /// halved where the two differ most, so that fast and slow modes get the steps they need; the
 /// contraction of the state bounds the integral after the last interval. In sampled time all samples are
-/// added where that needs fewer operations. The bracket is proven up
-/// to rounding; it is not narrowed below the rounding error of the integral of h^2. Cost: for each
-/// output about 100 n^3, and for each time constant or oscillation some 50 intervals of 3 n^2
-/// multiplications.
+/// added where that needs fewer operations. The bracket is proven up to rounding; it is not narrowed below
+/// the rounding error of the integral of h^2. Cost: for each output about 100 n^3, and for each time
+/// constant or oscillation some 50 intervals of 3 n^2 multiplications.
 ///
 /// Source: M. A. Dahleh and J. B. Pearson, L1-optimal compensators for continuous-time systems,
 /// IEEE Trans. Autom. Control 32 (1987), for the gain; the bracket is elementary.

@@ -49,10 +49,10 @@ impl TimeResponse {
 /// on) per time constant or radian of the fastest mode that has not yet decayed; a mode counts as decayed
 /// after 25 time constants. A real mode adds about 250 points. Each point is exact up to rounding for every step
 /// size: it is computed by matrix exponentials, in sampled time by powers of A, with steps of whole
-/// samples. A response has at most about 200000 points: an oscillation damped so lightly that it needs more
-/// gets fewer per radian, and a peak between them is missed. Rates 1e5 apart cost about four digits. Cost: about 20 (n + 2 m)^3 multiplications per
-/// mode, n (n + p) per point; from 48 states on the outputs are products of large matrices, whose last
-/// bits depend on the processor.
+/// samples. A response has at most about 200000 points: an oscillation damped so lightly that it needs
+/// more gets fewer per radian, and a peak between them is missed. Rates 1e5 apart cost about four digits.
+/// Cost: about 20 (n + 2 m)^3 multiplications per mode, n (n + p) per point; from 48 states on the outputs
+/// are products of large matrices, whose last bits depend on the processor.
 ///
 /// # Errors
 ///
