@@ -33,7 +33,7 @@ const SETTLED: f64 = 1e-13;
 /// s it is |E x| / |w|, for several it is the condition of Nevanlinna and Pick. It is the least norm if w has as
 /// many entries as y. Without such zeros the bound is 0: ever larger gains lower the norm without end.
 ///
-/// In sampled time z[k] is estimated from y[0] to y[k-1], as by A - L C. The zeros are those outside of the unit
+/// In sampled time `z[k]` is estimated from `y[0]` to `y[k-1]`, as by A - L C. The zeros are those outside of the unit
 /// circle, the infinite ones included: they are delays from w to y, within which no estimate knows w. They
 /// become finite by z = (1 + s) / (1 - s), which keeps the norm.
 ///
