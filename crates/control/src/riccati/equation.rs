@@ -49,34 +49,43 @@ impl RiccatiEquation {
         })
     }
 
-    /// Largest entry of the left side relative to the sum of its absolute terms, of P as in
-    /// [`lyapunov::Solution::residual`], and the rounding that the largest terms leave in others.
+    /// Largest entry of the left side relative to the sum of its absolute terms; the measure of an iteration.
+    pub(super) fn entrywise_residual(&self, p: &DMatrix<f64>) -> f64 {
+        self.relative_residual(p, &p.abs(), 0.0)
+    }
+
+    /// The same with the rounding of zeros: |P| as in [`lyapunov::Solution::residual`], and sums of at least
+    /// [`FLOOR`] of the largest one.
     pub(super) fn residual(&self, p: &DMatrix<f64>) -> f64 {
+        self.relative_residual(p, &sizes(p), FLOOR)
+    }
+
+    fn relative_residual(&self, p: &DMatrix<f64>, size: &DMatrix<f64>, floor: f64) -> f64 {
         let Some(gain) = self.gain(p) else { return f64::INFINITY };
         let left = self.left_side(p, &gain);
         if left.iter().any(|entry| !entry.is_finite()) {
             return f64::INFINITY;
         }
-        let (a, b, n, size) = (self.a.abs(), self.b.abs(), self.n.abs(), sizes(p));
-        let effect = b.tr_mul(&size);
+        let (a, b, n) = (self.a.abs(), self.b.abs(), self.n.abs());
+        let effect = b.tr_mul(size);
         let terms = match self.domain {
             Domain::Continuous => {
                 let feedback = effect + n.transpose();
-                a.tr_mul(&size) + &size * &a + feedback.tr_mul(&feedback)
+                a.tr_mul(size) + size * &a + feedback.tr_mul(&feedback)
             }
             Domain::Sampled { .. } => {
                 let closed = a + b * gain.abs();
                 let cross = n * gain.abs();
-                closed.tr_mul(&size) * &closed
-                    + &size
+                closed.tr_mul(size) * &closed
+                    + size
                     + &cross
                     + cross.transpose()
                     + gain.abs().tr_mul(&gain.abs())
             }
         };
         let terms = terms + self.q.abs();
-        let rounding = FLOOR * terms.amax();
-        relative(&left, &terms.add_scalar(rounding))
+        let least = floor * terms.amax();
+        relative(&left, &terms.map(|term| term.max(least)))
     }
 
     /// One step of Newton's method; None when A + B K is not stable or the step cannot be computed.

@@ -86,11 +86,11 @@ impl ScaledProblem {
 
     /// Applies Newton's method until the residual stops decreasing.
     pub(super) fn refined(&self, start: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
-        let (mut best, mut residual) = (start.clone(), self.equation.residual(start));
+        let (mut best, mut residual) = (start.clone(), self.equation.entrywise_residual(start));
         let mut p = start.clone();
         for _ in 0..NEWTON_STEPS {
             let Some(next) = self.equation.newton(&p) else { break };
-            let (moved, found) = ((&next - &p).amax(), self.equation.residual(&next));
+            let (moved, found) = ((&next - &p).amax(), self.equation.entrywise_residual(&next));
             if found < residual {
                 (best, residual) = (next.clone(), found);
             }
@@ -99,7 +99,7 @@ impl ScaledProblem {
             }
             p = next;
         }
-        if residual <= super::ALLOWED_RESIDUAL {
+        if self.residual(&best) <= super::ALLOWED_RESIDUAL {
             return Ok(best);
         }
         let what = "Newton's method for the Riccati equation";
