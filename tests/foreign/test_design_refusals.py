@@ -91,7 +91,7 @@ WRONG = [
     (
         "observer.eigenvalues = [-5, -6, -7]",
         "observer.h_infinity = 1e-9\nobserver.region = { disc = { center = -5, radius = 4 } }",
-        "6:23: this cannot be met, even without the other requirements: h_infinity",
+        "6:23: no gain with all eigenvalues in the disc keeps this bound: expected a bound above",
     ),
     (
         "feedback.eigenvalues = [-1, -2]",

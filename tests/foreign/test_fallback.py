@@ -451,7 +451,7 @@ def test_cases_without_a_common_gain_are_named(aso_ftc, tmp_path):
         ("[fallback]", "[fallback]\nloss = 1.5", "expected a fraction above 0 and at most 1, found 1.5"),
         ("[fallback]\nactuators = \"all\"", "[fallback]\nactuators = [\"e\"]", 'no actuator is named "e"; there are a, b, c, d'),
         ("together = 2", "together = 4", "from 1 to 3, found 4"),
-        ("robustness.cases = 0", "robustness.cases = 0\nestimation.law = \"learning\"", "with `reconfiguration` expected one of augmented"),
+        ("robustness.cases = 0", "robustness.cases = 0\nestimation.law = \"learning\"", "with `reconfiguration` the law is one of augmented"),
         ("region.decay = 0.1", "region.decay = 0.1\nregion.disc = { center = -1, radius = 2 }", "by `decay` only"),
     ],
 )
