@@ -21,15 +21,23 @@ LIMIT = 120  # s for one answer of the browser
 
 
 class Page:
-    """A page of the browser, with what it asked for and what it complained about."""
+    """A page of the browser, with what it and its workers asked for, and what it complained about."""
 
     def __init__(self, loop, connection):
         self.loop, self.connection, self.number = loop, connection, 0
         self.requests, self.complaints = [], []
 
-    def _note(self, message):
+    async def _send(self, method, values, **session):
+        self.number += 1
+        await self.connection.write_message(json.dumps({"id": self.number, "method": method, "params": values, **session}))
+
+    async def _note(self, message):
         method, values = message.get("method"), message.get("params", {})
-        if method == "Network.requestWillBeSent":
+        if method == "Target.attachedToTarget":
+            # A worker, which waits; answers need no attention.
+            for command in ("Network.enable", "Runtime.runIfWaitingForDebugger"):
+                await self._send(command, {}, sessionId=values["sessionId"])
+        elif method == "Network.requestWillBeSent":
             self.requests.append(values["request"]["url"])
         elif method == "Runtime.exceptionThrown":
             self.complaints.append(json.dumps(values["exceptionDetails"]))
@@ -39,14 +47,14 @@ class Page:
             self.complaints.append(json.dumps(values["args"]))
 
     async def _call(self, method, values):
-        self.number += 1
-        await self.connection.write_message(json.dumps({"id": self.number, "method": method, "params": values}))
+        await self._send(method, values)
+        own = self.number
         while True:
             message = json.loads(await asyncio.wait_for(self.connection.read_message(), LIMIT))
-            if message.get("id") == self.number:
+            if message.get("id") == own:
                 assert "error" not in message, message
                 return message["result"]
-            self._note(message)
+            await self._note(message)
 
     def call(self, method, **values):
         """A command of the protocol."""
@@ -142,6 +150,7 @@ def browser(folder, width=1200, height=900):
         page = Page(loop, loop.run_until_complete(_connected(address)))
         for domain in ("Page", "Runtime", "Network", "Log"):
             page.call(f"{domain}.enable")
+        page.call("Target.setAutoAttach", autoAttach=True, waitForDebuggerOnStart=True, flatten=True)
         yield page
     finally:
         process.kill()

@@ -87,6 +87,7 @@ def test_the_page_loads_at_most_300_kb_at_first(tmp_path):
     with served(PAGE, requested) as address, browser(tmp_path / "profile") as page:
         page.open(f"{address}/index.html")
         page.until("document.body.dataset.ready === 'true'")
+        assert f"{address}/paper.wasm" in page.requests, "requests of the worker are seen"
     names = {path.removeprefix("/") for path in requested}
     assert {"index.html", "worker.js", "paper.wasm"} <= names and "observer.wasm" not in names
     sizes = {name: len(gzip.compress((PAGE / name).read_bytes())) for name in names}

@@ -64,6 +64,18 @@ pub(crate) fn largest_gain(system: &StateSpace) -> Result<(f64, &'static str), E
     }
 }
 
+/// The peak gains of an output from each fault, from the rates, and from what the compensation leaves.
+type PeakGains = [RowDVector<f64>; 3];
+
+/// Why an output has no peak gains.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Missing {
+    /// The time for certificates and bounds was over.
+    Time,
+    /// The computation does not converge.
+    Numerics,
+}
+
 /// The transfer functions from the faults, and from their rates, to [x; e; eps].
 pub(crate) struct Loops<'a> {
     designed: &'a ControllerDesign,
@@ -91,38 +103,23 @@ impl<'a> Loops<'a> {
     }
 
     /// Returns the peak-to-peak gains of the outputs from faults, from their rates, and from the part of
-    /// them that the compensation leaves. Those of a sampled loop hold between its samples, too.
-    ///
-    /// An output is None if the time of `budget` was over before, or if the loop amplifies rounding so much
-    /// that there is no bound; the errors of the faults come first.
-    fn peak_gains(&self, budget: &Budget) -> Result<Vec<Option<[RowDVector<f64>; 3]>>, Error> {
-        let ControllerDesign { extended, plant, gains, domain, .. } = self.designed;
+    /// them that the compensation leaves. Those of a sampled loop hold between its samples, too. The errors of
+    /// the faults come first, as long as the time of `budget` allows.
+    fn peak_gains(&self, budget: &Budget) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
         let positions = &self.outputs.positions;
-        let gains_of = |rows: &[usize]| match *domain {
-            Domain::Continuous => fault_gains(plant, gains, *domain, (rows, WIDTH)),
-            Domain::Sampled { period } => {
-                gains_between_samples(extended, plant, gains, (period, PARTS), (rows, WIDTH))
-            }
-        };
-        let outputs_at_once = match domain {
+        let outputs_at_once = match self.designed.domain {
             Domain::Continuous => OUTPUTS_AT_ONCE,
             // Each state is read at all parts: about as many rows as the loop has states.
             Domain::Sampled { .. } => 1 + self.of_faults.a.nrows() / PARTS as usize,
         };
-        let mut found = vec![None; positions.len()];
+        let mut found = vec![Err(Missing::Time); positions.len()];
         let mut rest = positions.len();
         while rest > 0 && !budget.is_over() {
             let first = rest.saturating_sub(outputs_at_once * rayon::current_num_threads());
             let at_once = found[first..rest].par_chunks_mut(outputs_at_once);
             let rows = positions[first..rest].par_chunks(outputs_at_once);
             at_once.zip(rows).try_for_each(|(places, rows)| {
-                let all = match gains_of(rows) {
-                    Err(Error::NotConverged { .. }) => return Ok(()),
-                    found => found?,
-                };
-                for (row, place) in places.iter_mut().enumerate() {
-                    *place = Some(all.each_ref().map(|gains| gains.row(row).into_owned()));
-                }
+                places.clone_from_slice(&self.gains_of(rows)?);
                 Ok::<_, Error>(())
             })?;
             rest = first;
@@ -130,14 +127,37 @@ impl<'a> Loops<'a> {
         Ok(found)
     }
 
-    /// Returns the peak-to-peak gains from each fault to each output, and the resulting bounds; and a
-    /// sentence if there are outputs without them.
-    pub(crate) fn bounds(&self, budget: &Budget) -> Result<(Vec<Bound>, Option<String>), Error> {
+    /// Returns the gains of some outputs. If those of one do not converge, each is computed alone.
+    fn gains_of(&self, rows: &[usize]) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
+        let ControllerDesign { extended, plant, gains, domain, .. } = self.designed;
+        let found = match *domain {
+            Domain::Continuous => fault_gains(plant, gains, *domain, (rows, WIDTH)),
+            Domain::Sampled { period } => {
+                gains_between_samples(extended, plant, gains, (period, PARTS), (rows, WIDTH))
+            }
+        };
+        match found {
+            Ok(all) => {
+                let row = |row| all.each_ref().map(|gains| gains.row(row).into_owned());
+                Ok((0..rows.len()).map(|at| Ok(row(at))).collect())
+            }
+            Err(Error::NotConverged { .. }) if rows.len() == 1 => Ok(vec![Err(Missing::Numerics)]),
+            Err(Error::NotConverged { .. }) => {
+                let alone = rows.iter().map(|row| self.gains_of(&[*row]));
+                Ok(alone.collect::<Result<Vec<_>, _>>()?.concat())
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Returns the peak-to-peak gains from each fault to each output and the resulting bounds, and a warning for
+    /// each reason why some outputs have none.
+    pub(crate) fn bounds(&self, budget: &Budget) -> Result<(Vec<Bound>, Vec<String>), Error> {
         let gains = self.peak_gains(budget)?;
         let mut found = Vec::new();
         for (column, fault) in self.faults() {
             for (at, gains) in gains.iter().enumerate() {
-                let Some([jumping, gliding, uncancelled]) = gains else { continue };
+                let Ok([jumping, gliding, uncancelled]) = gains else { continue };
                 let of_fault = jumping[column];
                 // A constant fault that leaves a lasting error has no bound by its rate.
                 let leaks = self.designed.law.leaks();
@@ -159,16 +179,20 @@ impl<'a> Loops<'a> {
                 });
             }
         }
-        let missing = gains.iter().filter(|gains| gains.is_none()).count();
-        let reason = if budget.is_over() {
-            format!("were {}", budget.reason())
-        } else {
-            "cannot be computed: the loop hardly contracts beside its fastest modes, or rounding \
-             errors grow in it, as with eigenvectors that are almost parallel"
-                .to_owned()
+        let reasons = [
+            (Missing::Time, format!("were {}", budget.reason())),
+            (
+                Missing::Numerics,
+                "cannot be computed: the loop hardly contracts beside its fastest modes, or rounding \
+                 errors grow in it, as with eigenvectors that are almost parallel"
+                    .to_owned(),
+            ),
+        ];
+        let warning = |(missing, reason): (Missing, String)| {
+            let count = gains.iter().filter(|gains| gains.as_ref().err() == Some(&missing)).count();
+            (count > 0).then(|| format!("the bounds of {count} states and errors {reason}"))
         };
-        let warning = format!("the bounds of {missing} states and errors {reason}");
-        Ok((found, (missing > 0).then_some(warning)))
+        Ok((found, reasons.into_iter().filter_map(warning).collect()))
     }
 
     /// Returns the transfer function from the faults, as `system` has them, to their estimation

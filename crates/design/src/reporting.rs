@@ -68,7 +68,7 @@ pub(crate) fn report(
     let norms = unless_numerical("the norms of the estimation errors", norms, &mut missing)?;
     let budget = Budget::start(certificate_time);
     let certificate = steps.run(Step::Certificates, || certificate(designed, norms, &budget));
-    let (bounds, without_bound) = steps.run(Step::Bounds, || loops.bounds(&budget))?;
+    let (bounds, without_bounds) = steps.run(Step::Bounds, || loops.bounds(&budget))?;
     let losses = losses(designed, &budget)?;
     let of_losses = losses.iter().flat_map(LossReport::reasons);
     let further = of_losses.chain(reconfiguration.iter().flat_map(ReconfigurationReport::reasons));
@@ -96,7 +96,7 @@ pub(crate) fn report(
     let mut warnings: Vec<_> =
         designed.warnings.iter().map(|warning| line(file, warning)).collect();
     warnings.extend(references.iter().filter_map(beyond_limits));
-    warnings.extend(without_bound);
+    warnings.extend(without_bounds);
     Ok(Report {
         description,
         plant_file: file.name(),

@@ -154,20 +154,25 @@ impl Problem {
         Ok(())
     }
 
-    /// The least factor of `unit` with which the filter without unknown inputs forgets as fast as the loop, or
-    /// as it can.
+    /// The least factor of `unit` with which the filter without unknown inputs forgets as fast as the loop; if
+    /// none does, as fast as with any factor.
     fn least_factor(&self, unit: &DMatrix<f64>) -> Option<f64> {
         let decay = |factor: f64| {
             let plant = NoisyPlant { w: unit * factor, ..self.plant.clone() };
             let filter = detection_filter(&plant, &[]).ok().flatten()?;
             self.decay(&filter.generator.a).ok()
         };
-        let factors = std::iter::once(0.0).chain((-16..=12).map(|power| 4f64.powi(power)));
-        let decays: Vec<_> = factors.filter_map(|factor| Some((factor, decay(factor)?))).collect();
-        // More noise can make a sampled filter slower: it approaches the zeros of the sampled plant.
-        let fastest = decays.iter().map(|(_, own)| *own).fold(0.0, f64::max);
-        let enough = self.rate.min(NEARLY * fastest) * NEARLY;
-        decays.into_iter().find(|(_, own)| *own >= enough).map(|(factor, _)| factor)
+        let mut slower = Vec::new();
+        for factor in std::iter::once(0.0).chain((-16..=12).map(|power| 4f64.powi(power))) {
+            let Some(own) = decay(factor) else { continue };
+            if own >= NEARLY * self.rate {
+                return Some(factor);
+            }
+            slower.push((factor, own));
+        }
+        // Not always that with the most noise: a sampled filter approaches the zeros of the sampled plant.
+        let fastest = slower.iter().map(|(_, own)| *own).fold(0.0, f64::max);
+        slower.into_iter().find(|(_, own)| *own >= NEARLY * fastest).map(|(factor, _)| factor)
     }
 
     /// Process noise by which each fault that acts on the states varies by its size within a time

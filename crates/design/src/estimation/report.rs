@@ -35,7 +35,7 @@ pub(crate) fn estimation(designed: &ControllerDesign, errors: Vec<EstimationErro
     }
 }
 
-/// Returns the errors of the estimates; the noise only for a stable loop.
+/// Returns the errors of the estimate of each fault. What noise does to it is known for a stable loop only.
 pub(crate) fn errors(
     designed: &ControllerDesign,
     robustness: Option<&Robustness>,
