@@ -5,6 +5,9 @@ x_hat and f_hat are the predictions. The input is the fault f, the outputs are
 [x; x - x_hat; f_hat - f].
 """
 
+import json
+import tomllib
+
 import numpy as np
 from scipy.linalg import expm, matrix_balance, solve_continuous_lyapunov, solve_discrete_lyapunov
 
@@ -40,6 +43,17 @@ class Matrices:
         """A_0 - L C_0, or A_0 - L C_0 A_0 for a current estimator."""
         a_0, c_0, gain = self.augmented
         return a_0 - gain @ c_0 @ (a_0 if self.current else np.eye(len(a_0)))
+
+
+def made(aso_ftc, folder, text):
+    """The matrices of the design file for a plant file, and the report; None and the error if it is refused."""
+    plant, file = folder / "plant.toml", folder / "design.toml"
+    plant.write_text(text, encoding="utf-8")
+    done = aso_ftc("design", plant, "--out", file, "--json", "--force")
+    if done.returncode == 2:
+        return None, done.stderr
+    assert done.returncode in (0, 1), done.stderr
+    return Matrices(tomllib.loads(file.read_text(encoding="utf-8"))), json.loads(done.stdout)
 
 
 def commands(own):

@@ -4,13 +4,12 @@ Source: F. Leibfritz, COMPl_eib: constraint matrix-optimization problem library,
 """
 
 import json
-import tomllib
 
 import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 
-from design_oracle import Matrices, closed_loop, commands
+from design_oracle import closed_loop, commands, made
 
 NN6 = np.zeros((9, 9))
 NN6[[0, 2, 5, 7], [1, 3, 6, 8]] = 1
@@ -71,11 +70,9 @@ def designed(aso_ftc, folder, name, sampled):
     text += f"feedback.Q = {[1.0] * len(a)}\nfeedback.R = {[1.0] * b.shape[1]}\n"
     text += f"observer.W = {[1.0] * len(a) + [100.0]}\nobserver.V = {[0.01] * len(c)}\n"
     text += '[[faults]]\nname = "f"\nactuator = "u1"\nbound = 1.0\nrate_bound = 1.0\n'
-    (folder / "plant.toml").write_text(text, encoding="utf-8")
-    done = aso_ftc("design", folder / "plant.toml", "--out", folder / "design.toml", "--json")
-    assert done.returncode in (0, 1), done.stderr
-    design = tomllib.loads((folder / "design.toml").read_text(encoding="utf-8"))
-    return (a, b, c), json.loads(done.stdout), Matrices(design)
+    own, report = made(aso_ftc, folder, text)
+    assert own is not None, report
+    return (a, b, c), report, own
 
 
 def peak_of_s(own, near):

@@ -3,14 +3,11 @@
 The plant is the quadruple tank of test_norm_designs.py. The sweeps multiply the closed loop by the documented formula of each
 weight at each frequency; they know nothing of states of weights."""
 
-import json
-import tomllib
-
 import numpy as np
 import pytest
 from scipy.linalg import eig
 
-from design_oracle import Matrices
+from design_oracle import made
 from test_norm_designs import A, B, C, C_0, A_0, NOISE, PLANT, RATES
 
 SWEEP = np.logspace(-5, 5, 3000)
@@ -78,11 +75,9 @@ def designed(aso_ftc, tmp_path):
     """Designs a plant file; returns the matrices of the design file and the report."""
 
     def design(text):
-        plant = tmp_path / "plant.toml"
-        plant.write_text(text)
-        done = aso_ftc("design", plant, "--out", tmp_path / "design.toml", "--json", "--force")
-        assert done.returncode in (0, 1), done.stderr
-        return Matrices(tomllib.loads((tmp_path / "design.toml").read_text())), json.loads(done.stdout)
+        own, report = made(aso_ftc, tmp_path, text)
+        assert own is not None, report
+        return own, report
 
     return design
 
