@@ -1,5 +1,7 @@
 """Lower bounds of the H-infinity norm of observers without noise, beside zeros by scipy and frequency sweeps in numpy."""
 
+import tomllib
+
 import numpy as np
 import pytest
 from scipy.linalg import eig, expm, null_space

@@ -49,7 +49,7 @@ impl Arithmetic {
         all
     }
 
-    /// The place in the grid, the operating point there, the limits as deviations from it.
+    /// Adds what a schedule needs: its place in the grid, the operating point there, the limits as deviations from it.
     fn add_schedule(&mut self, controller: &Controller, [n, p, m, t]: [usize; 4]) {
         let Some(schedule) = &controller.schedule else { return };
         let vectors = n + p + m + t;
@@ -63,7 +63,7 @@ impl Arithmetic {
         }
     }
 
-    /// The tests, each with an alarm at the end of its window.
+    /// Adds the most that the tests of a detection need in a sample: each window ends, and each test gives an alarm.
     fn add_detection(&mut self, controller: &Controller) {
         let Some(own) = &controller.detection else { return };
         let (residuals, tests) = (own.c.nrows(), own.tests.len());

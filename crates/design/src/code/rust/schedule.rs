@@ -56,8 +56,8 @@ impl Source<'_> {
         let real = self.real;
         lines.push(format!(
             "
-/// Finds the interval of the grid that has theta, the weights of its two points, and whether theta is beyond
-/// the grid; it is then held at its end.
+/// Finds the interval of the grid that has theta, and the weights of its two points. Theta beyond the grid is held
+/// at its end; the flag says so.
 fn find_place(theta: {real}) -> (usize, [{real}; 2], bool) {{
     let [first, second, ..] = GRID;
     let [.., last] = GRID;
