@@ -1,6 +1,7 @@
 //! The conditions that a design must satisfy.
 
 use control::Domain;
+use control::distance::Distance;
 
 use super::designed::ControllerDesign;
 use super::report::Check;
@@ -52,20 +53,22 @@ pub(crate) fn checks(designed: &ControllerDesign) -> Vec<Check> {
 /// returned.
 fn existence(designed: &ControllerDesign) -> [Check; 3] {
     let ControllerDesign { controllability, distance, detectability, .. } = designed;
-    let away =
-        |what: &str, lower: f64| format!("{what}; distance from losing it, relative: {lower:.2e}");
+    // For a large system no lower bound is searched.
+    let proven = |distance: &Distance| Some(distance.lower).filter(|lower| *lower > 0.0);
+    let away = |what: &str, distance: &Distance| match proven(distance) {
+        Some(lower) => format!("{what}; distance from losing it, relative: {lower:.2e}"),
+        None => format!(
+            "{what}; distance from losing it, relative: at most {:.2e}, no lower bound is known",
+            distance.upper
+        ),
+    };
     let seen = &detectability.observability;
     let reached = format!("rank {} of {}", controllability.rank, controllability.n);
     let shown = format!("rank {} of {}", seen.rank, seen.n);
     let fixed = "; the other modes are stable and keep their eigenvalues";
     [
         if controllability.is_full() {
-            check(
-                "(A, B) is controllable",
-                true,
-                Some(distance.lower),
-                away(&reached, distance.lower),
-            )
+            check("(A, B) is controllable", true, proven(distance), away(&reached, distance))
         } else {
             check("(A, B) is stabilisable", true, None, reached + fixed)
         },
@@ -77,10 +80,10 @@ fn existence(designed: &ControllerDesign) -> [Check; 3] {
         check(
             "the augmented observer exists",
             detectability.hidden.is_empty() && detectability.is_detectable(),
-            Some(detectability.distance.lower),
+            proven(&detectability.distance),
             away(
                 "no invariant zero of (A, F_a, C) at an eigenvalue of the fault model",
-                detectability.distance.lower,
+                &detectability.distance,
             ),
         ),
     ]
