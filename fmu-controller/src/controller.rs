@@ -128,6 +128,7 @@ impl AsoController {
         f_hat.copy_from_slice(&self.f_hat_0);
         y_f.iter_mut().zip(&self.values.y).for_each(|(y_f, y)| *y_f = *y);
         x_i.copy_from_slice(&self.x_i_0);
+        self.deviations.u.fill(0.0);
         self.operating_point.read(&self.design);
     }
 

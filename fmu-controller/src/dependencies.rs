@@ -121,7 +121,11 @@ fn of_constant_slope(design: &Design, i: usize) -> Vec<Group> {
     } else {
         let k = i - n - q;
         let own = [design.measurements[k].name.clone()].into_iter();
-        vec![(Fixed, own.chain(names::filtered(design).nth(k)).collect())]
+        let mut groups = vec![(Fixed, own.chain(names::filtered(design).nth(k)).collect())];
+        if design.d.is_some() {
+            groups.extend(of_feedback(design, kinds_of_feedback(design, has_limits(design))));
+        }
+        groups
     }
 }
 
@@ -315,6 +319,13 @@ pub(crate) fn of_initial_slope(design: &Design, i: usize) -> Vec<String> {
         of_initial_fault_slope(design, i - n)
     } else if i >= design.integral_at(0) {
         of_initial_integral_slope(design, i - design.integral_at(0))
+    } else if let Some(d) = &design.d {
+        let k = i - n - q;
+        let mut names: Vec<_> =
+            names::channels("filter", design.measurements.len()).skip(k).take(1).collect();
+        names.extend(row("D", d, k));
+        names.extend((0..design.actuators.len()).flat_map(|j| of_initial_deviation(design, j)));
+        names
     } else {
         // y_f starts at y.
         return Vec::new();

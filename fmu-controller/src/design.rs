@@ -42,6 +42,9 @@ pub(crate) struct Design {
     /// C, p x n.
     #[serde(rename = "C")]
     pub(crate) c: Matrix,
+    /// D, p x m, of y = C x + D u, stated together with a filter; without it there is none.
+    #[serde(rename = "D", default)]
+    pub(crate) d: Option<Matrix>,
     /// F_a, n x q.
     #[serde(rename = "F_a")]
     pub(crate) f_a: Matrix,
@@ -511,6 +514,7 @@ impl Design {
         ];
         let stated = [
             ("A_f", &self.a_f),
+            ("D", &self.d),
             ("P_f", &self.p_f),
             ("H", &self.h),
             ("K_i", &self.k_i),

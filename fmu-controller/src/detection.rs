@@ -243,6 +243,7 @@ fn system((design, own): (&Design, &DetectionDesign), mode: Mode) -> (DMatrix<f6
         (DMatrix::zeros(whole, whole), DMatrix::zeros(whole, responses.len() - order));
     let dense =
         |matrix: &Matrix| DMatrix::from_row_slice(matrix.rows, matrix.columns, &matrix.values);
+    let feedthrough = design.d.as_ref().map(dense);
     let [b_u, b_y, d_u, d_y] = [&own.b_u, &own.b_y, &own.d_u, &own.d_y].map(dense);
     for (at, [slopes, u]) in responses.into_iter().enumerate() {
         let u = DVector::from_vec(u);
@@ -255,6 +256,13 @@ fn system((design, own): (&Design, &DetectionDesign), mode: Mode) -> (DMatrix<f6
             part += b_y.column(at - order);
             let mut part = column.rows_mut(order + k, rows);
             part += d_y.column(at - order);
+        }
+        if let Some(d) = &feedthrough {
+            let fed = d * &u;
+            let mut part = column.rows_mut(order, k);
+            part -= &b_y * &fed;
+            let mut part = column.rows_mut(order + k, rows);
+            part -= &d_y * &fed;
         }
         match at.checked_sub(order) {
             None => state.set_column(at, &column),

@@ -22,17 +22,17 @@
 //! In a design with a filter, y_f takes the place of y in e, and
 //!
 //! ```text
-//! y_f' = W (y - y_f)
+//! y_f' = W (y - D u - y_f)
 //! ```
 //!
-//! else z has no y_f. In a design with references
+//! else z has no y_f. A design without D has D = 0. In a design with references
 //!
 //! ```text
 //! u    = K_x x_hat + K_f f_hat + K_i x_i + N_r r
 //! x_i' = r - H y + F_i f_hat + L_w (u - (K_x x_hat + K_f f_hat + K_i x_i + N_r r))
 //! ```
 //!
-//! x_i integrates the distance of the references from H y without the estimated sensor faults, -F_i f_hat.
+//! y is what follows C x, without a row of D. x_i integrates the distance of the references from H y without the estimated sensor faults, -F_i f_hat.
 //! The last term is the back-calculation of Åström and Rundqwist, Integrator windup and how to avoid it
 //! (American Control Conference 1989): it is not zero while a command is at a limit, and then lets x_i
 //! follow the command that is really applied. Each term is there where the design states its matrix.
@@ -230,7 +230,7 @@ impl<'a, D: Number> Equations<'a, D> {
         k_s.fold(-D::zero(), |sum, (k_s, gone)| sum + k_s * D::at(u, gone))
     }
 
-    /// Computes z' = [A x_hat + B u + F_a f_hat + L_x e; A_f f_hat + L_f e; W (y - y_f); x_i'], the second
+    /// Computes z' = [A x_hat + B u + F_a f_hat + L_x e; A_f f_hat + L_f e; W (y - D u - y_f); x_i'], the second
     /// part 0 unless estimating.
     pub(crate) fn set_slopes(self, knowns: Knowns<'_, D>, z_slopes: &mut D::Out<'_, [f64]>) {
         let Knowns { z: Estimate { x_hat, f_hat, y_f, .. }, y, e, u, .. } = knowns;
@@ -255,8 +255,15 @@ impl<'a, D: Number> Equations<'a, D> {
             D::add_product::<false>(z_slopes, self.states, design(|design| &design.l_f), e);
         }
         let w = D::part(self.design, |design| design.filter.as_deref().unwrap_or_default());
+        // The measurements of a sampled controller are without D u already.
+        let Design { d, sample_time, .. } = D::values(self.design);
+        let has_feedthrough = d.is_some() && sample_time.is_none();
         for (k, w) in D::list(w).enumerate() {
-            let slope = w * (D::at(y, k) - D::at(y_f, k));
+            let mut distance = D::at(y, k) - D::at(y_f, k);
+            if has_feedthrough {
+                distance -= self.product(|design| row(design.d.as_ref(), k), u);
+            }
+            let slope = w * distance;
             D::write(z_slopes, |z_slopes| &mut z_slopes[self.states + self.faults + k], slope);
         }
         let first = self.states + self.faults + self.filters;

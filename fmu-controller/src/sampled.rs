@@ -15,7 +15,8 @@
 //!              x_i[k+1] = x_i[k] + T (r[k] - H y[k] + F_i f_hat) + L_w (u[k] - free command)
 //! ```
 //!
-//! with K_i x_i[k] + N_r r[k] in u[k], and f_hat in x_i[k+1] the one that u[k] uses: the terms of
+//! where y[k] is the measurement less D u[k-1], the part of the command that was in force when it was taken; u[-1]
+//! is that of the operating point. And with K_i x_i[k] + N_r r[k] in u[k], and f_hat in x_i[k+1] the one that u[k] uses: the terms of
 //! `equations.rs` for references. f_hat only while estimating, K_f f_hat only while compensating, u within its limits. A design
 //! without A_f has A_f = I. In a design with a direct term P_f, z has f_hat_i in place of f_hat, and
 //! f_hat[k] = f_hat_i + P_f (y[k] - C x_hat) with the estimates that u[k] uses. A sliding-mode law has
@@ -117,6 +118,7 @@ impl Sampler {
     ) -> Mode {
         values.z.copy_from_slice(&self.prediction);
         signals.set(values, point, offset);
+        signals.remove_feedthrough(design);
         self.last_prediction.copy_from_slice(&signals.z);
         let equations = Equations::<f64>::new(design, mode);
         estimate(self.estimator, equations, &self.last_prediction, &mut signals);

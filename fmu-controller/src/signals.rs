@@ -93,6 +93,14 @@ impl Signals {
         self.set_inputs(values, point, offset);
     }
 
+    /// Takes D u off the measurements, u being the commands of before.
+    pub(crate) fn remove_feedthrough(&mut self, design: &Design) {
+        let Some(d) = &design.d else { return };
+        for (k, y) in self.y.iter_mut().enumerate() {
+            *y -= d.row(k).iter().zip(&self.u).map(|(entry, u)| entry * u).sum::<f64>();
+        }
+    }
+
     /// Sets z, y and r to the derivatives of their deviations: those of the signals less those of the operating
     /// point, which `design` has in place of an operating point.
     pub(crate) fn set_rates(&mut self, (z, values): (&[f64], &Values), design: &Design) {

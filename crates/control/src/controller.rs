@@ -184,6 +184,47 @@ fn filtered(own: &StateSpace, filter: Option<&[f64]>) -> Result<StateSpace, Erro
     Ok(StateSpace { a, b, c, d, domain: own.domain })
 }
 
+/// The controller of a plant with y = C x + D u, from `own`, which is for the plant without D: it gets
+/// y - D u, u being its own commands.
+///
+/// ```text
+/// continuous:  z' = (A - B D C) z + B y,            u = C z
+/// sampled:     z[k+1] = A z[k] + B (y[k] - D v[k]),  u[k] = C z[k],  v[k+1] = u[k]
+/// ```
+///
+/// A sample `y[k]` is taken just before `u[k]` is applied, so that it contains `D u[k-1]`; the state is then
+/// [z; v]. `own`: k states, p inputs, and C for any output beside u; its direct term is zero, as with a
+/// measurement filter; `feedthrough`: D, p x m; `commands`: C of u, m x k.
+///
+/// # Errors
+///
+/// [`Error::Shape`] for matrices that do not fit; [`Error::OutOfRange`] for a direct term of `own`.
+pub fn with_feedthrough(
+    own: &StateSpace,
+    commands: &DMatrix<f64>,
+    feedthrough: &DMatrix<f64>,
+) -> Result<StateSpace, Error> {
+    let (p, m) = feedthrough.shape();
+    let k = check::square("A", &own.a)?;
+    check::shape("B", &own.b, (k, p))?;
+    check::shape("C of the commands", commands, (m, k))?;
+    let direct = own.d.amax();
+    if direct > 0.0 {
+        let name = "the controller's D";
+        return Err(Error::OutOfRange { name, value: direct, rule: "zero" });
+    }
+    let entered = &own.b * feedthrough;
+    if own.domain == Domain::Continuous {
+        return Ok(StateSpace { a: &own.a - entered * commands, ..own.clone() });
+    }
+    Ok(StateSpace {
+        a: block_2x2([&own.a, &-entered], [commands, &DMatrix::zeros(m, m)]),
+        b: own.b.clone().resize_vertically(k + m, 0.0),
+        c: own.c.clone().resize_horizontally(k + m, 0.0),
+        ..own.clone()
+    })
+}
+
 /// The dynamics of plant and controller together, of [x; z], where input i of the plant acts with
 /// the factor `effectiveness[i]`.
 ///

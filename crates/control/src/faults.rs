@@ -5,15 +5,19 @@
 //! | constant | x' = A x + B u + `F_a` f | `F_a` | 0 |
 //! | ramp, f' = g, g' = 0 | the same | [`F_a`, 0] | [0, I; 0, 0] |
 //! | sensor | y = C x + `F_s` f | [0; W `F_s`] | by its kind |
+//! | both | both of these | [`F_a`; W `F_s`] | by its kind |
 //! | loss of effectiveness | x' = A x + B (I - E) u | columns of B, f = -E u | by its kind |
 //!
-//! Sensor faults enter through the usual filter of the measurements, which is part of the
+//! What enters the measurements passes the usual filter of the measurements, which is part of the
 //! controller and becomes part of the plant that the observer sees:
 //!
 //! ```text
 //! y_f' = W (y - y_f)
 //! A -> [A, 0; W C, -W],  B -> [B; 0],  C -> [0, I],  F_a -> [F_a, 0; 0, W F_s]
 //! ```
+//!
+//! A plant with y = C x + D u is one without D for a controller that filters y - D u, which it knows:
+//! [`crate::controller::with_feedthrough`]. A fault f of its input i enters both: columns i of B and D.
 
 mod loss;
 mod lossy_loop;
@@ -46,8 +50,23 @@ pub enum FaultEntry {
     Actuator(DVector<f64>),
     /// y = C x + column f; p entries.
     Sensor(DVector<f64>),
+    /// x' = A x + B u + `states` f, y = C x + `measurements` f; n and p entries.
+    Both {
+        /// The column of `F_a`.
+        states: DVector<f64>,
+        /// The column of `F_s`.
+        measurements: DVector<f64>,
+    },
     /// The input with this index, from zero, loses the part E of its effect: f = -E u.
     LossOfEffectiveness(usize),
+}
+
+impl FaultEntry {
+    /// Whether the fault enters the measurements.
+    #[must_use]
+    pub fn is_measured(&self) -> bool {
+        matches!(self, Self::Sensor(_) | Self::Both { .. })
+    }
 }
 
 /// A fault.
@@ -75,7 +94,7 @@ pub struct FaultChannel {
 pub struct ExtendedPlant {
     /// The plant, in continuous time, with the filter's states after its own.
     pub plant: FaultyPlant,
-    /// Diagonal of W, in 1/s, p entries. None without sensor faults: y is then not filtered.
+    /// Diagonal of W, in 1/s, p entries. None if y is not filtered.
     pub filter: Option<Vec<f64>>,
     /// Number of states of the plant itself.
     pub states: usize,
@@ -95,8 +114,8 @@ impl ExtendedPlant {
     /// Builds the plant with the given faults.
     ///
     /// `a`: n x n; `b`: n x m; `c`: p x n; `faults`: at least one; `filter`: the diagonal of W, p
-    /// rates above zero in 1/s, used only if there is a sensor fault. `f_hat` holds the estimates
-    /// in the order of the faults, then the rates of the ramps.
+    /// rates above zero in 1/s, or none, which is possible if no fault enters the measurements.
+    /// `f_hat` holds the estimates in the order of the faults, then the rates of the ramps.
     /// [`FaultyPlant::check_observer_exists`] and [`crate::detectability`] test whether an observer
     /// exists: a sensor fault, for example, needs other measurements that show the same state.
     ///
@@ -138,9 +157,8 @@ impl ExtendedPlant {
         let (f_a, f_s) = columns(b, c.nrows(), faults)?;
         let (a_f, channels) = models(faults);
         let width = a_f.nrows();
-        let sensors = faults.iter().any(|fault| matches!(fault.entry, FaultEntry::Sensor(_)));
         let f_a = f_a.resize_horizontally(width, 0.0);
-        if !sensors {
+        if filter.is_empty() && !faults.iter().any(|fault| fault.entry.is_measured()) {
             let plant = FaultyPlant { a: a.clone(), b: b.clone(), c: c.clone(), f_a, a_f };
             return Ok(Self { plant, filter: None, states: n, channels });
         }
@@ -186,12 +204,19 @@ fn columns(
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
     let (n, m) = b.shape();
     let (mut f_a, mut f_s) = (DMatrix::zeros(n, faults.len()), DMatrix::zeros(p, faults.len()));
+    let set = |into: &mut DMatrix<f64>, at: usize, name, column: &DVector<f64>| {
+        let given = DMatrix::from_column_slice(column.len(), 1, column.as_slice());
+        check::shape(name, &given, (into.nrows(), 1))?;
+        into.set_column(at, column);
+        Ok(())
+    };
     for (at, fault) in faults.iter().enumerate() {
-        let (name, into, column) = match &fault.entry {
-            FaultEntry::Actuator(column) => ("a column of F_a", &mut f_a, column.clone()),
-            FaultEntry::Sensor(column) => ("a column of F_s", &mut f_s, column.clone()),
+        let (on_states, on_measurements) = match &fault.entry {
+            FaultEntry::Actuator(column) => (Some(column.clone()), None),
+            FaultEntry::Sensor(column) => (None, Some(column)),
+            FaultEntry::Both { states, measurements } => (Some(states.clone()), Some(measurements)),
             FaultEntry::LossOfEffectiveness(input) if *input < m => {
-                ("B", &mut f_a, b.column(*input).into())
+                (Some(b.column(*input).into()), None)
             }
             FaultEntry::LossOfEffectiveness(input) => {
                 #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
@@ -200,9 +225,12 @@ fn columns(
                 return Err(Error::OutOfRange { name: "the input of a loss", value, rule });
             }
         };
-        let given = DMatrix::from_column_slice(column.len(), 1, column.as_slice());
-        check::shape(name, &given, (into.nrows(), 1))?;
-        into.set_column(at, &column);
+        if let Some(column) = on_states {
+            set(&mut f_a, at, "a column of F_a", &column)?;
+        }
+        if let Some(column) = on_measurements {
+            set(&mut f_s, at, "a column of F_s", column)?;
+        }
     }
     Ok((f_a, f_s))
 }

@@ -52,7 +52,7 @@ pub use tolerance::{
 };
 
 use crate::blocks::{block_2x2, stacked};
-use crate::{Error, StateSpace, check};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
 /// Where the loop is opened.
@@ -64,7 +64,31 @@ pub enum Point {
     Output,
 }
 
-/// The loop y = G u, u = K y of a strictly proper plant G and a controller K.
+/// The continuous `plant` under a zero-order hold of its inputs, in samples of `period` seconds.
+///
+/// With y = C x + D u a sample contains the command that was held until then: `y[k] = C x[k] + D v[k]`,
+/// `v[k+1] = u[k]`; the state is [x; v], and D of the result is zero.
+///
+/// # Errors
+///
+/// Same as [`crate::hold::zero_order_hold`].
+pub fn held_plant(plant: &StateSpace, period: f64) -> Result<StateSpace, Error> {
+    let (a, b) = held::hold_inputs(&plant.a, &plant.b, period)?;
+    let domain = Domain::Sampled { period };
+    if plant.d.amax() <= 0.0 {
+        return Ok(StateSpace { a, b, domain, ..plant.clone() });
+    }
+    let (n, m) = b.shape();
+    Ok(StateSpace {
+        a: a.resize(n + m, n + m, 0.0),
+        b: stacked(&b, &DMatrix::identity(m, m)),
+        c: stacked(&plant.c.transpose(), &plant.d.transpose()).transpose(),
+        d: DMatrix::zeros(plant.c.nrows(), m),
+        domain,
+    })
+}
+
+/// The loop y = G u, u = K y of a plant G and a controller K, of which one is strictly proper.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loop {
     plant: StateSpace,
@@ -72,20 +96,21 @@ pub struct Loop {
 }
 
 impl Loop {
-    /// Closes the loop of `plant`, from m commands to p measurements with D = 0, and `controller`,
-    /// from p measurements to m commands, both in the same domain.
+    /// Closes the loop of `plant`, from m commands to p measurements, and `controller`, from p
+    /// measurements to m commands, both in the same domain. D of one of them is zero.
     ///
     /// # Errors
     ///
     /// Same as [`StateSpace::check`]; [`Error::Shape`] for a controller that does not fit the plant;
-    /// [`Error::OutOfRange`] for a plant with D other than zero, or for different domains.
+    /// [`Error::OutOfRange`] for a plant and a controller with D other than zero, or for different domains.
     pub fn new(plant: StateSpace, controller: StateSpace) -> Result<Self, Error> {
         plant.check()?;
         controller.check()?;
         check::shape("the controller's D", &controller.d, (plant.b.ncols(), plant.c.nrows()))?;
         let direct = plant.d.amax();
-        if direct > 0.0 {
-            return Err(Error::OutOfRange { name: "the plant's D", value: direct, rule: "zero" });
+        if direct > 0.0 && controller.d.amax() > 0.0 {
+            let rule = "zero, as that of the controller is not";
+            return Err(Error::OutOfRange { name: "the plant's D", value: direct, rule });
         }
         if plant.domain != controller.domain {
             let rule = "the same for plant and controller";
@@ -112,8 +137,23 @@ impl Loop {
         let (plant, own) = (&self.plant, &self.controller);
         block_2x2(
             [&(&plant.a + &plant.b * &own.d * &plant.c), &(&plant.b * &own.c)],
-            [&(&own.b * &plant.c), &own.a],
+            [&(&own.b * &plant.c), &(&own.a + &own.b * &plant.d * &own.c)],
         )
+    }
+
+    /// Commands and measurements from the states of plant and controller: [`D_k` C, `C_k`] and [C, D `C_k`].
+    fn signals(&self) -> [DMatrix<f64>; 2] {
+        let (plant, own) = (&self.plant, &self.controller);
+        let beside = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
+            stacked(&left.transpose(), &right.transpose()).transpose()
+        };
+        [beside(&(&own.d * &plant.c), &own.c), beside(&plant.c, &(&plant.d * &own.c))]
+    }
+
+    /// What is added to the commands, and to the measurements: [B; `B_k` D] and [B `D_k`; `B_k`].
+    fn entries(&self) -> [DMatrix<f64>; 2] {
+        let (plant, own) = (&self.plant, &self.controller);
+        [stacked(&plant.b, &(&own.b * &plant.d)), stacked(&(&plant.b * &own.d), &own.b)]
     }
 
     /// S as a system: from a signal that is added at `at` to the sum.
@@ -134,20 +174,14 @@ impl Loop {
 
     /// S - I = -T.
     fn response(&self, at: Point) -> StateSpace {
-        let (plant, own) = (&self.plant, &self.controller);
-        let (n, k) = (plant.a.nrows(), own.a.nrows());
+        let ([from_commands, from_measurements], [commands, measurements]) =
+            (self.entries(), self.signals());
         let (b, c) = match at {
-            Point::Input => {
-                let c = stacked(&(&own.d * &plant.c).transpose(), &own.c.transpose()).transpose();
-                (plant.b.clone().resize_vertically(n + k, 0.0), c)
-            }
-            Point::Output => {
-                let c = plant.c.clone().resize_horizontally(n + k, 0.0);
-                (stacked(&(&plant.b * &own.d), &own.b), c)
-            }
+            Point::Input => (from_commands, commands),
+            Point::Output => (from_measurements, measurements),
         };
         let d = DMatrix::zeros(c.nrows(), b.ncols());
-        StateSpace { a: self.dynamics(), b, c, d, domain: plant.domain }
+        StateSpace { a: self.dynamics(), b, c, d, domain: self.plant.domain }
     }
 
     /// From noise that is added to the measurements to `output` of the controller, which has the
@@ -161,8 +195,10 @@ impl Loop {
         check::shape("C of the output", &output.c, (output.c.nrows(), own.a.nrows()))?;
         check::shape("D of the output", &output.d, (output.c.nrows(), own.b.ncols()))?;
         let StateSpace { a, b, domain, .. } = self.response(Point::Output);
-        let seen = (&output.d * &self.plant.c).transpose();
-        let c = stacked(&seen, &output.c.transpose()).transpose();
+        let mut c = &output.d * &self.signals()[1];
+        let n = self.plant.a.nrows();
+        let seen = c.columns(n, own.a.nrows()) + &output.c;
+        c.columns_mut(n, own.a.nrows()).copy_from(&seen);
         Ok(StateSpace { a, b, c, d: output.d.clone(), domain })
     }
 }

@@ -198,6 +198,7 @@ impl ControllerDesign {
         if self.law.a_f.is_some() || self.extended.plant.a_f.amax() > 0.0 {
             matrices.push(("A_f", a_f));
         }
+        matrices.extend(linear.has_feedthrough().then_some(("D", &linear.d)));
         let Gains { k_x, k_f, l_x, l_f, p_f, .. } = &self.gains;
         let l_f = self.law.injection.as_ref().map_or(l_f, |own| &own.f);
         matrices.extend([("K_x", k_x), ("K_f", k_f), ("L_x", l_x), ("L_f", l_f)]);

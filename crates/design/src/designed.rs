@@ -2,6 +2,7 @@
 
 use super::estimation::Law;
 use super::family::{self, Family, common_feedback};
+use super::feedthrough;
 use super::fixed_mode::{described, described_in};
 use super::gains::{FeedbackProblem, GainResult, Refusal, feedback, observer};
 use super::law::{DesignedLaw, LawProblem};
@@ -80,6 +81,7 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
 /// Designs the controller for `file` with another law for the estimates of the faults.
 pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDesign, crate::Error> {
     let linear = LinearPlant::of(file)?;
+    feedthrough::check(file, &linear)?;
     let mut warnings = check_limits(file, &linear)?;
     let filter = file.filter.as_deref().unwrap_or_default();
     let LinearPlant { a, b, c, models, .. } = &linear;

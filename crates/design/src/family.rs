@@ -54,6 +54,11 @@ pub(crate) fn members(
         let linear = LinearPlant::of(&file.with(variant))
             .map_err(|error| error.within(format!("member `{}` of the family", variant.name)))?;
         check_states(file, variant, (nominal, &linear))?;
+        if linear.has_feedthrough() {
+            let message = "a measurement depends on a command directly (D is not 0); expected members \
+                           without direct feedthrough";
+            return Err(file.error_at(&variant.place, message).into());
+        }
         check_member(file, variant, &linear)?;
         if linear.residual.is_some_and(|residual| residual >= AT_REST) {
             let message = format!(

@@ -23,6 +23,7 @@ mod error;
 mod estimation;
 pub mod fallback;
 pub mod family;
+mod feedthrough;
 mod fixed_mode;
 mod gains;
 mod identity;

@@ -11,14 +11,15 @@ use super::signals::{EntryPoint, Fault, FaultDynamics, Signal};
 use crate::detection::request::{Disturbance, DisturbanceEntry};
 use files::PlaceError;
 
-/// Relative size in its row below which an entry of D or G counts as zero.
+/// Part of the largest entry of a row of C below which an entry of D counts as zero.
 const NOTHING: f64 = 1e-9;
 
-/// x' = A x + B u + faults, y = C x + sensor faults, about an operating point.
+/// x' = A x + B u + faults, y = C x + D u + faults, about an operating point.
 pub(crate) struct LinearPlant {
     pub(crate) a: DMatrix<f64>,
     pub(crate) b: DMatrix<f64>,
     pub(crate) c: DMatrix<f64>,
+    pub(crate) d: DMatrix<f64>,
     pub(crate) states: Vec<Signal>,
     pub(crate) actuators: Vec<Signal>,
     pub(crate) measurements: Vec<Signal>,
@@ -35,27 +36,33 @@ pub(crate) struct LinearPlant {
 }
 
 impl LinearPlant {
+    /// Whether a measurement depends on a command directly.
+    pub(crate) fn has_feedthrough(&self) -> bool {
+        self.d.amax() > 0.0
+    }
+
     /// Takes the matrices of `file`, or linearises its FMU.
     pub(crate) fn of(file: &PlantFile<'_>) -> Result<Self, crate::Error> {
         match &file.model {
-            plant_file::Model::Matrices { a, b, c, f_a, states } => {
+            plant_file::Model::Matrices { a, b, c, d, f_a, states } => {
                 let columns = f_a.clone().unwrap_or_else(|| DMatrix::zeros(a.nrows(), 0));
                 let model = |fault: &Fault| match fault.entry_point {
                     EntryPoint::Column(at) => {
                         modelled(fault, FaultEntry::Actuator(column(&columns, at)))
                     }
-                    _ => on_signals(fault, b, c.nrows()),
+                    _ => on_signals(fault, b, d),
                 };
                 Ok(Self {
                     a: a.clone(),
                     b: b.clone(),
                     c: c.clone(),
+                    d: d.clone(),
                     states: states.clone(),
                     actuators: file.actuators.clone(),
                     measurements: file.measurements.clone(),
                     faults: file.faults.clone(),
                     models: file.faults.iter().map(model).collect(),
-                    disturbances: disturbances(file, (b, c.nrows()), None)?,
+                    disturbances: disturbances(file, (b, d), None)?,
                     origin: "The plant file states the matrices.".to_owned(),
                     residual: None,
                 })
@@ -78,13 +85,16 @@ fn modelled(fault: &Fault, entry: FaultEntry) -> Model {
     Model { entry, kind }
 }
 
-/// Returns the model of an actuator or sensor fault; `p` is the number of measurements.
-fn on_signals(fault: &Fault, b: &DMatrix<f64>, p: usize) -> Model {
+/// Returns the model of an actuator or sensor fault.
+fn on_signals(fault: &Fault, b: &DMatrix<f64>, d: &DMatrix<f64>) -> Model {
     let enters = match fault.entry_point {
         EntryPoint::Sensor(at) => {
-            FaultEntry::Sensor(DVector::from_fn(p, |row, _| f64::from(u8::from(row == at))))
+            FaultEntry::Sensor(DVector::from_fn(d.nrows(), |row, _| f64::from(u8::from(row == at))))
         }
         EntryPoint::Loss { actuator, .. } => FaultEntry::LossOfEffectiveness(actuator),
+        EntryPoint::Actuator(at) if d.column(at).amax() > 0.0 => {
+            FaultEntry::Both { states: column(b, at), measurements: column(d, at) }
+        }
         EntryPoint::Actuator(at) => FaultEntry::Actuator(column(b, at)),
         EntryPoint::Column(_) | EntryPoint::Input(_) => {
             FaultEntry::Actuator(DVector::zeros(b.nrows()))
@@ -107,11 +117,10 @@ fn linearised(
     let merged = |own: &[Signal], found: &[linearise::Signal]| {
         own.iter().zip(found).map(|(own, found)| own.clone().or(known(found))).collect()
     };
-    refuse_feedthrough(file, &found.matrices.d, &found.matrices.c)?;
-    let (faults, models) = faults(file, &found)?;
-    let of = (&found.matrices.b, found.matrices.c.nrows());
+    let d = feedthrough(found.matrices.d.clone(), &found.matrices.c);
+    let (faults, models) = faults(file, &found, &d)?;
     Ok(LinearPlant {
-        disturbances: disturbances(file, of, Some(&found.matrices))?,
+        disturbances: disturbances(file, (&found.matrices.b, &d), Some(&found.matrices))?,
         states: found.states.iter().map(known).collect(),
         actuators: merged(&file.actuators, &found.inputs),
         measurements: merged(&file.measurements, &found.outputs),
@@ -122,6 +131,7 @@ fn linearised(
         a: found.matrices.a,
         b: found.matrices.b,
         c: found.matrices.c,
+        d,
     })
 }
 
@@ -162,21 +172,23 @@ fn disturbance_inputs<'a>(file: &'a PlantFile<'_>) -> impl Iterator<Item = Strin
     })
 }
 
-/// Returns how the disturbances of the file act on a plant with the input matrix `b` and `p`
-/// measurements; those of an FMU are the last columns of `found`.
+/// Returns how the disturbances of the file act on a plant with the input matrices `b` and `d`; those of an
+/// FMU are the last columns of `found`.
 fn disturbances(
     file: &PlantFile<'_>,
-    (b, p): (&DMatrix<f64>, usize),
+    (b, d): (&DMatrix<f64>, &DMatrix<f64>),
     found: Option<&linearise::Matrices>,
 ) -> Result<Vec<UnknownInput>, PlaceError> {
     let columns = found.map_or(0, |found| found.f.ncols());
     let mut next = columns - disturbance_inputs(file).count().min(columns)..;
-    let n = b.nrows();
+    let (n, p) = (b.nrows(), d.nrows());
     let one = |own: &Disturbance| {
         let (mut on_states, mut on_measurements) = (DVector::zeros(n), DVector::zeros(p));
         match (&own.entry_point, found) {
             (DisturbanceEntry::Column(e), _) => on_states.copy_from(e),
-            (DisturbanceEntry::Actuator(at), _) => on_states = column(b, *at),
+            (DisturbanceEntry::Actuator(at), _) => {
+                (on_states, on_measurements) = (column(b, *at), column(d, *at));
+            }
             (DisturbanceEntry::Sensor(at), _) => on_measurements[*at] = 1.0,
             (DisturbanceEntry::Input(_), None) => {}
             (DisturbanceEntry::Input(_), Some(found)) => {
@@ -237,6 +249,7 @@ fn stating(file: &PlantFile<'_>, operating_point: &[(String, f64)], name: &str) 
 fn faults(
     file: &PlantFile<'_>,
     found: &Linearisation,
+    d: &DMatrix<f64>,
 ) -> Result<(Vec<Fault>, Vec<Model>), crate::Error> {
     let mut inputs = 0..;
     let mut faults = file.faults.clone();
@@ -247,12 +260,9 @@ fn faults(
                 let at = inputs.next().unwrap_or_default();
                 (&found.faults[at], modelled(fault, entry(file, fault, &found.matrices, at)?))
             }
-            EntryPoint::Sensor(at) => {
-                let measurements = found.outputs.len();
-                (&found.outputs[at], on_signals(fault, &found.matrices.b, measurements))
-            }
+            EntryPoint::Sensor(at) => (&found.outputs[at], on_signals(fault, &found.matrices.b, d)),
             EntryPoint::Actuator(at) | EntryPoint::Loss { actuator: at, .. } => {
-                (&found.inputs[at], on_signals(fault, &found.matrices.b, found.outputs.len()))
+                (&found.inputs[at], on_signals(fault, &found.matrices.b, d))
             }
             EntryPoint::Column(_) => {
                 let message = format!("fault `{}`: an FMU has no F_a", fault.name);
@@ -265,27 +275,17 @@ fn faults(
     Ok((faults, models))
 }
 
-/// Rejects direct feedthrough: the observer requires y = C x.
-fn refuse_feedthrough(
-    file: &PlantFile<'_>,
-    d: &DMatrix<f64>,
-    c: &DMatrix<f64>,
-) -> Result<(), crate::Error> {
-    for row in 0..d.nrows() {
-        for actuator in 0..d.ncols() {
-            if d[(row, actuator)].abs() > NOTHING * c.row(row).amax() {
-                let message = format!(
-                    "the measurement {} depends on {} directly (D is {}); the observer is for y = \
-                     C x",
-                    file.measurements[row].name,
-                    file.actuators[actuator].name,
-                    d[(row, actuator)]
-                );
-                return Err(file.error(&["measurements"], message).into());
+/// D without the entries that are rounding beside the row of `c`.
+pub(crate) fn feedthrough(mut d: DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64> {
+    for (mut row, of_states) in d.row_iter_mut().zip(c.row_iter()) {
+        let negligible = NOTHING * of_states.amax();
+        row.apply(|entry| {
+            if entry.abs() <= negligible {
+                *entry = 0.0;
             }
-        }
+        });
     }
-    Ok(())
+    d
 }
 
 /// Returns where the fault input `at` of the FMU enters: the states or the measurements.
@@ -296,22 +296,22 @@ fn entry(
     at: usize,
 ) -> Result<FaultEntry, crate::Error> {
     let (states, measurements) = (column(&found.f, at), column(&found.g, at));
+    if measurements.amax() > 0.0 && file.filter.is_none() {
+        let message = format!(
+            "fault `{}` enters the measurements, which needs `filter`: the rates, in 1/s, of the filter \
+             that they pass",
+            fault.name
+        );
+        return Err(file.error_at(&fault.place, message).into());
+    }
     match (states.amax() > 0.0, measurements.amax() > 0.0) {
         (true, false) => Ok(FaultEntry::Actuator(states)),
-        (false, true) if file.filter.is_some() => Ok(FaultEntry::Sensor(measurements)),
-        (false, true) => {
+        (false, true) => Ok(FaultEntry::Sensor(measurements)),
+        (true, true) => Ok(FaultEntry::Both { states, measurements }),
+        (false, false) => {
             let message = format!(
-                "fault `{}` enters the measurements, which needs `filter`: the rates, in 1/s, of \
-                 the filter that they pass",
-                fault.name
-            );
-            Err(file.error_at(&fault.place, message).into())
-        }
-        (reaches_both, _) => {
-            let found = if reaches_both { "both" } else { "neither" };
-            let message = format!(
-                "fault `{}`: expected an input of the FMU that acts on states or on measurements, \
-                 found that it acts on {found}",
+                "fault `{}`: expected an input of the FMU that acts on states or on measurements, found \
+                 that it acts on neither",
                 fault.name
             );
             Err(file.error_at(&fault.place, message).into())

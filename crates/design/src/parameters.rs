@@ -10,7 +10,7 @@ use fmu_import::Fmu;
 use linearise::{Linearise, linearise};
 use nalgebra::{DMatrix, DVector};
 
-use super::linear_plant;
+use super::linear_plant::{self, feedthrough};
 use super::plant_file::{PlantFile, PlantFmu};
 use crate::robustness::report::Parameter;
 
@@ -67,8 +67,8 @@ pub(crate) struct ParameterFamily<'a> {
     fmu: Fmu,
     request: Linearise,
     parameters: Vec<Varied>,
-    /// Half of the change of A, B and C from the lowest to the highest value of each parameter.
-    directions: Vec<[DMatrix<f64>; 3]>,
+    /// Half of the change of A, B, C and D from the lowest to the highest value of each parameter.
+    directions: Vec<[DMatrix<f64>; 4]>,
 }
 
 struct Varied {
@@ -101,14 +101,15 @@ impl<'a> ParameterFamily<'a> {
         Ok(Some(found))
     }
 
-    fn direction(&self, at: usize) -> Result<[DMatrix<f64>; 3], crate::Error> {
+    fn direction(&self, at: usize) -> Result<[DMatrix<f64>; 4], crate::Error> {
         let end = |deviation: f64| {
             let mut deviations = vec![0.0; self.count()];
             deviations[at] = deviation;
             self.plant(&deviations)
         };
         let (high, low) = (end(1.0)?, end(-1.0)?);
-        Ok([(high.a - low.a) * 0.5, (high.b - low.b) * 0.5, (high.c - low.c) * 0.5])
+        let half = |high, low| (high - low) * 0.5;
+        Ok([half(high.a, low.a), half(high.b, low.b), half(high.c, low.c), half(high.d, low.d)])
     }
 
     /// Linearises the FMU at the operating point of the plant file, with other parameters; returns also the
@@ -133,11 +134,12 @@ impl<'a> ParameterFamily<'a> {
         let measured = found.outputs.iter().map(|signal| signal.value);
         let measured = DVector::from_iterator(found.outputs.len(), measured);
         let matrices = found.matrices;
+        let d = feedthrough(matrices.d, &matrices.c);
         let plant = StateSpace {
             a: matrices.a,
             b: matrices.b,
             c: matrices.c,
-            d: matrices.d,
+            d,
             domain: Domain::Continuous,
         };
         Ok((plant, DVector::from_vec(found.rates), measured))
@@ -145,7 +147,7 @@ impl<'a> ParameterFamily<'a> {
 
     /// The parameters for the report; `deviations`: those of the worst plant; `peaks`: derivatives of
     /// the peaks of S at the commands and at the measurements with respect to the entries.
-    pub(crate) fn report(&self, deviations: &[f64], peaks: &[[DMatrix<f64>; 3]]) -> Vec<Parameter> {
+    pub(crate) fn report(&self, deviations: &[f64], peaks: &[[DMatrix<f64>; 4]]) -> Vec<Parameter> {
         let effects: Vec<Vec<f64>> = peaks.iter().map(|entries| self.slopes(entries)).collect();
         let one = |(at, own): (usize, &Varied)| Parameter {
             name: own.name.clone(),
@@ -239,8 +241,8 @@ impl PlantFamily for ParameterFamily<'_> {
         Ok(self.at_operating_point(deviations)?.0)
     }
 
-    fn slopes(&self, entries: &[DMatrix<f64>; 3]) -> Vec<f64> {
-        let along = |direction: &[DMatrix<f64>; 3]| {
+    fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64> {
+        let along = |direction: &[DMatrix<f64>; 4]| {
             direction.iter().zip(entries).map(|(change, slopes)| change.dot(slopes)).sum()
         };
         self.directions.iter().map(along).collect()

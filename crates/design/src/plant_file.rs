@@ -70,6 +70,7 @@ pub(crate) enum Model {
         a: DMatrix<f64>,
         b: DMatrix<f64>,
         c: DMatrix<f64>,
+        d: DMatrix<f64>,
         f_a: Option<DMatrix<f64>>,
         states: Vec<Signal>,
     },
@@ -135,10 +136,11 @@ const KEYS: [&str; 32] = [
     "schedule",
 ];
 /// Entries that errors of later steps point at.
-const PLACES: [&str; 18] = [
+const PLACES: [&str; 24] = [
     "A",
     "B",
     "C",
+    "D",
     "F_a",
     "actuator_faults",
     "plant",
@@ -154,6 +156,11 @@ const PLACES: [&str; 18] = [
     "feedback",
     "observer",
     "reference",
+    "family",
+    "schedule",
+    "detection",
+    "reconfiguration",
+    "fallback",
 ];
 
 impl<'a> PlantFile<'a> {
@@ -352,7 +359,7 @@ fn stated(file: &Table<'_>) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
         let advice = "it belongs to `plant`; with matrices, `operating` in each signal states it";
         return Err(entry.error(advice));
     }
-    let meaning = "the plant x' = A x + B u + F_a f_a, y = C x; or `plant`, an FMU";
+    let meaning = "the plant x' = A x + B u + F_a f_a, y = C x + D u; or `plant`, an FMU";
     let entry = file.require("A", meaning)?;
     let n = entry.matrix()?.nrows();
     let a = entry.shaped((n, n), "states x states")?;
@@ -360,12 +367,10 @@ fn stated(file: &Table<'_>) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
     let b = b.shaped((n, b.matrix()?.ncols()), "states x actuators")?;
     let c = file.require("C", meaning)?;
     let c = c.shaped((c.matrix()?.nrows(), n), "measurements x states")?;
-    if let Some(entry) = file.get("D") {
-        let d = entry.shaped((c.nrows(), b.ncols()), "measurements x actuators")?;
-        if d.amax() > 0.0 {
-            return Err(entry.error("the observer is for y = C x, so D must be zero"));
-        }
-    }
+    let d = match file.get("D") {
+        Some(entry) => entry.shaped((c.nrows(), b.ncols()), "measurements x actuators")?,
+        None => DMatrix::zeros(c.nrows(), b.ncols()),
+    };
     let f_a = file.get("F_a").map(|entry| {
         let columns = entry.matrix()?.ncols();
         entry.shaped((n, columns), "states x faults")
@@ -374,7 +379,7 @@ fn stated(file: &Table<'_>) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
     let actuators = counted(file, "actuators", "u", (b.ncols(), "actuators, the columns of B"))?;
     let measurements =
         counted(file, "measurements", "y", (c.nrows(), "measurements, the rows of C"))?;
-    let model = Model::Matrices { a, b, c, f_a: f_a.transpose()?, states };
+    let model = Model::Matrices { a, b, c, d, f_a: f_a.transpose()?, states };
     Ok((model, [actuators, measurements]))
 }
 
@@ -448,7 +453,8 @@ fn sampling(file: &Table<'_>) -> Result<Option<Sampling>, PlaceError> {
     Ok(Some(Sampling { period: entry.positive()?, current }))
 }
 
-/// Reads the rates of the measurement filter, which sensor faults require.
+/// Reads the rates of the measurement filter, which sensor faults require; [`crate::feedthrough`] examines whether
+/// anything else does.
 fn filter(
     file: &Table<'_>,
     measurements: &[Signal],
@@ -465,11 +471,10 @@ fn filter(
             );
             Err(file.source.error(&fault.place, message))
         }
-        (Some(entry), None) => Err(entry.error("no fault enters a sensor, so none is needed")),
-        (Some(entry), Some(_)) if !entry.is_list() => {
+        (Some(entry), _) if !entry.is_list() => {
             Ok(Some(vec![entry.positive()?; measurements.len()]))
         }
-        (Some(entry), Some(_)) => {
+        (Some(entry), _) => {
             let members = entry.list()?;
             let (expected, found) = (measurements.len(), members.len());
             if found != expected {

@@ -193,6 +193,13 @@ impl OwnVariables {
         if ramps > 0 {
             own.matrices.push("A_f");
         }
+        let fed = match &file.model {
+            Model::Matrices { d, .. } => d.amax() > 0.0,
+            Model::Fmu(_) => file.filter.is_some(),
+        };
+        if fed {
+            own.matrices.push("D");
+        }
         let t = file.references.as_ref().map(|references| references.signals.len());
         if file.references.is_some() {
             own.matrices.extend(["H", "K_i", "F_i", "L_w", "N_r"]);

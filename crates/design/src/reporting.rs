@@ -213,6 +213,10 @@ impl Names {
             matrix("C", "measurements", &linear.c, measurements, states),
             matrix("F_a", "faults", &f_a, states, faults),
         ];
+        if linear.has_feedthrough() {
+            let meaning = "commands in the measurements";
+            matrices.insert(3, matrix("D", meaning, &linear.d, measurements, actuators));
+        }
         let own = &designed.plant;
         if own.a != linear.a {
             let kind = match designed.domain {

@@ -11,11 +11,10 @@ pub(crate) use tolerances::by_entries;
 pub(crate) use verdict::verdict;
 
 use control::aso::Gains;
-use control::controller::{CompleteController, complete_controller};
-use control::hold::zero_order_hold;
+use control::controller::{CompleteController, complete_controller, with_feedthrough};
 use control::response::{frequency_grid, frequency_response, h_infinity};
 use control::robustness::{
-    DiskMargin, Loop, OpenedLoop, Point, Tolerances, longest_hold, longest_period,
+    DiskMargin, Loop, OpenedLoop, Point, Tolerances, held_plant, longest_hold, longest_period,
     peak_derivatives, regulator_of_same_speed,
 };
 use control::tracking::IntegralAction;
@@ -169,7 +168,7 @@ impl Physical {
             a: linear.a.clone(),
             b: linear.b.clone(),
             c: linear.c.clone(),
-            d: DMatrix::zeros(linear.c.nrows(), linear.b.ncols()),
+            d: linear.d.clone(),
             domain: Domain::Continuous,
         };
         let CompleteController { commands, estimates } = complete(designed, gains)?;
@@ -190,18 +189,23 @@ impl Physical {
 
 /// The loop of a continuous plant and a controller, in the time domain of the controller.
 pub(crate) fn closed(plant: &StateSpace, controller: &StateSpace) -> Result<Loop, Error> {
-    let mut plant = plant.clone();
-    if let Domain::Sampled { period } = controller.domain {
-        (plant.a, plant.b) = zero_order_hold(&plant.a, &plant.b, period)?;
-        plant.domain = controller.domain;
-    }
+    let plant = match controller.domain {
+        Domain::Continuous => plant.clone(),
+        Domain::Sampled { period } => held_plant(plant, period)?,
+    };
     Loop::new(plant, controller.clone())
 }
 
-/// The controller with `gains`, its filter and its integrals.
+/// The controller with `gains`, its filter and its integrals, from the measurements as the plant of the design
+/// gives them.
 fn complete(designed: &ControllerDesign, gains: &Gains) -> Result<CompleteController, Error> {
     let filter = designed.filter.as_deref();
-    complete_controller(&designed.plant, gains, filter, designed.domain)
+    let found = complete_controller(&designed.plant, gains, filter, designed.domain)?;
+    if !designed.linear.has_feedthrough() {
+        return Ok(found);
+    }
+    let own = |system| with_feedthrough(system, &found.commands.c, &designed.linear.d);
+    Ok(CompleteController { commands: own(&found.commands)?, estimates: own(&found.estimates)? })
 }
 
 fn point(opened: &OpenedLoop, name: &str, signals: &[Signal]) -> Result<LoopPoint, Error> {
@@ -246,12 +250,12 @@ fn same_unit(signals: &[Signal]) -> bool {
     signals.iter().all(|signal| signal.unit == signals[0].unit)
 }
 
-/// Returns the derivatives of the judged peaks with respect to the entries of A, B and C.
+/// Returns the derivatives of the judged peaks with respect to the entries of A, B, C and D.
 fn slopes(
     linear: &LinearPlant,
     physical: &Physical,
     points: &[LoopPoint],
-) -> Result<Vec<[DMatrix<f64>; 3]>, Error> {
+) -> Result<Vec<[DMatrix<f64>; 4]>, Error> {
     let one = |((point, _), found): ((Point, &str), &LoopPoint)| {
         let signals = match point {
             Point::Input => &linear.actuators,
@@ -259,7 +263,7 @@ fn slopes(
         };
         let at = (point, found.judged_frequency, !same_unit(signals));
         let slopes = peak_derivatives(&physical.plant, &physical.controller, at)?;
-        Ok([slopes.a, slopes.b, slopes.c])
+        Ok([slopes.a, slopes.b, slopes.c, slopes.d])
     };
     POINTS.into_iter().zip(points).map(one).collect()
 }
@@ -268,12 +272,12 @@ fn slopes(
 fn sensitivity(
     designed: &ControllerDesign,
     plant: &StateSpace,
-    slopes: &[[DMatrix<f64>; 3]],
+    slopes: &[[DMatrix<f64>; 4]],
 ) -> Vec<PeakSensitivity> {
     let linear = &designed.linear;
-    let one = |((_, name), [to_a, to_b, to_c]): ((Point, &str), &[DMatrix<f64>; 3])| {
+    let one = |((_, name), [to_a, to_b, to_c, to_d]): ((Point, &str), &[DMatrix<f64>; 4])| {
         // One for the entries that tolerances vary, zero for structural ones.
-        let [in_a, in_b, in_c] = Tolerances::of_values(plant, [1.0; 3]).of;
+        let [in_a, in_b, in_c, in_d] = Tolerances::of_values(plant, [1.0; 4]).of;
         let matrix = |name: &str, of: (&[Signal], &[Signal]), effects: &DMatrix<f64>| Matrix {
             name: name.to_owned(),
             meaning: "entry times derivative of the peak of S".to_owned(),
@@ -285,14 +289,15 @@ fn sensitivity(
             varied.component_mul(values).component_mul(slopes)
         };
         let LinearPlant { states, actuators, measurements, .. } = linear;
-        PeakSensitivity {
-            point: name.to_owned(),
-            matrices: vec![
-                matrix("A", (states, states), &times(in_a, &plant.a, to_a)),
-                matrix("B", (states, actuators), &times(in_b, &plant.b, to_b)),
-                matrix("C", (measurements, states), &times(in_c, &plant.c, to_c)),
-            ],
+        let mut matrices = vec![
+            matrix("A", (states, states), &times(in_a, &plant.a, to_a)),
+            matrix("B", (states, actuators), &times(in_b, &plant.b, to_b)),
+            matrix("C", (measurements, states), &times(in_c, &plant.c, to_c)),
+        ];
+        if linear.has_feedthrough() {
+            matrices.push(matrix("D", (measurements, actuators), &times(in_d, &plant.d, to_d)));
         }
+        PeakSensitivity { point: name.to_owned(), matrices }
     };
     POINTS.into_iter().zip(slopes).map(one).collect()
 }

@@ -219,7 +219,7 @@ fn variant(
                 own.operating_point.push((name.to_owned(), value));
             }
         }
-        Model::Matrices { a, b, c, f_a, states } => {
+        Model::Matrices { a, b, c, d: _, f_a, states } => {
             let matrices = [
                 ("A", Some(&mut *a)),
                 ("B", Some(&mut *b)),

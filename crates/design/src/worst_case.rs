@@ -9,7 +9,7 @@ use super::plant_file::PlantFile;
 use super::report::Report;
 use crate::robustness::report::Parameter;
 
-/// Returns the plant file with A, B and C of the worst plant; a plant that is an FMU becomes one
+/// Returns the plant file with the matrices of the worst plant; a plant that is an FMU becomes one
 /// that matrices describe.
 pub(crate) fn plant_file(
     file: &PlantFile<'_>,
@@ -32,8 +32,7 @@ pub(crate) fn plant_file(
     let text = toml::to_string(&table).map_err(|error| unwritable(&error))?;
     let parameters = &robustness.tolerance.parameters;
     let within = if parameters.is_empty() {
-        let [a, b, c] = report.verdict.limits.tolerance.map(|tolerance| 100.0 * tolerance);
-        format!("within ±{a} % of A, ±{b} % of B, ±{c} % of C")
+        format!("within {}", report.verdict.limits.stated_tolerances(&robustness.tolerance.worst))
     } else {
         let worst = |own: &Parameter| format!("{} = {}", own.name, own.worst);
         format!("with {}", parameters.iter().map(worst).collect::<Vec<_>>().join(", "))

@@ -39,6 +39,7 @@ impl Design {
             "A" => (n, n),
             "B" => (n, m),
             "C" => (p, n),
+            "D" => (p, m),
             "F_a" => (n, q),
             "K_x" => (m, n),
             "K_f" => (m, q),
@@ -171,6 +172,9 @@ impl Design {
             }
             (None, None, None) => return Some("step_size is missing in experiment".to_owned()),
             _ => {}
+        }
+        if self.d.is_some() && (self.filter.is_none() || self.schedule.is_some()) {
+            return Some("D is stated, expected a filter and no schedule".to_owned());
         }
         let of_faults = self.faults.iter().find_map(|fault| self.contradiction_of(fault));
         of_faults

@@ -18,6 +18,7 @@ fn described(name: &str) -> (&'static str, Accessor) {
         "A" => ("system matrix A of (1)", |design| &mut design.a),
         "B" => ("input matrix B of (1)", |design| &mut design.b),
         "C" => ("measurement matrix C of (1)", |design| &mut design.c),
+        "D" => ("direct feedthrough D", |design| design.d.get_or_insert_default()),
         "F_a" => ("fault distribution matrix F_a of (1)", |design| &mut design.f_a),
         "K_x" => ("state feedback gain K_x of (2)", |design| &mut design.k_x),
         "K_f" => ("fault compensation gain K_f of (2)", |design| &mut design.k_f),

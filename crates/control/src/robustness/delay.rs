@@ -3,7 +3,7 @@
 use super::crossing::narrowed;
 use super::held::hold_inputs;
 use super::sweep::Sweep;
-use super::{Loop, Point};
+use super::{Loop, Point, held_plant};
 use crate::blocks::block_2x2;
 use crate::eigen::schur;
 use crate::response::KnownResponse;
@@ -73,9 +73,7 @@ fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Complex<f64>>, Error> {
 /// controller is continuous.
 pub fn sampled_delay_margin(plant: &StateSpace, controller: &StateSpace) -> Result<f64, Error> {
     let period = period_of(controller)?;
-    let (a, b) = hold_inputs(&plant.a, &plant.b, period)?;
-    let sampled = StateSpace { a, b, domain: controller.domain, ..plant.clone() };
-    let estimate = delay_margin(&Loop::new(sampled, controller.clone())?)?;
+    let estimate = delay_margin(&Loop::new(held_plant(plant, period)?, controller.clone())?)?;
     refined(plant, controller, estimate)
 }
 
@@ -131,15 +129,18 @@ fn delayed(
         (a, old, new) = (&rest * a, rest * old, held);
     }
     let own = controller;
-    let now = block_2x2([&a, &DMatrix::zeros(n, k)], [&(&own.b * &plant.c), &own.a]);
     let order = n + k + m * (samples + 1);
-    let mut dynamics = now.resize(order, order, 0.0);
-    let mut command = DMatrix::zeros(m, order);
-    command.columns_mut(0, n).copy_from(&(&own.d * &plant.c));
-    command.columns_mut(n, k).copy_from(&own.c);
     let at = |age: usize| n + k + (age - 1) * m;
     let mut older = DMatrix::zeros(m, order);
     older.view_mut((0, at(samples + 1)), (m, m)).fill_with_identity();
+    let measured = plant.c.clone().resize_horizontally(order, 0.0) + &plant.d * &older;
+    let now = block_2x2([&a, &DMatrix::zeros(n, k)], [&DMatrix::zeros(k, n), &own.a]);
+    let mut dynamics = now.resize(order, order, 0.0);
+    let controller_rows = dynamics.rows(n, k) + &own.b * &measured;
+    dynamics.rows_mut(n, k).copy_from(&controller_rows);
+    let mut command = &own.d * &measured;
+    let states = command.columns(n, k) + &own.c;
+    command.columns_mut(n, k).copy_from(&states);
     let mut newer = command.clone();
     if samples > 0 {
         newer = DMatrix::zeros(m, order);

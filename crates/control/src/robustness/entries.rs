@@ -1,10 +1,9 @@
 //! The effect of single entries of the plant's matrices on a peak of S.
 
 use super::scaling::scaled_norm;
-use super::{Loop, Point};
+use super::{Loop, Point, held_plant};
 use crate::blocks::{block_2x2, stacked, to_complex};
 use crate::exponential::exponential;
-use crate::hold::zero_order_hold;
 use crate::svd::ComplexSvd;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
@@ -12,7 +11,7 @@ use nalgebra::{Complex, DMatrix};
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
 /// The largest singular value of S at a frequency, and its derivatives with respect to the entries
-/// of A, B and C of the continuous plant.
+/// of A, B, C and D of the continuous plant.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PeakDerivatives {
@@ -24,6 +23,8 @@ pub struct PeakDerivatives {
     pub b: DMatrix<f64>,
     /// Derivatives with respect to C, p x n.
     pub c: DMatrix<f64>,
+    /// Derivatives with respect to D, p x m.
+    pub d: DMatrix<f64>,
 }
 
 /// Derivatives of the peak of S with respect to each entry of the plant, while the controller does
@@ -55,20 +56,26 @@ pub fn peak_derivatives(
     controller: &StateSpace,
     (point, frequency, scaled): (Point, f64, bool),
 ) -> Result<PeakDerivatives, Error> {
-    let mut model = plant.clone();
-    if let Domain::Sampled { period } = controller.domain {
-        (model.a, model.b) = zero_order_hold(&plant.a, &plant.b, period)?;
-        model.domain = controller.domain;
-    }
+    let model = match controller.domain {
+        Domain::Continuous => plant.clone(),
+        Domain::Sampled { period } => held_plant(plant, period)?,
+    };
     let own = Loop::new(model, controller.clone())?;
     let mut found = if frequency.is_finite() {
         own.derivatives(point, frequency, scaled)?
     } else {
         let zero = |m: &DMatrix<f64>| DMatrix::zeros(m.nrows(), m.ncols());
-        PeakDerivatives { value: 1.0, a: zero(&plant.a), b: zero(&plant.b), c: zero(&plant.c) }
+        let [a, b, c, d] = [&plant.a, &plant.b, &plant.c, &plant.d].map(zero);
+        return Ok(PeakDerivatives { value: 1.0, a, b, c, d });
     };
     if let Domain::Sampled { period } = controller.domain {
         (found.a, found.b) = through_hold(plant, period, &found)?;
+        let (n, m) = plant.b.shape();
+        if found.c.ncols() > n {
+            // The command before is a state of the held plant, and D a part of its C.
+            found.d = found.c.columns(n, m).into();
+            found.c = found.c.columns(0, n).into();
+        }
     }
     Ok(found)
 }
@@ -91,10 +98,7 @@ impl Loop {
         let pencil = ComplexMatrix::identity(n + k, n + k) * s - dynamics;
         // Signals added to the commands and to the measurements; commands and measurements.
         let (m, p) = own.d.shape();
-        let from_u = plant.b.clone().resize_vertically(n + k, 0.0);
-        let from_y = stacked(&(&plant.b * &own.d), &own.b);
-        let to_u = stacked(&(&own.d * &plant.c).transpose(), &own.c.transpose()).transpose();
-        let to_y = plant.c.clone().resize_horizontally(n + k, 0.0);
+        let ([from_u, from_y], [to_u, to_y]) = (self.entries(), self.signals());
         let inputs = stacked(&from_u.transpose(), &from_y.transpose()).transpose();
         let outputs = stacked(&to_u, &to_y);
         let singular = Error::Overflow { what: "S at its peak" };
@@ -102,9 +106,10 @@ impl Loop {
         let y = pencil.transpose().lu().solve(&to_complex(&outputs.transpose()));
         let y = y.ok_or(singular)?.transpose();
         let mut response = to_complex(&outputs) * &x;
-        // u = K (y + d): the controller's D from y to u; the added signals themselves.
+        // The controller's D from y to u, the plant's from u to y; the added signals themselves.
         for (row, column) in (0..m).flat_map(|i| (0..p).map(move |j| (i, j))) {
             response[(row, m + column)] += own.d[(row, column)];
+            response[(m + column, row)] += plant.d[(column, row)];
         }
         for at in 0..m + p {
             response[(at, at)] += 1.0;
@@ -145,6 +150,7 @@ impl Loop {
             a: outer(&on_states, &of_states),
             b: outer(&on_states, &of_commands),
             c: outer(&on_outputs, &of_states),
+            d: outer(&on_outputs, &of_commands),
         })
     }
 }
@@ -161,8 +167,8 @@ fn through_hold(
     both.view_mut((0, 0), (n, n)).copy_from(&plant.a);
     both.view_mut((0, n), (n, m)).copy_from(&plant.b);
     let mut gradient = DMatrix::zeros(order, order);
-    gradient.view_mut((0, 0), (n, n)).copy_from(&sampled.a);
-    gradient.view_mut((0, n), (n, m)).copy_from(&sampled.b);
+    gradient.view_mut((0, 0), (n, n)).copy_from(&sampled.a.view((0, 0), (n, n)));
+    gradient.view_mut((0, n), (n, m)).copy_from(&sampled.b.rows(0, n));
     let adjoint = both.transpose() * period;
     // The derivative is linear in the gradient: with one of the size of the matrix the exponential
     // needs no further squarings.

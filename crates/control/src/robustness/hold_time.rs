@@ -1,12 +1,13 @@
 //! The longest time over which the signals between plant and controller may be held.
 
-use super::Loop;
 use super::crossing::narrowed;
-use super::held::{Mean, hold_inputs};
+use super::held::Mean;
+use super::{Loop, held_plant};
 use crate::blocks::block_2x2;
 use crate::eigen::eigenvalues;
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
 
 /// The search begins at this part of the shortest time constant of the loop and ends at `LONGEST`
 /// times the longest one.
@@ -36,10 +37,13 @@ pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
         let (mean, own_mean) = (of_plant.at(h)?, of_own.at(h)?);
         let (a, b) = (&plant.a * &mean, mean * &plant.b);
         let (own_a, own_b) = (&own.a * &own_mean, own_mean * &own.b);
-        let rate = block_2x2(
+        let mut rate = block_2x2(
             [&(a + &b * &own.d * &plant.c), &(b * &own.c)],
-            [&(own_b * &plant.c), &own_a],
+            [&(&own_b * &plant.c), &own_a],
         );
+        if plant.d.amax() > 0.0 {
+            rate = with_held_commands(&rate, closed, &own_b, h);
+        }
         // |1 + h r| < 1 for the eigenvalues r.
         let excess = |r: &nalgebra::Complex<f64>| 2.0 * r.re + h * r.norm_sqr();
         Ok(eigenvalues(&rate)?.iter().map(excess).fold(f64::NEG_INFINITY, f64::max))
@@ -48,6 +52,23 @@ pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
     let fastest = modes.iter().map(|mode| mode.norm()).fold(0.0, f64::max);
     let slowest = modes.iter().map(|mode| mode.norm()).fold(f64::INFINITY, f64::min);
     search(value, [SHORTEST / fastest, SHORT / fastest, LONGEST / slowest])
+}
+
+/// `rate`, that of [x; z], with the commands before as further states v: a measurement C x + D v contains the
+/// command that was held until then.
+fn with_held_commands(
+    rate: &DMatrix<f64>,
+    closed: &Loop,
+    own_b: &DMatrix<f64>,
+    h: f64,
+) -> DMatrix<f64> {
+    let (plant, own) = (closed.plant(), closed.controller());
+    let (n, k, m) = (plant.a.nrows(), own.a.nrows(), own.c.nrows());
+    let mut all = rate.clone().resize(n + k + m, n + k + m, 0.0);
+    all.view_mut((n, n + k), (k, m)).copy_from(&(own_b * &plant.d));
+    all.view_mut((n + k, n), (m, k)).copy_from(&(&own.c / h));
+    all.view_mut((n + k, n + k), (m, m)).fill_diagonal(-h.recip());
+    all
 }
 
 /// Computes the longest sample time at which the loop of the continuous `plant` and the sampled
@@ -65,8 +86,7 @@ pub fn longest_period(plant: &StateSpace, controller: &StateSpace) -> Result<f64
         return Err(Error::OutOfRange { name: "the domain", value: f64::NAN, rule });
     };
     let value = |h: f64| {
-        let (a, b) = hold_inputs(&plant.a, &plant.b, h)?;
-        let sampled = StateSpace { a, b, domain: controller.domain, ..plant.clone() };
+        let sampled = StateSpace { domain: controller.domain, ..held_plant(plant, h)? };
         let closed = Loop::new(sampled, controller.clone())?;
         instability(&closed.dynamics(), controller.domain)
     };

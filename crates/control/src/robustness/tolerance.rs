@@ -1,9 +1,8 @@
 //! Errors of the plant's parameters: random cases and a search for the worst one.
 
-use super::Loop;
 use super::crossing::narrowed;
-use super::held::hold_inputs;
 use super::worst_case::climb;
+use super::{Loop, held_plant};
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
@@ -17,18 +16,18 @@ const FIRST: f64 = 1e-6;
 /// Below this multiple the tests are a factor of two apart.
 const SMALL: f64 = 0.05;
 
-/// The relative tolerances of the entries of A, B and C of a plant.
+/// The relative tolerances of the entries of A, B, C and D of a plant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tolerances {
-    /// Of A, B, C, in this order: each matrix as large as the plant's; zero for an exact entry.
-    pub of: [DMatrix<f64>; 3],
+    /// Of A, B, C, D, in this order: each matrix as large as the plant's; zero for an exact entry.
+    pub of: [DMatrix<f64>; 4],
 }
 
 impl Tolerances {
-    /// The tolerances `relative` of A, B and C for all entries that are not structural: 0, 1 and -1
+    /// The tolerances `relative` of A, B, C and D for all entries that are not structural: 0, 1 and -1
     /// are exact.
     #[must_use]
-    pub fn of_values(plant: &StateSpace, relative: [f64; 3]) -> Self {
+    pub fn of_values(plant: &StateSpace, relative: [f64; 4]) -> Self {
         let of = |(m, relative): (&DMatrix<f64>, f64)| {
             let negligible = STRUCTURAL * m.amax();
             m.map(|entry| {
@@ -36,8 +35,9 @@ impl Tolerances {
                 if fixed { 0.0 } else { relative }
             })
         };
-        let [a, b, c] = relative;
-        Self { of: [of((&plant.a, a)), of((&plant.b, b)), of((&plant.c, c))] }
+        let [a, b, c, d] = relative;
+        let matrices = [(&plant.a, a), (&plant.b, b), (&plant.c, c), (&plant.d, d)];
+        Self { of: matrices.map(of) }
     }
 
     /// The number of entries that are not exact.
@@ -82,8 +82,8 @@ pub trait PlantFamily {
     fn plant(&self, deviations: &[f64]) -> Result<StateSpace, Self::Error>;
 
     /// How a quantity changes with each deviation, from its derivatives with respect to the entries
-    /// of A, B and C. It guides the search only.
-    fn slopes(&self, entries: &[DMatrix<f64>; 3]) -> Vec<f64>;
+    /// of A, B, C and D. It guides the search only.
+    fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64>;
 
     /// The rising multiples of the tolerances at which the worst direction is tested.
     fn multiples(&self) -> Vec<f64> {
@@ -222,7 +222,7 @@ fn uniform(state: &mut u64) -> f64 {
     fraction / 9_007_199_254_740_992.0
 }
 
-/// A plant entry that varies: matrix (A, B, C), row, column, and the product of value and tolerance.
+/// A plant entry that varies: matrix (A, B, C, D), row, column, and the product of value and tolerance.
 struct Entry {
     matrix: usize,
     row: usize,
@@ -245,7 +245,7 @@ impl<'a> EntryFamily<'a> {
     /// [`Error::Shape`] for tolerances that do not fit; [`Error::OutOfRange`] for a negative one.
     pub fn new(plant: &'a StateSpace, tolerances: &Tolerances) -> Result<Self, Error> {
         let mut entries = Vec::new();
-        let named = [("A", &plant.a), ("B", &plant.b), ("C", &plant.c)];
+        let named = [("A", &plant.a), ("B", &plant.b), ("C", &plant.c), ("D", &plant.d)];
         for (matrix, ((name, values), of)) in named.into_iter().zip(&tolerances.of).enumerate() {
             check::shape(name, of, values.shape())?;
             for (row, column) in
@@ -279,14 +279,15 @@ impl PlantFamily for EntryFamily<'_> {
             let own = match entry.matrix {
                 0 => &mut plant.a,
                 1 => &mut plant.b,
-                _ => &mut plant.c,
+                2 => &mut plant.c,
+                _ => &mut plant.d,
             };
             own[(entry.row, entry.column)] += entry.size * deviation;
         }
         Ok(plant)
     }
 
-    fn slopes(&self, entries: &[DMatrix<f64>; 3]) -> Vec<f64> {
+    fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64> {
         let of = |entry: &Entry| entries[entry.matrix][(entry.row, entry.column)] * entry.size;
         self.entries.iter().map(of).collect()
     }
@@ -302,8 +303,7 @@ impl<F: PlantFamily> Loops<'_, F> {
     /// The dynamics of the loop with a plant, which is discretised for a sampled controller.
     pub(super) fn dynamics(&self, mut plant: StateSpace) -> Result<DMatrix<f64>, Error> {
         if let Domain::Sampled { period } = self.controller.domain {
-            (plant.a, plant.b) = hold_inputs(&plant.a, &plant.b, period)?;
-            plant.domain = self.controller.domain;
+            plant = held_plant(&plant, period)?;
         }
         Ok(Loop::new(plant, self.controller.clone())?.dynamics())
     }

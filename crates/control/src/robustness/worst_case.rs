@@ -87,9 +87,14 @@ fn gradients<F: PlantFamily>(
             continue;
         };
         let x: Vector = right.rows(0, n).into();
-        let y = to_complex(&plant.c) * &x;
-        let u = &command * right.rows(n, own.a.nrows()) + &direct * &y;
-        // d lambda = of_plant [dA, dB] [x; u] + of_output dC x
+        // A held plant with a direct term has the commands before among its states.
+        let first = dynamics.nrows() - own.a.nrows();
+        let before: Vector = right.rows(n, first - n).into();
+        let fed_back = &command * right.rows(first, own.a.nrows());
+        let through_d = if first > n { &before } else { &fed_back };
+        let y = to_complex(&plant.c) * &x + to_complex(&plant.d) * through_d;
+        let u = &fed_back + &direct * &y;
+        // d lambda = of_plant [dA, dB] [x; u] + of_output [dC, dD] [x; u], u before in a held plant.
         let mut of_plant: Vector = left.rows(0, n).into();
         let sensed = to_complex(&plant.b);
         let mut input: Vector = DVector::zeros(n + m);
@@ -104,7 +109,7 @@ fn gradients<F: PlantFamily>(
             of_plant = before * Complex::new(*period, 0.0);
         }
         let of_output =
-            direct.tr_mul(&through) + to_complex(&own.b).tr_mul(&left.rows(n, own.a.nrows()));
+            direct.tr_mul(&through) + to_complex(&own.b).tr_mul(&left.rows(first, own.a.nrows()));
         let turn = match domain {
             Domain::Continuous => Complex::new(1.0, 0.0),
             Domain::Sampled { .. } => mode.conj() / mode.norm().max(f64::MIN_POSITIVE),
@@ -118,6 +123,7 @@ fn gradients<F: PlantFamily>(
             outer(&of_plant, (0, n), &input),
             outer(&of_plant, (n, m), &input),
             outer(&of_output, (0, n), &x),
+            outer(&of_output, (0, m), through_d),
         ];
         found.push(loops.family.slopes(&entries));
     }

@@ -126,8 +126,10 @@ fn modal_bound(design: &AsoDesign, seconds: f64, size: f64) -> f64 {
 
 fn built(faults: &[Fault]) -> (Carts, ExtendedPlant, AsoDesign) {
     let carts = carts();
-    let extended = ExtendedPlant::new(&carts.a, &carts.b, &carts.c, faults, &[30.0, 40.0])
-        .expect("shapes that fit");
+    let measured = faults.iter().any(|fault| fault.entry.is_measured());
+    let filter: &[f64] = if measured { &[30.0, 40.0] } else { &[] };
+    let extended =
+        ExtendedPlant::new(&carts.a, &carts.b, &carts.c, faults, filter).expect("shapes that fit");
     let order = extended.plant.a.nrows() + extended.plant.f_a.ncols();
     let design =
         extended.design(&real_poles(&CARTS), &real_poles(&poles(order)), None).expect("a design");

@@ -12,6 +12,7 @@ mod exponential;
 #[cfg(feature = "lmi")]
 mod family;
 mod faults;
+mod feedthrough;
 mod hold;
 mod isolation;
 #[cfg(feature = "lmi")]

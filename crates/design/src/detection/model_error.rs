@@ -187,7 +187,7 @@ impl<'a> ModelErrors<'a> {
 }
 
 /// The linear plant with errors of its entries within the tolerances.
-fn uncertain(linear: &LinearPlant, tolerance: [f64; 3]) -> UncertainPlant {
+fn uncertain(linear: &LinearPlant, tolerance: [f64; 4]) -> UncertainPlant {
     let nominal = StateSpace {
         a: linear.a.clone(),
         b: linear.b.clone(),
@@ -195,7 +195,7 @@ fn uncertain(linear: &LinearPlant, tolerance: [f64; 3]) -> UncertainPlant {
         d: DMatrix::zeros(linear.c.nrows(), linear.b.ncols()),
         domain: Domain::Continuous,
     };
-    let Tolerances { of: [a, b, c] } = Tolerances::of_values(&nominal, tolerance);
+    let Tolerances { of: [a, b, c, _] } = Tolerances::of_values(&nominal, tolerance);
     let sizes = [
         a.component_mul(&nominal.a.abs()),
         b.component_mul(&nominal.b.abs()),

@@ -352,6 +352,10 @@ fn unknown_input(model: &Fault, b: &DMatrix<f64>, c: &DMatrix<f64>) -> UnknownIn
     match &model.entry {
         FaultEntry::Actuator(column) => on_states.copy_from(column),
         FaultEntry::Sensor(column) => on_measurements.copy_from(column),
+        FaultEntry::Both { states, measurements } => {
+            on_states.copy_from(states);
+            on_measurements.copy_from(measurements);
+        }
         FaultEntry::LossOfEffectiveness(at) => on_states.copy_from(&b.column(*at)),
         _ => {}
     }

@@ -186,7 +186,7 @@ fn parameters(report: &Report, found: &Robustness) -> Markup {
     let size = |at: usize| all.iter().map(|own| own[at].1.abs()).fold(0.0, f64::max);
     let mut order: Vec<usize> = (0..first.len()).filter(|&at| size(at) > 0.0).collect();
     order.sort_by(|&i, &j| size(j).total_cmp(&size(i)));
-    let values: Vec<f64> = ["A", "B", "C"]
+    let values: Vec<f64> = ["A", "B", "C", "D"]
         .iter()
         .filter_map(|name| report.plant.matrices.iter().find(|own| own.name == *name))
         .flat_map(|own| own.values.iter().flatten().copied())
@@ -215,13 +215,13 @@ fn parameters(report: &Report, found: &Robustness) -> Markup {
 }
 
 fn tolerances(report: &Report, found: &ToleranceResult) -> Markup {
-    let [a, b, c] = report.verdict.limits.tolerance;
+    let varied = report.verdict.limits.stated_tolerances(&found.worst);
     let tried = if found.parameters.is_empty() { 16.0 } else { 1.0 };
     html! {
         p {
             @if found.parameters.is_empty() {
-                "Each of " (number(f64::from(found.entries))) " entries of A (±" (number(a)) ", relative), B (±" (number(b))
-                ") and C (±" (number(c)) ") that is not 0, 1 or −1 varies by itself; "
+                "Each of " (number(f64::from(found.entries))) " entries that is not 0, 1 or −1 varies by \
+                 itself (" (varied) "); "
             } @else {
                 "The parameters of the table vary between their limits, and the FMU is linearised \
                  with each set of them at the same operating point; "

@@ -54,7 +54,7 @@ pub(super) fn verdict(report: &Report) -> Markup {
                  tolerances that make the loop unstable"
                 @if !parameters {
                     ": "
-                    @for (index, (name, tolerance)) in ["A", "B", "C"].iter().zip(limits.tolerance).enumerate() {
+                    @for (index, (name, tolerance)) in limits.of_matrices(&report.plant.matrices).enumerate() {
                         @if index > 0 { ", " }
                         (number(tolerance)) " of each entry of " (name)
                     }

@@ -7,8 +7,8 @@ use crate::parameters::{self, ParameterTolerance};
 /// What the robustness of a design is tested with, and the limits of its verdict.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RobustnessLimits {
-    /// Relative tolerances of the entries of A, B and C.
-    pub(crate) tolerance: [f64; 3],
+    /// Relative tolerances of the entries of A, B, C and D.
+    pub(crate) tolerance: [f64; 4],
     /// Tolerances of parameters of the plant's FMU; if there are any, the entries are exact.
     pub(crate) parameters: Vec<ParameterTolerance>,
     /// Number of random cases.
@@ -34,7 +34,7 @@ impl RobustnessLimits {
     /// Reads the table, or returns the defaults for a plant with that many measurements.
     pub(crate) fn read(file: &Table<'_>, measurements: usize) -> Result<Self, PlaceError> {
         let mut found = Self {
-            tolerance: [TOLERANCE; 3],
+            tolerance: [TOLERANCE; 4],
             parameters: Vec::new(),
             cases: CASES,
             seed: 1,
@@ -62,7 +62,7 @@ impl RobustnessLimits {
                 return Err(entry.error(message));
             }
             found.parameters = parameters::read(&entry)?;
-            found.tolerance = [0.0; 3];
+            found.tolerance = [0.0; 4];
         }
         if let Some(entry) = table.get("cases") {
             found.cases = whole(&entry, 100_000)?;
@@ -87,15 +87,15 @@ impl RobustnessLimits {
     }
 }
 
-/// Reads one number for A, B and C, or a table with a number for some of them.
-fn tolerances(entry: &Entry<'_>) -> Result<[f64; 3], PlaceError> {
+/// Reads one number for A, B, C and D, or a table with a number for some of them.
+fn tolerances(entry: &Entry<'_>) -> Result<[f64; 4], PlaceError> {
     if !entry.is_table() {
-        return Ok([fraction(entry)?; 3]);
+        return Ok([fraction(entry)?; 4]);
     }
     let table = entry.table()?;
-    table.allow(&["A", "B", "C"])?;
-    let mut found = [0.0; 3];
-    for (key, tolerance) in ["A", "B", "C"].into_iter().zip(&mut found) {
+    table.allow(&["A", "B", "C", "D"])?;
+    let mut found = [0.0; 4];
+    for (key, tolerance) in ["A", "B", "C", "D"].into_iter().zip(&mut found) {
         if let Some(entry) = table.get(key) {
             *tolerance = fraction(&entry)?;
         }

@@ -48,8 +48,25 @@ pub struct Limits {
     pub amber: f64,
     /// Peak of S above which it is red.
     pub red: f64,
-    /// Relative tolerances of the entries of A, B and C that are not 0, 1 or -1.
-    pub tolerance: [f64; 3],
+    /// Relative tolerances of the entries of A, B, C and D that are not 0, 1 or -1.
+    pub tolerance: [f64; 4],
+}
+
+impl Limits {
+    /// The tolerances of A, B, C and D, as far as they are among `matrices`.
+    pub(crate) fn of_matrices<'a>(
+        &self,
+        matrices: &'a [Matrix],
+    ) -> impl Iterator<Item = (&'static str, f64)> + use<'a> {
+        let all = ["A", "B", "C", "D"].into_iter().zip(self.tolerance);
+        all.filter(|(name, _)| matrices.iter().any(|own| own.name == *name))
+    }
+
+    /// The same in words.
+    pub(crate) fn stated_tolerances(&self, matrices: &[Matrix]) -> String {
+        let one = |(name, part): (&str, f64)| format!("±{} % of {name}", 100.0 * part);
+        self.of_matrices(matrices).map(one).collect::<Vec<_>>().join(", ")
+    }
 }
 
 /// The robustness of the loop of plant and controller. A number without a limit is infinite, in

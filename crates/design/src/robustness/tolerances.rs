@@ -38,7 +38,7 @@ pub(super) fn by_parameters(
     designed: &ControllerDesign,
     physical: &Physical,
     (limits, family): (&RobustnessLimits, &ParameterFamily<'_>),
-    slopes: &[[DMatrix<f64>; 3]],
+    slopes: &[[DMatrix<f64>; 4]],
 ) -> Result<ToleranceResult, crate::Error> {
     let request = (limits.cases, u64::from(limits.seed));
     let found = tolerance_test(family, &physical.controller, request)?;
@@ -60,6 +60,15 @@ fn tested(
         columns: by.to_vec(),
         values: rows(values),
     };
+    let measurements = names(&linear.measurements);
+    let mut worst = vec![
+        matrix("A", &found.worst.a, &states, &states),
+        matrix("B", &found.worst.b, &states, &actuators),
+        matrix("C", &found.worst.c, &measurements, &states),
+    ];
+    if linear.has_feedthrough() {
+        worst.push(matrix("D", &found.worst.d, &measurements, &actuators));
+    }
     ToleranceResult {
         entries: 0,
         parameters: Vec::new(),
@@ -72,10 +81,6 @@ fn tested(
         },
         worst_instability: found.worst_instability,
         first_unstable: found.first_unstable.unwrap_or(f64::INFINITY),
-        worst: vec![
-            matrix("A", &found.worst.a, &states, &states),
-            matrix("B", &found.worst.b, &states, &actuators),
-            matrix("C", &found.worst.c, &names(&linear.measurements), &states),
-        ],
+        worst,
     }
 }

@@ -12,6 +12,8 @@ pub(crate) fn verdict(
     limits: &RobustnessLimits,
     further: Vec<(Level, String)>,
 ) -> Verdict {
+    let RobustnessLimits { amber, red, tolerance, .. } = *limits;
+    let stated = Limits { amber, red, tolerance };
     let mut level = Level::Green;
     let mut reasons = Vec::new();
     for check in checks.iter().filter(|check| !check.holds) {
@@ -38,22 +40,20 @@ pub(crate) fn verdict(
         let unstable = found.stable < 1.0 || found.worst_instability >= 0.0;
         if unstable {
             level = Level::Red;
-            reasons.push(instability(found, limits.tolerance));
+            reasons.push(instability(found, &stated));
         }
     }
     for (reached, reason) in further {
         level = level.max(reached);
         reasons.push(reason);
     }
-    let RobustnessLimits { amber, red, tolerance, .. } = *limits;
-    Verdict { level, reasons, limits: Limits { amber, red, tolerance } }
+    Verdict { level, reasons, limits: stated }
 }
 
 /// The sentence about a loop that parameters within their tolerances make unstable.
-fn instability(found: &ToleranceResult, tolerance: [f64; 3]) -> String {
+fn instability(found: &ToleranceResult, limits: &Limits) -> String {
     let range = if found.parameters.is_empty() {
-        let [a, b, c] = tolerance.map(|part| 100.0 * part);
-        format!("parameters within ±{a} % of A, ±{b} % of B, ±{c} % of C")
+        format!("parameters within {}", limits.stated_tolerances(&found.worst))
     } else {
         let limits = |own: &Parameter| {
             let [low, high] = own.limits.map(rounded);

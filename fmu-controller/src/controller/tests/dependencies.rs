@@ -145,7 +145,7 @@ fn kind(factors: &[f64], limited: bool) -> Option<DependencyKind> {
 }
 
 /// Whether the row of this unknown has factors that are not constant, or cut off by a limit.
-fn is_bent((sizes, limits, _): Shape, unknown: &str) -> bool {
+fn is_bent((sizes, limits, features): Shape, unknown: &str) -> bool {
     match unknown.strip_prefix("actuators") {
         Some(index) => {
             let j: usize = index.parse().unwrap();
@@ -153,7 +153,9 @@ fn is_bent((sizes, limits, _): Shape, unknown: &str) -> bool {
         }
         None if unknown.starts_with("E_hat") => true,
         None => {
-            let bent = ["der(x_hat", "der(x_i"].iter().any(|state| unknown.starts_with(state));
+            let filters = if features.contains('u') { "der(y_f" } else { "der(x_i" };
+            let bent =
+                ["der(x_hat", "der(x_i", filters].iter().any(|state| unknown.starts_with(state));
             limits.contains('l') && sizes[0] > 0 && bent
         }
     }

@@ -12,6 +12,7 @@ pub(super) struct Oracle {
     a: DMatrix<f64>,
     b: DMatrix<f64>,
     c: DMatrix<f64>,
+    d: DMatrix<f64>,
     f_a: DMatrix<f64>,
     a_f: Option<DMatrix<f64>>,
     p_f: Option<DMatrix<f64>>,
@@ -86,6 +87,7 @@ impl Oracle {
             a: design.a.dense(),
             b: design.b.dense(),
             c: design.c.dense(),
+            d: stated(&design.d, p, m),
             f_a: design.f_a.dense(),
             a_f: design.a_f.as_ref().map(crate::matrix::Matrix::dense),
             p_f: design.p_f.as_ref().map(crate::matrix::Matrix::dense),
@@ -169,13 +171,14 @@ impl Oracle {
         let (u, e) = (self.command(z, inputs, on), self.innovation(z, &y));
         let [x_i, back] = self.integral(z, inputs, on);
         let fault = self.a_f.as_ref().map_or_else(|| &z.f * 0.0, |a_f| a_f * &z.f);
+        let given = y - &self.d * (&u - &self.u_op);
         Estimate {
             x: &self.a * (&z.x - &self.x_op)
                 + &self.b * (u - &self.u_op)
                 + &self.f_a * &z.f
                 + &self.l_x * &e,
             f: (fault + &self.l_f * e) * f64::from(u8::from(on)),
-            y_f: self.filter.as_ref().map_or(z.y_f.clone(), |w| w.component_mul(&(y - &z.y_f))),
+            y_f: self.filter.as_ref().map_or(z.y_f.clone(), |w| w.component_mul(&(given - &z.y_f))),
             x_i: x_i + back,
         }
     }
@@ -196,14 +199,20 @@ impl Oracle {
         z.along(&k1, h / 6.0).along(&k2, h / 3.0).along(&k3, h / 3.0).along(&k4, h / 6.0)
     }
 
-    /// A sample at z[k|k-1] with the inputs [y; r]: the estimate that is used, u, z[k+1|k].
+    /// The command at the operating point.
+    pub(super) fn operating_command(&self) -> Vector {
+        self.u_op.clone()
+    }
+
+    /// A sample at z[k|k-1] with the inputs [y; r] and the command before: the estimate that is used, u,
+    /// z[k+1|k].
     pub(super) fn sample(
         &self,
         z: &Estimate,
-        inputs: &Vector,
+        (inputs, before): (&Vector, &Vector),
         (current, on): (bool, bool),
     ) -> (Estimate, Vector, Estimate) {
-        let (y, _) = self.inputs(inputs);
+        let y = self.inputs(inputs).0 - &self.d * (before - &self.u_op);
         let e = self.innovation(z, &y);
         let gain = |wanted: bool| if wanted { &e * 1.0 } else { &e * 0.0 };
         let (before, after) = (gain(current), gain(!current));

@@ -19,9 +19,12 @@ fn samples(
 ) -> Vec<(Vec<f64>, DVector<f64>)> {
     let slope = DVector::from_element(y.len(), SLOPE);
     let mut all = Vec::new();
+    let mut before = oracle.operating_command();
     for k in 0..=last {
         let at = &y + &slope * (f64::from(k) * T);
-        let (used, u, next) = oracle.sample(&z, &at, (current, f64::from(k) * T >= 0.35));
+        let (used, u, next) =
+            oracle.sample(&z, (&at, &before), (current, f64::from(k) * T >= 0.35));
+        before.clone_from(&u);
         all.push((used.all(), u));
         z = next;
     }

@@ -11,10 +11,10 @@ pub(super) type Sizes = [usize; 4];
 /// Sizes; an `l` for each actuator with limits; what else the design has: `a` a fault model A_f, `w`
 /// a filter, `o` an operating point, `e` losses of effectiveness, `i` references with integral action,
 /// `n` references with a feedforward, `c` or `p` samples, with a current or a prediction estimator, `d` a
-/// direct term, `s` a sliding-mode law.
+/// direct term, `s` a sliding-mode law, `u` a feedthrough D.
 pub(super) type Shape = (Sizes, &'static str, &'static str);
 
-pub(super) const LIMITED: [Shape; 11] = [
+pub(super) const LIMITED: [Shape; 12] = [
     ([1, 1, 1, 1], "l", ""),
     ([2, 2, 2, 2], "ll", ""),
     ([3, 2, 1, 1], "l-", ""),
@@ -26,8 +26,9 @@ pub(super) const LIMITED: [Shape; 11] = [
     ([2, 2, 2, 2], "ll", "d"),
     ([3, 2, 2, 2], "-l", "dawoe"),
     ([2, 2, 2, 1], "l-", "din"),
+    ([3, 2, 2, 2], "-l", "wuo"),
 ];
-pub(super) const FREE: [Shape; 16] = [
+pub(super) const FREE: [Shape; 18] = [
     ([1, 1, 1, 1], "-", ""),
     ([2, 2, 2, 2], "--", ""),
     ([3, 1, 1, 2], "-", ""),
@@ -44,8 +45,10 @@ pub(super) const FREE: [Shape; 16] = [
     ([3, 2, 2, 2], "--", "dao"),
     ([2, 2, 2, 2], "--", "dwe"),
     ([2, 1, 2, 2], "-", "dwi"),
+    ([2, 2, 2, 1], "--", "wu"),
+    ([3, 1, 2, 2], "-", "dwuae"),
 ];
-pub(super) const SAMPLED: [Shape; 16] = [
+pub(super) const SAMPLED: [Shape; 18] = [
     ([1, 1, 1, 1], "l", "c"),
     ([2, 2, 2, 2], "--", "c"),
     ([3, 2, 1, 2], "l-", "cao"),
@@ -62,6 +65,8 @@ pub(super) const SAMPLED: [Shape; 16] = [
     ([2, 2, 1, 1], "l-", "cs"),
     ([3, 2, 2, 2], "-l", "csawoe"),
     ([2, 1, 2, 1], "l", "cwid"),
+    ([3, 2, 2, 2], "-l", "cawuoe"),
+    ([2, 2, 2, 1], "--", "pwu"),
 ];
 
 /// Numbers between -1 and 1, none of them zero, that follow no line.
@@ -103,10 +108,10 @@ pub(super) fn sized(of: Shape) -> AsoController {
     let ([n, m, p, q], _, features) = of;
     let t = references(of);
     let shapes = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p), (q, q)];
-    let shapes = shapes.into_iter().chain([(t, p), (m, t), (t, q), (t, m), (m, t), (q, p)]);
+    let shapes = shapes.into_iter().chain([(t, p), (m, t), (t, q), (t, m), (m, t), (q, p), (p, m)]);
     let names = [
         "A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f", "A_f", "H", "K_i", "F_i", "L_w", "N_r",
-        "P_f",
+        "P_f", "D",
     ];
     let has = |letters: &str| letters.chars().all(|letter| features.contains(letter));
     let stated = |name| match name {
@@ -115,6 +120,7 @@ pub(super) fn sized(of: Shape) -> AsoController {
         "F_i" => has("iw"),
         "N_r" => has("n"),
         "P_f" => has("d"),
+        "D" => has("u"),
         _ => true,
     };
     let mut lines = vec!["description = \"of any size\"\nt_on = 0.5".to_owned()];
@@ -240,6 +246,7 @@ fn place<'a>(design: &'a mut Design, name: &str) -> &'a mut Matrix {
         "L_x" => return &mut design.l_x,
         "L_f" => return &mut design.l_f,
         "A_f" => &mut design.a_f,
+        "D" => &mut design.d,
         "P_f" => &mut design.p_f,
         "H" => &mut design.h,
         "K_i" => &mut design.k_i,

@@ -406,7 +406,7 @@ pub(super) fn hostile() -> Report {
         verdict: Verdict {
             level: Level::Red,
             reasons: vec![format!("the peak of S {MARKUP}")],
-            limits: Limits { amber: 2.0, red: 4.0, tolerance: [0.0; 3] },
+            limits: Limits { amber: 2.0, red: 4.0, tolerance: [0.0; 4] },
         },
         robustness: Some(robustness(&mut numbers)),
         checks: vec![check("observable", true, None), check("detectable", false, Some(2.75e-13))],
@@ -517,7 +517,7 @@ pub(super) fn bare() -> Report {
         verdict: Verdict {
             level: Level::Green,
             reasons: Vec::new(),
-            limits: Limits { amber: 2.0, red: 4.0, tolerance: [0.0; 3] },
+            limits: Limits { amber: 2.0, red: 4.0, tolerance: [0.0; 4] },
         },
         checks: Vec::new(),
         robustness: None,

@@ -266,7 +266,7 @@ pub(super) fn pendulum() -> Report {
         verdict: Verdict {
             level: Level::Green,
             reasons: Vec::new(),
-            limits: Limits { amber: 2.0, red: 4.0, tolerance: [0.1; 3] },
+            limits: Limits { amber: 2.0, red: 4.0, tolerance: [0.1; 4] },
         },
         checks: checks(),
         robustness: None,
