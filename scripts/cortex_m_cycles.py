@@ -5,8 +5,9 @@
     scripts/cortex_m_cycles.py FOLDER [--cpu cortex-m7]
 
 Needs arm-none-eabi-gcc and qemu-system-arm (Debian: gcc-arm-none-eabi, qemu-system-arm). The controller is compiled with
--O2 and runs 40 samples in QEMU, which writes the address of every instruction. The measurements swing about the operating
-point, so that limits are reached. Each instruction counts with the cycles of the Technical Reference Manual of the
+-O2 and runs 40 samples in QEMU, which writes the address of every instruction. Measurements and references swing about the
+operating point, so that limits are reached; a scheduling variable moves over its range; each actuator that may be gone is
+gone for some samples, and the fall-back is in force for some. Each instruction counts with the cycles of the Technical Reference Manual of the
 Cortex-M4 (ARM DDI 0439, tables 3-1 and 7-1): loads and stores 2, of several registers one more than their number,
 divisions of integers 12, VDIV and VSQRT 14, VMLA 3, branches that are taken 3, the rest 1. Memory without wait states is
 assumed. Of a Cortex-M7, which issues up to two instructions at once, only the instructions are counted.
@@ -27,6 +28,8 @@ CPUS = {
     "cortex-m7": ("-mcpu=cortex-m7 -mfloat-abi=hard -mfpu=fpv5-d16", "mps2-an500"),
 }
 SAMPLES = 40
+# The instructions of the floating-point unit.
+ARITHMETIC = {"multiplications": r"vn?mul", "additions": r"v(add|sub)", "divisions": r"vdiv"}
 
 LAYOUT = """
 ENTRY(start)
@@ -47,6 +50,7 @@ __attribute__((noinline)) void run(void)
     %(name)s_Measurements y;
     %(name)s_Commands u;
     %(name)s_Estimates estimates;
+%(variables)s
     %(name)s_init(&state);
     for (uint32_t k = 0; k < %(samples)dU; k++)
     {
@@ -55,7 +59,8 @@ __attribute__((noinline)) void run(void)
         {
             values[i] = state.y[i] + offset[(k + i) %% 4U];
         }
-        (void)%(name)s_step(&state, &y, true, &u, &estimates);
+%(inputs)s
+        (void)%(name)s_step(&state, &y, %(before)strue%(reset)s, &u, &estimates%(after)s);
     }
 }
 void start(void)
@@ -66,6 +71,46 @@ void start(void)
     for (;;) {}
 }
 """
+
+# Of each structure in a header, in the order of the arguments: variables, what a sample sets, arguments before
+# `compensate`, after it, at the end.
+PARTS = {
+    "References": (
+        "    %(name)s_References r;",
+        """        for (uint32_t i = 0; i < %(capital)s_REFERENCES; i++)
+        {
+            ((%(real)s *)&r)[i] = state.r[i] + offset[(k + i) %% 4U];
+        }""",
+        "&r, ", "", "",
+    ),
+    "Schedule": (
+        "    %(name)s_Schedule theta;",
+        "        *(%(real)s *)&theta = %(first)s + (%(real)s)k * ((%(last)s - %(first)s) / %(samples)d);",
+        "&theta, ", "", "",
+    ),
+    "Detection": ("    %(name)s_Detection detection;", "", "", ", false", ", &detection"),
+    "Actuators": (
+        "    %(name)s_Actuators actuators;\n    int32_t reconfiguration;",
+        """        for (uint32_t i = 0; i < sizeof(actuators); i++)
+        {
+            ((bool *)&actuators)[i] = (k / 3U) %% (sizeof(actuators) + 1U) == i + 1U;
+        }""",
+        "&actuators, ", "", ", &reconfiguration",
+    ),
+}  # fmt: skip
+
+
+def program(header, names):
+    """A program that takes the samples with all arguments of the controller with this header."""
+    own = [part for kind, part in PARTS.items() if f"}} {names['name']}_{kind};" in header]
+    text = " ".join(header.replace("\n *", "").split())
+    found = re.search(r"points from (\S+) to (\S+), and change", text)
+    suffix = "F" if names["real"] == "float" else ""
+    ends = dict(zip(("first", "last"), (f"{end}{suffix}" for end in found.groups()))) if found else {}
+    variables, inputs, before, reset, after = ([part[k] for part in own] for k in range(5))
+    joined = {"variables": "\n".join(variables), "inputs": "\n".join(inputs)}
+    joined |= {"before": "".join(before), "reset": "".join(reset), "after": "".join(after)}
+    return MAIN % {**names, **{key: value % {**names, **ends} for key, value in joined.items()}}
 
 
 def run(*command, **options):
@@ -113,7 +158,8 @@ def main():
     }
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
-        (home / "main.c").write_text(MAIN % names, encoding="ascii")
+        header = source.with_suffix(".h").read_text(encoding="ascii")
+        (home / "main.c").write_text(program(header, names), encoding="ascii")
         (home / "layout.ld").write_text(LAYOUT, encoding="ascii")
         run(*compiler, "-c", source, "-o", home / "own.o")
         size = run("arm-none-eabi-size", home / "own.o").splitlines()[1].split()[0]
@@ -136,7 +182,7 @@ def main():
     samples, kinds, inside = [], Counter(), False
     for at, pc in enumerate(trace):
         if pc == first:
-            samples.append([0, 0])
+            samples.append([0, 0, Counter()])
             inside = True
         elif pc == after[caller]:
             inside = False
@@ -146,11 +192,15 @@ def main():
             samples[-1][0] += 1
             samples[-1][1] += count
             kinds[mnemonic.split(".")[0]] += 1
+            samples[-1][2].update(own for own, pattern in ARITHMETIC.items() if re.match(pattern, mnemonic))
     assert len(samples) == SAMPLES, f"{len(samples)} samples in the trace"
     most = max(samples, key=lambda own: own[1])
     print(f"{source.stem}, {names['real']}, {options.cpu}: program and constants {size} bytes")
     estimate = f", about {most[1]} cycles, {1e6 * most[1] / 168e6:.1f} us at 168 MHz"
     print(f"a sample: at most {most[0]} instructions{'' if options.cpu == 'cortex-m7' else estimate}")
+    if any(own[2] for own in samples):
+        counts = {kind: max(own[2][kind] for own in samples) for kind in ARITHMETIC}
+        print("of them, at most: " + ", ".join(f"{count} {kind}" for kind, count in counts.items()))
     print("most frequent: " + ", ".join(f"{name} {count // SAMPLES}" for name, count in kinds.most_common(8)))
 
 

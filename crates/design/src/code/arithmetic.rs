@@ -41,8 +41,9 @@ impl Arithmetic {
             all.additions += m * own.most_gone() + 2 * m;
             all.comparisons += own.cases.len();
         }
-        // E_hat = -(u scale) f_hat, scale = 1 / (u u + u_e^2).
+        // E_hat = -(u scale) f_hat, scale = 1 / (u u + u_e^2); the two ends of the range.
         let losses = controller.losses.len();
+        all.comparisons += 2 * losses;
         all.multiplications += 3 * losses;
         all.additions += losses;
         all.divisions += losses;
@@ -109,6 +110,12 @@ impl Arithmetic {
             Term::FilterStep => {
                 self.multiplications += rows;
                 self.additions += rows;
+            }
+            Term::Injection => {
+                self.multiplications += rows;
+                self.comparisons += rows;
+                self.additions += rows;
+                self.divisions += rows;
             }
         }
     }

@@ -240,17 +240,42 @@ static {real} product(const {real} row[], const {real} vector[], uint32_t count)
             ));
         }
         self.schedule_helpers(lines);
+        if self.controller.sliding_mode.is_some() {
+            lines.push(format!(
+                "
+/* rho s / (|s| + delta): largest is rho, width is delta. */
+static {real} injection({real} s, {real} largest, {real} width)
+{{
+    const {real} size = (s < {zero}) ? (-s) : s;
+
+    return (largest * s) / (size + width);
+}}"
+            ));
+        }
         self.detection_helpers(lines);
         self.reconfiguration_helpers(lines);
         if !self.controller.losses.is_empty() {
             lines.push(format!(
                 "
-/* E_hat = -u f_hat / (u^2 + u_e^2). */
+/* E_hat = -u f_hat / (u^2 + u_e^2), the largest number where it is beyond the range. */
 static {real} lost_effectiveness({real} u, {real} f_hat, {real} squared_least_command)
 {{
     const {real} scale = {one} / ((u * u) + squared_least_command);
+    {real} loss = (-(u * scale)) * f_hat;
 
-    return (-(u * scale)) * f_hat;
+    if (loss > {most})
+    {{
+        loss = {most};
+    }}
+    else if (loss < -{most})
+    {{
+        loss = -{most};
+    }}
+    else
+    {{
+        /* within the range */
+    }}
+    return loss;
 }}"
             ));
         }

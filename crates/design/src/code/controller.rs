@@ -34,6 +34,9 @@ pub(super) struct Controller {
     pub(super) k_f: DMatrix<f64>,
     pub(super) l_x: DMatrix<f64>,
     pub(super) l_f: DMatrix<f64>,
+    /// The direct term of the estimated faults, where the law has one.
+    pub(super) p_f: Option<DMatrix<f64>>,
+    pub(super) sliding_mode: Option<SlidingMode>,
     /// H, `K_i`, `F_i`, `L_w`, `N_r` of the references, where the design states them.
     pub(super) h: Option<DMatrix<f64>>,
     pub(super) k_i: Option<DMatrix<f64>>,
@@ -58,6 +61,14 @@ pub(super) struct Controller {
 pub(super) enum Estimator {
     Current,
     Prediction,
+}
+
+/// The bounds of a sliding-mode law, f_hat = rho s / (|s| + delta) with s = `L_f` e; a number for each fault.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SlidingMode {
+    pub(super) rho: Vec<f64>,
+    pub(super) delta: Vec<f64>,
 }
 
 /// A state, an actuator, a measurement or a fault.
@@ -136,6 +147,10 @@ struct File {
     l_x: Rows,
     #[serde(rename = "L_f")]
     l_f: Rows,
+    #[serde(rename = "P_f", default)]
+    p_f: Option<Rows>,
+    #[serde(default)]
+    sliding_mode: Option<SlidingMode>,
     #[serde(rename = "H", default)]
     h: Option<Rows>,
     #[serde(rename = "K_i", default)]
@@ -231,6 +246,8 @@ impl Controller {
             k_f,
             l_x: file.l_x.dense(),
             l_f: file.l_f.dense(),
+            p_f: file.p_f.map(Rows::dense),
+            sliding_mode: file.sliding_mode,
             h: file.h.map(Rows::dense),
             k_i: file.k_i.map(Rows::dense),
             f_i: file.f_i.map(Rows::dense),
@@ -314,6 +331,15 @@ impl Controller {
         if let Some(schedule) = &self.schedule {
             schedule.check_range(precision, LARGEST_SINGLE)?;
         }
+        if let Some(SlidingMode { rho, delta }) = &self.sliding_mode {
+            let range = SMALLEST_SINGLE..=LARGEST_SINGLE;
+            if let Some(value) = rho.iter().chain(delta).find(|value| !range.contains(*value)) {
+                return Err(Error::Invalid(format!(
+                    "the sliding-mode law has rho or delta = {value:?}; `float` code has them from \
+                     {SMALLEST_SINGLE:?} to {LARGEST_SINGLE:?} only"
+                )));
+            }
+        }
         match self.losses.iter().find(|loss| !COMMANDS.contains(&loss.least_command)) {
             None => Ok(()),
             Some(loss) => Err(Error::Invalid(format!(
@@ -329,8 +355,11 @@ impl Controller {
 
 /// The largest constant in single precision: its product with a signal of its own size is finite.
 const LARGEST_SINGLE: f64 = 1e18;
+/// The smallest bound of a sliding-mode law in single precision: its product with a signal of its own size is a
+/// normal number.
+const SMALLEST_SINGLE: f64 = 1e-18;
 /// The `least_command` whose square is a normal number in single precision.
-const COMMANDS: std::ops::RangeInclusive<f64> = 1e-18..=1e18;
+const COMMANDS: std::ops::RangeInclusive<f64> = SMALLEST_SINGLE..=LARGEST_SINGLE;
 
 fn too_large(name: &str, value: f64) -> Error {
     Error::Invalid(format!(
@@ -368,8 +397,8 @@ mod tests {
 
     #[test]
     fn an_entry_without_code_is_named() {
-        let error = Controller::of("P_f = [[1.0]]\n").err().unwrap().to_string();
-        assert_eq!(error, "only the FMU has this controller: there is no code for its entry `P_f`");
+        let error = Controller::of("Q_f = [[1.0]]\n").err().unwrap().to_string();
+        assert_eq!(error, "only the FMU has this controller: there is no code for its entry `Q_f`");
     }
 
     #[test]

@@ -19,6 +19,8 @@ pub(super) enum Term {
     Product(Matrix, Vector),
     /// `W[i]` (`y[i]` - `y_f[i]`).
     FilterStep,
+    /// `rho[i]` `s[i]` / (|`s[i]`| + `delta[i]`).
+    Injection,
 }
 
 /// What follows the first term of a statement.
@@ -101,7 +103,7 @@ fn deviations(controller: &Controller) -> Vec<Statement> {
             [Subtract(Element(Vector::YOp)), Add(Zero)],
         ),
         statement("", Vector::XHat, Element(Vector::StoredXHat), [Subtract(Element(Vector::XOp))]),
-        statement("", Vector::FHat, Element(Vector::StoredFHat), []),
+        statement("", integral(controller), Element(Vector::StoredFHat), []),
     ];
     if controller.filter.is_some() {
         let start = Element(Vector::StoredYF);
@@ -117,17 +119,17 @@ fn deviations(controller: &Controller) -> Vec<Statement> {
 
 /// The innovation; with a current estimator, the correction of the estimate by it.
 fn estimates(controller: &Controller) -> Vec<Statement> {
-    use Operation::{Accumulate, Add, Subtract};
-    use Term::{Element, Product, Zero};
-    let (equation, observed) = match controller.filter {
-        Some(_) => ("e = y_f - C x_hat", Vector::YF),
-        None => ("e = y - C x_hat", Vector::Y),
-    };
-    let predicted = Subtract(Product(Matrix::C, Vector::XHat));
-    let mut all = vec![statement(equation, Vector::E, Element(observed), [predicted])];
+    use Operation::{Accumulate, Add};
+    use Term::{Element, Zero};
+    let mut all = vec![innovation(controller)];
     if controller.estimator == Estimator::Prediction {
+        all.extend(direct_term(controller));
         all.push(statement("estimates", Vector::XValue, Element(Vector::StoredXHat), []));
-        all.push(statement("", Vector::FValue, Element(Vector::StoredFHat), []));
+        let f_value = match controller.p_f {
+            None => Vector::StoredFHat,
+            Some(_) => Vector::FHat,
+        };
+        all.push(statement("", Vector::FValue, Element(f_value), []));
         return all;
     }
     all.push(statement(
@@ -136,19 +138,78 @@ fn estimates(controller: &Controller) -> Vec<Statement> {
         Element(Vector::XHat),
         [Accumulate(Matrix::LX, Vector::E)],
     ));
-    all.push(Statement {
-        when: while_estimating(controller),
-        ..statement(
-            "f_hat = f_hat + L_f e",
-            Vector::FHat,
-            Element(Vector::FHat),
-            [Accumulate(Matrix::LF, Vector::E)],
-        )
-    });
+    all.extend(fault_corrections(controller));
+    if controller.p_f.is_some() {
+        // The one of the corrected estimate.
+        all.push(innovation(controller));
+        all.extend(direct_term(controller));
+    }
     let x_value = [Add(Element(Vector::XOp))];
     all.push(statement("estimates", Vector::XValue, Element(Vector::XHat), x_value));
-    all.push(statement("", Vector::FValue, Element(Vector::FHat), [Add(Zero)]));
+    // The FMU has the operating point of f_hat, which is 0, with z, and no direct term in z.
+    let f_value = Statement {
+        operations: if controller.p_f.is_none() { vec![Add(Zero)] } else { Vec::new() },
+        ..statement("", Vector::FValue, Element(Vector::FHat), [])
+    };
+    all.push(f_value);
     all
+}
+
+fn innovation(controller: &Controller) -> Statement {
+    let (equation, observed) = match controller.filter {
+        Some(_) => ("e = y_f - C x_hat", Vector::YF),
+        None => ("e = y - C x_hat", Vector::Y),
+    };
+    let predicted = Operation::Subtract(Term::Product(Matrix::C, Vector::XHat));
+    statement(equation, Vector::E, Term::Element(observed), [predicted])
+}
+
+/// The correction of the estimated faults by the innovation, with a current estimator.
+fn fault_corrections(controller: &Controller) -> Vec<Statement> {
+    let when = while_estimating(controller);
+    if controller.sliding_mode.is_some() {
+        let s = Term::Product(Matrix::LF, Vector::E);
+        let equation = "f_hat = rho s / (|s| + delta), s = L_f e, element by element";
+        return vec![
+            Statement { when, ..statement(equation, Vector::S, s, []) },
+            Statement { when, ..statement("", Vector::FHat, Term::Injection, []) },
+        ];
+    }
+    let (equation, corrected) = match controller.p_f {
+        None => ("f_hat = f_hat + L_f e", Vector::FHat),
+        Some(_) => ("f_hat_i = f_hat_i + L_f e", Vector::FHatI),
+    };
+    let correction = [Operation::Accumulate(Matrix::LF, Vector::E)];
+    vec![Statement { when, ..statement(equation, corrected, Term::Element(corrected), correction) }]
+}
+
+/// The estimated faults with the direct term of the law, if it has one.
+fn direct_term(controller: &Controller) -> Vec<Statement> {
+    if controller.p_f.is_none() {
+        return Vec::new();
+    }
+    let when = while_estimating(controller);
+    let direct = [Operation::Add(Term::Product(Matrix::PF, Vector::E))];
+    let integral = Term::Element(Vector::FHatI);
+    let own = statement("f_hat = f_hat_i + P_f e", Vector::FHat, integral, direct);
+    let kept = statement("f_hat = f_hat_i", Vector::FHat, integral, []);
+    in_turn(Statement { when, ..own }, kept)
+}
+
+/// The vector that the observer predicts the faults from: without the direct term.
+fn integral(controller: &Controller) -> Vector {
+    match controller.p_f {
+        None => Vector::FHat,
+        Some(_) => Vector::FHatI,
+    }
+}
+
+/// A statement that is carried out while faults are estimated, or always, and the other one otherwise.
+fn in_turn(estimating: Statement, otherwise: Statement) -> Vec<Statement> {
+    match estimating.when {
+        When::Always => vec![estimating],
+        _ => vec![estimating, Statement { when: When::NotEstimating, ..otherwise }],
+    }
 }
 
 /// The commands without limits.
@@ -187,17 +248,18 @@ fn predictions(controller: &Controller) -> Vec<Statement> {
     use Operation::{Accumulate, Add};
     use Term::{Element, FilterStep, Product};
     let corrected = controller.estimator == Estimator::Prediction;
-    let (b, f_a) = (Product(Matrix::B, Vector::U), Product(Matrix::FA, Vector::FHat));
+    let (b, f_a) = (Product(Matrix::B, Vector::U), Product(Matrix::FA, integral(controller)));
     let mut operations = vec![Add(b), Add(f_a)];
     operations.extend(corrected.then_some(Accumulate(Matrix::LX, Vector::E)));
     operations.push(Add(Element(Vector::XOp)));
     let mut all = vec![Statement {
         operations,
         ..statement(
-            if corrected {
-                "x_hat[k+1] = A x_hat + B u + F_a f_hat + L_x e"
-            } else {
-                "x_hat[k+1] = A x_hat + B u + F_a f_hat"
+            match (corrected, controller.p_f.is_some()) {
+                (true, false) => "x_hat[k+1] = A x_hat + B u + F_a f_hat + L_x e",
+                (true, true) => "x_hat[k+1] = A x_hat + B u + F_a f_hat_i + L_x e",
+                (false, false) => "x_hat[k+1] = A x_hat + B u + F_a f_hat",
+                (false, true) => "x_hat[k+1] = A x_hat + B u + F_a f_hat_i",
             },
             Vector::NextXHat,
             Product(Matrix::A, Vector::XHat),
@@ -272,31 +334,37 @@ fn integrals(controller: &Controller) -> Vec<Statement> {
 fn fault_predictions(controller: &Controller) -> Vec<Statement> {
     use Operation::{Accumulate, Add};
     use Term::{Element, Product, Zero};
-    let estimating = while_estimating(controller);
+    let when = while_estimating(controller);
     let corrected = controller.estimator == Estimator::Prediction;
-    let kept =
-        statement("f_hat[k+1] = f_hat", Vector::NextFHat, Element(Vector::FHat), [Add(Zero)]);
+    let (direct, own) = (controller.p_f.is_some(), integral(controller));
+    let equation = match direct {
+        false => "f_hat[k+1] = f_hat",
+        true => "f_hat_i[k+1] = f_hat_i",
+    };
+    let kept = statement(equation, Vector::NextFHat, Element(own), [Add(Zero)]);
     let correction = Accumulate(Matrix::LF, Vector::E);
     let (equation, start, mut operations) = match (controller.constant_faults, corrected) {
         (true, false) => return vec![kept],
-        (true, true) => {
-            ("f_hat[k+1] = f_hat + L_f e", Zero, vec![correction, Add(Element(Vector::FHat))])
-        }
-        (false, false) => ("f_hat[k+1] = A_f f_hat", Product(Matrix::AF, Vector::FHat), Vec::new()),
-        (false, true) => {
-            ("f_hat[k+1] = A_f f_hat + L_f e", Product(Matrix::AF, Vector::FHat), vec![correction])
-        }
+        (true, true) => (
+            ["f_hat[k+1] = f_hat + L_f e", "f_hat_i[k+1] = f_hat_i + L_f e"],
+            Zero,
+            vec![correction, Add(Element(own))],
+        ),
+        (false, false) => (
+            ["f_hat[k+1] = A_f f_hat", "f_hat_i[k+1] = A_f f_hat_i"],
+            Product(Matrix::AF, own),
+            Vec::new(),
+        ),
+        (false, true) => (
+            ["f_hat[k+1] = A_f f_hat + L_f e", "f_hat_i[k+1] = A_f f_hat_i + L_f e"],
+            Product(Matrix::AF, own),
+            vec![correction],
+        ),
     };
     operations.push(Add(Zero));
-    let next = Statement {
-        when: estimating,
-        operations,
-        ..statement(equation, Vector::NextFHat, start, [])
-    };
-    match estimating {
-        When::Always => vec![next],
-        _ => vec![next, Statement { when: When::NotEstimating, ..kept }],
-    }
+    let equation = equation[usize::from(direct)];
+    let next = statement(equation, Vector::NextFHat, start, []);
+    in_turn(Statement { when, operations, ..next }, kept)
 }
 
 /// Faults are estimated while they are compensated; with `monitor`, always.

@@ -20,20 +20,30 @@
 //! The residuals r of a detection are further outputs, and x_r is part of d; their size follows from those of y
 //! and u. The bound takes the worst case of every rounding; errors of both signs cancel in practice. A scheduled loop is
 //! not such a system, and has no bound.
+//!
+//! The law g(s) = rho s / (|s| + delta) of a sliding mode is not linear, but the slope of each of its chords is
+//! between 0 and c = rho / delta. So dg = (c / 2) ds + v with |v| <= (c / 2) |ds|, and v is one more input of the
+//! linear system, ds one more output: with its gains `G_s`, `G_v` from w and v to ds,
+//!
+//! ```text
+//! |ds| <= G_s kappa s + G_v (c / 2) |ds|,   so   |ds| <= (1 - G_v c / 2)^-1 G_s kappa s
+//! ```
+//!
+//! if the spectral radius of the matrix `G_v` c / 2, which has no negative element, is below 1 (the small-gain
+//! theorem; M. A. Dahleh and I. J. Diaz-Bobillo, Control of Uncertain Systems, 1995, section 7.3).
 
-use std::ops::AddAssign as _;
+mod analysis;
 
 use control::response::peak_gain;
 use control::{Domain, Error, StateSpace};
-use nalgebra::{DMatrix, DVector, RowDVector};
+use nalgebra::DMatrix;
 
+use self::analysis::Analysis;
 use super::controller::Controller;
-use super::recursion::{Operation, Recursion, Statement, Term};
+use super::recursion::Recursion;
 use super::summary::{Fields, aligned, filled};
-use super::symbols::{Kind, Matrix, Vector};
+use super::symbols::Kind;
 
-/// The relative rounding error of single precision.
-const UNIT: f64 = 5.960_464_477_539_063e-8;
 /// For products of rounding errors, for the width of the peak gains, for the printed digits.
 const SECOND_ORDER: f64 = 1.001;
 /// The relative width of the peak gains.
@@ -61,10 +71,7 @@ impl RoundingBound {
             Ok(gains) => gains,
             Err(error) => return Self { bound: Err(error.to_string()), slowest: f64::NAN },
         };
-        let mut analysis = Analysis::new(controller, state_of_filter);
-        for statement in recursion.longest() {
-            analysis.follow(statement);
-        }
+        let analysis = Analysis::of(controller, recursion, state_of_filter);
         let order = analysis.order();
         if order > LARGEST_ORDER {
             let reason =
@@ -75,9 +82,9 @@ impl RoundingBound {
         let domain = Domain::Sampled { period: controller.sample_time };
         let slowest =
             control::stability::instability(&system.a, domain).map_or(f64::NAN, |own| -own);
-        let gains = peak_gain(&system, WIDTH).map(|gain| gain.upper * analysis.kappa());
-        let bound =
-            gains.map(|bound| bound * SECOND_ORDER).map_err(|error: Error| error.to_string());
+        let gains = peak_gain(&system, WIDTH).map_err(|error| error.to_string());
+        let bound = gains.and_then(|gains| analysis.bound(&gains.upper));
+        let bound = bound.map(|bound| bound * SECOND_ORDER);
         Self { bound, slowest }
     }
 
@@ -177,315 +184,31 @@ fn named(start: &str, fields: &[String]) -> Vec<String> {
     fields.iter().map(|field| format!("{start}{field}")).collect()
 }
 
-/// The elements of a vector: what they are made of, and how exact they are.
-#[derive(Clone)]
-struct Elements {
-    /// Elements x (states of the loop, then errors w): the difference from exact arithmetic.
-    form: DMatrix<f64>,
-    /// Elements x signals: a bound of the absolute value.
-    magnitude: DMatrix<f64>,
-    /// Elements x signals: a bound of the errors that are not among w.
-    error: DMatrix<f64>,
-}
+#[cfg(test)]
+mod tests {
+    use super::{Controller, Recursion, RoundingBound};
 
-impl Elements {
-    fn zero(rows: usize, (forms, signals): (usize, usize)) -> Self {
-        let none = DMatrix::zeros(rows, signals);
-        Self { form: DMatrix::zeros(rows, forms), magnitude: none.clone(), error: none }
+    /// x[k+1] = 0.9 x + u + f, u = -f_hat, f_hat = s / (|s| + delta), s = y - x_hat.
+    fn bound(delta: f64) -> Result<f64, String> {
+        let text = format!(
+            "description = \"\"\nt_on = 0.0\nsample_time = 1.0\nestimator = \"current\"\n\
+             states = [{{ name = \"x\" }}]\nactuators = [{{ name = \"u\" }}]\n\
+             measurements = [{{ name = \"y\" }}]\nfaults = [{{ name = \"f\" }}]\n\
+             A = [[0.9]]\nB = [[1.0]]\nC = [[1.0]]\nF_a = [[1.0]]\nA_f = [[0.0]]\n\
+             K_x = [[0.0]]\nK_f = [[-1.0]]\nL_x = [[0.0]]\nL_f = [[1.0]]\n\
+             sliding_mode = {{ rho = [1.0], delta = [{delta:?}] }}\nexperiment = {{ stop_time = 1.0 }}\n"
+        );
+        let controller = Controller::of(&text).unwrap();
+        let found = RoundingBound::of(&controller, &Recursion::of(&controller));
+        found.bound.map(|bound| bound[(1, 1)])
     }
 
-    /// Adds `sign` times other elements; a sum with zero has no error.
-    fn add(&mut self, other: &Self, sign: f64) {
-        self.form += &other.form * sign;
-        self.error += &other.error;
-        for (mut row, other) in self.magnitude.row_iter_mut().zip(other.magnitude.row_iter()) {
-            row += other;
-        }
-        for i in 0..self.error.nrows() {
-            if other.magnitude.row(i).iter().any(|part| *part > 0.0) {
-                let rounding = self.magnitude.row(i) * UNIT;
-                self.error.row_mut(i).add_assign(&rounding);
-            }
-        }
-    }
-
-    /// Multiplies by a constant.
-    fn scale(&mut self, factor: f64) {
-        self.form *= factor;
-        self.error = &self.error * factor + &self.magnitude * product_error(factor);
-        self.magnitude *= factor;
-    }
-
-    /// Adds row i of `matrix` times `vector` to element i, one product after the other.
-    fn accumulate(&mut self, matrix: &DMatrix<f64>, vector: &Self) {
-        self.form += matrix * &vector.form;
-        for (i, row) in matrix.row_iter().enumerate() {
-            for (j, &entry) in row.iter().enumerate().filter(|(_, entry)| **entry != 0.0) {
-                let factor = vector.magnitude.row(j);
-                let is_first = self.magnitude.row(i).amax() == 0.0;
-                self.magnitude.row_mut(i).add_assign(&(factor * entry.abs()));
-                let sum = if is_first { 0.0 } else { UNIT };
-                let rounding = factor * product_error(entry) + self.magnitude.row(i) * sum;
-                self.error.row_mut(i).add_assign(&rounding);
-            }
-        }
-    }
-}
-
-/// The error of a product with `entry`, relative to the other factor: of the constant and of the
-/// product.
-fn product_error(entry: f64) -> f64 {
-    let is_power_of_two = entry.to_bits().trailing_zeros() >= 52;
-    let product = if is_power_of_two { 0.0 } else { entry.abs() * UNIT };
-    product + constant_error(entry)
-}
-
-/// The error of a constant in single precision.
-#[expect(clippy::cast_possible_truncation, reason = "the error is what is computed")]
-fn constant_error(value: f64) -> f64 {
-    (value - f64::from(value as f32)).abs()
-}
-
-/// Follows the statements of a sample.
-struct Analysis<'a> {
-    controller: &'a Controller,
-    /// A bound of the elements of `x_r`, states x signals; see [`residual_states`].
-    state_of_filter: DMatrix<f64>,
-    known: Vec<(Vector, Elements)>,
-    /// kappa: a row over the signals for each error.
-    errors: Vec<RowDVector<f64>>,
-}
-
-impl<'a> Analysis<'a> {
-    fn new(controller: &'a Controller, state_of_filter: DMatrix<f64>) -> Self {
-        let (known, errors) = (Vec::new(), Vec::new());
-        let mut own = Self { controller, state_of_filter, known, errors };
-        let [n, p] = [Kind::State, Kind::Measurement].map(|kind| own.count(kind));
-        own.start(Vector::StoredXHat, |form| form.columns_mut(n, n).fill_with_identity());
-        let q = own.count(Kind::Fault);
-        own.start(Vector::StoredFHat, |form| form.columns_mut(2 * n, q).fill_with_identity());
-        match &controller.filter {
-            None => own.start(Vector::Measured, |form| {
-                form.columns_mut(0, n).copy_from(&controller.c);
-            }),
-            Some(filter) => {
-                // The last states of the design are the filtered measurements, which the controller
-                // computes: y_f[k+1] = y_f + w (C x - y_f).
-                let first = n - p;
-                own.start(Vector::StoredYF, |form| {
-                    form.columns_mut(first, p).fill_with_identity();
-                });
-                own.start(Vector::Measured, |form| {
-                    for (k, w) in filter.iter().enumerate() {
-                        let row = controller.a.view((first + k, 0), (1, first)) / *w;
-                        form.view_mut((k, 0), (1, first)).copy_from(&row);
-                    }
-                });
-            }
-        }
-        let integrals = own.count(Kind::Integral);
-        own.start(Vector::StoredXI, |form| {
-            form.columns_mut(2 * n + q, integrals).fill_with_identity();
-        });
-        let k = own.count(Kind::ResidualState);
-        own.start(Vector::StoredXR, |form| {
-            form.columns_mut(2 * n + q + integrals, k).fill_with_identity();
-        });
-        own.start(Vector::Referred, |_| {});
-        for vector in [Vector::Measured, Vector::Referred] {
-            let mut rounded = own.get(vector);
-            rounded.error = &rounded.magnitude * UNIT;
-            own.learn(vector, rounded);
-        }
-        own
-    }
-
-    fn count(&self, kind: Kind) -> usize {
-        kind.count(self.controller)
-    }
-
-    /// States of the loop: plant, stored `x_hat`, stored `f_hat`, `x_i`, `x_r`.
-    fn order(&self) -> usize {
-        let [n, q, t, k] = [Kind::State, Kind::Fault, Kind::Integral, Kind::ResidualState]
-            .map(|kind| self.count(kind));
-        2 * n + q + t + k
-    }
-
-    /// The columns of forms, with room for the errors of 6 vectors of each kind, and the signals.
-    fn widths(&self) -> (usize, usize) {
-        let signals: usize = Kind::ALL.map(|kind| self.count(kind)).iter().sum();
-        let detection = self.count(Kind::ResidualState) + self.count(Kind::Residual);
-        (self.order() + 6 * signals + detection, signals + 1)
-    }
-
-    /// Sets the exact elements of a vector at the start of a sample.
-    fn start(&mut self, vector: Vector, fill: impl FnOnce(&mut DMatrix<f64>)) {
-        let mut elements = Elements::zero(self.count(vector.kind()), self.widths());
-        fill(&mut elements.form);
-        elements.magnitude = self.magnitude(vector);
-        self.known.push((vector, elements));
-    }
-
-    /// A vector as it is now; zero if no statement has computed it.
-    fn get(&self, vector: Vector) -> Elements {
-        let operating = match vector {
-            Vector::XOp => Some(&self.controller.states),
-            Vector::UOp => Some(&self.controller.actuators),
-            Vector::YOp => Some(&self.controller.measurements),
-            Vector::ROp => Some(&self.controller.references),
-            _ => None,
-        };
-        let zero = || Elements::zero(self.count(vector.kind()), self.widths());
-        if let Some(signals) = operating {
-            let mut constant = zero();
-            let last = constant.error.ncols() - 1;
-            for (i, signal) in signals.iter().enumerate() {
-                constant.magnitude[(i, last)] = signal.operating.abs();
-                constant.error[(i, last)] = constant_error(signal.operating);
-            }
-            return constant;
-        }
-        let found = self.known.iter().rev().find(|(other, _)| *other == vector);
-        found.map_or_else(zero, |(_, elements)| elements.clone())
-    }
-
-    /// A bound of the elements of a vector, from the largest deviations of the signals.
-    fn magnitude(&self, vector: Vector) -> DMatrix<f64> {
-        let (rows, signals) = (self.count(vector.kind()), self.widths().1);
-        match vector {
-            Vector::StoredXR | Vector::NextXR => return self.state_of_filter.clone(),
-            Vector::Residual => return self.residual_magnitude(),
-            _ => {}
-        }
-        let mut own = DMatrix::zeros(rows, signals);
-        own.columns_mut(first_signal(vector.kind(), self.controller), rows).fill_with_identity();
-        let operating = match vector {
-            Vector::StoredXHat | Vector::XValue | Vector::NextXHat => &self.controller.states,
-            Vector::StoredYF | Vector::Measured | Vector::NextYF => &self.controller.measurements,
-            Vector::Command => &self.controller.actuators,
-            Vector::Referred => &self.controller.references,
-            Vector::E => {
-                let c = self.controller.c.abs();
-                own.columns_mut(0, c.ncols()).copy_from(&c);
-                return own;
-            }
-            _ => return own,
-        };
-        for (i, signal) in operating.iter().enumerate() {
-            own[(i, signals - 1)] = signal.operating.abs();
-        }
-        own
-    }
-
-    /// |r| <= |C| |x_r| + |D_u| |u| + |D_y| |y|, residuals x signals.
-    fn residual_magnitude(&self) -> DMatrix<f64> {
-        let Some(own) = &self.controller.detection else {
-            return DMatrix::zeros(0, self.widths().1);
-        };
-        let mut all = own.c.abs() * &self.state_of_filter;
-        for (kind, matrix) in [(Kind::Actuator, &own.d_u), (Kind::Measurement, &own.d_y)] {
-            let first = first_signal(kind, self.controller);
-            all.columns_mut(first, matrix.ncols()).add_assign(&matrix.abs());
-        }
-        all
-    }
-
-    /// Takes the elements that a statement computes; their errors become elements of w.
-    fn learn(&mut self, vector: Vector, mut elements: Elements) {
-        elements.magnitude = self.magnitude(vector);
-        for (i, error) in elements.error.row_iter().enumerate() {
-            if error.amax() > 0.0 {
-                elements.form[(i, self.order() + self.errors.len())] = 1.0;
-                self.errors.push(error.into_owned());
-            }
-        }
-        elements.error.fill(0.0);
-        self.known.push((vector, elements));
-    }
-
-    fn follow(&mut self, statement: &Statement) {
-        match statement.target {
-            // No output of the loop and no later statement has these.
-            Vector::XValue | Vector::XIValue | Vector::V => return,
-            // Without limits it is exactly zero.
-            Vector::Excess => {
-                let zero = Elements::zero(self.count(Kind::Actuator), self.widths());
-                self.known.push((Vector::Excess, zero));
-                return;
-            }
-            _ => {}
-        }
-        let rows = self.count(statement.target.kind());
-        let mut sum = self.term(statement.start, rows);
-        for operation in &statement.operations {
-            match *operation {
-                Operation::Add(term) => sum.add(&self.term(term, rows), 1.0),
-                Operation::Subtract(term) => sum.add(&self.term(term, rows), -1.0),
-                Operation::Accumulate(matrix, vector) => self.accumulate(&mut sum, matrix, vector),
-                Operation::TimesPeriod => sum.scale(self.controller.sample_time),
-            }
-        }
-        self.learn(statement.target, sum);
-    }
-
-    fn accumulate(&self, sum: &mut Elements, matrix: Matrix, vector: Vector) {
-        if let Some(matrix) = matrix.of(self.controller) {
-            sum.accumulate(matrix, &self.get(vector));
-        }
-    }
-
-    fn term(&self, term: Term, rows: usize) -> Elements {
-        let mut own = Elements::zero(rows, self.widths());
-        match term {
-            Term::Zero => {}
-            Term::Element(vector) => own = self.get(vector),
-            Term::Product(matrix, vector) => {
-                self.accumulate(&mut own, matrix, vector);
-            }
-            Term::FilterStep => {
-                let mut difference = self.get(Vector::Y);
-                difference.add(&self.get(Vector::YF), -1.0);
-                let filter = self.controller.filter.as_deref().unwrap_or_default();
-                let diagonal = DMatrix::from_diagonal(&DVector::from_column_slice(filter));
-                own.accumulate(&diagonal, &difference);
-                own.error += diagonal * difference.error;
-            }
-        }
-        own
-    }
-
-    /// The loop from the errors w to [u; `f_hat`; r].
-    fn system(&self) -> StateSpace {
-        let ([n, q, p, m, _, integrals], order) =
-            (Kind::ALL.map(|kind| self.count(kind)), self.order());
-        let inputs = self.errors.len();
-        let command = self.get(Vector::Command).form;
-        let mut next = DMatrix::zeros(order, self.widths().0);
-        next.view_mut((0, 0), (n, n)).copy_from(&self.controller.a);
-        next.rows_mut(0, n).add_assign(&(&self.controller.b * &command));
-        if self.controller.filter.is_some() {
-            next.rows_mut(n - p, p).copy_from(&self.get(Vector::NextYF).form);
-        }
-        next.rows_mut(n, n).copy_from(&self.get(Vector::NextXHat).form);
-        next.rows_mut(2 * n, q).copy_from(&self.get(Vector::NextFHat).form);
-        next.rows_mut(2 * n + q, integrals).copy_from(&self.get(Vector::NextXI).form);
-        let [k, residuals] = [Kind::ResidualState, Kind::Residual].map(|kind| self.count(kind));
-        next.rows_mut(order - k, k).copy_from(&self.get(Vector::NextXR).form);
-        let mut outputs = DMatrix::zeros(m + q + residuals, self.widths().0);
-        outputs.rows_mut(0, m).copy_from(&command);
-        outputs.rows_mut(m, q).copy_from(&self.get(Vector::FValue).form);
-        outputs.rows_mut(m + q, residuals).copy_from(&self.get(Vector::Residual).form);
-        StateSpace {
-            a: next.columns(0, order).into_owned(),
-            b: next.columns(order, inputs).into_owned(),
-            c: outputs.columns(0, order).into_owned(),
-            d: outputs.columns(order, inputs).into_owned(),
-            domain: Domain::Sampled { period: self.controller.sample_time },
-        }
-    }
-
-    /// kappa, errors x signals.
-    fn kappa(&self) -> DMatrix<f64> {
-        DMatrix::from_rows(&self.errors)
+    /// s[k+1] = 0.9 s - s / (|s| + delta): the chords have slopes from 0.9 - 1 / delta to 0.9, so that it contracts
+    /// above delta = 1 / 1.9.
+    #[test]
+    fn a_sliding_mode_has_a_bound_where_all_slopes_contract() {
+        assert!(bound(0.6).unwrap() < 1e-4);
+        let error = bound(0.45).unwrap_err();
+        assert_eq!(error, "the slope of the sliding-mode law changes too much for one");
     }
 }

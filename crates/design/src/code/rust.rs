@@ -218,14 +218,31 @@ fn product(row: &[{real}], vector: &[{real}]) -> {real} {{
             ));
         }
         self.schedule_helpers(lines);
+        if self.controller.sliding_mode.is_some() {
+            lines.push(format!(
+                "
+/// rho s / (|s| + delta).
+fn injection(s: {real}, rho: {real}, delta: {real}) -> {real} {{
+    let size = if s < 0.0 {{ -s }} else {{ s }};
+    rho * s / (size + delta)
+}}"
+            ));
+        }
         self.detection_helpers(lines);
         if !self.controller.losses.is_empty() {
             lines.push(format!(
                 "
-/// E_hat = -u f_hat / (u^2 + u_e^2).
+/// E_hat = -u f_hat / (u^2 + u_e^2), the largest number where it is beyond the range.
 fn lost_effectiveness(u: {real}, f_hat: {real}, squared_least_command: {real}) -> {real} {{
     let scale = 1.0 / (u * u + squared_least_command);
-    -(u * scale) * f_hat
+    let loss = -(u * scale) * f_hat;
+    if loss > {real}::MAX {{
+        {real}::MAX
+    }} else if loss < {real}::MIN {{
+        {real}::MIN
+    }} else {{
+        loss
+    }}
 }}"
             ));
         }

@@ -3,7 +3,7 @@
 mod options;
 
 use super::arithmetic::{Arithmetic, Memory};
-use super::controller::{Controller, Estimator, Loss, Signal};
+use super::controller::{Controller, Estimator, Loss, Signal, SlidingMode};
 use super::names::fields;
 use super::recursion::Recursion;
 use super::rounding::RoundingBound;
@@ -205,14 +205,36 @@ fn modes(controller: &Controller) -> Vec<String> {
         0 => "the first sample".to_owned(),
         sample => format!("sample {sample} (t_on = {t_on:?} s)"),
     };
-    let estimated = if controller.monitor {
-        "They are estimated in every sample (monitor)."
-    } else {
-        "They are estimated while they are compensated; otherwise their estimates keep their values."
+    let estimated = match (controller.monitor, &controller.p_f) {
+        (true, _) => "They are estimated in every sample (monitor).",
+        (false, None) => {
+            "They are estimated while they are compensated; otherwise their estimates keep their values."
+        }
+        (false, Some(_)) => {
+            "They are estimated while they are compensated; otherwise their estimates are f_hat_i, which keeps \
+             its value."
+        }
     };
     let mut all = vec![format!(
         "Faults are compensated from {start} on while `compensate` is true. {estimated}"
     )];
+    if controller.p_f.is_some() {
+        let text = "The estimates of faults have a direct term: f_hat = f_hat_i + P_f e, with the innovation e of \
+                    the corrected estimate. The observer predicts with the integral part f_hat_i, which `init_at` \
+                    sets, and which is the estimate after an overflow.";
+        all.push(text.to_owned());
+    }
+    if let Some(SlidingMode { rho, delta }) = &controller.sliding_mode {
+        let list = |values: &[f64]| {
+            values.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ")
+        };
+        all.push(format!(
+            "The law that estimates the faults is a sliding mode: f_hat = rho s / (|s| + delta), s = L_f e, for \
+             each fault; rho = {}, delta = {}. So no estimate exceeds rho.",
+            list(rho),
+            list(delta)
+        ));
+    }
     if let Some(filter) = &controller.filter {
         let list: Vec<_> = filter.iter().map(|gain| format!("{gain:?}")).collect();
         all.push(format!(

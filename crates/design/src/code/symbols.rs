@@ -31,6 +31,10 @@ pub(super) enum Vector {
     E,
     XHat,
     FHat,
+    /// The integral part of `f_hat` in a law with a direct term.
+    FHatI,
+    /// `L_f` e of a sliding-mode law.
+    S,
     YF,
     U,
     R,
@@ -64,6 +68,7 @@ pub(super) enum Matrix {
     KF,
     LX,
     LF,
+    PF,
     H,
     KI,
     FI,
@@ -79,7 +84,7 @@ pub(super) enum Matrix {
 }
 
 impl Matrix {
-    pub(super) const ALL: [Self; 20] = [
+    pub(super) const ALL: [Self; 21] = [
         Self::A,
         Self::B,
         Self::C,
@@ -89,6 +94,7 @@ impl Matrix {
         Self::KF,
         Self::LX,
         Self::LF,
+        Self::PF,
         Self::H,
         Self::KI,
         Self::FI,
@@ -114,6 +120,7 @@ impl Matrix {
             Self::KF => &controller.k_f,
             Self::LX => &controller.l_x,
             Self::LF => &controller.l_f,
+            Self::PF => return controller.p_f.as_ref(),
             Self::H => return controller.h.as_ref(),
             Self::KI => return controller.k_i.as_ref(),
             Self::FI => return controller.f_i.as_ref(),
@@ -150,6 +157,7 @@ impl Matrix {
             Self::KF => "K_f",
             Self::LX => "L_x",
             Self::LF => "L_f",
+            Self::PF => "P_f",
             Self::H => "H",
             Self::KI => "K_i",
             Self::FI => "F_i",
@@ -171,6 +179,8 @@ impl Vector {
         match self {
             Self::StoredXHat | Self::XHat => "x_hat",
             Self::StoredFHat | Self::FHat => "f_hat",
+            Self::FHatI => "f_hat_i",
+            Self::S => "s",
             Self::StoredYF | Self::YF => "y_f",
             Self::Measured | Self::Y => "y",
             Self::XOp => "x_op",
@@ -219,7 +229,12 @@ impl Vector {
             Self::StoredXHat | Self::XHat | Self::XOp | Self::XValue | Self::NextXHat => {
                 Kind::State
             }
-            Self::StoredFHat | Self::FHat | Self::FValue | Self::NextFHat => Kind::Fault,
+            Self::StoredFHat
+            | Self::FHat
+            | Self::FHatI
+            | Self::S
+            | Self::FValue
+            | Self::NextFHat => Kind::Fault,
             Self::UOp | Self::U | Self::V | Self::Excess | Self::Command => Kind::Actuator,
             Self::Referred | Self::ROp | Self::R => Kind::Reference,
             Self::StoredXI | Self::XIValue | Self::NextXI => Kind::Integral,

@@ -120,6 +120,11 @@ pub(super) fn tables(controller: &Controller, recursion: &Recursion) -> Vec<Cons
     all.extend(controller.filter.clone().map(|filter| {
         Constants::vector("filter", "gains of the measurement filter", Kind::Measurement, filter)
     }));
+    all.extend(controller.sliding_mode.iter().flat_map(|own| {
+        let meaning = "bounds of the estimated faults, and half-widths of the boundary layer";
+        let rho = Constants::vector("rho", meaning, Kind::Fault, own.rho.clone());
+        [rho, Constants::vector("delta", "", Kind::Fault, own.delta.clone())]
+    }));
     all.extend(schedule(controller));
     all.extend(controller.detection.iter().flat_map(Detection::tables));
     let reconfiguration = controller.reconfiguration.iter();

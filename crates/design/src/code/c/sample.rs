@@ -287,6 +287,7 @@ impl Source<'_> {
             Term::Element(vector) => element(vector),
             Term::Product(matrix, vector) => self.row_product("product", "", (matrix, vector)),
             Term::FilterStep => "filter[i] * (y[i] - y_f[i])".to_owned(),
+            Term::Injection => "injection(s[i], rho[i], delta[i])".to_owned(),
         }
     }
 }

@@ -289,6 +289,10 @@ impl<'a> Zipped<'a> {
                 let [w, y, y_f] = ["&FILTER", "&y", "&y_f"].map(|source| self.row(source));
                 format!("*{w} * (*{y} - *{y_f})")
             }
+            Term::Injection => {
+                let [s, rho, delta] = ["&s", "&RHO", "&DELTA"].map(|source| self.row(source));
+                format!("injection(*{s}, *{rho}, *{delta})")
+            }
         }
     }
 }

@@ -1,0 +1,401 @@
+//! What the errors of a sample do to the loop of plant and controller.
+
+use std::ops::AddAssign as _;
+
+use control::{Domain, StateSpace};
+use nalgebra::{DMatrix, DVector, RowDVector};
+
+use super::first_signal;
+use crate::code::controller::{Controller, SlidingMode};
+use crate::code::recursion::{Operation, Recursion, Statement, Term};
+use crate::code::symbols::{Kind, Matrix, Vector};
+
+/// The relative rounding error of single precision.
+const UNIT: f64 = 5.960_464_477_539_063e-8;
+
+/// The elements of a vector: what they are made of, and how exact they are.
+#[derive(Clone)]
+struct Elements {
+    /// Elements x (states of the loop, then errors w): the difference from exact arithmetic.
+    form: DMatrix<f64>,
+    /// Elements x signals: a bound of the absolute value.
+    magnitude: DMatrix<f64>,
+    /// Elements x signals: a bound of the errors that are not among w.
+    error: DMatrix<f64>,
+}
+
+impl Elements {
+    fn zero(rows: usize, (forms, signals): (usize, usize)) -> Self {
+        let none = DMatrix::zeros(rows, signals);
+        Self { form: DMatrix::zeros(rows, forms), magnitude: none.clone(), error: none }
+    }
+
+    /// Adds `sign` times other elements; a sum with zero has no error.
+    fn add(&mut self, other: &Self, sign: f64) {
+        self.form += &other.form * sign;
+        self.error += &other.error;
+        for (mut row, other) in self.magnitude.row_iter_mut().zip(other.magnitude.row_iter()) {
+            row += other;
+        }
+        for i in 0..self.error.nrows() {
+            if other.magnitude.row(i).iter().any(|part| *part > 0.0) {
+                let rounding = self.magnitude.row(i) * UNIT;
+                self.error.row_mut(i).add_assign(&rounding);
+            }
+        }
+    }
+
+    /// Multiplies by a constant.
+    fn scale(&mut self, factor: f64) {
+        self.form *= factor;
+        self.error = &self.error * factor + &self.magnitude * product_error(factor);
+        self.magnitude *= factor;
+    }
+
+    /// Adds row i of `matrix` times `vector` to element i, one product after the other.
+    fn accumulate(&mut self, matrix: &DMatrix<f64>, vector: &Self) {
+        self.form += matrix * &vector.form;
+        for (i, row) in matrix.row_iter().enumerate() {
+            for (j, &entry) in row.iter().enumerate().filter(|(_, entry)| **entry != 0.0) {
+                let factor = vector.magnitude.row(j);
+                let is_first = self.magnitude.row(i).amax() == 0.0;
+                self.magnitude.row_mut(i).add_assign(&(factor * entry.abs()));
+                let sum = if is_first { 0.0 } else { UNIT };
+                let rounding = factor * product_error(entry) + self.magnitude.row(i) * sum;
+                self.error.row_mut(i).add_assign(&rounding);
+            }
+        }
+    }
+}
+
+/// The error of a product with `entry`, relative to the other factor: of the constant and of the
+/// product.
+fn product_error(entry: f64) -> f64 {
+    let is_power_of_two = entry.to_bits().trailing_zeros() >= 52;
+    let product = if is_power_of_two { 0.0 } else { entry.abs() * UNIT };
+    product + constant_error(entry)
+}
+
+/// The error of a constant in single precision.
+#[expect(clippy::cast_possible_truncation, reason = "the error is what is computed")]
+fn constant_error(value: f64) -> f64 {
+    (value - f64::from(value as f32)).abs()
+}
+
+/// Follows the statements of a sample.
+pub(super) struct Analysis<'a> {
+    controller: &'a Controller,
+    /// A bound of the elements of `x_r`, states x signals; see [`residual_states`].
+    state_of_filter: DMatrix<f64>,
+    known: Vec<(Vector, Elements)>,
+    /// kappa: a row over the signals for each error.
+    errors: Vec<RowDVector<f64>>,
+    /// The inputs v of a sliding-mode law, which have a row of zeros among the errors: their positions there,
+    /// and rho / (2 delta).
+    chords: Vec<(usize, f64)>,
+}
+
+impl<'a> Analysis<'a> {
+    /// The analysis of the longest sample.
+    pub(super) fn of(
+        controller: &'a Controller,
+        recursion: &Recursion,
+        state_of_filter: DMatrix<f64>,
+    ) -> Self {
+        let mut own = Self::new(controller, state_of_filter);
+        for statement in recursion.longest() {
+            own.follow(statement);
+        }
+        own
+    }
+
+    fn new(controller: &'a Controller, state_of_filter: DMatrix<f64>) -> Self {
+        let (known, errors, chords) = (Vec::new(), Vec::new(), Vec::new());
+        let mut own = Self { controller, state_of_filter, known, errors, chords };
+        let [n, p] = [Kind::State, Kind::Measurement].map(|kind| own.count(kind));
+        own.start(Vector::StoredXHat, |form| form.columns_mut(n, n).fill_with_identity());
+        let q = own.count(Kind::Fault);
+        own.start(Vector::StoredFHat, |form| form.columns_mut(2 * n, q).fill_with_identity());
+        match &controller.filter {
+            None => own.start(Vector::Measured, |form| {
+                form.columns_mut(0, n).copy_from(&controller.c);
+            }),
+            Some(filter) => {
+                // The last states of the design are the filtered measurements, which the controller
+                // computes: y_f[k+1] = y_f + w (C x - y_f).
+                let first = n - p;
+                own.start(Vector::StoredYF, |form| {
+                    form.columns_mut(first, p).fill_with_identity();
+                });
+                own.start(Vector::Measured, |form| {
+                    for (k, w) in filter.iter().enumerate() {
+                        let row = controller.a.view((first + k, 0), (1, first)) / *w;
+                        form.view_mut((k, 0), (1, first)).copy_from(&row);
+                    }
+                });
+            }
+        }
+        let integrals = own.count(Kind::Integral);
+        own.start(Vector::StoredXI, |form| {
+            form.columns_mut(2 * n + q, integrals).fill_with_identity();
+        });
+        let k = own.count(Kind::ResidualState);
+        own.start(Vector::StoredXR, |form| {
+            form.columns_mut(2 * n + q + integrals, k).fill_with_identity();
+        });
+        own.start(Vector::Referred, |_| {});
+        for vector in [Vector::Measured, Vector::Referred] {
+            let mut rounded = own.get(vector);
+            rounded.error = &rounded.magnitude * UNIT;
+            own.learn(vector, rounded);
+        }
+        own
+    }
+
+    fn count(&self, kind: Kind) -> usize {
+        kind.count(self.controller)
+    }
+
+    /// States of the loop: plant, stored `x_hat`, stored `f_hat`, `x_i`, `x_r`.
+    pub(super) fn order(&self) -> usize {
+        let [n, q, t, k] = [Kind::State, Kind::Fault, Kind::Integral, Kind::ResidualState]
+            .map(|kind| self.count(kind));
+        2 * n + q + t + k
+    }
+
+    /// The columns of forms, with room for the errors of 6 vectors of each kind and for v, and the signals.
+    fn widths(&self) -> (usize, usize) {
+        let signals: usize = Kind::ALL.map(|kind| self.count(kind)).iter().sum();
+        let detection = self.count(Kind::ResidualState) + self.count(Kind::Residual);
+        (self.order() + 6 * signals + detection + self.count(Kind::Fault), signals + 1)
+    }
+
+    /// Sets the exact elements of a vector at the start of a sample.
+    fn start(&mut self, vector: Vector, fill: impl FnOnce(&mut DMatrix<f64>)) {
+        let mut elements = Elements::zero(self.count(vector.kind()), self.widths());
+        fill(&mut elements.form);
+        elements.magnitude = self.magnitude(vector);
+        self.known.push((vector, elements));
+    }
+
+    /// A vector as it is now; zero if no statement has computed it.
+    fn get(&self, vector: Vector) -> Elements {
+        let operating = match vector {
+            Vector::XOp => Some(&self.controller.states),
+            Vector::UOp => Some(&self.controller.actuators),
+            Vector::YOp => Some(&self.controller.measurements),
+            Vector::ROp => Some(&self.controller.references),
+            _ => None,
+        };
+        let zero = || Elements::zero(self.count(vector.kind()), self.widths());
+        if let Some(signals) = operating {
+            let mut constant = zero();
+            let last = constant.error.ncols() - 1;
+            for (i, signal) in signals.iter().enumerate() {
+                constant.magnitude[(i, last)] = signal.operating.abs();
+                constant.error[(i, last)] = constant_error(signal.operating);
+            }
+            return constant;
+        }
+        let found = self.known.iter().rev().find(|(other, _)| *other == vector);
+        found.map_or_else(zero, |(_, elements)| elements.clone())
+    }
+
+    /// A bound of the elements of a vector, from the largest deviations of the signals.
+    fn magnitude(&self, vector: Vector) -> DMatrix<f64> {
+        let (rows, signals) = (self.count(vector.kind()), self.widths().1);
+        match vector {
+            Vector::StoredXR | Vector::NextXR => return self.state_of_filter.clone(),
+            Vector::Residual => return self.residual_magnitude(),
+            Vector::S => return self.controller.l_f.abs() * self.magnitude(Vector::E),
+            _ => {}
+        }
+        let mut own = DMatrix::zeros(rows, signals);
+        own.columns_mut(first_signal(vector.kind(), self.controller), rows).fill_with_identity();
+        if let (Vector::StoredFHat | Vector::FHatI | Vector::NextFHat, Some(p_f)) =
+            (vector, &self.controller.p_f)
+        {
+            // |f_hat_i| <= |f_hat| + |P_f| |e|.
+            return own + p_f.abs() * self.magnitude(Vector::E);
+        }
+        let operating = match vector {
+            Vector::StoredXHat | Vector::XValue | Vector::NextXHat => &self.controller.states,
+            Vector::StoredYF | Vector::Measured | Vector::NextYF => &self.controller.measurements,
+            Vector::Command => &self.controller.actuators,
+            Vector::Referred => &self.controller.references,
+            Vector::E => {
+                let c = self.controller.c.abs();
+                own.columns_mut(0, c.ncols()).copy_from(&c);
+                return own;
+            }
+            _ => return own,
+        };
+        for (i, signal) in operating.iter().enumerate() {
+            own[(i, signals - 1)] = signal.operating.abs();
+        }
+        own
+    }
+
+    /// |r| <= |C| |x_r| + |D_u| |u| + |D_y| |y|, residuals x signals.
+    fn residual_magnitude(&self) -> DMatrix<f64> {
+        let Some(own) = &self.controller.detection else {
+            return DMatrix::zeros(0, self.widths().1);
+        };
+        let mut all = own.c.abs() * &self.state_of_filter;
+        for (kind, matrix) in [(Kind::Actuator, &own.d_u), (Kind::Measurement, &own.d_y)] {
+            let first = first_signal(kind, self.controller);
+            all.columns_mut(first, matrix.ncols()).add_assign(&matrix.abs());
+        }
+        all
+    }
+
+    /// Takes the elements that a statement computes; their errors become elements of w.
+    fn learn(&mut self, vector: Vector, mut elements: Elements) {
+        elements.magnitude = self.magnitude(vector);
+        for (i, error) in elements.error.row_iter().enumerate() {
+            if error.amax() > 0.0 {
+                elements.form[(i, self.order() + self.errors.len())] = 1.0;
+                self.errors.push(error.into_owned());
+            }
+        }
+        elements.error.fill(0.0);
+        self.known.push((vector, elements));
+    }
+
+    fn follow(&mut self, statement: &Statement) {
+        match statement.target {
+            // No output of the loop and no later statement has these.
+            Vector::XValue | Vector::XIValue | Vector::V => return,
+            // Without limits it is exactly zero.
+            Vector::Excess => {
+                let zero = Elements::zero(self.count(Kind::Actuator), self.widths());
+                self.known.push((Vector::Excess, zero));
+                return;
+            }
+            _ => {}
+        }
+        let rows = self.count(statement.target.kind());
+        let mut sum = self.term(statement.start, rows);
+        for operation in &statement.operations {
+            match *operation {
+                Operation::Add(term) => sum.add(&self.term(term, rows), 1.0),
+                Operation::Subtract(term) => sum.add(&self.term(term, rows), -1.0),
+                Operation::Accumulate(matrix, vector) => self.accumulate(&mut sum, matrix, vector),
+                Operation::TimesPeriod => sum.scale(self.controller.sample_time),
+            }
+        }
+        self.learn(statement.target, sum);
+    }
+
+    fn accumulate(&self, sum: &mut Elements, matrix: Matrix, vector: Vector) {
+        if let Some(matrix) = matrix.of(self.controller) {
+            sum.accumulate(matrix, &self.get(vector));
+        }
+    }
+
+    fn term(&mut self, term: Term, rows: usize) -> Elements {
+        let mut own = Elements::zero(rows, self.widths());
+        match term {
+            Term::Zero => {}
+            Term::Element(vector) => own = self.get(vector),
+            Term::Product(matrix, vector) => {
+                self.accumulate(&mut own, matrix, vector);
+            }
+            Term::FilterStep => {
+                let mut difference = self.get(Vector::Y);
+                difference.add(&self.get(Vector::YF), -1.0);
+                let filter = self.controller.filter.as_deref().unwrap_or_default();
+                let diagonal = DMatrix::from_diagonal(&DVector::from_column_slice(filter));
+                own.accumulate(&diagonal, &difference);
+                own.error += diagonal * difference.error;
+            }
+            Term::Injection => self.inject(&mut own),
+        }
+        own
+    }
+
+    /// Follows rho s / (|s| + delta): the chord of half the largest slope, and v.
+    fn inject(&mut self, own: &mut Elements) {
+        let Some(SlidingMode { rho, delta }) = &self.controller.sliding_mode else { return };
+        let s = self.get(Vector::S);
+        own.magnitude = self.magnitude(Vector::FHat);
+        for (i, (rho, delta)) in rho.iter().zip(delta).enumerate() {
+            let half = rho / (2.0 * delta);
+            let position = self.errors.len();
+            own.form.row_mut(i).copy_from(&(s.form.row(i) * half));
+            own.form[(i, self.order() + position)] = 1.0;
+            self.errors.push(RowDVector::zeros(self.widths().1));
+            self.chords.push((position, half));
+            // Of the product, the sum, the quotient and the constants, relative to the result.
+            let relative = 3.0 * UNIT + constant_error(*rho) / rho + constant_error(*delta) / delta;
+            let rounding = own.magnitude.row(i) * relative;
+            own.error.row_mut(i).add_assign(&rounding);
+        }
+    }
+
+    /// A bound of the differences of the outputs, outputs x signals, from the peak-to-peak gains of
+    /// [`Self::system`].
+    ///
+    /// # Errors
+    ///
+    /// The reason why there is none.
+    pub(super) fn bound(&self, gains: &DMatrix<f64>) -> Result<DMatrix<f64>, String> {
+        let linear = gains * self.kappa();
+        let count = self.chords.len();
+        if count == 0 {
+            return Ok(linear);
+        }
+        let outputs = gains.nrows() - count;
+        let back = DMatrix::from_fn(gains.nrows(), count, |i, j| {
+            let (position, half) = self.chords[j];
+            gains[(i, position)] * half
+        });
+        let loops = DMatrix::identity(count, count) - back.rows(outputs, count);
+        let lu = loops.lu();
+        // The spectral radius of a matrix M >= 0 is below 1 if M x < x for some x > 0: here M x = x - 1.
+        let x = lu.solve(&DVector::from_element(count, 1.0));
+        if !x.is_some_and(|x| x.iter().all(|own| *own >= 1.0 && own.is_finite())) {
+            return Err("the slope of the sliding-mode law changes too much for one".to_owned());
+        }
+        let of_s = lu.solve(&linear.rows(outputs, count).into_owned()).unwrap_or_default();
+        Ok(linear.rows(0, outputs) + back.rows(0, outputs) * of_s)
+    }
+
+    /// The loop from the errors w, v included, to [u; `f_hat`; r], and s of a sliding-mode law.
+    pub(super) fn system(&self) -> StateSpace {
+        let ([n, q, p, m, _, integrals], order) =
+            (Kind::ALL.map(|kind| self.count(kind)), self.order());
+        let inputs = self.errors.len();
+        let command = self.get(Vector::Command).form;
+        let mut next = DMatrix::zeros(order, self.widths().0);
+        next.view_mut((0, 0), (n, n)).copy_from(&self.controller.a);
+        next.rows_mut(0, n).add_assign(&(&self.controller.b * &command));
+        if self.controller.filter.is_some() {
+            next.rows_mut(n - p, p).copy_from(&self.get(Vector::NextYF).form);
+        }
+        next.rows_mut(n, n).copy_from(&self.get(Vector::NextXHat).form);
+        next.rows_mut(2 * n, q).copy_from(&self.get(Vector::NextFHat).form);
+        next.rows_mut(2 * n + q, integrals).copy_from(&self.get(Vector::NextXI).form);
+        let [k, residuals] = [Kind::ResidualState, Kind::Residual].map(|kind| self.count(kind));
+        next.rows_mut(order - k, k).copy_from(&self.get(Vector::NextXR).form);
+        let chords = self.chords.len();
+        let mut outputs = DMatrix::zeros(m + q + residuals + chords, self.widths().0);
+        outputs.rows_mut(0, m).copy_from(&command);
+        outputs.rows_mut(m, q).copy_from(&self.get(Vector::FValue).form);
+        outputs.rows_mut(m + q, residuals).copy_from(&self.get(Vector::Residual).form);
+        let s = self.get(Vector::S).form;
+        outputs.rows_mut(m + q + residuals, chords).copy_from(&s.rows(0, chords));
+        StateSpace {
+            a: next.columns(0, order).into_owned(),
+            b: next.columns(order, inputs).into_owned(),
+            c: outputs.columns(0, order).into_owned(),
+            d: outputs.columns(order, inputs).into_owned(),
+            domain: Domain::Sampled { period: self.controller.sample_time },
+        }
+    }
+
+    /// kappa, errors x signals.
+    fn kappa(&self) -> DMatrix<f64> {
+        DMatrix::from_rows(&self.errors)
+    }
+}
