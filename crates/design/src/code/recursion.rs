@@ -171,7 +171,7 @@ fn fault_corrections(controller: &Controller) -> Vec<Statement> {
         let s = Term::Product(Matrix::LF, Vector::E);
         let equation = "f_hat = rho s / (|s| + delta), s = L_f e, element by element";
         return vec![
-            Statement { when, ..statement(equation, Vector::S, s, []) },
+            statement(equation, Vector::S, s, []),
             Statement { when, ..statement("", Vector::FHat, Term::Injection, []) },
         ];
     }
