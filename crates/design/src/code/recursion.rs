@@ -337,10 +337,7 @@ fn fault_predictions(controller: &Controller) -> Vec<Statement> {
     let when = while_estimating(controller);
     let corrected = controller.estimator == Estimator::Prediction;
     let (direct, own) = (controller.p_f.is_some(), integral(controller));
-    let equation = match direct {
-        false => "f_hat[k+1] = f_hat",
-        true => "f_hat_i[k+1] = f_hat_i",
-    };
+    let equation = if direct { "f_hat_i[k+1] = f_hat_i" } else { "f_hat[k+1] = f_hat" };
     let kept = statement(equation, Vector::NextFHat, Element(own), [Add(Zero)]);
     let correction = Accumulate(Matrix::LF, Vector::E);
     let (equation, start, mut operations) = match (controller.constant_faults, corrected) {
