@@ -16,7 +16,7 @@ mod norm_filter;
 mod problem;
 
 pub use kalman::{KalmanFilter, kalman};
-pub use norm_filter::{NormFilterProblem, norm_filter};
+pub use norm_filter::{NormFilter, NormFilterProblem};
 
 use crate::{Domain, Error, stability};
 use nalgebra::{Complex, DMatrix};

@@ -10,7 +10,7 @@ use control::lmi::{
     weighted_state_feedback,
 };
 use control::response::h_infinity;
-use control::riccati::{NormFilterProblem, kalman, norm_filter};
+use control::riccati::{NormFilter, NormFilterProblem};
 use control::weight::{Weight, diagonal};
 use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
@@ -28,6 +28,8 @@ const NARROW: f64 = 1.02;
 /// The bound for which a filter is designed, relative to the least one: the gain grows without limit
 /// towards that.
 const RELAXED: f64 = 1.1;
+/// The norm of such a filter, relative to its bound, above which it is not used.
+const ROUNDED: f64 = 1.05;
 
 /// The pair of the augmented observer and what its channel needs.
 pub(crate) struct ObserverProblem<'a> {
@@ -111,58 +113,55 @@ impl ObserverProblem<'_> {
         Ok(Some(ChannelWeights { input, output }))
     }
 
-    /// Computes the gain of the filter for the bound, or for the least bound that any filter reaches; regions do
-    /// not matter. Only in continuous time with noise on each unfiltered measurement.
+    /// Computes the gain of the filter for the bound, or near the least bound that any filter reaches; regions do
+    /// not matter. Only with noise on each measurement: behind a measurement filter there is none in the equation of
+    /// continuous time.
     fn riccati(
         &self,
         required: NormRequirement<'_>,
         domain: Domain,
     ) -> Result<Option<DMatrix<f64>>, Error> {
-        let noise = &required.channel.noise;
-        let unsuitable = required.channel.has_states()
-            || noise.is_empty()
-            || self.filter.is_some()
-            || self.a_0.nrows() > LARGEST_ORDER;
-        if domain != Domain::Continuous || unsuitable {
+        let channel = required.channel;
+        let unsuitable = channel.has_states() || channel.noise.is_empty();
+        if unsuitable || self.a_0.nrows() > LARGEST_ORDER {
             return Ok(None);
         }
-        let squares = noise.iter().map(|one| one.factor() * one.factor()).collect::<Vec<_>>();
         let given = self.performance(required, domain);
-        let rates = given.disturbance.columns(0, self.faults).into_owned();
+        let seen = self.estimator.output_matrix(self.a_0, self.c_0);
         let problem = NormFilterProblem {
             a: self.a_0,
-            c: self.c_0,
-            disturbance: &rates,
-            noise: &DMatrix::from_diagonal(&squares.into()),
+            c: &seen,
+            disturbance: &given.disturbance,
+            feedthrough: &given.feedthrough,
             output: &given.output,
         };
         // A plant with a mode at rest that no fault excites has no such filter.
-        let solve = |gamma| norm_filter(&problem, gamma).unwrap_or(None);
+        let Ok(filter) = NormFilter::new(&problem, domain) else { return Ok(None) };
         if let Some(bound) = required.bound {
-            return Ok(solve(bound));
+            return filter.gain(bound);
         }
-        let process = &rates * rates.transpose();
-        let Ok(kalman) = kalman(self.a_0, self.c_0, &process, problem.noise, domain) else {
-            return Ok(None);
+        let norm = |gain: &DMatrix<f64>| -> Result<f64, Error> {
+            let system = StateSpace {
+                a: self.a_0 - gain * &seen,
+                b: &given.disturbance - gain * &given.feedthrough,
+                c: given.output.clone(),
+                d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
+                domain,
+            };
+            Ok(h_infinity(&system, WIDTH)?.upper)
         };
-        let start = kalman.gain;
-        let system = StateSpace {
-            a: self.a_0 - &start * self.c_0,
-            b: &given.disturbance - &start * &given.feedthrough,
-            c: given.output.clone(),
-            d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
-            domain,
-        };
-        let mut high = h_infinity(&system, WIDTH)?.upper * RELAXED;
+        let mut high = norm(&filter.kalman_gain())? * RELAXED;
         let mut low = high / RANGE;
         while high > NARROW * low {
             let middle = (low * high).sqrt();
-            match solve(middle) {
+            match filter.gain(middle)? {
                 Some(_) => high = middle,
                 None => low = middle,
             }
         }
-        Ok(solve(RELAXED * high))
+        let Some(gain) = filter.gain(RELAXED * high)? else { return Ok(None) };
+        // Rounding errors of the equation are errors of the norm: then inequalities are the better way.
+        Ok((norm(&gain)? <= ROUNDED * RELAXED * high).then_some(gain))
     }
 
     /// Computes a norm below which no gain is, and without a noise channel, if it is larger, one for the disc of

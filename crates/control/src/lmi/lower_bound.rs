@@ -17,11 +17,12 @@ use nalgebra::{DMatrix, SymmetricEigen};
 /// x' = A x + B w,  y = C x + D w,  z = E x          (sampled: x[k+1] = A x[k] + B w[k])
 /// gamma_low^2 = tr(E H_xx E') / tr(H_ww)  for a H = [H_xx, H_xw; H_wx, H_ww] >= 0 with
 /// [C, D] H = 0  and  A H_xx + H_xx A' + B H_wx + H_xw B' >= 0
-/// (sampled: [A, B] H [A, B]' - H_xx >= 0)
+/// (sampled: gamma_low^2 = tr(E H_+ E') / tr(H_ww),  H_+ = [A, B] H [A, B]',  H_+ - H_xx >= 0)
 /// ```
 ///
 /// Such an H is the covariance of growing disturbances that the measurement does not show: every
-/// filter estimates z = 0. So no filter from y to an estimate of z, of any order, has an error with a
+/// filter estimates z = 0. In sampled time `z[k]` is estimated from `y[0]` to `y[k-1]`, as by A - L C, so that the
+/// error after the last sample counts, which the next measurement may show. So no filter from y to an estimate of z, of any order, has an error with a
 /// smaller norm; for error dynamics A - L C the traces of H with the inequality of the norm (see
 /// [`super::certify_gain`]) give the bound, whatever L is. The largest bound is computed; it equals the
 /// least norm of any filter (strong duality), which gains in general only approach.
@@ -186,13 +187,20 @@ impl HiddenDisturbance {
         Ok(Some((covariance.dot(&of_z) / covariance.dot(&of_w)).sqrt()))
     }
 
+    /// [A, B].
+    fn next(&self) -> DMatrix<f64> {
+        let (order, free) = self.b.shape();
+        let mut next = self.a.clone().resize_horizontally(order + free, 0.0);
+        next.columns_mut(order, free).copy_from(&self.b);
+        next
+    }
+
     /// A X + X A' + B Y + Y' B' of the covariance [X, Y'; Y, U]; sampled: [A, B] [X, Y'; Y, U]
     /// [A, B]' - X.
     fn growth(&self, covariance: &Affine) -> Affine {
         let (order, free) = self.b.shape();
         let state = DMatrix::identity(order, order + free);
-        let mut next = self.a.clone().resize_horizontally(order + free, 0.0);
-        next.columns_mut(order, free).copy_from(&self.b);
+        let next = self.next();
         let moved = &next * covariance;
         match self.domain {
             Domain::Continuous => (&moved * &state.transpose()).plus_transpose(),
@@ -203,11 +211,15 @@ impl HiddenDisturbance {
         }
     }
 
-    /// M of tr(M H) for the energies of z and of w.
+    /// M of tr(M H) for the energies of z, in sampled time one sample later, and of w.
     fn energies(&self) -> (DMatrix<f64>, DMatrix<f64>) {
         let (order, free) = self.b.shape();
         let whole = order + free;
-        let of_z = self.output.tr_mul(&self.output).resize(whole, whole, 0.0);
+        let seen = match self.domain {
+            Domain::Continuous => self.output.clone().resize_horizontally(whole, 0.0),
+            Domain::Sampled { .. } => &self.output * self.next(),
+        };
+        let of_z = seen.tr_mul(&seen);
         let mut of_w = self.energy.tr_mul(&self.energy).resize(whole, whole, 0.0);
         of_w.view_mut((order, order), (free, free)).fill_with_identity();
         (of_z, of_w)
@@ -268,6 +280,20 @@ mod tests {
             observer_norm_lower_bound(&row(&[3.0]), &row(&[1.0]), &given, Domain::Continuous);
         let bound = found.unwrap().unwrap();
         assert!(bound <= 1.0 && bound > 0.9999, "{bound}");
+    }
+
+    /// X = a^2 / (1 / X + 1 - `1/gamma^2`) + 1 of x[k+1] = a x[k] + w[k], y = x + v, z = x has a solution with X below
+    /// `gamma^2` for `gamma^2` above a^2 + 1.
+    #[test]
+    fn the_sampled_bound_of_a_scalar_filter_is_that_of_the_riccati_equation() {
+        let given = performance(row(&[1.0, 0.0]), row(&[1.0]), row(&[0.0, 1.0]));
+        for a in [0.5_f64, -1.0, 1.0, 2.0] {
+            let domain = Domain::Sampled { period: 1.0 };
+            let found = observer_norm_lower_bound(&row(&[a]), &row(&[1.0]), &given, domain);
+            let least = (1.0 + a * a).sqrt();
+            let bound = found.unwrap().unwrap();
+            assert!(bound <= least && bound > 0.9999 * least, "{a}: {bound}, {least}");
+        }
     }
 
     #[test]

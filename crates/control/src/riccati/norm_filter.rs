@@ -1,17 +1,24 @@
 //! The filter whose error keeps a bound of its H-infinity norm.
 
-use super::kalman;
-use crate::{Domain, Error, check};
+use super::problem::{balancing, scaled_equation};
+use super::{KalmanFilter, doubling, kalman};
+use crate::balance::{divide_columns, divide_rows};
+use crate::blocks::symmetric_part;
+use crate::{Domain, Error, check, stability};
 use nalgebra::DMatrix;
 
-/// Riccati equations that are solved for one bound.
+/// Riccati equations that are solved for one bound, if doubling does not solve its equation directly.
 const ITERATIONS: usize = 400;
 /// Relative change at which the iteration has converged.
 const CONVERGED: f64 = 1e-4;
 /// Largest growth of X from the Kalman filter's on, beyond which the bound counts as too small.
 const GROWTH: f64 = 1e8;
+/// Largest relative difference of the covariances of the Kalman filter by doubling and by [`kalman`] at which
+/// doubling is trusted for bounds, too.
+const SAME: f64 = 1e-6;
 
-/// The error dynamics for [`norm_filter`]: x' = (A - L C) x + B w - L v, z = E x.
+/// The error dynamics for [`NormFilter`]: x' = (A - L C) x + (B - L D) w, z = E x, in sampled time
+/// `x[k+1] = (A - L C) x[k] + (B - L D) w[k]`.
 #[derive(Debug, Clone, Copy)]
 pub struct NormFilterProblem<'a> {
     /// A, n x n.
@@ -20,73 +27,306 @@ pub struct NormFilterProblem<'a> {
     pub c: &'a DMatrix<f64>,
     /// B, n x k.
     pub disturbance: &'a DMatrix<f64>,
-    /// V, p x p, positive definite: v = `V^(1/2)` times noise of unit size.
-    pub noise: &'a DMatrix<f64>,
+    /// D, p x k, of full row rank: every measurement has noise.
+    pub feedthrough: &'a DMatrix<f64>,
     /// E, r x n.
     pub output: &'a DMatrix<f64>,
 }
 
-/// Computes the gain L of the filter in continuous time whose H-infinity norm from the disturbance w
-/// and the noise to z is below `gamma`; None if no such filter was found.
+/// Filters whose H-infinity norm from the disturbance w to the error z is below a bound.
 ///
 /// ```text
-/// A X + X A' - X (C' V^-1 C - E' E / gamma^2) X + B B' = 0,   L = X C' V^-1
+/// R = D D',  S = B D',  A_s = A - S R^-1 C,  Q = B B' - S R^-1 S',  G = C' R^-1 C - E' E / gamma^2
+///
+/// continuous:  A_s X + X A_s' - X G X + Q = 0
+///              L = X C' R^-1 + S R^-1
+/// sampled:     X = A_s X (I + G X)^-1 A_s' + Q,  gamma^2 I - E X E' > 0
+///              Y = X + X E' (gamma^2 I - E X E')^-1 E X
+///              L = A_s Y C' (R + C Y C')^-1 + S R^-1
 /// ```
 ///
-/// Method: X is the limit of the covariances of Kalman filters, each with the process noise B B' +
-/// X E' E X / `gamma^2` of the one before. They grow from that of the Kalman filter, and stay below the
-/// solution X if there is one, so they converge if and only if gamma is above the least norm of any
-/// filter. The number of iterations grows without limit towards that norm; 400 reach to
-/// about 2 % above it. The bound holds up to the tolerance 1e-4 of X: evaluate the norm of the result.
+/// A filter of any order exists if and only if there is a solution X >= 0 that stabilises `A_s` - X G, in sampled
+/// time `A_s` (I + X G)^-1; X >= 0 is equivalent to A - L C being stable.
+///
+/// Method: doubling in balanced coordinates. Where it does not find the covariance of the Kalman filter, as it may not for
+/// unstable modes that no w moves: X is the limit of the covariances of Kalman filters, each with the process noise that X of the one
+/// before adds. They grow from that of the Kalman filter, and stay below the solution X if there is one, so
+/// they converge if and only if gamma is above the least norm. Their number grows without limit towards that
+/// norm; 400 reach to about 2 % above it.
 ///
 /// Source: K. M. Nagpal, P. P. Khargonekar, Filtering and smoothing in an H-infinity setting, IEEE
-/// Trans. Autom. Control 36 (1991), theorem 3.1.
-///
-/// # Errors
-///
-/// Same as [`kalman`] for the first filter; [`Error::OutOfRange`] for `gamma`.
-pub fn norm_filter(
-    problem: &NormFilterProblem<'_>,
-    gamma: f64,
-) -> Result<Option<DMatrix<f64>>, Error> {
-    check::positive("gamma", gamma)?;
-    let NormFilterProblem { a, c, disturbance, noise, output } = *problem;
-    check::shape("E", output, (output.nrows(), a.nrows()))?;
-    let process = disturbance * disturbance.transpose();
-    let mut filter = kalman(a, c, &process, noise, Domain::Continuous)?;
-    let first = filter.covariance.norm();
-    for _ in 0..ITERATIONS {
-        let before = filter.covariance;
-        let seen = output * &before / gamma;
-        let grown = &process + seen.tr_mul(&seen);
-        let symmetric = (&grown + grown.transpose()) * 0.5;
-        let Ok(next) = kalman(a, c, &symmetric, noise, Domain::Continuous) else { return Ok(None) };
-        let size = next.covariance.norm();
-        if (&next.covariance - before).norm() <= CONVERGED * size {
-            return Ok(Some(next.gain));
-        }
-        if size > GROWTH * first {
-            return Ok(None);
-        }
-        filter = next;
+/// Trans. Autom. Control 36 (1991), theorem 3.1; sampled: B. Hassibi, A. H. Sayed, T. Kailath, Linear
+/// estimation in Krein spaces, part II, IEEE Trans. Autom. Control 41 (1996), theorem 4 (a priori filter).
+#[derive(Debug, Clone)]
+pub struct NormFilter {
+    /// `A_s`.
+    a: DMatrix<f64>,
+    c: DMatrix<f64>,
+    process: DMatrix<f64>,
+    noise: DMatrix<f64>,
+    output: DMatrix<f64>,
+    /// C' R^-1 C.
+    seen: DMatrix<f64>,
+    /// S R^-1.
+    correlated: DMatrix<f64>,
+    domain: Domain,
+    filter: KalmanFilter,
+    /// Whether doubling finds the covariance of the Kalman filter.
+    doubles: bool,
+}
+
+impl NormFilter {
+    /// Prepares filters for a problem.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`] for B, D or E; [`Error::NotPositiveDefinite`] if a measurement has no noise; otherwise same
+    /// as [`kalman`].
+    pub fn new(problem: &NormFilterProblem<'_>, domain: Domain) -> Result<Self, Error> {
+        let NormFilterProblem { a, c, disturbance: b, feedthrough: d, output } = *problem;
+        let (n, p, k) = (check::square("A", a)?, c.nrows(), b.ncols());
+        check::shape("C", c, (p, n))?;
+        check::shape("B", b, (n, k))?;
+        check::shape("D", d, (p, k))?;
+        check::shape("E", output, (output.nrows(), n))?;
+        let noise = symmetric_part(&(d * d.transpose()));
+        let indefinite = Error::NotPositiveDefinite { matrix: "D D'" };
+        let factor = noise.clone().cholesky().ok_or(indefinite)?;
+        let correlated = factor.solve(&(d * b.transpose())).transpose();
+        // B - S R^-1 D is free of D: its square is Q without a difference of large numbers.
+        let free = b - &correlated * d;
+        let process = symmetric_part(&(&free * free.transpose()));
+        let a = a - &correlated * c;
+        let filter = kalman(&a, c, &process, &noise, domain)?;
+        let seen = symmetric_part(&c.tr_mul(&factor.solve(c)));
+        let mut all = Self {
+            a,
+            c: c.clone(),
+            process,
+            noise,
+            output: output.clone(),
+            seen,
+            correlated,
+            domain,
+            filter,
+            doubles: false,
+        };
+        let covariance = &all.filter.covariance;
+        all.doubles = all
+            .doubled(f64::INFINITY)
+            .is_some_and(|found| (found - covariance).norm() <= SAME * covariance.norm());
+        Ok(all)
     }
-    Ok(None)
+
+    /// Returns the gain of the Kalman filter, the limit for large bounds.
+    #[must_use]
+    pub fn kalman_gain(&self) -> DMatrix<f64> {
+        &self.filter.gain + &self.correlated
+    }
+
+    /// Computes the gain of a filter whose norm is below `gamma`; None if no such filter was found.
+    ///
+    /// The bound holds up to rounding errors, and up to 1e-4 of X where doubling is not possible: evaluate the norm
+    /// of the result.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] for `gamma`.
+    pub fn gain(&self, gamma: f64) -> Result<Option<DMatrix<f64>>, Error> {
+        check::positive("gamma", gamma)?;
+        if self.doubles {
+            let stable = |x| self.stabilising(&x, gamma);
+            return Ok(self.doubled(gamma).and_then(stable));
+        }
+        Ok(self.iterated(gamma))
+    }
+
+    /// G.
+    fn information(&self, gamma: f64) -> DMatrix<f64> {
+        let output = &self.output / gamma;
+        symmetric_part(&(&self.seen - output.tr_mul(&output)))
+    }
+
+    /// X by doubling.
+    fn doubled(&self, gamma: f64) -> Option<DMatrix<f64>> {
+        let (a, g) = (self.a.transpose(), self.information(gamma));
+        let scale = balancing(&a, &g, &self.process);
+        let (a, g, q) = scaled_equation(&a, &g, &self.process, &scale);
+        let found = match self.domain {
+            Domain::Continuous => doubling::continuous(&a, &g, &q),
+            Domain::Sampled { .. } => doubling::sampled(&a, &g, &q),
+        };
+        Some(divide_rows(&divide_columns(&found.ok()?, &scale), &scale))
+    }
+
+    /// The gain of X, if X is the stabilising and positive semidefinite solution.
+    fn stabilising(&self, x: &DMatrix<f64>, gamma: f64) -> Option<DMatrix<f64>> {
+        let g = self.information(gamma);
+        let game = match self.domain {
+            Domain::Continuous => &self.a - x * g,
+            Domain::Sampled { .. } => {
+                let identity = DMatrix::identity(x.nrows(), x.nrows());
+                &self.a * (identity + x * g).try_inverse()?
+            }
+        };
+        let gain = self.gain_of(&(x + self.added(x, gamma)?))?;
+        let stable = |matrix| stability::require_stable("", matrix, self.domain).is_ok();
+        let error = &self.a - &gain * &self.c;
+        (stable(&game) && stable(&error)).then(|| gain + &self.correlated)
+    }
+
+    /// The process noise that X adds: X E' E X / `gamma^2`, in sampled time X E' (`gamma^2` I - E X E')^-1 E X, by
+    /// which the covariance then grows itself.
+    fn added(&self, x: &DMatrix<f64>, gamma: f64) -> Option<DMatrix<f64>> {
+        let seen = &self.output * x / gamma;
+        let added = match self.domain {
+            Domain::Continuous => return Some(DMatrix::zeros(x.nrows(), x.ncols())),
+            Domain::Sampled { .. } => {
+                let rest = DMatrix::identity(seen.nrows(), seen.nrows())
+                    - &seen * self.output.transpose() / gamma;
+                seen.tr_mul(&symmetric_part(&rest).cholesky()?.solve(&seen))
+            }
+        };
+        Some(symmetric_part(&added))
+    }
+
+    /// L - S R^-1 for a covariance: X, in sampled time Y.
+    fn gain_of(&self, covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let crossed = &self.c * covariance;
+        Some(match self.domain {
+            Domain::Continuous => self.noise.clone().cholesky()?.solve(&crossed).transpose(),
+            Domain::Sampled { .. } => {
+                let innovation = &self.noise + &crossed * self.c.transpose();
+                let factor = symmetric_part(&innovation).cholesky()?;
+                &self.a * factor.solve(&crossed).transpose()
+            }
+        })
+    }
+
+    /// The gain by Kalman filters.
+    fn iterated(&self, gamma: f64) -> Option<DMatrix<f64>> {
+        let first = self.filter.covariance.norm();
+        let mut x = self.filter.covariance.clone();
+        for _ in 0..ITERATIONS {
+            let added = match self.domain {
+                Domain::Continuous => {
+                    let seen = &self.output * &x / gamma;
+                    symmetric_part(&seen.tr_mul(&seen))
+                }
+                Domain::Sampled { .. } => self.added(&x, gamma)?,
+            };
+            let next =
+                kalman(&self.a, &self.c, &(&self.process + &added), &self.noise, self.domain);
+            let next = next.ok()?;
+            let found = match self.domain {
+                Domain::Continuous => next.covariance,
+                Domain::Sampled { .. } => next.covariance - added,
+            };
+            let size = found.norm();
+            if (&found - x).norm() <= CONVERGED * size {
+                return Some(next.gain + &self.correlated);
+            }
+            if size > GROWTH * first {
+                return None;
+            }
+            x = found;
+        }
+        None
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::StateSpace;
+    use crate::response::h_infinity;
 
-    /// For x' = w, y = x + v, z = x: 0 = -(1 - `1/gamma^2`) X^2 + 1, so a filter exists for gamma above
-    /// 1, and L = 1 / sqrt(1 - `1/gamma^2`).
+    const SAMPLED: Domain = Domain::Sampled { period: 1.0 };
+
+    fn row(entries: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_row_slice(1, entries.len(), entries)
+    }
+
+    /// x' = a x + w, y = x + v, z = x.
+    fn scalar(a: f64, domain: Domain) -> NormFilter {
+        NormFilter::new(
+            &NormFilterProblem {
+                a: &row(&[a]),
+                c: &row(&[1.0]),
+                disturbance: &row(&[1.0, 0.0]),
+                feedthrough: &row(&[0.0, 1.0]),
+                output: &row(&[1.0]),
+            },
+            domain,
+        )
+        .unwrap()
+    }
+
+    /// 0 = -(1 - `1/gamma^2`) X^2 + 1: a filter exists for gamma above 1, and L = 1 / sqrt(1 - `1/gamma^2`).
     #[test]
     fn the_filter_of_an_integrator_has_the_gain_of_the_scalar_equation() {
-        let (zero, one) = (DMatrix::zeros(1, 1), DMatrix::identity(1, 1));
-        let problem =
-            NormFilterProblem { a: &zero, c: &one, disturbance: &one, noise: &one, output: &one };
-        let gain = norm_filter(&problem, 1.25).unwrap().unwrap();
-        assert!((gain[(0, 0)] - 1.0 / 0.6).abs() < 1e-3);
-        assert_eq!(norm_filter(&problem, 0.9).unwrap(), None);
-        assert!(norm_filter(&problem, 0.0).is_err());
+        let filter = scalar(0.0, Domain::Continuous);
+        assert!(filter.doubles);
+        let by_doubling = filter.gain(1.25).unwrap().unwrap();
+        assert!((by_doubling[(0, 0)] - 1.0 / 0.6).abs() < 1e-12);
+        assert!((filter.iterated(1.25).unwrap()[(0, 0)] - 1.0 / 0.6).abs() < 1e-3);
+        assert_eq!(filter.gain(0.9).unwrap(), None);
+        assert_eq!(filter.iterated(0.9), None);
+        assert!(filter.gain(0.0).is_err());
+    }
+
+    /// X = a^2 / (1 / X + 1 - `1/gamma^2`) + 1 with X below `gamma^2`: at the limit X = `gamma^2` = a^2 + 1.
+    #[test]
+    fn a_sampled_filter_exists_above_the_limit_of_the_scalar_equation() {
+        for a in [0.0, 0.5, -1.0, 1.0, 2.0_f64] {
+            let (filter, least) = (scalar(a, SAMPLED), (1.0 + a * a).sqrt());
+            for gain in [filter.gain(1.001 * least).unwrap(), filter.iterated(1.05 * least)] {
+                let gain = gain.unwrap();
+                let error = StateSpace {
+                    a: row(&[a - gain[(0, 0)]]),
+                    b: row(&[1.0, -gain[(0, 0)]]),
+                    c: row(&[1.0]),
+                    d: row(&[0.0, 0.0]),
+                    domain: SAMPLED,
+                };
+                let norm = h_infinity(&error, 1e-6).unwrap().upper;
+                assert!(norm > 0.999 * least && norm < 1.05 * least, "{a}: {norm}, {least}");
+            }
+            assert_eq!(filter.gain(0.999 * least).unwrap(), None, "{a}");
+            assert_eq!(filter.iterated(0.99 * least), None, "{a}");
+        }
+    }
+
+    /// y[k] = x[k] + w[k] shares w with x[k+1] = x[k] + w[k]: L = 1 leaves no error.
+    #[test]
+    fn noise_that_is_the_disturbance_leaves_no_error() {
+        let one = row(&[1.0]);
+        let both = row(&[1.0, 1e-3]);
+        let problem = NormFilterProblem {
+            a: &one,
+            c: &one,
+            disturbance: &row(&[1.0, 0.0]),
+            feedthrough: &both,
+            output: &one,
+        };
+        let gain = NormFilter::new(&problem, SAMPLED).unwrap().gain(0.01).unwrap().unwrap();
+        assert!((gain[(0, 0)] - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn an_unstable_mode_that_no_disturbance_moves_is_stabilised() {
+        let a = DMatrix::from_row_slice(2, 2, &[0.5, 0.0, 0.0, -1.0]);
+        let problem = NormFilterProblem {
+            a: &a,
+            c: &row(&[1.0, 1.0]),
+            disturbance: &DMatrix::from_row_slice(2, 2, &[0.0, 0.0, 1.0, 0.0]),
+            feedthrough: &row(&[0.0, 1.0]),
+            output: &row(&[1.0, 0.0]),
+        };
+        let filter = NormFilter::new(&problem, Domain::Continuous).unwrap();
+        for gain in [filter.gain(10.0).unwrap(), filter.iterated(10.0)] {
+            let error = &a - gain.unwrap() * problem.c;
+            assert!(stability::require_stable("", &error, Domain::Continuous).is_ok());
+        }
     }
 }

@@ -135,7 +135,7 @@ fn per_unit(m: &DMatrix<f64>, factor: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Diagonal S that balances the Hamiltonian matrix [A, -G; -Q, -A'] by diag(S, S^-1).
-fn balancing(a: &DMatrix<f64>, g: &DMatrix<f64>, q: &DMatrix<f64>) -> DVector<f64> {
+pub(super) fn balancing(a: &DMatrix<f64>, g: &DMatrix<f64>, q: &DMatrix<f64>) -> DVector<f64> {
     let order = a.nrows();
     let mut hamiltonian = DMatrix::zeros(2 * order, 2 * order);
     hamiltonian.view_mut((0, 0), (order, order)).copy_from(&a.abs());
@@ -144,4 +144,18 @@ fn balancing(a: &DMatrix<f64>, g: &DMatrix<f64>, q: &DMatrix<f64>) -> DVector<f6
     hamiltonian.view_mut((order, order), (order, order)).copy_from(&a.abs().transpose());
     let scale = Balance::new(&hamiltonian).scale;
     DVector::from_fn(order, |i, _| power_of_two((scale[i] / scale[order + i]).sqrt()))
+}
+
+/// (S^-1 A S, S^-1 G S^-1, S Q S).
+pub(super) fn scaled_equation(
+    a: &DMatrix<f64>,
+    g: &DMatrix<f64>,
+    q: &DMatrix<f64>,
+    scale: &DVector<f64>,
+) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
+    (
+        divide_rows(&multiply_columns(a, scale), scale),
+        divide_rows(&divide_columns(g, scale), scale),
+        multiply_rows(&multiply_columns(q, scale), scale),
+    )
 }
