@@ -1,14 +1,18 @@
 //! Eigenvalues of a real square matrix.
 
+mod complex;
 mod francis;
 mod hamiltonian;
 mod rank_one;
 
 use crate::balance::Balance;
 use crate::{Error, check};
+pub(crate) use complex::complex_eigenvalues;
 pub(crate) use hamiltonian::Hamiltonian;
 use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, Schur};
 pub(crate) use rank_one::RankOne;
+
+const WHAT: &str = "the QR algorithm for eigenvalues";
 
 /// Largest number of QR iterations per row of the matrix; two or three are usual.
 const ITERATIONS_PER_ROW: usize = 100;
@@ -64,9 +68,8 @@ where
     T: ComplexField<RealField = f64>,
 {
     let iterations = ITERATIONS_PER_ROW * m.nrows();
-    let what = "the QR algorithm for eigenvalues";
     let found = ZERO.iter().find_map(|&zero| Schur::try_new(m.clone(), zero, iterations));
-    found.ok_or(Error::NotConverged { what, iterations })
+    found.ok_or(Error::NotConverged { what: WHAT, iterations })
 }
 
 /// H M H with the reflection H = I - 2 v v' / (v'v), v = (1, 1/2, 1/3, ...).

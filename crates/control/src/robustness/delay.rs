@@ -5,7 +5,7 @@ use super::held::hold_inputs;
 use super::sweep::Sweep;
 use super::{Loop, Point, held_plant};
 use crate::blocks::block_2x2;
-use crate::eigen::schur;
+use crate::eigen::complex_eigenvalues;
 use crate::response::KnownResponse;
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace};
@@ -38,24 +38,34 @@ pub fn delay_margin(closed: &Loop) -> Result<f64, Error> {
 /// The delay margin of the loop with this T.
 pub(super) fn delay_of(complementary: &KnownResponse) -> Result<f64, Error> {
     let sweep = Sweep::new(complementary)?;
+    let all = sweep.values.iter().map(loci).collect::<Result<Vec<_>, _>>()?;
     let mut delay = f64::INFINITY;
     for rank in 0..complementary.system.d.nrows() {
-        let modulus =
-            |t: &DMatrix<Complex<f64>>| loci(t).map_or(f64::NAN, |loci| loci[rank].norm() - 1.0);
-        for frequency in sweep.crossings(modulus)? {
-            let at = loci(&sweep.at(frequency)?)?[rank];
+        let excess: Vec<_> = all.iter().map(|loci| loci[rank].excess).collect();
+        let value = |t: &DMatrix<Complex<f64>>| Ok(loci(t)?[rank].excess);
+        for frequency in sweep.crossings_of(&excess, value)? {
+            let at = loci(&sweep.at(frequency)?)?[rank].value;
             delay = delay.min((-at).arg().rem_euclid(TAU) / frequency);
         }
     }
     Ok(delay)
 }
 
+/// An eigenvalue of L.
+struct Locus {
+    value: Complex<f64>,
+    /// The modulus less 1; infinite for a pole of L at this frequency.
+    excess: f64,
+}
+
 /// The eigenvalues of L = T (I - T)^-1, those of T divided by one less themselves, by modulus.
-fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Complex<f64>>, Error> {
-    let triangular = schur(t)?.unpack().1;
+fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Locus>, Error> {
     let one = Complex::new(1.0, 0.0);
-    let mut found: Vec<_> = triangular.diagonal().iter().map(|t| t / (one - t)).collect();
-    found.sort_by(|x, y| x.norm().total_cmp(&y.norm()));
+    let mut found: Vec<_> = complex_eigenvalues(t)?
+        .into_iter()
+        .map(|t| Locus { value: t / (one - t), excess: t.norm() / (one - t).norm() - 1.0 })
+        .collect();
+    found.sort_by(|x, y| x.excess.total_cmp(&y.excess));
     Ok(found)
 }
 

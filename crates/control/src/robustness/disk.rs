@@ -1,6 +1,6 @@
 //! Disk margins, and peaks that do not depend on the units of the channels.
 
-use super::scaling::{ScaledPeak, balanced_norm, scaled_norm};
+use super::scaling::{ScaledPeak, balanced_norm, scaled_norm_above};
 use super::sweep::Sweep;
 use super::{Loop, Point};
 use crate::blocks::to_complex;
@@ -10,6 +10,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 pub(super) const WIDTH: f64 = 1e-4;
 const REFINEMENTS: usize = 30;
+/// Relative distance from the largest value at which the refinement ends.
+const FLAT: f64 = 1e-5;
 
 /// The symmetric disk margin: the loop stays stable while each channel, all at the same time and
 /// independently of each other, is multiplied by a complex factor of the disk.
@@ -157,7 +159,7 @@ impl Largest {
         let scaling = DVector::zeros(system.d.nrows());
         let mut best = Self { value: 0.0, frequency: 0.0, scaling };
         if system.domain == Domain::Continuous {
-            best.offer(&to_complex(&system.d), f64::INFINITY)?;
+            best.offer(&to_complex(&system.d), f64::INFINITY, 0.0)?;
         }
         let bounds = sweep.values.iter().map(balanced_norm).collect::<Result<Vec<_>, _>>()?;
         let mut order: Vec<usize> = (0..bounds.len()).collect();
@@ -168,7 +170,7 @@ impl Largest {
                 break;
             }
             let before = best.value;
-            if best.offer(&sweep.values[at], sweep.frequencies[at])? > before {
+            if best.offer(&sweep.values[at], sweep.frequencies[at], before)? > before {
                 place = Some(at);
             }
         }
@@ -186,9 +188,14 @@ impl Largest {
         for _ in 0..REFINEMENTS {
             let third = (high - low) / 3.0;
             let (first, second) = (low + third, high - third);
-            let values = [first, second].map(|w| self.offer(&sweep.at(w)?, w));
+            let values = [first, second].map(|w| self.offer(&sweep.at(w)?, w, 0.0));
             let [left, right] = values;
-            if left? < right? {
+            let (left, right) = (left?, right?);
+            // As flat as the values are precise.
+            if left.min(right) >= (1.0 - FLAT) * self.value {
+                break;
+            }
+            if left < right {
                 low = first;
             } else {
                 high = second;
@@ -197,9 +204,14 @@ impl Largest {
         Ok(())
     }
 
-    /// Takes the value at a frequency if it is larger; returns it.
-    fn offer(&mut self, gain: &DMatrix<Complex<f64>>, frequency: f64) -> Result<f64, Error> {
-        let (value, scaling) = scaled_norm(gain)?;
+    /// Takes the value at a frequency if it is larger; returns it, or a bound of it that is at most `enough`.
+    fn offer(
+        &mut self,
+        gain: &DMatrix<Complex<f64>>,
+        frequency: f64,
+        enough: f64,
+    ) -> Result<f64, Error> {
+        let (value, scaling) = scaled_norm_above(gain, enough)?;
         if value > self.value {
             *self = Self { value, frequency, scaling };
         }

@@ -34,10 +34,18 @@ pub struct ScaledPeak {
 /// Source: J. C. Doyle, Analysis of feedback systems with structured uncertainties, IEE Proc. D 129
 /// (1982).
 pub(super) fn scaled_norm(m: &DMatrix<Complex<f64>>) -> Result<(f64, DVector<f64>), Error> {
+    scaled_norm_above(m, 0.0)
+}
+
+/// [`scaled_norm`], but the search ends as soon as the bound is at most `enough`.
+pub(super) fn scaled_norm_above(
+    m: &DMatrix<Complex<f64>>,
+    enough: f64,
+) -> Result<(f64, DVector<f64>), Error> {
     let k = m.nrows();
     let start = balanced(m);
     let first = Scaled::new(m, &start)?;
-    if k == 1 || first.norm <= 0.0 {
+    if k == 1 || first.norm <= enough {
         return Ok((first.norm, start));
     }
     let free = k - 1;
@@ -58,7 +66,7 @@ pub(super) fn scaled_norm(m: &DMatrix<Complex<f64>>) -> Result<(f64, DVector<f64
         let reach = gradient.dot(&direction).max(0.0).sqrt();
         let level = scaled.norm.ln();
         lower = f64::max(lower, level - reach);
-        if best.0.ln() - lower <= WIDTH || reach <= 0.0 {
+        if best.0 <= enough || best.0.ln() - lower <= WIDTH || reach <= 0.0 {
             break;
         }
         // A deep cut: the minimum is where the linear bound is below the best value.
@@ -158,6 +166,21 @@ mod tests {
             assert!((found / exact - 1.0).abs() < 2e-5, "{k}: {found} {exact}");
             assert!(balanced_norm(&m).unwrap() >= found * (1.0 - 1e-12));
         }
+    }
+
+    #[test]
+    fn a_search_that_may_end_early_ends_between_the_least_bound_and_the_value_that_is_enough() {
+        let m = DMatrix::from_fn(6, 6, |i, j| {
+            let at = f64::from(u32::try_from(7 * i + 3 * j * j).unwrap());
+            Complex::from_polar(1.0 + at.sin().abs(), at)
+        });
+        let (least, _) = scaled_norm(&m).unwrap();
+        for enough in [1.0001 * least, 1.05 * least] {
+            let (found, scaling) = scaled_norm_above(&m, enough).unwrap();
+            assert!(found <= enough && found >= least * (1.0 - 2e-5), "{found} {least}");
+            assert!((Scaled::new(&m, &scaling).unwrap().norm - found).abs() < 1e-12 * found);
+        }
+        assert!((scaled_norm_above(&m, 0.9 * least).unwrap().0 / least - 1.0).abs() < 2e-5);
     }
 
     /// The structured singular value of a triangular matrix is its largest diagonal entry; D tends

@@ -33,6 +33,15 @@ impl<'a> Sweep<'a> {
         of: impl Fn(&DMatrix<Complex<f64>>) -> f64,
     ) -> Result<Vec<f64>, Error> {
         let values: Vec<f64> = self.values.iter().map(&of).collect();
+        self.crossings_of(&values, |response| Ok(of(response)))
+    }
+
+    /// The same for a function whose `values` on the grid are known, and whose evaluation may fail.
+    pub(super) fn crossings_of(
+        &self,
+        values: &[f64],
+        of: impl Fn(&DMatrix<Complex<f64>>) -> Result<f64, Error>,
+    ) -> Result<Vec<f64>, Error> {
         let mut found = Vec::new();
         for at in 1..values.len() {
             let (before, after) = (values[at - 1], values[at]);
@@ -40,7 +49,7 @@ impl<'a> Sweep<'a> {
                 continue;
             }
             let ends = ((self.frequencies[at - 1], before), (self.frequencies[at], after));
-            let value = |frequency| Ok::<_, Error>(of(&self.at(frequency)?));
+            let value = |frequency| of(&self.at(frequency)?);
             let (low, high) = narrowed(ends.0, ends.1, value)?;
             found.push(0.5 * (low + high));
         }

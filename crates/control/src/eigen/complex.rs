@@ -1,0 +1,168 @@
+//! Eigenvalues of a complex matrix, without vectors.
+
+use super::WHAT;
+use crate::Error;
+use nalgebra::{Complex, DMatrix};
+
+/// Largest number of sweeps for one eigenvalue; two or three are usual.
+const SWEEPS: usize = 120;
+/// Every so many sweeps without a result an exceptional shift is used.
+const EXCEPTIONAL: usize = 10;
+/// After so many sweeps an entry counts as zero if it is small in comparison with the whole matrix.
+const PATIENCE: usize = 20;
+
+/// Computes the eigenvalues of a complex matrix, in no particular order.
+///
+/// Method: Hessenberg form, then the explicit QR algorithm with the shift of Wilkinson and exceptional shifts, on
+/// the part that has not been deflated. The result is exact for a matrix that differs by a few units of
+/// rounding of its norm. Symmetries of the matrix, and clusters of eigenvalues beside larger entries, do not stop it.
+///
+/// Source: J. H. Wilkinson, The algebraic eigenvalue problem (1965), chapter 8; exceptional shifts: LAPACK's
+/// `zlahqr`.
+///
+/// # Errors
+///
+/// [`Error::NotConverged`] after 120 sweeps for one eigenvalue; also for entries that are not finite.
+pub(crate) fn complex_eigenvalues(m: &DMatrix<Complex<f64>>) -> Result<Vec<Complex<f64>>, Error> {
+    let n = m.nrows();
+    let failed = || Error::NotConverged { what: WHAT, iterations: SWEEPS };
+    if n == 0 || !m.iter().all(|entry| entry.re.is_finite() && entry.im.is_finite()) {
+        return if n == 0 { Ok(Vec::new()) } else { Err(failed()) };
+    }
+    let mut h = m.clone().hessenberg().unpack_h();
+    let norm = h.norm();
+    let mut found = Vec::with_capacity(n);
+    let mut end = n;
+    while end > 0 {
+        let last = end - 1;
+        let mut sweeps = 0;
+        loop {
+            let first = start_of_block(&h, last, if sweeps < PATIENCE { 0.0 } else { norm });
+            if first > 0 {
+                h[(first, first - 1)] = Complex::ZERO;
+            }
+            if first == last {
+                found.push(h[(last, last)]);
+                end = last;
+                break;
+            }
+            if sweeps == SWEEPS {
+                return Err(failed());
+            }
+            sweeps += 1;
+            let shift = if sweeps % EXCEPTIONAL == 0 {
+                h[(last, last)] + 0.75 * h[(last, last - 1)].norm()
+            } else {
+                wilkinson(&h, last)
+            };
+            sweep(&mut h, (first, last), shift);
+        }
+    }
+    Ok(found)
+}
+
+/// The first row of the last block that no negligible subdiagonal entry divides. An entry is compared with its
+/// neighbours on the diagonal and with `norm`.
+fn start_of_block(h: &DMatrix<Complex<f64>>, last: usize, norm: f64) -> usize {
+    let size = |at: (usize, usize)| h[at].re.abs() + h[at].im.abs();
+    let negligible = |k: usize| {
+        let around = size((k, k)) + size((k - 1, k - 1));
+        size((k, k - 1)) <= (f64::EPSILON * around.max(norm)).max(f64::MIN_POSITIVE)
+    };
+    (1..=last).rev().find(|&k| negligible(k)).unwrap_or(0)
+}
+
+/// The eigenvalue of the last 2 x 2 block that is nearer to the last entry.
+fn wilkinson(h: &DMatrix<Complex<f64>>, last: usize) -> Complex<f64> {
+    let (a, d) = (h[(last - 1, last - 1)], h[(last, last)]);
+    let product = h[(last - 1, last)] * h[(last, last - 1)];
+    let half = (a - d) * 0.5;
+    let root = (half * half + product).sqrt();
+    let farther = if (half.conj() * root).re < 0.0 { half - root } else { half + root };
+    if farther.norm() > 0.0 { d - product / farther } else { d }
+}
+
+/// H - s I = Q R, then R Q + s I, on the rows and columns from `first` to `last`.
+fn sweep(h: &mut DMatrix<Complex<f64>>, (first, last): (usize, usize), shift: Complex<f64>) {
+    for k in first..=last {
+        h[(k, k)] -= shift;
+    }
+    let mut rotations = Vec::with_capacity(last - first);
+    for k in first..last {
+        let (above, below) = (h[(k, k)], h[(k + 1, k)]);
+        let size = above.norm().hypot(below.norm());
+        let (c, s) =
+            if size > 0.0 { (above / size, below / size) } else { (Complex::ONE, Complex::ZERO) };
+        for column in k..=last {
+            let (x, y) = (h[(k, column)], h[(k + 1, column)]);
+            h[(k, column)] = c.conj() * x + s.conj() * y;
+            h[(k + 1, column)] = c * y - s * x;
+        }
+        rotations.push((c, s));
+    }
+    for (k, (c, s)) in (first..last).zip(rotations) {
+        for row in first..=k + 1 {
+            let (x, y) = (h[(row, k)], h[(row, k + 1)]);
+            h[(row, k)] = x * c + y * s;
+            h[(row, k + 1)] = y * c.conj() - x * s.conj();
+        }
+    }
+    for k in first..=last {
+        h[(k, k)] += shift;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    fn sorted(mut all: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
+        all.sort_by(|x, y| x.arg().total_cmp(&y.arg()));
+        all
+    }
+
+    /// The cyclic permutation of n entries, turned by an angle: e^(i (angle + 2 pi k / n)).
+    #[test]
+    fn the_eigenvalues_of_a_cyclic_permutation_are_roots_of_unity() {
+        for n in [1_u32, 2, 3, 8, 20, 31] {
+            let size = n as usize;
+            let one = Complex::from_polar(1.0, 0.01);
+            let shifted = |i: usize, j: usize| (i + 1) % size == j;
+            let m = DMatrix::from_fn(
+                size,
+                size,
+                |i, j| if shifted(i, j) { one } else { Complex::ZERO },
+            );
+            let angle = |k: u32| 0.01 + TAU * f64::from(k) / f64::from(n);
+            let expected = sorted((0..n).map(|k| Complex::from_polar(1.0, angle(k))).collect());
+            let found = sorted(complex_eigenvalues(&m).unwrap());
+            for (found, expected) in found.iter().zip(&expected) {
+                assert!((found - expected).norm() < 1e-13, "{n}: {found}, {expected}");
+            }
+        }
+    }
+
+    /// V diag(0, 1, 1, ...) V^-1 with rounding errors, as T of a loop with many integrators at low frequencies.
+    #[test]
+    fn a_cluster_beside_a_zero_is_found() {
+        let n = 20;
+        let v = DMatrix::from_fn(n, n, |i, j| {
+            let at = f64::from(u32::try_from(i * n + j).unwrap());
+            Complex::new((at * 1.7).sin(), (at * 0.9).cos()) + if i == j { 4.0 } else { 0.0 }
+        });
+        let mut diagonal = DMatrix::identity(n, n);
+        diagonal[(7, 7)] = Complex::ZERO;
+        let m = &v * diagonal * v.clone().try_inverse().unwrap();
+        let mut found = complex_eigenvalues(&m).unwrap();
+        found.sort_by(|x, y| x.norm().total_cmp(&y.norm()));
+        assert!(found[0].norm() < 1e-12);
+        assert!(found[1..].iter().all(|one| (one - Complex::ONE).norm() < 1e-10), "{found:?}");
+    }
+
+    #[test]
+    fn entries_that_are_not_finite_are_an_error() {
+        let m = DMatrix::from_element(2, 2, Complex::new(f64::NAN, 0.0));
+        assert!(complex_eigenvalues(&m).is_err());
+    }
+}
