@@ -12,6 +12,7 @@ from conftest import ROOT
 from scheduled_design import DRIVE
 from test_estimation_laws import PLANT
 from test_fallback import SAMPLED, VEHICLE
+from test_feedthrough import SAMPLED as FEEDTHROUGH
 
 HERE = Path(__file__).parent
 # What adds inputs to a controller.
@@ -144,6 +145,8 @@ CASES = {
     "fast-adaptive-schedule": Case(law("monitor = true\n" + TANKS["schedule"], "fast-adaptive"), 6e-5, 1e-3),
     "sliding-mode": Case(law(TANKS["reference"], "sliding-mode"), 6e-5, 1e-3),
     "sliding-mode-detection": Case(law(UNSTABLE + CUSUM, "sliding-mode"), 0.5, 1e-2),
+    "feedthrough": Case(FEEDTHROUGH.replace('["force"]', '[{ name = "force", limits = [-4.0, 5.0], operating = 0.5 }]'), 6.0, 1e-2),
+    "feedthrough-integral": Case(law(FEEDTHROUGH.replace("0.01\nfilter", "0.01\nestimator = 'current'\nfilter"), "proportional-integral"), 0.5, 1e-2),
     "constant-prediction": Case("sample_time = 1.0\nestimator = 'prediction'\n" + QUADRUPLE, 0.3, 1e-2),
 }
 
@@ -226,18 +229,18 @@ class Plant:
             n, w = len(self.a) - len(self.c), np.array(design["filter"])[:, None]
             self.c, self.sensors = self.a[n:, :n] / w, self.f_a[n:] / w
             self.a, self.b, self.f_a = self.a[:n, :n], self.b[:n], self.f_a[:n]
-        self.x = np.zeros(len(self.a))
+        self.x, self.d = np.zeros(len(self.a)), np.array(design.get("D", np.zeros((len(self.c), self.b.shape[1]))))
         operating = lambda name: np.array([own.get("operating", 0.0) for own in design[name]])
         self.u_op, self.y_op = operating("actuators"), operating("measurements")
-        self.x_op = operating("states")
+        self.x_op, self.u = operating("states"), self.u_op
 
     def measured(self, fault):
         """The measurements."""
-        return self.c @ self.x + self.sensors @ fault + self.y_op
+        return self.c @ self.x + self.sensors @ fault + self.d @ (self.u - self.u_op) + self.y_op
 
     def step(self, u, fault):
         """The next sample."""
-        self.x = self.a @ self.x + self.b @ (u - self.u_op) + self.f_a @ fault
+        self.x, self.u = self.a @ self.x + self.b @ (u - self.u_op) + self.f_a @ fault, u
 
 
 def bound_of(header):

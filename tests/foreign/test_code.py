@@ -413,6 +413,33 @@ def test_float_is_refused_a_green_light_where_rounding_hides_the_changes(aso_ftc
     assert re.search(r"warning: float: rounding may change \S+ by .* % of itself: the slowest eigenvalue", own.done.stderr)
 
 
+def sheared(size):
+    """An oscillator whose states are x_1 + size x_2 and x_2: entries of its matrices cancel."""
+    to, back = np.array([[1, size], [0, 1]]), np.array([[1, -size], [0, 1]])
+    a, b, c = to @ np.array([[0, 1], [-1.0, -0.5]]) @ back, to @ np.array([[0.0], [1]]), np.array([[1.0, 0]]) @ back
+    return f"""sample_time = 0.05
+A = {a.tolist()}
+B = {b.tolist()}
+C = {c.tolist()}
+actuator_faults = "all"
+feedback.eigenvalues = [-1.0, -1.5]
+observer.eigenvalues = [-3, -3.5, -4]
+robustness.cases = 0
+experiment = {{ stop_time = 10, step_size = 0.05 }}
+"""
+
+
+@pytest.mark.parametrize(("size", "is_stable"), [(10.0, True), (1e4, False)])
+def test_float_warns_of_a_loop_that_rounding_makes_unstable(aso_ftc, tmp_path, size, is_stable):
+    text, largest = "nothing excludes that rounding makes the loop unstable", []
+    for options in ([], ["--float"]):
+        (folder := tmp_path / f"o{len(options)}").mkdir()
+        own = Built(aso_ftc, sheared(size), folder, *options)
+        largest.append(abs(looped(own)[0][:, 0]).max())
+    assert largest[0] < 1 and (largest[1] < 1) == is_stable, "the loops themselves"
+    assert (text in own.done.stderr) == (text.replace("nothing", "Nothing") in own.header.replace("\n *", "")) == (not is_stable)
+
+
 def test_names_become_different_identifiers_and_the_header_lists_them(aso_ftc, tmp_path):
     own = Built(aso_ftc, masses("current", "true"), tmp_path, name="String")
     assert own.name == "String_ctl"

@@ -51,6 +51,7 @@ def test_the_crate_is_built_for_a_cortex_m_and_nothing_in_it_panics(aso_ftc, tmp
         ("proportional-integral-schedule", []),
         ("fast-adaptive", ["--float"]),
         ("sliding-mode-detection", []),
+        ("feedthrough", []),
     ]:
         (folder := tmp_path / name).mkdir()
         members[name] = Built(aso_ftc, CASES[name].text, folder, *options, name=name.replace("-", "_"))
@@ -75,7 +76,7 @@ def test_the_crate_is_built_for_a_cortex_m_and_nothing_in_it_panics(aso_ftc, tmp
 @pytest.mark.parametrize(
     "name",
     ["reference", "scheduled-drive", "scheduled-by-measurement", "detection-cusum", "fall-back-alone", "reconfiguration-detection",
-     "proportional-integral-sensor", "fast-adaptive-schedule", "sliding-mode-detection"],
+     "proportional-integral-sensor", "fast-adaptive-schedule", "sliding-mode-detection", "feedthrough"],
 )  # fmt: skip
 def test_no_sample_has_more_operations_than_the_header_states(aso_ftc, packed, tmp_path, name):
     """The instructions of the floating-point unit in QEMU. The compiler leaves out products with 1 and the sum of -0 and a number."""

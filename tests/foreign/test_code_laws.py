@@ -49,10 +49,11 @@ def test_the_stated_arithmetic_of_a_sliding_mode_has_its_quotients(built):
         (CASES["proportional-integral-detection"].text, 200),
         (law(TANKS["plant"], "fast-adaptive"), 200),
         (law(UNSTABLE, "fast-adaptive"), 200),
+        (CASES["feedthrough"].text, 200),
         # The slope of its law may be any up to that at 0.
         (law(TANKS["plant"], "sliding-mode"), 2000),
     ],
-    ids=["proportional-integral", "proportional-integral-detection", "fast-adaptive", "unstable", "sliding-mode"],
+    ids=["proportional-integral", "proportional-integral-detection", "fast-adaptive", "unstable", "feedthrough", "sliding-mode"],
 )
 def test_float_stays_within_its_bound_with_each_law(aso_ftc, packed, tmp_path, text, most):
     packed_plant(aso_ftc, "ThreeTank")

@@ -34,6 +34,10 @@ impl Arithmetic {
         if controller.is_limited() {
             all.comparisons += 2 * m;
         }
+        if controller.d.is_some() {
+            // Deviations of the commands for the next sample.
+            all.comparisons += 2 * m;
+        }
         all.add_detection(controller);
         if let Some(own) = &controller.reconfiguration {
             // K_s times the commands of stuck actuators, the commands with that sum; the losses.

@@ -315,11 +315,15 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
             Some(_) => format!("        state->y_f[i] = {y}[i];\n"),
             None => String::new(),
         };
+        let before = match controller.d {
+            Some(_) => format!("        state->u_before[i] = {};\n", self.literal(0.0)),
+            None => String::new(),
+        };
         for (kind, body) in [
             (Kind::State, "        state->x_hat[i] = x_hat_0[i];".to_owned()),
             (Kind::Fault, "        state->f_hat[i] = f_hat_0[i];".to_owned()),
             (Kind::Measurement, format!("{filtered}        state->y[i] = {y}[i];")),
-            (Kind::Actuator, format!("        state->u[i] = {u}[i];")),
+            (Kind::Actuator, format!("{before}        state->u[i] = {u}[i];")),
             (Kind::Reference, format!("        state->r[i] = {r}[i];")),
             (Kind::Integral, format!("        state->x_i[i] = {};", self.literal(0.0))),
         ] {

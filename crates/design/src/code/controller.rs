@@ -26,6 +26,8 @@ pub(super) struct Controller {
     pub(super) a: DMatrix<f64>,
     pub(super) b: DMatrix<f64>,
     pub(super) c: DMatrix<f64>,
+    /// The part of the commands in the measurements, if they contain them.
+    pub(super) d: Option<DMatrix<f64>>,
     pub(super) f_a: DMatrix<f64>,
     /// The identity where faults are constant.
     pub(super) a_f: DMatrix<f64>,
@@ -135,6 +137,8 @@ struct File {
     b: Rows,
     #[serde(rename = "C")]
     c: Rows,
+    #[serde(rename = "D", default)]
+    d: Option<Rows>,
     #[serde(rename = "F_a")]
     f_a: Rows,
     #[serde(rename = "A_f", default)]
@@ -239,6 +243,7 @@ impl Controller {
             a: file.a.dense(),
             b: file.b.dense(),
             c: file.c.dense(),
+            d: file.d.map(Rows::dense),
             f_a: file.f_a.dense(),
             constant_faults: file.a_f.is_none(),
             a_f: file.a_f.map_or_else(|| DMatrix::identity(faults, faults), Rows::dense),

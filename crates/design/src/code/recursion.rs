@@ -94,7 +94,7 @@ fn statement<const N: usize>(
 /// Signals as deviations from the operating point.
 fn deviations(controller: &Controller) -> Vec<Statement> {
     use Operation::{Add, Subtract};
-    use Term::{Element, Zero};
+    use Term::{Element, Product, Zero};
     let mut all = vec![
         statement(
             "deviations from the operating point",
@@ -105,6 +105,10 @@ fn deviations(controller: &Controller) -> Vec<Statement> {
         statement("", Vector::XHat, Element(Vector::StoredXHat), [Subtract(Element(Vector::XOp))]),
         statement("", integral(controller), Element(Vector::StoredFHat), []),
     ];
+    if controller.d.is_some() {
+        let before = [Subtract(Product(Matrix::D, Vector::StoredU))];
+        all.push(statement("y = y - D u[k-1]", Vector::Y, Element(Vector::Y), before));
+    }
     if controller.filter.is_some() {
         let start = Element(Vector::StoredYF);
         all.push(statement("", Vector::YF, start, [Subtract(Element(Vector::YOp))]));

@@ -17,6 +17,9 @@
 //!
 //! so that G kappa s bounds the differences of the outputs, with the peak-to-peak gains G of that system.
 //! The bound holds in the loop of the design, while faults are compensated and no command is at a limit.
+//! The signals are those of single precision. If the differences of all of them, x_hat and y included, are at most
+//! M s and the spectral radius of M is below 1, the signals of double precision bound those of single precision:
+//! rounding does not make the loop unstable.
 //! The residuals r of a detection are further outputs, and x_r is part of d; their size follows from those of y
 //! and u. The bound takes the worst case of every rounding; errors of both signs cancel in practice. A scheduled loop is
 //! not such a system, and has no bound.
@@ -53,39 +56,52 @@ const LARGEST_ORDER: usize = 60;
 /// The part of a signal by which its rounding errors may change it before that is a warning.
 const COARSE: f64 = 0.01;
 
+/// The reason why a loop may not be stable.
+const UNPROVEN: &str = "at worst, the errors of all signals are larger than the signals";
+
 /// The bound, or the reason why there is none.
 pub(super) struct RoundingBound {
     /// Outputs (commands, faults, residuals) x signals (as [`Kind::ALL`], then 1).
     bound: Result<DMatrix<f64>, String>,
     /// 1 - |lambda| of the slowest eigenvalue of the loop.
     slowest: f64,
+    /// Whether it proves that the loop with this controller is stable.
+    contracts: bool,
 }
 
 impl RoundingBound {
     pub(super) fn of(controller: &Controller, recursion: &Recursion) -> Self {
         if controller.schedule.is_some() {
             let reason = "matrices and operating point change with the scheduling variable";
-            return Self { bound: Err(reason.to_owned()), slowest: f64::NAN };
+            return Self::none(reason);
         }
         let state_of_filter = match residual_states(controller) {
             Ok(gains) => gains,
-            Err(error) => return Self { bound: Err(error.to_string()), slowest: f64::NAN },
+            Err(error) => return Self::none(&error.to_string()),
         };
         let analysis = Analysis::of(controller, recursion, state_of_filter);
         let order = analysis.order();
         if order > LARGEST_ORDER {
             let reason =
                 format!("{order} states of plant and controller are too many to compute it");
-            return Self { bound: Err(reason), slowest: f64::NAN };
+            return Self::none(&reason);
         }
         let system = analysis.system();
         let domain = Domain::Sampled { period: controller.sample_time };
         let slowest =
             control::stability::instability(&system.a, domain).map_or(f64::NAN, |own| -own);
         let gains = peak_gain(&system, WIDTH).map_err(|error| error.to_string());
-        let bound = gains.and_then(|gains| analysis.bound(&gains.upper));
-        let bound = bound.map(|bound| bound * SECOND_ORDER);
-        Self { bound, slowest }
+        let all = gains.and_then(|gains| analysis.bound(&gains.upper));
+        let all = all.map(|bound| bound * SECOND_ORDER);
+        let contracts = all.as_ref().is_ok_and(|all| analysis.contracts(all));
+        let outputs = [Kind::Actuator, Kind::Fault, Kind::Residual];
+        let outputs = outputs.map(|kind| kind.count(controller)).iter().sum();
+        let bound = all.map(|all| all.rows(0, outputs).into_owned());
+        Self { bound, slowest, contracts }
+    }
+
+    fn none(reason: &str) -> Self {
+        Self { bound: Err(reason.to_owned()), slowest: f64::NAN, contracts: false }
     }
 
     /// What makes single precision too coarse for this design.
@@ -102,7 +118,13 @@ impl RoundingBound {
         let (m, faults) = (controller.actuators.len(), controller.faults.iter().enumerate());
         let faults = faults.map(|(i, own)| (&own.name, bound[(m + i, first(Kind::Fault) + i)]));
         let coarse = commands.chain(faults).filter(|(_, part)| *part > COARSE);
-        coarse
+        let unstable = (!self.contracts).then(|| {
+            format!(
+                "float: nothing excludes that rounding makes the loop unstable: {UNPROVEN}; use double, or a longer \
+                 sample time"
+            )
+        });
+        let coarse = coarse
             .map(|(name, part)| {
                 format!(
                     "float: rounding may change {name} by {:.2} % of itself: the slowest eigenvalue of \
@@ -111,8 +133,8 @@ impl RoundingBound {
                     100.0 * part,
                     self.slowest
                 )
-            })
-            .collect()
+            });
+        unstable.into_iter().chain(coarse).collect()
     }
 
     /// The lines of the header.
@@ -142,6 +164,11 @@ impl RoundingBound {
              an output differs by at most the sum over the signals of coefficient times largest \
              deviation from the operating point (last row: a constant):"
         ));
+        if !self.contracts {
+            let text =
+                format!("Nothing excludes that rounding makes the loop unstable: {UNPROVEN}.");
+            lines.extend(filled(&text));
+        }
         for (output, row) in outputs.into_iter().zip(bound.row_iter()) {
             lines.extend([String::new(), output]);
             let rows = signals.iter().zip(row.iter());

@@ -193,6 +193,11 @@ fn timing(request: &Request<'_>, controller: &Controller, vocabulary: &Vocabular
     let mut all = vec![format!(
         "Sample time: {period:?} s. Sample k is at k times the sample time. {estimator}"
     )];
+    if controller.d.is_some() {
+        let text = "The measurements contain the commands (D): take them just before new commands are applied, so \
+                    that they contain those of the sample before.";
+        all.push(text.to_owned());
+    }
     all.extend(request.delay_margin.map(|margin| {
         format!("The loop is stable with a further delay of all commands below {margin:.3e} s.")
     }));

@@ -21,6 +21,8 @@ pub(super) enum Vector {
     /// The state of the filter of the residuals, and the residuals of the last sample.
     StoredXR,
     StoredResidual,
+    /// The commands of the sample before as deviations, for measurements that contain them.
+    StoredU,
     /// The operating point.
     XOp,
     UOp,
@@ -62,6 +64,7 @@ pub(super) enum Matrix {
     A,
     B,
     C,
+    D,
     FA,
     AF,
     KX,
@@ -84,10 +87,11 @@ pub(super) enum Matrix {
 }
 
 impl Matrix {
-    pub(super) const ALL: [Self; 21] = [
+    pub(super) const ALL: [Self; 22] = [
         Self::A,
         Self::B,
         Self::C,
+        Self::D,
         Self::FA,
         Self::AF,
         Self::KX,
@@ -114,6 +118,7 @@ impl Matrix {
             Self::A => &controller.a,
             Self::B => &controller.b,
             Self::C => &controller.c,
+            Self::D => return controller.d.as_ref(),
             Self::FA => &controller.f_a,
             Self::AF => &controller.a_f,
             Self::KX => &controller.k_x,
@@ -151,6 +156,7 @@ impl Matrix {
             Self::A => "A",
             Self::B => "B",
             Self::C => "C",
+            Self::D => "D",
             Self::FA => "F_a",
             Self::AF => "A_f",
             Self::KX => "K_x",
@@ -183,6 +189,7 @@ impl Vector {
             Self::S => "s",
             Self::StoredYF | Self::YF => "y_f",
             Self::Measured | Self::Y => "y",
+            Self::StoredU => "u_before",
             Self::XOp => "x_op",
             Self::UOp => "u_op",
             Self::YOp => "y_op",
@@ -218,6 +225,7 @@ impl Vector {
                 | Self::StoredXI
                 | Self::StoredXR
                 | Self::StoredResidual
+                | Self::StoredU
                 | Self::Measured
                 | Self::Referred
         )
@@ -235,7 +243,9 @@ impl Vector {
             | Self::S
             | Self::FValue
             | Self::NextFHat => Kind::Fault,
-            Self::UOp | Self::U | Self::V | Self::Excess | Self::Command => Kind::Actuator,
+            Self::StoredU | Self::UOp | Self::U | Self::V | Self::Excess | Self::Command => {
+                Kind::Actuator
+            }
             Self::Referred | Self::ROp | Self::R => Kind::Reference,
             Self::StoredXI | Self::XIValue | Self::NextXI => Kind::Integral,
             Self::StoredXR | Self::NextXR => Kind::ResidualState,

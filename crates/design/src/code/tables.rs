@@ -15,6 +15,7 @@ pub(super) fn stored(controller: &Controller) -> Vec<Vector> {
     all.push(Vector::Measured);
     all.extend((!controller.references.is_empty()).then_some(Vector::Referred));
     all.extend(controller.h.is_some().then_some(Vector::StoredXI));
+    all.extend(controller.d.is_some().then_some(Vector::StoredU));
     if controller.detection.is_some() {
         all.extend(detection::STORED);
     }
@@ -28,6 +29,7 @@ pub(super) fn kept(controller: &Controller) -> Vec<(Vector, Vector)> {
     let filtered = (Vector::NextYF, Vector::StoredYF);
     all.extend(controller.filter.is_some().then_some(filtered));
     all.extend(controller.h.is_some().then_some((Vector::NextXI, Vector::StoredXI)));
+    all.extend(controller.d.is_some().then_some((Vector::U, Vector::StoredU)));
     if controller.detection.is_some() {
         let next = [Vector::NextXR, Vector::Residual];
         all.extend(next.into_iter().zip(detection::STORED));

@@ -6,7 +6,7 @@ use control::{Domain, StateSpace};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::first_signal;
-use crate::code::controller::{Controller, SlidingMode};
+use crate::code::controller::{Controller, Estimator, SlidingMode};
 use crate::code::recursion::{Operation, Recursion, Statement, Term};
 use crate::code::symbols::{Kind, Matrix, Vector};
 
@@ -144,6 +144,14 @@ impl<'a> Analysis<'a> {
             form.columns_mut(2 * n + q + integrals, k).fill_with_identity();
         });
         own.start(Vector::Referred, |_| {});
+        // The measurements contain D times the commands of the sample before, which the controller takes off again:
+        // what remains is D times the rounding of these commands as values.
+        own.start(Vector::StoredU, |_| {});
+        if controller.d.is_some() {
+            let mut rounded = own.get(Vector::StoredU);
+            rounded.add(&own.get(Vector::UOp), 1.0);
+            own.learn(Vector::StoredU, rounded);
+        }
         for vector in [Vector::Measured, Vector::Referred] {
             let mut rounded = own.get(vector);
             rounded.error = &rounded.magnitude * UNIT;
@@ -203,37 +211,85 @@ impl<'a> Analysis<'a> {
 
     /// A bound of the elements of a vector, from the largest deviations of the signals.
     fn magnitude(&self, vector: Vector) -> DMatrix<f64> {
-        let (rows, signals) = (self.count(vector.kind()), self.widths().1);
-        match vector {
+        let mut own = match vector {
             Vector::StoredXR | Vector::NextXR => return self.state_of_filter.clone(),
             Vector::Residual => return self.residual_magnitude(),
-            Vector::S => return self.controller.l_f.abs() * self.magnitude(Vector::E),
-            _ => {}
-        }
-        let mut own = DMatrix::zeros(rows, signals);
-        own.columns_mut(first_signal(vector.kind(), self.controller), rows).fill_with_identity();
-        if let (Vector::StoredFHat | Vector::FHatI | Vector::NextFHat, Some(p_f)) =
-            (vector, &self.controller.p_f)
-        {
-            // |f_hat_i| <= |f_hat| + |P_f| |e|.
-            return own + p_f.abs() * self.magnitude(Vector::E);
-        }
+            Vector::S => return self.controller.l_f.abs() * self.get(Vector::E).magnitude,
+            Vector::E => return self.innovation(&self.get(Vector::XHat).magnitude),
+            Vector::StoredXHat | Vector::NextXHat | Vector::XHat if self.is_predicted(vector) => {
+                let Controller { a, b, f_a, .. } = self.controller;
+                a.abs() * self.unit(Kind::State)
+                    + b.abs() * self.unit(Kind::Actuator)
+                    + f_a.abs() * self.integral_part()
+            }
+            Vector::StoredFHat | Vector::NextFHat | Vector::FHat | Vector::FHatI
+                if self.is_predicted(vector) =>
+            {
+                self.controller.a_f.abs() * self.integral_part()
+            }
+            Vector::StoredFHat | Vector::NextFHat | Vector::FHatI => self.integral_part(),
+            Vector::Y | Vector::StoredYF | Vector::YF | Vector::NextYF => self.given(),
+            _ => self.unit(vector.kind()),
+        };
         let operating = match vector {
             Vector::StoredXHat | Vector::XValue | Vector::NextXHat => &self.controller.states,
             Vector::StoredYF | Vector::Measured | Vector::NextYF => &self.controller.measurements,
             Vector::Command => &self.controller.actuators,
             Vector::Referred => &self.controller.references,
-            Vector::E => {
-                let c = self.controller.c.abs();
-                own.columns_mut(0, c.ncols()).copy_from(&c);
-                return own;
-            }
             _ => return own,
         };
+        let last = own.ncols() - 1;
         for (i, signal) in operating.iter().enumerate() {
-            own[(i, signals - 1)] = signal.operating.abs();
+            own[(i, last)] += signal.operating.abs();
         }
         own
+    }
+
+    /// Whether a vector is one that a current estimator corrects before a user sees it: its size follows from
+    /// the signals of the sample before.
+    fn is_predicted(&self, vector: Vector) -> bool {
+        let is_first = || !self.known.iter().any(|(other, _)| *other == vector);
+        let is_current = self.controller.estimator == Estimator::Current;
+        is_current
+            && match vector {
+                Vector::StoredXHat | Vector::NextXHat | Vector::StoredFHat | Vector::NextFHat => {
+                    true
+                }
+                Vector::XHat | Vector::FHatI => is_first(),
+                Vector::FHat => self.controller.p_f.is_none() && is_first(),
+                _ => false,
+            }
+    }
+
+    /// The largest deviations of a kind of signals.
+    fn unit(&self, kind: Kind) -> DMatrix<f64> {
+        let (rows, signals) = (self.count(kind), self.widths().1);
+        let mut own = DMatrix::zeros(rows, signals);
+        own.columns_mut(first_signal(kind, self.controller), rows).fill_with_identity();
+        own
+    }
+
+    /// |e| <= |y - D u| + |C| |x_hat|.
+    fn innovation(&self, x_hat: &DMatrix<f64>) -> DMatrix<f64> {
+        self.given() + self.controller.c.abs() * x_hat
+    }
+
+    /// |y - D u| <= |y| + |D| |u|; y without D.
+    fn given(&self) -> DMatrix<f64> {
+        let y = self.unit(Kind::Measurement);
+        match &self.controller.d {
+            None => y,
+            Some(d) => y + d.abs() * self.unit(Kind::Actuator),
+        }
+    }
+
+    /// |f_hat_i| <= |f_hat| + |P_f| |e| with a direct term, else |f_hat|.
+    fn integral_part(&self) -> DMatrix<f64> {
+        let f_hat = self.unit(Kind::Fault);
+        match &self.controller.p_f {
+            None => f_hat,
+            Some(p_f) => f_hat + p_f.abs() * self.innovation(&self.unit(Kind::State)),
+        }
     }
 
     /// |r| <= |C| |x_r| + |D_u| |u| + |D_y| |y|, residuals x signals.
@@ -265,7 +321,7 @@ impl<'a> Analysis<'a> {
     fn follow(&mut self, statement: &Statement) {
         match statement.target {
             // No output of the loop and no later statement has these.
-            Vector::XValue | Vector::XIValue | Vector::V => return,
+            Vector::XIValue | Vector::V => return,
             // Without limits it is exactly zero.
             Vector::Excess => {
                 let zero = Elements::zero(self.count(Kind::Actuator), self.widths());
@@ -350,18 +406,39 @@ impl<'a> Analysis<'a> {
             let (position, half) = self.chords[j];
             gains[(i, position)] * half
         });
-        let loops = DMatrix::identity(count, count) - back.rows(outputs, count);
-        let lu = loops.lu();
-        // The spectral radius of a matrix M >= 0 is below 1 if M x < x for some x > 0: here M x = x - 1.
-        let x = lu.solve(&DVector::from_element(count, 1.0));
-        if !x.is_some_and(|x| x.iter().all(|own| *own >= 1.0 && own.is_finite())) {
+        let Some(loops) = without_loop(&back.rows(outputs, count).into_owned()) else {
             return Err("the slope of the sliding-mode law changes too much for one".to_owned());
-        }
-        let of_s = lu.solve(&linear.rows(outputs, count).into_owned()).unwrap_or_default();
+        };
+        let of_s = loops * linear.rows(outputs, count);
         Ok(linear.rows(0, outputs) + back.rows(0, outputs) * of_s)
     }
 
-    /// The loop from the errors w, v included, to [u; `f_hat`; r], and s of a sliding-mode law.
+    /// Whether the bound of the differences of all signals, [`Self::bound`], is smaller than the signals: then
+    /// no rounding makes the loop unstable.
+    pub(super) fn contracts(&self, bound: &DMatrix<f64>) -> bool {
+        let [n, q, p, m, _, integrals] = Kind::ALL.map(|kind| self.count(kind));
+        let residuals = self.count(Kind::Residual);
+        let signals = self.widths().1 - 1;
+        let mut all = DMatrix::zeros(signals, signals);
+        let mut first = 0;
+        for (kind, rows) in [
+            (Some(Kind::Actuator), m),
+            (Some(Kind::Fault), q),
+            (None, residuals),
+            (Some(Kind::State), n),
+            (Some(Kind::Measurement), p),
+            (Some(Kind::Integral), integrals),
+        ] {
+            if let Some(kind) = kind {
+                let place = first_signal(kind, self.controller);
+                all.rows_mut(place, rows).copy_from(&bound.view((first, 0), (rows, signals)));
+            }
+            first += rows;
+        }
+        without_loop(&all).is_some()
+    }
+
+    /// The loop from the errors w, v included, to [u; `f_hat`; r; `x_hat`; y; `x_i`], and s of a sliding-mode law.
     pub(super) fn system(&self) -> StateSpace {
         let ([n, q, p, m, _, integrals], order) =
             (Kind::ALL.map(|kind| self.count(kind)), self.order());
@@ -379,12 +456,22 @@ impl<'a> Analysis<'a> {
         let [k, residuals] = [Kind::ResidualState, Kind::Residual].map(|kind| self.count(kind));
         next.rows_mut(order - k, k).copy_from(&self.get(Vector::NextXR).form);
         let chords = self.chords.len();
-        let mut outputs = DMatrix::zeros(m + q + residuals + chords, self.widths().0);
-        outputs.rows_mut(0, m).copy_from(&command);
-        outputs.rows_mut(m, q).copy_from(&self.get(Vector::FValue).form);
-        outputs.rows_mut(m + q, residuals).copy_from(&self.get(Vector::Residual).form);
-        let s = self.get(Vector::S).form;
-        outputs.rows_mut(m + q + residuals, chords).copy_from(&s.rows(0, chords));
+        let sizes = [m, q, residuals, n, p, integrals, chords];
+        let mut outputs = DMatrix::zeros(sizes.iter().sum(), self.widths().0);
+        let mut first = 0;
+        for (rows, vector) in sizes.into_iter().zip([
+            Vector::Command,
+            Vector::FValue,
+            Vector::Residual,
+            Vector::XValue,
+            Vector::Measured,
+            Vector::StoredXI,
+            Vector::S,
+        ]) {
+            let form = self.get(vector).form;
+            outputs.rows_mut(first, rows).copy_from(&form.rows(0, rows));
+            first += rows;
+        }
         StateSpace {
             a: next.columns(0, order).into_owned(),
             b: next.columns(order, inputs).into_owned(),
@@ -398,4 +485,13 @@ impl<'a> Analysis<'a> {
     fn kappa(&self) -> DMatrix<f64> {
         DMatrix::from_rows(&self.errors)
     }
+}
+
+/// (1 - M)^-1 of a matrix M without negative elements, if its spectral radius is below 1.
+fn without_loop(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let count = matrix.nrows();
+    let inverse = (DMatrix::identity(count, count) - matrix).try_inverse()?;
+    // It is, if M x < x for some x > 0: here M x = x - 1.
+    let x = &inverse * DVector::from_element(count, 1.0);
+    x.iter().all(|own| *own >= 1.0 - 1e-9 && own.is_finite()).then_some(inverse)
 }

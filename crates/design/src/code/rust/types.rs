@@ -175,6 +175,9 @@ impl Controller {{
         if controller.h.is_some() {
             lines.push("            x_i: [0.0; REFERENCES],".to_owned());
         }
+        if controller.d.is_some() {
+            lines.push("            u_before: [0.0; ACTUATORS],".to_owned());
+        }
         if let [input] = controller.schedule_inputs() {
             lines.push(format!("            theta: [{}],", self.literal(input.operating)));
         }
