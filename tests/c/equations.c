@@ -9,7 +9,8 @@
  * The FMU requests the end of the simulation at the time `end`. It discards states with h < `floor`.
  * Events take two iterations.
  *
- * With UNREADABLE_INPUTS it refuses to read u.
+ * With UNREADABLE_INPUTS it refuses to read u. With STALE_OUTPUTS its outputs are those of the states
+ * before, once the derivatives have been read, as in FMUs of OpenModelica 1.19.
  *
  * It is strict: a call that section 3.2.3 forbids in its state, and a time before the last event or
  * after the next one, end the process by SIGABRT. */
@@ -37,6 +38,11 @@ typedef struct {
     double time, last_event, next_tick;
     /* Whether the event needs another iteration. */
     int unsettled;
+#ifdef STALE_OUTPUTS
+    /* Whether something was computed for these states; the states that the outputs show. */
+    int computed;
+    double shown[STATES];
+#endif
 } Values;
 
 typedef struct {
@@ -193,6 +199,9 @@ EXPORT fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], s
         return fmi2Discard;
     }
     memcpy(&now->real[X], x, STATES * sizeof *x);
+#ifdef STALE_OUTPUTS
+    now->computed = 0;
+#endif
     return fmi2OK;
 }
 
@@ -216,6 +225,9 @@ EXPORT fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real slopes[], size_t 
     Values *now = &((Instance *)c)->now;
     demand(now->state >= INITIALIZING && count == STATES);
     derive(now);
+#ifdef STALE_OUTPUTS
+    now->computed = 1;
+#endif
     memcpy(slopes, &now->real[DER_X], STATES * sizeof *slopes);
     return fmi2OK;
 }
@@ -240,6 +252,15 @@ EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference referenc
         }
 #endif
         values[i] = now->real[references[i]];
+#ifdef STALE_OUTPUTS
+        if (!now->computed) {
+            memcpy(now->shown, &now->real[X], sizeof now->shown);
+            now->computed = 1;
+        }
+        if (references[i] >= X && references[i] <= P) {
+            values[i] = now->shown[references[i] - X];
+        }
+#endif
     }
     return fmi2OK;
 }

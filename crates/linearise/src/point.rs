@@ -184,14 +184,14 @@ impl<'p> Equations<'p> {
         let mut values = vec![0.0; self.states.len() + self.outputs.len()];
         let (derivatives, outputs) = values.split_at_mut(self.states.len());
         let component = &mut self.component;
+        // An FMU of OpenModelica 1.19 no longer computes its outputs once it has returned the derivatives.
         let done = component
             .set_continuous_states(&x)
             .and_then(|()| if u.is_empty() { Ok(()) } else { component.set_real(&self.inputs, &u) })
+            .and_then(|()| {
+                if outputs.is_empty() { Ok(()) } else { component.get_real(&self.outputs, outputs) }
+            })
             .and_then(|()| component.get_derivatives(derivatives));
-        let done = match done {
-            Ok(()) if !outputs.is_empty() => component.get_real(&self.outputs, outputs),
-            done => done,
-        };
         done.map_err(|source| match changed {
             Some((name, value)) => refused(name, &value, source),
             None => LineariseError::Call(source),

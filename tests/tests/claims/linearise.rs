@@ -304,6 +304,24 @@ fn derivatives_of_the_van_der_pol_oscillator_equal_those_by_hand() {
     }
 }
 
+/// der(x) = -2 (x - u), y = x.
+#[test]
+fn outputs_that_are_stale_after_the_derivatives_have_their_own_derivatives() {
+    let folder = tempfile::tempdir().unwrap();
+    let fmu =
+        Fmu::open_any(&tests::equations::write_with(folder.path(), &["-DSTALE_OUTPUTS"])).unwrap();
+    let request = Linearise {
+        inputs: names(&["u"]),
+        outputs: names(&["x", "h"]),
+        at: at(&[("k", "2")]),
+        ..Linearise::default()
+    };
+    let found = linearise(&fmu, &request).unwrap().matrices;
+    let expected = DMatrix::from_row_slice(2, 4, &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+    assert!((found.c - expected).amax() < 1e-9);
+    assert!((found.a[(0, 0)] + 2.0).abs() < 1e-9 && (found.b[(0, 0)] - 2.0).abs() < 1e-9);
+}
+
 #[test]
 fn states_have_the_order_of_the_request_and_one_that_nothing_depends_on_may_be_left_out() {
     let (mut request, expected) = pendulum("true");
