@@ -466,3 +466,15 @@ def test_a_family_is_refused(aso_ftc, tmp_path):
     member = '[[family]]\nname = "other"\nA = [[0, 0, 1, 0], [0, 0, 0, 1], [-1, 0, 0, 0], [0, -1, 0, 0]]\n'
     done = designed(aso_ftc, tmp_path, alone + member)
     assert done.returncode == 2 and "not possible together with `family`" in done.stderr
+
+
+def test_a_loop_that_the_observer_makes_unstable_is_said_to_grow(aso_ftc, tmp_path):
+    """The plant of J. C. Doyle, Guaranteed margins for LQG regulators (1978)."""
+    plant = tmp_path / "plant.toml"
+    plant.write_text(
+        'A = [[1, 1], [0, 1]]\nB = [[0], [1]]\nC = [[1, 0]]\nactuator_faults = "all"\nfeedback.Q = [1, 1]\nfeedback.R = [1]\n'
+        'observer.W = [1, 1, 100]\nobserver.V = [0.01]\n[fallback]\nactuators = "all"\nloss = 0.5\n'
+    )
+    done = aso_ftc("design", plant, "--out", tmp_path / "design.toml")
+    assert done.returncode == 2
+    assert "the loop with u1 with a loss of 0.5 is unstable and grows with " in done.stderr, done.stderr

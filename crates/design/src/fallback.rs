@@ -197,11 +197,15 @@ impl Search<'_> {
         let k_x = gain.clone().resize_horizontally(gains.k_x.ncols(), 0.0);
         let mut found = Fallback { k_x, k_f: None, region, certificate, method };
         if let Some((name, rate)) = self.too_slow(&found)? {
+            let slowest = if rate < 0.0 {
+                format!("the loop with {name} is unstable and grows with {} 1/s", rounded(-rate))
+            } else {
+                format!("the slowest eigenvalue with {name} decays with {} 1/s", rounded(rate))
+            };
             return Ok(Err(format!(
                 "a state feedback meets the region in all cases, but together with the observer, which \
-                 does not know of the loss, the slowest eigenvalue with {name} decays with {} 1/s; \
-                 expected fewer `actuators`, a smaller `loss`, a smaller decay rate, or a faster observer",
-                rounded(rate)
+                 does not know of the loss, {slowest}; \
+                 expected fewer `actuators`, a smaller `loss`, a smaller decay rate, or a faster observer"
             )));
         }
         found.k_f = Some(gains.k_f.clone());
