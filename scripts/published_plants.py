@@ -32,6 +32,7 @@ SAMPLE_TIMES = {
     "two-mass-drive": 0.001,
     "unstable-reactor": 0.02,
 }
+SAMPLE_TIME = 0.05  # of other plants
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def compared(file, sampled):
         **stated,
         "controller_eigenvalues": stated["feedback"]["eigenvalues"],
         "observer_eigenvalues": stated["observer"]["eigenvalues"],
-        "sample_time": SAMPLE_TIMES[file.stem],
+        "sample_time": SAMPLE_TIMES.get(file.stem, SAMPLE_TIME),
         "current_estimator": True,
     }
     plant = Plant(file.stem, data, sampled)
@@ -107,7 +108,7 @@ def row(file, sampled):
     values = [pair(value, getattr(scipy, name, None)) for name, value in vars(own).items()]
     disks = [point["together"]["alpha"] for point in report["robustness"]["points"]]
     stable = 100 * report["robustness"]["tolerance"]["stable"]
-    name = file.stem + (f", {SAMPLE_TIMES[file.stem]} s" if sampled else "")
+    name = file.stem + (f", {SAMPLE_TIMES.get(file.stem, SAMPLE_TIME)} s" if sampled else "")
     return [name, *values, f"{min(disks):.2g}", f"{stable:.0f} %", report["verdict"]["level"]]
 
 

@@ -13,7 +13,7 @@ PLANTS = sorted((ROOT / "examples" / "plants").glob("*.toml"))
 
 @pytest.mark.parametrize("sampled", [False, True], ids=["continuous", "sampled"])
 @pytest.mark.parametrize("file", PLANTS, ids=lambda file: file.stem)
-def test_figures_of_a_report_are_those_of_its_gains_and_its_gains_as_small_as_scipys(file, sampled):
+def test_figures_of_a_report_are_those_of_its_gains_and_at_most_a_tenth_above_scipys(file, sampled):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # place_poles warns of slow convergence
         report, own, scipy = published_plants.compared(file, sampled)
@@ -21,9 +21,8 @@ def test_figures_of_a_report_are_those_of_its_gains_and_its_gains_as_small_as_sc
     assert peaks == pytest.approx([own.input, own.output], rel=1e-3)
     assert report["feedback"]["condition"] == pytest.approx(own.feedback, rel=1e-3)
     assert report["observer"]["condition"] == pytest.approx(own.observer, rel=1e-3)
-    assert own.gain <= 1.15 * scipy.gain
-    assert own.feedback <= 1.1 * scipy.feedback
-    assert own.observer <= 1.1 * scipy.observer
+    for name, value in vars(own).items():
+        assert value <= 1.1 * getattr(scipy, name), name
 
 
 def test_every_published_plant_has_a_sample_time():

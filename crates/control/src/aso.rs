@@ -93,20 +93,33 @@ pub(crate) fn best_pair(
         p_f: None,
         integral: None,
     };
-    let mut pairs: Vec<_> = feedbacks.pairs(observers).collect();
-    let best = if pairs.len() > 1 {
-        let d = DMatrix::zeros(plant.c.nrows(), plant.b.ncols());
-        let FaultyPlant { a, b, c, .. } = plant.clone();
-        let system = StateSpace { a, b, c, d, domain };
-        let own = |(k, l): &(&Placement, &Placement)| {
-            Loop::new(system.clone(), controller(plant, &with(k, l), domain)?)
-        };
-        least_sensitive(&pairs.iter().map(own).collect::<Result<Vec<_>, _>>()?)
+    let [mut pairs, second] = pairs(&feedbacks.candidates(), &observers.candidates());
+    let standard: Vec<_> = feedbacks.standard_pairs(observers).collect();
+    let d = DMatrix::zeros(plant.c.nrows(), plant.b.ncols());
+    let FaultyPlant { a, b, c, .. } = plant.clone();
+    let system = StateSpace { a, b, c, d, domain };
+    let own = |(k, l): &(&Placement, &Placement)| {
+        Loop::new(system.clone(), controller(plant, &with(k, l), domain)?)
+    };
+    let loops = |pairs: &[_]| pairs.iter().map(own).collect::<Result<Vec<_>, Error>>();
+    let best = if pairs.len() + second.len() > 1 {
+        least_sensitive([&loops(&pairs)?, &loops(&second)?], &loops(&standard)?)
     } else {
         0
     };
+    pairs.extend(second);
     let (k, l) = pairs.swap_remove(best);
     Ok((with(k, l), [k.quality, l.quality]))
+}
+
+/// The pairs of the first candidates, and those with at least one of the second ones.
+#[must_use]
+pub fn pairs<T: Copy>(own: &[Vec<T>; 2], other: &[Vec<T>; 2]) -> [Vec<(T, T)>; 2] {
+    let of = |i: usize, j: usize| {
+        let all = own[i].iter().flat_map(move |x| other[j].iter().map(move |y| (*x, *y)));
+        all.collect::<Vec<_>>()
+    };
+    [of(0, 0), [of(0, 1), of(1, 0), of(1, 1)].concat()]
 }
 
 /// Designs the controller: assigns the eigenvalues of A + B `K_x` and of `A_0` - L `C_0`.

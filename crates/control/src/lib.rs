@@ -55,6 +55,7 @@ pub mod lyapunov;
 pub mod placement;
 mod product;
 pub mod rank;
+mod reflections;
 pub mod residual;
 pub mod response;
 pub mod riccati;

@@ -8,7 +8,9 @@ mod eigenvectors;
 mod figures;
 mod pole_block;
 mod pole_error;
+mod standard;
 mod subspace;
+mod update_order;
 
 pub use alternatives::{Alternatives, alternatives, alternatives_balanced, alternatives_discrete};
 
@@ -24,6 +26,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use pole_block::pole_blocks;
 pub(crate) use pole_error::DISCRETE;
 use pole_error::{CONTINUOUS, PoleTolerance};
+use standard::standard_directions;
 use subspace::AssignableSubspaces;
 
 /// Inputs count as dependent when a singular value of B, its columns scaled to length one, is below
@@ -246,6 +249,8 @@ pub(crate) fn alternatives_in(
         scale = balance(&other.gain);
     }
     let Assignable { problem, basis, .. } = &best.assignable;
+    let independent = if problem.inputs() == b.ncols() { b } else { &best.assignable.b };
+    let standard = standard_directions((a, independent), problem)?;
     let (mut choice, mut others) = (None, vec![]);
     if problem.inputs() > 1 {
         let feedback = FeedbackLoop::new(problem, basis, b, tolerance.sampled);
@@ -270,6 +275,7 @@ pub(crate) fn alternatives_in(
         Ok::<_, Error>(Placement { gain, quality })
     };
     let Assignment { assignable, directions, gain } = best;
+    let is_unique = assignable.problem.inputs() == 1;
     let chosen = match (choice, other) {
         (Some(best), _) => placement(&assignable, &best, assignable.gain(&best)?)?,
         (None, Some(other)) => placement(&other.assignable, &other.directions, other.gain)?,
@@ -280,7 +286,15 @@ pub(crate) fn alternatives_in(
         let found = placement(&assignable, directions, assignable.gain(directions).ok()?).ok()?;
         (found.quality.pole_error <= allowed).then_some(found)
     });
-    Ok(Alternatives { others: others.collect(), chosen })
+    let others = others.collect();
+    let alone = is_unique.then(|| chosen.clone());
+    let standard = standard.map(|found| match found {
+        Some(directions) => {
+            placement(&assignable, &directions, assignable.gain(&directions).ok()?).ok()
+        }
+        None => alone.clone(),
+    });
+    Ok(Alternatives { chosen, others, standard })
 }
 
 /// The eigenvectors that can be assigned, in given coordinates.

@@ -4,7 +4,7 @@ use super::estimation::Law;
 use super::family::{self, Family, common_feedback};
 use super::feedthrough;
 use super::fixed_mode::{described, described_in};
-use super::gains::{FeedbackProblem, GainResult, Refusal, feedback, observer};
+use super::gains::{FeedbackProblem, GainResult, Refusal, feedback, observer, unique};
 use super::law::{DesignedLaw, LawProblem};
 use super::linear_plant::LinearPlant;
 use super::norm_gains::ObserverProblem;
@@ -197,14 +197,8 @@ fn not_existing(
 
 /// The observer of a law with error dynamics of its own.
 fn by_law(law: &DesignedLaw) -> GainResult {
-    GainResult {
-        gain: law.gains.observer_gain(),
-        method: format!("By the law {}, as fast as the requirement on average.", law.law.name()),
-        required: Vec::new(),
-        quality: None,
-        norm: None,
-        others: Vec::new(),
-    }
+    let method = format!("By the law {}, as fast as the requirement on average.", law.law.name());
+    unique(law.gains.observer_gain(), method)
 }
 
 fn estimator(file: &PlantFile<'_>) -> Estimator {

@@ -8,7 +8,7 @@ use control::{Domain, Error};
 use files::PlaceError;
 
 use super::checks::AT_REST;
-use super::gains::{GainResult, Refusal};
+use super::gains::{GainResult, Refusal, unique};
 use super::linear_plant::LinearPlant;
 use super::plant_file::PlantFile;
 use super::references::References;
@@ -112,15 +112,7 @@ pub(crate) fn common_feedback(
                 plants.len(),
                 certificate.margin
             );
-            let found = GainResult {
-                gain,
-                method,
-                required: Vec::new(),
-                quality: None,
-                norm: None,
-                others: Vec::new(),
-            };
-            Ok((found, certificate))
+            Ok((unique(gain, method), certificate))
         }
         Outcome::Infeasible { conflict } => {
             let names: Vec<_> = conflict.iter().map(|&at| name(members, at)).collect();

@@ -32,7 +32,16 @@ pub(crate) struct GainResult {
     /// The H-infinity norm, of a design by it.
     pub(crate) norm: Option<NormReport>,
     /// Other results of an eigenvalue assignment.
-    pub(crate) others: Vec<Self>,
+    pub(crate) choice: Option<Box<GainChoice>>,
+}
+
+/// The results of an eigenvalue assignment among which the loop decides.
+#[derive(Clone)]
+pub(crate) struct GainChoice {
+    /// See [`Alternatives::candidates`].
+    pub(crate) candidates: [Vec<GainResult>; 2],
+    /// The gains of the standard methods, see [`Alternatives::standard`].
+    pub(crate) standard: [Option<DMatrix<f64>>; 2],
 }
 
 /// Why no gain was found.
@@ -207,9 +216,14 @@ fn assigned(found: &Alternatives, required: &[Complex<f64>]) -> GainResult {
         required: required.to_vec(),
         quality: Some(placement.quality),
         norm: None,
-        others: Vec::new(),
+        choice: None,
     };
-    GainResult { others: found.others.iter().map(result).collect(), ..result(&found.chosen) }
+    let candidates = found.candidates().map(|own| own.into_iter().map(result).collect());
+    let standard = found.standard.each_ref().map(|own| own.as_ref().map(|own| own.gain.clone()));
+    GainResult {
+        choice: Some(Box::new(GainChoice { candidates, standard })),
+        ..result(&found.chosen)
+    }
 }
 
 /// The quality is that of the movable part, so that it is not stated.
@@ -225,13 +239,21 @@ fn partly_assigned(
     );
     let named = |own: GainResult| GainResult { method: method.clone(), quality: None, ..own };
     let mut result = named(assigned(found, required));
-    result.others = result.others.into_iter().map(named).collect();
+    if let Some(choice) = &mut result.choice {
+        let candidates = std::mem::take(&mut choice.candidates);
+        choice.candidates = candidates.map(|own| own.into_iter().map(named).collect());
+    }
     result
 }
 
 fn weighted(gain: DMatrix<f64>, method: &str, residual: f64) -> GainResult {
     let method = format!("{method}; relative residual of the Riccati equation {residual:.1e}.");
-    GainResult { gain, method, required: Vec::new(), quality: None, norm: None, others: Vec::new() }
+    unique(gain, method)
+}
+
+/// The gain of a method without a choice, without required eigenvalues.
+pub(crate) fn unique(gain: DMatrix<f64>, method: String) -> GainResult {
+    GainResult { gain, method, required: Vec::new(), quality: None, norm: None, choice: None }
 }
 
 pub(crate) fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<GainResult, Refusal> {
@@ -243,14 +265,7 @@ pub(crate) fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<Gai
             });
             let margin = found.region.margin;
             let method = format!("{method}; region verified with margin {margin:.1e}{bound}.");
-            Ok(GainResult {
-                gain: found.gain,
-                method,
-                required: Vec::new(),
-                quality: None,
-                norm: None,
-                others: Vec::new(),
-            })
+            Ok(unique(found.gain, method))
         }
         Outcome::Infeasible { conflict } => Err(Refusal::Conflict(contradiction(&conflict))),
         Outcome::Inconclusive(reason) => Err(Refusal::Conflict(format!(
@@ -275,16 +290,25 @@ fn contradiction(conflict: &[&str]) -> String {
     }
 }
 
+impl GainChoice {
+    pub(crate) fn candidates(&self) -> [Vec<&GainResult>; 2] {
+        self.candidates.each_ref().map(|own| own.iter().collect())
+    }
+}
+
 impl GainResult {
     /// The result with another gain.
     fn mapped(self, map: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
         Self { gain: map(&self.gain), ..self }
     }
 
-    /// The result, then the others.
-    pub(crate) fn with_others(mut self) -> Vec<Self> {
-        let others = std::mem::take(&mut self.others);
-        std::iter::once(self).chain(others).collect()
+    /// The results among which the loop decides; without others the result alone.
+    pub(crate) fn into_choice(mut self) -> GainChoice {
+        if let Some(choice) = self.choice.take() {
+            return *choice;
+        }
+        let standard = [Some(self.gain.clone()), Some(self.gain.clone())];
+        GainChoice { candidates: [vec![self], vec![]], standard }
     }
 }
 

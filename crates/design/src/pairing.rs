@@ -1,6 +1,6 @@
 //! The choice of feedback and observer together, among the placements that were found for each.
 
-use control::aso::{FaultyPlant, Gains};
+use control::aso::{FaultyPlant, Gains, pairs};
 use control::robustness::{Loop, least_sensitive};
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
@@ -28,18 +28,23 @@ impl PairProblem<'_> {
         (feedback, observer): (GainResult, GainResult),
         gains: impl Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains,
     ) -> Result<(GainResult, GainResult), Error> {
-        let (feedbacks, observers) = (feedback.with_others(), observer.with_others());
-        let count = observers.len();
-        let pairs =
-            feedbacks.iter().flat_map(|own| observers.iter().map(move |other| (own, other)));
-        let own = |(feedback, observer): (&GainResult, &GainResult)| {
+        let (feedback, observer) = (feedback.into_choice(), observer.into_choice());
+        let [first, second] = pairs(&feedback.candidates(), &observer.candidates());
+        let chosen =
+            |(feedback, observer): (&GainResult, &GainResult)| (feedback.clone(), observer.clone());
+        if let ([only], []) = (first.as_slice(), second.as_slice()) {
+            return Ok(chosen(*only));
+        }
+        let own = |(feedback, observer): &(&GainResult, &GainResult)| {
             self.closed(&gains(&feedback.gain, &observer.gain))
         };
-        let best = match feedbacks.len() * count {
-            1 => 0,
-            _ => least_sensitive(&pairs.map(own).collect::<Result<Vec<_>, _>>()?),
-        };
-        Ok((feedbacks[best / count].clone(), observers[best % count].clone()))
+        let loops = |pairs: &[_]| pairs.iter().map(own).collect::<Result<Vec<_>, Error>>();
+        let standard = feedback.standard.iter().zip(&observer.standard);
+        let standard = standard.filter_map(|(own, other)| own.as_ref().zip(other.as_ref()));
+        let references = standard.map(|(own, other)| self.closed(&gains(own, other)));
+        let references = references.collect::<Result<Vec<_>, Error>>()?;
+        let best = least_sensitive([&loops(&first)?, &loops(&second)?], &references);
+        Ok(chosen(*first.iter().chain(&second).nth(best).unwrap_or(&first[0])))
     }
 
     fn closed(&self, gains: &Gains) -> Result<Loop, Error> {

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 use super::designed::ControllerDesign;
 use super::fallback::Fallback;
 use super::fixed_mode::described;
-use super::gains::{FeedbackProblem, Refusal, feedback};
+use super::gains::{FeedbackProblem, GainChoice, Refusal, feedback};
 use super::plant_file::PlantFile;
 use super::report::{pairs, rows};
 use super::requirements::Requirement;
@@ -132,6 +132,14 @@ struct Without<'a> {
     gone: Vec<usize>,
 }
 
+/// Feedbacks that meet the same requirement.
+struct Feedbacks {
+    /// At least one; then further ones, which come second.
+    all: [Vec<DMatrix<f64>>; 2],
+    /// Those of the standard methods, if there is a choice.
+    standard: Vec<DMatrix<f64>>,
+}
+
 impl Without<'_> {
     /// The matrices and the report, or the reason why there are none.
     fn design(
@@ -150,7 +158,8 @@ impl Without<'_> {
         let (feedbacks, method) = if allocation.residual < EXACT {
             let method = "Control allocation: the other actuators have the effect of all, with the least \
                           effort relative to their limits; the loop keeps its eigenvalues.";
-            (vec![&allocation.matrix * gains.k_x.columns(0, n)], method.to_owned())
+            let feedback = &allocation.matrix * gains.k_x.columns(0, n);
+            (Feedbacks { all: [vec![feedback], vec![]], standard: vec![] }, method.to_owned())
         } else {
             match self.redesigned(requirement) {
                 Ok((feedbacks, method)) => {
@@ -190,20 +199,27 @@ impl Without<'_> {
     /// of the intact plant.
     fn chosen(
         &self,
-        feedbacks: &[DMatrix<f64>],
+        feedbacks: &Feedbacks,
         authority: &[f64],
     ) -> Result<(ReconfiguredGains, Rest), Error> {
         let order = self.designed.plant.a.nrows();
-        let (mut all, mut loops) = (Vec::new(), Vec::new());
-        for feedback in feedbacks {
+        let with = |feedback: &DMatrix<f64>| {
             let (k_f, k_s, rest) = self.static_commands(feedback, authority)?;
             let k_x = feedback.clone().resize_horizontally(order, 0.0);
-            if feedbacks.len() > 1 {
-                loops.push(self.known_loop(&k_x, &k_f)?);
-            }
-            all.push((ReconfiguredGains { k_x, k_f, k_s }, rest));
+            Ok::<_, Error>((ReconfiguredGains { k_x, k_f, k_s }, rest))
+        };
+        let of =
+            |feedbacks: &[DMatrix<f64>]| feedbacks.iter().map(with).collect::<Result<Vec<_>, _>>();
+        let [mut first, second] = [of(&feedbacks.all[0])?, of(&feedbacks.all[1])?];
+        if first.len() + second.len() == 1 {
+            return Ok(first.swap_remove(0));
         }
-        Ok(all.swap_remove(least_sensitive(&loops)))
+        let closed = |(own, _): &(ReconfiguredGains, Rest)| self.known_loop(&own.k_x, &own.k_f);
+        let loops = |all: &[_]| all.iter().map(closed).collect::<Result<Vec<_>, Error>>();
+        let references = loops(&of(&feedbacks.standard)?)?;
+        let best = least_sensitive([&loops(&first)?, &loops(&second)?], &references);
+        first.extend(second);
+        Ok(first.swap_remove(best))
     }
 
     /// The loop in which the observer knows that the actuators are gone.
@@ -261,8 +277,8 @@ impl Without<'_> {
         distances.iter().flatten().map(|own| (own / largest).max(1e-3)).collect()
     }
 
-    /// Feedbacks of the other actuators that meet the requirement of the plant file, at least one.
-    fn redesigned(&self, requirement: &Requirement) -> Result<(Vec<DMatrix<f64>>, String), String> {
+    /// Feedbacks of the other actuators that meet the requirement of the plant file, and the method.
+    fn redesigned(&self, requirement: &Requirement) -> Result<(Feedbacks, String), String> {
         let ControllerDesign { linear, plant, extended, domain, .. } = self.designed;
         let n = extended.states;
         let gone = &self.gone;
@@ -292,8 +308,12 @@ impl Without<'_> {
             Ok(found) => {
                 let with_zeros = |gain: DMatrix<f64>, at: &usize| gain.insert_row(*at, 0.0);
                 let method = found.method.clone();
-                let all = found.with_others().into_iter();
-                Ok((all.map(|own| gone.iter().fold(own.gain, with_zeros)).collect(), method))
+                let complete = |gain: DMatrix<f64>| gone.iter().fold(gain, with_zeros);
+                let GainChoice { candidates, standard } = found.into_choice();
+                let all =
+                    candidates.map(|own| own.into_iter().map(|own| complete(own.gain)).collect());
+                let standard = standard.into_iter().flatten().map(complete).collect();
+                Ok((Feedbacks { all, standard }, method))
             }
             Err(Refusal::Control(error)) => Err(not_met(&error.to_string())),
             Err(Refusal::Conflict(message)) => Err(not_met(&message)),

@@ -3,10 +3,14 @@
 use super::eigenvectors::LARGEST_DESCENT;
 use super::{CONTINUOUS, Coordinates, DISCRETE, Placement, Wanted, alternatives_in};
 use crate::Error;
+use crate::svd::norm_2;
 use nalgebra::{Complex, DMatrix};
 
 /// Largest number of alternatives above the order `LARGEST_DESCENT`.
 const MOST_OF_LARGE: usize = 2;
+/// The factor by which condition number and gain of a candidate for a pair may exceed the lower ones of
+/// the standard methods.
+const NEAR: f64 = 1.05;
 
 /// Feedbacks that assign the same eigenvalues by different eigenvectors.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +21,11 @@ pub struct Alternatives {
     /// Others, the lowest peak of S first, at most 21, above 24 states at most 2. Condition number
     /// and gain of each are at most 9 % above the least ones of eigenvectors of largest volume.
     pub others: Vec<Placement>,
+    /// The results of two methods, up to 24 states: of method 0 of Kautsky, Nichols and Van Dooren,
+    /// which needs real eigenvalues, and of the method of Tits and Yang, each with start and end as in
+    /// scipy's `place_poles`. They are references for a choice, with figures that may be above those of
+    /// the others. With one independent input both are the chosen one.
+    pub standard: [Option<Placement>; 2],
 }
 
 impl Alternatives {
@@ -25,18 +34,47 @@ impl Alternatives {
         std::iter::once(&self.chosen).chain(&self.others)
     }
 
-    /// All pairs with those of `other`, the two chosen ones first.
-    pub fn pairs<'a>(
+    /// The candidates for a pair of feedback and observer: the chosen one and the others, and the results
+    /// of the standard methods, which come second.
+    ///
+    /// Of both only those whose condition number and gain are at most 5 % above the lower ones of the
+    /// standard methods, unless there are none.
+    #[must_use]
+    pub fn candidates(&self) -> [Vec<&Placement>; 2] {
+        let figures =
+            |own: &Placement| [own.quality.condition, norm_2(&own.gain).unwrap_or(f64::INFINITY)];
+        let least = self.standard.iter().flatten().map(figures);
+        let [condition, gain] =
+            least.reduce(|x, y| [x[0].min(y[0]), x[1].min(y[1])]).unwrap_or([f64::INFINITY; 2]);
+        let is_near = |own: &&Placement| {
+            let [own_condition, own_gain] = figures(own);
+            own_condition <= NEAR * condition && own_gain <= NEAR * gain
+        };
+        let own: Vec<_> = self.all().filter(is_near).collect();
+        let standard = self.standard.iter().flatten().filter(|own| **own != self.chosen);
+        let standard: Vec<_> = standard.filter(is_near).collect();
+        match (own.is_empty(), standard.is_empty()) {
+            (false, _) => [own, standard],
+            (true, false) => [standard, vec![]],
+            (true, true) => [self.all().collect(), vec![]],
+        }
+    }
+
+    /// The pairs of the results of the same standard method, see [`Self::standard`].
+    pub fn standard_pairs<'a>(
         &'a self,
         other: &'a Self,
     ) -> impl Iterator<Item = (&'a Placement, &'a Placement)> {
-        self.all().flat_map(|own| other.all().map(move |other| (own, other)))
+        let pairs = self.standard.iter().zip(&other.standard);
+        pairs.filter_map(|(own, other)| own.as_ref().zip(other.as_ref()))
     }
 
     /// Replaces each gain by `map` of it.
     #[must_use]
     pub fn map(mut self, map: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
-        for placement in std::iter::once(&mut self.chosen).chain(&mut self.others) {
+        let Self { chosen, others, standard } = &mut self;
+        let standard = standard.iter_mut().flatten();
+        for placement in std::iter::once(chosen).chain(others).chain(standard) {
             placement.gain = map(&placement.gain);
         }
         self

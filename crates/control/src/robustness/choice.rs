@@ -10,13 +10,22 @@ use nalgebra::{Complex, DMatrix};
 const PER_DECADE: u32 = 12;
 /// The first loop is kept unless another one is lower by more than this factor.
 const KEPT: f64 = 1.1;
+/// Factor by which a peak may exceed the lowest one of the references.
+const ACCEPTABLE: f64 = 1.02;
 
 /// The number, from 0, of the loop with the lowest peaks of S among loops with the same eigenvalues.
 ///
 /// Compared is `p_u^2 p_y` of the largest singular values `p_u` at the input and `p_y` at the output:
 /// relative changes of both count, those at the commands twice, because errors of actuators and
 /// delays of the computation act there. The first loop is kept unless another one is lower by more
-/// than 10 %, and if it is not stable. Without loops the result is 0.
+/// than 10 %. Without loops the result is 0.
+///
+/// `references`: loops that other methods have for these eigenvalues. The product alone may buy a peak
+/// far below theirs at one point with one above theirs at the other. Therefore only loops count whose
+/// peaks are each at most 2 % above the lowest one of the references. `loops`: the first ones, then
+/// others, counted on, which are considered if none of the first ones counts. If no loop
+/// counts, the one is chosen whose larger ratio to the lowest peaks is least: these need not be those
+/// of one reference.
 ///
 /// Method: Hessenberg form of each loop, 12 frequencies for each decade and the resonances of the
 /// first loop. A resonance of S between two of them is possible only near an eigenvalue, of which the
@@ -24,19 +33,35 @@ const KEPT: f64 = 1.1;
 /// p) for each frequency. A loop whose response cannot be computed, or that is not stable, is left
 /// out. The result is deterministic.
 #[must_use]
-pub fn least_sensitive(loops: &[Loop]) -> usize {
-    let [first, _, ..] = loops else { return 0 };
-    let system = first.sensitivity(Point::Input);
+pub fn least_sensitive(loops: [&[Loop]; 2], references: &[Loop]) -> usize {
+    let [first, second] = loops;
+    let Some(any) = first.first() else { return 0 };
+    let system = any.sensitivity(Point::Input);
     let Ok(modes) = system.stable_eigenvalues() else { return 0 };
     let frequencies = frequencies(&system, &modes);
+    let stable = |own: &Loop| own.sensitivity(Point::Input).stable_eigenvalues().is_ok();
+    let stable_references = references.iter().filter(|own| stable(own));
+    let lowest = stable_references.filter_map(|own| peaks(own, &frequencies).ok());
+    let lowest = lowest
+        .fold([f64::INFINITY; 2], |[input, output], own| [input.min(own[0]), output.min(own[1])]);
     let value = |(at, own): (usize, &Loop)| {
         let [input, output] = peaks(own, &frequencies).ok()?;
-        Some((input * input * output * if at == 0 { 1.0 } else { KEPT }, at))
+        let ratio = (input / lowest[0]).max(output / lowest[1]);
+        let excess = if ratio <= ACCEPTABLE { 0.0 } else { ratio };
+        Some((excess, input * input * output * if at == 0 { 1.0 } else { KEPT }, at))
     };
-    let mut all: Vec<_> = loops.iter().enumerate().filter_map(value).collect();
-    all.sort_by(|x, y| x.0.total_cmp(&y.0));
-    let stable = |at: &usize| loops[*at].sensitivity(Point::Input).stable_eigenvalues().is_ok();
-    all.into_iter().map(|(_, at)| at).find(stable).unwrap_or(0)
+    let mut all = vec![];
+    for (from, own) in [(0, first), (first.len(), second)] {
+        all.extend((from..).zip(own).filter_map(value));
+        all.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.total_cmp(&y.1)));
+        let best =
+            all.iter().find(|(.., at)| stable(first.iter().chain(second).nth(*at).unwrap_or(any)));
+        match best {
+            Some(&(excess, _, at)) if excess <= 0.0 || from > 0 || second.is_empty() => return at,
+            _ => {}
+        }
+    }
+    0
 }
 
 /// The largest singular values of S at input and output over the frequencies.

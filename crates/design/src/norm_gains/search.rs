@@ -6,7 +6,7 @@ use control::response::h_infinity;
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-use crate::gains::{GainResult, Refusal, synthesised};
+use crate::gains::{GainResult, Refusal, synthesised, unique};
 use crate::norm_gains::NormRequirement;
 use crate::report::{LowerBoundFor, NormReport};
 use crate::requirements::Region;
@@ -84,14 +84,10 @@ impl Search<'_> {
             )));
         }
         let mut chosen = match &self.filter {
-            Some(gain) if self.usable(gain)? => GainResult {
-                gain: gain.clone(),
-                method: format!("{channel}, by the Riccati equation of the filter."),
-                required: Vec::new(),
-                quality: None,
-                norm: None,
-                others: Vec::new(),
-            },
+            Some(gain) if self.usable(gain)? => {
+                let method = format!("{channel}, by the Riccati equation of the filter.");
+                unique(gain.clone(), method)
+            }
             _ => self.by_inequalities(channel)?,
         };
         let report = self.report(&chosen.gain, channel)?;

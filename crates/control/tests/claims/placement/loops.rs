@@ -37,7 +37,8 @@ fn designed(fields: &[&str]) -> (FaultyPlant, Gains, Domain) {
     (found.plant, found.gains, Domain::Sampled { period })
 }
 
-/// The pair of feedback and observer is chosen by the peaks of its loop.
+/// The pair of feedback and observer is chosen by the peaks of its loop: the lowest product alone is 29 % above scipy
+/// at the commands of the heat flow, 13 % at the measurements of the aircraft AC1.
 #[test]
 fn the_peaks_of_sensitivity_of_whole_loops_are_at_most_a_twentieth_above_the_best_of_scipy() {
     let lines =
@@ -62,5 +63,5 @@ fn the_peaks_of_sensitivity_of_whole_loops_are_at_most_a_twentieth_above_the_bes
         }
         count += 1;
     }
-    assert_eq!(count, 10);
+    assert_eq!(count, 14);
 }

@@ -139,6 +139,28 @@ fn alternatives_have_condition_and_gain_at_most_a_tenth_above_the_best_of_scipy_
     assert!(count > 200, "{count}");
 }
 
+/// Without repeated eigenvalues, for which the start has equal eigenvectors, and large condition numbers:
+/// there a method may end before it converges, at eigenvectors that rounding errors of A decide.
+#[test]
+fn the_standard_methods_have_condition_and_gain_of_scipy_with_few_exceptions() {
+    let (mut count, mut exceptions) = (0, vec![]);
+    for (system, found) in SYSTEMS.iter() {
+        let [condition, gain, _] = system.figures;
+        if condition > 1e4 || gain < 1e-6 || system.kind == "repeated" {
+            continue;
+        }
+        let standard = found.standard.iter().flatten().map(|own| system.ratios(own));
+        let least = standard.reduce(|x, y| [0, 1, 2].map(|k: usize| x[k].min(y[k])));
+        let [condition, gain, _] = least.expect("a method");
+        count += 1;
+        if [condition, gain].iter().any(|ratio| (ratio - 1.0).abs() > 0.01) {
+            exceptions.push((system.kind, system.b.shape(), condition, gain));
+        }
+    }
+    assert!(count > 50, "{count}");
+    assert!(exceptions.len() < 4, "{count}: {exceptions:?}");
+}
+
 #[test]
 fn placement_with_alternatives_chooses_the_gain_of_placement_alone() {
     for (system, found) in SYSTEMS.iter().step_by(9) {

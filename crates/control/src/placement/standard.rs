@@ -1,0 +1,216 @@
+//! The two published methods from their usual start, as scipy's `place_poles` runs them.
+
+use super::eigenvectors::{Directions, LARGEST_DESCENT};
+use super::subspace::AssignableSubspaces;
+use super::update_order::update_order;
+use crate::blocks::to_complex;
+use crate::svd::Svd;
+use crate::{Error, reflections::Reflections};
+use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
+
+/// Sweeps over all eigenvectors, and the relative change of their determinant at which they end.
+const SWEEPS: usize = 30;
+const CHANGE: f64 = 1e-3;
+/// Relative and absolute difference of singular values that count as equal; entries below the latter
+/// count as zero.
+const EQUAL: f64 = 1e-5;
+const ZERO: f64 = 1e-8;
+const EIGEN_ITERATIONS: usize = 1000;
+
+/// The directions of method 0 of Kautsky, Nichols and Van Dooren, and of the method of Tits and Yang.
+///
+/// `a`: n x n; `b`: n x r, independent columns. The first method needs real eigenvalues. Above 24
+/// states and with one input neither is computed. With as many inputs as states both have the unit
+/// vectors.
+///
+/// Both enlarge the determinant of the eigenvectors of length one, the first by one of them at a time,
+/// the second by two. They end at a local optimum, or before it, which depends on their start; it is
+/// the one of scipy: for each eigenvalue the sum of the basis of its subspace that Householder
+/// reflections give. So their figures are those that scipy reaches, up to rounding.
+///
+/// Sources: see [`super::place`]; the start: scipy 1.17, `scipy.signal.place_poles`.
+pub(crate) fn standard_directions(
+    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    problem: &AssignableSubspaces,
+) -> Result<[Option<Directions>; 2], Error> {
+    let (n, r) = b.shape();
+    if r == 1 || n > LARGEST_DESCENT {
+        return Ok([None, None]);
+    }
+    let is_real = problem.spaces.iter().all(|space| space.poles.count() == 1);
+    let start = Iteration::new((a, b), problem);
+    if n == r {
+        let unit = start.directions(problem);
+        return Ok([is_real.then(|| unit.clone()), Some(unit)]);
+    }
+    let mut knv = None;
+    if is_real {
+        let order: Vec<_> = (0..n).map(|column| (column, column)).collect();
+        knv = Some(start.clone().run(&order)?.directions(problem));
+    }
+    let yt = start.clone().run(&update_order(start.reals, n))?.directions(problem);
+    let is_finite =
+        |all: &Directions| all.iter().flat_map(|w| w.iter()).all(|entry| entry.is_finite());
+    Ok([knv.filter(is_finite), Some(yt).filter(is_finite)])
+}
+
+/// The eigenvectors while they are improved.
+#[derive(Clone)]
+struct Iteration {
+    /// One column for each real eigenvalue, in ascending order; then real and imaginary part for each
+    /// pair, of the eigenvalue with positive imaginary part.
+    vectors: DMatrix<f64>,
+    /// For each column the orthonormal basis of the subspace of its eigenvalue.
+    kernels: Vec<DMatrix<Complex<f64>>>,
+    /// Number of real eigenvalues.
+    reals: usize,
+    /// The number of the space of each column, real eigenvalues first.
+    order: Vec<usize>,
+}
+
+impl Iteration {
+    fn new((a, b): (&DMatrix<f64>, &DMatrix<f64>), problem: &AssignableSubspaces) -> Self {
+        let (n, r) = b.shape();
+        let count = |number: &usize| problem.spaces[*number].poles.count();
+        let mut order: Vec<usize> = (0..problem.spaces.len()).rev().collect();
+        order.sort_by_key(count);
+        let reals = order.iter().filter(|number| count(number) == 1).count();
+        let normal = to_complex(&Reflections::new(b.clone()).last_columns(n - r));
+        let mut start = Self { vectors: DMatrix::identity(n, n), kernels: vec![], reals, order };
+        if n == r {
+            return start;
+        }
+        for number in start.order.clone() {
+            let pole = problem.spaces[number].poles.pole().conj();
+            let shifted = to_complex(&a.transpose()) - DMatrix::from_diagonal_element(n, n, pole);
+            let kernel = Reflections::new(shifted * &normal).last_columns(r);
+            let sum = kernel.column_sum().normalize();
+            let column = start.kernels.len();
+            start.vectors.set_column(column, &sum.map(|entry| entry.re));
+            if count(&number) == 2 {
+                start.vectors.set_column(column + 1, &sum.map(|entry| entry.im));
+                start.kernels.push(kernel.clone());
+            }
+            start.kernels.push(kernel);
+        }
+        start
+    }
+
+    /// Sweeps over pairs of columns in the given order; the same column twice is one alone.
+    fn run(mut self, order: &[(usize, usize)]) -> Result<Self, Error> {
+        let floor = f64::EPSILON.sqrt();
+        for _ in 0..SWEEPS {
+            let before = self.vectors.determinant().abs();
+            for &(i, j) in order {
+                match (i == j, i < self.reals) {
+                    (true, _) => self.improve_one(i),
+                    (false, true) => self.improve_two(i, j)?,
+                    (false, false) => self.improve_pair(i)?,
+                }
+            }
+            let after = self.vectors.determinant().abs().max(floor);
+            if after > floor && (after - before).abs() < CHANGE * after {
+                break;
+            }
+        }
+        Ok(self)
+    }
+
+    /// Orthonormal columns normal to all vectors but those of the given columns.
+    fn normals(&self, columns: &[usize]) -> DMatrix<f64> {
+        let others = self.vectors.clone().remove_columns_at(columns);
+        Reflections::new(others).last_columns(columns.len())
+    }
+
+    fn kernel(&self, column: usize) -> DMatrix<f64> {
+        self.kernels[column].map(|entry| entry.re)
+    }
+
+    /// The projection of the normal of the plane that the others span.
+    fn improve_one(&mut self, j: usize) {
+        let kernel = self.kernel(j);
+        let found = &kernel * kernel.tr_mul(&self.normals(&[j]));
+        if found.amax() > ZERO {
+            self.vectors.set_column(j, &found.column(0).normalize());
+        }
+    }
+
+    /// The two vectors x, y of largest x' (u v' - v u') y with u and v normal to the others.
+    fn improve_two(&mut self, i: usize, j: usize) -> Result<(), Error> {
+        let n = self.vectors.nrows();
+        let normals = self.normals(&[i.min(j), i.max(j)]);
+        let (u, v) = (normals.column(0), normals.column(1));
+        let (own, other) = (self.kernel(i), self.kernel(j));
+        let (of_u, of_v) = (own.tr_mul(&u), own.tr_mul(&v));
+        let svd =
+            Svd::new(&(of_u * other.tr_mul(&v).transpose() - of_v * other.tr_mul(&u).transpose()))?;
+        let count = if is_close(svd.values[0], svd.values[1]) { 2 } else { 1 };
+        let mut plane = DMatrix::zeros(2 * n, count);
+        plane.rows_mut(0, n).copy_from(&(own * svd.left.columns(0, count)));
+        plane.rows_mut(n, n).copy_from(&(other * svd.right.columns(0, count)));
+        let mut before = DVector::zeros(2 * n);
+        before.rows_mut(0, n).copy_from(&self.vectors.column(i));
+        before.rows_mut(n, n).copy_from(&self.vectors.column(j));
+        let mut found = &plane * plane.tr_mul(&before);
+        if found.amax() > ZERO {
+            found *= std::f64::consts::SQRT_2 / found.norm();
+        } else {
+            found = plane.column(0).into();
+        }
+        self.vectors.set_column(i, &found.rows(0, n));
+        self.vectors.set_column(j, &found.rows(n, n));
+        Ok(())
+    }
+
+    /// The eigenvector of the pair in columns i and i + 1 whose real and imaginary part span the
+    /// largest area beside the others.
+    fn improve_pair(&mut self, i: usize) -> Result<(), Error> {
+        let normals = self.normals(&[i, i + 1]);
+        let kernel = &self.kernels[i];
+        let entry = |re, im| Complex::new(re, im);
+        let root = std::f64::consts::SQRT_2;
+        let u = normals.column(0).zip_map(&normals.column(1), entry) * Complex::new(root, 0.0);
+        let (own, other) = (kernel.ad_mul(&u), kernel.ad_mul(&u.conjugate()));
+        let form = &own * own.adjoint() - &other * other.adjoint();
+        let found = SymmetricEigen::try_new(form, f64::EPSILON, EIGEN_ITERATIONS).ok_or(
+            Error::NotConverged { what: "the eigenvalue iteration", iterations: EIGEN_ITERATIONS },
+        )?;
+        let values = found.eigenvalues.map(f64::abs);
+        let mut numbers: Vec<usize> = (0..values.len()).collect();
+        numbers.sort_by(|&x, &y| values[y].total_cmp(&values[x]));
+        let count = if is_close(values[numbers[0]], values[numbers[1]]) { 2 } else { 1 };
+        let before = self.vectors.column(i).zip_map(&self.vectors.column(i + 1), entry);
+        let axes = numbers.iter().take(count).map(|&k| kernel * found.eigenvectors.column(k));
+        let axes: Vec<DVector<_>> = axes.collect();
+        let mut found = DVector::zeros(before.len());
+        for axis in &axes {
+            found += axis * axis.dotc(&before);
+        }
+        if found.camax() > ZERO {
+            found.normalize_mut();
+        } else {
+            found.copy_from(&axes[0]);
+        }
+        self.vectors.set_column(i, &found.map(|entry| entry.re));
+        self.vectors.set_column(i + 1, &found.map(|entry| entry.im));
+        Ok(())
+    }
+
+    fn directions(&self, problem: &AssignableSubspaces) -> Directions {
+        let mut ordered: Vec<Vec<DVector<f64>>> = vec![vec![]; self.order.len()];
+        let mut column = 0;
+        for &number in &self.order {
+            ordered[number].push(self.vectors.column(column).into());
+            if problem.spaces[number].poles.count() == 2 {
+                ordered[number].push(self.vectors.column(column + 1).into());
+            }
+            column += problem.spaces[number].poles.count();
+        }
+        let columns: Vec<_> = ordered.into_iter().flatten().collect();
+        problem.directions_of(&DMatrix::from_columns(&columns))
+    }
+}
+
+fn is_close(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ZERO + EQUAL * b.abs()
+}
