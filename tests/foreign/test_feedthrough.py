@@ -219,7 +219,7 @@ def test_an_fmu_with_feedthrough_gives_the_design_of_its_matrices(aso_ftc, tmp_p
     found = []
     for name, text in [("fmu", of_fmu), ("matrices", of_matrices)]:
         (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
-        done = aso_ftc("design", tmp_path / f"{name}.toml", "--json")
+        done = aso_ftc("design", tmp_path / f"{name}.toml", "--out", tmp_path / f"{name}-design.toml", "--json")
         assert done.returncode in (0, 1), done.stderr
         found.append(json.loads(done.stdout))
     for one, other in zip(found[0]["gains"], found[1]["gains"], strict=True):
@@ -255,3 +255,31 @@ def test_a_fault_in_the_acceleration_is_detected_with_the_stated_delay(aso_ftc, 
                 detected = 0.01 * (k - 2000)
         # No false alarm in 18 s; twice the delay that nine of ten detections do not exceed.
         assert detected is not None and 0 <= detected < 2 * latest, (kind, detected, latest)
+
+
+def test_the_master_does_not_extrapolate_across_the_jumps_of_a_sampled_command(aso_ftc, tmp_path):
+    """A loop with a delay margin of one sample: a measurement with D u that is extrapolated by its last values makes it unstable."""
+    done = aso_ftc("pack", ROOT / "examples/state-space", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    (tmp_path / "plant.toml").write_text(
+        'plant = "StateSpace.fmu"\nactuators = ["u[1]"]\nmeasurements = ["y[1]"]\nactuator_faults = "all"\n'
+        "sample_time = 0.02\nfilter = 40\nfeedback.eigenvalues = [-2, -3]\nobserver.eigenvalues = [-8, -9, -10, -11]\n"
+        'operating_point = { "D[1,1]" = 0.5, "x[1]" = 0 }\n',
+        encoding="utf-8",
+    )
+    fmu = tmp_path / "Own.fmu"
+    done = aso_ftc(
+        "design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml", "--fmu", fmu,
+        "--from", ROOT / "dist/AsoController.fmu", "--json",
+    )  # fmt: skip
+    assert json.loads(done.stdout)["robustness"]["delay_margin"] == pytest.approx(0.02, rel=0.05)
+    links = ("--connect", "Own.u[1]=StateSpace.u[1]", "--connect", "StateSpace.y[1]=Own.y[1]")
+    done = aso_ftc(
+        "run", tmp_path / "StateSpace.fmu", fmu, "--set", "StateSpace.D[1,1]=0.5", *links,
+        "--stop-time", "8", "--step", "0.02", "--out", tmp_path / "run",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    table = np.genfromtxt(tmp_path / "run/results.csv", delimiter=",", names=True, deletechars="")
+    columns = [name for name in table.dtype.names if name.startswith("StateSpace.x")]
+    assert len(columns) == 2 and table[columns[0]][0] == 1.0
+    assert all(abs(table[name][-1]) < 1e-5 for name in columns)

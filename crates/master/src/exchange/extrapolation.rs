@@ -21,6 +21,8 @@ pub(super) struct OutputHistory {
     pub(super) end: f64,
     pub(super) slope: Option<f64>,
     pub(super) curvature: Option<f64>,
+    /// Whether it jumps at communication points, so that the values before say nothing about its slope.
+    pub(super) jumps: bool,
     /// Sizes of the last three steps in s.
     pub(super) earlier_size: f64,
     pub(super) last_size: f64,
@@ -66,6 +68,10 @@ impl OutputHistory {
         let quotient = (self.start - self.before) / self.last_size;
         let (slope, curvature) = match extrapolation {
             Extrapolation::Hold => (0.0, 0.0),
+            Extrapolation::Quadratic if self.jumps => {
+                (self.slope.unwrap_or(0.0), self.curvature.unwrap_or(0.0))
+            }
+            _ if self.jumps => (self.slope.unwrap_or(0.0), 0.0),
             Extrapolation::Limited => (self.limited(quotient), 0.0),
             Extrapolation::Linear => (self.slope.unwrap_or(quotient), 0.0),
             Extrapolation::Quadratic => self.parabola(quotient),

@@ -1,9 +1,9 @@
 //! The layout of connected Reals: value references and array indices of all slaves, computed once.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
-use fmu_description::Kind;
+use fmu_description::{Kind, Variability};
 
 use crate::algorithm::{Algorithm, Extrapolation};
 use crate::system::{Port, System};
@@ -86,6 +86,8 @@ pub(super) struct Layout {
     pub(super) owners: Vec<u32>,
     pub(super) slopes: Vec<Option<u32>>,
     pub(super) curvatures: Vec<Option<u32>>,
+    /// For each output, whether it depends directly on a discrete output of another slave.
+    pub(super) jumping: Vec<bool>,
     /// Number of derivatives of all outputs, and of all inputs.
     pub(super) output_derivatives: usize,
     pub(super) input_derivatives: usize,
@@ -103,6 +105,7 @@ impl Layout {
         layout.port_maps.resize_with(count, PortMap::default);
         layout.collect_outputs(system);
         layout.collect_inputs(system);
+        layout.find_jumping(system);
         for (slave, port_map) in layout.port_maps.iter_mut().enumerate() {
             let Some(flags) = &system.slaves[slave].1.description().co_simulation else { continue };
             let order = match algorithm.extrapolation {
@@ -191,6 +194,29 @@ impl Layout {
         }
     }
 
+    /// Finds the outputs that jump with a discrete output of another slave: those that depend directly on an input
+    /// that follows it, also through further slaves. An output without stated dependencies counts as smooth.
+    fn find_jumping(&mut self, system: &System) {
+        let is_discrete = |port: Port| system.variable(port).variability == Variability::Discrete;
+        let mut jumping: HashSet<Port> =
+            self.output_ports.iter().copied().filter(|port| is_discrete(*port)).collect();
+        loop {
+            let fed = system.connections.iter().filter(|own| jumping.contains(&own.from));
+            let fed: HashSet<Port> = fed.map(|connection| connection.to).collect();
+            let follows = |port: &&Port| {
+                let dependencies = direct_dependencies(system, **port);
+                !jumping.contains(port) && dependencies.iter().any(|input| fed.contains(input))
+            };
+            let found: Vec<Port> = self.output_ports.iter().filter(follows).copied().collect();
+            if found.is_empty() {
+                break;
+            }
+            jumping.extend(found);
+        }
+        let jumps = |port: &Port| jumping.contains(port) && !is_discrete(*port);
+        self.jumping = self.output_ports.iter().map(jumps).collect();
+    }
+
     /// Assigns indices to the derivatives: slave by slave, first order before second order.
     fn place_derivatives(&mut self) {
         for port_map in &mut self.port_maps {
@@ -223,6 +249,15 @@ impl Layout {
     pub(super) fn output(&self, port: Port) -> Option<usize> {
         self.indices.get(&port).map(|&index| index as usize)
     }
+}
+
+/// The variables on which an output depends directly, as far as its model description states them.
+fn direct_dependencies(system: &System, output: Port) -> Vec<Port> {
+    let outputs = &system.slaves[output.slave].1.description().structure.outputs;
+    let unknown = outputs.iter().find(|unknown| unknown.index as usize == output.variable + 1);
+    let list = unknown.and_then(|unknown| unknown.dependencies.as_deref()).unwrap_or_default();
+    let variable = |index: &u32| Port { variable: *index as usize - 1, ..output };
+    list.iter().filter(|index| **index > 0).map(variable).collect()
 }
 
 /// Whether the values of a variable are Reals.

@@ -244,6 +244,7 @@ impl Reals {
             },
             slope: derivative(layout.slopes[output]),
             curvature: derivative(layout.curvatures[output]),
+            jumps: layout.jumping[output],
             earlier_size: span.earlier_size,
             last_size: span.last_size,
             size: span.size,

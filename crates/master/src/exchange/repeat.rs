@@ -43,6 +43,7 @@ impl Reals {
                 end: trace.latest[output],
                 slope: derivative(self.layout.slopes[output]),
                 curvature: derivative(self.layout.curvatures[output]),
+                jumps: self.layout.jumping[output],
                 earlier_size: span.last_size,
                 last_size: span.size,
                 size,

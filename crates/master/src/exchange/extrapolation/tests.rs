@@ -15,6 +15,7 @@ const PAST: OutputHistory = OutputHistory {
     earlier_size: 1.0,
     last_size: 0.5,
     size: 2.0,
+    jumps: false,
 };
 const PARABOLA: Polynomial = Polynomial { value: 6.0, slope: 8.0, curvature: 6.0 };
 
@@ -93,4 +94,17 @@ fn missing_past_values_add_no_curvature() {
     let slope = OutputHistory { slope: Some(8.0), ..first };
     assert_eq!(slope.extrapolated(Extrapolation::Quadratic).end(2.0), 22.0);
     assert_eq!(first.interpolated(Extrapolation::Quadratic).mean(2.0), 20.0);
+}
+
+/// The values before are on the other side of a jump.
+#[test]
+fn an_output_that_jumps_is_extrapolated_by_its_own_derivatives_only() {
+    let jump = OutputHistory { jumps: true, ..PAST };
+    let slope = OutputHistory { slope: Some(8.0), ..jump };
+    for extrapolation in [Extrapolation::Limited, Extrapolation::Linear, Extrapolation::Quadratic] {
+        assert_eq!(jump.extrapolated(extrapolation), Polynomial::held(6.0));
+        assert_eq!(slope.extrapolated(extrapolation), line(8.0));
+    }
+    let both = OutputHistory { curvature: Some(6.0), ..slope };
+    assert_eq!(both.extrapolated(Extrapolation::Quadratic).end(2.0), 34.0);
 }
