@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix};
 const MOST_OF_LARGE: usize = 2;
 /// The factor by which condition number and gain of a candidate for a pair may exceed the lower ones of
 /// the standard methods.
-const NEAR: f64 = 1.05;
+const NEAR: f64 = 1.09;
 
 /// Feedbacks that assign the same eigenvalues by different eigenvectors.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,7 +37,7 @@ impl Alternatives {
     /// The candidates for a pair of feedback and observer: the chosen one and the others, and the results
     /// of the standard methods, which come second.
     ///
-    /// Of both only those whose condition number and gain are at most 5 % above the lower ones of the
+    /// Of both only those whose condition number and gain are at most 9 % above the lower ones of the
     /// standard methods, unless there are none.
     #[must_use]
     pub fn candidates(&self) -> [Vec<&Placement>; 2] {
