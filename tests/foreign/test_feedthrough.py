@@ -18,6 +18,7 @@ from fmpy.fmi2 import FMU2Slave
 from scipy.linalg import expm
 
 from conftest import ROOT
+from test_estimation_laws import Designed as DesignedFmu
 
 # Two masses between springs; position of the first one and acceleration of the second one are measured.
 A = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-30, 10, -0.8, 0.1], [12, -25, 0.1, -1.1]])
@@ -40,16 +41,9 @@ SAMPLED = PLANT.replace("filter", "sample_time = 0.01\nfilter")
 TEXTS = {"continuous": PLANT, "sampled": SAMPLED}
 
 
-class Designed:
+class Designed(DesignedFmu):
     def __init__(self, aso_ftc, folder, text):
-        (folder / "plant.toml").write_text(text, encoding="utf-8")
-        self.fmu = folder / "Own.fmu"
-        done = aso_ftc(
-            "design", folder / "plant.toml", "--out", folder / "design.toml", "--fmu", self.fmu,
-            "--from", ROOT / "dist/AsoController.fmu", "--json",
-        )  # fmt: skip
-        assert done.returncode in (0, 1), done.stderr
-        self.report = json.loads(done.stdout)
+        super().__init__(aso_ftc, folder, text)
         self.design = tomllib.loads((folder / "design.toml").read_text(encoding="utf-8"))
 
     def __getattr__(self, name):
