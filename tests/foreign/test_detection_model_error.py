@@ -220,16 +220,6 @@ def test_what_detection_does_not_allow_for_is_refused_at_its_line(tmp_path, extr
     assert run.returncode == 2 and sentence in run.stderr and "plant.toml:" in run.stderr, run.stderr
 
 
-@pytest.mark.parametrize("option", ["--c-code", "--no-std"])
-def test_code_for_a_microcontroller_is_refused_with_the_entry_that_it_has_not(tmp_path, option):
-    own, entry = f"sample_time = {T}\nestimation.law = \"proportional-integral\"\n" + PLANT, "P_f"
-    (tmp_path / "plant.toml").write_text(own, encoding="utf-8")
-    command = [COMMAND, "design", "plant.toml", option, "code", "--certificate-time", "0"]
-    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert run.returncode == 2 and f"there is no code for its entry `{entry}`" in run.stderr, run.stderr
-    assert not (tmp_path / "code").exists()
-
-
 REFERENCE = ('[reference]\ntrack = ["y1"]\n', ("[-1.0, -1.2, -1.4, -1.6]", "[-1.0, -1.1, -1.2, -1.4, -1.6]"))
 GONE = ('[reconfiguration]\nactuators = "all"\nstuck_at = { u1 = 0.3 }\n', ("", ""))
 
