@@ -32,7 +32,8 @@
 //! x_i' = r - H y + F_i f_hat + L_w (u - (K_x x_hat + K_f f_hat + K_i x_i + N_r r))
 //! ```
 //!
-//! y is what follows C x, without a row of D. x_i integrates the distance of the references from H y without the estimated sensor faults, -F_i f_hat.
+//! H takes measurements whose rows of D are zero. x_i integrates the distance of the references from H y without
+//! the estimated sensor faults, -F_i f_hat.
 //! The last term is the back-calculation of Åström and Rundqwist, Integrator windup and how to avoid it
 //! (American Control Conference 1989): it is not zero while a command is at a limit, and then lets x_i
 //! follow the command that is really applied. Each term is there where the design states its matrix.

@@ -15,13 +15,13 @@
 //!              x_i[k+1] = x_i[k] + T (r[k] - H y[k] + F_i f_hat) + L_w (u[k] - free command)
 //! ```
 //!
-//! where y[k] is the measurement less D u[k-1], the part of the command that was in force when it was taken; u[-1]
-//! is that of the operating point. And with K_i x_i[k] + N_r r[k] in u[k], and f_hat in x_i[k+1] the one that u[k] uses: the terms of
+//! with K_i x_i[k] + N_r r[k] in u[k], and f_hat in x_i[k+1] the one that u[k] uses: the terms of
 //! `equations.rs` for references. f_hat only while estimating, K_f f_hat only while compensating, u within its limits. A design
 //! without A_f has A_f = I. In a design with a direct term P_f, z has f_hat_i in place of f_hat, and
 //! f_hat[k] = f_hat_i + P_f (y[k] - C x_hat) with the estimates that u[k] uses. A sliding-mode law has
 //! f_hat[k|k] = rho L_f e[k] / (|L_f e[k]| + delta), element by element. All signals are deviations
-//! from the operating point.
+//! from the operating point. In a design with D, y[k] is the measurement less D u[k-1], which is in it; u[-1] is the
+//! command of the operating point.
 
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};

@@ -93,7 +93,7 @@ impl Signals {
         self.set_inputs(values, point, offset);
     }
 
-    /// Takes D u off the measurements, u being the commands of before.
+    /// Takes D u off the measurements, u being the commands of the sample before.
     pub(crate) fn remove_feedthrough(&mut self, design: &Design) {
         let Some(d) = &design.d else { return };
         for (k, y) in self.y.iter_mut().enumerate() {

@@ -52,19 +52,19 @@ class Designed(DesignedFmu):
     def points(self):
         return {point["point"]: point for point in self.report["robustness"]["points"]}
 
-    def controller(self, s, fed, observed):
-        """The transfer function from y to u at s or z; `fed`: D, or D / z."""
+    def controller(self, s, fed, kind):
+        """The transfer function from y to u at s or z; `fed`: D, or D / z; `kind`: continuous or sampled."""
         n, q, p, m = len(self.A), self.F_a.shape[1], len(self.C), self.B.shape[1]
         W = np.diag(self.design["filter"])
         # z = [x_hat; f_hat], e = y_f - C x_hat: u = K_1 y_f, then y_f from y and u.
         C_0 = np.hstack([self.C, np.zeros((p, q))])
         K = np.hstack([self.K_x, self.K_f])
         L = np.vstack([self.L_x, self.L_f])
-        A_f = np.zeros((q, q)) if observed == "continuous" else np.eye(q)
+        A_f = np.zeros((q, q)) if kind == "continuous" else np.eye(q)
         A_0 = np.block([[self.A, self.F_a], [np.zeros((q, n)), A_f]])
         B_0 = np.vstack([self.B, np.zeros((q, m))])
         one = np.eye(n + q)
-        if observed == "continuous":
+        if kind == "continuous":
             K_1 = K @ np.linalg.solve(s * one - A_0 - B_0 @ K + L @ C_0, L)
             filtered = W @ np.linalg.inv(s * np.eye(p) + W)
         else:
@@ -77,8 +77,9 @@ class Designed(DesignedFmu):
         K_1 = K_1 @ filtered
         return np.linalg.solve(np.eye(m) + K_1 @ fed, K_1)
 
-    def plant(self, s, A, B, C, D, observed):
-        if observed == "continuous":
+    def plant(self, s, A, B, C, D, kind):
+        """The transfer function of the plant, and the part of it that is D."""
+        if kind == "continuous":
             return C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D, D
         h = self.design["sample_time"]
         both = expm(np.block([[A, B], [np.zeros((B.shape[1], len(A) + B.shape[1]))]]) * h)
@@ -160,7 +161,7 @@ class Run:
             self.slave.doStep(t, self.step)
             u = self.get("force")
             x = self.phi @ x + self.gamma @ (u + f)
-        return x, self.get("f_force" if "f_force" in self.names else "f_hat")
+        return x, self.get("f_hat")
 
 
 def test_the_fault_is_estimated_and_cancelled_through_the_feedthrough(designed):

@@ -6,13 +6,11 @@ use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
 
+use super::feedthrough::significant;
 use super::plant_file::{self, PlantFile};
 use super::signals::{EntryPoint, Fault, FaultDynamics, Signal};
 use crate::detection::request::{Disturbance, DisturbanceEntry};
 use files::PlaceError;
-
-/// Part of the largest entry of a row of C below which an entry of D counts as zero.
-const NOTHING: f64 = 1e-9;
 
 /// x' = A x + B u + faults, y = C x + D u + faults, about an operating point.
 pub(crate) struct LinearPlant {
@@ -117,7 +115,7 @@ fn linearised(
     let merged = |own: &[Signal], found: &[linearise::Signal]| {
         own.iter().zip(found).map(|(own, found)| own.clone().or(known(found))).collect()
     };
-    let d = feedthrough(found.matrices.d.clone(), &found.matrices.c);
+    let d = significant(found.matrices.d.clone(), &found.matrices.c);
     let (faults, models) = faults(file, &found, &d)?;
     Ok(LinearPlant {
         disturbances: disturbances(file, (&found.matrices.b, &d), Some(&found.matrices))?,
@@ -273,19 +271,6 @@ fn faults(
         models.push(model);
     }
     Ok((faults, models))
-}
-
-/// D without the entries that are rounding beside the row of `c`.
-pub(crate) fn feedthrough(mut d: DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64> {
-    for (mut row, of_states) in d.row_iter_mut().zip(c.row_iter()) {
-        let negligible = NOTHING * of_states.amax();
-        row.apply(|entry| {
-            if entry.abs() <= negligible {
-                *entry = 0.0;
-            }
-        });
-    }
-    d
 }
 
 /// Returns where the fault input `at` of the FMU enters: the states or the measurements.

@@ -10,7 +10,8 @@ use fmu_import::Fmu;
 use linearise::{Linearise, linearise};
 use nalgebra::{DMatrix, DVector};
 
-use super::linear_plant::{self, feedthrough};
+use super::feedthrough::significant;
+use super::linear_plant;
 use super::plant_file::{PlantFile, PlantFmu};
 use crate::robustness::report::Parameter;
 
@@ -134,7 +135,7 @@ impl<'a> ParameterFamily<'a> {
         let measured = found.outputs.iter().map(|signal| signal.value);
         let measured = DVector::from_iterator(found.outputs.len(), measured);
         let matrices = found.matrices;
-        let d = feedthrough(matrices.d, &matrices.c);
+        let d = significant(matrices.d, &matrices.c);
         let plant = StateSpace {
             a: matrices.a,
             b: matrices.b,

@@ -136,7 +136,7 @@ const KEYS: [&str; 32] = [
     "schedule",
 ];
 /// Entries that errors of later steps point at.
-const PLACES: [&str; 24] = [
+const PLACES: [&str; 23] = [
     "A",
     "B",
     "C",
@@ -158,7 +158,6 @@ const PLACES: [&str; 24] = [
     "reference",
     "family",
     "schedule",
-    "detection",
     "reconfiguration",
     "fallback",
 ];

@@ -93,6 +93,13 @@ impl<'a> Rows<'a> {
         }
     }
 
+    /// Returns the variables (1-based indices) on which the output at position `output` depends
+    /// directly; `None`: possibly all.
+    pub(crate) fn direct_dependencies(&self, output: usize) -> Option<&'a [u32]> {
+        let index = u32::try_from(output + 1).ok()?;
+        self.outputs.get(&index)?.dependencies.as_deref()
+    }
+
     /// Returns the variables (1-based indices) on which the output at position `output` depends in
     /// initialization mode; `None`: possibly all.
     pub(crate) fn initial_dependencies(&self, output: usize) -> Option<&'a [u32]> {

@@ -206,7 +206,7 @@ fn hold_times_and_delays_are_the_limits_of_runs() {
     assert!(growth(&own, PERIOD, 1.05 * delay) > 1.0, "{delay}");
 }
 
-/// No random vertex of A, B, C and D is worse than the one that the search found.
+/// No vertex of C and D is worse than the one that the search found.
 #[test]
 fn the_worst_case_includes_the_feedthrough() {
     for domain in [Domain::Continuous, SAMPLED] {

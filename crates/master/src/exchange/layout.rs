@@ -6,6 +6,7 @@ use std::ops::Range;
 use fmu_description::{Kind, Variability};
 
 use crate::algorithm::{Algorithm, Extrapolation};
+use crate::order::Rows;
 use crate::system::{Port, System};
 use slave::Advance;
 use slave::{Transformation, ValueType};
@@ -200,12 +201,22 @@ impl Layout {
         let is_discrete = |port: Port| system.variable(port).variability == Variability::Discrete;
         let mut jumping: HashSet<Port> =
             self.output_ports.iter().copied().filter(|port| is_discrete(*port)).collect();
+        if jumping.is_empty() {
+            self.jumping = vec![false; self.output_ports.len()];
+            return;
+        }
+        let rows: Vec<_> =
+            system.slaves.iter().map(|(_, slave)| Rows::new(slave.description())).collect();
         loop {
             let fed = system.connections.iter().filter(|own| jumping.contains(&own.from));
             let fed: HashSet<Port> = fed.map(|connection| connection.to).collect();
             let follows = |port: &&Port| {
-                let dependencies = direct_dependencies(system, **port);
-                !jumping.contains(port) && dependencies.iter().any(|input| fed.contains(input))
+                let inputs = rows[port.slave].direct_dependencies(port.variable);
+                let is_fed = |index: &u32| {
+                    let position = (*index as usize).checked_sub(1);
+                    position.is_some_and(|variable| fed.contains(&Port { variable, ..**port }))
+                };
+                !jumping.contains(port) && inputs.is_some_and(|all| all.iter().any(is_fed))
             };
             let found: Vec<Port> = self.output_ports.iter().filter(follows).copied().collect();
             if found.is_empty() {
@@ -249,15 +260,6 @@ impl Layout {
     pub(super) fn output(&self, port: Port) -> Option<usize> {
         self.indices.get(&port).map(|&index| index as usize)
     }
-}
-
-/// The variables on which an output depends directly, as far as its model description states them.
-fn direct_dependencies(system: &System, output: Port) -> Vec<Port> {
-    let outputs = &system.slaves[output.slave].1.description().structure.outputs;
-    let unknown = outputs.iter().find(|unknown| unknown.index as usize == output.variable + 1);
-    let list = unknown.and_then(|unknown| unknown.dependencies.as_deref()).unwrap_or_default();
-    let variable = |index: &u32| Port { variable: *index as usize - 1, ..output };
-    list.iter().filter(|index| **index > 0).map(variable).collect()
 }
 
 /// Whether the values of a variable are Reals.

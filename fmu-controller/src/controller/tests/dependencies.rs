@@ -153,9 +153,9 @@ fn is_bent((sizes, limits, features): Shape, unknown: &str) -> bool {
         }
         None if unknown.starts_with("E_hat") => true,
         None => {
-            let filters = if features.contains('u') { "der(y_f" } else { "der(x_i" };
-            let bent =
-                ["der(x_hat", "der(x_i", filters].iter().any(|state| unknown.starts_with(state));
+            let starts = |state: &&str| unknown.starts_with(state);
+            let bent = ["der(x_hat", "der(x_i"].iter().any(starts)
+                || features.contains('u') && starts(&"der(y_f");
             limits.contains('l') && sizes[0] > 0 && bent
         }
     }
