@@ -4,13 +4,15 @@ use std::error::Error;
 use std::path::Path;
 use std::{env, fs};
 
+use control::aso::FaultyPlant;
 use controller::AsoController;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let file = "../../fmu-controller/resources/design.toml";
     println!("cargo:rerun-if-changed={file}");
     let design = AsoController::bytes_of_design(&fs::read_to_string(file)?)?;
-    let plant = AsoController::from_bytes(&design)?.plant();
+    let [a, b, c, f_a] = AsoController::from_bytes(&design)?.plant();
+    let plant = FaultyPlant::with_constant_faults(a, b, c, f_a);
     // Here, so that the module needs no code for a plant without an observer.
     plant.check_observer_exists()?;
     let (dynamics, output) = (plant.augmented_dynamics(), plant.augmented_output());

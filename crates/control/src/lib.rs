@@ -31,45 +31,76 @@
 //! [`StateSpace`]; [`Domain`] distinguishes continuous and sampled time. Matrices may have any size. Bad
 //! arguments and unsolvable problems are an [`Error`], never a panic.
 #![forbid(unsafe_code)]
+#![cfg_attr(not(feature = "design"), allow(dead_code, reason = "balancing and checks that design needs"))]
 
+#[cfg(feature = "design")]
 pub mod allocation;
+#[cfg(feature = "design")]
 pub mod aso;
 mod balance;
+#[cfg(feature = "design")]
 mod blocks;
 mod check;
+#[cfg(feature = "design")]
 pub mod controller;
+#[cfg(feature = "design")]
 pub mod detectability;
+#[cfg(feature = "design")]
 pub mod detection;
+#[cfg(feature = "design")]
 pub mod distance;
+#[cfg(feature = "design")]
 mod domain;
+#[cfg(feature = "design")]
 pub mod eigen;
 mod error;
+#[cfg(feature = "design")]
 pub mod estimation;
 pub mod exponential;
+#[cfg(feature = "design")]
 pub mod faults;
 pub mod hold;
+#[cfg(feature = "design")]
 pub mod isolation;
 #[cfg(feature = "lmi")]
 pub mod lmi;
+#[cfg(feature = "design")]
 pub mod lyapunov;
+#[cfg(feature = "design")]
 pub mod placement;
 mod product;
+#[cfg(feature = "design")]
 pub mod rank;
+#[cfg(feature = "design")]
 mod reflections;
+#[cfg(feature = "design")]
 pub mod residual;
+#[cfg(feature = "design")]
 pub mod response;
+#[cfg(feature = "design")]
 pub mod riccati;
+#[cfg(feature = "design")]
 pub mod robustness;
+#[cfg(feature = "design")]
 pub mod sampled;
+#[cfg(feature = "design")]
 pub mod stability;
+#[cfg(feature = "design")]
 mod state_space;
+#[cfg(feature = "design")]
 mod svd;
+#[cfg(feature = "design")]
 pub mod theorem1;
+#[cfg(feature = "design")]
 pub mod tracking;
+#[cfg(feature = "design")]
 pub mod weight;
+#[cfg(feature = "design")]
 pub mod zeros;
 
+#[cfg(feature = "design")]
 pub use domain::Domain;
 pub use error::Error;
 pub use product::product;
+#[cfg(feature = "design")]
 pub use state_space::StateSpace;

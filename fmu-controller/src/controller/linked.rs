@@ -1,7 +1,7 @@
 //! The controller in a program that links it, without files.
 
-use control::aso::FaultyPlant;
 use fmu::Failure;
+use nalgebra::DMatrix;
 
 use super::AsoController;
 use crate::design::Design;
@@ -32,10 +32,8 @@ impl AsoController {
             .map_err(|error| Failure::Error(format!("the bytes are no design: {error}")))
     }
 
-    /// The plant of the design with its fault model.
-    pub fn plant(&self) -> FaultyPlant {
-        let [a, b, c, f_a] =
-            [&self.design.a, &self.design.b, &self.design.c, &self.design.f_a].map(Matrix::dense);
-        FaultyPlant::with_constant_faults(a, b, c, f_a)
+    /// A, B, C and `F_a` of the design: the plant and the columns by which faults enter it.
+    pub fn plant(&self) -> [DMatrix<f64>; 4] {
+        [&self.design.a, &self.design.b, &self.design.c, &self.design.f_a].map(Matrix::dense)
     }
 }
