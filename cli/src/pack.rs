@@ -99,12 +99,8 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
         locked: options.crates.is_empty(),
         versions: options.fmi,
     };
-    for folder in &options.crates {
-        let fmus = pack_crate(folder, &packing)
-            .with_context(|| format!("cannot pack {}", folder.display()))?;
-        for fmu in fmus {
-            println!("{}", fmu.path.display());
-        }
+    for fmu in pack_crates(&options.crates, &packing)? {
+        println!("{}", fmu.path.display());
     }
     if !options.crates.is_empty() {
         return Ok(true);
@@ -152,18 +148,14 @@ pub(crate) fn pack_into(root: &Path, out: &Path) -> anyhow::Result<Vec<PackedFmu
 }
 
 fn pack_models(root: &Path, packing: &PackOptions<'_>) -> anyhow::Result<Vec<PackedFmu>> {
-    let packed: Vec<_> = MODELS
-        .iter()
-        .map(|model| pack_crate(&root.join(model), packing))
-        .collect::<anyhow::Result<_>>()?;
-    Ok(packed.into_iter().flatten().collect())
+    pack_crates(&MODELS.map(|model| root.join(model)), packing)
 }
 
 /// Writes the model descriptions of both versions of FMI to the folder modelDescription.
 fn update_descriptions(root: &Path) -> anyhow::Result<()> {
-    for model in MODELS {
-        let folder = root.join(model);
-        let library = library::build(&folder, true, &[])?;
+    let folders = MODELS.map(|model| root.join(model));
+    let libraries = library::build(&folders, true, &[])?;
+    for ((model, folder), library) in MODELS.iter().zip(&folders).zip(&libraries) {
         for &version in Versions::Both.list() {
             let resources = folder.join("resources");
             let (xml, description) =
@@ -199,12 +191,19 @@ pub(crate) fn workspace() -> anyhow::Result<PathBuf> {
         })
 }
 
-/// Builds the library of a crate and packs it, once for each version of FMI.
-fn pack_crate(folder: &Path, packing: &PackOptions<'_>) -> anyhow::Result<Vec<PackedFmu>> {
+/// Builds the libraries of crates and packs each, once for each version of FMI.
+fn pack_crates(folders: &[PathBuf], packing: &PackOptions<'_>) -> anyhow::Result<Vec<PackedFmu>> {
     let others = packing.binaries.map_or(Ok(Vec::new()), binaries::targets)?;
-    let library = library::build(folder, packing.locked, &others)?;
-    let versions = packing.versions.list().iter();
-    versions.map(|&version| pack_version(folder, packing, &library, version)).collect()
+    let libraries = library::build(folders, packing.locked, &others)?;
+    let mut fmus = Vec::new();
+    for (folder, library) in folders.iter().zip(&libraries) {
+        for &version in packing.versions.list() {
+            let fmu = pack_version(folder, packing, library, version)
+                .with_context(|| format!("cannot pack {}", folder.display()))?;
+            fmus.push(fmu);
+        }
+    }
+    Ok(fmus)
 }
 
 fn pack_version(

@@ -1,12 +1,14 @@
-//! Builds the library of a crate with cargo and lists its dependencies.
+//! Builds the libraries of crates with cargo and lists their dependencies.
 
-use std::collections::HashSet;
+use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
 use std::ffi::OsString;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, bail};
+use cargo_metadata::camino::Utf8PathBuf;
 use cargo_metadata::{
     Artifact, CrateType, DependencyKind, Message, Metadata, MetadataCommand, Package, PackageId,
     TargetKind,
@@ -25,52 +27,110 @@ pub(super) struct Library {
 }
 
 /// The compiler whose standard library is in the library.
+#[derive(Clone)]
 pub(super) struct Toolchain {
     pub(super) release: String,
     pub(super) sysroot: PathBuf,
     host: String,
 }
 
-/// Builds the library of the crate in `folder`; `locked` is `--locked` of cargo. The dependencies
-/// include the dependencies on the targets `others`, for which the library is built elsewhere.
+/// Builds the libraries of the crates in `folders`, those of one workspace by one call of cargo, which
+/// compiles them side by side; `locked` is `--locked` of cargo. The dependencies include the
+/// dependencies on the targets `others`, for which the libraries are built elsewhere.
 ///
 /// # Errors
 ///
-/// Returns an error if there is no such crate, if it is not a `cdylib`, or if it does not compile.
-pub(super) fn build(folder: &Path, locked: bool, others: &[&str]) -> anyhow::Result<Library> {
-    let folder = std::path::absolute(folder)?;
-    let manifest = folder.join("Cargo.toml");
-    let manifest = manifest.display();
-    if !folder.join("Cargo.toml").is_file() {
-        bail!("there is no {manifest}: expected the folder of a crate that uses fmu");
+/// Returns an error, with the folder, if there is no such crate, if it is not a `cdylib`, or if it does
+/// not compile.
+pub(super) fn build(
+    folders: &[PathBuf],
+    locked: bool,
+    others: &[&str],
+) -> anyhow::Result<Vec<Library>> {
+    let sources = folders.iter().map(|folder| {
+        Source::new(folder, locked).with_context(|| format!("cannot pack {}", folder.display()))
+    });
+    let sources = sources.collect::<anyhow::Result<Vec<_>>>()?;
+    let mut artifacts: HashMap<&Utf8PathBuf, Vec<Artifact>> = HashMap::new();
+    for source in &sources {
+        if let Entry::Vacant(entry) = artifacts.entry(source.workspace()) {
+            let members = sources.iter().filter(|member| member.workspace() == source.workspace());
+            entry.insert(compile(source, members, locked)?);
+        }
     }
-    let toolchain = Toolchain::of(&folder)?;
-    let metadata = metadata(&folder, &toolchain.host, locked)?;
-    let Some(package) = metadata.root_package() else {
-        bail!("{manifest} is a workspace: expected the folder of one of its crates");
-    };
-    if !package.targets.iter().any(|target| target.crate_types.contains(&CrateType::CDyLib)) {
-        bail!("{manifest}: expected a library with crate-type = [\"cdylib\"] under [lib]");
-    }
-    let artifacts = compile(&folder, &metadata, locked)?;
-    let mut dependencies = dependencies(&metadata, package, &artifacts);
-    let everywhere: HashSet<_> =
-        reached(&metadata, package).into_iter().map(|own| &own.id).collect();
-    for target in others {
-        let there = self::metadata(&folder, target, locked)?;
-        let more = reached(&there, package).into_iter().filter(|own| !everywhere.contains(&own.id));
-        let more: Vec<_> = more.filter(|own| !dependencies.contains(own)).cloned().collect();
-        dependencies.extend(more);
-    }
-    dependencies
-        .sort_by(|one, other| (&one.name, &one.version).cmp(&(&other.name, &other.version)));
-    let file = artifacts
+    sources
         .iter()
-        .filter(|artifact| artifact.package_id == package.id)
-        .flat_map(|artifact| &artifact.filenames)
-        .find(|file| file.extension() == Some(std::env::consts::DLL_EXTENSION))
-        .with_context(|| format!("{manifest}: cargo made no library for this platform"))?;
-    Ok(Library { file: file.into(), package: package.clone(), dependencies, toolchain })
+        .map(|source| source.library(&artifacts[source.workspace()], others, locked))
+        .collect()
+}
+
+/// A crate whose library is to be built.
+struct Source {
+    folder: PathBuf,
+    metadata: Metadata,
+    package: Package,
+    toolchain: Toolchain,
+}
+
+impl Source {
+    fn new(folder: &Path, locked: bool) -> anyhow::Result<Self> {
+        let folder = std::path::absolute(folder)?;
+        let manifest = folder.join("Cargo.toml");
+        let manifest = manifest.display();
+        if !folder.join("Cargo.toml").is_file() {
+            bail!("there is no {manifest}: expected the folder of a crate that uses fmu");
+        }
+        let toolchain = Toolchain::of(&folder)?;
+        let metadata = metadata(&folder, &toolchain.host, locked)?;
+        let Some(package) = metadata.root_package() else {
+            bail!("{manifest} is a workspace: expected the folder of one of its crates");
+        };
+        if !package.targets.iter().any(|target| target.crate_types.contains(&CrateType::CDyLib)) {
+            bail!("{manifest}: expected a library with crate-type = [\"cdylib\"] under [lib]");
+        }
+        let package = package.clone();
+        Ok(Self { folder, metadata, package, toolchain })
+    }
+
+    fn workspace(&self) -> &Utf8PathBuf {
+        &self.metadata.workspace_root
+    }
+
+    /// The built library, from the artifacts of the workspace.
+    fn library(
+        &self,
+        artifacts: &[Artifact],
+        others: &[&str],
+        locked: bool,
+    ) -> anyhow::Result<Library> {
+        let Self { folder, metadata, package, toolchain } = self;
+        let mut dependencies = dependencies(metadata, package, artifacts);
+        let everywhere: HashSet<_> =
+            reached(metadata, package).into_iter().map(|own| &own.id).collect();
+        for target in others {
+            let there = self::metadata(folder, target, locked)?;
+            let more =
+                reached(&there, package).into_iter().filter(|own| !everywhere.contains(&own.id));
+            let more: Vec<_> = more.filter(|own| !dependencies.contains(own)).cloned().collect();
+            dependencies.extend(more);
+        }
+        dependencies
+            .sort_by(|one, other| (&one.name, &one.version).cmp(&(&other.name, &other.version)));
+        let file = artifacts
+            .iter()
+            .filter(|artifact| artifact.package_id == package.id)
+            .flat_map(|artifact| &artifact.filenames)
+            .find(|file| file.extension() == Some(std::env::consts::DLL_EXTENSION))
+            .with_context(|| {
+                format!("{}: cargo made no library for this platform", folder.display())
+            })?;
+        Ok(Library {
+            file: file.into(),
+            package: package.clone(),
+            dependencies,
+            toolchain: toolchain.clone(),
+        })
+    }
 }
 
 impl Toolchain {
@@ -115,21 +175,32 @@ fn metadata(folder: &Path, host: &str, locked: bool) -> anyhow::Result<Metadata>
     })
 }
 
-/// Builds the library with the profile `fmu` and returns all artifacts.
-fn compile(folder: &Path, metadata: &Metadata, locked: bool) -> anyhow::Result<Vec<Artifact>> {
+/// Builds the libraries of `members`, crates of the workspace of `source`, with the profile `fmu`;
+/// returns all artifacts.
+fn compile<'a>(
+    source: &Source,
+    members: impl Iterator<Item = &'a Source>,
+    locked: bool,
+) -> anyhow::Result<Vec<Artifact>> {
+    let metadata = &source.metadata;
     let root = &metadata.workspace_root;
     let target = metadata.target_directory.join("libraries");
     let mut command = Command::new(program("CARGO", "cargo"));
-    command.current_dir(folder).args(["rustc", "--lib", "--profile", "fmu", "--target-dir"]);
+    command.current_dir(&source.folder).args([
+        "build",
+        "--lib",
+        "--profile",
+        "fmu",
+        "--target-dir",
+    ]);
     command.arg(&target).args(["--message-format", "json-render-diagnostics"]);
     command.args(locked.then_some("--locked"));
+    command.args(members.flat_map(|member| ["-p", &member.package.id.repr]));
     if !has_profile(root.as_std_path())? {
         for (name, value) in profile()? {
             command.args(["--config", &format!("profile.fmu.{name}={value}")]);
         }
     }
-    // Cargo passes paths relative to the workspace to rustc; a macro may use absolute paths.
-    command.args(["--", &format!("--remap-path-prefix={root}=.")]);
     command.env("CARGO_ENCODED_RUSTFLAGS", remappings(metadata).join("\u{1f}"));
     let mut cargo = command
         .stdout(Stdio::piped())
@@ -157,7 +228,10 @@ fn remappings(metadata: &Metadata) -> Vec<String> {
         .map(PathBuf::from)
         .or_else(|| std::env::home_dir().map(|home| home.join(".cargo")));
     let remap = |path: &dyn std::fmt::Display, to: &str| format!("--remap-path-prefix={path}={to}");
-    let mut flags = vec![remap(&metadata.target_directory, "target")];
+    // Cargo passes paths relative to the workspace to rustc; a macro may use absolute paths. The last of
+    // several that match is used.
+    let mut flags =
+        vec![remap(&metadata.workspace_root, "."), remap(&metadata.target_directory, "target")];
     flags.extend(cargo_home.map(|home| remap(&home.display(), "cargo")));
     for package in &metadata.packages {
         let folder = package.manifest_path.parent();

@@ -31,7 +31,10 @@
 //! [`StateSpace`]; [`Domain`] distinguishes continuous and sampled time. Matrices may have any size. Bad
 //! arguments and unsolvable problems are an [`Error`], never a panic.
 #![forbid(unsafe_code)]
-#![cfg_attr(not(feature = "design"), allow(dead_code, reason = "balancing and checks that design needs"))]
+#![cfg_attr(
+    not(feature = "design"),
+    allow(dead_code, reason = "balancing and checks that design needs")
+)]
 
 #[cfg(feature = "design")]
 pub mod allocation;
