@@ -58,7 +58,7 @@ def test_the_crate_is_built_for_a_cortex_m_and_nothing_in_it_panics(aso_ftc, tmp
     listed = ", ".join(f'"{name}/rust"' for name in members)
     (tmp_path / "Cargo.toml").write_text(f'[workspace]\nresolver = "2"\nmembers = [{listed}]\n', encoding="utf-8")
     cargo, rustc, _ = map(str, DEBIAN)
-    options = ["--release", "--workspace", "--offline", "--target", "thumbv7em-none-eabihf", "-Z", "build-std=core"]
+    options = ["--release", "--workspace", "--target", "thumbv7em-none-eabihf", "-Z", "build-std=core"]
     kept = {name: os.environ[name] for name in ("HOME", "CARGO_HOME") if name in os.environ}
     tools = {"PATH": "/usr/bin:/bin", "RUSTC": rustc, "RUSTC_BOOTSTRAP": "1", "RUSTFLAGS": "-D warnings", **kept}
     done = subprocess.run([cargo, "build", *options], cwd=tmp_path, env=tools, capture_output=True, text=True)
