@@ -1,4 +1,4 @@
-"""The error of an excursion beyond a limit within a step: docs/reference/plant-file.md, "Limits"."""
+"""The error of an excursion beyond a limit within a step: docs/reference/plant-file/limits.md."""
 
 import numpy as np
 import pytest
