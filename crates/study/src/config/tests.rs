@@ -156,7 +156,8 @@ fn hostile_text_ends_in_an_error() {
 #[test]
 fn the_documented_example_has_every_entry_of_the_algorithm() {
     let document = include_str!("../../../../docs/reference/system-toml.md");
-    let example = document.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let section = document.split("## A complete example\n\n```toml\n").nth(1).unwrap();
+    let example = section.split("```").next().unwrap();
     let config = parsed(example);
     assert_eq!((config.fmus.0.len(), config.settings.0.len()), (1, 3));
     // The error about an unknown entry lists the known entries.
