@@ -298,7 +298,7 @@ def test_a_measurement_that_moves_its_own_operating_point_leaves_no_equilibrium_
     ("old", "new", "words"),
     [
         ("at = 3.0", "at = 1.5", "expected ascending values"),
-        ("at = 1.0\n", "at = 1.0\nA = [[0, 1], [0, -0.5]]\n", "expected one point with nothing but `at`"),
+        ("at = 1.0\n", "at = 1.0\nA = [[0, 1], [0, -0.5]]\n", "expected exactly one point with only `at`"),
         ('variable = "inertia"', 'variable = "torque"', "is an actuator"),
         ('variable = "inertia"', 'variable = "angle"', "the measurement `angle` states it"),
         ('variable = "inertia"', 'variable = "T_s"', "a variable `T_s` of its own"),

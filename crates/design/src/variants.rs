@@ -184,7 +184,7 @@ fn points(listed: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usiz
     if found.len() < 2 {
         return Err(listed.error(format!("expected at least two points, found {}", found.len())));
     }
-    let missing = "expected one point with nothing but `at`: that of the plant of the file";
+    let missing = "expected exactly one point with only `at`: the plant of this file";
     let nominal = nominal.ok_or_else(|| listed.error(missing))?;
     Ok((found, nominal))
 }
