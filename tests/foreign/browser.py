@@ -18,6 +18,8 @@ from tornado.websocket import websocket_connect
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 LIMIT = 120  # s for one answer of the browser
+# Chromium without a window has no mouse; a page may treat that as a touch screen.
+MOUSE = "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 
 
 class Page:
@@ -111,18 +113,26 @@ class Page:
             self._touch("touchMove", [(x, y - k * distance / 15)])
         self._touch("touchEnd", [])
 
-    def violations(self):
-        """What axe-core finds serious or critical in the page, light and dark: rule and elements."""
+    def serious(self, place="document", **rules):
+        """What axe-core finds serious or critical in a part of the page, an expression: rule and elements.
+
+        `rules` are axe's options that choose rules.
+        """
         package = find_spec("axe_playwright_python")
         assert package, "axe-core is missing: pip install --no-deps --requirement scripts/axe-requirements.txt"
-        axe = (Path(package.submodule_search_locations[0]) / "axe.min.js").read_text(encoding="utf-8")
+        if not self.evaluate("'axe' in window"):
+            self.evaluate((Path(package.submodule_search_locations[0]) / "axe.min.js").read_text(encoding="utf-8"))
+        options = json.dumps({"resultTypes": ["violations"], **rules})
+        violations = self.evaluate(f"axe.run({place}, {options}).then((found) => found.violations)")
+        serious = [rule for rule in violations if rule["impact"] in ("serious", "critical")]
+        return [(rule["id"], [node["target"][0] for node in rule["nodes"]]) for rule in serious]
+
+    def violations(self):
+        """What axe-core finds serious or critical in the page, light and dark: scheme, rule and elements."""
         found = []
         for scheme in ("light", "dark"):
             self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
-            self.evaluate(axe)
-            for own in self.evaluate("axe.run(document, {resultTypes: ['violations']}).then((found) => found.violations)"):
-                places = [node["target"][0] for node in own["nodes"]]
-                found += [(scheme, own["id"], places)] if own["impact"] in ("serious", "critical") else []
+            found += [(scheme, *rule) for rule in self.serious()]
         return found
 
     def picture(self, path):
@@ -132,10 +142,10 @@ class Page:
 
 
 @contextmanager
-def browser(folder, width=1200, height=900):
+def browser(folder, width=1200, height=900, flags=()):
     """A page in a new browser; `folder` keeps its profile."""
     words = ["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0", f"--user-data-dir={folder}"]
-    words += [f"--window-size={width},{height}", "--no-first-run", "about:blank"]
+    words += [f"--window-size={width},{height}", "--no-first-run", *flags, "about:blank"]
     process = subprocess.Popen([CHROMIUM, *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     loop = asyncio.new_event_loop()
     try:
