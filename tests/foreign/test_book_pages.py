@@ -2,6 +2,7 @@
 axe-core finds nothing serious, in light and in dark colours. Needs `scripts/book` first."""
 
 import pytest
+
 from browser import CHROMIUM, MOUSE, browser
 from conftest import ROOT
 
