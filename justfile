@@ -38,6 +38,6 @@ book:
 cross:
     scripts/cross --test
 
-# The wheel of the Python package, tested in an environment of its own.
+# The Python package, installed into a new environment and tested there.
 wheel:
     scripts/wheel --test
