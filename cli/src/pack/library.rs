@@ -186,20 +186,19 @@ fn compile<'a>(
     let root = &metadata.workspace_root;
     let target = metadata.target_directory.join("libraries");
     let mut command = Command::new(program("CARGO", "cargo"));
-    command.current_dir(&source.folder).args([
-        "build",
-        "--lib",
-        "--profile",
-        "fmu",
-        "--target-dir",
-    ]);
-    command.arg(&target).args(["--message-format", "json-render-diagnostics"]);
-    command.args(locked.then_some("--locked"));
-    command.args(members.flat_map(|member| ["-p", &member.package.id.repr]));
+    let ids: Vec<_> = members.flat_map(|member| ["-p", &member.package.id.repr]).collect();
+    let alone = ids.len() == 2;
+    command.current_dir(&source.folder).arg(if alone { "rustc" } else { "build" }).args(ids);
+    command.args(["--lib", "--profile", "fmu", "--message-format", "json-render-diagnostics"]);
+    command.args(locked.then_some("--locked")).arg("--target-dir").arg(&target);
     if !has_profile(root.as_std_path())? {
         for (name, value) in profile()? {
             command.args(["--config", &format!("profile.fmu.{name}={value}")]);
         }
+    }
+    // Cargo passes paths relative to the workspace to rustc; a macro of another crate may use absolute paths.
+    if alone {
+        command.args(["--", &format!("--remap-path-prefix={root}=.")]);
     }
     command.env("CARGO_ENCODED_RUSTFLAGS", remappings(metadata).join("\u{1f}"));
     let mut cargo = command
@@ -228,10 +227,7 @@ fn remappings(metadata: &Metadata) -> Vec<String> {
         .map(PathBuf::from)
         .or_else(|| std::env::home_dir().map(|home| home.join(".cargo")));
     let remap = |path: &dyn std::fmt::Display, to: &str| format!("--remap-path-prefix={path}={to}");
-    // Cargo passes paths relative to the workspace to rustc; a macro may use absolute paths. The last of
-    // several that match is used.
-    let mut flags =
-        vec![remap(&metadata.workspace_root, "."), remap(&metadata.target_directory, "target")];
+    let mut flags = vec![remap(&metadata.target_directory, "target")];
     flags.extend(cargo_home.map(|home| remap(&home.display(), "cargo")));
     for package in &metadata.packages {
         let folder = package.manifest_path.parent();
