@@ -6,8 +6,6 @@ pub mod c_fmu;
 pub mod c_versions;
 pub mod coupled;
 pub mod equations;
-#[cfg(feature = "fmi")]
-pub mod fmi_crate;
 pub mod isolated;
 pub mod linear;
 pub mod network;

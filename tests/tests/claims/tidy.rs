@@ -1,8 +1,10 @@
 //! The invariants of ARCHITECTURE.md.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use tests::root;
 
@@ -228,6 +230,37 @@ fn there_are_no_marks_of_unfinished_work() {
         let text = fs::read_to_string(&file).unwrap();
         for mark in marks {
             assert!(!text.contains(mark), "{} has {mark}", name(&file));
+        }
+    }
+}
+
+/// The features with which cargo builds each package of a selection.
+fn features(selection: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let options = ["tree", "--locked", "--prefix", "none", "--format", "{p}|{f}"];
+    let output =
+        Command::new(cargo).current_dir(root()).args(options).args(selection).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut packages: BTreeMap<_, BTreeSet<_>> = BTreeMap::new();
+    for line in String::from_utf8(output.stdout).unwrap().lines() {
+        let Some((package, features)) = line.split_once('|') else { continue };
+        let package = package.split(" (").next().unwrap().to_owned();
+        packages.entry(package).or_default().insert(features.trim_end_matches(" (*)").to_owned());
+    }
+    packages
+}
+
+/// Cargo compiles a package again for each set of its features, and all that use it.
+#[test]
+fn one_build_serves_the_command_the_python_package_and_the_tests() {
+    let edges = "normal,build";
+    let alone = features(&["--edges", edges, "--package", "aso-ftc"]);
+    let python = ["--edges", edges, "--package", "aso-ftc", "--package", "aso-ftc-python"];
+    let tests = ["--edges", "normal,build,dev", "--workspace", "--exclude", "importers"];
+    for selection in [&python[..], &tests] {
+        let others = features(selection);
+        for (package, own) in &alone {
+            assert_eq!(own, &others[package], "{package}: see the end of cli/Cargo.toml");
         }
     }
 }

@@ -1,7 +1,6 @@
 //! The crate `fmi-rs` as an importer: it reads, checks, couples and simulates both FMUs.
 //!
 //! It offers neither input and output derivatives nor `fmi2GetStatus`, so inputs are held.
-#![cfg(feature = "fmi")]
 #![expect(clippy::unwrap_used, reason = "a test fails by a panic, in its set-up too")]
 
 use std::fs;

@@ -1,5 +1,4 @@
 //! The FMUs of FMI 3.0 through the crate `fmi`, compared with our own loader.
-#![cfg(feature = "fmi")]
 #![expect(clippy::unwrap_used, reason = "a test fails by a panic, in its set-up too")]
 
 use std::fs;

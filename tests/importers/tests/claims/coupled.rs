@@ -1,5 +1,4 @@
 //! The closed loop through the crate `fmi`, compared with our own loader.
-#![cfg(feature = "fmi")]
 #![expect(clippy::unwrap_used, reason = "a test fails by a panic, in its set-up too")]
 
 use std::fs;
@@ -10,8 +9,8 @@ use fmu_description::Causality;
 use fmu_description::Experiment;
 use fmu_description::package::{Package, platforms};
 use fmu_import::{Fmu, FmuError, LoadError};
+use importers::{FmiCrateError, FmiSlave};
 use master::{Algorithm, Extrapolation, Failure, Method, Probe, Simulation, Slave, System};
-use tests::fmi_crate::{FmiCrateError, FmiSlave};
 
 const PENDULUM: &str = "FrictionPendulum.fmu";
 
