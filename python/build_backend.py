@@ -84,9 +84,7 @@ def build():
         sys.exit(f"aso-ftc: the wheel is not built: the system is {sys.platform}, expected {', '.join(NAMES)}")
     if not shutil.which("cargo"):
         sys.exit("aso-ftc: the wheel is not built: cargo is not in PATH; install Rust 1.90 or later: https://rustup.rs")
-    for name in ("CARGO_TARGET_DIR", "CARGO_BUILD_TARGET_DIR"):
-        os.environ.pop(name, None)
-    folder = Path(os.environ.get("BUILT_PROGRAMS") or ROOT / "target" / "release")
+    folder = Path(os.environ.get("BUILT_PROGRAMS") or ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release")
     if "BUILT_PROGRAMS" not in os.environ:
         run("cargo", "build", "--release", "--locked", "--package", "aso-ftc", "--package", "aso-ftc-python")
     command, library, _ = NAMES[sys.platform]

@@ -1,53 +1,45 @@
-"""README.md and the book: every command in them runs, and the outputs shown are those of the commands.
+"""README.md, the book and their neighbours: every command in them runs as it is written, and the outputs shown are
+those of the commands.
 
-The blocks marked `sh` of a page run in the order of the page, with the built command, in a copy of the folder with
-packed FMUs. A comment on the line before a block says why it cannot run here, or which exit status it has:
-`<!-- not run: REASON -->`, `<!-- ends with status N -->`.
+The blocks marked `sh` of a page run in the order of the page, in a copy of the checkout, with cargo and with the Python
+environment that the commands of README.md make: outside of the checkout, empty at the start. README.md is first. If
+BUILT_PROGRAMS is set, the copy gets what is built here, and cargo does not build it again; else all is built from nothing.
+A comment on the line before a block may say `<!-- ends with status N -->`, `<!-- runs until interrupted -->`, or
+`<!-- not run: REASON -->` with a reason of NOT_RUN.
 """
 
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import urllib.request
+import venv
+from collections import Counter
 from functools import cache
+from pathlib import Path
 
 import pytest
 
 from conftest import ROOT
 
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
-BLOCK = re.compile(r"(?:^<!-- ([^\n]*) -->\n)?^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+README = ROOT / "README.md"
+NEIGHBOURS = [ROOT / "CONTRIBUTING.md", ROOT / "python" / "README.md", *sorted(ROOT.glob("crates/*/README.md"))]
+PAGES = [README, *NEIGHBOURS, *sorted((ROOT / "docs").rglob("*.md"))]
+BLOCK = re.compile(r"(?:^<!-- ([^\n]*) -->\n)?^```([\w,]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LANGUAGES = {"sh", "text", "toml", "python", "rust", "lua", "xml", "c"}
-LEFT_OUT = shutil.ignore_patterns(".git", ".venv", "target", "results", "dist", "__pycache__", "fuzz")
-
-# Replaces `aso-ftc` and `cargo run --release --` on PATH. Commands that build libraries run in the
-# real folder, where the libraries are built already, and write into the copy.
-STAND_IN = f'''#!{sys.executable}
-import os, shutil, sys
-from pathlib import Path
-
-arguments, root, here = sys.argv[1:], {str(ROOT)!r}, os.getcwd()
-if Path(sys.argv[0]).name == "cargo":
-    if arguments[:3] != ["run", "--release", "--"]:
-        sys.exit("only cargo run --release -- is expected in a page")
-    arguments = arguments[3:]
-verb = arguments[0]
-if verb in ("pack", "reproduce"):
-    for place, text in enumerate(arguments):
-        if text.startswith(("results/", "../")):
-            arguments[place] = os.path.abspath(text)
-        if text.startswith("../"):
-            shutil.copy(os.path.join(root, "Cargo.lock"), arguments[place])
-            os.environ["CARGO_TARGET_DIR"] = os.path.join(root, "target", "author")
-    if verb == "reproduce" and "--out" not in arguments:
-        arguments += ["--out", os.path.abspath("results/reproduce")]
-    arguments += ["--out" if verb == "pack" else "--dist", os.path.abspath("dist")]
-    os.chdir(root)
-os.environ["PATH"] = os.environ["PATH"].split(os.pathsep, 1)[1]
-command = os.path.join(root, "target", "release", "aso-ftc")
-os.execv(command, [command, *arguments])
-'''
+# The reasons for which a command is not run, with the number of blocks.
+NOT_RUN = {
+    "the test command": 4,
+    r"\d+ minutes": 7,
+    "scripts/test-long runs it": 1,
+    "scripts/release runs it": 3,
+    "not in the registries: Reference-FMUs": 2,
+}
+REMARK = re.compile(rf"not run: ({'|'.join(NOT_RUN)})|ends with status \d+|runs until interrupted")
+ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+[\w/.-]*")
+SECONDS = 1800
 
 
 def blocks(page):
@@ -55,40 +47,92 @@ def blocks(page):
     return BLOCK.findall(page.read_text(encoding="utf-8"))
 
 
+def commands(page):
+    """The blocks of a page that run: the comment before each, and its text."""
+    found = blocks(page)
+    return [(remark, text) for remark, language, text in found if language == "sh" and not remark.startswith("not run")]
+
+
 def name(page):
     """The path of a page in the repository."""
     return str(page.relative_to(ROOT))
 
 
+def files():
+    """The files of the checkout, with those that are not committed yet."""
+    listed = subprocess.check_output(["git", "ls-files", "-coz", "--exclude-standard"], cwd=ROOT, text=True)
+    return [path for path in listed.split("\0") if path and (ROOT / path).is_file()]
+
+
+class Reader:
+    """Somebody who types the commands of the pages into a shell."""
+
+    def __init__(self, home):
+        self.folder = home / "copy"
+        for path in files():
+            (self.folder / path).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / path, self.folder / path)
+        if built := os.environ.get("BUILT_PROGRAMS"):
+            (self.folder / "target").mkdir()
+            for name in ("release", "libraries"):
+                subprocess.run(["cp", "--archive", Path(built).parent / name, self.folder / "target"], check=True)
+        venv.create(home / "python", with_pip=True)
+        ours = str(Path(sys.prefix) / "bin")
+        path = [part for part in os.environ["PATH"].split(os.pathsep) if part != ours]
+        kept = {"PATH": os.pathsep.join([str(home / "python" / "bin"), *path])}
+        kept["CARGO_INSTALL_ROOT"] = str(home / "installed")
+        dropped = {"VIRTUAL_ENV", "PYTHONPATH", "PYTHONHOME", "BUILT_PROGRAMS", "CARGO_TARGET_DIR"}
+        self.environment = {key: value for key, value in os.environ.items() if key not in dropped} | kept
+        self.run = cache(self.run)
+
+    def start(self, text):
+        """A shell with these commands, in a process group of its own."""
+        options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "start_new_session": True}
+        return subprocess.Popen(["bash", "-e", "-c", text], cwd=self.folder, env=self.environment, **options)
+
+    def run(self, text):
+        """Runs the commands once: a later call returns the same exit status and output."""
+        shell = self.start(text)
+        try:
+            output, _ = shell.communicate(timeout=SECONDS)
+        except subprocess.TimeoutExpired:
+            os.killpg(shell.pid, signal.SIGKILL)
+            raise
+        return subprocess.CompletedProcess(text, shell.returncode, output)
+
+    def visit(self, text):
+        """Runs commands that serve a page, loads the page and interrupts them."""
+        shell, printed = self.start(text), ""
+        try:
+            for line in shell.stdout:
+                printed += line
+                if found := ADDRESS.search(line):
+                    with urllib.request.urlopen(found[0], timeout=60) as page:
+                        assert page.status == 200 and b"<html" in page.read().lower(), found[0]
+                    return
+        finally:
+            os.killpg(shell.pid, signal.SIGINT)
+            shell.wait(60)
+        raise AssertionError(f"{text}\nno address:\n{printed}")
+
+    def follow(self, page):
+        """Runs all commands of a page, each as its remark says."""
+        for remark, text in commands(page):
+            if remark == "runs until interrupted":
+                self.visit(text)
+                continue
+            expected = int(remark.rsplit(" ", 1)[1]) if remark else 0
+            done = self.run(text)
+            assert done.returncode == expected, f"{text}\n{done.stdout}"
+
+
 @pytest.fixture(scope="module")
-def copy(tmp_path_factory):
-    """Runs a shell text in a copy of the folder, once: a later call returns the same exit status and output."""
-    home = tmp_path_factory.mktemp("book")
-    folder, programs = home / "copy", home / "programs"
-    shutil.copytree(ROOT, folder, ignore=LEFT_OUT, symlinks=True)
-    (folder / ".venv").symlink_to(sys.prefix)
-    programs.mkdir()
-    for program in ("aso-ftc", "cargo"):
-        (programs / program).write_text(STAND_IN, encoding="utf-8")
-        (programs / program).chmod(0o755)
-    environment = {**os.environ, "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}"}
-    # Campaigns need the wheel, which scripts/test installs here before.
-    environment["ASO_FTC_PYTHON"] = str(ROOT / "target" / "wheel" / "test" / "bin" / "python")
-    options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "timeout": 300}
-
-    @cache
-    def once(text):
-        command = ["bash", "-e", "-c", text]
-        return subprocess.run(command, cwd=folder, env=environment, check=False, **options)
-
-    def run(text):
-        text = text.replace("cargo run --release --", "aso-ftc")
-        return once(re.sub(r" +#.*$", "", text, flags=re.MULTILINE))
-
-    examples = "examples/dc-servo examples/pid examples/three-tank"
-    done = run(f"aso-ftc pack --ssp\naso-ftc pack {examples}")
-    assert done.returncode == 0, done.stdout
-    return run
+def reader(tmp_path_factory):
+    """A reader who has followed README.md."""
+    reader = Reader(tmp_path_factory.mktemp("book"))
+    for _, text in commands(README):
+        reader.run(text)
+    return reader
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
@@ -97,20 +141,25 @@ def test_every_block_is_marked_by_its_language(page):
     found = blocks(page)
     assert text.count("```") == 2 * len(found), "a block that is not closed, or inside of a list"
     for remark, language, content in found:
-        assert language in LANGUAGES, content
-        assert not remark or re.match(r"not run: .{10}|ends with status \d+$", remark), remark
+        assert language.split(",")[0] in LANGUAGES, content
+        assert not remark or language != "sh" or REMARK.fullmatch(remark), remark
     outside = BLOCK.sub("", text)
     assert not re.search(r"^ {4}\S", outside, re.MULTILINE), "a block without a mark"
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if any(b[1] == "sh" for b in blocks(p))], ids=name)
-def test_every_command_of_the_page_runs(copy, page):
-    for remark, language, content in blocks(page):
-        if language != "sh" or remark.startswith("not run: "):
-            continue
-        expected = int(remark.rsplit(" ", 1)[1]) if remark else 0
-        done = copy(content)
-        assert done.returncode == expected, f"{content}\n{done.stdout}"
+def test_the_commands_that_are_not_run_are_counted():
+    remarks = [remark.removeprefix("not run: ") for page in PAGES for remark, language, _ in blocks(page) if language == "sh"]
+    found = Counter(next((r for r in NOT_RUN if re.fullmatch(r, remark)), None) for remark in remarks)
+    del found[None]
+    assert found == NOT_RUN
+
+
+FOLLOWED = [pytest.param(page, marks=[pytest.mark.builds] * (page == README)) for page in PAGES if commands(page)]
+
+
+@pytest.mark.parametrize("page", FOLLOWED, ids=name)
+def test_every_command_of_the_page_runs(reader, page):
+    reader.follow(page)
 
 
 def shown(page, index):
@@ -118,11 +167,11 @@ def shown(page, index):
     return [b[2] for b in blocks(page) if b[1] == "text"][index].splitlines()
 
 
-def test_the_first_tutorial_shows_the_printed_output_and_the_files_unchanged(copy):
+def test_the_first_tutorial_shows_the_printed_output_and_the_files_unchanged(reader):
     page = ROOT / "docs" / "tutorials" / "first-coupled-system.md"
     commands = [b[2] for b in blocks(page) if b[1] == "sh"]
     for index, command in ((0, 0), (1, 1), (2, 3)):
-        printed = copy(commands[command]).stdout.splitlines()
+        printed = reader.run(commands[command]).stdout.splitlines()
         assert set(shown(page, index)) <= set(printed), printed
     files = page.parent / "first"
     whole, added = [b[2] for b in blocks(page) if b[1] == "toml"]
@@ -130,18 +179,18 @@ def test_the_first_tutorial_shows_the_printed_output_and_the_files_unchanged(cop
     assert (files / "biased.toml").read_text(encoding="utf-8") == f"{whole}\n{added}"
 
 
-def test_the_page_on_campaigns_shows_the_printed_summary_and_the_file_unchanged(copy):
+def test_the_page_on_campaigns_shows_the_printed_summary_and_the_file_unchanged(reader):
     page = ROOT / "docs" / "how-to" / "campaigns.md"
     (command,) = [b[2] for b in blocks(page) if b[1] == "sh" and "campaigns/faults.toml" in b[2]]
-    assert set(shown(page, 0)) <= set(copy(command).stdout.splitlines()), copy(command).stdout
+    assert set(shown(page, 0)) <= set(reader.run(command).stdout.splitlines()), reader.run(command).stdout
     (file,) = [b[2] for b in blocks(page) if b[1] == "toml"]
     assert file == (page.parent / "campaigns" / "faults.toml").read_text(encoding="utf-8")
 
 
-def test_the_swapped_controller_has_the_residual_shown_on_the_page(copy):
+def test_the_swapped_controller_has_the_residual_shown_on_the_page(reader):
     page = ROOT / "docs" / "tutorials" / "swap.md"
     build, theirs, ours = [b[2] for b in blocks(page) if b[1] == "sh"][:3]
-    assert copy(build).returncode == 0
+    assert reader.run(build).returncode == 0
     for index, command in ((0, theirs.splitlines()[1]), (1, ours)):
-        printed = copy(command).stdout.splitlines()
+        printed = reader.run(command).stdout.splitlines()
         assert set(shown(page, index)) <= set(printed), printed
