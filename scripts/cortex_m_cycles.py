@@ -7,9 +7,9 @@
 Needs arm-none-eabi-gcc and qemu-system-arm (Debian: gcc-arm-none-eabi, qemu-system-arm). The controller is compiled with
 -O2 and runs 40 samples in QEMU, which writes the address of every instruction. Measurements and references swing about the
 operating point, so that limits are reached; a scheduling variable moves over its range; each actuator that may be gone is
-gone for some samples, and the fall-back is in force for some. Each instruction counts with the cycles of the Technical Reference Manual of the
-Cortex-M4 (ARM DDI 0439, tables 3-1 and 7-1): loads and stores 2, of several registers one more than their number,
-divisions of integers 12, VDIV and VSQRT 14, VMLA 3, branches that are taken 3, the rest 1. Memory without wait states is
+gone for some samples, and the fall-back is in force for some. Each instruction counts with the cycles of the Technical
+Reference Manual of the Cortex-M4 (ARM DDI 0439, tables 3-1 and 7-1): loads and stores 2, of several registers one more than
+their number, divisions of integers 12, VDIV and VSQRT 14, VMLA 3, branches that are taken 3, the rest 1. Memory without wait states is
 assumed. Of a Cortex-M7, which issues up to two instructions at once, only the instructions are counted.
 """
 
@@ -182,24 +182,23 @@ def main():
     samples, kinds, inside = [], Counter(), False
     for at, pc in enumerate(trace):
         if pc == first:
-            samples.append([0, 0, Counter()])
+            samples.append(Counter())
             inside = True
         elif pc == after[caller]:
             inside = False
         if inside and at + 1 < len(trace):
             mnemonic, operands = code[pc]
             count = cycles(mnemonic, operands.split(";")[0], trace[at + 1] != after.get(pc))
-            samples[-1][0] += 1
-            samples[-1][1] += count
+            samples[-1].update({"instructions": 1, "cycles": count})
             kinds[mnemonic.split(".")[0]] += 1
-            samples[-1][2].update(own for own, pattern in ARITHMETIC.items() if re.match(pattern, mnemonic))
+            samples[-1].update(own for own, pattern in ARITHMETIC.items() if re.match(pattern, mnemonic))
     assert len(samples) == SAMPLES, f"{len(samples)} samples in the trace"
-    most = max(samples, key=lambda own: own[1])
+    most = max(samples, key=lambda own: own["cycles"])
     print(f"{source.stem}, {names['real']}, {options.cpu}: program and constants {size} bytes")
-    estimate = f", about {most[1]} cycles, {1e6 * most[1] / 168e6:.1f} us at 168 MHz"
-    print(f"a sample: at most {most[0]} instructions{'' if options.cpu == 'cortex-m7' else estimate}")
-    if any(own[2] for own in samples):
-        counts = {kind: max(own[2][kind] for own in samples) for kind in ARITHMETIC}
+    estimate = f", about {most['cycles']} cycles, {1e6 * most['cycles'] / 168e6:.1f} us at 168 MHz"
+    print(f"a sample: at most {most['instructions']} instructions{'' if options.cpu == 'cortex-m7' else estimate}")
+    counts = {kind: max(own[kind] for own in samples) for kind in ARITHMETIC}
+    if any(counts.values()):
         print("of them, at most: " + ", ".join(f"{count} {kind}" for kind, count in counts.items()))
     print("most frequent: " + ", ".join(f"{name} {count // SAMPLES}" for name, count in kinds.most_common(8)))
 

@@ -173,14 +173,13 @@ def couple(chosen, folder):
         name, _, value = text.partition("=")
         slave, variable = split(name)
         values[slave][variable] = value
-    both = [Slave(getattr(chosen, n), n, values[n], folder, chosen.hold) for n in values]
-    plant, controller = both
+    plant, controller = both = [Slave(getattr(chosen, n), n, values[n], folder, chosen.hold) for n in values]
     wires = links(plant, controller, chosen.connect), links(controller, plant, chosen.connect)
     experiment = controller.experiment
     step = chosen.step or float(experiment.stepSize)
     stop_time = chosen.stop_time or float(experiment.stopTime)
     t_on = controller.get(["t_on"])[0] if "t_on" in controller.reference else 0.0
-    table = run(*both, wires, step, stop_time)
+    table = run(plant, controller, wires, step, stop_time)
     for slave in both:
         slave.fmu.terminate()
         slave.fmu.freeInstance()

@@ -10,6 +10,7 @@ import tempfile
 from pathlib import Path
 
 import numpy
+
 from field_process import run
 
 SIDE = Path(__file__).resolve().with_name("field_fmpy.py")

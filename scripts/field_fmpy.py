@@ -87,13 +87,13 @@ def main():
     calls = {
         "validate": lambda: validate(fmu),
         "defaults": lambda: defaults(fmu),
-        "timed": lambda: timed(fmu, out, *numbers, chosen),
+        "timed": lambda: timed(fmu, out, numbers[0], numbers[1], chosen),
         "replay": lambda: replay(fmu, out, numbers[0], chosen),
-        "set": lambda: kept(fmu, *numbers, chosen),
+        "set": lambda: kept(fmu, numbers[0], numbers[1], chosen),
     }
     try:
         said = calls[task]()
-    except Exception as error:  # noqa: BLE001 - whatever FMPy raises is the result
+    except Exception as error:  # whatever FMPy raises is the result
         said = {"error": f"{type(error).__name__}: {error}"[:300]}
     Path(out).write_text(json.dumps(said), encoding="utf-8")
 

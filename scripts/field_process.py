@@ -42,11 +42,12 @@ def run(command, limit, folder):
         cwd=folder,
         env={**os.environ, "TMPDIR": str(folder)},
         start_new_session=True,
+        bufsize=0,
     )
     kept = bytearray()
 
     def drain():
-        while chunk := process.stdout.read1(KEPT):
+        while chunk := process.stdout.read(KEPT):
             kept.extend(chunk)
             del kept[:-KEPT]
 

@@ -110,7 +110,7 @@ def main():
         lines.append(("FMPy's loop, steps", min(fmpy_loop() for _ in range(3)) * 1e3, "ms"))
     except ImportError:
         print("FMPy is not installed")
-    short = lambda: [system.run(stop_time=STEP) for _ in range(200)]  # noqa: E731
+    short = lambda: [system.run(stop_time=STEP) for _ in range(200)]
     lines.append(("start of a run of one step", best(short)[0] / 200 * 1e3, "ms"))
     (one, of_one), (two, of_two) = (max(threads(system, count) for _ in range(3)) for count in (1, 2))
     lines += [("one thread, runs of 20 s", one, "per s"), ("two threads", two, "per s")]

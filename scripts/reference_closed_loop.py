@@ -254,7 +254,7 @@ def header(design, scenario, trajectories):
 
 def write_reference(path, design, scenario):
     """Runs one scenario in all settings and writes its file."""
-    trajectories = [simulate(design, *scenario, setting) for setting in SETTINGS]
+    trajectories = [simulate(design, scenario[0], scenario[1], setting) for setting in SETTINGS]
     lines = [f"# {line}".rstrip() for line in header(design, scenario, trajectories)]
     lines.append(",".join(COLUMNS))
     for number, row in enumerate(trajectories[0].rows):

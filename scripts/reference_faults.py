@@ -51,7 +51,7 @@ def distance(a, b):
         return np.linalg.svd(np.hstack([a - complex(*s) * np.eye(len(a)), b]), compute_uv=False)[-1]
 
     side = np.linspace(-2.0, 2.0, 161)
-    starts = sorted(((least((x, y)), x, y) for x in side for y in side if y >= 0.0))[:40]
+    starts = sorted((least((x, y)), x, y) for x in side for y in side if y >= 0.0)[:40]
     options = dict(xatol=1e-12, fatol=1e-14, maxiter=4000)
     found = [minimize(least, start[1:], method="Nelder-Mead", options=options) for start in starts]
     best = min(found, key=lambda result: result.fun)

@@ -3,8 +3,9 @@
 placement_reference.txt, each line: kind; n; m; A by rows; B by rows; required eigenvalues (real parts, then imaginary
 parts); "continuous" or "sampled"; the lowest condition number of the eigenvectors of length one, the lowest 2-norm of the
 gain and the lowest peak of S = (I - K (sI - A)^-1 B)^-1, each over KNV0 and YT with their default settings (without the
-peak, "nan", if a required eigenvalue is unstable); the method of the lowest condition number; the largest distance of an eigenvalue of A - B K from the required one there, relative to the latter (to the largest one for zero). A
-result of scipy that misses an eigenvalue by more than 1e-6 does not count, a system without results is left out.
+peak, "nan", if a required eigenvalue is unstable); the method of the lowest condition number; the largest distance of an
+eigenvalue of A - B K from the required one there, relative to the latter (to the largest one for zero). A result of
+scipy that misses an eigenvalue by more than 1e-6 does not count, a system without results is left out.
 
 placement_loops.txt, each line: plant; sample time (0 for continuous); "prediction" or "current" estimator; n; m; p; A, B,
 C by rows, of the continuous plant; eigenvalues of feedback and observer (real parts, then imaginary parts of each), in

@@ -75,11 +75,11 @@ def interval(k, state, direction, events):
     while begin < end:
         if direction:
             def stop(t, y): return direction * y[2]
-            stop.terminal, stop.direction = True, -1
+            vars(stop).update(terminal=True, direction=-1)
             run = solve_ivp(lambda t, y: sliding(t, y, force(t), direction), (begin, end), state, events=[stop], **OPTIONS)
         else:
             def away(t, y): return STATIC - abs(balancing(y, force(t)))
-            away.terminal, away.direction = True, -1
+            vars(away).update(terminal=True, direction=-1)
             run = solve_ivp(sticking, (begin, end), state, events=[away], **OPTIONS)
         assert run.success, run.message
         begin, state = run.t[-1], run.y[:, -1].copy()

@@ -107,7 +107,8 @@ def write_norms(file, random):
         peak, frequency = control.linfnorm(system, tol=1e-12)
         strict = control.ss(a, b, c, 0 * d, 0.1) if sampled else control.ss(a, b, c, 0 * d)
         frequencies = np.array([0.01, 0.3, 1.0, 5.0, 30.0])
-        sizes = [np.linalg.svd(system(np.exp(1j * w * period) if sampled else 1j * w, squeeze=False), compute_uv=False)[0] for w in frequencies]
+        at = np.exp(1j * frequencies * period) if sampled else 1j * frequencies
+        sizes = [np.linalg.svd(system(s, squeeze=False), compute_uv=False)[0] for s in at]
         write(file, "norms", f"random {case}", A=a, B=b, C=c, D=d, period=[[period]], hinf=[[peak]],
               h2=[[control.norm(strict, 2)]], frequencies=frequencies, sizes=sizes)
 
@@ -125,7 +126,8 @@ def write_loop(file):
     design = tomllib.loads((ROOT / "fmu-controller" / "resources" / "design.toml").read_text())
     names = "A B C F_a K_x K_f L_x L_f".split()
     a, b, c, f_a, k_x, k_f, l_x, l_f = matrices = [np.array(design[name], dtype=float) for name in names]
-    loop = np.block([[a + b @ k_x, -b @ k_x, b @ k_f], [np.zeros((4, 4)), a - l_x @ c, -f_a], [np.zeros((1, 4)), l_f @ c, np.zeros((1, 1))]])
+    error = np.block([[a - l_x @ c, -f_a], [l_f @ c, np.zeros((1, 1))]])
+    loop = np.block([[a + b @ k_x, np.hstack([-b @ k_x, b @ k_f])], [np.zeros((5, 4)), error]])
     fault = np.vstack([f_a, f_a, [[0.0]]])
     through = np.vstack([np.zeros((8, 1)), [[-1.0]]])
     rate = np.vstack([np.zeros((8, 1)), [[-1.0]]])
@@ -144,7 +146,8 @@ def main():
     random = np.random.default_rng(SEED)
     default = ROOT / "crates" / "control" / "tests" / "data" / "response.txt"
     with (Path(sys.argv[1]) if len(sys.argv) > 1 else default).open("w") as file:
-        file.write(f"# scripts/reference_response.py: python-control {control.__version__}, slycot {slycot.__version__}, mpmath {mp.__version__}\n")
+        versions = f"python-control {control.__version__}, slycot {slycot.__version__}, mpmath {mp.__version__}"
+        file.write(f"# scripts/reference_response.py: {versions}\n")
         write_norms(file, random)
         write_peaks(file, random)
         write_loop(file)

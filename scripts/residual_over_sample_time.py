@@ -146,7 +146,7 @@ def noise_gain(design_file):
 def root(a, column):
     """R with R R' = sum of a^k column column' a'^k."""
     while np.linalg.norm(a) > 1e-12:
-        column = np.linalg.qr(np.hstack([column, a @ column]).T, mode="r").T
+        column = np.transpose(np.linalg.qr(np.hstack([column, a @ column]).T, mode="r"))
         a = a @ a
     return column
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
-from typing import Any, Union
+from typing import Any
 
 from . import _core
 
@@ -79,7 +79,7 @@ class ModelDescription:
         raise KeyError(name)
 
 
-def read_model_description(path: Union[str, os.PathLike[str]]) -> ModelDescription:
+def read_model_description(path: str | os.PathLike[str]) -> ModelDescription:
     """Read the model description of an FMU of FMI 1.0, 2.0 or 3.0, an archive or a folder.
 
     Raises:

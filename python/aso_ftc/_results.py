@@ -6,7 +6,7 @@ import html
 import importlib
 import os
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any
 
 from . import _core
 from ._errors import MissingPackageError
@@ -195,15 +195,15 @@ class Results:
         dataset: xarray.Dataset = package.Dataset(variables, coords=coordinates)
         return dataset
 
-    def to_csv(self, path: Union[str, os.PathLike[str]]) -> None:
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the same CSV file as the command ``aso-ftc run``."""
         self._write(path, ".csv")
 
-    def to_parquet(self, path: Union[str, os.PathLike[str]]) -> None:
+    def to_parquet(self, path: str | os.PathLike[str]) -> None:
         """Write the same Parquet file as the command ``aso-ftc run``."""
         self._write(path, ".parquet")
 
-    def _write(self, path: Union[str, os.PathLike[str]], ending: str) -> None:
+    def _write(self, path: str | os.PathLike[str], ending: str) -> None:
         text = os.fspath(path)
         if not text.lower().endswith(ending):
             raise ValueError(f"{text}: expected a name that ends in {ending}")

@@ -6,7 +6,7 @@ import copy
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Literal, Union
+from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
 from ._description import Variable
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Cancel", "Simulation", "System", "fault"]
 
-PathLike = Union[str, "os.PathLike[str]"]
-Value = Union[bool, int, float, str]
+PathLike = str | os.PathLike[str]
+Value = bool | int | float | str
 Cancel = _core.Cancel
 
 # Tables of a system.toml that a System shows as attributes.

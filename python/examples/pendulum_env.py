@@ -11,10 +11,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import aso_ftc as af
 import gymnasium
 import numpy as np
-
-import aso_ftc as af
 
 OBSERVED = ["pendulum.x_p", "pendulum.theta", "pendulum.v_p", "pendulum.omega"]
 

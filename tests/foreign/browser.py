@@ -172,20 +172,20 @@ async def _connected(address):
     return await websocket_connect(address, max_message_size=1 << 28)
 
 
-class _Quiet(SimpleHTTPRequestHandler):
-    def log_request(self, *_):
-        """Keeps the path."""
-        self.server.requested.append(self.path)
-
-    def log_message(self, *_):
-        """Nothing."""
-
-
 @contextmanager
 def served(folder, requested=None):
     """The address of a file server of a folder; `requested` gets the paths asked for."""
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=folder))
-    server.requested = [] if requested is None else requested
+
+    class Handler(SimpleHTTPRequestHandler):
+        def log_request(self, *_):
+            """Keeps the path."""
+            if requested is not None:
+                requested.append(self.path)
+
+        def log_message(self, *_):
+            """Nothing."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=folder))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     try:
         yield f"http://127.0.0.1:{server.server_address[1]}"

@@ -47,7 +47,7 @@ REALS, INTEGERS, STRINGS = POINTER(c_double), POINTER(c_int), POINTER(c_char_p)
 STATE = POINTER(c_void_p)
 
 # Arguments of every function that has an instance, after the instance.
-FUNCTIONS = {
+FUNCTIONS: dict[str, list] = {
     "FreeInstance": [],
     "SetDebugLogging": [c_int, c_size_t, STRINGS],
     "SetupExperiment": [c_int, c_double, c_double, c_int, c_double],

@@ -72,8 +72,9 @@ class CartPendulum(Fmi2Slave):
     def do_step(self, current_time, step_size):
         """Integrates over the communication step."""
         count = max(1, ceil(step_size / LARGEST_SUBSTEP - 1e-9))
-        state = (self.x_p, self.theta, self.v_p, self.omega)
+        state = tuple(getattr(self, name) for name in OUTPUTS)
         for _ in range(count):
             state = runge_kutta_step(state, self.u, step_size / count)
-        self.x_p, self.theta, self.v_p, self.omega = state
+        for name, value in zip(OUTPUTS, state):
+            setattr(self, name, value)
         return True

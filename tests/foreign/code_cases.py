@@ -146,7 +146,9 @@ CASES = {
     "sliding-mode": Case(law(TANKS["reference"], "sliding-mode"), 6e-5, 1e-3),
     "sliding-mode-detection": Case(law(UNSTABLE + CUSUM, "sliding-mode"), 0.5, 1e-2),
     "feedthrough": Case(FEEDTHROUGH.replace('["force"]', '[{ name = "force", limits = [-4.0, 5.0], operating = 0.5 }]'), 6.0, 1e-2),
-    "feedthrough-integral": Case(law(FEEDTHROUGH.replace("0.01\nfilter", "0.01\nestimator = 'current'\nfilter"), "proportional-integral"), 0.5, 1e-2),
+    "feedthrough-integral": Case(
+        law(FEEDTHROUGH.replace("0.01\nfilter", "0.01\nestimator = 'current'\nfilter"), "proportional-integral"), 0.5, 1e-2
+    ),
     "constant-prediction": Case("sample_time = 1.0\nestimator = 'prediction'\n" + QUADRUPLE, 0.3, 1e-2),
 }
 

@@ -44,6 +44,7 @@ class Designed:
         assert done.returncode in (0, 1), done.stderr
         self.report = json.loads(done.stdout)
         assert done.returncode == (self.report["verdict"]["level"] == "red")
+        self.plant_file = tomllib.loads((ROOT / plant_file).read_text(encoding="utf-8"))
         self.design = tomllib.loads(file.read_text(encoding="utf-8"))
         self.page = (self.folder / "report.html").read_text(encoding="utf-8")
 

@@ -18,8 +18,8 @@ class Matrices:
     def __init__(self, design):
         self.period = design.get("sample_time")
         self.current = design.get("estimator") == "current"
-        for name in ("A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f"):
-            setattr(self, name, np.array(design[name]))
+        self.A, self.B, self.C, self.F_a = (np.array(design[name]) for name in ("A", "B", "C", "F_a"))
+        self.K_x, self.K_f, self.L_x, self.L_f = (np.array(design[name]) for name in ("K_x", "K_f", "L_x", "L_f"))
         self.n, self.q = self.F_a.shape
         self.filtered = "filter" in design
         constant = np.zeros((self.q, self.q)) if self.period is None else np.eye(self.q)

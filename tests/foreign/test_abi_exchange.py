@@ -224,5 +224,5 @@ def test_every_field_of_the_event_info_is_written(fmu):
         instance.start()
         info = EventInfo(7, 7, 7, 7, 7, math.nan)
         instance.must("NewDiscreteStates", byref(info))
-        flags = [getattr(info, name) for name, _ in EventInfo._fields_[:5]]
+        flags = [getattr(info, name) for name, *_ in EventInfo._fields_[:5]]
         assert set(flags) <= {0, 1} and math.isfinite(info.next_event_time)

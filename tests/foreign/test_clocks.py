@@ -9,7 +9,6 @@ import pytest
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
-
 from residual_over_sample_time import CONSTANT, plant_file
 
 MODEL = "tests/models/clocks"

@@ -2,7 +2,6 @@
 
 import re
 import shutil
-import subprocess
 
 import numpy as np
 import pytest
@@ -24,13 +23,19 @@ def designed(aso_ftc, packed, tmp_path_factory):
         if name not in made:
             packed_plant(aso_ftc, "ThreeTank")
             folder = tmp_path_factory.mktemp(name)
-            own = Built(aso_ftc, CASES[name].text, folder, "--fmu", folder / "Own.fmu")
-            own.fmu = Fmu(extract(str(folder / "Own.fmu"), str(folder / "fmu")))
-            own.samples, own.expected = in_the_loop(own, CASES[name])
-            made[name] = own
+            made[name] = BuiltWithFmu(aso_ftc, CASES[name], folder)
         return made[name]
 
     return of
+
+
+class BuiltWithFmu(Built):
+    """The source code and the FMU of a design, and what the FMU does in the loop with the plant."""
+
+    def __init__(self, aso_ftc, case, folder):
+        super().__init__(aso_ftc, case.text, folder, "--fmu", folder / "Own.fmu")
+        self.fmu = Fmu(extract(str(folder / "Own.fmu"), str(folder / "fmu")))
+        self.samples, self.expected = in_the_loop(self, case)
 
 
 def in_the_loop(own, case):
@@ -200,7 +205,7 @@ def test_the_samples_of_a_detection_have_alarms_resets_and_decisions(designed, n
 
 def test_a_start_at_other_estimates_has_the_bits_of_the_fmu(designed):
     own, count = designed("detection-cusum"), 200
-    (n, m, p, q), k = own.sizes, len(own.design["detection"]["C"])
+    (n, _, p, q), k = own.sizes, len(own.design["detection"]["C"])
     x_0 = np.array([state["operating"] for state in own.design["states"]]) + 0.01 * np.arange(1, n + 1)
     inputs = [signal["name"] for signal in own.design["measurements"]]
     names = [actuator["name"] for actuator in own.design["actuators"]] + vector("x_hat", n) + vector("f_hat", q)

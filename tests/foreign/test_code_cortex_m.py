@@ -18,7 +18,7 @@ TOOLS = [shutil.which(name) for name in ("arm-none-eabi-gcc", "arm-none-eabi-obj
 @pytest.mark.skipif(not shutil.which("arm-none-eabi-gcc"), reason="no compiler for ARM Cortex-M: gcc-arm-none-eabi")
 @pytest.mark.parametrize("options", [[], ["--float"]], ids=["double", "float"])
 def test_it_compiles_for_a_cortex_m(aso_ftc, tmp_path, options):
-    own = Built(aso_ftc, CASES["constant-prediction"].text, tmp_path, *options)
+    Built(aso_ftc, CASES["constant-prediction"].text, tmp_path, *options)
     target = "-mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -ffreestanding".split()
     always = "-std=c99 -O2 -ffp-contract=off -Wall -Wextra -Wconversion -Werror".split()
     run("arm-none-eabi-gcc", *always, *target, "-c", tmp_path / "c" / "plant.c", "-o", tmp_path / "m4.o")

@@ -10,6 +10,7 @@ from code_cases import CASES, TANKS, UNSTABLE, Built, fed, law, stated
 from design_loop import packed_plant
 from test_code import differences
 
+
 @pytest.fixture
 def built(aso_ftc, packed, tmp_path):
     """The code of a case, by its name."""

@@ -5,7 +5,7 @@ import pytest
 
 from c_abi import CO_SIMULATION, MODEL_EXCHANGE, Instance
 from design_file import shipped_design, vector
-from named_equations import evaluated, losses, rounding, size_of, state_names
+from named_equations import evaluated, losses, rounding, size_of
 from test_designs import LIMITED, SIZES, made, random_design
 
 STEP = 1e-30

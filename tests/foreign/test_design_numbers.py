@@ -44,7 +44,6 @@ def case(request, aso_ftc, tmp_path_factory):
     for plant in ("DcServo", "ThreeTank"):
         packed_plant(aso_ftc, plant)
     designed = Designed(aso_ftc, request.param, tmp_path_factory.mktemp("design"))
-    designed.file = read(request.param)
     return designed, Matrices(designed.design), DESIGNS[request.param]
 
 
@@ -90,7 +89,7 @@ def test_the_design_file_has_the_gains_of_the_report_and_the_fmu_reads_it(case, 
 def test_the_eigenvalues_of_both_loops_are_those_of_the_plant_file(case):
     designed, own, _ = case
     for name, dynamics in (("feedback", own.fed_back), ("observer", own.error_dynamics)):
-        loop, wish = designed.report[name], designed.file[name]
+        loop, wish = designed.report[name], designed.plant_file[name]
         found = np.sort_complex(np.linalg.eigvals(dynamics))
         assert found == pytest.approx(complex_numbers(loop["eigenvalues"]), rel=1e-8)
         if "eigenvalues" in wish:
@@ -117,7 +116,7 @@ def test_the_sampled_plant_is_the_matrix_exponential(case):
     shown = {m["name"]: np.array(m["values"]) for m in designed.report["plant"]["matrices"]}
     assert (shown["F_a"][:, :m] == b).all()
     if own.filtered:
-        part = 1 - np.exp(-designed.file["filter"] * own.period)
+        part = 1 - np.exp(-designed.plant_file["filter"] * own.period)
         assert designed.design["filter"] == pytest.approx([part] * 3, rel=1e-14)
 
 
@@ -216,7 +215,7 @@ def test_the_peak_gains_are_integrals_of_the_impulse_response(case):
         of_rate = total(times, abs(step), own.period)
     else:
         of_fault, of_rate = between_samples(designed, own, horizon)
-    stated = {own["name"]: own for own in designed.file.get("faults", [])}
+    stated = {own["name"]: own for own in designed.plant_file.get("faults", [])}
     for bound in designed.report["bounds"]:
         at = outputs(designed).index(bound["error"]), faults(designed).index(bound["fault"])
         # If a fault does not affect a state, both values are rounding errors.
@@ -374,7 +373,7 @@ def test_theorem_1_is_that_of_scipy(case):
     if own.period is not None:
         assert "continuous time" in certificate["printed"]["reason"]
         return
-    bounds = [fault.get("bound") for fault in designed.file.get("faults", [{}])]
+    bounds = [fault.get("bound") for fault in designed.plant_file.get("faults", [{}])]
     if own.A_f.any() or None in bounds:
         assert any(text in certificate["printed"]["reason"] for text in ("constant", "`bound`"))
         return

@@ -228,9 +228,17 @@ def test_the_fmu_names_the_direct_dependence_of_its_command(designed):
 @pytest.mark.parametrize(
     ("changes", "law", "expected"),
     [
-        ([("C = " + str(C.tolist()), "C = [[0.0, 1.0, 0.0]]")], "fast-adaptive", "rank C F_a is 0, expected 1; possible are augmented, proportional-integral"),
+        (
+            [("C = " + str(C.tolist()), "C = [[0.0, 1.0, 0.0]]")],
+            "fast-adaptive",
+            "rank C F_a is 0, expected 1; possible are augmented, proportional-integral",
+        ),
         ([("C = " + str(C.tolist()), "C = [[1.0, 0.0, -3.0]]")], "fast-adaptive", "invariant zeros that are not stable"),
-        ([], "sliding-mode", "sampled controllers only: expected `sample_time`; possible are augmented, proportional-integral, fast-adaptive"),
+        (
+            [],
+            "sliding-mode",
+            "sampled controllers only: expected `sample_time`; possible are augmented, proportional-integral, fast-adaptive",
+        ),
         ([], "learning", "sampled controllers only"),
         ([("A = ", 'sample_time = 0.1\nestimator = "prediction"\nA = ')], "fast-adaptive", 'expected estimator = "current"'),
         ([("A = ", "sample_time = 0.1\nA = "), (", bound = 2.0", "")], "sliding-mode", "it needs `rho`, or `bound` of fault `f`"),

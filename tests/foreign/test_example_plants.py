@@ -123,7 +123,7 @@ def levels(h, times, stop):
     values, begin = np.empty((len(times), 3)), 0.0
     spills = np.array([0, 1, 1])
     full = lambda _, h: BRIM - h[0]
-    full.terminal, full.direction = True, -1
+    vars(full).update(terminal=True, direction=-1)
     for edge in edges[1:]:
         while begin < edge:
             pumps = delivered(begin)
@@ -226,7 +226,7 @@ def slid(begin, end, drive, state, direction):
         return [state[1], torque / INERTIA]
 
     stop = lambda _, state: state[1]
-    stop.terminal, stop.direction = True, -direction
+    vars(stop).update(terminal=True, direction=-direction)
     part = solve_ivp(right_side, (begin, end), state, events=stop, **EXACT)
     omega = 0.0 if part.status == 1 else part.y[1, -1]
     return part.t[-1], np.array([part.y[0, -1], omega])

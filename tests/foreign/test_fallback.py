@@ -278,7 +278,8 @@ def test_at_the_switch_the_estimates_continue_and_the_commands_change_by_the_gai
         loop = before if k < 100 else after
         y = plant.advance(np.where(np.arange(4) == 2, 0.0, u))
         run.do(y)
-        phi, gamma = exact(loop) if k in (0, 100) else (phi, gamma)
+        if k in (0, 100):
+            phi, gamma = exact(loop)
         z = phi @ z + gamma @ y
         u = loop.k @ z
         assert abs(run.get(*run.actuators) - run.operating - u).max() < 1e-9, k
@@ -451,7 +452,11 @@ def test_cases_without_a_common_gain_are_named(aso_ftc, tmp_path):
         ("[fallback]", "[fallback]\nloss = 1.5", "expected a fraction above 0 and at most 1, found 1.5"),
         ("[fallback]\nactuators = \"all\"", "[fallback]\nactuators = [\"e\"]", 'no actuator is named "e"; there are a, b, c, d'),
         ("together = 2", "together = 4", "from 1 to 3, found 4"),
-        ("robustness.cases = 0", "robustness.cases = 0\nestimation.law = \"learning\"", "with `reconfiguration` the law is one of augmented"),
+        (
+            "robustness.cases = 0",
+            "robustness.cases = 0\nestimation.law = \"learning\"",
+            "with `reconfiguration` the law is one of augmented",
+        ),
         ("region.decay = 0.1", "region.decay = 0.1\nregion.disc = { center = -1, radius = 2 }", "by `decay` only"),
     ],
 )

@@ -82,7 +82,7 @@ def test_n_r_is_that_of_the_left_eigenvectors(carts):
 
 def run(fmu, folder, plant, disturbance, is_sampled, end=20.0):
     """A plant under the FMU after a step of both references: states, commands, integrals at each communication step."""
-    phi, gamma = held(*plant, PERIOD)
+    phi, gamma = held(plant[0], plant[1], PERIOD)
     _, xi = held(plant[0], disturbance[:, None], PERIOD)
     own = Stepped(fmu, folder, [("r_p_1", STEP[0]), ("r_p_2", STEP[1])])
     x, rows = np.zeros(4), []
@@ -101,7 +101,8 @@ def run(fmu, folder, plant, disturbance, is_sampled, end=20.0):
 
 def continuous(design, plant, disturbance, count):
     """The same for a continuous controller that holds its measurements during a step, by matrix exponentials."""
-    own = {key: np.array(value, float) for key, value in design.items() if key in ("A", "B", "C", "F_a", "K_x", "K_f", "K_i", "N_r", "H", "L_x", "L_f")}
+    names = ("A", "B", "C", "F_a", "K_x", "K_f", "K_i", "N_r", "H", "L_x", "L_f")
+    own = {key: np.array(value, float) for key, value in design.items() if key in names}
     n, q, t = 4, 1, 2
     k = np.hstack([own["K_x"], own["K_f"], own["K_i"]])
     dynamics = np.zeros((n + q + t, n + q + t))
@@ -114,7 +115,7 @@ def continuous(design, plant, disturbance, count):
         [-own["H"], np.eye(t)],
     ])
     step, entry = held(dynamics, inputs, PERIOD)
-    phi, gamma = held(*plant, PERIOD)
+    phi, gamma = held(plant[0], plant[1], PERIOD)
     _, xi = held(plant[0], disturbance[:, None], PERIOD)
     z, x, rows = np.zeros(n + q + t), np.zeros(n), []
     for _ in range(count):
@@ -283,7 +284,8 @@ def test_each_member_settles_on_its_reference(family, name, tmp_path):
     (instability,) = [own["instability"] for own in report["family"]["members"] if own["name"] == name]
     values = np.linalg.eigvals(member_loop(name, design).matrices()[0])
     assert instability == pytest.approx(abs(values).max() - 1 if "sample_time" in design else values.real.max(), rel=1e-5)
-    phi, gamma = held(*(np.array(own, float) for own in MEMBERS[name]), 0.02)
+    a, b = (np.array(own, float) for own in MEMBERS[name])
+    phi, gamma = held(a, b, 0.02)
     own = Stepped(fmu, tmp_path, [("p", 2.0), ("r_p", 2.5)])
     x = np.array([2.0, 0.0])
     for k in range(1000):
@@ -295,7 +297,8 @@ def test_each_member_settles_on_its_reference(family, name, tmp_path):
 
 def test_a_family_without_a_common_p_is_not_green_and_says_so(aso_ftc, tmp_path):
     # The observer is that of the nominal plant, so that a member far from it has no P together with it.
-    changes = [("feedforward = true\n", ""), ("[0.6]", "[0.25]"), ("-0.3]]", "-0.05]]"), ("feedback.region = { decay = 1.0 }", "feedback.Q = [4, 1, 9]\nfeedback.R = [0.1]")]
+    changes = [("feedforward = true\n", ""), ("[0.6]", "[0.25]"), ("-0.3]]", "-0.05]]")]
+    changes += [("feedback.region = { decay = 1.0 }", "feedback.Q = [4, 1, 9]\nfeedback.R = [0.1]")]
     text = FAMILY
     for old, new in changes:
         assert old in text
@@ -310,7 +313,12 @@ def test_a_family_without_a_common_p_is_not_green_and_says_so(aso_ftc, tmp_path)
     "old, new, line, parts",
     [
         ("feedforward = true", "integral = false", 13, ["the other members of the family would miss", "`integral = true`"]),
-        ("A = [[0, 1], [0, -0.3]]\nB = [[0], [0.6]]", "A = [[0, 1], [-1, -1]]\nB = [[0], [1]]\nC = [[0, 1]]", 15, ["no integral action exists for the member `loaded`"]),
+        (
+            "A = [[0, 1], [0, -0.3]]\nB = [[0], [0.6]]",
+            "A = [[0, 1], [-1, -1]]\nB = [[0], [1]]\nC = [[0, 1]]",
+            15,
+            ["no integral action exists for the member `loaded`"],
+        ),
     ],
 )
 def test_a_family_that_cannot_follow_is_refused_at_its_line(aso_ftc, tmp_path, old, new, line, parts):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import fmpy
 import pytest
-from lxml import etree
 from fmpy.validation import validate_fmu
+from lxml import etree
 
 from c_abi import STANDARD_FUNCTIONS
 

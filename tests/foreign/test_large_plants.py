@@ -8,9 +8,8 @@ import pytest
 from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov
 from scipy.optimize import linear_sum_assignment, minimize_scalar
 
-from design_oracle import Matrices, closed_loop
-
 import large_plants
+from design_oracle import Matrices, closed_loop
 
 MASSES, COMMANDS, MEASUREMENTS = 25, 3, 6
 STATES = 2 * MASSES

@@ -86,7 +86,7 @@ class Live:
 def live(out, *options, start="--live=paused", fmus=FMUS):
     """A run of the pendulum."""
     command = [COMMAND, "run", *fmus, *options, start, *(["--out", out] if out else [])]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    pipes: dict = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     process = subprocess.Popen(list(map(str, command)), cwd=ROOT, **pipes)
     try:
         yield Live(process)
@@ -150,8 +150,8 @@ def test_a_run_with_interventions_is_repeated_bit_for_bit(aso_ftc, tmp_path, alg
             for _ in range(3 + 2 * number):
                 run.do("step")
                 steps += 1
-            reached = run.until(lambda state, steps=steps: state["phase"] == "paused" and state["steps"] == steps)["time"]
-            text = re.sub(r"@(\S+)", lambda found, reached=reached: repr(reached + float(found[1])), fault)
+            reached = run.until(lambda state: state["phase"] == "paused" and state["steps"] == steps)["time"]
+            text = re.sub(r"@(\S+)", lambda found: repr(reached + float(found[1])), fault)
             assert run.do("scenario", text).startswith("Accepted: it takes effect at t = ")
         assert len(run.until(lambda state: len(state["interventions"]) == 7)["interventions"]) == 7
         run.do("continue")
@@ -169,9 +169,11 @@ def test_a_run_with_interventions_is_repeated_bit_for_bit(aso_ftc, tmp_path, alg
 def test_a_paced_run_that_is_changed_while_it_goes_on_is_repeated_bit_for_bit(aso_ftc, tmp_path):
     with live(tmp_path, "--stop-time", 100, "--record-every", "step", "--real-time=1", start="--live") as run:
         for fault in [SET, *FAULTS[:1], *FAULTS[2:3]]:
-            run.until(lambda state, before=run.state()["time"]: state["time"] > before)
+            before = run.state()["time"]
+            run.until(lambda state: state["time"] > before)
             assert run.do("scenario", fault).startswith("Accepted: it takes effect at t = ")
-        run.until(lambda state, before=run.state()["time"]: state["time"] > before + 0.2)
+        before = run.state()["time"]
+        run.until(lambda state: state["time"] > before + 0.2)
         run.do("stop")
         run.end()
     text = (tmp_path / "live.toml").read_text(encoding="utf-8")
@@ -182,9 +184,9 @@ def test_a_paced_run_that_is_changed_while_it_goes_on_is_repeated_bit_for_bit(as
 
 def test_every_kind_of_fault_is_repeated_bit_for_bit(aso_ftc, tmp_path):
     kinds = [
-        "bias = { value = 1e-4 }", "gain = { factor = 0.99 }", "drift = { rate = 1e-4 }", "stuck = { until = 0.06 }", "dropout = { until = 0.06 }",
-        "dropout = { period = 0.01, lost = 0.002 }", "dropout = { probability = 0.1, seed = 4 }", "quantisation = { step = 1e-5 }",
-        "saturation = { min = -0.2, max = 0.2 }", "noise = { amplitude = 1e-5, every = 0.003 }",
+        "bias = { value = 1e-4 }", "gain = { factor = 0.99 }", "drift = { rate = 1e-4 }", "stuck = { until = 0.06 }",
+        "dropout = { until = 0.06 }", "dropout = { period = 0.01, lost = 0.002 }", "dropout = { probability = 0.1, seed = 4 }",
+        "quantisation = { step = 1e-5 }", "saturation = { min = -0.2, max = 0.2 }", "noise = { amplitude = 1e-5, every = 0.003 }",
     ]
     with live(tmp_path, "--stop-time", 0.2, "--record-every", "step") as run:
         for number, kind in enumerate(kinds):
@@ -192,7 +194,8 @@ def test_every_kind_of_fault_is_repeated_bit_for_bit(aso_ftc, tmp_path):
             name = ["controller.x_p", "controller.theta", "plant.u"][number % 3]
             run.do("scenario", f'[[fault]]\nconnection = "{name}"\n{kind}\n')
         # Of a Boolean input that is set, and of a Real input that is set.
-        run.do("scenario", '[[set]]\nvariable = "controller.compensate"\nvalue = false\n[[fault]]\nconnection = "controller.compensate"\ninversion = {}\n')
+        inversion = '[[fault]]\nconnection = "controller.compensate"\ninversion = {}\n'
+        run.do("scenario", f'[[set]]\nvariable = "controller.compensate"\nvalue = false\n{inversion}')
         run.do("scenario", '[[set]]\nvariable = "plant.f_a"\nvalue = 0.5\n[[fault]]\nconnection = "plant.f_a"\ndropout = { from = 0.1 }\n')
         run.do("step")
         run.do("scenario", '[[set]]\nvariable = "plant.f_a"\nvalue = 0.25\nat = 0.05\n')
@@ -264,7 +267,8 @@ BAD = {
     '[[set]]\nvariable = "plant.u"\nvalue = 1': "scenario.set[1]: plant.u is connected to controller.u",
     '[[set]]\nvariable = "plant.x_p"\nvalue = 1': "scenario.set[1]: plant.x_p is a continuous output, expected an input",
     '[[set]]\nvariable = "plant.F_c"\nvalue = 1\nat = 0': "at is 0, expected a time of 0.001 s or later",
-    '[[fault]]\nconnection = "plant.u"\ndelay = { seconds = 0.01, from = 0.005 }': "from is 0.005, expected a time of 0.01 s or later, when the delayed values are known",
+    '[[fault]]\nconnection = "plant.u"\ndelay = { seconds = 0.01, from = 0.005 }':
+        "from is 0.005, expected a time of 0.01 s or later, when the delayed values are known",
     '[[fault]]\nconnection = "plant.u"\ndelay = { seconds = "long" }': "invalid type",
     '[[fault]]\nconnection = "plant.u"\nbias = { value = 1, until = 0 }': "scenario.fault[1]: until is 0",
     '[[fault]]\nconnection = "plant.f_a"\nbias = { value = 1 }': "scenario.fault[1]: plant.f_a is an input without a source",
@@ -374,7 +378,8 @@ def test_an_unknown_start_of_the_live_view_is_refused(aso_ftc):
 def test_nobody_without_the_token_gets_anything(tmp_path):
     with live(tmp_path) as run:
         token = run.root.strip("/")
-        wrong = ["/", "//", "/state", f"/{token}", f"/{token[:-1]}/", f"/{token}0/", f"/{token.upper()}x/", f"/../{token}/", f"/%2e/{token}/", f"/x?{token}/"]
+        wrong = ["/", "//", "/state", f"/{token}", f"/{token[:-1]}/", f"/{token}0/", f"/{token.upper()}x/"]
+        wrong += [f"/../{token}/", f"/%2e/{token}/", f"/x?{token}/"]
         for root in [*wrong, "/" + "0" * len(token) + "/"]:
             status, headers, text = run.ask("", root=root)
             assert status == 404 and token not in text and token not in str(headers), root
@@ -389,7 +394,8 @@ def test_nobody_without_the_token_gets_anything(tmp_path):
 def test_other_sites_and_names_are_refused_also_with_the_token(tmp_path):
     with live(tmp_path) as run:
         own = f"127.0.0.1:{run.port}"
-        for host in ["evil.example", f"evil.example:{run.port}", "127.0.0.1", f"127.0.0.1:{run.port + 1}", f"[::1]:{run.port}", f"{own}.evil.example", ""]:
+        hosts = ["evil.example", f"evil.example:{run.port}", "127.0.0.1", f"127.0.0.1:{run.port + 1}", f"[::1]:{run.port}"]
+        for host in [*hosts, f"{own}.evil.example", ""]:
             assert run.ask("facts", Host=host)[0] == 403, host
         for origin in ["null", "http://evil.example", f"https://{own}", f"http://{own}.evil.example", f"http://127.0.0.1:{run.port + 1}"]:
             assert run.ask("facts", Origin=origin)[0] == 403, origin
@@ -566,13 +572,17 @@ def test_the_page_shows_the_run_and_all_controls_work(aso_ftc, tmp_path):
         page.until("Number(document.body.dataset.time) > 0.5")
         page.evaluate(
             "document.getElementById('fault-input').value = 'controller.theta';"
-            "document.getElementById('fault-kind').value = 'noise'; document.getElementById('fault-kind').dispatchEvent(new Event('change'));"
+            "document.getElementById('fault-kind').value = 'noise';"
+            "document.getElementById('fault-kind').dispatchEvent(new Event('change'));"
             "document.getElementById('fault-members').value = 'deviation = 1e-5'; document.querySelector('#fault button').click()"
         )
         page.until("document.getElementById('interventions').childElementCount === 2")
         page.evaluate("document.getElementById('fault-members').value = 'nonsense'; document.querySelector('#fault button').click()")
         page.until("document.getElementById('answer').classList.contains('failed')")
-        page.evaluate("document.getElementById('text').value = '[[set]]\\nvariable = \"controller.compensate\"\\nvalue = true'; document.querySelector('#entries button').click()")
+        page.evaluate(
+            "document.getElementById('text').value = '[[set]]\\nvariable = \"controller.compensate\"\\nvalue = true';"
+            "document.querySelector('#entries button').click()"
+        )
         page.until("document.getElementById('interventions').childElementCount === 3")
         page.evaluate("document.querySelectorAll('#signals input')[6].click()")
         page.until("document.querySelectorAll('#figures .uplot').length >= 2")

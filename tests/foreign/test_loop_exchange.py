@@ -197,7 +197,7 @@ def by_radau(loop, tolerance):
             loop.move(time, states)
             return loop.find_indicators()[k]
 
-        function.terminal = True
+        vars(function).update(terminal=True)
         return function
 
     functions = [indicator(k) for k in range(len(loop.indicators))]

@@ -112,7 +112,8 @@ def test_a_sampled_observer_reaches_the_bound_of_the_delay(designed, estimator):
     delay = {"current": 1, "prediction": 2}[estimator]
     least = PERIOD * np.linalg.norm(np.tril(np.ones((delay, delay))), 2)
     assert found["norm"]["lower_bound"] == pytest.approx(least, rel=1e-5) and found["norm"]["lower_bound_for"] == "filters"
-    n, (a, b) = 2, np.split(expm(PERIOD * np.block([[np.array([[-0.5, 0.2], [0.1, -0.4]]), np.array([[1], [0.3]])], [np.zeros((1, 3))]]))[:2], [2], axis=1)
+    n, slopes = 2, np.array([[-0.5, 0.2, 1], [0.1, -0.4, 0.3], [0, 0, 0]])
+    a, b = np.split(expm(PERIOD * slopes)[:n], [n], axis=1)
     assert own.A == pytest.approx(a) and own.B == pytest.approx(b)
     a_0 = np.block([[a, -b], [np.zeros((1, n)), np.eye(1)]])
     c_0 = np.array([[1.0, 0, 0]])

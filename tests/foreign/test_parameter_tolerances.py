@@ -1,6 +1,7 @@
 """Tolerances of the parameters of a plant's FMU, beside the equations of the DC servo in numpy.
 
-J w' = k i - F_v w, R i = u - k w (examples/dc-servo, friction off); the random numbers are those of SplitMix64 (Steele, Lea, Flood 2014)."""
+J w' = k i - F_v w, R i = u - k w (examples/dc-servo, friction off); the random numbers are those of SplitMix64 (Steele, Lea, Flood
+2014)."""
 
 import json
 import tomllib

@@ -200,7 +200,7 @@ def test_a_sliding_cart_stops_at_scipys_time_and_position(plant):
         return derivative(state, -friction)
 
     stops = lambda _, state: state[2]
-    stops.terminal = True
+    vars(stops).update(terminal=True)
     reference = solve_ivp(
         right, (0, 1), state, method="DOP853", rtol=1e-12, atol=1e-13, events=stops
     )

@@ -32,7 +32,7 @@ GLIBC = Path(os.environ.get("OLD_GLIBC") or "/nowhere")
 ZIG = os.environ.get("ZIG", "").split()
 LIBRARIES = GLIBC / "lib" / "x86_64-linux-gnu"
 # For each platform: how the host is compiled, and how it is run.
-RUN = {
+RUN: dict[str, tuple[str, list, list]] = {
     "linux64": ("linux64", ["cc"], []),
     "glibc 2.31": (
         "linux64",

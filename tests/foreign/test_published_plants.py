@@ -4,9 +4,8 @@ import warnings
 
 import pytest
 
-from conftest import ROOT
-
 import published_plants
+from conftest import ROOT
 
 PLANTS = sorted((ROOT / "examples" / "plants").glob("*.toml"))
 

@@ -10,7 +10,7 @@ import pytest
 from conftest import ROOT
 
 FMUS = [ROOT / "dist" / f"{name}.fmu" for name in ("FrictionPendulum", "AsoController")]
-SYSTEMS = {
+SYSTEMS: dict[str, list] = {
     "FMUs": FMUS,
     "--fmu": ["--fmu", f"plant={FMUS[0]}", "--fmu", f"controller={FMUS[1]}"],
     "SSP": [ROOT / "dist" / "InvertedPendulum.ssp"],

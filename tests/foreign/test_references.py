@@ -97,10 +97,10 @@ def test_constant_references_and_faults_leave_no_error(case):
 
 def test_another_plant_is_held_at_its_references_by_integral_action(case):
     loop, design, _, sensor, action = case
-    other = list(entries(sensor))
-    other[0] = np.array(A) * 1.1 + 0.03
-    other[1] = np.array(B) * 0.9
-    other = TrackingLoop(other, design)
+    matrices = list(entries(sensor))
+    matrices[0] = np.array(A) * 1.1 + 0.03
+    matrices[1] = np.array(B) * 0.9
+    other = TrackingLoop(matrices, design)
     outputs = np.array([[1.0, 0, 0], [0, 1.0, -1.0]]) @ np.array(C)
     error = np.abs(outputs @ other.constant()[:3, :2] - np.eye(2)).max()
     # The estimate of the sensor fault depends on the model, and so does what it is subtracted from.

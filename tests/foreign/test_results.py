@@ -132,7 +132,7 @@ def test_pyarrow_reads_the_parquet_file_typed_without_nulls_and_with_units(files
 def test_pandas_reads_the_parquet_file_with_the_same_bits_and_the_units(files):
     found = pd.read_parquet(files.parquet)
     assert list(found.columns) == NAMES
-    assert found.dtypes["ctrl.on"] == bool and found.dtypes["plant.mode"] == np.int32
+    assert found.dtypes["ctrl.on"] == np.bool_ and found.dtypes["plant.mode"] == np.int32
     assert found.attrs["units"] == UNITS
     assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from conftest import ROOT
-
 from residual_over_sample_time import (
     CONSTANT,
     CONSTANT_PREDICTION,

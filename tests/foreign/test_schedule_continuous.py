@@ -191,7 +191,7 @@ def test_slopes_of_the_command_include_the_moving_gains(drive):
     with Instance(fmu) as own:
         own.start({"angle": 0.2, "r_angle": 0.3, "inertia": 1.3})
         own.step(0.0, 0.4)
-        for k in range(20):
+        for _ in range(20):
             rates = dict(zip(["angle", "r_angle", "inertia"], 0.3 * random.standard_normal(3)))
             inputs = {"angle": 0.1 * random.standard_normal(), "r_angle": 0.3, "inertia": random.uniform(1.1, 3.9)}
             own.set(inputs)
@@ -203,7 +203,8 @@ def test_slopes_of_the_command_include_the_moving_gains(drive):
             def command(t):
                 values = {name: inputs[name] + rates[name] * t for name in inputs}
                 slope, _ = schedule.equations(z, np.array([inputs["angle"]]), np.array([inputs["r_angle"]]), inputs["inertia"])
-                return schedule.equations(z + slope * t, np.array([values["angle"]]), np.array([values["r_angle"]]), values["inertia"])[1][0]
+                measured, reference = np.array([values["angle"]]), np.array([values["r_angle"]])
+                return schedule.equations(z + slope * t, measured, reference, values["inertia"])[1][0]
 
             if "P_f" in schedule.points[0]:
 

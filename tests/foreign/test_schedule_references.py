@@ -93,7 +93,8 @@ def made(aso_ftc, packed, tmp_path_factory):
             text = text.replace(old, new)
         (folder / "drive.toml").write_text(text, encoding="utf-8")
         out = folder / "design.toml"
-        done = aso_ftc("design", folder / "drive.toml", "--out", out, "--fmu", folder / "Drive.fmu", "--json", *([] if certified else ["--certificate-time", "0"]))
+        options = [] if certified else ["--certificate-time", "0"]
+        done = aso_ftc("design", folder / "drive.toml", "--out", out, "--fmu", folder / "Drive.fmu", "--json", *options)
         assert done.returncode in (0, 1), done.stderr
         return Schedule(out.read_text(encoding="utf-8")), json.loads(done.stdout), folder / "Drive.fmu"
 
@@ -148,7 +149,11 @@ def run(schedule, fmu, folder, inertia, reference, count, plant, disturbance=0.0
     return np.array(rows)
 
 
-@pytest.mark.parametrize("change", [(), tuple(WITHOUT), (("sample_time", 'estimator = "prediction"\nsample_time'),)], ids=["both", "feedforward", "prediction"])
+@pytest.mark.parametrize(
+    "change",
+    [(), tuple(WITHOUT), (("sample_time", 'estimator = "prediction"\nsample_time'),)],
+    ids=["both", "feedforward", "prediction"],
+)
 def test_the_fmu_follows_the_interpolated_recursion_at_its_limits_too(made, change, tmp_path):
     schedule, _, fmu = made(*change, certified=change in ((), tuple(WITHOUT)))
     inertia = lambda k: 0.9 + 0.015 * k
@@ -297,9 +302,18 @@ def test_a_measurement_that_schedules_moves_the_references_too(made, change):
     "replacements, parts",
     [
         # K_i grows with the inertia: half of the way the product with L_w is above 2.
-        ([("B = [[0], [0.25]]", "B = [[0], [0.0005]]"), ("0.25", "0.0005")], ["back-calculation of the integrals is not stable while torque is at the limits", "inertia = "]),
-        ([("[schedule]", '[estimation]\nlaw = "sliding-mode"\n\n[schedule]')], ["with `schedule` the law is one of augmented, proportional-integral, fast-adaptive, learning; found \"sliding-mode\""]),
-        ([("A = [[0, 1], [-0.375, -0.05]]\nB = [[0], [0.25]]", "A = [[0, 1], [-1, -1]]\nB = [[0], [1]]\nC = [[0, 1]]")], ["no integral action exists for r_angle", "schedule with inertia = 4"]),
+        (
+            [("B = [[0], [0.25]]", "B = [[0], [0.0005]]"), ("0.25", "0.0005")],
+            ["back-calculation of the integrals is not stable while torque is at the limits", "inertia = "],
+        ),
+        (
+            [("[schedule]", '[estimation]\nlaw = "sliding-mode"\n\n[schedule]')],
+            ["with `schedule` the law is one of augmented, proportional-integral, fast-adaptive, learning; found \"sliding-mode\""],
+        ),
+        (
+            [("A = [[0, 1], [-0.375, -0.05]]\nB = [[0], [0.25]]", "A = [[0, 1], [-1, -1]]\nB = [[0], [1]]\nC = [[0, 1]]")],
+            ["no integral action exists for r_angle", "schedule with inertia = 4"],
+        ),
     ],
 )
 def test_a_schedule_that_cannot_follow_is_refused_at_its_line(aso_ftc, tmp_path, replacements, parts):

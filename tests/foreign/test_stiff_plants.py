@@ -76,7 +76,7 @@ def designed(aso_ftc, folder, name, sampled):
 
 
 def peak_of_s(own, near):
-    """The largest singular value of S at the commands, on a grid around `near`: S maps a signal that adds to the commands to the actuators'."""
+    """The largest singular value of S, from a signal that is added to the commands to the actuators, on a grid around `near`."""
     a, *_ = closed_loop(own)
     b = np.vstack([own.B, np.zeros((own.n + own.q, own.B.shape[1]))])
     c = commands(own)

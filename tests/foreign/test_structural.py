@@ -130,7 +130,7 @@ def test_in_model_exchange_the_number_of_states_follows(fmus, references):
 def test_our_master_sets_the_extents_and_gets_the_exact_solution(fmus, aso_ftc, tmp_path):
     settings = []
     for name, values in {"n": [3], "m": [2], "p": [2], "A": A, "B": B, "C": C, "D": D, "u": U, "x": X0}.items():
-        settings += ["--set", f"s.{name}=" + " ".join(f"{value}" for value in np.ravel(values).tolist())]
+        settings += ["--set", f"s.{name}=" + " ".join(f"{value}" for value in np.array(values).ravel().tolist())]
     run = ["run", "--fmu", f"s={fmus[3]}", "--stop-time", "2", "--step", "0.1"]
     done = aso_ftc(*run, *settings, "--out", tmp_path)
     assert done.returncode == 0, done.stderr

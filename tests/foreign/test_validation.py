@@ -3,13 +3,13 @@
 import re
 import struct
 import zipfile
+from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 from lxml import etree
-from pathlib import Path
 
 from c_abi import STANDARD_FUNCTIONS
 

@@ -46,7 +46,8 @@ def test_the_delay_margin_of_a_string_of_vehicles_is_that_of_the_loop_gain(aso_f
     a, b, c = vehicles(COUNT)
     faults = "".join(f'[[faults]]\nname = "f{at + 1}"\nactuator = "u{at + 1}"\n' for at in range(COUNT - 1))
     weights = f"feedback.Q = {[1.0] * len(a)}\nfeedback.R = {[1.0] * COUNT}\nobserver.W = {[1.0] * len(a) + [100.0] * (COUNT - 1)}\n"
-    text = f"sample_time = {PERIOD}\nA = {a.tolist()}\nB = {b.tolist()}\nC = {c.tolist()}\n{weights}observer.V = {[0.01] * (COUNT - 1)}\n{faults}"
+    weights += f"observer.V = {[0.01] * (COUNT - 1)}\n"
+    text = f"sample_time = {PERIOD}\nA = {a.tolist()}\nB = {b.tolist()}\nC = {c.tolist()}\n{weights}{faults}"
     own, found = made(aso_ftc, tmp_path, text)
     assert own is not None, found
     stated = found["robustness"]["delay_margin"]

@@ -152,8 +152,8 @@ def test_every_control_answers_and_settings_without_a_design_are_refused(open_pa
     page.until("window.paper.rows[0].at(-1) > 1")
     page.evaluate(click.format("play"))
     assert page.evaluate(state) == "Paused."
-    shown = "FIELDS.every((f) => document.querySelectorAll(`#set-${f.id}`).length === 1 && document.getElementById(`set-${f.id}`).value !== '')"
-    assert page.evaluate(shown)
+    one = "document.querySelectorAll(`#set-${f.id}`).length === 1"
+    assert page.evaluate(f"FIELDS.every((f) => {one} && document.getElementById(`set-${{f.id}}`).value !== '')")
     fields = json.loads(page.evaluate("JSON.stringify(FIELDS.filter((f) => typeof f.value === 'number'))"))
     for field in fields:
         page.evaluate(

@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import eig
 
 from design_oracle import made
-from test_norm_designs import A, B, C, C_0, A_0, NOISE, PLANT, RATES
+from test_norm_designs import A_0, C_0, NOISE, PLANT, RATES, A, B, C
 
 SWEEP = np.logspace(-5, 5, 3000)
 # The noise is coloured, and the error of the first fault matters at low frequencies.

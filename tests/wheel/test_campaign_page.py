@@ -21,10 +21,10 @@ class Page(html.parser.HTMLParser):
 
     def __init__(self, path):
         super().__init__()
-        self.tags, self.text, self.data, self.inside = [], "", "", None
+        self.tags, self.text, self.embedded, self.inside = [], "", "", None
         self.source = path.read_text(encoding="utf-8")
         self.feed(self.source)
-        self.data = json.loads(self.data)
+        self.data = json.loads(self.embedded)
 
     def handle_starttag(self, tag, attrs):
         self.tags.append((tag, dict(attrs)))
@@ -37,7 +37,7 @@ class Page(html.parser.HTMLParser):
         if self.inside is None:
             self.text += data
         elif self.inside == ("script", "data"):
-            self.data += data
+            self.embedded += data
 
     def column(self, name, kind):
         (found,) = [own for own in self.data["columns"] if (own["name"], own["kind"]) == (name, kind)]

@@ -15,7 +15,7 @@ def results(paper):
 def test_columns_are_read_only_arrays_of_the_types_of_their_variables(results):
     kinds = {name: results[name].dtype for name in results}
     assert kinds["plant.x_p"] == np.float64 and kinds["plant.regime"] == np.int32
-    assert kinds["controller.compensate"] == bool
+    assert kinds["controller.compensate"] == np.bool_
     with pytest.raises(ValueError, match="read-only"):
         results["plant.x_p"][0] = 1.0
     assert results.units["plant.x_p"] == "m" and results.units["plant.regime"] is None

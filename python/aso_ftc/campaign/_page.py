@@ -529,7 +529,6 @@ const across = [...inputs, {name: 'run', unit: null, values: data.runs}];
 const column = (name, kind) => data.columns.find(own => own.kind === kind && own.name === name);
 const status = column('status', 'status'), fault = column('fault', 'fault');
 const shown = (own, at) => own.labels ? own.labels[own.values[at]] : own.values[at];
-const finished = at => shown(status, at) === 'ok';
 const measure = () => data.measures[byId('measure').value];
 const values = () => column(measure().name, 'measure').values;
 const inside = value => {
@@ -581,7 +580,8 @@ function drawParallel() {
     let low = finite.reduce((a, b) => Math.min(a, b), Infinity), high = finite.reduce((a, b) => Math.max(a, b), -Infinity);
     if (!(low < high)) { const half = Math.abs(low) / 10 || 1; low -= half; high += half; }
     // A run without a value of this axis, such as the size of a fault that has none, is at its lower end.
-    return {label: plain(short(from.name + (from.unit ? ' in ' + from.unit : ''), 26)), values: picked.map(value => value === null ? low : value), range: [low, high]};
+    const label = plain(short(from.name + (from.unit ? ' in ' + from.unit : ''), 26));
+    return {label, values: picked.map(value => value === null ? low : value), range: [low, high]};
   };
   const dimensions = inputs.filter(from => rows.some(at => from.values[at] !== null)).map(from => {
     const found = dimension(from, at => from.values[at]);
@@ -727,6 +727,9 @@ document.addEventListener('click', event => {
 });
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', drawAll);
 let pending;
-addEventListener('resize', () => { clearTimeout(pending); pending = setTimeout(() => { if (data.measures.length) { drawParallel(); drawHeat(); } }, 200); });
+addEventListener('resize', () => {
+  clearTimeout(pending);
+  pending = setTimeout(() => { if (data.measures.length) { drawParallel(); drawHeat(); } }, 200);
+});
 drawAll();
 """
