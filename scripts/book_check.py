@@ -1,6 +1,7 @@
 """Makes the checks that mkdocs lacks: links of README.md and its neighbours, and no requests to other hosts.
 
-Usage: python scripts/book_check.py FOLDER. Prints what is wrong, with status 1.
+Usage: python scripts/book_check.py FOLDER | PAGE.. For the built book in FOLDER, both; for pages in Markdown,
+their links. Prints what is wrong, with status 1.
 """
 
 import re
@@ -8,7 +9,6 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-BESIDE = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 # Elements that make a browser load something without a click: sources, style sheets, icons,
 # imports.
@@ -37,9 +37,9 @@ def broken_links(page):
         path, _, place = target.partition("#")
         file = page.parent / path if path else page
         if not file.exists():
-            yield f"{page.name}: {target}: there is no such file"
+            yield f"{page}: {target}: there is no such file"
         elif place and place not in anchors(file):
-            yield f"{page.name}: {target}: there is no such heading"
+            yield f"{page}: {target}: there is no such heading"
 
 
 def foreign_requests(site):
@@ -52,10 +52,13 @@ def foreign_requests(site):
 
 def main():
     """Prints all findings."""
-    if len(sys.argv) != 2:
-        sys.exit(__doc__.strip().splitlines()[-1])
-    found = [line for name in BESIDE for line in broken_links(ROOT / name)]
-    found += foreign_requests(Path(sys.argv[1]))
+    found, paths = [], [Path(argument) for argument in sys.argv[1:]]
+    if not paths:
+        sys.exit(__doc__)
+    if paths[0].is_dir():
+        found += foreign_requests(paths[0])
+        paths = sorted(ROOT.glob("*.md"))
+    found += [line for page in paths for line in broken_links(page)]
     for line in found:
         print(line, file=sys.stderr)
     sys.exit(1 if found else 0)
