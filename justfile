@@ -2,6 +2,7 @@
 
 # Format, lints and unit tests: under two minutes once everything is built.
 quick:
+    scripts/lint
     cargo fmt --all --check
     cargo clippy --release --workspace --exclude importers --locked -- -D warnings
     cargo test --release --workspace --exclude importers --lib --locked --quiet

@@ -87,8 +87,15 @@ class Reader:
 
     def start(self, text):
         """A shell with these commands, in a process group of its own."""
-        options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "start_new_session": True}
-        return subprocess.Popen(["bash", "-e", "-c", text], cwd=self.folder, env=self.environment, **options)
+        return subprocess.Popen(
+            ["bash", "-e", "-c", text],
+            cwd=self.folder,
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
 
     def run(self, text):
         """Runs the commands once: a later call returns the same exit status and output."""
