@@ -22,7 +22,7 @@ def test_it_compiles_for_a_cortex_m(aso_ftc, tmp_path, options):
     target = "-mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -ffreestanding".split()
     always = "-std=c99 -O2 -ffp-contract=off -Wall -Wextra -Wconversion -Werror".split()
     run("arm-none-eabi-gcc", *always, *target, "-c", tmp_path / "c" / "plant.c", "-o", tmp_path / "m4.o")
-    undefined = subprocess.run(["arm-none-eabi-nm", "-u", tmp_path / "m4.o"], capture_output=True, text=True).stdout
+    undefined = subprocess.check_output(["arm-none-eabi-nm", "-u", tmp_path / "m4.o"], text=True)
     needed = {line.split()[-1] for line in undefined.splitlines()}
     assert not needed if options else all(name.startswith("__aeabi_d") for name in needed), needed
 
@@ -66,7 +66,7 @@ def test_the_crate_is_built_for_a_cortex_m_and_nothing_in_it_panics(aso_ftc, tmp
     assert done.returncode == 0, done.stderr
     for own in members.values():
         library = tmp_path / "target" / "thumbv7em-none-eabihf" / "release" / f"lib{own.name}.rlib"
-        listed = subprocess.run(["arm-none-eabi-nm", "-u", library], capture_output=True, text=True).stdout
+        listed = subprocess.check_output(["arm-none-eabi-nm", "-u", library], text=True)
         needed = {line.split()[-1] for line in listed.splitlines() if " U " in line}
         numbers = () if own.single else ("__aeabi_d", "__aeabi_ui2d")
         memory = ("__aeabi_mem", "memcpy", "memset", "memcmp", "bcmp")
