@@ -107,16 +107,16 @@ def write_metadata(folder, maturin="maturin"):
 
 def write_wheel(folder, files, platform_tag=None, maturin="maturin"):
     """Writes a wheel of these files, by their names in it, and the metadata; returns the name of the wheel."""
-    made = WORK / "metadata"
-    shutil.rmtree(made, ignore_errors=True)
-    made.mkdir(parents=True)
-    info = write_metadata(made, maturin)
+    metadata = WORK / "metadata"
+    shutil.rmtree(metadata, ignore_errors=True)
+    metadata.mkdir(parents=True)
+    info = write_metadata(metadata, maturin)
     text = (info / "WHEEL").read_text(encoding="utf-8")
     if platform_tag:
         text = re.sub(r"(?m)^(Tag: \w+-\w+)-.*$", rf"\1-{platform_tag}", text)
         (info / "WHEEL").write_text(text, encoding="utf-8")
     tag = re.search(r"(?m)^Tag: (.*)$", text)[1]
-    files = {**files, **{str(path.relative_to(made)): path for path in info.rglob("*") if path.is_file()}}
+    files = {**files, **{str(path.relative_to(metadata)): path for path in info.rglob("*") if path.is_file()}}
     name, record = f"{info.stem}-{tag}.whl", f"{info.name}/RECORD"
     lines = []
     with zipfile.ZipFile(Path(folder) / name, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -133,9 +133,10 @@ def write_wheel(folder, files, platform_tag=None, maturin="maturin"):
 
 
 def sources():
-    """The Python files of the package, by name."""
-    paths = [path for path in PYTHON.glob("aso_ftc/**/*") if path.suffix in (".py", ".pyi", ".typed")]
-    return {str(path.relative_to(PYTHON)): path for path in paths}
+    """The files of the package that are not built, by name."""
+    built = {"bin", "fmus", NOTICES, "__pycache__", *(module for _, _, module in NAMES.values())}
+    files = {path.relative_to(PYTHON): path for path in PYTHON.glob("aso_ftc/**/*") if path.is_file()}
+    return {str(name): path for name, path in files.items() if not built.intersection(name.parts)}
 
 
 def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
