@@ -208,17 +208,36 @@ impl System {
         outputs
     }
 
-    /// Returns the outputs that can be connected to `input`: free outputs of other FMUs with its
-    /// type and unit.
+    /// Returns the outputs that may belong to `input`: free outputs of other FMUs with its type and unit
+    /// that have its name or, if the unit is stated, do not depend on the FMU of the input. A unit alone
+    /// is no reason to close a loop: the estimate of a disturbance has the unit of the disturbance.
     #[must_use]
     pub fn candidates(&self, input: Port) -> Vec<Port> {
+        let dependent = self.dependent_slaves(input.slave);
+        let has_unit = self.dimension(input).is_some();
         let mut outputs = self.free_outputs();
         outputs.retain(|&output| {
             output.slave != input.slave
                 && self.variable(output).kind.element() == self.variable(input).kind.element()
                 && self.dimension(output) == self.dimension(input)
+                && (self.variable(output).name == self.variable(input).name
+                    || has_unit && !dependent[output.slave])
         });
         outputs
+    }
+
+    /// Returns for each slave whether connections lead from `slave` to it.
+    fn dependent_slaves(&self, slave: usize) -> Vec<bool> {
+        let mut dependent = vec![false; self.slaves.len()];
+        let mut open = vec![slave];
+        while let Some(source) = open.pop() {
+            for wire in self.connections.iter().filter(|wire| wire.from.slave == source) {
+                if !std::mem::replace(&mut dependent[wire.to.slave], true) {
+                    open.push(wire.to.slave);
+                }
+            }
+        }
+        dependent
     }
 
     /// Returns all variables of the given causality.

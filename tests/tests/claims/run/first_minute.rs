@@ -42,7 +42,18 @@ fn the_only_free_output_and_input_of_a_unit_are_connected_and_reported() {
     assert!(message.contains("warning: pump.y and tank.u are connected because"), "{message}");
     // Inputs that remain are listed with the option that sets each.
     assert!(printed(&output).contains("  pump.u: set it by --set pump.u=VALUE"));
-    assert!(printed(&output).contains("  pump.i_in: --connect tank.i_out=pump.i_in"));
+    assert!(printed(&output).contains("  pump.i_in: set it by --set pump.i_in=VALUE"));
+}
+
+#[test]
+fn no_connection_is_proposed_that_closes_a_loop_over_a_unit() {
+    let bench = Bench::new();
+    let (plant, controller) = (fmu("FrictionPendulum"), fmu("AsoController"));
+    let output = printed(&bench.run(&[&plant, &controller, "--stop-time", "0.01", "--out", "a"]));
+    // The controller, which the plant feeds, estimates this force in N.
+    let line = "  FrictionPendulum.f_a: set it by --set FrictionPendulum.f_a=VALUE\n";
+    assert!(output.contains(line), "{output}");
+    assert!(!output.contains("f_hat="), "{output}");
 }
 
 #[test]
