@@ -94,9 +94,12 @@ pub fn assemble_with(
         }
     }
     if assembly.elements.is_empty() && slaves.is_empty() {
-        return Err(Error::Invalid(
-            "the system has no FMU, expected `system` or an entry of [fmus]".to_owned(),
-        ));
+        return Err(Error::Invalid(match &config.system {
+            Some(path) => {
+                format!("{}: the system has no FMU, expected at least one", path.display())
+            }
+            None => "the system has no FMU, expected `system` or an entry of [fmus]".to_owned(),
+        }));
     }
     let (mut system, integrated) = instantiate(&assembly.elements, config, options)?;
     for (name, function) in &assembly.functions {
