@@ -243,7 +243,7 @@ class Results:
 
     def __repr__(self) -> str:
         count = len(self.names) - 1
-        return f"<Results: {count} variables, {len(self)} rows, end at t = {self.end_time} s ({self.end})>"
+        return f"<Results: {count} variables, {len(self)} rows, end at t = {self.end_time:.12g} s ({self.end})>"
 
     def _repr_html_(self) -> str:
         units, names = self.units, self.names[1:]

@@ -7,6 +7,7 @@
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use fmu_description::number::seconds;
 use pyo3::prelude::*;
 use study::LogFields;
 use tracing::span::{Attributes, Id, Record};
@@ -128,7 +129,7 @@ fn level(level: Level) -> u8 {
 /// Returns the message of an FMU with its name, time and category.
 fn of_fmu(fields: LogFields) -> String {
     let LogFields { message, instance, category, time, others } = fields;
-    let time = time.map(|time| format!(", t = {time} s")).unwrap_or_default();
+    let time = time.map(|time| format!(", t = {} s", seconds(time))).unwrap_or_default();
     let category = if category.is_empty() { category } else { format!(", {category}") };
     format!("{instance}{time}{category}: {}{others}", message.trim_end())
 }

@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::{LazyLock, OnceLock, PoisonError};
 
+use fmu_description::number::seconds;
 use master::{Port, Simulation, Slave};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -118,16 +119,17 @@ impl Study {
         if let (None, RunEnd::AtStop | RunEnd::ByFmu(_)) = (&watch.stop, &ended) {
             watch.finish(py)?;
         }
+        let shown = seconds(time);
         let (end, exception) = match (watch.stop.take(), ended) {
             (Some(Stop::Raised(error)), _) => return Err(error),
             (Some(Stop::TimeLimit(limit)), _) => {
                 let sentence =
-                    format!("the run reached its time limit of {limit} s at t = {time} s");
+                    format!("the run reached its time limit of {limit} s at t = {shown} s");
                 let own = Exception::new("TimeLimitError", "TimeLimit", sentence);
                 ("time limit".to_owned(), Some(own.number("time", time).raise(py)))
             }
             (Some(Stop::Cancelled), _) => {
-                let sentence = format!("the run was cancelled at t = {time} s");
+                let sentence = format!("the run was cancelled at t = {shown} s");
                 let own = Exception::new("CancelledError", "Cancelled", sentence);
                 ("cancelled".to_owned(), Some(own.number("time", time).raise(py)))
             }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use fmu_description::number::seconds;
 use serde::Serialize;
 
 use super::finding::{Finding, Tool};
@@ -33,7 +34,7 @@ impl fmt::Display for TrialResult {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             TrialResult::Yes { steps, step, start, tolerance, but } => {
-                write!(formatter, "yes, {steps} steps of {step} s from t = {start} s")?;
+                write!(formatter, "yes, {steps} steps of {} s from t = {start} s", seconds(*step))?;
                 match tolerance {
                     Some(tolerance) => write!(formatter, " with tolerance {tolerance:e}")?,
                     None => write!(formatter, " without a tolerance")?,

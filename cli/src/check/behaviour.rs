@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use fmu_description::number::seconds;
 use fmu_description::{Experiment, ModelDescription, Version};
 use master::{CallError, Failure, Slave, StepResult};
 
@@ -230,14 +231,17 @@ impl<S: Slave> Trial<'_, S> {
             match slave.do_step(self.time(k), self.step_size(), true) {
                 Ok(StepResult::Whole) => trajectory.push(self.read(slave)?),
                 Ok(StepResult::Part { reached, .. }) => {
-                    let what =
-                        format!("a step of {} s is done to {reached} s only", self.step_size());
+                    let what = format!(
+                        "a step of {} s is done to {} s only",
+                        seconds(self.step_size()),
+                        seconds(reached)
+                    );
                     let why = "FMPy and others end the run there.";
                     self.findings.add(Note, "fmi2DoStep", what, (why, "4.2.2"));
                     break;
                 }
                 Err(error) => {
-                    self.failed(&error, &format!("at t = {} s", self.time(k)), "4.2.2");
+                    self.failed(&error, &format!("at t = {} s", seconds(self.time(k))), "4.2.2");
                     return None;
                 }
             }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
+use fmu_description::number::seconds;
 use fmu_description::{Causality, Kind, ScalarVariable, Variability};
 use live::{Action, Facts, Phase, Request, Sample, Source, Subject, Variable, View};
 use master::{Port, Probe, Readout, System};
@@ -67,6 +68,7 @@ impl Live {
         let first =
             "A run with --live, with its interventions. `aso-ftc run` with this file repeats it";
         let (file, first) = if resumed {
+            let begin = seconds(begin);
             let name = format!("live-from-{begin}.toml");
             (name, format!("{first} from its start, not from the checkpoint at t = {begin} s."))
         } else {
@@ -162,7 +164,7 @@ impl Live {
     }
 
     fn perform(&mut self, run: &mut Run, request: Request) {
-        let time = run.simulation.time();
+        let time = seconds(run.simulation.time());
         if run.simulation.is_finished() {
             return request.answer(Err(format!("the run has reached its end, t = {time} s")));
         }
@@ -195,8 +197,8 @@ impl Live {
 
     fn intervene(&mut self, run: &mut Run, text: &str) -> Result<String, String> {
         let done = run.intervene(text).map_err(|error| error.sentence())?;
-        let from = done.from;
-        let line = format!("At t = {} s, to take effect at t = {from} s or later:", done.time);
+        let [time, from] = [done.time, done.from].map(seconds);
+        let line = format!("At t = {time} s, to take effect at t = {from} s or later:");
         self.view.intervened(done.time, format!("{line}\n{}", done.text));
         let entries = done.text.lines().map(|line| format!("  {line}"));
         self.remarks.extend(std::iter::once(line).chain(entries));

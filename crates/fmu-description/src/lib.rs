@@ -9,7 +9,7 @@
 //! * `package` (feature `package`) unpacks and writes `.fmu` archives.
 //! * [`abi1`], [`abi`] (FMI 2.0) and [`abi3`] have the C types of each version.
 //! * [`unit`](mod@unit) derives base units from names, [`location`] converts paths to `fmuResourceLocation` and
-//!   back, [`documentation`] writes the documentation page of a model.
+//!   back, [`documentation`] writes the documentation page of a model, [`number`] rounds numbers for messages.
 //!
 //! To run an FMU use `fmu-import`; to write a model use `fmu`.
 #![forbid(unsafe_code)]
@@ -23,6 +23,7 @@ mod description;
 pub mod documentation;
 mod experiment;
 pub mod location;
+pub mod number;
 #[cfg(feature = "package")]
 pub mod package;
 pub mod similar;

@@ -17,6 +17,8 @@ use std::sync::atomic::{AtomicBool, AtomicI32, AtomicUsize, Ordering};
 use std::thread::Thread;
 use std::time::Duration;
 
+use fmu_description::number::seconds;
+
 pub use place::Name;
 pub(crate) use place::{Place, Slot, last_of_this_thread};
 
@@ -74,7 +76,7 @@ pub struct Ending {
 
 impl fmt::Display for Call {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{} at t = {} s: {}", self.instance, self.time, self.function)
+        write!(formatter, "{} at t = {} s: {}", self.instance, seconds(self.time), self.function)
     }
 }
 

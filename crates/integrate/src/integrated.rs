@@ -7,6 +7,7 @@ mod step;
 
 use std::str::FromStr;
 
+use fmu_description::number::seconds;
 use fmu_description::{CoSimulation, Kind, ModelDescription};
 use serde::{Deserialize, Serialize};
 use slave::{CallError, Failure, ModelExchange, Slave, Status};
@@ -262,11 +263,6 @@ impl Integrated {
         );
         CallError { messages, ..failed(what) }
     }
-}
-
-/// Returns a time with an exponent if it is close to zero.
-fn seconds(time: f64) -> String {
-    if time != 0.0 && time.abs() < 1e-6 { format!("{time:e}") } else { time.to_string() }
 }
 
 /// Returns an error of the integration.

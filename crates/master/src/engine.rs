@@ -6,6 +6,7 @@ mod threads;
 
 use std::ops::Range;
 
+use fmu_description::number::seconds;
 use serde::{Deserialize, Serialize};
 
 use crate::algorithm::Algorithm;
@@ -377,7 +378,10 @@ impl Engine {
                 })?;
         }
         let what = format!(
-            "returned fmi2Discard and came to {start} s only, on the way from {time} to {end} s"
+            "returned fmi2Discard and came to {} s only, on the way from {} to {} s",
+            seconds(start),
+            seconds(time),
+            seconds(end)
         );
         let source = CallError {
             function: "fmi2DoStep",

@@ -1,5 +1,6 @@
 //! Errors of a system and of a simulation.
 
+use fmu_description::number::seconds;
 use slave::CallError;
 
 /// Error of building, initialising or advancing a system.
@@ -134,7 +135,7 @@ pub enum SystemError {
         found: String,
     },
     /// An FMI call failed.
-    #[error("{slave} at t = {time} s: {source}")]
+    #[error("{slave} at t = {} s: {source}", seconds(*time))]
     Call {
         /// The slave.
         slave: String,
@@ -144,7 +145,7 @@ pub enum SystemError {
         source: CallError,
     },
     /// An output, or the value of a connection, is NaN or infinite.
-    #[error("{name} is {value} at t = {time} s, expected a finite number")]
+    #[error("{name} is {value} at t = {} s, expected a finite number", seconds(*time))]
     NotFinite {
         /// The output.
         name: String,
@@ -164,7 +165,7 @@ pub enum SystemError {
         required_by: String,
     },
     /// The initial values of an algebraic loop cannot be found.
-    #[error("the loop through {names} at t = {time} s: {why}")]
+    #[error("the loop through {names} at t = {} s: {why}", seconds(*time))]
     Loop {
         /// The outputs.
         names: String,
@@ -174,7 +175,11 @@ pub enum SystemError {
         why: String,
     },
     /// The iteration of a step did not converge.
-    #[error("the step from t = {time} s over {size} s cannot be solved: {why}")]
+    #[error(
+        "the step from t = {} s over {} s cannot be solved: {why}",
+        seconds(*time),
+        seconds(*size)
+    )]
     Coupling {
         /// Begin of the step in s.
         time: f64,
@@ -195,8 +200,10 @@ pub enum SystemError {
     },
     /// The error of the smallest step exceeds the tolerance.
     #[error(
-        "at t = {time} s the smallest step, {size} s, has an error of {error:.1e} times the \
-         tolerance; a larger tolerance or a smaller smallest step helps"
+        "at t = {} s the smallest step, {} s, has an error of {error:.1e} times the \
+         tolerance; a larger tolerance or a smaller smallest step helps",
+        seconds(*time),
+        seconds(*size)
     )]
     Stuck {
         /// Begin of the step in s.
@@ -208,9 +215,11 @@ pub enum SystemError {
     },
     /// The steps are so small that the run cannot reach its stop time.
     #[error(
-        "at t = {time} s the last {steps} steps cover {length:.1e} s in total, close to the \
-         smallest step of {smallest} s each; the stop time needs {left:.0e} more of them. A larger \
-         relative tolerance, a larger smallest step or fixed steps help"
+        "at t = {} s the last {steps} steps cover {length:.1e} s in total, close to the \
+         smallest step of {} s each; the stop time needs {left:.0e} more of them. A larger \
+         relative tolerance, a larger smallest step or fixed steps help",
+        seconds(*time),
+        seconds(*smallest)
     )]
     TooManySteps {
         /// Number of steps in the observed interval.

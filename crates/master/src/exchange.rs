@@ -17,6 +17,7 @@ mod start;
 mod tasks;
 mod trace;
 
+use fmu_description::number::seconds;
 use serde::{Deserialize, Serialize};
 
 use crate::algorithm::Algorithm;
@@ -331,7 +332,8 @@ impl Exchange {
             let name = system.name(port);
             tracing::warn!(
                 "{name}: its output derivative (fmi2GetRealOutputDerivatives) is {value} at \
-                 t = {time} s; connections from {name} are held while it is not finite"
+                 t = {} s; connections from {name} are held while it is not finite",
+                seconds(time)
             );
         }
     }

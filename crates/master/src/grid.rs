@@ -6,6 +6,7 @@ use crate::algorithm::Algorithm;
 use crate::error::SystemError;
 use crate::signal::reached;
 use crate::system::System;
+use fmu_description::number::seconds;
 use slave::Slave;
 
 /// Part of a step below which the rest of a run is rounding and gets no step.
@@ -42,7 +43,8 @@ pub struct EarlyEnd {
 
 impl fmt::Display for EarlyEnd {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { slave, step, end, stop } = self;
+        let Self { slave, .. } = self;
+        let [step, end, stop] = [self.step, self.end, self.stop].map(seconds);
         write!(
             formatter,
             "{slave} takes equal steps only (canHandleVariableCommunicationStepSize is false), and \

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use fmu_description::DefaultExperiment;
 use fmu_description::Experiment;
+use fmu_description::number::seconds;
 use master::{
     Algorithm, AlgorithmRequest, Coupling, Extrapolation, Method, StepControl, System,
     by_direct_dependencies, choose,
@@ -215,7 +216,7 @@ fn times(config: &Config, assembled: &AssembledSystem, reasons: &mut Vec<String>
 fn rows(algorithm: &Algorithm, length: f64, reasons: &mut Vec<String>) -> Every {
     if algorithm.control == StepControl::Fixed && length > ROWS * algorithm.step * (1.0 + NEAR) {
         let interval = length / ROWS;
-        reasons.push(format!("a row every {interval} s: {ROWS} intervals"));
+        reasons.push(format!("a row every {} s: {ROWS} intervals", seconds(interval)));
         Every::Seconds(interval)
     } else {
         Every::Step

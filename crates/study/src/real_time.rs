@@ -3,6 +3,8 @@
 use std::fmt;
 use std::time::{Duration, Instant};
 
+use fmu_description::number::seconds;
+
 /// Longest sleep between two checks whether the wait ends early.
 const SLICE: Duration = Duration::from_millis(50);
 /// Remaining wait in which the clock is read in a loop, because a sleep may end late by about this
@@ -67,7 +69,7 @@ impl fmt::Display for Overruns {
             "paced at {factor} times real time: {count} of {steps} steps ended late"
         )?;
         if *count > 0 {
-            write!(formatter, ", at most by {largest:.3e} s, at t = {at} s")?;
+            write!(formatter, ", at most by {largest:.3e} s, at t = {} s", seconds(*at))?;
         }
         Ok(())
     }

@@ -1,10 +1,9 @@
 //! Resumes a run from a checkpoint.
 
+use fmu_description::number::seconds;
+use master::{Checkpoint, Scenario, Simulation, System, SystemError};
+
 use crate::error::Error;
-
-use master::Scenario;
-use master::{Checkpoint, Simulation, System, SystemError};
-
 use crate::plan::Plan;
 
 /// Restores the simulation of `checkpoint`. Returns an error or logs a warning if settings differ
@@ -31,7 +30,7 @@ pub(crate) fn resume(
         );
     }
     if simulation.is_finished() && simulation.ended_by().is_none() {
-        let time = checkpoint.time();
+        let time = seconds(checkpoint.time());
         tracing::warn!(
             "resume: the checkpoint was taken at t = {time} s, which is the end of the run; \
              --stop-time SECONDS gives a later one"

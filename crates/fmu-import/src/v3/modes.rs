@@ -3,6 +3,7 @@
 use super::Instance;
 use super::access::refused;
 use crate::library::Interface;
+use fmu_description::number::seconds;
 use slave::{CallError, Failure, StepResult};
 
 use fmu_description::abi::Status;
@@ -92,7 +93,8 @@ impl Instance {
             }
             if updates == UPDATES {
                 let what = format!(
-                    "needs more than {UPDATES} updates of the discrete states at t = {time} s"
+                    "needs more than {UPDATES} updates of the discrete states at t = {} s",
+                    seconds(time)
                 );
                 return Err(refused("fmi3UpdateDiscreteStates", what));
             }
@@ -188,6 +190,7 @@ impl Instance {
             }
             standstills = if reached > now { 0 } else { standstills + 1 };
             if standstills == STANDSTILLS {
+                let reached = seconds(reached);
                 let what = format!("returned early {STANDSTILLS} times at t = {reached} s");
                 return Err(refused("fmi3DoStep", what));
             }

@@ -1,5 +1,6 @@
 //! Events: their iteration, and changes of variables that need one.
 
+use fmu_description::number::seconds;
 use slave::{CallError, EventInfo};
 
 use super::{Integrated, Mode, failed};
@@ -22,7 +23,7 @@ impl Integrated {
         let mut iterations = 0;
         while info.discrete_states_need_update {
             if iterations == ITERATIONS {
-                let time = self.point.time;
+                let time = seconds(self.point.time);
                 return Err(failed(format!(
                     "stops at t = {time} s: the discrete states of an event still change after \
                      {ITERATIONS} iterations"
@@ -72,7 +73,7 @@ pub(super) fn check_indicators(time: f64, indicators: &[f64]) -> Result<(), Call
     match indicators.iter().position(|indicator| indicator.is_nan()) {
         None => Ok(()),
         Some(index) => {
-            let number = index + 1;
+            let (number, time) = (index + 1, seconds(time));
             Err(failed(format!("stops: event indicator {number} is NaN at t = {time} s")))
         }
     }

@@ -1,5 +1,6 @@
 //! A communication step: integration from event to event.
 
+use fmu_description::number::seconds;
 use slave::{CallError, CompletedStep, Failure, StepResult};
 use solve::Bracket;
 
@@ -60,7 +61,7 @@ impl Integrated {
             if self.point.mode == Mode::Event {
                 events += 1;
                 if events > EVENTS {
-                    let time = self.point.time;
+                    let (time, start) = (seconds(self.point.time), seconds(start));
                     return Err(failed(format!(
                         "stops at t = {time} s after {EVENTS} events since t = {start} s"
                     )));

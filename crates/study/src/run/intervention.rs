@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use files::Source;
+use fmu_description::number::seconds;
 
 use super::Run;
 use crate::error::Error;
@@ -45,8 +46,9 @@ impl Run {
         let time = self.simulation.time();
         let from = self.simulation.next_change().ok_or_else(|| {
             Error::Invalid(format!(
-                "t = {time} s: the run ends before a change can take effect, at the second \
-                 communication point from now or before"
+                "t = {} s: the run ends before a change can take effect, at the second \
+                 communication point from now or before",
+                seconds(time)
             ))
         })?;
         let (added, text) = entries(text, time, from)?;
