@@ -4,6 +4,7 @@ use std::fmt;
 use std::io::{self, Write};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
+use fmu_description::number::seconds;
 use indicatif::MultiProgress;
 use study::LogFields;
 use tracing::{Event, Level, Subscriber};
@@ -12,6 +13,8 @@ use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields, MakeWriter};
 use tracing_subscriber::layer::{Context, Layer, SubscriberExt as _};
 use tracing_subscriber::registry::LookupSpan;
+
+use crate::output;
 
 /// `target` of the events for messages of FMUs.
 const FMU: &str = "fmu";
@@ -99,8 +102,7 @@ struct StandardError;
 
 impl Write for StandardError {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        // If standard error is closed, nobody can read the message.
-        let _ = bars().suspend(|| io::stderr().write_all(bytes));
+        bars().suspend(|| output::error(format_args!("{}", String::from_utf8_lossy(bytes))));
         Ok(bytes.len())
     }
 
@@ -150,7 +152,7 @@ fn sentence(event: &Event<'_>) -> String {
     if metadata.target() != FMU {
         return format!("{word}: {message}{others}");
     }
-    let time = time.map_or_else(String::new, |time| format!(", t = {time} s"));
+    let time = time.map_or_else(String::new, |time| format!(", t = {} s", seconds(time)));
     let category =
         if category.is_empty() { String::new() } else { format!(", {}", plain(&category)) };
     format!("{word}: {}{time}{category}: {}{others}", plain(&instance), plain(&message))

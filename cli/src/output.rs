@@ -1,10 +1,17 @@
 //! Prints to standard output and standard error, which a reader may have closed, as `| head` does.
 //! The command then continues without output.
 //!
-//! The macros replace those of the standard library, which panic in this case.
+//! The macros replace those of the standard library, which panic in this case. The words `error:` and
+//! `warning:` at the start of a text have the colours of clap's errors, unless the stream is no
+//! terminal or `NO_COLOR` is set; `CLICOLOR_FORCE` asks for colours everywhere.
 
 use std::fmt::Arguments;
 use std::io::{self, Write as _};
+use std::sync::OnceLock;
+
+use anstream::stream::{AsLockedWrite, RawStream};
+use anstream::{AutoStream, ColorChoice};
+use anstyle::{AnsiColor, Style};
 
 /// As `print!` of the standard library; silent if standard output is closed.
 macro_rules! print {
@@ -22,13 +29,50 @@ macro_rules! eprintln {
     ($($text:tt)*) => { $crate::output::error(format_args!("{}\n", format_args!($($text)*))) };
 }
 
+/// The words that have a colour at the start of a text.
+const WORDS: [(&str, Style); 2] = [
+    ("error:", AnsiColor::Red.on_default().bold()),
+    ("warning:", AnsiColor::Yellow.on_default().bold()),
+];
+
 /// Prints to standard output.
 pub(crate) fn out(text: Arguments<'_>) {
-    // Printing fails only if the reader has closed the stream.
-    let _ = io::stdout().write_fmt(text);
+    static CHOICE: OnceLock<ColorChoice> = OnceLock::new();
+    write(io::stdout(), &CHOICE, &text.to_string());
 }
 
 /// Prints to standard error.
 pub(crate) fn error(text: Arguments<'_>) {
-    let _ = io::stderr().write_fmt(text);
+    static CHOICE: OnceLock<ColorChoice> = OnceLock::new();
+    write(io::stderr(), &CHOICE, &text.to_string());
+}
+
+/// Writes `text` with colours, or without them, as `choice` says; it is made when the first text is
+/// written, because the environment cannot be read while a crash is handled.
+fn write(stream: impl RawStream + AsLockedWrite, choice: &OnceLock<ColorChoice>, text: &str) {
+    let choice = choice.get_or_init(|| AutoStream::choice(&stream));
+    // Printing fails only if the reader has closed the stream.
+    let _ = AutoStream::new(stream, *choice).write_all(coloured(text).as_bytes());
+}
+
+fn coloured(text: &str) -> String {
+    let start = |(word, style)| Some((word, style, text.strip_prefix(word)?));
+    match WORDS.into_iter().find_map(start) {
+        Some((word, style, rest)) => format!("{style}{word}{style:#}{rest}"),
+        None => text.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_word_has_the_colour_of_claps_errors() {
+        let clap = clap::builder::Styles::styled();
+        let expected = format!("{0}error:{0:#} plant: error: lost\n", clap.get_error());
+        assert_eq!(coloured("error: plant: error: lost\n"), expected);
+        assert_eq!(coloured("warning: late\n"), "\u{1b}[1m\u{1b}[33mwarning:\u{1b}[0m late\n");
+        assert_eq!(coloured("errors: 2\n"), "errors: 2\n");
+    }
 }
