@@ -22,8 +22,10 @@ pub(super) struct Bar {
 impl Bar {
     pub(super) fn new() -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{bar:40} {elapsed}  {msg}")
-                .unwrap_or_else(|_| ProgressStyle::default_bar());
+            let style = ProgressStyle::with_template(
+                "{bar:24} {percent:>3} %, {elapsed}, {eta} left: {msg}",
+            )
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
             let bar = logging::bars().add(ProgressBar::new(parts(1.0)).with_style(style));
             bar.enable_steady_tick(REDRAWN);
             bar

@@ -1,13 +1,17 @@
 //! The progress bar of a run.
 
 use std::io::IsTerminal;
+use std::time::Instant;
 
+use fmu_description::number::rounded;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::logging;
 
 /// Number of updates of the bar during the run.
 const PARTS: f64 = 400.0;
+/// Significant digits of the time and of the speed on the bar.
+const DIGITS: usize = 3;
 
 /// A progress bar of simulated time; hidden if standard error is not a terminal.
 pub(super) struct Progress {
@@ -15,19 +19,20 @@ pub(super) struct Progress {
     start: f64,
     part: f64,
     next: f64,
+    began: Instant,
 }
 
 impl Progress {
     /// Creates a bar from `start` to `stop`, in s.
     pub(super) fn new(start: f64, stop: f64) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{bar:40} {msg} of {prefix} s simulated")
+            let template = "{bar:24} {percent:>3} %, {msg}, {eta} left";
+            let style = ProgressStyle::with_template(template)
                 .unwrap_or_else(|_| ProgressStyle::default_bar());
-            let bar = ProgressBar::new(whole(PARTS)).with_style(style);
-            logging::bars().add(bar.with_prefix(format!("{stop}")))
+            logging::bars().add(ProgressBar::new(whole(PARTS)).with_style(style))
         });
         let next = if bar.is_some() { start } else { f64::INFINITY };
-        Self { bar, start, part: (stop - start) / PARTS, next }
+        Self { bar, start, part: (stop - start) / PARTS, next, began: Instant::now() }
     }
 
     /// Updates the bar to `time`, in s.
@@ -42,8 +47,11 @@ impl Progress {
     fn draw(&mut self, time: f64) {
         self.next = time + self.part;
         if let Some(bar) = &self.bar {
-            bar.set_message(format!("{time:.4}"));
-            bar.set_position(whole((time - self.start) / self.part));
+            let done = time - self.start;
+            let speed = done / self.began.elapsed().as_secs_f64().max(f64::MIN_POSITIVE);
+            let (time, speed) = (rounded(time, DIGITS), rounded(speed, DIGITS));
+            bar.set_message(format!("t = {time} s, {speed} times real time"));
+            bar.set_position(whole(done / self.part));
         }
     }
 }
