@@ -32,7 +32,7 @@ use clap::{Parser, Subcommand};
 
 /// Fault-tolerant control with an augmented state observer, as FMUs.
 #[derive(Parser)]
-#[command(version)]
+#[command(version = env!("ASO_FTC_VERSION"))]
 struct Arguments {
     #[command(subcommand)]
     verb: Command,

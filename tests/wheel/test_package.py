@@ -61,11 +61,11 @@ def test_importing_loads_neither_numpy_nor_other_packages(python):
 
 
 def test_the_command_and_the_module_are_one_program():
-    expected = f"aso-ftc {af.__version__}\n"
+    expected = ["aso-ftc", af.__version__]
     script = Path(sysconfig.get_path("scripts"), "aso-ftc")
     for words in ([str(af.command())], [sys.executable, "-I", "-m", "aso_ftc"], [str(script)]):
         done = subprocess.run([*words, "--version"], check=True, capture_output=True, text=True)
-        assert done.stdout == expected
+        assert done.stdout.split()[:2] == expected
 
 
 def test_a_type_checker_finds_the_marker():
