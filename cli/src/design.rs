@@ -9,6 +9,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::models;
 use crate::outputs::{Outputs, check_distinct, check_own};
 use anyhow::Context;
 use design::{Design, Language, Precision};
@@ -31,9 +32,10 @@ pub(crate) struct Options {
     /// Also make the controller FMU
     #[arg(long, value_name = "FMU")]
     fmu: Option<PathBuf>,
-    /// The packed controller FMU from which it is made
-    #[arg(long, value_name = "FMU", default_value = "dist/AsoController.fmu", requires = "fmu")]
-    from: PathBuf,
+    /// The packed controller FMU from which it is made [default: dist/AsoController.fmu, or the one
+    /// beside the command]
+    #[arg(long, value_name = "FMU", requires = "fmu")]
+    from: Option<PathBuf>,
     /// Also write the controller of a sampled design as C99: NAME.h and NAME.c in this folder
     #[arg(long, value_name = "FOLDER", group = "code")]
     c_code: Option<PathBuf>,
@@ -72,10 +74,11 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         return compare(options).map(|()| true);
     }
     let (out, report) = names(options);
+    let from = options.from()?;
     let mut outputs: Vec<(&str, &Path)> = vec![("--out", &out), ("--report", &report)];
     outputs.extend(options.fmu.as_deref().map(|path| ("--fmu", path)));
     outputs.extend(options.worst_case.as_deref().map(|path| ("--worst-case", path)));
-    check_distinct(&inputs(options, None), &outputs)?;
+    check_distinct(&inputs(options, from.as_deref(), None), &outputs)?;
     for library in &options.preload {
         fmu_import::preload(library)?;
     }
@@ -87,11 +90,11 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     for (option, path, _) in &code.files {
         outputs.push((option, path));
     }
-    check_distinct(&inputs(options, made.model.as_deref()), &outputs)?;
+    check_distinct(&inputs(options, from.as_deref(), made.model.as_deref()), &outputs)?;
     if !options.force {
         outputs.iter().try_for_each(|(_, path)| check_own(path, &made.identity))?;
     }
-    let fmu = options.fmu.is_some().then(|| made.fmu(&options.from)).transpose()?;
+    let fmu = from.map(|from| made.fmu(&from)).transpose()?;
     let page = made.page();
     let mut staged = Outputs::default();
     staged.stage(&out, |path| fs::write(path, &made.file))?;
@@ -158,12 +161,12 @@ fn compare(options: &Options) -> anyhow::Result<()> {
     let page = || PathBuf::from(format!("{stem}-comparison.html"));
     let path = options.report.clone().unwrap_or_else(page);
     let outputs = [("--report", path.as_path())];
-    check_distinct(&inputs(options, None), &outputs)?;
+    check_distinct(&inputs(options, None, None), &outputs)?;
     for library in &options.preload {
         fmu_import::preload(library)?;
     }
     let found = design::compare(&options.plant)?;
-    check_distinct(&inputs(options, found.model.as_deref()), &outputs)?;
+    check_distinct(&inputs(options, None, found.model.as_deref()), &outputs)?;
     if !options.force {
         check_own(&path, &found.identity)?;
     }
@@ -196,12 +199,24 @@ fn names(options: &Options) -> (PathBuf, PathBuf) {
     (out, report)
 }
 
-/// The files that the command reads.
-fn inputs<'a>(options: &'a Options, model: Option<&'a Path>) -> Vec<(&'a str, &'a Path)> {
+/// The files that the command reads: the plant file, the FMU `from` which the controller is made, and
+/// the plant's FMU.
+fn inputs<'a>(
+    options: &'a Options,
+    from: Option<&'a Path>,
+    model: Option<&'a Path>,
+) -> Vec<(&'a str, &'a Path)> {
     let mut all: Vec<(&str, &Path)> = vec![("the plant file", &options.plant)];
-    if options.fmu.is_some() {
-        all.push(("--from", &options.from));
-    }
+    all.extend(from.map(|path| ("--from", path)));
     all.extend(model.map(|path| ("the plant's FMU", path)));
     all
+}
+
+impl Options {
+    /// Returns the FMU from which the controller FMU is made, if one is requested.
+    fn from(&self) -> anyhow::Result<Option<PathBuf>> {
+        let default = || models::default_fmu(models::FMUS[1].1);
+        let path = || self.from.clone().map_or_else(default, Ok);
+        self.fmu.is_some().then(path).transpose()
+    }
 }

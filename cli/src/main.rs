@@ -14,6 +14,7 @@ mod claims;
 mod crash;
 mod design;
 mod logging;
+mod models;
 mod new;
 mod outputs;
 mod pack;

@@ -93,10 +93,11 @@ fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-/// Returns the folder of the crate fmu in the clone that contains this program or, failing that,
-/// the current folder.
+/// Returns the folder of the crate fmu in the clone that contains this program or the current folder,
+/// or that the program was built in.
 fn clone() -> Option<PathBuf> {
-    let places = [std::env::current_exe().ok(), std::env::current_dir().ok()];
+    let built_in = option_env!("ASO_FTC_CLONE").map(PathBuf::from);
+    let places = [std::env::current_exe().ok(), std::env::current_dir().ok(), built_in];
     let folders = places.iter().flatten().flat_map(|place| place.ancestors());
     folders.map(|folder| folder.join("crates/fmu")).find(|folder| is_fmu(folder))
 }

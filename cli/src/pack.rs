@@ -18,8 +18,7 @@ use fmu_description::{ModelDescription, Version, terminals};
 
 use figure::rasterise;
 
-/// The models of this workspace.
-const MODELS: [&str; 2] = ["fmu-plant", "fmu-controller"];
+use crate::models;
 
 /// The equations of a model and its drawing, from which the packer makes index.html and model.png.
 /// The equations stay in the FMU, so that index.html can be made again for another design.
@@ -105,7 +104,7 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
     if !options.crates.is_empty() {
         return Ok(true);
     }
-    let root = workspace()?;
+    let root = models::clone()?;
     let fmus = pack_models(&root, &packing)?;
     for fmu in &fmus {
         println!("{}", fmu.path.display());
@@ -148,14 +147,14 @@ pub(crate) fn pack_into(root: &Path, out: &Path) -> anyhow::Result<Vec<PackedFmu
 }
 
 fn pack_models(root: &Path, packing: &PackOptions<'_>) -> anyhow::Result<Vec<PackedFmu>> {
-    pack_crates(&MODELS.map(|model| root.join(model)), packing)
+    pack_crates(&models::CRATES.map(|model| root.join(model)), packing)
 }
 
 /// Writes the model descriptions of both versions of FMI to the folder modelDescription.
 fn update_descriptions(root: &Path) -> anyhow::Result<()> {
-    let folders = MODELS.map(|model| root.join(model));
+    let folders = models::CRATES.map(|model| root.join(model));
     let libraries = library::build(&folders, true, &[])?;
-    for ((model, folder), library) in MODELS.iter().zip(&folders).zip(&libraries) {
+    for ((model, folder), library) in models::CRATES.iter().zip(&folders).zip(&libraries) {
         for &version in Versions::Both.list() {
             let resources = folder.join("resources");
             let (xml, description) =
@@ -173,22 +172,6 @@ fn update_descriptions(root: &Path) -> anyhow::Result<()> {
 fn file_stem(description: &ModelDescription) -> String {
     let name = &description.model_name;
     if description.version() == Version::V3 { format!("{name}.fmi3") } else { name.clone() }
-}
-
-/// Returns the folder of this workspace: the nearest folder upwards with the models.
-pub(crate) fn workspace() -> anyhow::Result<PathBuf> {
-    let here = std::env::current_dir()?;
-    here.ancestors()
-        .find(|folder| MODELS.iter().all(|model| folder.join(model).join("Cargo.toml").is_file()))
-        .map(Path::to_path_buf)
-        .with_context(|| {
-            let here = here.display();
-            format!(
-                "{here} is not inside a clone of this project: expected a folder upwards that \
-                     has {}",
-                MODELS.join(" and ")
-            )
-        })
 }
 
 /// Builds the libraries of crates and packs each, once for each version of FMI.

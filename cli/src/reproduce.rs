@@ -15,7 +15,7 @@ use study::{AssemblyOptions, Config, Every, LoadedConfig, PreparedRun, RunEnd};
 use crate::run::{AlgorithmOptions, advance, setting};
 use crate::scenario::Scenario;
 use crate::summary::{ControllerCertificate, Summary};
-use crate::{pack, paper_figures, summary};
+use crate::{models, paper_figures, summary};
 
 /// Name of the results file.
 const RESULTS: &str = "results.csv";
@@ -53,11 +53,11 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     if options.record_every == Every::Never {
         bail!("--record-every never leaves nothing to draw, expected seconds or `step`");
     }
-    pack::pack_into(&pack::workspace()?, &options.dist)?;
+    let fmus = models::folder(&options.dist)?;
     let settings = settings(options);
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("cannot make the folder {}", options.out.display()))?;
-    let prepared = PreparedRun::new(experiment(options, &settings), &AssemblyOptions::default())?;
+    let prepared = PreparedRun::new(experiment(options, &fmus, &settings), &AssemblyOptions::default())?;
     let mut watch = Watch::new(&prepared.system)?;
     let mut run = prepared.start(None)?;
     let ended = advance(&mut run, |run| {
@@ -94,11 +94,11 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     Ok(claims.iter().all(|claim| claim.holds != Some(false)))
 }
 
-/// Returns the configuration of plant and controller with these settings.
-fn experiment(options: &Options, settings: &[(String, String)]) -> LoadedConfig {
+/// Returns the configuration of plant and controller in the folder `fmus` with these settings.
+fn experiment(options: &Options, fmus: &Path, settings: &[(String, String)]) -> LoadedConfig {
     let mut config = Config::default();
-    for (name, file) in [("plant", "FrictionPendulum.fmu"), ("controller", "AsoController.fmu")] {
-        config.fmus.put(name.to_owned(), options.dist.join(file));
+    for (name, file) in models::FMUS {
+        config.fmus.put(name.to_owned(), fmus.join(file));
     }
     for (name, value) in settings {
         config.settings.push(name.clone(), value.clone());

@@ -12,12 +12,10 @@ use study::{
 };
 
 use super::live::LiveStart;
+use crate::models;
 
 /// Default folder of the results.
 const OUT: &str = "results/run";
-/// The FMUs that are coupled by default.
-const PLANT: &str = "dist/FrictionPendulum.fmu";
-const CONTROLLER: &str = "dist/AsoController.fmu";
 
 /// Options of the algorithm. Options that are not stated are chosen for the FMUs.
 #[derive(clap::Args)]
@@ -74,10 +72,12 @@ pub(crate) struct Options {
     #[arg(long = "fmu", value_name = "NAME=FMU", value_parser = setting)]
     #[arg(conflicts_with_all = ["plant", "controller"])]
     fmus: Vec<(String, String)>,
-    /// The FMU called plant [default: dist/FrictionPendulum.fmu]
+    /// The FMU called plant [default: dist/FrictionPendulum.fmu, or the one beside the
+    /// command]
     #[arg(long, value_name = "FMU", conflicts_with = "resume")]
     plant: Option<PathBuf>,
-    /// The FMU called controller [default: dist/AsoController.fmu]
+    /// The FMU called controller [default: dist/AsoController.fmu, or the one beside the
+    /// command]
     #[arg(long, value_name = "FMU", conflicts_with = "resume")]
     controller: Option<PathBuf>,
     /// Use this interface of an FMU that offers both, co-simulation (the default) or model-exchange; may be
@@ -321,11 +321,11 @@ impl Options {
                     .join(", ")
             ),
             [] if self.fmus.is_empty() => {
-                let path = |stated: &Option<PathBuf>, default: &str| {
-                    stated.clone().unwrap_or_else(|| default.into())
-                };
-                config.fmus.put("plant".to_owned(), path(&self.plant, PLANT));
-                config.fmus.put("controller".to_owned(), path(&self.controller, CONTROLLER));
+                let stated = [&self.plant, &self.controller];
+                for ((name, file), stated) in models::FMUS.into_iter().zip(stated) {
+                    let path = stated.clone().map_or_else(|| models::default_fmu(file), Ok)?;
+                    config.fmus.put(name.to_owned(), path);
+                }
             }
             [] => {}
         }

@@ -1,0 +1,88 @@
+//! Where the FMUs of the paper are: packed from a clone of this project, or beside the command.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, bail};
+
+use crate::pack;
+
+/// The FMUs of the paper, by the names that the instances get.
+pub(crate) const FMUS: [(&str, &str); 2] =
+    [("plant", "FrictionPendulum.fmu"), ("controller", "AsoController.fmu")];
+
+/// The folder into which FMUs are packed if no other is stated.
+const DIST: &str = "dist";
+
+/// Folders in which an installed command searches the FMUs, from its own folder: in a folder of a
+/// release, below the prefix of an installation, in the Python package.
+const BESIDE: [&str; 3] = ["fmus", "../share/aso-ftc/fmus", "../fmus"];
+
+/// The crates of the FMUs.
+pub(crate) const CRATES: [&str; 2] = ["fmu-plant", "fmu-controller"];
+
+/// Returns the folder with the FMUs: `dist`, into which they are packed if the current folder is in a
+/// clone; the one beside the command; or `dist`, packed from the clone that the command was built in.
+pub(crate) fn folder(dist: &Path) -> anyhow::Result<PathBuf> {
+    if clone_upwards()?.is_none()
+        && let Some(folder) = beside()
+    {
+        println!("FMUs: {}", folder.display());
+        return Ok(folder);
+    }
+    pack::pack_into(&clone()?, dist)?;
+    Ok(dist.to_owned())
+}
+
+/// Returns the path of an FMU that is not stated: the one in `dist`, or the one beside the command.
+pub(crate) fn default_fmu(name: &str) -> anyhow::Result<PathBuf> {
+    let packed = Path::new(DIST).join(name);
+    if packed.is_file() {
+        return Ok(packed);
+    }
+    let Some(folder) = beside() else {
+        bail!(
+            "there is no {}: name another FMU, or write this one by `aso-ftc pack`",
+            packed.display()
+        );
+    };
+    Ok(folder.join(name))
+}
+
+/// Returns the clone of this project that the current folder is in or, failing that, the one that the
+/// command was built in.
+pub(crate) fn clone() -> anyhow::Result<PathBuf> {
+    if let Some(root) = clone_upwards()? {
+        return Ok(root);
+    }
+    if let Some(root) = option_env!("ASO_FTC_CLONE").map(PathBuf::from).filter(|own| is_clone(own))
+    {
+        eprintln!("packing the models of {}", root.display());
+        return Ok(root);
+    }
+    let here = std::env::current_dir()?;
+    bail!(
+        "{} is not inside a clone of this project (a folder with {}), and there are no FMUs beside the \
+         command: change to a clone, or put the folder fmus of a release beside the command",
+        here.display(),
+        CRATES.join(" and ")
+    )
+}
+
+fn clone_upwards() -> anyhow::Result<Option<PathBuf>> {
+    let here = std::env::current_dir().context("the current folder")?;
+    Ok(here.ancestors().find(|folder| is_clone(folder)).map(Path::to_path_buf))
+}
+
+fn is_clone(folder: &Path) -> bool {
+    CRATES.iter().all(|model| folder.join(model).join("Cargo.toml").is_file())
+}
+
+/// Returns the folder with the FMUs beside the command.
+fn beside() -> Option<PathBuf> {
+    let command = std::env::current_exe().ok()?;
+    let command = command.canonicalize().ok()?;
+    let own = command.parent()?;
+    let folders = BESIDE.map(|folder| own.join(folder));
+    let has_fmus = |folder: &PathBuf| FMUS.iter().all(|(_, name)| folder.join(name).is_file());
+    folders.into_iter().find(has_fmus)
+}
