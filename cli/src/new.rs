@@ -23,7 +23,7 @@ pub(crate) struct Options {
     path: Option<PathBuf>,
     /// The crate fmu: its folder, or the URL of a git repository [default: the one in the clone
     /// that this program was built in or is called in]
-    #[arg(long, alias = "fmi2", value_name = "SOURCE")]
+    #[arg(long, value_name = "SOURCE")]
     fmu: Option<String>,
 }
 

@@ -30,9 +30,6 @@ pub(crate) struct AlgorithmOptions {
     /// Extrapolation of inputs during a step: hold, limited, linear or quadratic
     #[arg(long, value_parser = str::parse::<Extrapolation>)]
     pub(crate) extrapolation: Option<Extrapolation>,
-    /// The former name of --extrapolation
-    #[arg(long, hide = true, conflicts_with = "extrapolation", value_parser = str::parse::<Extrapolation>)]
-    course: Option<Extrapolation>,
     /// Iteration of a step until inputs and outputs agree: once, newton, anderson or quasi-newton
     #[arg(long, value_parser = str::parse::<Coupling>)]
     pub(crate) coupling: Option<Coupling>,
@@ -241,10 +238,7 @@ impl AlgorithmOptions {
     pub(crate) fn apply(&self, request: &mut AlgorithmRequest) {
         put(&mut request.step, self.step);
         put(&mut request.method, self.method);
-        if self.course.is_some() {
-            tracing::warn!("--course is now called --extrapolation");
-        }
-        put(&mut request.extrapolation, self.extrapolation.or(self.course));
+        put(&mut request.extrapolation, self.extrapolation);
         put(&mut request.coupling, self.coupling);
         put(&mut request.step_control, self.step_control);
         put(&mut request.relative_tolerance, self.relative_tolerance);

@@ -25,8 +25,8 @@ pub struct AlgorithmRequest {
     /// `jacobi` or `gauss-seidel`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<Method>,
-    /// Extrapolation of the inputs. The former name of this key is `course`.
-    #[serde(alias = "course", skip_serializing_if = "Option::is_none")]
+    /// Extrapolation of the inputs.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub extrapolation: Option<Extrapolation>,
     /// Iteration of a step.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -88,10 +88,6 @@ impl LoadedConfig {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let source = Source::read(path).map_err(Error::file("read", path))?;
         let config = parse(source.text(), path)?;
-        let table: toml::Table = source.text().parse().unwrap_or_default();
-        if table.get("algorithm").is_some_and(|algorithm| algorithm.get("course").is_some()) {
-            tracing::warn!("{}: algorithm.course is now called extrapolation", path.display());
-        }
         Ok(Self { config, source: Some(source) })
     }
 

@@ -165,8 +165,7 @@ fn the_documented_example_has_every_entry_of_the_algorithm() {
     let known: Vec<_> = message.lines().next().unwrap().split('`').skip(3).step_by(2).collect();
     assert!(known.len() >= 17, "{message}");
     let stated = example.parse::<toml::Table>().unwrap();
-    // `course` is the former name of `extrapolation`.
-    for name in known.into_iter().filter(|name| *name != "course") {
+    for name in known {
         assert!(stated["algorithm"].get(name).is_some(), "{name} is not in the example");
     }
 }

@@ -150,28 +150,3 @@ fn an_option_replaces_an_fmu_of_the_file() {
     let controller = format!("controller={}", fmu("AsoController"));
     printed(&bench.run(&["system.toml", "--fmu", &controller, "--out", "out"]));
 }
-
-#[test]
-fn the_former_name_of_the_extrapolation_is_accepted_with_a_warning() {
-    let bench = Bench::new();
-    let run = |arguments: &[&str]| {
-        let output = bench.run(arguments);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        printed(&output);
-        (bench.read("out/results.csv"), said)
-    };
-    let run_coupled = |more: &[&str]| {
-        let arguments = coupled(more);
-        run(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
-    };
-    let (held, silent) = run_coupled(&["--stop-time=0.2", "--extrapolation=hold"]);
-    assert_eq!(silent, "");
-    let (former, said) = run_coupled(&["--stop-time=0.2", "--course=hold"]);
-    assert_eq!(former, held);
-    assert!(said.contains("--course is now called --extrapolation"), "{said}");
-    let rest = "\n[experiment]\nstop-time = 0.2\n\n[algorithm]\ncourse = 'hold'\n";
-    bench.write("system.toml", &system_toml(rest));
-    let (file, said) = run(&["system.toml", "--out=out"]);
-    assert_eq!(file, held);
-    assert!(said.contains("algorithm.course is now called extrapolation"), "{said}");
-}
