@@ -1,6 +1,7 @@
 //! `aso-ftc campaign`: passes its arguments to the Python package, which does the runs.
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 
 /// The interpreter that is asked for the package, unless the variable [`VARIABLE`] names another.
@@ -8,12 +9,63 @@ const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
 /// The environment variable that names the interpreter.
 const VARIABLE: &str = "ASO_FTC_PYTHON";
 
+/// The options are those of the Python package.
 #[derive(clap::Args)]
-#[command(disable_help_flag = true)]
 pub(crate) struct Options {
-    /// Arguments for the Python package; --help lists them
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-    arguments: Vec<OsString>,
+    /// A campaign.toml, or a folder of results
+    ///
+    /// With --report or --show, it is the folder of the results.
+    campaign: PathBuf,
+    /// Folder of the results [default: results/NAME]
+    ///
+    /// A campaign that was interrupted goes on in its folder.
+    #[arg(long, value_name = "FOLDER", help_heading = "Results")]
+    out: Option<PathBuf>,
+    /// Only print the system.toml of this run
+    ///
+    /// It is for `aso-ftc run`.
+    #[arg(long, value_name = "RUN", help_heading = "Results")]
+    show: Option<u64>,
+    /// Only write the page of the results
+    #[arg(long, value_name = "FILE", help_heading = "Results")]
+    report: Option<PathBuf>,
+    /// Number of local processes [default: all processors]
+    #[arg(long, value_name = "N", help_heading = "Runs")]
+    workers: Option<usize>,
+    /// Dask scheduler, such as tcp://host:8786
+    #[arg(long, value_name = "ADDRESS", help_heading = "Runs")]
+    scheduler: Option<OsString>,
+    /// Show the runs on a page while they are done
+    ///
+    /// The page is on this machine.
+    #[arg(long, help_heading = "Runs")]
+    live: bool,
+    /// Find what is wrong, and do not run
+    #[arg(long, help_heading = "Runs")]
+    check: bool,
+}
+
+impl Options {
+    /// Returns the arguments for the Python package.
+    fn arguments(&self) -> Vec<OsString> {
+        let mut all = Vec::new();
+        let mut put = |name: &str, value: Option<OsString>| {
+            all.extend(value.map(|value| {
+                let mut word = OsString::from(name);
+                word.push(value);
+                word
+            }));
+        };
+        put("--out=", self.out.clone().map(Into::into));
+        put("--show=", self.show.map(|run| run.to_string().into()));
+        put("--report=", self.report.clone().map(Into::into));
+        put("--workers=", self.workers.map(|count| count.to_string().into()));
+        put("--scheduler=", self.scheduler.clone());
+        put("--live", self.live.then(OsString::new));
+        put("--check", self.check.then(OsString::new));
+        all.extend(["--".into(), self.campaign.clone().into()]);
+        all
+    }
 }
 
 /// Runs `python3 -m aso_ftc campaign` and returns its exit status.
@@ -29,17 +81,19 @@ pub(crate) fn campaign(options: &Options) -> ExitCode {
     let sentence = match found {
         Ok(status) if status.success() => {
             let mut command = Command::new(&python);
-            command.args(["-m", "aso_ftc", "campaign"]).args(&options.arguments);
+            command.args(["-m", "aso_ftc", "campaign"]).args(options.arguments());
             match replaced(command) {
                 Ok(status) => return status,
                 Err(error) => format!("cannot start {shown}: {error}"),
             }
         }
         Ok(_) => format!(
-            "{shown} has no package aso_ftc, which does campaigns: install the wheel of scripts/wheel with its \
-             extra \"campaign\", or name another interpreter in {VARIABLE}"
+            "{shown} has no package aso_ftc, which does campaigns: install it, in a clone of this project by \
+             `{shown} -m pip install './python[campaign]'`, or name another interpreter in {VARIABLE}"
         ),
-        Err(error) => format!("campaigns need Python, and {shown} cannot be started: {error}"),
+        Err(error) => format!(
+            "campaigns need Python, and {shown} cannot be started: {error}; {VARIABLE} names another interpreter"
+        ),
     };
     eprintln!("error: {sentence}");
     ExitCode::from(2)

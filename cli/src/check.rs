@@ -43,7 +43,9 @@ pub(crate) struct Options {
     /// Time limit of a call of the FMU in s
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0, allow_negative_numbers = true)]
     time_limit: f64,
-    /// Load a shared library first, its symbols visible to the FMU; may be repeated
+    /// Load a shared library first
+    ///
+    /// Its symbols are visible to the FMU. May be repeated.
     #[arg(long, value_name = "LIBRARY")]
     preload: Vec<OsString>,
 }

@@ -19,52 +19,72 @@ use progress::Bar;
 #[command(group(clap::ArgGroup::new("code").multiple(true)))]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct Options {
-    /// The plant file: plant, faults and requirements on the controller
-    /// (docs/reference/plant-file.md)
+    /// The plant file
+    ///
+    /// It states plant, faults and requirements on the controller.
     plant: PathBuf,
-    /// The design file to write; the report goes into the same folder [default: NAME-design.toml for
-    /// the plant file NAME.toml]
-    #[arg(long, value_name = "FILE")]
+    /// The design file [default: NAME-design.toml]
+    ///
+    /// NAME is that of the plant file, NAME.toml. The report goes into the same folder.
+    #[arg(long, value_name = "FILE", help_heading = "Results")]
     out: Option<PathBuf>,
-    /// The report to write [default: NAME-report.html in the folder of the design file]
-    #[arg(long, value_name = "FILE")]
+    /// The report [default: NAME-report.html]
+    ///
+    /// In the folder of the design file.
+    #[arg(long, value_name = "FILE", help_heading = "Results")]
     report: Option<PathBuf>,
     /// Also make the controller FMU
-    #[arg(long, value_name = "FMU")]
+    #[arg(long, value_name = "FMU", help_heading = "Results")]
     fmu: Option<PathBuf>,
-    /// The packed controller FMU from which it is made [default: dist/AsoController.fmu, or the one
-    /// beside the command]
-    #[arg(long, value_name = "FMU", requires = "fmu")]
+    /// The FMU from which --fmu makes it
+    ///
+    /// A packed controller FMU [default: dist/AsoController.fmu, or the one beside the command].
+    #[arg(long, value_name = "FMU", requires = "fmu", help_heading = "Results")]
     from: Option<PathBuf>,
-    /// Also write the controller of a sampled design as C99: NAME.h and NAME.c in this folder
-    #[arg(long, value_name = "FOLDER", group = "code")]
-    c_code: Option<PathBuf>,
-    /// Also write it as a Rust crate without the standard library
-    #[arg(long, value_name = "FOLDER", group = "code")]
-    no_std: Option<PathBuf>,
-    /// Single precision in the code, with a bound of the difference; the default is double precision
-    #[arg(long, requires = "code")]
-    float: bool,
-    /// Also write the worst plant within the tolerances, as a plant file
-    #[arg(long, value_name = "FILE")]
+    /// Also write the worst plant within tolerances
+    ///
+    /// As a plant file.
+    #[arg(long, value_name = "FILE", help_heading = "Results")]
     worst_case: Option<PathBuf>,
-    /// Load a shared library first, its symbols visible to the plant's FMU; may be repeated
-    #[arg(long, value_name = "LIBRARY")]
-    preload: Vec<OsString>,
-    /// Overwrite files that another design, or another program, has written
-    #[arg(long)]
+    /// Overwrite files of another design
+    ///
+    /// Or of another program.
+    #[arg(long, help_heading = "Results")]
     force: bool,
-    /// The time in s that certificates and bounds of large plants may take before the rest of them is
-    /// left out; 0 leaves all out
-    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = seconds)]
-    certificate_time: Duration,
-    /// Compare all laws that estimate faults on this plant: write one page, NAME-comparison.html or
-    /// --report, and no design
-    #[arg(long, conflicts_with_all = ["out", "fmu", "worst_case", "c_code", "no_std"])]
-    compare: bool,
     /// Print the numbers of the report as JSON
-    #[arg(long)]
+    #[arg(long, help_heading = "Results")]
     json: bool,
+    /// Also write the controller as C99
+    ///
+    /// Needs a sampled design; the files are NAME.h and NAME.c in this folder.
+    #[arg(long, value_name = "FOLDER", group = "code", help_heading = "Source code")]
+    c_code: Option<PathBuf>,
+    /// Also write it as a Rust crate without std
+    #[arg(long, value_name = "FOLDER", group = "code", help_heading = "Source code")]
+    no_std: Option<PathBuf>,
+    /// Single precision in the code
+    ///
+    /// With a bound of the difference; the default is double precision.
+    #[arg(long, requires = "code", help_heading = "Source code")]
+    float: bool,
+    /// Compare all laws that estimate faults
+    ///
+    /// Writes one page, NAME-comparison.html or --report, and no design.
+    #[arg(long, conflicts_with_all = ["out", "fmu", "worst_case", "c_code", "no_std"])]
+    #[arg(help_heading = "Computation")]
+    compare: bool,
+    /// Time for proofs in s
+    ///
+    /// The time that certificates and bounds of large plants may take before the rest of them is left out;
+    /// 0 leaves all out.
+    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = seconds)]
+    #[arg(help_heading = "Computation")]
+    certificate_time: Duration,
+    /// Load a shared library first
+    ///
+    /// Its symbols are visible to the plant's FMU. May be repeated.
+    #[arg(long, value_name = "LIBRARY", help_heading = "Computation")]
+    preload: Vec<OsString>,
 }
 
 /// Designs the controller and writes the requested files, all or none; returns whether all checks

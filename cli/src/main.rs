@@ -13,7 +13,9 @@ mod check;
 mod claims;
 mod crash;
 mod design;
+mod examples;
 mod logging;
+mod manual;
 mod models;
 mod new;
 mod outputs;
@@ -25,15 +27,17 @@ mod reproduce;
 mod run;
 mod scenario;
 mod summary;
+#[cfg(test)]
+mod tests;
 mod worker;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 
-/// Fault-tolerant control with an augmented state observer, as FMUs.
+/// Fault-tolerant control with an augmented state observer, as FMUs
 #[derive(Parser)]
-#[command(version = env!("ASO_FTC_VERSION"))]
+#[command(version = env!("ASO_FTC_VERSION"), after_long_help = examples::text(&examples::COMMAND))]
 struct Arguments {
     #[command(subcommand)]
     verb: Command,
@@ -41,24 +45,53 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Build and pack both FMUs, run the paper's experiment, compare with its claims
+    /// Repeat the paper's experiment, compare with its claims
+    ///
+    /// Builds and packs both FMUs, runs the experiment, and compares with the claims of the paper.
+    #[command(after_long_help = examples::text(&examples::REPRODUCE))]
     Reproduce(reproduce::Options),
-    /// Build crates that use the crate fmu, or the models of this workspace, and pack them into
-    /// FMUs
-    Pack(pack::Options),
-    /// Write a crate with a small model as a starting point
-    New(new::Options),
-    /// Couple FMUs: from an SSP, an SSD or a system.toml, or named on the command line
+    /// Couple FMUs and record their variables
+    ///
+    /// The FMUs come from an SSP, an SSD or a system.toml, or are named on the command line.
+    #[command(after_long_help = examples::text(&examples::RUN))]
     Run(Box<run::Options>),
-    /// Design observer and feedback for the plant of a plant file
+    /// Design a fault-tolerant controller for a plant
+    ///
+    /// Designs observer and feedback for the plant of a plant file (docs/reference/plant-file.md); writes
+    /// the design, a report, a controller FMU and source code.
+    #[command(after_long_help = examples::text(&examples::DESIGN))]
     Design(design::Options),
-    /// Do many runs of a system: sweeps, Monte Carlo, fault campaigns, sensitivity; needs the Python
-    /// package aso-ftc
+    /// Do many runs: sweeps, Monte Carlo, faults, sensitivity
+    ///
+    /// Needs Python and the package aso-ftc. In a clone of this project, this command installs it:
+    ///
+    /// python -m pip install './python[campaign]'
+    ///
+    /// The variable ASO_FTC_PYTHON names another interpreter than the one in PATH.
+    #[command(after_long_help = examples::text(&examples::CAMPAIGN))]
     Campaign(campaign::Options),
-    /// Write a page with interactive plots of a results file, and its difference to a second one
+    /// Write a page with plots of a results file
+    ///
+    /// The plots are interactive; with a second results file, the page shows the difference.
+    #[command(after_long_help = examples::text(&examples::REPORT))]
     Report(report::Options),
-    /// Check an FMU against the rules of its version of FMI, and try it
+    /// Check an FMU by the rules of its standard, and try it
+    #[command(after_long_help = examples::text(&examples::CHECK))]
     Check(check::Options),
+    /// Build crates and pack them into FMUs
+    ///
+    /// The crates use the crate fmu; without one, the models of this project are packed.
+    #[command(after_long_help = examples::text(&examples::PACK))]
+    Pack(pack::Options),
+    /// Write a crate with a small model to start from
+    #[command(after_long_help = examples::text(&examples::NEW))]
+    New(new::Options),
+    /// Print completions for a shell
+    #[command(hide = true)]
+    Completions(manual::CompletionOptions),
+    /// Write the manual pages
+    #[command(hide = true)]
+    Man(manual::ManOptions),
 }
 
 fn main() -> ExitCode {
@@ -85,6 +118,11 @@ fn perform(verb: Command) -> ExitCode {
         Command::Design(options) => design::design(&options),
         Command::Report(options) => report::report(&options).map(|()| true),
         Command::Check(options) => check::check(&options),
+        Command::Completions(options) => {
+            manual::completions(&options, Arguments::command());
+            Ok(true)
+        }
+        Command::Man(options) => manual::man(&options, Arguments::command()).map(|()| true),
     };
     match done {
         Ok(true) => ExitCode::SUCCESS,

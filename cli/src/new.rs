@@ -16,13 +16,16 @@ const TAKEN: &str = "about alloc aux clone con core default deserialize err expe
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// Name of the crate, such as heat-pump; the model is then called `HeatPump`
+    /// Name of the crate, such as heat-pump
+    ///
+    /// The model is then called `HeatPump`.
     name: String,
     /// Folder to create [default: ./NAME]
     #[arg(long, value_name = "FOLDER")]
     path: Option<PathBuf>,
-    /// The crate fmu: its folder, or the URL of a git repository [default: the one in the clone
-    /// that this program was built in or is called in]
+    /// The crate fmu: a folder or a git URL
+    ///
+    /// [default: the one in the clone that this program was built in or is called in]
     #[arg(long, value_name = "SOURCE")]
     fmu: Option<String>,
 }

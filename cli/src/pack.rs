@@ -27,8 +27,10 @@ const DRAWING: &str = "model.svg";
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// Folders of crates that end in `fmu::export!`, in or outside of this workspace [default: the
-    /// plant and the controller of this workspace]
+    /// Crates to pack [default: plant and controller]
+    ///
+    /// Folders of crates that end in `fmu::export!`, in or outside of this workspace; without one, the
+    /// plant and the controller of the clone.
     ///
     /// The FMU contains, besides the library: `resources`; `documentation`, with an index.html made
     /// from the description and `documentation/model.html` unless there is one; `model.png`, or a
@@ -37,27 +39,36 @@ pub(crate) struct Options {
     #[arg(value_name = "PATH")]
     crates: Vec<PathBuf>,
     /// Folder for the FMUs
-    #[arg(long, value_name = "FOLDER", default_value = "dist")]
+    #[arg(long, value_name = "FOLDER", default_value = "dist", help_heading = "Results")]
     out: PathBuf,
-    /// Versions of FMI: `2` writes MODEL.fmu of FMI 2.0, `3` writes MODEL.fmi3.fmu of FMI 3.0, `both`
-    /// writes both. The library is the same; on Linux the functions of the other version are
-    /// hidden in it, because some importers choose the version by the functions that they find
-    #[arg(long, value_name = "VERSION", default_value = "2")]
+    /// Versions of FMI: 2, 3 or both
+    ///
+    /// `2` writes MODEL.fmu of FMI 2.0, `3` writes MODEL.fmi3.fmu of FMI 3.0, `both` writes both. The
+    /// library is the same; on Linux the functions of the other version are hidden in it, because some
+    /// importers choose the version by the functions that they find.
+    #[arg(long, value_name = "VERSION", default_value = "2", help_heading = "Results")]
+    #[arg(hide_possible_values = true)]
     fmi: Versions,
-    /// Also write the model descriptions of FMI 2.0 and 3.0 into the folder modelDescription of the
-    /// workspace
-    #[arg(long, conflicts_with = "crates")]
-    update_descriptions: bool,
-    /// Also write InvertedPendulum.ssp: both FMUs of this workspace, connected, with a stop time of
-    /// 100 s
-    #[arg(long, conflicts_with = "crates")]
+    /// Also write InvertedPendulum.ssp
+    ///
+    /// It has both FMUs of this workspace, connected, with a stop time of 100 s.
+    #[arg(long, conflicts_with = "crates", help_heading = "Results")]
     ssp: bool,
-    /// Pack the libraries in this folder, as FOLDER/win64/MODEL.dll, instead of the one built here
-    #[arg(long, value_name = "FOLDER")]
-    binaries: Option<PathBuf>,
-    /// Also write a bill of materials for each FMU; needs a command built with the feature `sbom`
-    #[arg(long)]
+    /// Also write a bill of materials for each FMU
+    ///
+    /// Needs a command built with the feature `sbom`.
+    #[arg(long, help_heading = "Results")]
     sbom: bool,
+    /// Also write the model descriptions
+    ///
+    /// Those of FMI 2.0 and 3.0, into the folder modelDescription of the workspace.
+    #[arg(long, conflicts_with = "crates", help_heading = "Results")]
+    update_descriptions: bool,
+    /// Pack the libraries in this folder
+    ///
+    /// As FOLDER/win64/MODEL.dll, instead of the one built here.
+    #[arg(long, value_name = "FOLDER", help_heading = "Libraries")]
+    binaries: Option<PathBuf>,
 }
 
 /// The versions of FMI to pack.

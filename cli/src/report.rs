@@ -3,25 +3,32 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
+use fmu_description::number::seconds;
 use report::{Request, identity};
 
 use crate::outputs::{check_distinct, check_own};
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The results file, .csv or .parquet, of this program or another one
+    /// The results file, .csv or .parquet
+    ///
+    /// Of this program or another one.
     #[arg(value_name = "RESULTS")]
     results: PathBuf,
-    /// A second results file, which is subtracted from the first
+    /// Subtract a second results file
     #[arg(long, value_name = "RESULTS")]
     against: Option<PathBuf>,
-    /// Show these variables only, by name or pattern (`plant.*`); may be repeated
+    /// Show these variables only
+    ///
+    /// By name or pattern (`plant.*`); may be repeated.
     #[arg(long, value_name = "PATTERN", value_delimiter = ',')]
     variables: Vec<String>,
-    /// The page to write [default: the name of the results file, with .html]
+    /// The page to write [default: RESULTS, with .html]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Overwrite a page of other results, or a file of another program
+    /// Overwrite a page of other results
+    ///
+    /// Or a file of another program.
     #[arg(long)]
     force: bool,
 }
@@ -53,7 +60,7 @@ pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
                 other.display(),
                 largest.name,
                 largest.largest,
-                largest.at,
+                seconds(largest.at),
                 largest.relative
             );
         } else {

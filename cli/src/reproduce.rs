@@ -25,26 +25,41 @@ const STEP: f64 = 0.001;
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The experiment
+    ///
+    /// paper has the nonlinear plant from x(0) = [0.1, -0.1, 0, 0]; paper-literal the
+    /// linearised plant from the paper's x(0) = [1.1, -1.1, 0, 0]; printed-gains the paper's printed L with
+    /// two signs corrected, with which the nonlinear plant becomes unstable.
     #[arg(long, value_enum, default_value_t = Scenario::Paper)]
+    #[arg(hide_possible_values = true, help_heading = "System")]
     scenario: Scenario,
-    /// Folder for the results
-    #[arg(long, value_name = "FOLDER", default_value = "results/reproduce")]
-    out: PathBuf,
+    /// Set a variable before the run
+    ///
+    /// For example `plant.F_c=20`; may be repeated.
+    #[arg(long = "set", value_name = "FMU.VARIABLE=VALUE", value_parser = setting)]
+    #[arg(help_heading = "System")]
+    settings: Vec<(String, String)>,
     /// Folder for the FMUs
-    #[arg(long, value_name = "FOLDER", default_value = "dist")]
+    ///
+    /// They are packed from the clone that the current folder is in. Outside of a clone, the FMUs beside
+    /// the command are used and nothing is packed.
+    #[arg(long, value_name = "FOLDER", default_value = "dist", help_heading = "System")]
     dist: PathBuf,
     /// Stop time in s
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = 100.0)]
+    #[arg(help_heading = "Time")]
     stop_time: f64,
-    /// Interval between the rows of results.csv in s, or `step` (each communication point)
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value = "0.01")]
-    #[arg(value_parser = str::parse::<Every>)]
-    record_every: Every,
-    /// Set a variable before the run, for example `plant.F_c=20`; may be repeated
-    #[arg(long = "set", value_name = "FMU.VARIABLE=VALUE", value_parser = setting)]
-    settings: Vec<(String, String)>,
     #[command(flatten)]
     algorithm: AlgorithmOptions,
+    /// Results folder
+    #[arg(long, value_name = "FOLDER", default_value = "results/reproduce")]
+    #[arg(help_heading = "Results")]
+    out: PathBuf,
+    /// Interval between rows in s
+    ///
+    /// Or `step`, which records each communication point.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value = "0.01")]
+    #[arg(value_parser = str::parse::<Every>, help_heading = "Results")]
+    record_every: Every,
 }
 
 /// Packs the FMUs, runs the experiment, writes results and figures, and compares with the claims;
@@ -57,7 +72,8 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     let settings = settings(options);
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("cannot make the folder {}", options.out.display()))?;
-    let prepared = PreparedRun::new(experiment(options, &fmus, &settings), &AssemblyOptions::default())?;
+    let prepared =
+        PreparedRun::new(experiment(options, &fmus, &settings), &AssemblyOptions::default())?;
     let mut watch = Watch::new(&prepared.system)?;
     let mut run = prepared.start(None)?;
     let ended = advance(&mut run, |run| {

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
+use fmu_description::number;
 use fmu_import::CallLog;
 use master::{Coupling, Port, System, by_direct_dependencies};
 use results::Selection;
@@ -32,8 +33,8 @@ const LISTED: usize = 20;
 /// Couples FMUs and writes the results. Exit status: 0 the run reached its end, 1 it failed after
 /// the first step, 2 it failed before, 130 it was interrupted.
 pub(crate) fn run(options: &Options) -> ExitCode {
-    logging::start(options.verbose, options.log_json);
-    if options.report {
+    logging::start(options.watching.verbose, options.watching.log_json);
+    if options.results.report {
         logging::collect();
     }
     if let Err(error) = interrupt::listen() {
@@ -69,33 +70,33 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     let (loaded, saved) = options.load()?;
     // An FMU may change the current folder.
     let here = std::env::current_dir().context("the current folder")?;
-    let log_calls = options.log_calls.as_deref().map(open_call_log).transpose()?;
+    let log_calls = options.watching.log_calls.as_deref().map(open_call_log).transpose()?;
     let making = AssemblyOptions {
-        logging: options.verbose > 0,
+        logging: options.watching.verbose > 0,
         by_unit: options.names_fmus_by_file(),
         log_calls: log_calls.as_ref(),
         ..Default::default()
     };
     let by_name = loaded.config.connections.is_none() && loaded.config.system.is_none();
     let prepared = PreparedRun::new(loaded, &making)?;
-    if options.print_config {
+    if options.watching.print_config {
         print!("{}", prepared.config.render()?);
         return Ok(None);
     }
     let PreparedRun { config, system, plan, ports, .. } = &prepared;
     check_plot(config, system, ports)?;
-    if options.report && config.results.every == Some(Every::Never) {
+    if options.results.report && config.results.every == Some(Every::Never) {
         bail!("--report: there is nothing to report where rows are recorded `never`");
     }
     describe(options, system, plan, by_name);
     let units = units(system, ports);
-    let report = options.report.then(|| facts::facts(system, plan));
+    let report = options.results.report.then(|| facts::facts(system, plan));
     let ports = prepared.ports.clone();
     let mut run = prepared.start(saved.as_ref())?;
-    let pace = options.real_time.map(RealTime::new);
+    let pace = options.time.real_time.map(RealTime::new);
     let factor = pace.as_ref().map(|pace| pace.overruns().factor);
     let open = |start| Live::open(&mut run, &ports, factor, start, &here);
-    let live = options.live.map(open).transpose()?;
+    let live = options.watching.live.map(open).transpose()?;
     Ok(Some(Started { run, here, units, report, pace, live }))
 }
 
@@ -106,7 +107,7 @@ fn describe(options: &Options, system: &System, plan: &Plan, by_name: bool) {
     if !open.is_empty() {
         println!("{open}");
     }
-    if options.explain {
+    if options.watching.explain {
         println!("{}", plan.explanation(system));
     }
     warn_of_loop(plan, system);
@@ -188,8 +189,9 @@ fn summary(tally: RunStatistics, start: f64, time: f64) -> String {
     let steps = if steps == 1 { "1 step".to_owned() } else { format!("{steps} steps") };
     let factor = (time - start) / seconds.max(f64::MIN_POSITIVE);
     format!(
-        "t = {time} s reached in {steps} and {seconds:.3} s of wall-clock time, {factor:.3} times \
-         real time"
+        "t = {} s reached in {steps} and {seconds:.3} s of wall-clock time, {} times real time",
+        number::seconds(time),
+        number::rounded(factor, 3)
     )
 }
 
@@ -216,6 +218,7 @@ impl Started {
         }
         let tally = self.run.tally();
         let time = self.run.simulation.time();
+        let shown = number::seconds(time);
         let mut outcome = summary(tally, start, time);
         if let Some(pace) = &self.pace {
             outcome = format!("{outcome}; {}", pace.overruns());
@@ -232,27 +235,27 @@ impl Started {
             RunEnd::AtStop => 0,
             RunEnd::ByFmu(name) => {
                 let asked = self.run.simulation.ended_at().unwrap_or(time);
-                let ending = apart(asked, time);
+                let (asked, ending) = (number::seconds(asked), apart(asked, time));
                 tracing::warn!(
                     "{name} requested the end of the simulation at t = {asked} s{ending}"
                 );
                 0
             }
             RunEnd::Interrupted if self.is_stopped() => {
-                told = format!("the run was stopped in the live view at t = {time} s");
+                told = format!("the run was stopped in the live view at t = {shown} s");
                 println!("{told}");
                 0
             }
             RunEnd::Interrupted => {
                 let more = self.run.checkpoint_file().map(|path| resume_hint(path, &self.here));
                 let more = more.unwrap_or_default();
-                told = format!("the run was interrupted at t = {time} s{more}");
+                told = format!("the run was interrupted at t = {shown} s{more}");
                 tracing::error!("{told}");
                 interrupt::STATUS
             }
             RunEnd::Failed(error) => {
                 let error = error.sentence();
-                told = format!("the run ended early, after t = {time} s: {error}");
+                told = format!("the run ended early, after t = {shown} s: {error}");
                 tracing::error!("{told}");
                 1
             }
@@ -344,6 +347,7 @@ fn apart(asked: f64, end: f64) -> String {
     if asked <= end {
         return String::new();
     }
+    let [asked, end] = [asked, end].map(number::seconds);
     format!(
         "; the results end at t = {end} s, the last time that all FMUs have in common (with \
          --rollback, which needs FMUs that can go back, they end at {asked} s)"

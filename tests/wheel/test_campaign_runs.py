@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -425,6 +426,14 @@ def test_the_command_passes_campaigns_to_python(campaign, tmp_path):
     found = subprocess.run(words, capture_output=True, text=True, env=nowhere)
     assert found.returncode == 2
     assert found.stderr.startswith("error: campaigns need Python, and /nowhere/python cannot be started")
+
+
+def test_the_help_of_the_command_lists_the_options_of_the_package():
+    def options(*words):
+        text = subprocess.check_output([*words, "campaign", "--help"], text=True)
+        return set(re.findall(r"--[a-z]+", text))
+
+    assert options(str(af.command())) == options(sys.executable, "-m", "aso_ftc")
 
 
 def test_the_claims_of_the_paper_have_the_values_of_the_command(campaign, tmp_path):

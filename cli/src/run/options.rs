@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use fmu_description::number::seconds;
 use master::{AlgorithmRequest, Coupling, Extrapolation, Method, StepControl};
 use toml::Spanned;
 
@@ -19,38 +20,58 @@ const OUT: &str = "results/run";
 
 /// Options of the algorithm. Options that are not stated are chosen for the FMUs.
 #[derive(clap::Args)]
+#[command(next_help_heading = "Algorithm")]
 pub(crate) struct AlgorithmOptions {
-    /// Communication step in s; the first one if the step control varies it
+    /// Communication step in s
+    ///
+    /// It is the first one if the step control varies it.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub(crate) step: Option<f64>,
-    /// Order of stepping: gauss-seidel (one FMU after the other) or jacobi (all from the same
-    /// values)
+    /// Order of stepping: gauss-seidel or jacobi
+    ///
+    /// gauss-seidel steps one FMU after the other, each with the newest values; jacobi steps all from the
+    /// same values.
     #[arg(long, value_parser = method)]
     pub(crate) method: Option<Method>,
-    /// Extrapolation of inputs during a step: hold, limited, linear or quadratic
-    #[arg(long, value_parser = str::parse::<Extrapolation>)]
+    /// Inputs in a step: hold, limited, linear, ...
+    ///
+    /// Extrapolation of inputs during a step: hold, limited, linear or quadratic.
+    #[arg(long, value_name = "KIND", value_parser = str::parse::<Extrapolation>)]
     pub(crate) extrapolation: Option<Extrapolation>,
-    /// Iteration of a step until inputs and outputs agree: once, newton, anderson or quasi-newton
-    #[arg(long, value_parser = str::parse::<Coupling>)]
+    /// Iteration of a step: once, newton, ...
+    ///
+    /// Iteration of a step until inputs and outputs agree: once, newton, anderson or quasi-newton.
+    #[arg(long, value_name = "KIND", value_parser = str::parse::<Coupling>)]
     pub(crate) coupling: Option<Coupling>,
-    /// Choice of the step size: fixed, doubling, embedded, increment or energy
-    #[arg(long, value_parser = str::parse::<StepControl>)]
+    /// Step size: fixed, doubling, embedded, ...
+    ///
+    /// Choice of the step size: fixed, doubling, embedded, increment or energy.
+    #[arg(long, value_name = "KIND", value_parser = str::parse::<StepControl>)]
     pub(crate) step_control: Option<StepControl>,
-    /// Relative tolerance of iteration and step control in the master; --tolerance is for the
-    /// solvers inside the FMUs
-    #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
+    /// Relative tolerance of the master
+    ///
+    /// It is for iteration and step control in the master; --tolerance is for the solvers inside the
+    /// FMUs.
+    #[arg(long, value_name = "TOL", allow_negative_numbers = true)]
     pub(crate) relative_tolerance: Option<f64>,
-    /// Absolute tolerance of iteration and step control, as a fraction of nominal values
-    #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
+    /// Absolute tolerance of the master
+    ///
+    /// It is for iteration and step control, as a fraction of nominal values.
+    #[arg(long, value_name = "TOL", allow_negative_numbers = true)]
     pub(crate) absolute_tolerance: Option<f64>,
-    /// Let all FMUs repeat a step that one FMU completed only in part; all FMUs must support saved
-    /// states
+    /// Repeat a step that an FMU ended early
+    ///
+    /// All FMUs then repeat a step that one FMU completed only in part; all must support saved states.
     #[arg(long)]
     pub(crate) rollback: bool,
-    /// Let an FMU step every N communication steps only; may be repeated
+    /// Let an FMU step every N communication steps
+    ///
+    /// May be repeated.
     #[arg(long, value_name = "FMU=N", value_parser = multiple)]
     pub(crate) every: Vec<(String, u32)>,
-    /// Number of threads that step FMUs in parallel if this is faster; 0: number of processors
+    /// Number of threads; 0: number of processors
+    ///
+    /// They step FMUs in parallel if this is faster.
     #[arg(long, value_name = "N")]
     pub(crate) jobs: Option<usize>,
     /// Allow NaN and infinity on connections
@@ -59,132 +80,211 @@ pub(crate) struct AlgorithmOptions {
 }
 
 #[derive(clap::Args)]
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct Options {
-    /// An SSP archive, an SSD or OspSystemStructure.xml next to its FMUs, or a system.toml; or
-    /// FMUs, which get the names of their files
-    #[arg(value_name = "SYSTEM|FMU", conflicts_with_all = ["plant", "controller", "resume"])]
+    #[command(flatten)]
+    system: SystemOptions,
+    #[command(flatten)]
+    pub(super) time: TimeOptions,
+    #[command(flatten)]
+    algorithm: AlgorithmOptions,
+    /// Relative tolerance of the solvers in the FMUs
+    ///
+    /// It is also for the integration of model-exchange FMUs [default: from the default experiment of each
+    /// FMU]; the tolerance of the coupling is --relative-tolerance.
+    #[arg(long, value_name = "TOL", allow_negative_numbers = true, help_heading = "Algorithm")]
+    tolerance: Option<f64>,
+    #[command(flatten)]
+    pub(super) results: ResultsOptions,
+    #[command(flatten)]
+    safety: SafetyOptions,
+    #[command(flatten)]
+    pub(super) watching: WatchingOptions,
+}
+
+#[derive(clap::Args)]
+#[command(next_help_heading = "System")]
+struct SystemOptions {
+    /// A system (.ssp, .ssd, .xml or .toml), or FMUs
+    ///
+    /// An SSP archive, an SSD or OspSystemStructure.xml next to its FMUs, or a system.toml; or FMUs, which
+    /// get the names of their files.
+    #[arg(value_name = "SYSTEM|FMU", help_heading = None, conflicts_with_all = ["plant", "controller", "resume"])]
     inputs: Vec<PathBuf>,
-    /// Add an FMU, or replace one of the system; may be repeated
+    /// Add an FMU, or replace one of the system
+    ///
+    /// May be repeated.
     #[arg(long = "fmu", value_name = "NAME=FMU", value_parser = setting)]
     #[arg(conflicts_with_all = ["plant", "controller"])]
     fmus: Vec<(String, String)>,
-    /// The FMU called plant [default: dist/FrictionPendulum.fmu, or the one beside the
-    /// command]
+    /// The FMU called plant of the default system
+    ///
+    /// Without it, and without a system, it is dist/FrictionPendulum.fmu, or the one beside the command.
     #[arg(long, value_name = "FMU", conflicts_with = "resume")]
     plant: Option<PathBuf>,
-    /// The FMU called controller [default: dist/AsoController.fmu, or the one beside the
-    /// command]
+    /// The FMU called controller of that system
+    ///
+    /// Without it, and without a system, it is dist/AsoController.fmu, or the one beside the command.
     #[arg(long, value_name = "FMU", conflicts_with = "resume")]
     controller: Option<PathBuf>,
-    /// Use this interface of an FMU that offers both, co-simulation (the default) or model-exchange; may be
-    /// repeated
+    /// Use co-simulation or model-exchange
+    ///
+    /// For an FMU that offers both; the default is co-simulation. May be repeated.
     #[arg(long = "interface", value_name = "FMU=INTERFACE", value_parser = interface)]
     interfaces: Vec<(String, Interface)>,
-    /// Integrate a model-exchange FMU by this method: automatic (the default), explicit or stiff; may be
-    /// repeated
+    /// Method for a model-exchange FMU
+    ///
+    /// Integrate it by this method: automatic (the default), explicit or stiff. May be repeated.
     #[arg(long = "solver", value_name = "FMU=METHOD", value_parser = solver)]
     solvers: Vec<(String, Solver)>,
-    /// Connect an output to an input, for example `plant.y=controller.y`; may be repeated. Without
-    /// this, FMUs given here are connected where names are equal, and those given without `--fmu`
-    /// also where one free output and one free input have the same unit
+    /// Connect an output to an input
+    ///
+    /// For example `plant.y=controller.y`; may be repeated. Without this, FMUs given here are connected
+    /// where names are equal, and those given without `--fmu` also where one free output and one free input
+    /// have the same unit.
     #[arg(long = "connect", value_name = "FROM=TO", value_parser = connection)]
     connections: Vec<(String, String)>,
-    /// Set a variable before the run, for example `plant.F_c=20`; may be repeated
+    /// Set a variable before the run
+    ///
+    /// For example `plant.F_c=20`; may be repeated.
     #[arg(long = "set", value_name = "FMU.VARIABLE=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
+    /// Load a shared library before the FMUs
+    ///
+    /// Its symbols are visible to the FMUs. May be repeated.
+    #[arg(long, value_name = "LIBRARY")]
+    preload: Vec<String>,
+}
+
+#[derive(clap::Args)]
+#[command(next_help_heading = "Time")]
+pub(super) struct TimeOptions {
     /// Start time in s
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     start_time: Option<f64>,
-    /// Stop time in s [default: the stop time of the system, or the latest of the FMUs, or 1 s
-    /// after the start]
+    /// Stop time in s
+    ///
+    /// [default: the stop time of the system, or the latest of the FMUs, or 1 s after the start]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     stop_time: Option<f64>,
-    /// Relative tolerance for the solvers inside the FMUs and for the integration of model-exchange
-    /// FMUs [default: from the default experiment of
-    /// each FMU]; the tolerance of the coupling is --relative-tolerance
-    #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
-    tolerance: Option<f64>,
-    #[command(flatten)]
-    algorithm: AlgorithmOptions,
-    /// Record these variables, by name or pattern (`plant.*`), instead of all inputs, outputs and
-    /// locals; may be repeated
-    #[arg(long, value_name = "PATTERN")]
-    record: Vec<String>,
-    /// Do not record these variables; may be repeated
-    #[arg(long, value_name = "PATTERN")]
-    exclude: Vec<String>,
-    /// Interval between rows in s, or `step` (each communication point), or `never`
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
-    #[arg(value_parser = str::parse::<Every>)]
-    record_every: Option<Every>,
-    /// File for the results, .csv or .parquet [default: results.csv in the folder of --out]
-    #[arg(long, value_name = "FILE")]
-    results: Option<PathBuf>,
-    /// Format of the results: csv or parquet
-    #[arg(long, value_parser = ["csv", "parquet"])]
-    format: Option<String>,
-    /// Plot variables, by name or pattern, separated by commas; may be repeated
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
-    plot: Vec<String>,
-    /// File for the plot, .svg or .png [default: plot.svg in the folder of --out]
-    #[arg(long, value_name = "FILE")]
-    plot_file: Option<PathBuf>,
-    /// Also write a page with interactive plots, statistics, the system and all warnings: the name of the
-    /// results file, with .html
-    #[arg(long)]
-    pub(super) report: bool,
-    /// Folder for all files written [default: results/run]
-    #[arg(long, value_name = "FOLDER")]
-    out: Option<PathBuf>,
-    /// Pace the run by the clock: FACTOR seconds of simulated time take one second [default without
-    /// a value: 1]. Steps that end late are counted
+    /// Pace the run by the clock
+    ///
+    /// FACTOR seconds of simulated time take one second [default without a value: 1]. Steps that end late
+    /// are counted.
     #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1")]
     #[arg(allow_negative_numbers = true, value_parser = str::parse::<RealTimeFactor>)]
     pub(super) real_time: Option<RealTimeFactor>,
-    /// Show the run on a page on this machine, which can pause, change and stop it; --live=paused waits for
-    /// the page at the start
-    #[arg(long, value_name = "START", num_args = 0..=1, require_equals = true)]
-    #[arg(default_missing_value = "running")]
-    pub(super) live: Option<LiveStart>,
+}
+
+#[derive(clap::Args)]
+#[command(next_help_heading = "Results")]
+pub(super) struct ResultsOptions {
+    /// Folder for all files [default: results/run]
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    /// File of the results, .csv or .parquet
+    ///
+    /// [default: results.csv in the folder of --out]
+    #[arg(long, value_name = "FILE")]
+    results: Option<PathBuf>,
+    /// Format of the results: csv or parquet
+    #[arg(long, value_parser = ["csv", "parquet"], hide_possible_values = true)]
+    format: Option<String>,
+    /// Record these variables only
+    ///
+    /// By name or pattern (`plant.*`), instead of all inputs, outputs and locals; may be repeated.
+    #[arg(long, value_name = "PATTERN")]
+    record: Vec<String>,
+    /// Do not record these variables
+    ///
+    /// May be repeated.
+    #[arg(long, value_name = "PATTERN")]
+    exclude: Vec<String>,
+    /// Interval between rows in s, step or never
+    ///
+    /// `step` records each communication point.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(value_parser = str::parse::<Every>)]
+    record_every: Option<Every>,
+    /// Plot these variables
+    ///
+    /// By name or pattern, separated by commas; may be repeated.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    plot: Vec<String>,
+    /// File of the plot, .svg or .png
+    ///
+    /// [default: plot.svg in the folder of --out]
+    #[arg(long, value_name = "FILE")]
+    plot_file: Option<PathBuf>,
+    /// Also write a page with interactive plots
+    ///
+    /// It has statistics, the system and all warnings, too. Its name is that of the results file, with
+    /// .html.
+    #[arg(long)]
+    pub(super) report: bool,
+}
+
+#[derive(clap::Args)]
+#[command(next_help_heading = "Faults and safety")]
+struct SafetyOptions {
     /// Run each FMU in a separate process
     #[arg(long)]
     isolate: bool,
-    /// Time limit of a call of an FMU in s, with --isolate; without it, only a pending answer has a
-    /// limit, and a call that hangs does not end
+    /// Time limit of a call of an FMU in s
+    ///
+    /// Needs --isolate; without it, only a pending answer has a limit, and a call that hangs does not end.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time_limit: Option<f64>,
-    /// Memory limit (address space) of the process of each FMU, in bytes or as in 512MiB, 2GiB;
-    /// needs --isolate
+    /// Memory limit of an FMU, with --isolate
+    ///
+    /// Address space of the process of each FMU, in bytes or as in 512MiB, 2GiB.
     #[arg(long, value_name = "BYTES", value_parser = str::parse::<Memory>)]
     memory_limit: Option<Memory>,
-    /// Load a shared library first, its symbols visible to the FMUs; may be repeated
-    #[arg(long, value_name = "LIBRARY")]
-    preload: Vec<String>,
-    /// Save the state of the run to this file at its end, and when it is interrupted
+    /// Save the state of the run to this file
+    ///
+    /// At the end of the run, and when it is interrupted.
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
-    /// Interval between checkpoints in s of simulated time
+    /// Interval between checkpoints in s
+    ///
+    /// In s of simulated time.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     checkpoint_every: Option<f64>,
-    /// Resume a run from a checkpoint, which contains its system
+    /// Resume a run from a checkpoint
+    ///
+    /// The checkpoint contains the system.
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
-    /// Print the complete configuration as a system.toml, and do not run
-    #[arg(long)]
-    pub(super) print_config: bool,
-    /// Write every FMI call with its arguments, results and status to this file
-    #[arg(long, value_name = "FILE")]
-    pub(super) log_calls: Option<PathBuf>,
-    /// Print the algorithm and the reasons for its settings
+}
+
+#[derive(clap::Args)]
+#[command(next_help_heading = "Watching")]
+pub(super) struct WatchingOptions {
+    /// Show the run on a page that can change it
+    ///
+    /// The page is on this machine; it can pause, change and stop the run. --live=paused waits for the page
+    /// at the start.
+    #[arg(long, value_name = "START", num_args = 0..=1, require_equals = true)]
+    #[arg(default_missing_value = "running", hide_possible_values = true)]
+    pub(super) live: Option<LiveStart>,
+    /// Print the algorithm and the reasons for it
     #[arg(long)]
     pub(super) explain: bool,
-    /// Log more, including messages of FMUs; -vv: everything
-    #[arg(short, long, action = clap::ArgAction::Count)]
-    pub(crate) verbose: u8,
-    /// Write messages as JSON, one object on each line
+    /// Print the configuration, and do not run
+    ///
+    /// The complete configuration is a system.toml.
     #[arg(long)]
-    pub(crate) log_json: bool,
+    pub(super) print_config: bool,
+    /// Write every FMI call to this file
+    ///
+    /// With its arguments, results and status.
+    #[arg(long, value_name = "FILE")]
+    pub(super) log_calls: Option<PathBuf>,
+    /// Log more, including messages of FMUs; -vv: all
+    #[arg(short, long, action = clap::ArgAction::Count)]
+    pub(super) verbose: u8,
+    /// Write messages as JSON, one object on a line
+    #[arg(long)]
+    pub(super) log_json: bool,
 }
 
 /// Splits `name=value`.
@@ -266,27 +366,27 @@ impl Options {
         self.put_system(config)?;
         self.algorithm.apply(&mut config.algorithm);
         let placed = |value: Option<f64>| value.map(|value| Spanned::new(0..0, value));
-        put(&mut config.experiment.start_time, placed(self.start_time));
-        put(&mut config.experiment.stop_time, placed(self.stop_time));
+        put(&mut config.experiment.start_time, placed(self.time.start_time));
+        put(&mut config.experiment.stop_time, placed(self.time.stop_time));
         put(&mut config.experiment.tolerance, placed(self.tolerance));
-        put(&mut config.isolation.isolate, self.isolate.then_some(true));
-        put(&mut config.isolation.time_limit, placed(self.time_limit));
-        put(&mut config.isolation.memory_limit, self.memory_limit);
-        put(&mut config.checkpoint.file, self.checkpoint.clone());
-        put(&mut config.checkpoint.every, placed(self.checkpoint_every));
+        put(&mut config.isolation.isolate, self.safety.isolate.then_some(true));
+        put(&mut config.isolation.time_limit, placed(self.safety.time_limit));
+        put(&mut config.isolation.memory_limit, self.safety.memory_limit);
+        put(&mut config.checkpoint.file, self.safety.checkpoint.clone());
+        put(&mut config.checkpoint.every, placed(self.safety.checkpoint_every));
         self.put_results(config, saved.as_ref());
         check_numbers(config)?;
         Ok((loaded, saved))
     }
 
     fn base(&self) -> anyhow::Result<(LoadedConfig, Option<SavedRun>)> {
-        if let Some(path) = &self.resume {
+        if let Some(path) = &self.safety.resume {
             let saved = SavedRun::read(path)?;
             let (config, source) = (saved.config(path)?, None);
             return Ok((LoadedConfig { config, source }, Some(saved)));
         }
         let mut config = Config::default();
-        match self.inputs.as_slice() {
+        match self.system.inputs.as_slice() {
             fmus if !fmus.is_empty() && fmus.iter().all(|path| is_fmu(path)) => {
                 for path in fmus {
                     let name = free_name(path, &config);
@@ -308,14 +408,15 @@ impl Options {
             [_, _, ..] => bail!(
                 "expected one system or any number of FMUs, found {}; --fmu NAME=FMU adds \
                  an FMU to a system",
-                self.inputs
+                self.system
+                    .inputs
                     .iter()
                     .map(|path| path.display().to_string())
                     .collect::<Vec<_>>()
                     .join(", ")
             ),
-            [] if self.fmus.is_empty() => {
-                let stated = [&self.plant, &self.controller];
+            [] if self.system.fmus.is_empty() => {
+                let stated = [&self.system.plant, &self.system.controller];
                 for ((name, file), stated) in models::FMUS.into_iter().zip(stated) {
                     let path = stated.clone().map_or_else(|| models::default_fmu(file), Ok)?;
                     config.fmus.put(name.to_owned(), path);
@@ -327,17 +428,17 @@ impl Options {
     }
 
     fn put_system(&self, config: &mut Config) -> anyhow::Result<()> {
-        for (name, path) in &self.fmus {
+        for (name, path) in &self.system.fmus {
             config.fmus.put(name.clone(), path.into());
         }
-        for (name, interface) in &self.interfaces {
+        for (name, interface) in &self.system.interfaces {
             config.interface.put(name.clone(), *interface);
         }
-        for (name, solver) in &self.solvers {
+        for (name, solver) in &self.system.solvers {
             config.solver.put(name.clone(), *solver);
         }
-        for (position, (from, to)) in self.connections.iter().enumerate() {
-            let earlier = &self.connections[..position];
+        for (position, (from, to)) in self.system.connections.iter().enumerate() {
+            let earlier = &self.system.connections[..position];
             if let Some((first, _)) = earlier.iter().find(|(_, known)| known == to) {
                 bail!(
                     "{to} has two sources, {first} and {from}, expected one --connect for an input"
@@ -347,32 +448,32 @@ impl Options {
             connections.retain(|entry| entry.get_ref().to.get_ref() != to);
             connections.push(ConnectionEntry::new(from.clone(), to.clone()));
         }
-        for (name, value) in &self.settings {
+        for (name, value) in &self.system.settings {
             config.settings.push(name.clone(), value.clone());
         }
-        config.preload.extend(self.preload.iter().cloned());
+        config.preload.extend(self.system.preload.iter().cloned());
         Ok(())
     }
 
     /// Whether FMUs are given as paths only.
     pub(super) fn names_fmus_by_file(&self) -> bool {
-        self.inputs.first().is_some_and(|path| is_fmu(path))
+        self.system.inputs.first().is_some_and(|path| is_fmu(path))
     }
 
     fn put_results(&self, config: &mut Config, saved: Option<&SavedRun>) {
         let results = &mut config.results;
-        if !self.record.is_empty() {
-            results.record.clone_from(&self.record);
+        if !self.results.record.is_empty() {
+            results.record.clone_from(&self.results.record);
         }
-        if !self.exclude.is_empty() {
-            results.exclude.clone_from(&self.exclude);
+        if !self.results.exclude.is_empty() {
+            results.exclude.clone_from(&self.results.exclude);
         }
-        if !self.plot.is_empty() {
-            results.plot.clone_from(&self.plot);
+        if !self.results.plot.is_empty() {
+            results.plot.clone_from(&self.results.plot);
         }
-        put(&mut results.every, self.record_every);
-        let out = self.out.as_deref();
-        let format = self.format.as_deref();
+        put(&mut results.every, self.results.record_every);
+        let out = self.results.out.as_deref();
+        let format = self.results.format.as_deref();
         // A resumed run must not overwrite the rows before the checkpoint.
         let place = |stated: &Option<PathBuf>, known: &Option<PathBuf>, name: &str| {
             if let Some(path) = stated {
@@ -384,12 +485,12 @@ impl Options {
             };
             saved.map_or(path.clone(), |saved| resumed(&path, saved.time()))
         };
-        let mut file = place(&self.results, &results.file, "results.csv");
+        let mut file = place(&self.results.results, &results.file, "results.csv");
         if let Some(format) = format {
             file.set_extension(format);
         }
         results.file = Some(file);
-        results.plot_file = Some(place(&self.plot_file, &results.plot_file, "plot.svg"));
+        results.plot_file = Some(place(&self.results.plot_file, &results.plot_file, "plot.svg"));
     }
 }
 
@@ -400,7 +501,7 @@ fn resumed(path: &Path, time: f64) -> PathBuf {
     // The file may belong to a run that was itself resumed.
     let stem = stem.split("-from-").next().unwrap_or_default();
     let ending = path.extension().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!("{stem}-from-{time}.{ending}"))
+    path.with_file_name(format!("{stem}-from-{}.{ending}", seconds(time)))
 }
 
 /// Whether `path` is an FMU, packed or unpacked.

@@ -1,0 +1,82 @@
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use super::*;
+
+/// Columns of a terminal.
+const COLUMNS: usize = 80;
+
+/// The command and its verbs as they are on a terminal.
+fn commands() -> Vec<clap::Command> {
+    let mut command = Arguments::command().term_width(COLUMNS);
+    command.build();
+    std::iter::once(command.clone()).chain(command.get_subcommands().cloned()).collect()
+}
+
+/// The verbs of the help.
+fn verbs() -> Vec<clap::Command> {
+    commands().into_iter().skip(1).filter(|verb| !verb.is_hide_set()).collect()
+}
+
+fn is_documented(argument: &&clap::Arg) -> bool {
+    !argument.is_hide_set() && argument.get_id() != "help" && argument.get_id() != "version"
+}
+
+#[test]
+fn the_short_help_has_a_line_of_80_columns_for_each_option() {
+    for mut command in commands() {
+        let help = command.render_help().to_string();
+        for line in help.lines() {
+            assert!(line.chars().count() <= COLUMNS, "{line:?}");
+            assert!(!line.starts_with("       "), "{line:?} continues a line");
+        }
+        for argument in command.get_arguments().filter(is_documented) {
+            let help = help.clone();
+            let sentence = argument.get_help().unwrap().to_string();
+            let line = help.lines().find(|line| line.contains(&sentence));
+            let line = line.unwrap_or_else(|| panic!("{sentence:?} is not on one line of\n{help}"));
+            let name = argument.get_long().map(|name| format!("--{name}"));
+            assert!(line.contains(&name.unwrap_or_default()), "{line}");
+        }
+    }
+}
+
+#[test]
+fn the_options_of_a_run_are_in_six_groups() {
+    let run = verbs().into_iter().find(|verb| verb.get_name() == "run").unwrap();
+    let options = run.get_arguments().filter(|argument| !argument.is_positional());
+    let headings: Vec<_> = options.filter(is_documented).map(clap::Arg::get_help_heading).collect();
+    let mut groups = headings.clone();
+    groups.sort_unstable();
+    groups.dedup();
+    let expected = ["Algorithm", "Faults and safety", "Results", "System", "Time", "Watching"];
+    assert_eq!(groups, expected.map(Some));
+    let largest = expected.map(|name| headings.iter().filter(|own| **own == Some(name)).count());
+    assert!(largest.iter().all(|count| (3..=13).contains(count)), "{largest:?}");
+}
+
+#[test]
+fn each_verb_ends_its_help_with_three_examples_that_it_accepts() {
+    for verb in verbs().iter().filter(|verb| verb.get_name() != "help") {
+        let text = verb.get_after_long_help().unwrap().to_string();
+        let start = format!("  aso-ftc {} ", verb.get_name());
+        let examples: Vec<_> = text.lines().map(|line| format!("{line} ")).collect();
+        let examples = examples.iter().filter(|line| line.starts_with(&start));
+        let examples: Vec<_> = examples.collect();
+        assert_eq!(examples.len(), 3, "{text}");
+        for example in examples {
+            let words = example.split_whitespace().map(|word| word.trim_matches('\''));
+            if let Err(error) = Arguments::try_parse_from(words) {
+                panic!("{example}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_reference_lists_each_verb() {
+    let page = include_str!("../../docs/reference/command-line.md");
+    let names: Vec<_> = commands().iter().skip(1).map(|verb| verb.get_name().to_owned()).collect();
+    for name in names.iter().filter(|name| *name != "help") {
+        assert!(page.contains(&format!("| `{name}` |")), "{name}");
+    }
+}
