@@ -188,8 +188,8 @@ fn bad_files_are_refused() {
     let broken = folder.path().join("broken.fmu");
     fs::write(&broken, b"PK\x03\x04 but no archive").unwrap();
     let broken = broken.display().to_string();
-    refuses(&["run", "--plant", &broken], &["broken.fmu"]);
-    refuses(&["run", "--plant", "missing.fmu"], &["missing.fmu"]);
+    refuses(&["run", &broken], &["broken.fmu"]);
+    refuses(&["run", "missing.fmu"], &["missing.fmu"]);
     refuses(&["check", "missing.fmu"], &["missing.fmu"]);
     refuses(&["design", "missing.toml"], &["missing.toml"]);
     let plant = folder.path().join("plant.toml");
