@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
 import sys
 import textwrap
@@ -21,6 +22,8 @@ _REPORT = "report.html"
 _LONGEST = 100
 # Faults or parameters that the summary names.
 _SHOWN = 3
+# Colours of words at the start of a message, as in the command.
+_COLOURS = {"error": 31, "warning": 33}
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -61,15 +64,24 @@ def _parser() -> argparse.ArgumentParser:
 def main(words: list[str]) -> int:
     """Run the command; return its exit status."""
     chosen = _parser().parse_args(words)
-    warnings.showwarning = lambda message, *_, **__: print(f"warning: {message}", file=sys.stderr)
+    warnings.showwarning = lambda message, *_, **__: _say("warning", message)
     try:
         return _perform(chosen)
     except Error as error:
-        print(f"error: {error}", file=sys.stderr)
+        _say("error", error)
         return 2 if isinstance(error, (ConfigurationError, ImportError)) else 1
     except KeyboardInterrupt:
-        print("error: interrupted; the same command goes on where it stopped", file=sys.stderr)
+        _say("error", "interrupted; the same command goes on where it stopped")
         return 130
+
+
+def _say(word: str, text: object) -> None:
+    """Print an error or a warning; the word has a colour on a terminal."""
+    forced = os.environ.get("CLICOLOR_FORCE", "0") != "0"
+    if (forced or sys.stderr.isatty()) and not os.environ.get("NO_COLOR"):
+        print(f"\x1b[1m\x1b[{_COLOURS[word]}m{word}:\x1b[0m {text}", file=sys.stderr)
+    else:
+        print(f"{word}: {text}", file=sys.stderr)
 
 
 def _perform(chosen: argparse.Namespace) -> int:
