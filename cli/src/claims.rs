@@ -2,6 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use fmu_description::number::rounded;
 use serde::Serialize;
 
 /// The variables used by the claims, in the order of the values of [`Measurement::add`].
@@ -212,7 +213,7 @@ pub(crate) fn table(claims: &[Claim]) -> String {
             None => "not judged: the run ended before",
         };
         let measured = if claim.measured.is_finite() {
-            format!("{:.4} {}", claim.measured, claim.unit)
+            format!("{} {}", rounded(claim.measured, 4), claim.unit)
         } else {
             "-".to_owned()
         };

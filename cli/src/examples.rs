@@ -11,10 +11,7 @@ pub(crate) const REPRODUCE: [Example; 3] = [
         "aso-ftc reproduce --scenario paper-literal --out results/literal",
         "Does the same with the initial state that the paper states",
     ),
-    (
-        "aso-ftc reproduce --set plant.F_s=30 --stop-time 60",
-        "Changes the static friction of the cart",
-    ),
+    ("aso-ftc reproduce --set plant.F_s=28", "Changes the static friction of the cart"),
 ];
 
 pub(crate) const RUN: [Example; 3] = [
