@@ -33,19 +33,17 @@ pub(crate) fn folder(dist: &Path) -> anyhow::Result<PathBuf> {
     Ok(dist.to_owned())
 }
 
-/// Returns the path of an FMU that is not stated: the one in `dist`, or the one beside the command.
+/// Returns the path of an FMU that is not stated: the one in `dist`, beside the command, or in `dist` of
+/// the clone that the command was built in.
 pub(crate) fn default_fmu(name: &str) -> anyhow::Result<PathBuf> {
     let packed = Path::new(DIST).join(name);
-    if packed.is_file() {
-        return Ok(packed);
-    }
-    let Some(folder) = beside() else {
-        bail!(
-            "there is no {}: name another FMU, or write this one by `aso-ftc pack`",
-            packed.display()
-        );
-    };
-    Ok(folder.join(name))
+    let others = [beside(), built_in().map(|root| root.join(DIST))].into_iter().flatten();
+    let others = others.map(|folder| folder.join(name));
+    let mut paths = std::iter::once(packed.clone()).chain(others);
+    paths.find(|path| path.is_file()).with_context(|| {
+        let packed = packed.display();
+        format!("there is no {packed}: name another FMU, or write this one by `aso-ftc pack`")
+    })
 }
 
 /// Returns the clone of this project that the current folder is in or, failing that, the one that the
@@ -54,8 +52,7 @@ pub(crate) fn clone() -> anyhow::Result<PathBuf> {
     if let Some(root) = clone_upwards()? {
         return Ok(root);
     }
-    if let Some(root) = option_env!("ASO_FTC_CLONE").map(PathBuf::from).filter(|own| is_clone(own))
-    {
+    if let Some(root) = built_in() {
         eprintln!("packing the models of {}", root.display());
         return Ok(root);
     }
@@ -66,6 +63,11 @@ pub(crate) fn clone() -> anyhow::Result<PathBuf> {
         here.display(),
         CRATES.join(" and ")
     )
+}
+
+/// Returns the clone that the command was built in, if it is still there.
+fn built_in() -> Option<PathBuf> {
+    option_env!("ASO_FTC_CLONE").map(PathBuf::from).filter(|folder| is_clone(folder))
 }
 
 fn clone_upwards() -> anyhow::Result<Option<PathBuf>> {
