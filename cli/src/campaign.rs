@@ -32,7 +32,9 @@ pub(crate) struct Options {
     /// Number of local processes [default: all processors]
     #[arg(long, value_name = "N", help_heading = "Runs")]
     workers: Option<usize>,
-    /// Dask scheduler, such as tcp://host:8786
+    /// Address of a Dask scheduler
+    ///
+    /// For example `tcp://host:8786`.
     #[arg(long, value_name = "ADDRESS", help_heading = "Runs")]
     scheduler: Option<OsString>,
     /// Show the runs on a page while they are done

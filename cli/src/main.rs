@@ -67,7 +67,7 @@ enum Command {
     ///
     /// python -m pip install './python[campaign]'
     ///
-    /// The variable ASO_FTC_PYTHON names another interpreter than the one in PATH.
+    /// The variable `ASO_FTC_PYTHON` names another interpreter than the one in PATH.
     #[command(after_long_help = examples::text(&examples::CAMPAIGN))]
     Campaign(campaign::Options),
     /// Write a page with plots of a results file

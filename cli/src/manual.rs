@@ -80,8 +80,6 @@ fn section(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "tests")]
-
     use clap::CommandFactory as _;
 
     use crate::Arguments;

@@ -1,5 +1,3 @@
-#![expect(clippy::unwrap_used, reason = "tests")]
-
 use super::*;
 
 /// Columns of a terminal.
@@ -17,7 +15,7 @@ fn verbs() -> Vec<clap::Command> {
     commands().into_iter().skip(1).filter(|verb| !verb.is_hide_set()).collect()
 }
 
-fn is_documented(argument: &&clap::Arg) -> bool {
+fn is_documented(argument: &clap::Arg) -> bool {
     !argument.is_hide_set() && argument.get_id() != "help" && argument.get_id() != "version"
 }
 
@@ -29,7 +27,7 @@ fn the_short_help_has_a_line_of_80_columns_for_each_option() {
             assert!(line.chars().count() <= COLUMNS, "{line:?}");
             assert!(!line.starts_with("       "), "{line:?} continues a line");
         }
-        for argument in command.get_arguments().filter(is_documented) {
+        for argument in command.get_arguments().filter(|own| is_documented(own)) {
             let help = help.clone();
             let sentence = argument.get_help().unwrap().to_string();
             let line = help.lines().find(|line| line.contains(&sentence));
@@ -44,7 +42,8 @@ fn the_short_help_has_a_line_of_80_columns_for_each_option() {
 fn the_options_of_a_run_are_in_six_groups() {
     let run = verbs().into_iter().find(|verb| verb.get_name() == "run").unwrap();
     let options = run.get_arguments().filter(|argument| !argument.is_positional());
-    let headings: Vec<_> = options.filter(is_documented).map(clap::Arg::get_help_heading).collect();
+    let headings: Vec<_> =
+        options.filter(|own| is_documented(own)).map(clap::Arg::get_help_heading).collect();
     let mut groups = headings.clone();
     groups.sort_unstable();
     groups.dedup();

@@ -157,6 +157,7 @@ struct SystemOptions {
 
 #[derive(clap::Args)]
 #[command(next_help_heading = "Time")]
+#[expect(clippy::struct_field_names, reason = "the names of the options")]
 pub(super) struct TimeOptions {
     /// Start time in s
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
