@@ -1,6 +1,7 @@
 """The package: types, stubs, documentation, the command."""
 
 import doctest
+import importlib.metadata
 import inspect
 import subprocess
 import sys
@@ -70,3 +71,11 @@ def test_the_command_and_the_module_are_one_program():
 
 def test_a_type_checker_finds_the_marker():
     assert (PACKAGE / "py.typed").is_file()
+
+
+def test_the_licences_of_the_package_and_of_the_crates_in_it_are_there():
+    information = importlib.metadata.distribution("aso-ftc")
+    assert "Permission is hereby granted" in information.read_text("licenses/LICENSE-MIT")
+    assert "Apache License" in information.read_text("licenses/LICENSE-APACHE")
+    others = (PACKAGE / "THIRD-PARTY.txt").read_text(encoding="utf-8")
+    assert {"clarabel", "clap", "pyo3", "parquet"} <= {line.partition(" ")[0] for line in others.splitlines()}
