@@ -6,7 +6,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::{LazyLock, OnceLock, PoisonError};
 
-use fmu_description::number::seconds;
 use master::{Port, Simulation, Slave};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -119,7 +118,7 @@ impl Study {
         if let (None, RunEnd::AtStop | RunEnd::ByFmu(_)) = (&watch.stop, &ended) {
             watch.finish(py)?;
         }
-        let shown = seconds(time);
+        let shown = fmu_description::number::seconds(time);
         let (end, exception) = match (watch.stop.take(), ended) {
             (Some(Stop::Raised(error)), _) => return Err(error),
             (Some(Stop::TimeLimit(limit)), _) => {
