@@ -36,8 +36,7 @@ fn git(words: &[&str]) -> Option<String> {
     output.status.success().then(|| text.trim().to_owned())
 }
 
-/// Returns the folder of the clone that this crate is built in, unless paths of this machine shall not
-/// be in the command.
+/// Returns the folder of the clone that this crate is built in; `None` if paths are remapped.
 fn clone() -> Option<PathBuf> {
     let flags = std::env::var("CARGO_ENCODED_RUSTFLAGS").unwrap_or_default();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent()?;

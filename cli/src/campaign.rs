@@ -18,7 +18,7 @@ pub(crate) struct Options {
     campaign: PathBuf,
     /// Folder of the results [default: results/NAME]
     ///
-    /// A campaign that was interrupted goes on in its folder.
+    /// An interrupted campaign continues in its folder.
     #[arg(long, value_name = "FOLDER", help_heading = "Results")]
     out: Option<PathBuf>,
     /// Only print the system.toml of this run

@@ -58,8 +58,8 @@ pub(crate) fn clone() -> anyhow::Result<PathBuf> {
     }
     let here = std::env::current_dir()?;
     bail!(
-        "{} is not inside a clone of this project (a folder with {}), and there are no FMUs beside the \
-         command: change to a clone, or put the folder fmus of a release beside the command",
+        "{} is not inside a clone of this project (a folder with {}): change to a clone; `run` and \
+         `reproduce` also use the FMUs of a release in a folder fmus beside the command",
         here.display(),
         CRATES.join(" and ")
     )

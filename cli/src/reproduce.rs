@@ -41,7 +41,7 @@ pub(crate) struct Options {
     /// Folder for the FMUs
     ///
     /// They are packed from the clone that the current folder is in. Outside of a clone, the FMUs beside
-    /// the command are used and nothing is packed.
+    /// the command are used; without these, the clone in which the command was built is packed.
     #[arg(long, value_name = "FOLDER", default_value = "dist", help_heading = "System")]
     dist: PathBuf,
     /// Stop time in s

@@ -166,6 +166,14 @@ fn an_fmu_contains_the_licences_of_exactly_the_linked_crates() {
 }
 
 #[test]
+fn the_libraries_are_stripped() {
+    for model in MODELS {
+        let library = fs::read(unpacked(model).library(model).unwrap()).unwrap();
+        assert!(!library.windows(7).any(|bytes| bytes == b".symtab"), "{model} has symbols");
+    }
+}
+
+#[test]
 fn the_libraries_contain_no_path_of_the_building_machine() {
     let home = std::env::var("HOME").unwrap_or_default();
     for model in MODELS {
