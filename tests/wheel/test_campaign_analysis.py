@@ -370,4 +370,6 @@ def test_a_missing_package_names_the_extra(tmp_path):
         "try:\n    outcome.failure_probability()\nexcept MissingPackageError as error:\n    print(error)"
     )
     done = subprocess.run([sys.executable, "-I", "-c", text], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == ('campaigns need the package scipy: pip install "aso-ftc[campaign]"')
+    assert done.stdout.strip() == (
+        'campaigns need the package scipy: install it, in a clone of this project by `python -m pip install "./python[campaign]"`'
+    )

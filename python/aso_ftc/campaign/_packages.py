@@ -21,7 +21,7 @@ def package(name: str) -> Any:
     except ModuleNotFoundError as error:
         missing = (error.name or name).partition(".")[0]
         raise MissingPackageError(
-            f'campaigns need the package {missing}: pip install "aso-ftc[campaign]"',
+            f'campaigns need the package {missing}: install it, in a clone of this project by `python -m pip install "./python[campaign]"`',
             "MissingPackage",
             {"package": missing},
         ) from None
