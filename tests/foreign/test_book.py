@@ -161,10 +161,7 @@ def test_the_commands_that_are_not_run_are_counted():
     assert found == NOT_RUN
 
 
-FOLLOWED = [pytest.param(page, marks=[pytest.mark.builds] * (page == README)) for page in PAGES if commands(page)]
-
-
-@pytest.mark.parametrize("page", FOLLOWED, ids=name)
+@pytest.mark.parametrize("page", [page for page in PAGES if commands(page)], ids=name)
 def test_every_command_of_the_page_runs(reader, page):
     reader.follow(page)
 

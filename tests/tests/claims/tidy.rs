@@ -221,6 +221,15 @@ fn the_models_forbid_unsafe_code() {
 }
 
 #[test]
+fn the_python_package_has_the_licences_of_the_project() {
+    for file in ["LICENSE-APACHE", "LICENSE-MIT"] {
+        let [ours, copy] =
+            [root(), root().join("python")].map(|folder| fs::read(folder.join(file)));
+        assert_eq!(ours.unwrap(), copy.unwrap(), "{file}");
+    }
+}
+
+#[test]
 fn there_are_no_marks_of_unfinished_work() {
     let marks = ["todo!(", "unimplemented!(", "FIXME", "#[ignore"];
     for file in files(&root(), "rs").into_iter().chain(files(&root(), "py")) {
