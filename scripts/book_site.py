@@ -17,7 +17,10 @@ def on_config(config):
     """Links the repository of this clone, if it is on the web."""
     command = ["git", "-C", str(ROOT), "config", "--get", "remote.origin.url"]
     remote = subprocess.run(command, capture_output=True, text=True, check=False)
-    address = re.fullmatch(r"(https://[^@\s]+?)(\.git)?/?", remote.stdout.strip())
+    # ssh://git@HOST:PORT/PATH and git@HOST:PATH have their page at https://HOST/PATH.
+    secure = r"^(?:ssh://(?:[^@/]+@)?([^:/]+)(?::\d+)?/|[^@/:]+@([^:/]+):/?)"
+    page = re.sub(secure, r"https://\1\2/", remote.stdout.strip())
+    address = re.fullmatch(r"(https://[^@\s]+?)(\.git)?/?", page)
     config.repo_url = address[1] if address else None
     config.repo_name = "Repository"
     return config
