@@ -30,7 +30,6 @@ def test_it_compiles_for_a_cortex_m(aso_ftc, tmp_path, options):
 DEBIAN = [Path("/usr/bin/cargo"), Path("/usr/bin/rustc"), Path("/usr/lib/rustlib/src/rust")]
 
 
-@pytest.mark.builds
 @pytest.mark.skipif(
     not all(path.exists() for path in DEBIAN) or not shutil.which("arm-none-eabi-nm"),
     reason="no Rust compiler with the sources of core: rustc-web, cargo-web, rust-web-src, gcc-arm-none-eabi",

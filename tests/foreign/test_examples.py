@@ -275,7 +275,6 @@ def test_the_table_agrees_with_numpy_between_at_and_outside_of_its_rows(examples
                 assert found == pytest.approx(expected, rel=1e-14)
 
 
-@pytest.mark.builds
 def test_a_new_crate_is_tested_packed_and_simulated_outside_of_the_workspace(
     aso_ftc, root, tmp_path
 ):
