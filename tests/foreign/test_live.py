@@ -340,7 +340,7 @@ def test_a_resumed_run_with_interventions_is_repeated_bit_for_bit_from_its_start
         run.do("scenario", FAULTS[0])
         run.do("continue")
         out = run.end()
-    file = tmp_path / f"live-from-{facts['start']}.toml"
+    file = tmp_path / f"live-from-{facts['start']:.12g}.toml"
     assert re.search(rf"to repeat it: \S+ run \S+/{re.escape(file.name)}\n", out)
     assert (tmp_path / "live.toml").read_bytes() == first
     done = aso_ftc("run", file)

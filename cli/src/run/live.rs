@@ -68,8 +68,8 @@ impl Live {
         let first =
             "A run with --live, with its interventions. `aso-ftc run` with this file repeats it";
         let (file, first) = if resumed {
-            let name = format!("live-from-{begin}.toml");
             let begin = seconds(begin);
+            let name = format!("live-from-{begin}.toml");
             (name, format!("{first} from its start, not from the checkpoint at t = {begin} s."))
         } else {
             ("live.toml".to_owned(), format!("{first}."))
