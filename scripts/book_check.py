@@ -46,22 +46,22 @@ def foreign_requests(site):
     """The requests of the built book's pages and style sheets to other hosts."""
     for file in sorted(site.rglob("*")):
         if file.suffix in (".html", ".css"):
-            for found in FETCHED.findall(file.read_text(encoding="utf-8")):
-                yield f"{file.relative_to(site)}: fetches {found}"
+            for address in FETCHED.findall(file.read_text(encoding="utf-8")):
+                yield f"{file.relative_to(site)}: fetches {address}"
 
 
 def main():
     """Prints all findings."""
-    found, paths = [], [Path(argument) for argument in sys.argv[1:]]
+    problems, paths = [], [Path(argument) for argument in sys.argv[1:]]
     if not paths:
         sys.exit(__doc__)
     if paths[0].is_dir():
-        found += foreign_requests(paths[0])
+        problems += foreign_requests(paths[0])
         paths = sorted(ROOT.glob("*.md"))
-    found += [line for page in paths for line in broken_links(page)]
-    for line in found:
+    problems += [line for page in paths for line in broken_links(page)]
+    for line in problems:
         print(line, file=sys.stderr)
-    sys.exit(1 if found else 0)
+    sys.exit(1 if problems else 0)
 
 
 if __name__ == "__main__":

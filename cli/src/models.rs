@@ -83,8 +83,8 @@ fn is_clone(folder: &Path) -> bool {
 fn beside() -> Option<PathBuf> {
     let command = std::env::current_exe().ok()?;
     let command = command.canonicalize().ok()?;
-    let own = command.parent()?;
-    let folders = BESIDE.map(|folder| own.join(folder));
+    let parent = command.parent()?;
+    let folders = BESIDE.map(|folder| parent.join(folder));
     let has_fmus = |folder: &PathBuf| FMUS.iter().all(|(_, name)| folder.join(name).is_file());
     folders.into_iter().find(has_fmus)
 }

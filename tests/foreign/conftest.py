@@ -24,6 +24,11 @@ EXAMPLES = {
 }
 
 
+def pytest_collection_modifyitems(items):
+    """The file that takes longest is first, so that no process works on it alone at the end."""
+    items.sort(key=lambda item: item.path.name != "test_book.py")
+
+
 @pytest.fixture(scope="session")
 def root():
     """Folder of the workspace."""

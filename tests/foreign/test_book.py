@@ -49,8 +49,7 @@ def blocks(page):
 
 def commands(page):
     """The blocks of a page that run: the comment before each, and its text."""
-    found = blocks(page)
-    return [(remark, text) for remark, language, text in found if language == "sh" and not remark.startswith("not run")]
+    return [(remark, text) for remark, language, text in blocks(page) if language == "sh" and not remark.startswith("not run")]
 
 
 def name(page):
@@ -79,10 +78,10 @@ class Reader:
         venv.create(home / "python", with_pip=True)
         ours = str(Path(sys.prefix) / "bin")
         path = [part for part in os.environ["PATH"].split(os.pathsep) if part != ours]
-        kept = {"PATH": os.pathsep.join([str(home / "python" / "bin"), *path])}
-        kept["CARGO_INSTALL_ROOT"] = str(home / "installed")
+        changes = {"PATH": os.pathsep.join([str(home / "python" / "bin"), *path])}
+        changes["CARGO_INSTALL_ROOT"] = str(home / "installed")
         dropped = {"VIRTUAL_ENV", "PYTHONPATH", "PYTHONHOME", "BUILT_PROGRAMS", "CARGO_TARGET_DIR"}
-        self.environment = {key: value for key, value in os.environ.items() if key not in dropped} | kept
+        self.environment = {key: value for key, value in os.environ.items() if key not in dropped} | changes
         self.run = cache(self.run)
 
     def start(self, text):
@@ -113,9 +112,9 @@ class Reader:
         try:
             for line in shell.stdout:
                 printed += line
-                if found := ADDRESS.search(line):
-                    with urllib.request.urlopen(found[0], timeout=60) as page:
-                        assert page.status == 200 and b"<html" in page.read().lower(), found[0]
+                if address := ADDRESS.search(line):
+                    with urllib.request.urlopen(address[0], timeout=60) as page:
+                        assert page.status == 200 and b"<html" in page.read().lower(), address[0]
                     return
         finally:
             os.killpg(shell.pid, signal.SIGINT)
@@ -145,9 +144,9 @@ def reader(tmp_path_factory):
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_every_block_is_marked_by_its_language(page):
     text = page.read_text(encoding="utf-8")
-    found = blocks(page)
-    assert text.count("```") == 2 * len(found), "a block that is not closed, or inside of a list"
-    for remark, language, content in found:
+    marked = blocks(page)
+    assert text.count("```") == 2 * len(marked), "a block that is not closed, or inside of a list"
+    for remark, language, content in marked:
         assert language.split(",")[0] in LANGUAGES, content
         assert not remark or language != "sh" or REMARK.fullmatch(remark), remark
     outside = BLOCK.sub("", text)
@@ -156,9 +155,9 @@ def test_every_block_is_marked_by_its_language(page):
 
 def test_the_commands_that_are_not_run_are_counted():
     remarks = [remark.removeprefix("not run: ") for page in PAGES for remark, language, _ in blocks(page) if language == "sh"]
-    found = Counter(next((r for r in NOT_RUN if re.fullmatch(r, remark)), None) for remark in remarks)
-    del found[None]
-    assert found == NOT_RUN
+    counts = Counter(next((r for r in NOT_RUN if re.fullmatch(r, remark)), None) for remark in remarks)
+    del counts[None]
+    assert counts == NOT_RUN
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if commands(page)], ids=name)

@@ -46,13 +46,13 @@ def test_no_page_scrolls_sideways_or_lacks_a_picture_and_axe_finds_nothing_serio
     for path in PAGES:
         page.open(path.as_uri())
         width = page.evaluate("document.documentElement.scrollWidth")
-        found = [f"{width} pixels wide"] if width > WIDTH else []
-        found += page.evaluate("[...document.images].filter((image) => !image.naturalWidth).map((image) => image.src)")
+        problems = [f"{width} pixels wide"] if width > WIDTH else []
+        problems += page.evaluate("[...document.images].filter((image) => !image.naturalWidth).map((image) => image.src)")
         # What surrounds the article is the same on all pages.
         place = "document" if path == PAGES[0] else "'.md-content'"
-        found += page.serious(place, rules={"color-contrast": {"enabled": False}})
+        problems += page.serious(place, rules={"color-contrast": {"enabled": False}})
         for scheme in ("default", "slate"):
             page.evaluate(SCHEME % scheme)
-            found += [f"{scheme}: {rule}" for rule in page.serious(KINDS, runOnly=["color-contrast"])]
-        wrong += [f"{path.relative_to(BOOK)}: {one}" for one in found]
+            problems += [f"{scheme}: {rule}" for rule in page.serious(KINDS, runOnly=["color-contrast"])]
+        wrong += [f"{path.relative_to(BOOK)}: {one}" for one in problems]
     assert not wrong, "\n".join(wrong)

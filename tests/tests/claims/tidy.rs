@@ -268,8 +268,8 @@ fn one_build_serves_the_command_the_python_package_and_the_tests() {
     let tests = ["--edges", "normal,build,dev", "--workspace", "--exclude", "importers"];
     for selection in [&python[..], &tests] {
         let others = features(selection);
-        for (package, own) in &alone {
-            assert_eq!(own, &others[package], "{package}: see the end of cli/Cargo.toml");
+        for (package, features) in &alone {
+            assert_eq!(features, &others[package], "{package}: see the end of cli/Cargo.toml");
         }
     }
 }
