@@ -86,7 +86,10 @@ def build():
         sys.exit("aso-ftc: the wheel is not built: cargo is not in PATH; install Rust 1.90 or later: https://rustup.rs")
     folder = Path(os.environ.get("BUILT_PROGRAMS") or ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release")
     if "BUILT_PROGRAMS" not in os.environ:
-        run("cargo", "build", "--release", "--locked", "--package", "aso-ftc", "--package", "aso-ftc-python")
+        # PyO3 is compiled again if the interpreter or PATH changes, and pip changes PATH each time.
+        python = {"PYO3_PYTHON": getattr(sys, "_base_executable", sys.executable)}
+        words = ["cargo", "build", "--release", "--locked", "--package", "aso-ftc", "--package", "aso-ftc-python"]
+        run(*words, env={**python, **os.environ})
     command, library, _ = NAMES[sys.platform]
     run(folder / command, "pack", "--out", WORK / "fmus", stdout=subprocess.DEVNULL)
     if sys.platform == "linux":
