@@ -7,11 +7,53 @@ const TIME: usize = 12;
 /// if it is below 1e-4, or has more digits before the decimal point than both `digits` and 6.
 #[must_use]
 pub fn rounded(value: f64, digits: usize) -> String {
-    let decimals = digits.saturating_sub(1);
-    let rounded: f64 = format!("{value:.decimals$e}").parse().unwrap_or(value);
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    // By integers: formatting with a precision, and parsing, need tables that are large in WebAssembly.
+    let (mut mantissa, exponent) = scaled(value.abs(), digits);
+    while mantissa > 9 && mantissa.is_multiple_of(10) {
+        mantissa /= 10;
+    }
+    let text = mantissa.to_string();
+    let sign = if value < 0.0 { "-" } else { "" };
     let longest = i32::try_from(digits.max(6)).unwrap_or(i32::MAX);
-    let is_plain = rounded == 0.0 || (1e-4..10f64.powi(longest)).contains(&rounded.abs());
-    if is_plain || !rounded.is_finite() { format!("{rounded}") } else { format!("{rounded:e}") }
+    if !(-4..longest).contains(&exponent) {
+        let (first, rest) = text.split_at(1);
+        let point = if rest.is_empty() { "" } else { "." };
+        return format!("{sign}{first}{point}{rest}e{exponent}");
+    }
+    if exponent < 0 {
+        let zeros = usize::try_from(-exponent - 1).unwrap_or(0);
+        return format!("{sign}0.{}{text}", "0".repeat(zeros));
+    }
+    let whole = usize::try_from(exponent).unwrap_or(0) + 1;
+    if text.len() <= whole {
+        return format!("{sign}{text:0<whole$}");
+    }
+    let (whole, rest) = text.split_at(whole);
+    format!("{sign}{whole}.{rest}")
+}
+
+/// Returns `digits` significant digits of a positive number as an integer, and its decimal exponent.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 17 digits")]
+fn scaled(value: f64, digits: usize) -> (u64, i32) {
+    let digits = i32::try_from(digits.clamp(1, 17)).unwrap_or(17);
+    let largest = 10f64.powi(digits);
+    let mut exponent = value.log10().floor() as i32;
+    loop {
+        let shift = digits - 1 - exponent;
+        // In two factors, of which none overflows.
+        let first = shift.clamp(-300, 300);
+        let mantissa = (value * 10f64.powi(first) * 10f64.powi(shift - first)).round();
+        if mantissa >= largest {
+            exponent += 1;
+        } else if mantissa < largest / 10.0 {
+            exponent -= 1;
+        } else {
+            return (mantissa as u64, exponent);
+        }
+    }
 }
 
 /// Returns a time in s, or the length of a step, without the rounding errors of its computation:
@@ -34,6 +76,12 @@ mod tests {
             (123_456.0, 3, "123000"),
             (-0.000_012_345, 3, "-1.23e-5"),
             (0.0, 3, "0"),
+            (0.999_96, 3, "1"),
+            (999_960.0, 3, "1e6"),
+            (5e-324, 3, "4.94e-324"),
+            (f64::MAX, 3, "1.8e308"),
+            (1e-15, 12, "1e-15"),
+            (1.0 / 3.0, 12, "0.333333333333"),
             (f64::INFINITY, 3, "inf"),
             (f64::NAN, 3, "NaN"),
         ];
