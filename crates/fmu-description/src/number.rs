@@ -3,7 +3,7 @@
 /// Significant digits of a time. The rounding errors of a sum of steps are behind them.
 const TIME: usize = 12;
 
-/// Returns `value`, rounded to `digits` significant digits, without trailing zeros; with an exponent
+/// Returns `value`, rounded to `digits` significant digits (1 to 15), without trailing zeros; with an exponent
 /// if it is below 1e-4, or has more digits before the decimal point than both `digits` and 6.
 #[must_use]
 pub fn rounded(value: f64, digits: usize) -> String {
@@ -36,9 +36,9 @@ pub fn rounded(value: f64, digits: usize) -> String {
 }
 
 /// Returns `digits` significant digits of a positive number as an integer, and its decimal exponent.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 17 digits")]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 15 digits")]
 fn scaled(value: f64, digits: usize) -> (u64, i32) {
-    let digits = i32::try_from(digits.clamp(1, 17)).unwrap_or(17);
+    let digits = i32::try_from(digits.clamp(1, 15)).unwrap_or(15);
     let largest = 10f64.powi(digits);
     let mut exponent = value.log10().floor() as i32;
     loop {
@@ -87,6 +87,21 @@ mod tests {
         ];
         for (value, digits, text) in cases {
             assert_eq!(rounded(value, digits), text);
+        }
+    }
+
+    #[test]
+    fn rounding_is_as_near_as_that_of_the_standard_library() {
+        for k in 1..4000_i32 {
+            let value = f64::from(k).sqrt() * 10f64.powi(k % 601 - 300);
+            for digits in [1, 3, 6, 12] {
+                let decimals = digits - 1;
+                let expected: f64 = format!("{value:.decimals$e}").parse().unwrap();
+                let result: f64 = rounded(value, digits).parse().unwrap();
+                // They differ only for values in the middle between two numbers of so many digits.
+                let (error, least) = ((result - value).abs(), (expected - value).abs());
+                assert!(error <= 1.001 * least, "{value:e} {digits}: {result:e}, {expected:e}");
+            }
         }
     }
 
