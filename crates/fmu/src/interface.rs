@@ -52,7 +52,7 @@ pub(crate) struct Interface<M> {
     pub(crate) guid: Guid,
     /// The structural parameters that are the extents of arrays.
     sizes: sizes::Sizes,
-    clocks: clocks::Clocks,
+    pub(crate) clocks: clocks::Clocks,
 }
 
 /// Type and value reference of a variable.

@@ -189,7 +189,9 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     /// change at events only. Called at least once before the first continuous-time mode.
     ///
     /// It may be called when nothing has happened, and several times at one time: importers do so, and the
-    /// default [`Model::step`]. So it decides from the values of the fields what to change.
+    /// default [`Model::step`]. So it decides from the values of the fields what to change. If there are clocked
+    /// variables ([`Variable::clocked_by`]), values that are read while a clock ticks are those that this function
+    /// gives to a copy of the model.
     ///
     /// # Errors
     ///

@@ -225,6 +225,20 @@ impl<M: Model> Instance<M> {
         self.located_in_arrays(kind, references, count, body)
     }
 
+    /// [`Instance::located`] for a function that reads.
+    pub(crate) fn read_located(
+        &mut self,
+        kind: Type,
+        references: &[u32],
+        count: usize,
+        read: impl FnOnce(&mut Self, &[u32]) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        if self.core.state == State::EventMode && self.interface.clocks.any() && self.ticks() {
+            return self.at_tick(|own| own.located(kind, references, count, read));
+        }
+        self.located(kind, references, count, read)
+    }
+
     /// [`Instance::located`] of arrays or of many variables.
     #[inline(never)]
     fn located_in_arrays(

@@ -5,12 +5,17 @@ use crate::variable::Declaration;
 use fmu_description::{Kind, ModelDescription};
 
 /// The clocked variables of a model, by name, with the names of their clocks.
-pub(super) struct Clocks(Vec<(String, Vec<String>)>);
+pub(crate) struct Clocks(Vec<(String, Vec<String>)>);
 
 impl Clocks {
     pub(super) fn of(variables: &[Declaration]) -> Self {
         let clocked = variables.iter().filter(|own| !own.clocks.is_empty());
         Self(clocked.map(|own| (own.name.clone(), own.clocks.clone())).collect())
+    }
+
+    /// Whether a variable is clocked.
+    pub(crate) fn any(&self) -> bool {
+        !self.0.is_empty()
     }
 
     /// Sets `clocks` of the variables of a description of FMI 3.0.

@@ -1,7 +1,7 @@
 //! `fmi3GetXXX` and `fmi3SetXXX`.
 //!
 //! The number of values is compared with the sizes of the variables before any value is touched (section
-//! 2.2.7.1).
+//! 2.2.7.1). In an instant at which a clock ticks, values are read as the event leaves them.
 
 use super::super::{borrow_output, read, texts};
 use super::entry_points_3;
@@ -19,7 +19,7 @@ macro_rules! values {
         entry_points_3! {
             $($get = $getter(
                 vr: *const fmi3ValueReference, n: usize, values: *mut $c, n_values: usize
-            ), instance => instance.located(Type::$type, read(vr, n)?, n_values, |instance, places| {
+            ), instance => instance.read_located(Type::$type, read(vr, n)?, n_values, |instance, places| {
                 instance.$read(places, borrow_output(values, n_values)?)
             });
             $set = $setter(
@@ -52,7 +52,7 @@ values! {
 entry_points_3! {
     get_string = GetString(
         vr: *const fmi3ValueReference, n: usize, values: *mut fmi3String, n_values: usize
-    ), instance => instance.located(Type::String, read(vr, n)?, n_values, |instance, places| {
+    ), instance => instance.read_located(Type::String, read(vr, n)?, n_values, |instance, places| {
         instance.get_string(places, borrow_output(values, n_values)?)
     });
     set_string = SetString(
@@ -63,7 +63,7 @@ entry_points_3! {
     get_binary = GetBinary(
         vr: *const fmi3ValueReference, n: usize, sizes: *mut usize, values: *mut fmi3Binary,
         n_values: usize
-    ), instance => instance.located(Type::Binary, read(vr, n)?, n_values, |instance, places| {
+    ), instance => instance.read_located(Type::Binary, read(vr, n)?, n_values, |instance, places| {
         let (sizes, values) = (borrow_output(sizes, n_values)?, borrow_output(values, n_values)?);
         instance.get_binary(places, |position, value| {
             sizes[position].write(value.len());

@@ -23,6 +23,28 @@ impl<M: Model> Instance<M> {
         }
     }
 
+    /// Whether a clock ticks.
+    pub(super) fn ticks(&mut self) -> bool {
+        let clocks = bool::slots(&self.interface.typed);
+        clocks.iter().any(|clock| *(clock.field)(&mut self.core.model))
+    }
+
+    /// Runs `read` on the values that this event leaves, found on a copy of the model: a clocked variable has its
+    /// new value while its clock ticks, and `fmi3UpdateDiscreteStates` keeps it (section 2.2.8.3).
+    #[inline(never)]
+    pub(super) fn at_tick(
+        &mut self,
+        read: impl FnOnce(&mut Self) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        self.core.check()?;
+        let (model, stale) = (self.core.model.clone(), self.core.stale);
+        let handled = self.core.model.event(self.core.time);
+        self.core.stale = true;
+        let done = handled.and_then(|_| read(self));
+        (self.core.model, self.core.stale) = (model, stale);
+        done
+    }
+
     /// `fmi3GetClock`.
     pub(crate) fn get_clock(&mut self, places: &[u32], to: &mut [MaybeUninit<fmi3Clock>]) {
         let clocks = bool::slots(&self.interface.typed);
