@@ -29,3 +29,12 @@ pub fn among<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a st
     similar.truncate(5);
     similar
 }
+
+/// Returns the one of `names` that `name` is but for the case of its letters or, if it has more than three, for
+/// one letter.
+#[must_use]
+pub fn slip<'a>(mut names: impl Iterator<Item = &'a str>, name: &str) -> Option<&'a str> {
+    let wanted = name.to_ascii_lowercase();
+    let edits = usize::from(wanted.len() > 3);
+    names.find(|known| levenshtein(&known.to_ascii_lowercase(), &wanted) <= edits)
+}

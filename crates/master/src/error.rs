@@ -111,6 +111,16 @@ pub enum SystemError {
         /// The type.
         expected: String,
     },
+    /// The standard allows nobody to set the variable.
+    #[error("{name} = {value:?}: the variable is {what}, so it cannot be set")]
+    NotSettable {
+        /// The variable.
+        name: String,
+        /// The text.
+        value: String,
+        /// What it is.
+        what: &'static str,
+    },
     /// An FMU refused a setting.
     #[error("{name} = {value:?}: {source}")]
     Setting {
@@ -134,6 +144,19 @@ pub enum SystemError {
         /// The value in the FMU.
         found: String,
     },
+    /// An FMU refuses to read a variable of the results and cannot be used any more.
+    #[error(
+        "{name} at t = {} s: {source}. An FMU must not be used after an error: exclude {name} from the results",
+        seconds(*time)
+    )]
+    Unreadable {
+        /// The variable.
+        name: String,
+        /// Time of the master in s.
+        time: f64,
+        /// Function, status and messages.
+        source: CallError,
+    },
     /// An FMI call failed.
     #[error("{slave} at t = {} s: {source}", seconds(*time))]
     Call {
@@ -143,6 +166,19 @@ pub enum SystemError {
         time: f64,
         /// Function, status and messages.
         source: CallError,
+    },
+    /// The iteration of an instant does not end.
+    #[error(
+        "the events at t = {} s do not settle within {iterations} iterations: {names} still change",
+        seconds(*time)
+    )]
+    Unsettled {
+        /// Time in s.
+        time: f64,
+        /// Number of iterations.
+        iterations: usize,
+        /// What changes.
+        names: String,
     },
     /// An output, or the value of a connection, is NaN or infinite.
     #[error("{name} is {value} at t = {} s, expected a finite number", seconds(*time))]

@@ -38,7 +38,7 @@ pub(crate) fn initialise(
     for (name, slave) in &mut system.slaves {
         slave.enter_initialization_mode().map_err(|source| call(name, start, source))?;
     }
-    system.repeat_settings();
+    system.repeat_settings(start)?;
     scenario.drives.write(system, start)?;
     solve_connections(system, scenario, start)?;
     for (name, slave) in &mut system.slaves {
@@ -48,9 +48,8 @@ pub(crate) fn initialise(
     let driven = scenario.drives.iter().map(Drive::port);
     let replaced: HashSet<Port> =
         connections.map(|connection| connection.to).chain(driven).collect();
-    system.confirm_settings(&replaced)?;
-    system.confirm_start_values(&replaced);
-    Ok(())
+    system.confirm_settings(&replaced, start)?;
+    system.confirm_start_values(&replaced, start)
 }
 
 /// Returns the experiment for one FMU: with the tolerance of its own `DefaultExperiment` if the
@@ -99,6 +98,10 @@ impl<'a> Graph<'a> {
         let mut connections: Vec<Vec<usize>> = Vec::new();
         let mut inputs: Vec<Vec<(usize, usize)>> = vec![Vec::new(); system.slaves.len()];
         for (number, connection) in system.connections.iter().chain(&system.initial).enumerate() {
+            if matches!(system.variable(connection.to).kind, Kind::Clock(_)) {
+                // Clocks tick in event mode.
+                continue;
+            }
             let node = *nodes.entry(connection.from).or_insert_with(|| {
                 outputs.push(connection.from);
                 connections.push(Vec::new());

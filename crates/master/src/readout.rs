@@ -134,13 +134,13 @@ impl Readout {
         Ok(())
     }
 
-    /// Returns the variables among `ports` that their FMUs refuse to read now, each with the error.
+    /// Returns the variables among `ports` that their FMUs discard to read now, each with the error.
     /// `ports` are the ports of this readout. Reads single variables only in groups whose common
-    /// read fails. `time` in s appears in the error message.
+    /// read fails, after an error to name the variable. `time` in s appears in the error message.
     ///
     /// # Errors
     ///
-    /// Returns an error if an FMU ends its process or returns `fmi2Fatal`.
+    /// Returns an error if an FMU cannot be used any more.
     pub fn unreadable(
         &mut self,
         system: &mut System,
@@ -151,21 +151,29 @@ impl Readout {
         for position in 0..self.reads.len() {
             let slave = self.reads[position].slave;
             let (name, instance) = &mut system.slaves[slave];
-            match self.read_one(position, instance.as_mut()) {
+            let whole = match self.read_one(position, instance.as_mut()) {
                 Ok(()) => continue,
                 Err(source) if !source.leaves_the_instance_usable() => {
                     return Err(call(name, time, source));
                 }
-                Err(_) => {}
-            }
+                Err(source) => source,
+            };
             let kind = self.reads[position].kind;
             let members = ports.iter().filter(|port| {
                 port.slave == slave && ValueType::of(&system.variable(**port).kind) == kind
             });
             for &port in members.collect::<Vec<_>>() {
-                if let Err(error) = system.get_value(port) {
-                    refused.push((port, error));
+                match system.get_value(port) {
+                    Err(source) if source.ends_the_instance() => {
+                        let name = system.name(port);
+                        return Err(SystemError::Unreadable { name, time, source });
+                    }
+                    Err(error) => refused.push((port, error)),
+                    Ok(_) => {}
                 }
+            }
+            if whole.ends_the_instance() {
+                return Err(call(&system.slaves[slave].0, time, whole));
             }
         }
         Ok(refused)

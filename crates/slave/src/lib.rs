@@ -431,6 +431,14 @@ pub enum Failure {
     InvalidAnswer(String),
 }
 
+
+    /// Whether the instance must not go on: after `fmi2Error` a simulation can only be restored, reset or freed
+    /// (FMI 2.0.5, section 2.1.3; FMI 3.0.2, section 2.2.3). A function that is optional may return `fmi2Error`
+    /// for want of it, which [`CallError::leaves_the_instance_usable`] allows.
+    #[must_use]
+    pub fn ends_the_instance(&self) -> bool {
+        !self.leaves_the_instance_usable() || self.failure == Failure::Status(Status::Error)
+    }
 impl fmt::Display for Failure {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

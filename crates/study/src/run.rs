@@ -8,6 +8,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use fmu_description::Version;
+use fmu_description::similar::slip;
+use master::drive::Drive;
 use master::{Port, Scenario, Simulation, Slave, SlowState, System, SystemError};
 use results::{Column, ResultsError, Sink};
 use ssp::Opened;
@@ -153,11 +155,25 @@ fn scenario(loaded: &LoadedConfig, system: &System, plan: &Plan) -> Result<Scena
         let place = error.place.clone();
         loaded.point(&place, Error::Scenario(error))
     })?;
+    let driven: Vec<Port> = prepared.scenario.drives.iter().map(Drive::port).collect();
+    let free = system.free_inputs().into_iter().filter(|port| !driven.contains(port));
+    let free: Vec<String> = free.map(|port| system.name(port)).collect();
     for (file, column) in &prepared.unused {
-        tracing::info!(
-            "{}: the column {column:?} has no free input and is not used",
-            file.display()
-        );
+        let file = file.display();
+        let variable = |name: &str| name.split_once('.').map_or("", |(_, own)| own).to_owned();
+        let meant = free.iter().find(|name| {
+            let names = [name.as_str(), &variable(name)];
+            slip(names.into_iter(), column).is_some()
+        });
+        match meant {
+            Some(input) => tracing::warn!(
+                "{file}: the column {column:?} names no input and is not used; {input}, of a similar name, has no \
+                 column and keeps its start value"
+            ),
+            None => {
+                tracing::info!("{file}: the column {column:?} has no free input and is not used");
+            }
+        }
     }
     Ok(prepared.scenario)
 }

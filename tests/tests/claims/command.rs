@@ -162,7 +162,7 @@ fn bad_settings_are_refused_by_name_value_and_rule() {
     run_refuses(&["--set", "plant.M=-1"], &["M = -1", "> 0"]);
     run_refuses(&["--set", "plant.F_s=20"], &["F_s = 20"]);
     run_refuses(&["--set", "plant.linearised=maybe"], &["maybe", "true or false"]);
-    run_refuses(&["--set", "plant.x_p=1"], &["x_p", "must not be set"]);
+    run_refuses(&["--set", "plant.x_p=1"], &["x_p", "calculated by the FMU"]);
     run_refuses(&["--set", "plant.F_c"], &["NAME=VALUE"]);
 }
 

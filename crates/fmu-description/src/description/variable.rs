@@ -67,6 +67,23 @@ impl ScalarVariable {
             _ => Some(Initial::Calculated),
         })
     }
+
+    /// Says what a variable is that the standard allows nobody to set (FMI 2.0.5, table 4.2.4; FMI 3.0.2,
+    /// section 2.4.7.5). One with a start value may be set before the initialization.
+    #[must_use]
+    pub fn never_set(&self) -> Option<&'static str> {
+        match self.causality {
+            Causality::Independent => Some("the independent variable"),
+            Causality::CalculatedParameter => Some("a calculated parameter"),
+            _ if self.variability == Variability::Constant => Some("a constant"),
+            Causality::Output | Causality::Local
+                if self.initial == Some(Initial::Calculated) && !self.kind.has_start() =>
+            {
+                Some("calculated by the FMU (initial = calculated)")
+            }
+            _ => None,
+        }
+    }
 }
 
 impl Default for Kind {

@@ -3,11 +3,12 @@
 
 use std::collections::HashSet;
 
-use fmu_description::{Causality, Initial, Variability};
+use fmu_description::{Causality, Initial};
 
 use super::{Port, System};
 use crate::error::SystemError;
-use slave::Value;
+use crate::exchange::call;
+use slave::{CallError, Value};
 
 /// A value for a variable.
 #[derive(Clone, Debug)]
@@ -34,13 +35,18 @@ impl System {
     ///
     /// # Errors
     ///
-    /// Returns an error if the FMU refuses the value of a structural parameter.
+    /// Returns an error if the standard allows nobody to set the variable, or if the FMU refuses the value of
+    /// a structural parameter.
     pub fn set_port_value(
         &mut self,
         port: Port,
         value: Value,
         text: &str,
     ) -> Result<(), SystemError> {
+        if let Some(what) = self.variable(port).never_set() {
+            let (name, value) = (self.name(port), text.to_owned());
+            return Err(SystemError::NotSettable { name, value, what });
+        }
         if self.variable(port).causality == Causality::StructuralParameter {
             return self.configure(port, &value, text);
         }
@@ -64,27 +70,52 @@ impl System {
     }
 
     /// Repeats the settings that the standard allows in initialization mode (FMI 2.0.5, table
-    /// 4.2.4), because some FMUs reset them when they enter it. Ignores refusals;
-    /// [`System::confirm_settings`] detects values that are lost.
-    pub(crate) fn repeat_settings(&mut self) {
-        for setting in self.settings.clone() {
-            let variable = self.variable(setting.port);
-            let settable = variable.causality == Causality::Input
-                || variable.variability != Variability::Constant
-                    && variable.initial_in_force() == Some(Initial::Exact);
-            if settable && let Err(error) = self.set_value(setting.port, &setting.value) {
-                tracing::debug!("{}: {error}", self.name(setting.port));
-            }
-        }
-    }
-
-    /// Reads the settings back after the initialization, except the variables in `replaced`, which
-    /// have received another value.
+    /// 4.2.4) and that are lost, because some FMUs reset them when they enter it. `time` in s appears in the
+    /// error message.
     ///
     /// # Errors
     ///
-    /// Returns an error if a parameter or an input has another value than the one set.
-    pub(crate) fn confirm_settings(&mut self, replaced: &HashSet<Port>) -> Result<(), SystemError> {
+    /// Returns an error if an FMU cannot be used any more.
+    pub(crate) fn repeat_settings(&mut self, time: f64) -> Result<(), SystemError> {
+        for setting in self.settings.clone() {
+            let variable = self.variable(setting.port);
+            let settable = variable.causality == Causality::Input
+                || variable.initial_in_force() == Some(Initial::Exact);
+            let repeated = match self.get_value(setting.port) {
+                Ok(found) if found == setting.value => continue,
+                Ok(_) if settable => self.set_value(setting.port, &setting.value),
+                Ok(_) => continue,
+                Err(error) => Err(error),
+            };
+            if let Err(error) = repeated {
+                self.go_on_after(setting.port, time, error)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns an error if the FMU cannot be used any more after `error` of a call for a variable (FMI 2.0.5,
+    /// section 2.1.3).
+    fn go_on_after(&self, port: Port, time: f64, error: CallError) -> Result<(), SystemError> {
+        if error.ends_the_instance() {
+            return Err(call(&self.name(port), time, error));
+        }
+        tracing::debug!("{}: {error}", self.name(port));
+        Ok(())
+    }
+
+    /// Reads the settings back after the initialization, except the variables in `replaced`, which
+    /// have received another value. `time` in s appears in the error message.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if a parameter or an input has another value than the one set, or if an FMU cannot be
+    /// used any more.
+    pub(crate) fn confirm_settings(
+        &mut self,
+        replaced: &HashSet<Port>,
+        time: f64,
+    ) -> Result<(), SystemError> {
         for setting in self.settings.clone() {
             if replaced.contains(&setting.port) {
                 continue;
@@ -97,6 +128,7 @@ impl System {
                         "{name}: cannot be read, so it is not known whether {:?} is kept: {error}",
                         setting.text
                     );
+                    self.go_on_after(setting.port, time, error)?;
                     continue;
                 }
             };
@@ -116,8 +148,17 @@ impl System {
     }
 
     /// Warns after the initialization about parameters and inputs whose value differs from the
-    /// start value of the description, except variables that were set or are in `replaced`.
-    pub(crate) fn confirm_start_values(&mut self, replaced: &HashSet<Port>) {
+    /// start value of the description, except variables that were set or are in `replaced`. `time` in s
+    /// appears in the error message.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if an FMU cannot be used any more.
+    pub(crate) fn confirm_start_values(
+        &mut self,
+        replaced: &HashSet<Port>,
+        time: f64,
+    ) -> Result<(), SystemError> {
         let set: HashSet<Port> = self.settings.iter().map(|setting| setting.port).collect();
         for slave in 0..self.slaves.len() {
             let ports = (0..self.slaves[slave].1.description().variables.len())
@@ -126,10 +167,12 @@ impl System {
             let mut lost = Vec::new();
             for port in ports.collect::<Vec<_>>() {
                 let Some(start) = self.start_value(port) else { continue };
-                if let Ok(found) = self.get_value(port)
-                    && !start.is_near(&found)
-                {
-                    lost.push(format!("{} is {found}, not {start}", self.variable(port).name));
+                match self.get_value(port) {
+                    Ok(found) if start.is_near(&found) => {}
+                    Ok(found) => {
+                        lost.push(format!("{} is {found}, not {start}", self.variable(port).name));
+                    }
+                    Err(error) => self.go_on_after(port, time, error)?,
                 }
             }
             if let Some(first) = lost.first() {
@@ -141,6 +184,7 @@ impl System {
                 );
             }
         }
+        Ok(())
     }
 
     /// Returns the start value of a parameter or an input, if it is a number or a Boolean.

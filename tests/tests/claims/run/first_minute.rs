@@ -95,7 +95,7 @@ fn the_log_of_calls_has_every_call_of_a_run() {
             "a fmi2SetupExperiment(no tolerance, start time 0.0, stop time 1.0) -> fmi2OK",
             "a fmi2SetReal([2], [2.5]) -> fmi2OK",
             "a fmi2EnterInitializationMode() -> fmi2OK",
-            "a fmi2SetReal([2], [2.5]) -> fmi2OK",
+            "a fmi2GetReal([2]) -> fmi2OK [2.5]",
             "a fmi2ExitInitializationMode() -> fmi2OK",
             "a fmi2GetReal([2]) -> fmi2OK [2.5]",
             "a fmi2GetReal([1]) -> fmi2OK [0.0]",

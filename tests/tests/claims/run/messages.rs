@@ -1,6 +1,7 @@
 //! Messages on standard error.
 
 use serde_json::Value;
+use tests::c_fmu::CFmu;
 
 use super::*;
 
@@ -92,4 +93,21 @@ fn misuse_is_refused_with_the_expected_input() {
     fails(&bench.run(&["a.toml", "--plant", "b.fmu"]), 2, &["--plant"]);
     bench.write("empty.toml", "");
     fails(&bench.run(&["empty.toml"]), 2, &["no FMU"]);
+}
+
+#[test]
+fn a_column_that_is_an_input_but_for_a_letter_is_named() {
+    let bench = Bench::new();
+    let fmu = CFmu::well_behaved().write(bench.folder.path(), "a");
+    let system =
+        format!("[fmus]\na = {fmu:?}\n[[scenario.table]]\ncsv = \"in.csv\"\nelement = \"a\"\n");
+    let system = bench.write("system.toml", &system);
+    let warnings = |column: &str| {
+        bench.write("in.csv", &format!("time,i_in,{column}\n0,1,2\n"));
+        let output = bench.run(&[&system, "--stop-time", "0.5", "--step", "0.5"]);
+        said(&output).lines().filter(|line| line.starts_with("warning")).collect::<String>()
+    };
+    assert_eq!(warnings("other"), "");
+    let warning = warnings("U");
+    assert!(warning.contains("\"U\"") && warning.contains("a.u"), "{warning}");
 }
