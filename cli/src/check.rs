@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
-use fmu_description::Version;
 use fmu_description::package::Unpacked;
+use fmu_description::{ModelDescription, Version};
 use fmu_import::isolate::{self, IsolateError, Isolated, Package};
 use fmu_import::{Fmu, Instance};
 use serde::Serialize;
@@ -127,18 +127,16 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
     }
     let not_tried = |reason: &str| Some(TrialResult::NotTried { reason: reason.to_owned() });
     let own = &unpacked.description;
-    let simulation = own.co_simulation.as_ref();
     let exchange = own.model_exchange.as_ref().filter(|_| own.version() != Version::V1);
-    let simulation = simulation.map(|own| (&own.model_identifier, own.needs_execution_tool));
-    let exchange = exchange.map(|own| (&own.model_identifier, own.needs_execution_tool));
+    let simulation = own.stepped().map(|own| (own.model_identifier, own.needs_execution_tool));
+    let exchange = exchange.map(|own| (own.model_identifier.clone(), own.needs_execution_tool));
+    let is_simulation = simulation.is_some();
     let Some((identifier, needs_tool)) = simulation.or(exchange) else {
-        return not_tried(if own.model_exchange.is_some() {
-            "it is for model exchange of FMI 1.0, which `aso-ftc run` does not offer"
-        } else {
-            "it is for scheduled execution only, which `aso-ftc run` does not offer"
-        });
+        return not_tried(
+            "it is for model exchange of FMI 1.0, which `aso-ftc run` does not offer",
+        );
     };
-    if simulation.is_none() && cfg!(not(target_os = "linux")) {
+    if !is_simulation && cfg!(not(target_os = "linux")) {
         return not_tried("it is for model exchange only, which is tried on Linux only");
     }
     if needs_tool {
@@ -146,7 +144,7 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
         let reason = format!("it needs {tool} beside it (needsExecutionTool)");
         return Some(TrialResult::NotTried { reason });
     }
-    let refused = unpacked.library(identifier).err()?;
+    let refused = unpacked.library(&identifier).err()?;
     Some(TrialResult::No { reason: refused.to_string() })
 }
 
@@ -176,7 +174,12 @@ fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, V
         instance.set_time_limit(Some(limit));
         Ok(instance)
     };
-    Ok(behaviour::check(&unpacked.description, &mut make))
+    Ok(behaviour::check(&as_stepped(&unpacked.description), &mut make))
+}
+
+/// Returns the description of an FMU with the steps of its scheduled execution, if it has no co-simulation.
+fn as_stepped(own: &ModelDescription) -> ModelDescription {
+    ModelDescription { co_simulation: own.stepped(), ..own.clone() }
 }
 
 /// Runs the FMU in separate processes. A failure that is not the FMU's fault is an error of the
@@ -188,15 +191,16 @@ fn isolated(
 ) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let package = Package::open(unpacked.folder())?;
     let preload = options.preload.clone();
-    let exchange = unpacked.description.co_simulation.is_none();
+    let own = as_stepped(&unpacked.description);
+    let exchange = own.co_simulation.is_none();
     let integration = exchange.then(|| isolate::Integration {
         options: integrate::Method::default().name().to_owned(),
         describe: integrate::description_of,
     });
     let options =
         isolate::Options { time_limit: Some(limit), preload, integration, ..Default::default() };
-    let integrated = exchange.then(|| integrate::description_of(&unpacked.description));
-    let description = integrated.as_ref().unwrap_or(&unpacked.description);
+    let description = if exchange { integrate::description_of(&own) } else { own };
+    let description = &description;
     let flags = description.co_simulation.as_ref();
     let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
     let mut broken = None;

@@ -105,6 +105,7 @@ pub(crate) fn merge(base: &mut Config, changes: Config) {
     own.every.extend(new.every);
     replace(&mut own.next_event, new.next_event);
     replace(&mut own.crossing, new.crossing);
+    replace(&mut own.discrete, new.discrete);
     replace(&mut own.power_bonds, new.power_bonds);
     set(&mut own.jobs, new.jobs);
     set(&mut own.rollback, new.rollback);

@@ -118,7 +118,6 @@ fn fmu_kind(error: &fmu_import::FmuError) -> &'static str {
         E::NoCoSimulation { .. } => "NoCoSimulation",
         E::OnlyOnce { .. } => "OnlyOnce",
         E::Version { .. } => "Version",
-        E::ScheduledExecution { .. } => "ScheduledExecution",
         E::NoInterface { .. } => "NoInterface",
         E::NeedsTool { .. } => "NeedsTool",
         _ => "Other",

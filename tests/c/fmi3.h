@@ -25,5 +25,7 @@ typedef void (*fmi3IntermediateUpdateCallback)(void *environment, double time, b
                                                bool get_allowed, bool finished,
                                                bool can_return_early, bool *return_requested,
                                                double *return_time);
+typedef void (*fmi3ClockUpdateCallback)(void *environment);
+typedef void (*fmi3PreemptionCallback)(void);
 
 #endif

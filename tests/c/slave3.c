@@ -456,7 +456,13 @@ static fmi3Status int32(Slave *slave, const fmi3ValueReference *vr, size_t n, vo
         case K_IN: COPY(int32_t, now->k_in, 1); break;
         case K_OUT: COPY(int32_t, now->k_out, 1); break;
         case EVENTS: COPY(int32_t, now->events, 1); break;
-        case TICKS: COPY(int32_t, now->ticks, 1); break;
+        case TICKS: {
+            demand(now->mode == INITIALIZATION || (now->mode == EVENT && now->tick),
+                   "a clocked output is read at a tick");
+            int32_t ticks = now->ticks + (now->tick ? now->weight : 0);
+            COPY(int32_t, ticks, 1);
+            break;
+        }
         case WEIGHT:
             demand(!set || now->mode != EVENT || now->tick, "a clocked input is set at a tick");
             COPY(int32_t, now->weight, 1);

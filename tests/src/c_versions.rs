@@ -15,7 +15,7 @@ use crate::root;
 static LIBRARIES: Mutex<BTreeMap<&str, Vec<u8>>> = Mutex::new(BTreeMap::new());
 
 /// Builds the shared library of `source`, once.
-fn library(source: &'static str) -> Vec<u8> {
+pub(crate) fn library(source: &'static str) -> Vec<u8> {
     let mut known = LIBRARIES.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let build = || {
         let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
@@ -61,6 +61,16 @@ fn version_3(folder: &Path, token: &str, interface: &str, file: &str) -> PathBuf
     package.add(format!("binaries/{}/{name}", platforms_of(Version::V3)[0]), library("slave3.c"));
     package.add("resources/text.txt", "text");
     written(&package, folder, file)
+}
+
+/// Writes `source`, without its extension, as an FMU of FMI 3.0 with this description to `folder`.
+pub(crate) fn fmu_3(folder: &Path, source: &'static str, description: &str) -> PathBuf {
+    let mut package = Package::new(description.to_owned()).for_version(Version::V3);
+    let name = source.trim_end_matches(".c");
+    let library_name = format!("{name}{}", std::env::consts::DLL_SUFFIX);
+    let platform = platforms_of(Version::V3)[0];
+    package.add(format!("binaries/{platform}/{library_name}"), library(source));
+    written(&package, folder, name)
 }
 
 /// Writes `slave1.c` as an FMU of FMI 1.0 to `folder`; `guid` selects a misbehaviour.

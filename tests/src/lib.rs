@@ -9,7 +9,9 @@ pub mod equations;
 pub mod isolated;
 pub mod linear;
 pub mod network;
+pub mod node;
 pub mod problems;
+pub mod scheduled;
 mod troubles;
 
 pub use troubles::{Trouble, troubles};

@@ -229,7 +229,9 @@ impl<S: Slave> Trial<'_, S> {
         let mut trajectory = vec![self.read(slave)?];
         for k in from..from + STEPS {
             match slave.do_step(self.time(k), self.step_size(), true) {
-                Ok(StepResult::Whole) => trajectory.push(self.read(slave)?),
+                Ok(StepResult::Whole | StepResult::Event { .. }) => {
+                    trajectory.push(self.read(slave)?);
+                }
                 Ok(StepResult::Part { reached, .. }) => {
                     let what = format!(
                         "a step of {} s is done to {} s only",

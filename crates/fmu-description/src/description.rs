@@ -92,6 +92,28 @@ impl ModelDescription {
         self.variables.iter().find(|variable| variable.name == name)
     }
 
+    /// Returns how the FMU makes steps: its co-simulation or, without it, its scheduled execution, whose steps are of
+    /// any size and end at the ticks of its clocks.
+    #[must_use]
+    pub fn stepped(&self) -> Option<CoSimulation> {
+        let scheduled = || {
+            let own = self.scheduled_execution.as_ref()?;
+            Some(CoSimulation {
+                model_identifier: own.model_identifier.clone(),
+                needs_execution_tool: own.needs_execution_tool,
+                can_handle_variable_communication_step_size: true,
+                can_be_instantiated_only_once_per_process: own
+                    .can_be_instantiated_only_once_per_process,
+                can_get_and_set_fmu_state: own.can_get_and_set_fmu_state,
+                can_serialize_fmu_state: own.can_serialize_fmu_state,
+                provides_directional_derivative: own.provides_directional_derivative,
+                has_event_mode: true,
+                ..CoSimulation::default()
+            })
+        };
+        self.co_simulation.clone().or_else(scheduled)
+    }
+
     /// Returns the variable with a 1-based index, as `structure`, `derivative`, `previous` and `clocks`
     /// have it.
     #[must_use]

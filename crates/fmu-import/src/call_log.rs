@@ -1,5 +1,6 @@
 //! The log of FMI calls: one line per call with instance, function, arguments, status and results.
 
+mod events;
 mod model_exchange;
 
 use std::fmt::{Debug, Write as _};
@@ -11,7 +12,7 @@ use std::sync::{Arc, Mutex};
 use fmu_description::Experiment;
 use fmu_description::{ModelDescription, Version};
 
-use slave::{CallError, ModelExchange, Slave, StepResult};
+use slave::{CallError, Events, ModelExchange, Slave, StepResult};
 
 /// A log file of FMI calls.
 ///
@@ -350,12 +351,14 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
         self.begin("fmi2DoStep", &format!("{time:?}, {size:?}, {never_back}"));
         let done = self.slave.do_step(time, size, never_back);
-        if let Ok(StepResult::Part { reached, terminated }) = done {
-            self.write(&format!(
+        match done {
+            Ok(StepResult::Part { reached, terminated }) => self.write(&format!(
                 " -> fmi2Discard fmi2LastSuccessfulTime {reached:?}, fmi2Terminated {terminated}\n"
-            ));
-        } else {
-            self.end(&done, "");
+            )),
+            Ok(StepResult::Event { reached }) => {
+                self.end(&done, &format!(" event at {reached:?}"));
+            }
+            _ => self.end(&done, ""),
         }
         done
     }
@@ -395,5 +398,14 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let call = |slave: &mut S| slave.deserialize_state(bytes);
         self.plain("fmi2DeSerializeFMUstate", format!("{} bytes", bytes.len()), call)
+    }
+
+    fn hand_over_events(&mut self, stop: bool) -> Result<bool, CallError> {
+        self.slave.hand_over_events(stop)
+    }
+
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        self.slave.events()?;
+        Some(self)
     }
 }

@@ -56,15 +56,6 @@ pub enum FmuError {
         /// What is expected.
         expected: &'static str,
     },
-    /// The FMU offers scheduled execution only.
-    #[error(
-        "{path}: the FMU offers scheduled execution only, which is not supported, expected the element \
-         CoSimulation or ModelExchange"
-    )]
-    ScheduledExecution {
-        /// The FMU.
-        path: PathBuf,
-    },
     /// The FMU has no interface, or lacks the requested one.
     #[error(
         "{path}: the FMU lacks an interface, expected the element CoSimulation or ModelExchange"
@@ -109,7 +100,7 @@ impl Drop for OnlyInstance {
 
 /// Fields are dropped in this order, which unloads the library before its file is removed.
 struct Content {
-    /// The library for co-simulation; `None` if the FMU offers model exchange only.
+    /// The library for co-simulation or scheduled execution; `None` if the FMU offers model exchange only.
     library: Option<CoSimulation>,
     unpacked: Unpacked,
     /// Whether an FMU that allows one instance only has it.
@@ -174,13 +165,11 @@ impl Fmu {
 
     fn load(path: &Path, unpacked: Unpacked) -> Result<Self, FmuError> {
         let description = &unpacked.description;
-        if description.co_simulation.is_none() && description.model_exchange.is_none() {
-            if description.scheduled_execution.is_some() {
-                return Err(FmuError::ScheduledExecution { path: path.to_owned() });
-            }
+        let stepped = description.stepped();
+        if stepped.is_none() && description.model_exchange.is_none() {
             return Err(FmuError::NoInterface { path: path.to_owned() });
         }
-        let library = description.co_simulation.as_ref().map(|flags| {
+        let library = stepped.map(|flags| {
             let library = unpacked.library(&flags.model_identifier)?;
             open_library(description, &library, &flags.model_identifier)
         });
@@ -211,14 +200,15 @@ impl Fmu {
         Ok(view.description)
     }
 
-    /// Creates a co-simulation instance called `name`.
+    /// Creates an instance called `name` for co-simulation or, if the FMU does not offer it, for scheduled
+    /// execution.
     ///
     /// # Errors
     ///
     /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`LoadError::Instantiate`] with the
     /// FMU's messages if the FMU does not instantiate; [`FmuError::NoInterface`] without co-simulation.
     pub fn instantiate(&self, name: &str) -> Result<Instance, FmuError> {
-        let flags = self.description().co_simulation.as_ref();
+        let flags = self.description().stepped();
         let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
         let only = once.then(|| self.occupy(name)).transpose()?;
         let inner = self.instantiate_version(name)?;
@@ -247,7 +237,7 @@ impl Fmu {
             }
             Some(CoSimulation::V3(library)) => {
                 let resources = resource_path(&unpacked.resources());
-                let (interface, resources) = (Interface::CoSimulation, resources.as_deref());
+                let (interface, resources) = (stepped(description), resources.as_deref());
                 let created =
                     crate::v3::Instance::new(library, description, interface, name, resources);
                 Ok(Inner::V3(Box::new(created.map_err(hint)?)))
@@ -339,10 +329,18 @@ fn open_library(
             Library::open(path, Interface::CoSimulation).map(Arc::new).map(CoSimulation::V2)
         }
         Version::V3 => {
-            v3::Library::open(path, Interface::CoSimulation).map(Arc::new).map(CoSimulation::V3)
+            v3::Library::open(path, stepped(description)).map(Arc::new).map(CoSimulation::V3)
         }
     };
     library.map_err(|error| with_tool_hint(description, error))
+}
+
+/// Returns the interface of FMI 3.0 by which an FMU makes steps.
+fn stepped(description: &ModelDescription) -> v3::Interface {
+    match description.co_simulation {
+        Some(_) => v3::Interface::CoSimulation,
+        None => v3::Interface::ScheduledExecution,
+    }
 }
 
 /// Returns the `resourcePath` of FMI 3.0: absolute, with a trailing separator (section 2.3.1); `None` if

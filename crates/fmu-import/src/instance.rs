@@ -6,7 +6,7 @@ use fmu_description::{Experiment, ModelDescription};
 
 use crate::fmu::{Fmu, OnlyInstance};
 use crate::{v1, v2, v3};
-use slave::{CallError, CallSink, Slave, StepResult, absent};
+use slave::{CallError, CallSink, EventInfo, Events, Slave, StepResult, absent};
 
 /// An instance of an FMU in this process, for either interface.
 pub struct Instance {
@@ -291,6 +291,14 @@ impl Slave for Instance {
         Ok(done)
     }
 
+    fn hand_over_events(&mut self, stop: bool) -> Result<bool, CallError> {
+        Ok(if let Inner::V3(own) = &mut self.inner { own.hand_over_events(stop) } else { false })
+    }
+
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        if let Inner::V3(own) = &mut self.inner { Some(own.as_mut()) } else { None }
+    }
+
     fn log_calls(&mut self, sink: CallSink) -> bool {
         match &mut self.inner {
             Inner::V1(_) | Inner::V2(_) => false,
@@ -307,5 +315,23 @@ impl Slave for Instance {
             Inner::V2(own) => own.component.take_warning(),
             Inner::V3(own) => own.take_warning(),
         }
+    }
+}
+
+impl Events for v3::Instance {
+    fn next_event(&mut self) -> Result<Option<f64>, CallError> {
+        Ok(v3::Instance::next_event(self))
+    }
+
+    fn enter_event_mode(&mut self) -> Result<(), CallError> {
+        v3::Instance::enter_event_mode(self)
+    }
+
+    fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
+        v3::Instance::update_discrete_states(self)
+    }
+
+    fn leave_event_mode(&mut self) -> Result<(), CallError> {
+        v3::Instance::leave_event_mode(self)
     }
 }

@@ -248,7 +248,7 @@ impl Package {
     pub fn instantiate(&self, name: &str, options: &Options) -> Result<Isolated, IsolateError> {
         let (own, path) = (self.description(), self.path.clone());
         match options.integration {
-            None if own.co_simulation.is_none() => {
+            None if own.stepped().is_none() => {
                 return Err(IsolateError::NoCoSimulation { path });
             }
             Some(_) if own.model_exchange.is_none() => {

@@ -1,17 +1,20 @@
-//! FMUs of FMI 3.0 as slaves: types, arrays, events and clocks.
+//! FMUs of FMI 3.0 as slaves: types, arrays, events, clocks and model partitions.
 //!
 //! In co-simulation the slave uses Event Mode if the FMU has it, and lets the FMU return early. It handles
 //! the events and continues the step, so that the master sees one whole communication step (FMI 3.0.2,
-//! section 4.2). In model exchange its caller handles the events, and the slave ticks its clocks in them.
+//! section 4.2), unless the master handles the events. In model exchange its caller does, and the slave ticks its
+//! clocks in them.
 
 mod access;
 mod buffer;
+mod clocked;
 mod clocks;
 mod derivatives;
 mod elements;
 mod equations;
 mod modes;
 mod plan;
+mod scheduled;
 mod states;
 
 use std::collections::HashMap;
@@ -20,10 +23,10 @@ use std::sync::Arc;
 use fmu_description::{CoSimulation, Experiment, ModelDescription};
 
 use crate::error::LoadError;
-use crate::library::Interface;
-use crate::library::v3::{Component, Instantiation, Library};
+use crate::library::v3::{Component, Instantiation, Interface, Library};
 use access::refused;
 use buffer::Buffer;
+use clocked::ClockedRuns;
 use clocks::Clocks;
 pub(crate) use elements::ElementView;
 use modes::{Mode, State};
@@ -44,9 +47,11 @@ pub(crate) struct Instance {
     /// Whether the FMU was instantiated with `eventModeUsed`.
     event_mode: bool,
     experiment: Experiment,
+    /// Whether the master handles the events, and whether a step then ends at the first one.
+    hands_over: bool,
+    stops: bool,
     state: State,
-    /// The clocks that have ticked in the present event of model exchange.
-    active: Vec<u32>,
+    clocked: ClockedRuns,
     /// The states that belong to the FMU states of the slots.
     slots: Vec<State>,
     /// Values of structural parameters, by value reference.
@@ -64,8 +69,10 @@ impl Instance {
         resources: Option<&str>,
     ) -> Result<Self, LoadError> {
         let flags = match interface {
-            Interface::CoSimulation => own.co_simulation.clone().unwrap_or_default(),
             Interface::ModelExchange => CoSimulation::default(),
+            Interface::CoSimulation | Interface::ScheduledExecution => {
+                own.stepped().unwrap_or_default()
+            }
         };
         let sizes = HashMap::new();
         let view = ElementView::new(own, &sizes)
@@ -106,16 +113,18 @@ impl Instance {
         let state =
             State { held: vec![None; view.shadows], clocks: Clocks::new(own), ..State::default() };
         let experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };
-        let (plans, active, slots) = (Plans::default(), Vec::new(), Vec::new());
+        let (plans, slots, clocked) = (Plans::default(), Vec::new(), ClockedRuns::new(&view));
         Ok(Self {
             component,
+            hands_over: false,
+            stops: false,
+            clocked,
             view,
             plans,
             interface,
             event_mode,
             experiment,
             state,
-            active,
             slots,
             sizes,
         })
@@ -146,6 +155,7 @@ impl Instance {
         let set = self.write("fmi3SetUInt64", references, values, Buffer::put_integer);
         set.and_then(|()| self.component.exit_configuration_mode())?;
         self.state.held = vec![None; view.shadows];
+        self.clocked = ClockedRuns::new(&view);
         (self.view, self.sizes) = (view, sizes);
         self.plans.clear();
         Ok(())

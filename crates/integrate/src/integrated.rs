@@ -88,6 +88,8 @@ struct Point {
     next_event: Option<f64>,
     /// Whether the FMU requested the end of the simulation.
     ends: bool,
+    /// Whether an event has happened here, before event mode is entered.
+    event: bool,
     /// Whether inputs may have changed since the event indicators were read.
     input_changed: bool,
     memory: Memory,
@@ -130,7 +132,7 @@ fn clocks_of(description: &ModelDescription) -> Vec<u32> {
 /// an event, as the standard demands, if the value is a new one.
 ///
 /// Where an event coincides with the end of a step, it belongs to this step: the outputs are those after
-/// the event.
+/// the event. A master that handles the events ([`Slave::hand_over_events`]) reads them after its iteration.
 pub struct Integrated {
     instance: Box<dyn ModelExchange>,
     description: ModelDescription,
@@ -141,6 +143,11 @@ pub struct Integrated {
     inputs: Inputs,
     /// Value references of clocks.
     clocks: Vec<u32>,
+    /// Whether the master handles the events, and whether a step then ends at the first one.
+    hands_over: bool,
+    stops: bool,
+    /// Whether the present event has changed the nominal values of the states.
+    nominals_changed: bool,
     /// The continuous states, and the event indicators at the present point.
     states: Vec<f64>,
     indicators: Vec<f64>,
@@ -163,6 +170,7 @@ impl Integrated {
             mode: Mode::Setup,
             next_event: None,
             ends: false,
+            event: false,
             input_changed: false,
             memory: Memory::default(),
         };
@@ -175,6 +183,9 @@ impl Integrated {
             stepper: Stepper::new(options.method, Scale::new(TOLERANCE, TOLERANCE, Vec::new())),
             inputs,
             clocks,
+            hands_over: false,
+            stops: false,
+            nominals_changed: false,
             states: Vec::new(),
             indicators: Vec::new(),
             search: step::Search::default(),

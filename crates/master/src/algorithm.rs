@@ -168,6 +168,8 @@ pub struct Algorithm {
     pub fallback: bool,
     /// Events that end a step.
     pub events: Vec<EventSource>,
+    /// Variables that are discrete although their FMU does not say so.
+    pub discrete: Vec<Port>,
     /// Power bonds, for [`StepControl::Energy`].
     pub bonds: Vec<PowerBond>,
     /// Number of threads that step independent slaves at the same time if this is faster; 1: no
@@ -206,6 +208,7 @@ impl Algorithm {
             iterations: 50,
             fallback: false,
             events: Vec::new(),
+            discrete: Vec::new(),
             bonds: Vec::new(),
             jobs: 1,
             rollback: false,

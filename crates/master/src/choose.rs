@@ -8,8 +8,9 @@ use crate::algorithm::{
 };
 use crate::error::SystemError;
 use crate::order::by_direct_dependencies;
-use crate::system::System;
-use fmu_description::CoSimulation;
+use crate::signal_type::SignalType;
+use crate::system::{Connection, Port, System};
+use fmu_description::{CoSimulation, Version};
 use slave::Slave;
 
 /// Default communication step in s for runs of up to [`STEPS`] steps; used if neither the user nor
@@ -65,6 +66,10 @@ pub struct AlgorithmRequest {
     /// Outputs, `slave.variable`, whose zero crossing ends a step.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub crossing: Vec<String>,
+    /// Variables, `slave.variable`, that change at events or communication points only, although their FMU does not
+    /// say so.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub discrete: Vec<String>,
     /// Pairs of inputs, `slave.variable`, whose product is a power.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub power_bonds: Vec<(String, String)>,
@@ -116,6 +121,8 @@ pub fn choose(
     });
     let extrapolation =
         request.extrapolation.unwrap_or_else(|| default_extrapolation(system, &mut reasons));
+    let discrete = ports(system, &request.discrete)?;
+    explain_signals(system, &discrete, &mut reasons);
     let loose = matches!(control, StepControl::Increment | StepControl::Energy);
     let default_relative = if loose { 1e-2 } else { base.relative_tolerance };
     let algorithm = Algorithm {
@@ -132,6 +139,7 @@ pub fn choose(
         iterations: request.iterations.unwrap_or(base.iterations),
         fallback: request.fallback.unwrap_or(request.coupling.is_none()),
         events: events(system, request)?,
+        discrete,
         bonds: bonds(system, request)?,
         jobs: match request.jobs {
             Some(0) => std::thread::available_parallelism().map_or(1, usize::from),
@@ -208,25 +216,59 @@ fn default_extrapolation(system: &System, reasons: &mut Vec<String>) -> Extrapol
         system.connections.iter().map(|connection| connection.to.slave).collect();
     fed.sort_unstable();
     fed.dedup();
-    let unable: Vec<_> = fed
-        .into_iter()
-        .filter(|&k| {
-            !flags(system.slaves[k].1.as_ref()).is_some_and(|flags| flags.can_interpolate_inputs)
-        })
-        .map(|k| system.slaves[k].0.as_str())
-        .collect();
-    if unable.is_empty() {
-        reasons.push(
+    // FMI 3.0 has no canInterpolateInputs: an FMU asks for the inputs that have intermediateUpdate.
+    let is_third = |&k: &usize| system.slaves[k].1.description().version() == Version::V3;
+    let (third, others): (Vec<usize>, Vec<usize>) = fed.into_iter().partition(is_third);
+    let unable = |slaves: &[usize]| -> Vec<&str> {
+        let able = |k: usize| {
+            flags(system.slaves[k].1.as_ref()).is_some_and(|flags| flags.can_interpolate_inputs)
+        };
+        let unable = slaves.iter().filter(|&&k| !able(k));
+        unable.map(|&k| system.slaves[k].0.as_str()).collect()
+    };
+    let held = [
+        (unable(&others), "canInterpolateInputs is false"),
+        (unable(&third), "no input of theirs has intermediateUpdate"),
+    ];
+    let held = held.iter().filter(|(slaves, _)| !slaves.is_empty());
+    let held: Vec<_> =
+        held.map(|(slaves, why)| format!(", held for {}: {why}", shortened(slaves))).collect();
+    reasons.push(match (held.is_empty(), third.is_empty()) {
+        (false, _) => format!("extrapolation limited{}", held.join("")),
+        (true, true) => {
             "extrapolation limited: all connected FMUs take input derivatives (canInterpolateInputs)"
-                .to_owned(),
-        );
-    } else {
-        reasons.push(format!(
-            "extrapolation limited, held for {}: canInterpolateInputs is false",
-            shortened(&unable)
-        ));
-    }
+                .to_owned()
+        }
+        (true, false) => {
+            "extrapolation limited: all connected FMUs take inputs that vary within a step".to_owned()
+        }
+    });
     Extrapolation::Limited
+}
+
+/// Says which connections carry signals that are not continuous.
+fn explain_signals(system: &System, discrete: &[Port], reasons: &mut Vec<String>) {
+    let signal_type = |port: Port| {
+        if discrete.contains(&port) { SignalType::Discrete } else { system.signal_type(port) }
+    };
+    for (chosen, what) in [
+        (SignalType::Discrete, "discrete, held until they change"),
+        (SignalType::Clocked, "clocked, passed on at the ticks of their clock"),
+    ] {
+        let of_connection = |own: &&Connection| match (signal_type(own.from), signal_type(own.to)) {
+            (SignalType::Clocked, _) | (_, SignalType::Clocked) => chosen == SignalType::Clocked,
+            (SignalType::Discrete, _) | (_, SignalType::Discrete) => chosen == SignalType::Discrete,
+            _ => false,
+        };
+        let names = system.connections.iter().filter(of_connection);
+        let names: Vec<String> = names
+            .map(|own| format!("{} -> {}", system.name(own.from), system.name(own.to)))
+            .collect();
+        if !names.is_empty() {
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            reasons.push(format!("{what}: {}", shortened(&names)));
+        }
+    }
 }
 
 /// Joins the first names of a list for a message.
@@ -246,6 +288,10 @@ fn multiples(system: &System, request: &AlgorithmRequest) -> Result<Vec<u32>, Sy
         multiples[system.slave(name)?] = *multiple;
     }
     Ok(multiples)
+}
+
+fn ports(system: &System, names: &[String]) -> Result<Vec<Port>, SystemError> {
+    names.iter().map(|name| system.port(name)).collect()
 }
 
 fn events(system: &System, request: &AlgorithmRequest) -> Result<Vec<EventSource>, SystemError> {

@@ -5,10 +5,13 @@ use serde::{Deserialize, Serialize};
 use crate::error::SystemError;
 use crate::exchange::call;
 use crate::fault::FaultChain;
-use crate::signal::{Cursor, Sample, Signal, earliest, reached};
+use crate::signal::{Cursor, Sample, Signal, earliest, near, reached};
 use crate::system::{Port, System};
 use fmu_description::Version;
 use slave::ValueType;
+
+/// Relative distance below which a time may be a break; see [`near`].
+pub(crate) const BREAK: f64 = 1e-8;
 
 /// Signals and faults that act on a system during a run.
 #[derive(Clone, Debug, Default)]
@@ -37,6 +40,8 @@ pub enum DriveKind {
     },
     /// Boolean: 0 is false.
     Boolean,
+    /// Triggered input clock: ticks where the signal jumps to another value than 0.
+    Clock,
     /// String: the value of the signal is an index into the texts of the drive.
     String,
 }
@@ -115,6 +120,11 @@ impl Drive {
     /// Whether the FMU already holds this value since the last commit and the value is constant.
     fn is_settled(&self, sample: Sample) -> bool {
         sample.slope == 0.0 && self.accepted == Some(sample) && self.written == self.accepted
+    }
+
+    /// Whether the signal or a fault on it jumps or has a kink at `time` in s.
+    pub(crate) fn breaks_at(&self, time: f64) -> bool {
+        self.next_break(time - BREAK * time.abs()).is_some_and(|next| near(next, time))
     }
 
     fn next_break(&self, after: f64) -> Option<f64> {
@@ -225,15 +235,49 @@ impl Drives {
         self.all.is_empty()
     }
 
-    /// Sets every driven variable at `time` in s, before the step that starts there: its value and,
+    /// Sets every driven variable but clocks at `time` in s, before the step that starts there: its value and,
     /// if the FMU takes it, its derivative. Skips values that the FMU already holds.
     ///
     /// # Errors
     ///
     /// Returns an error if an FMU refuses a value.
     pub fn write(&mut self, system: &mut System, time: f64) -> Result<(), SystemError> {
+        self.write_to(system, time, |_| true)
+    }
+
+    /// Makes the driven clocks of `slave` tick that have to at `time` in s, in event mode.
+    pub(crate) fn tick(
+        &mut self,
+        system: &mut System,
+        slave: usize,
+        time: f64,
+    ) -> Result<(), SystemError> {
+        let own = |drive: &&mut Drive| drive.kind == DriveKind::Clock && drive.port.slave == slave;
+        for drive in self.all.iter_mut().filter(own) {
+            let Some(sample) = drive.sample(time) else { continue };
+            if sample.value != 0.0 && (drive.written.is_none() || drive.breaks_at(time)) {
+                let (name, instance) = &mut system.slaves[slave];
+                instance
+                    .set_boolean(&[drive.reference], &[1])
+                    .map_err(|source| call(name, time, source))?;
+            }
+            drive.written = Some(sample);
+        }
+        Ok(())
+    }
+
+    /// As [`Drives::write`], for the slaves for which `belongs` is true.
+    pub(crate) fn write_to(
+        &mut self,
+        system: &mut System,
+        time: f64,
+        belongs: impl Fn(usize) -> bool,
+    ) -> Result<(), SystemError> {
         for group in 0..self.groups.len() {
             let (start, end) = self.groups[group];
+            if self.all[start].kind == DriveKind::Clock || !belongs(self.all[start].port.slave) {
+                continue;
+            }
             self.write_group(system, start, end, time).map_err(|source| {
                 call(&system.slaves[self.all[start].port.slave].0, time, source)
             })?;
@@ -271,6 +315,7 @@ impl Drives {
                     self.integers.push(integer(sample.value, least, largest));
                 }
                 DriveKind::Boolean => self.booleans.push(i32::from(sample.value != 0.0)),
+                DriveKind::Clock => {}
                 DriveKind::String => {
                     if let Some(text) = drive.text(sample.value) {
                         slave.set_string(&[drive.reference], std::slice::from_ref(text))?;
@@ -285,7 +330,7 @@ impl Drives {
             DriveKind::Real { .. } => slave.set_real(&self.references, &self.reals)?,
             DriveKind::Integer { .. } => slave.set_integer(&self.references, &self.integers)?,
             DriveKind::Boolean => slave.set_boolean(&self.references, &self.booleans)?,
-            DriveKind::String => {}
+            DriveKind::Clock | DriveKind::String => {}
         }
         if !self.derived.is_empty() {
             slave.set_input_derivatives(&self.derived, &self.orders, &self.slopes)?;
@@ -371,6 +416,7 @@ fn rank(kind: DriveKind) -> u8 {
         DriveKind::Integer { .. } => 1,
         DriveKind::Boolean => 2,
         DriveKind::String => 3,
+        DriveKind::Clock => 4,
     }
 }
 
@@ -389,6 +435,7 @@ impl DriveKind {
         let least = i64::try_from(least).unwrap_or(i64::MIN);
         let largest = i64::try_from(largest).unwrap_or(i64::MAX);
         match ValueType::of(kind) {
+            _ if matches!(kind, fmu_description::Kind::Clock(_)) => Self::Clock,
             ValueType::Real => Self::Real { derivatives },
             ValueType::Integer => Self::Integer { least, largest },
             ValueType::Boolean => Self::Boolean,

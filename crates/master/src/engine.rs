@@ -2,6 +2,7 @@
 //! every slave makes one step, and saves and restores the state of all slaves and connections.
 
 mod groups;
+mod instants;
 mod threads;
 
 use std::ops::Range;
@@ -17,7 +18,8 @@ use crate::grid::{Grid, size_between};
 use crate::order::Order;
 use crate::system::{Port, System};
 use groups::Groups;
-use slave::{CallError, Failure, StepResult, Value};
+pub(crate) use instants::{InstantEnd, Instants, Parts};
+use slave::{CallError, Failure, Slave, StepResult, Value};
 pub(crate) use threads::Task;
 use threads::{Threads, run};
 
@@ -25,6 +27,8 @@ use threads::{Threads, run};
 const PARTS: u32 = 1000;
 /// Part of a step below which the missing rest is rounding.
 const ROUNDING: f64 = 1e-9;
+/// Smallest part of a step that is made before or after an event within it.
+const DIVISION: f64 = 1e-6;
 
 /// Advice for an FMU that fails after `fmi2Discard`.
 const ADVICE: &str = "the step before it was discarded; with rollback all FMUs repeat it";
@@ -35,6 +39,10 @@ pub(crate) struct Engine {
     pub(crate) exchange: Exchange,
     pub(crate) drives: Drives,
     pub(crate) grid: Grid,
+    pub(crate) instants: Instants,
+    /// Why steps cannot end anywhere; `None` if all slaves take steps of any size.
+    rigid: Option<Rigid>,
+    division: Division,
     /// Whether steps may be repeated; every slave can then restore its state. Otherwise a slave
     /// that completes only a part of its step (`fmi2Discard`) continues until the end.
     pub(crate) repeats: bool,
@@ -48,6 +56,43 @@ pub(crate) struct Engine {
     threads: Option<Threads>,
     /// Whether a sweep is a single loop over the slaves; see [`Engine::pass`].
     passes: bool,
+}
+
+/// What happens to a step with an event, or a jump or kink of a signal or fault, within it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Division {
+    /// Nothing.
+    Never,
+    /// It ends there.
+    AtChanges,
+    /// The first change is reported, because it takes effect late.
+    Report,
+}
+
+/// Why steps cannot end anywhere.
+struct Rigid {
+    why: String,
+    /// Whether a change that took effect late has been reported.
+    reported: bool,
+}
+
+impl Rigid {
+    fn of(system: &System, multiples: &[u32]) -> Option<Self> {
+        let is_rigid = |slave: &dyn Slave| {
+            let flags = slave.description().co_simulation.as_ref();
+            flags.is_some_and(|flags| !flags.can_handle_variable_communication_step_size)
+        };
+        let why = if multiples.iter().any(|multiple| *multiple != 1) {
+            "some FMUs step at multiples of the communication step (every)".to_owned()
+        } else {
+            let mut slaves = system.slaves.iter();
+            let (name, _) = slaves.find(|(_, slave)| is_rigid(slave.as_ref()))?;
+            format!(
+                "{name} takes equal steps only (canHandleVariableCommunicationStepSize is false)"
+            )
+        };
+        Some(Self { why, reported: false })
+    }
 }
 
 /// How far a sweep came.
@@ -89,14 +134,19 @@ impl Engine {
         exchange: Exchange,
         drives: Drives,
         grid: Grid,
+        instants: Instants,
         algorithm: &Algorithm,
         (order, multiples): (&Order, Vec<u32>),
     ) -> Result<Self, SystemError> {
+        let rigid = Rigid::of(&system, &multiples);
         let groups = Groups::new(&system, algorithm.method, order);
         let background = system.slaves.iter_mut().any(|(_, slave)| slave.in_background().is_some());
         let threads = Threads::new(algorithm.jobs, groups.len())?;
         let mut engine = Self {
             passes: false,
+            rigid,
+            division: Division::Never,
+            instants,
             repeats: algorithm.repeats(),
             sizes: vec![0.0; multiples.len()],
             system,
@@ -112,10 +162,80 @@ impl Engine {
         Ok(engine)
     }
 
-    /// Chooses between [`Engine::pass`] and [`Engine::step_groups`]. Call it after a change of the
-    /// faults.
+    /// Chooses between [`Engine::pass`] and [`Engine::step_groups`], and whether steps end within the planned ones.
+    /// Call it after a change of the scenario.
     pub(crate) fn choose_sweep(&mut self) {
         self.passes = self.threads.is_none() && !self.background && self.exchange.passes();
+        let changes = !self.drives.is_empty() || self.exchange.is_faulty();
+        self.division = match &self.rigid {
+            None if changes || self.instants.are_connected() => Division::AtChanges,
+            Some(rigid) if changes && !rigid.reported => Division::Report,
+            _ => Division::Never,
+        };
+    }
+
+    /// Returns the end of a step from `time` that was planned to end at `end`: the first known event, jump or kink
+    /// within it; all in s.
+    #[inline]
+    pub(crate) fn divided(&mut self, time: f64, end: f64) -> Option<f64> {
+        match self.division {
+            Division::Never => None,
+            Division::AtChanges => self.first_within(time, end),
+            Division::Report => {
+                self.report_late(time, end);
+                None
+            }
+        }
+    }
+
+    /// Returns the first jump or kink of a signal or fault within a step.
+    fn change_within(&self, time: f64, end: f64) -> Option<f64> {
+        let rounding = DIVISION * (end - time);
+        let breaks = self.next_breaks(time + rounding).filter(|next| *next < end - rounding);
+        breaks.reduce(f64::min)
+    }
+
+    #[inline(never)]
+    fn first_within(&self, time: f64, end: f64) -> Option<f64> {
+        let change = self.change_within(time, end).into_iter();
+        change.chain(self.instants.next_within(time, end)).reduce(f64::min)
+    }
+
+    /// Warns about the first change that takes effect late.
+    #[inline(never)]
+    fn report_late(&mut self, time: f64, end: f64) {
+        let change = self.change_within(time, end);
+        let (Some(change), Some(rigid)) = (change, &mut self.rigid) else { return };
+        rigid.reported = true;
+        self.division = Division::Never;
+        let driven = self.drives.iter().filter(|drive| drive.breaks_at(change));
+        let names: Vec<String> = driven.map(|drive| self.system.name(drive.port())).collect();
+        let what = if names.is_empty() { "a fault".to_owned() } else { names.join(", ") };
+        tracing::warn!(
+            "{what} changes at t = {} s and takes effect at {} s, {} s late: {}; a step that \
+             divides the times of all changes helps",
+            seconds(change),
+            seconds(end),
+            seconds(end - change),
+            rigid.why
+        );
+    }
+
+    /// Iterates the instant at the time reached, if there is an event.
+    #[inline]
+    pub(crate) fn settle(&mut self) -> Result<InstantEnd, SystemError> {
+        if self.instants.is_empty() { Ok(InstantEnd::default()) } else { self.settle_instant() }
+    }
+
+    #[inline(never)]
+    fn settle_instant(&mut self) -> Result<InstantEnd, SystemError> {
+        let (system, exchange, drives) = (&mut self.system, &mut self.exchange, &mut self.drives);
+        let mut parts = Parts { system, exchange, drives };
+        if self.instants.is_due(&mut parts, self.grid.time) {
+            self.instants.iterate(&mut parts, self.grid.time)
+        } else {
+            Ok(InstantEnd::default())
+        }
     }
 
     /// Makes a sweep: sets the driven variables and steps all slaves from `time` over `size`.
@@ -143,6 +263,7 @@ impl Engine {
             slave.restore_state(state.slot).map_err(|source| call(name, state.time, source))?;
         }
         self.exchange.restore(&state.values);
+        self.instants.forget();
         Ok(())
     }
 
@@ -348,8 +469,14 @@ impl Engine {
         let end = time + size;
         let mut start = time;
         for _ in 0..PARTS {
-            let StepResult::Part { reached, terminated } = done else {
-                return self.exchange.read(&mut self.system, slave, end);
+            let (reached, terminated) = match done {
+                StepResult::Whole => return self.exchange.read(&mut self.system, slave, end),
+                StepResult::Part { reached, terminated } => (reached, terminated),
+                StepResult::Event { reached } if reached >= end - ROUNDING * size => {
+                    self.instants.expect(slave, end, size);
+                    return Ok(());
+                }
+                StepResult::Event { reached } => (reached, false),
             };
             if terminated {
                 *swept = Swept::Ended(Ending { slave, time: reached });

@@ -5,9 +5,11 @@
 //! the inputs (extrapolation, transformation, fault), and [`Exchange::advance`] sets them, calls
 //! `fmi2DoStep` and reads the outputs.
 
+mod channels;
 mod discrete;
 mod extrapolation;
 mod faulty;
+mod instant;
 mod layout;
 mod multirate;
 mod pass;
@@ -24,21 +26,23 @@ use crate::algorithm::Algorithm;
 use crate::engine::Task;
 use crate::error::SystemError;
 use crate::fault::FaultChain;
-use crate::system::{Port, System};
-use discrete::{BINARIES, BOOLEANS, Channel, INTEGERS, STRINGS};
+use crate::signal_type::Way;
+use crate::system::{Connection, Port, System};
+use channels::{Channels, ChannelsState};
+use instant::Ticks;
 pub(crate) use layout::Refusal;
 pub(crate) use reals::{Reals, Trace};
-use slave::{CallError, Slave, StepResult, ValueType};
+use slave::{CallError, Slave, StepResult};
 
 /// All connections of a system with the current values of their outputs.
 pub(crate) struct Exchange {
     pub(crate) reals: Reals,
-    integers: Channel<i64>,
-    booleans: Channel<i32>,
-    strings: Channel<String>,
-    binaries: Channel<Vec<u8>>,
-    /// Whether there are connections of types other than Real.
-    discrete: bool,
+    /// The other connections, whose inputs are set before a step.
+    held: Channels,
+    /// The connections to discrete and clocked inputs of slaves whose events the master handles. These inputs are
+    /// set in event mode only.
+    at_events: Channels,
+    ticks: Ticks,
     allow_nan: bool,
     /// Whether any connection has a fault.
     faulty: bool,
@@ -48,25 +52,16 @@ pub(crate) struct Exchange {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Values {
     reals: Trace,
-    integers: Vec<i64>,
-    booleans: Vec<i32>,
-    strings: Vec<String>,
-    binaries: Vec<Vec<u8>>,
-    /// Values at the start of the last steps.
-    start_integers: Vec<i64>,
-    start_booleans: Vec<i32>,
-    start_strings: Vec<String>,
-    start_binaries: Vec<Vec<u8>>,
+    held: ChannelsState,
+    at_events: ChannelsState,
 }
 
 impl Values {
     /// Whether both belong to systems with equal numbers of connected variables.
     pub(crate) fn has_shape_of(&self, other: &Self) -> bool {
         self.reals.has_shape_of(&other.reals)
-            && self.integers.len() == other.integers.len()
-            && self.booleans.len() == other.booleans.len()
-            && self.strings.len() == other.strings.len()
-            && self.binaries.len() == other.binaries.len()
+            && self.held.has_shape_of(&other.held)
+            && self.at_events.has_shape_of(&other.at_events)
     }
 }
 
@@ -76,17 +71,13 @@ impl Exchange {
     pub(crate) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
         let reals = Reals::new(system, algorithm, refusing);
         let to_reals = reals.integer_sources().iter().map(|(port, _)| *port);
-        let none = std::iter::empty;
-        let integers = Channel::new(system, INTEGERS, ValueType::Integer, to_reals);
-        let booleans = Channel::new(system, BOOLEANS, ValueType::Boolean, none());
-        let strings = Channel::new(system, STRINGS, ValueType::String, none());
-        let binaries = Channel::new(system, BINARIES, ValueType::Binary, none());
-        let discrete = !(integers.latest.is_empty()
-            && booleans.latest.is_empty()
-            && strings.latest.is_empty()
-            && binaries.latest.is_empty());
-        let allow_nan = algorithm.allow_nan;
-        Self { reals, integers, booleans, strings, binaries, discrete, allow_nan, faulty: false }
+        let along = |way| -> Vec<&Connection> {
+            system.connections.iter().filter(|own| Way::of(system, own) == way).collect()
+        };
+        let held = Channels::new(system, &along(Way::Held), to_reals);
+        let at_events = Channels::new(system, &along(Way::AtEvents), std::iter::empty());
+        let ticks = Ticks::new(system, &along(Way::Tick));
+        Self { reals, held, at_events, ticks, allow_nan: algorithm.allow_nan, faulty: false }
     }
 
     /// Puts faults on connections; each fault is given with the input of its connection.
@@ -101,11 +92,11 @@ impl Exchange {
     ) -> Result<(), SystemError> {
         for (input, fault) in faults {
             let set = self.reals.set_fault(*input, fault)
-                || self.integers.set_fault(*input, fault)
-                || self.booleans.set_fault(*input, fault);
+                || self.held.set_fault(*input, fault)
+                || self.at_events.set_fault(*input, fault);
             if !set {
                 let what = format!(
-                    "{} has a fault, expected a connected input that is no String",
+                    "{} has a fault, expected a connected input that is no String and no clock",
                     system.name(*input)
                 );
                 return Err(SystemError::Algorithm { what });
@@ -115,10 +106,15 @@ impl Exchange {
         Ok(())
     }
 
+    /// Whether any connection has a fault.
+    pub(crate) fn is_faulty(&self) -> bool {
+        self.faulty
+    }
+
     /// Returns the faults on the connection to an input.
     pub(crate) fn fault(&self, input: Port) -> Option<&FaultChain> {
         let reals = self.reals.fault(input);
-        reals.or_else(|| self.integers.fault(input)).or_else(|| self.booleans.fault(input))
+        reals.or_else(|| self.held.fault(input)).or_else(|| self.at_events.fault(input))
     }
 
     /// Records the undisturbed values in the faults; the communication point `time` is final.
@@ -127,8 +123,8 @@ impl Exchange {
         if self.faulty {
             self.reals.commit(time);
             let ahead = |slave| self.reals.is_ahead(slave, time);
-            self.integers.commit(time, ahead);
-            self.booleans.commit(time, ahead);
+            self.held.commit(time, ahead);
+            self.at_events.commit(time, ahead);
         }
     }
 
@@ -140,40 +136,35 @@ impl Exchange {
         }
         let breaks = [
             self.reals.next_break(after),
-            self.integers.next_break(after),
-            self.booleans.next_break(after),
+            self.held.next_break(after),
+            self.at_events.next_break(after),
         ];
         breaks.into_iter().flatten().reduce(f64::min)
     }
 
     /// Iterates over all faults, for a checkpoint.
     pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultChain> {
-        self.reals.faults().chain(self.integers.faults()).chain(self.booleans.faults())
+        self.reals.faults().chain(self.held.faults()).chain(self.at_events.faults())
     }
 
     /// Prepares a step of `slave` from `time` over `size`: the last end values become the start
     /// values.
     pub(crate) fn shift(&mut self, slave: usize, time: f64, size: f64) {
         self.reals.shift(slave, time, size);
-        if self.discrete && self.reals.multirate {
-            self.integers.shift(slave);
-            self.booleans.shift(slave);
-            self.strings.shift(slave);
-            self.binaries.shift(slave);
+        if self.reals.multirate {
+            self.held.shift(slave);
+            self.at_events.shift(slave);
         }
     }
 
     /// Computes the inputs of `slave` for a step from `time` over `size`.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, size: f64) {
         self.reals.gather(slave, time, size);
-        if self.discrete {
+        if !self.held.is_empty() {
             let ahead = |source| {
                 self.reals.is_ahead(source, self.reals.source_time(slave, source, time, size))
             };
-            self.integers.gather(slave, time, ahead);
-            self.booleans.gather(slave, time, ahead);
-            self.strings.gather(slave, time, ahead);
-            self.binaries.gather(slave, time, ahead);
+            self.held.gather(slave, time, ahead);
         }
     }
 
@@ -188,14 +179,10 @@ impl Exchange {
     ) -> Result<StepResult, SystemError> {
         let (name, slave) = &mut system.slaves[position];
         let slave = slave.as_mut();
-        if self.discrete {
-            self.set_discrete(position, slave).map_err(|source| call(name, time, source))?;
-        }
+        self.set_held(position, slave).map_err(|source| call(name, time, source))?;
         let done = self.reals.advance(position, slave, (time, size), never_back);
         let done = done.map_err(|source| call(name, time, source))?;
-        if self.discrete {
-            self.read_discrete(position, slave).map_err(|source| call(name, time, source))?;
-        }
+        self.read_discrete(position, slave).map_err(|source| call(name, time, source))?;
         Ok(done)
     }
 
@@ -211,7 +198,7 @@ impl Exchange {
         if slave.in_background().is_none() {
             return Ok(());
         }
-        let set = self.set_discrete(position, slave.as_mut());
+        let set = self.set_held(position, slave.as_mut());
         set.and_then(|()| match slave.in_background() {
             Some(slave) => {
                 slave.begin_advance(&self.reals.step(position, (time, size), never_back))
@@ -251,7 +238,7 @@ impl Exchange {
     ) -> Result<Vec<StepResult>, SystemError> {
         for &position in slaves {
             let (name, slave) = &mut system.slaves[position];
-            self.set_discrete(position, slave.as_mut())
+            self.set_held(position, slave.as_mut())
                 .map_err(|source| call(name, span(position).0, source))?;
         }
         let results = self.reals.advance_all(system, slaves, span, never_back, run);
@@ -267,30 +254,28 @@ impl Exchange {
 
     /// Whether [`Reals::pass`] can make a complete sweep.
     pub(crate) fn passes(&self) -> bool {
-        !self.discrete && self.reals.passes()
+        self.held.is_empty() && self.at_events.is_empty() && self.reals.passes()
     }
 
-    fn set_discrete(&self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {
-        self.integers.set(position, slave)?;
-        self.booleans.set(position, slave)?;
-        self.strings.set(position, slave)?;
-        self.binaries.set(position, slave)
+    #[inline]
+    fn set_held(&mut self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {
+        if self.held.is_empty() { Ok(()) } else { self.held.set(position, slave) }
     }
 
+    #[inline]
     fn read_discrete(&mut self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {
-        self.integers.read(position, slave)?;
-        self.booleans.read(position, slave)?;
-        self.strings.read(position, slave)?;
-        self.binaries.read(position, slave)?;
-        self.copy_integers_to_reals();
-        Ok(())
+        if !self.held.is_empty() {
+            self.held.read(position, slave)?;
+            self.copy_integers_to_reals();
+        }
+        if self.at_events.is_empty() { Ok(()) } else { self.at_events.read(position, slave) }
     }
 
     /// Copies Integer outputs that are connected to Real inputs.
     fn copy_integers_to_reals(&mut self) {
         for k in 0..self.reals.integer_sources().len() {
             let (port, output) = self.reals.integer_sources()[k];
-            if let Some(&value) = self.integers.value(port) {
+            if let Some(&value) = self.held.integers.value(port) {
                 self.reals.outputs_mut()[output] = slave::to_real(value);
             }
         }
@@ -371,27 +356,15 @@ impl Exchange {
     /// Saves all values in `values`.
     pub(crate) fn save(&self, values: &mut Values) {
         values.reals.copy(&self.reals.trace);
-        values.integers.clone_from(&self.integers.latest);
-        values.booleans.clone_from(&self.booleans.latest);
-        values.strings.clone_from(&self.strings.latest);
-        values.binaries.clone_from(&self.binaries.latest);
-        values.start_integers.clone_from(&self.integers.start);
-        values.start_booleans.clone_from(&self.booleans.start);
-        values.start_strings.clone_from(&self.strings.start);
-        values.start_binaries.clone_from(&self.binaries.start);
+        self.held.save(&mut values.held);
+        self.at_events.save(&mut values.at_events);
     }
 
     /// Restores all values from `values`.
     pub(crate) fn restore(&mut self, values: &Values) {
         self.reals.trace.copy(&values.reals);
-        self.integers.latest.clone_from(&values.integers);
-        self.booleans.latest.clone_from(&values.booleans);
-        self.strings.latest.clone_from(&values.strings);
-        self.binaries.latest.clone_from(&values.binaries);
-        self.integers.start.clone_from(&values.start_integers);
-        self.booleans.start.clone_from(&values.start_booleans);
-        self.strings.start.clone_from(&values.start_strings);
-        self.binaries.start.clone_from(&values.start_binaries);
+        self.held.restore(&values.held);
+        self.at_events.restore(&values.at_events);
     }
 }
 

@@ -17,7 +17,8 @@
 //!    `engine/threads.rs` uses threads where they are faster.
 //! 5. For each slave, `exchange.rs` gathers the inputs (extrapolation, transformation, fault), sets
 //!    them, calls `fmi2DoStep` and reads the outputs.
-//! 6. When the communication point is final, faults and driven variables record it (`commit`).
+//! 6. `engine/instants.rs` iterates the events at the end of the step over all slaves.
+//! 7. When the communication point is final, faults and driven variables record it (`commit`).
 //!
 //! The crate reads no files and loads no libraries: the crate `fmu-import` turns FMUs into slaves,
 //! the crate `study` runs a `system.toml` or an SSP.
@@ -39,6 +40,7 @@ mod order;
 mod probe;
 mod readout;
 pub mod signal;
+mod signal_type;
 mod simulation;
 mod step_control;
 mod system;
@@ -52,6 +54,7 @@ pub use grid::EarlyEnd;
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use readout::{Readout, SlowState, SlowValues};
+pub use signal_type::SignalType;
 pub use simulation::{Checkpoint, KeptState, Simulation};
 pub use slave::{
     Advance, Background, CallError, Failure, Slave, StepResult, Transformation, Value, ValueType,

@@ -94,7 +94,9 @@ impl Readout {
                 DriveKind::Integer { least, largest } => {
                     self.integers[position] = integer(value, least, largest);
                 }
-                DriveKind::Boolean => self.booleans[position] = i32::from(value != 0.0),
+                DriveKind::Boolean | DriveKind::Clock => {
+                    self.booleans[position] = i32::from(value != 0.0);
+                }
                 DriveKind::String => {
                     if let Some(text) = text {
                         self.strings[position].clone_from(text);

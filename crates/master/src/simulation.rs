@@ -2,7 +2,7 @@
 //!
 //! [`Simulation::step`] is the entry point. It reads from the top: [`SizeControl`] plans a step,
 //! [`Events`] shorten it, [`Coupler`] repeats it until inputs and outputs agree, and [`Engine`]
-//! makes each sweep over the slaves.
+//! makes each sweep over the slaves, and iterates the events at its end.
 
 mod change;
 mod checkpoint;
@@ -13,7 +13,7 @@ use crate::algorithm::{Algorithm, Extrapolation, StepControl};
 use crate::capabilities;
 use crate::coupling::{Coupler, Fallbacks};
 use crate::drive::Scenario;
-use crate::engine::{Ending, Engine};
+use crate::engine::{Ending, Engine, Instants, Parts};
 use crate::error::SystemError;
 use crate::events::Events;
 use crate::exchange::{Exchange, call};
@@ -89,15 +89,21 @@ impl Simulation {
         let (grid, early_end) = Grid::new(&system, algorithm.step, &multiples, span)?;
         let origin = Origin::new(&system, algorithm, experiment);
         let order = by_direct_dependencies(&system);
+        system.discrete = algorithm.discrete.iter().copied().collect();
+        system.hand_over_events(algorithm.repeats(), experiment.start_time)?;
         initialise(&mut system, experiment, &mut scenario)?;
+        let (instants, ending) = first_instant(&mut system, &mut scenario, algorithm, experiment)?;
         let algorithm = &capabilities::confirm_rollback(&mut system, algorithm);
+        if !algorithm.repeats() {
+            system.hand_over_events(false, experiment.start_time)?;
+        }
         let mut exchange = capabilities::build_exchange(&mut system, algorithm);
         exchange.set_faults(&system, &scenario.faults)?;
         read_at_start(&mut system, &mut exchange, algorithm, experiment.start_time)?;
         scenario.drives.commit(experiment.start_time);
         let drives = scenario.drives;
         let ordering = (&order, multiples);
-        let engine = Engine::new(system, exchange, drives, grid, algorithm, ordering)?;
+        let engine = Engine::new(system, exchange, drives, grid, instants, algorithm, ordering)?;
         let control = SizeControl::new(&engine.system, &engine.exchange.reals, algorithm)?;
         let events = Events::new(&algorithm.events);
         let varies = algorithm.control != StepControl::Fixed || events.is_some();
@@ -111,7 +117,7 @@ impl Simulation {
             early_end,
             origin,
             attempted: experiment.start_time,
-            ended: None,
+            ended: ending,
         })
     }
 
@@ -227,6 +233,13 @@ impl Simulation {
         if let Some(ending) = made.ending {
             self.end_early(start, ending);
         }
+        if self.time() > start && self.ended.is_none() {
+            let settled = self.engine.settle()?;
+            self.ended = settled.ending;
+            if settled.jumped {
+                self.control.clear_history();
+            }
+        }
         if self.time() > start {
             self.engine.commit();
         }
@@ -301,9 +314,32 @@ fn read_at_start(
     if algorithm.extrapolation == Extrapolation::Quadratic {
         exchange.derive_at_start(system, (start, algorithm.step))?;
     }
+    exchange.accept_at_events(system.slaves.len(), start);
     exchange.reals.clear_history();
     exchange.commit(start);
     Ok(())
+}
+
+/// Iterates the instant at the start time; returns the slaves with events, and the one that requested the end.
+fn first_instant(
+    system: &mut System,
+    scenario: &mut Scenario,
+    algorithm: &Algorithm,
+    experiment: &Experiment,
+) -> Result<(Instants, Option<Ending>), SystemError> {
+    let mut instants = Instants::new(system);
+    if instants.is_empty() {
+        return Ok((instants, None));
+    }
+    let mut exchange = Exchange::new(system, algorithm, &[]);
+    exchange.set_faults(system, &scenario.faults)?;
+    for slave in 0..system.slaves.len() {
+        exchange.read_in_event(system, slave, experiment.start_time)?;
+    }
+    exchange.commit(experiment.start_time);
+    let mut parts = Parts { system, exchange: &mut exchange, drives: &mut scenario.drives };
+    let end = instants.iterate(&mut parts, experiment.start_time)?;
+    Ok((instants, end.ending))
 }
 
 // A simulation can move to another thread.

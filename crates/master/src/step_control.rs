@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::algorithm::{Algorithm, Extrapolation, StepControl};
 use crate::coupling::Coupler;
+use crate::drive::BREAK;
 use crate::engine::{Ending, Engine, SavedState, Swept};
 use crate::error::SystemError;
 use crate::exchange::Reals;
@@ -74,8 +75,6 @@ impl StepMade {
 
 /// Slot of the FMU states to which a rejected step returns.
 const SLOT: usize = 1;
-/// Relative distance below which a time may be a break; see [`near`].
-const BREAK: f64 = 1e-8;
 
 /// Returns the magnitude of a variable: its `nominal`, or 1.
 pub(crate) fn nominal(system: &System, port: Port) -> f64 {
@@ -135,17 +134,20 @@ impl SizeControl {
         })
     }
 
-    /// Plans the next step. A step of variable size ends where a signal or a fault starts, ends or
-    /// has a kink.
+    /// Plans the next step. It ends where a signal or a fault starts, ends or has a kink, and at known events, if all
+    /// slaves take steps of any size.
     #[inline]
-    pub(crate) fn plan(&self, engine: &Engine) -> PlannedStep {
+    pub(crate) fn plan(&self, engine: &mut Engine) -> PlannedStep {
         if self.kind == StepControl::Fixed {
             let (end, size) = engine.grid.next();
-            return PlannedStep { end, size };
+            return match engine.divided(engine.grid.time, end) {
+                None => PlannedStep { end, size },
+                Some(end) => PlannedStep::between(engine.grid.time, end),
+            };
         }
         let (time, end) = (engine.grid.time, engine.grid.end_of(self.size));
-        let breaks = engine.next_breaks(time + 1e-9 * self.size);
-        PlannedStep::between(time, breaks.fold(end, f64::min))
+        let breaks = engine.next_breaks(time + 1e-9 * self.size).fold(end, f64::min);
+        PlannedStep::between(time, engine.divided(time, breaks).unwrap_or(breaks))
     }
 
     /// Returns the end of a step from `time`, in s, in a run whose steps vary; `None` if all steps

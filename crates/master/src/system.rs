@@ -6,7 +6,7 @@ mod connecting;
 mod settings;
 mod units;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use fmu_description::{Causality, ModelDescription, ScalarVariable};
 
@@ -53,6 +53,10 @@ pub struct System {
     names: HashMap<String, usize>,
     /// Index of the connection of each input.
     sources: HashMap<Port, usize>,
+    /// Variables that the user says are discrete.
+    pub(crate) discrete: HashSet<Port>,
+    /// For each slave, whether the master handles its events.
+    pub(crate) events: Vec<bool>,
 }
 
 impl System {
@@ -69,6 +73,7 @@ impl System {
         let variables = slave.description().variables.iter().enumerate().rev();
         self.variables.push(variables.map(|(k, variable)| (variable.name.clone(), k)).collect());
         self.slaves.push((name.to_owned(), slave));
+        self.events.push(false);
         Ok(())
     }
 

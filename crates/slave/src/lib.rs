@@ -4,12 +4,14 @@
 //! process, a test double. `fmu-import` implements it for FMUs; `master` couples slaves.
 #![forbid(unsafe_code)]
 
+mod events;
 mod model_exchange;
 mod transformation;
 mod value;
 
 use std::fmt;
 
+pub use events::Events;
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 pub use fmu_description::abi::Status;
@@ -29,7 +31,9 @@ pub use value::{Value, ValueType, from_hex, mapped_integer, to_hex, to_real};
 /// * Each element of an array is a variable of [`Slave::description`] with a value reference of its own,
 ///   called `name[1,2]` with indices that start at 1. So there are always as many values as references.
 /// * Events are handled inside of the slave: [`Slave::do_step`] continues after an event until the end
-///   of the communication step.
+///   of the communication step. [`Slave::hand_over_events`] changes this.
+/// * Clocked variables may be read and set at any time: outside of the ticks of their clock, reading
+///   returns the value at the last tick, and a value set reaches the FMU at the next one.
 ///
 /// Arrays that belong together have the same length. A call succeeds (`fmi2OK`, `fmi2Warning`) or
 /// returns a [`CallError`]. The default implementation of an optional function returns
@@ -98,14 +102,15 @@ pub trait Slave: Send {
         Err(absent("fmi2SetInteger"))
     }
 
-    /// `fmi2GetBoolean`: 0 is false. A clock is true if it has ticked in the last step.
+    /// `fmi2GetBoolean`: 0 is false. In event mode a clock is true while it ticks, otherwise if it has ticked in
+    /// the last step or in the instant at its end.
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
         let _ = (references, values);
         Err(absent("fmi2GetBoolean"))
     }
 
-    /// `fmi2SetBoolean`: 0 is false. True makes a triggered input clock tick at the start of the next
-    /// step.
+    /// `fmi2SetBoolean`: 0 is false. True makes a triggered input clock tick: in event mode now, otherwise at the
+    /// start of the next step.
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
         let _ = (references, values);
         Err(absent("fmi2SetBoolean"))
@@ -235,6 +240,22 @@ pub trait Slave: Send {
         self.advance(&mut Advance::held(inputs, (time, size), never_back, outputs))
     }
 
+    /// Hands the events of this slave over to the master; call it before [`Slave::setup_experiment`]. Returns
+    /// whether the slave has events that [`Slave::events`] can handle. It then
+    ///
+    /// * is in event mode after [`Slave::exit_initialization_mode`],
+    /// * ends a step with [`StepResult::Event`] if an event happens at the end of the step, or, with `stop`, at the
+    ///   first event. Without `stop` it handles earlier events itself.
+    fn hand_over_events(&mut self, stop: bool) -> Result<bool, CallError> {
+        let _ = stop;
+        Ok(false)
+    }
+
+    /// Returns the interface for events that have been handed over.
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        None
+    }
+
     /// Logs the C calls of this slave: passes the text of each call to `sink` before it is made, and
     /// status, results and the end of the line after it. False if the slave cannot do so; the caller
     /// then logs the functions of this trait.
@@ -356,6 +377,11 @@ impl<'a> Advance<'a> {
 pub enum StepResult {
     /// The step reached its end.
     Whole,
+    /// The step ended at an event, which the master handles by [`Slave::events`].
+    Event {
+        /// The time reached, in s.
+        reached: f64,
+    },
     /// `fmi2Discard`: the step ended early.
     Part {
         /// `fmi2LastSuccessfulTime`: the time reached, in s.
@@ -405,6 +431,14 @@ impl CallError {
             _ => false,
         }
     }
+
+    /// Whether the instance must not go on: after `fmi2Error` a simulation can only be restored, reset or freed
+    /// (FMI 2.0.5, section 2.1.3; FMI 3.0.2, section 2.2.3). A function that is optional may return `fmi2Error`
+    /// for want of it, which [`CallError::leaves_the_instance_usable`] allows.
+    #[must_use]
+    pub fn ends_the_instance(&self) -> bool {
+        !self.leaves_the_instance_usable() || self.failure == Failure::Status(Status::Error)
+    }
 }
 
 /// How a call failed.
@@ -431,14 +465,6 @@ pub enum Failure {
     InvalidAnswer(String),
 }
 
-
-    /// Whether the instance must not go on: after `fmi2Error` a simulation can only be restored, reset or freed
-    /// (FMI 2.0.5, section 2.1.3; FMI 3.0.2, section 2.2.3). A function that is optional may return `fmi2Error`
-    /// for want of it, which [`CallError::leaves_the_instance_usable`] allows.
-    #[must_use]
-    pub fn ends_the_instance(&self) -> bool {
-        !self.leaves_the_instance_usable() || self.failure == Failure::Status(Status::Error)
-    }
 impl fmt::Display for Failure {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -1,5 +1,7 @@
 //! The trait [`ModelExchange`]: the functions that an integrator calls.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{CallError, Slave, absent};
 
 /// An instance of a model-exchange FMU (FMI 2.0.5, section 3.2; FMI 3.0, section 3), whose states the
@@ -74,8 +76,8 @@ pub struct CompletedStep {
     pub terminate_simulation: bool,
 }
 
-/// The result of [`ModelExchange::update_discrete_states`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// The result of [`ModelExchange::update_discrete_states`] and [`Events::update_discrete_states`](crate::Events).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "the flags of the standard, one for one")]
 pub struct EventInfo {
     /// `newDiscreteStatesNeeded`: call [`ModelExchange::update_discrete_states`] again.

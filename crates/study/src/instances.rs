@@ -117,7 +117,7 @@ fn choose_interface(
     stated: Option<Interface>,
 ) -> Result<Interface, Error> {
     let offers = |interface| match interface {
-        Interface::CoSimulation => description.co_simulation.is_some(),
+        Interface::CoSimulation => description.stepped().is_some(),
         Interface::ModelExchange => description.model_exchange.is_some(),
     };
     let default = if offers(Interface::CoSimulation) {
@@ -160,7 +160,7 @@ impl Content {
     /// Whether several runs of a process can use it.
     pub(crate) fn is_reusable(&self) -> bool {
         let own = self.description();
-        let simulation = own.co_simulation.as_ref();
+        let simulation = own.stepped();
         let exchange = own.model_exchange.as_ref();
         let once = simulation.is_some_and(|own| own.can_be_instantiated_only_once_per_process)
             || exchange.is_some_and(|own| own.can_be_instantiated_only_once_per_process);

@@ -109,8 +109,7 @@ pub struct CoSimulation {
     pub can_handle_events: bool,
 }
 
-/// `ScheduledExecution`: identifier and capability flags (FMI 3.0.2, section 5.4). FMUs are read and
-/// written with this interface; nothing in this project runs it.
+/// `ScheduledExecution`: identifier and capability flags (FMI 3.0.2, section 5.4).
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[expect(clippy::struct_excessive_bools, reason = "the flags of the standard, one for one")]
 pub struct ScheduledExecution {

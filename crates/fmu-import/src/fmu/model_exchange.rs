@@ -37,7 +37,7 @@ impl Fmu {
             return Err(FmuError::NoInterface { path: unpacked.folder().to_owned() });
         };
         let hint = |error| with_tool_hint(description, error);
-        let interface = Interface::ModelExchange;
+        let interface = v3::Interface::ModelExchange;
         let library = unpacked.library(&flags.model_identifier)?;
         let library = Arc::new(v3::Library::open(&library, interface).map_err(hint)?);
         let resources = resource_path(&unpacked.resources());

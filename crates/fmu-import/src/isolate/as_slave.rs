@@ -7,8 +7,9 @@ use serde::de::DeserializeOwned;
 use super::function::Function;
 use super::isolated::{Isolated, description_of_instance};
 use super::message::Request;
+use super::perform::{EVENT, PART, TERMINATED, WHOLE};
 use super::words::{Reader, Word, Writer};
-use slave::{Advance, Background, CallError, Slave, StepResult};
+use slave::{Advance, Background, CallError, EventInfo, Events, Slave, StepResult};
 
 /// Writes references and one value for each.
 #[inline]
@@ -25,9 +26,15 @@ fn assert_equally_many<T>(references: &[u32], values: &[T]) {
 }
 
 fn read_step_result(reader: &mut Reader<'_>) -> Option<StepResult> {
-    let part: u64 = reader.take()?;
-    let (reached, terminated) = (reader.take()?, reader.take::<u64>()? != 0);
-    Some(if part == 0 { StepResult::Whole } else { StepResult::Part { reached, terminated } })
+    let end: u64 = reader.take()?;
+    let reached = reader.take()?;
+    Some(match end {
+        WHOLE => StepResult::Whole,
+        EVENT => StepResult::Event { reached },
+        PART => StepResult::Part { reached, terminated: false },
+        TERMINATED => StepResult::Part { reached, terminated: true },
+        _ => return None,
+    })
 }
 
 impl Isolated {
@@ -251,5 +258,31 @@ impl Slave for Isolated {
 
     fn in_background(&mut self) -> Option<&mut dyn Background> {
         Some(self)
+    }
+
+    fn hand_over_events(&mut self, stop: bool) -> Result<bool, CallError> {
+        self.request(&Request::HandOverEvents(stop))
+    }
+
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        Some(self)
+    }
+}
+
+impl Events for Isolated {
+    fn next_event(&mut self) -> Result<Option<f64>, CallError> {
+        self.request(&Request::NextEvent)
+    }
+
+    fn enter_event_mode(&mut self) -> Result<(), CallError> {
+        self.request(&Request::EnterEventMode)
+    }
+
+    fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
+        self.request(&Request::UpdateDiscreteStates)
+    }
+
+    fn leave_event_mode(&mut self) -> Result<(), CallError> {
+        self.request(&Request::LeaveEventMode)
     }
 }

@@ -5,10 +5,7 @@ use fmu_description::Version;
 use serde::{Deserialize, Serialize};
 
 /// Names of functions of FMI 3.0 that are not the name of a [`Function`]: a slave calls them for it.
-const OTHERS: [&str; 24] = [
-    "fmi3EnterEventMode",
-    "fmi3EnterStepMode",
-    "fmi3UpdateDiscreteStates",
+const OTHERS: [&str; 21] = [
     "fmi3ExitConfigurationMode",
     "fmi3GetFloat32",
     "fmi3SetFloat32",
@@ -98,6 +95,11 @@ functions! {
     GetBinary = "fmi3GetBinary" "fmi3GetBinary" "fmi3GetBinary",
     SetBinary = "fmi3SetBinary" "fmi3SetBinary" "fmi3SetBinary",
     Configure = "fmi3EnterConfigurationMode" "fmi3EnterConfigurationMode" "fmi3EnterConfigurationMode",
+    HandOverEvents = "fmi2Instantiate" "fmi3InstantiateCoSimulation" "fmiInstantiateSlave",
+    NextEvent = "fmi2NewDiscreteStates" "fmi3UpdateDiscreteStates" "fmi2NewDiscreteStates",
+    EnterEventMode = "fmi2EnterEventMode" "fmi3EnterEventMode" "fmi2EnterEventMode",
+    UpdateDiscreteStates = "fmi2NewDiscreteStates" "fmi3UpdateDiscreteStates" "fmi2NewDiscreteStates",
+    LeaveEventMode = "fmi2EnterContinuousTimeMode" "fmi3EnterStepMode" "fmi2EnterContinuousTimeMode",
     // Transfer the parts of a request or of an answer that is longer than the shared memory.
     Upload = "the transfer of data to it" "the transfer of data to it" "the transfer of data to it",
     Download = "the transfer of data from it" "the transfer of data from it" "the transfer of data from it",

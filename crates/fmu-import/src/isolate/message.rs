@@ -48,6 +48,12 @@ pub(super) enum Request<'a> {
     RestoreState(usize),
     SerializeState,
     DeserializeState(&'a [u8]),
+    /// Whether a step ends at the first event.
+    HandOverEvents(bool),
+    NextEvent,
+    EnterEventMode,
+    UpdateDiscreteStates,
+    LeaveEventMode,
     Free,
 }
 
@@ -88,6 +94,11 @@ impl Request<'_> {
             Request::RestoreState(_) => Function::RestoreState,
             Request::SerializeState => Function::SerializeState,
             Request::DeserializeState(_) => Function::DeserializeState,
+            Request::HandOverEvents(_) => Function::HandOverEvents,
+            Request::NextEvent => Function::NextEvent,
+            Request::EnterEventMode => Function::EnterEventMode,
+            Request::UpdateDiscreteStates => Function::UpdateDiscreteStates,
+            Request::LeaveEventMode => Function::LeaveEventMode,
             Request::Free => Function::Free,
         }
     }

@@ -11,12 +11,18 @@ use super::layout::Shared;
 use super::message::{RemoteError, Request, encode};
 use super::words::{Reader, Word, Writer};
 use crate::{Fmu, FmuError};
-use slave::{CallError, Slave, StepResult};
+use slave::{CallError, Events, Slave, StepResult, absent};
 
 /// First word of an answer that consists of words.
 pub(super) const VALUES: u64 = 0;
 /// First word of an encoded answer or error. The number of all its bytes and its first bytes follow.
 pub(super) const MESSAGE: u64 = 1;
+
+/// The end of a step: complete, at an event, partial, or partial at the request of the FMU.
+pub(super) const WHOLE: u64 = 0;
+pub(super) const EVENT: u64 = 1;
+pub(super) const PART: u64 = 2;
+pub(super) const TERMINATED: u64 = 3;
 
 /// The result of a command; `None` if its arguments are invalid.
 pub(super) type CommandResult = Option<Result<(), CallError>>;
@@ -176,12 +182,30 @@ impl Executor {
                 return reply(done.map(|()| changes), answer);
             }
             Request::SerializeState => return reply(instance.serialize_state(), answer),
+            Request::HandOverEvents(stop) => {
+                return reply(instance.hand_over_events(stop), answer);
+            }
+            Request::NextEvent => {
+                let next = events(instance.as_mut()).and_then(Events::next_event);
+                return reply(next, answer);
+            }
+            Request::UpdateDiscreteStates => {
+                let events = events(instance.as_mut());
+                return reply(events.and_then(Events::update_discrete_states), answer);
+            }
+            Request::EnterEventMode => events(instance.as_mut()).and_then(Events::enter_event_mode),
+            Request::LeaveEventMode => events(instance.as_mut()).and_then(Events::leave_event_mode),
             Request::Open(_) | Request::Renew { .. } | Request::Free => {
                 Err(super::worker::invalid_command(request.function()))
             }
         };
         reply(done, answer);
     }
+}
+
+/// Returns the events of an instance that has handed them over.
+fn events(instance: &mut dyn Slave) -> Result<&mut dyn Events, CallError> {
+    instance.events().ok_or_else(|| absent("fmi3EnterEventMode"))
 }
 
 /// Encodes an answer.
@@ -199,14 +223,15 @@ impl Step {
     ) -> CommandResult {
         self.read(reader)?;
         Some(self.run(instance, shared).map(|done| {
-            let (part, reached, terminated) = match done {
-                StepResult::Whole => (false, 0.0, false),
-                StepResult::Part { reached, terminated } => (true, reached, terminated),
+            let (end, reached) = match done {
+                StepResult::Whole => (WHOLE, 0.0),
+                StepResult::Event { reached } => (EVENT, reached),
+                StepResult::Part { reached, terminated: false } => (PART, reached),
+                StepResult::Part { reached, terminated: true } => (TERMINATED, reached),
             };
             writer.put(VALUES);
-            writer.put(u64::from(part));
+            writer.put(end);
             writer.put(reached);
-            writer.put(u64::from(terminated));
             writer.put_all(&self.output_values);
             writer.put_all(&self.output_derivatives);
         }))

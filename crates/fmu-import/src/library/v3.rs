@@ -13,7 +13,7 @@ mod step;
 mod values;
 
 use std::cell::{Cell, RefCell};
-use std::ffi::CStr;
+use std::ffi::{CStr, c_void};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,13 +22,39 @@ use fmu_description::abi::Status;
 use libloading::Library as Handle;
 
 use super::log::{Sink, receive_message};
-use super::{Interface, c_string, load};
+use super::{c_string, load};
 use crate::crash::Place;
 use crate::error::LoadError;
-use functions::{Functions, Instance, IntermediateUpdate, State};
+use functions::{ClockUpdate, Functions, Instance, IntermediateUpdate, Preemption, State};
 use intermediate::Inputs;
 pub(crate) use intermediate::ORDERS;
 use slave::{CallError, CallSink, Failure};
+pub(crate) use step::StepDone;
+
+/// The interface of an instance of FMI 3.0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Interface {
+    CoSimulation,
+    ModelExchange,
+    ScheduledExecution,
+}
+
+impl Interface {
+    /// Returns the name of the function that creates the instance.
+    fn function(self) -> &'static &'static str {
+        match self {
+            Interface::CoSimulation => &"fmi3InstantiateCoSimulation",
+            Interface::ModelExchange => &"fmi3InstantiateModelExchange",
+            Interface::ScheduledExecution => &"fmi3InstantiateScheduledExecution",
+        }
+    }
+}
+
+/// `clockUpdate`: after each model partition its output clocks and intervals are asked for in any case.
+unsafe extern "C" fn clock_update(_environment: *mut c_void) {}
+
+/// `lockPreemption` and `unlockPreemption`: in simulated time, one model partition ends before the next one begins.
+unsafe extern "C" fn preemption() {}
 
 /// A loaded library with the functions of FMI 3.0.
 pub(crate) struct Library {
@@ -39,8 +65,7 @@ pub(crate) struct Library {
     _handle: Handle,
 }
 
-/// The arguments of `fmi3InstantiateCoSimulation` or `fmi3InstantiateModelExchange` that depend on the
-/// FMU.
+/// The arguments of the function that creates an instance that depend on the FMU.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Instantiation<'a> {
     /// Which of the functions is called.
@@ -118,6 +143,25 @@ impl Library {
                 // SAFETY: as above.
                 unsafe { function(name, token, resources, false, false, environment, log) }
             }),
+            Interface::ScheduledExecution => self.functions.instantiate_scheduled.map(|function| {
+                let (update, lock) = (clock_update as ClockUpdate, preemption as Preemption);
+                let (update, lock, unlock) = (Some(update), Some(lock), Some(lock));
+                // SAFETY: as above.
+                unsafe {
+                    function(
+                        name,
+                        token,
+                        resources,
+                        false,
+                        false,
+                        environment,
+                        log,
+                        update,
+                        lock,
+                        unlock,
+                    )
+                }
+            }),
         };
         created.unwrap_or(std::ptr::null_mut())
     }
@@ -127,12 +171,7 @@ impl Library {
         self: &Arc<Self>,
         with: &Instantiation<'_>,
     ) -> Result<Component, LoadError> {
-        const CO_SIMULATION: &str = "fmi3InstantiateCoSimulation";
-        const MODEL_EXCHANGE: &str = "fmi3InstantiateModelExchange";
-        let function = match with.interface {
-            Interface::CoSimulation => &CO_SIMULATION,
-            Interface::ModelExchange => &MODEL_EXCHANGE,
-        };
+        let function = with.interface.function();
         let place = Place::new(with.name);
         let sink = Sink::new(&place, None);
         place.enter(function);

@@ -4,6 +4,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::Instance;
 use super::buffer::Buffer;
+use super::clocked::Listed;
 use super::elements::NativeType;
 use super::modes::Mode;
 use super::plan::Run;
@@ -54,7 +55,9 @@ impl Instance {
     ) -> Result<(), CallError> {
         self.for_runs(function, list, |own, run| {
             if run.kind == NativeType::Clock {
-                own.state.clocks.read(run);
+                own.read_clocks(run)?;
+            } else if own.is_silent(run) {
+                own.recall(run);
             } else {
                 run.buffer.get(&mut own.component, &run.references)?;
             }
@@ -82,7 +85,10 @@ impl Instance {
         put: fn(&mut Buffer, usize, T) -> Option<()>,
     ) -> Result<(), CallError> {
         self.for_runs(function, list, |own, run| {
-            if run.partial && run.kind != NativeType::Clock {
+            let silent = own.is_silent(run);
+            if run.partial && silent {
+                own.recall(run);
+            } else if run.partial && run.kind != NativeType::Clock {
                 run.buffer.get(&mut own.component, &run.references)?;
             }
             for &(position, place) in &run.places {
@@ -96,11 +102,13 @@ impl Instance {
                 }
             }
             if run.kind == NativeType::Clock {
-                return own.state.clocks.request(function, run);
+                return own.let_tick(function, run);
             }
-            if !run.clocks.is_empty() && own.state.mode.is_initialized() {
+            if !run.clocks.is_empty() {
+                own.remember(run);
+            }
+            if silent {
                 // Set when one of its clocks ticks.
-                run.deferred = true;
                 return Ok(());
             }
             if own.may_set(run.event, &run.shadows, |place| run.buffer.bits(place))? {
@@ -111,7 +119,7 @@ impl Instance {
     }
 
     /// Reads Strings or binaries by `get`.
-    pub(super) fn read_list<T: Clone + Default>(
+    pub(super) fn read_list<T: Listed>(
         &mut self,
         function: &'static str,
         list: &[u32],
@@ -119,20 +127,27 @@ impl Instance {
         get: Get<T>,
     ) -> Result<(), CallError> {
         self.for_runs(function, list, |own, run| {
+            if own.is_silent(run) {
+                let all = own.recall_list(run);
+                for &(position, place) in &run.places {
+                    values[position] = all[place].clone().unwrap_or_default();
+                }
+                return Ok(());
+            }
             if run.direct {
                 return get(own, &run.references, values);
             }
-            let mut found = vec![T::default(); run.shadows.len()];
-            get(own, &run.references, &mut found)?;
+            let mut all = vec![T::default(); run.shadows.len()];
+            get(own, &run.references, &mut all)?;
             for &(position, place) in &run.places {
-                values[position].clone_from(&found[place]);
+                values[position].clone_from(&all[place]);
             }
             Ok(())
         })
     }
 
     /// Passes Strings or binaries by `set`.
-    pub(super) fn write_list<T: Clone + Default + Hash>(
+    pub(super) fn write_list<T: Listed + Hash>(
         &mut self,
         function: &'static str,
         list: &[u32],
@@ -141,12 +156,22 @@ impl Instance {
         set: Set<T>,
     ) -> Result<(), CallError> {
         self.for_runs(function, list, |own, run| {
+            let silent = own.is_silent(run);
             let mut all = vec![T::default(); run.shadows.len()];
-            if run.partial {
+            if run.partial && silent {
+                let known = own.recall_list(run).into_iter();
+                all = known.map(Option::unwrap_or_default).collect();
+            } else if run.partial {
                 get(own, &run.references, &mut all)?;
             }
             for &(position, place) in &run.places {
                 all[place].clone_from(&values[position]);
+            }
+            if !run.clocks.is_empty() {
+                own.remember_list(run, &all);
+            }
+            if silent {
+                return Ok(());
             }
             if own.may_set(run.event, &run.shadows, |place| hash(&all[place]))? {
                 set(own, &run.references, &all)?;
@@ -163,7 +188,7 @@ impl Instance {
         shadows: &[usize],
         bits: impl Fn(usize) -> u64,
     ) -> Result<bool, CallError> {
-        if !(event && self.event_mode) {
+        if !(event && self.event_mode) || self.is_scheduled() {
             return Ok(true);
         }
         let mut changed = false;

@@ -13,6 +13,8 @@ trait Number: Copy + Default + PartialEq {
     fn from_integer(value: i64) -> Option<Self>;
     /// Returns bits that are equal for equal values only.
     fn bits(self) -> u64;
+    /// Returns the number with these [`Number::bits`].
+    fn from_bits(bits: u64) -> Self;
 }
 
 macro_rules! integers {
@@ -38,6 +40,12 @@ macro_rules! integers {
             #[allow(clippy::cast_lossless, clippy::cast_sign_loss, reason = "only compared")]
             fn bits(self) -> u64 {
                 self as u64
+            }
+
+            #[expect(clippy::allow_attributes, reason = "depends on the type")]
+            #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "of bits")]
+            fn from_bits(bits: u64) -> Self {
+                bits as Self
             }
         })*
     };
@@ -65,6 +73,10 @@ impl Number for f64 {
     fn bits(self) -> u64 {
         self.to_bits()
     }
+
+    fn from_bits(bits: u64) -> Self {
+        f64::from_bits(bits)
+    }
 }
 
 impl Number for f32 {
@@ -88,6 +100,11 @@ impl Number for f32 {
 
     fn bits(self) -> u64 {
         self.to_bits().into()
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "the bits of an f32")]
+    fn from_bits(bits: u64) -> Self {
+        f32::from_bits(bits as u32)
     }
 }
 
@@ -175,6 +192,16 @@ macro_rules! buffer {
                 match self {
                     $(Buffer::$variant(values) => values[position].bits(),)*
                     Buffer::Other => 0,
+                }
+            }
+
+            /// Stores the value with these [`Buffer::bits`].
+            pub(super) fn put_bits(&mut self, position: usize, bits: u64) {
+                match self {
+                    $(Buffer::$variant(values) => {
+                        values[position] = <$type as Number>::from_bits(bits);
+                    })*
+                    Buffer::Other => {}
                 }
             }
         }

@@ -1,11 +1,13 @@
-//! Clocks: input clocks based on time tick in the slave, triggered ones when the master says so; ticks of
-//! output clocks are kept until the next step (FMI 3.0.2, section 2.2.8).
+//! Clocks: input clocks based on time tick in the slave, triggered ones when the master says so; ticks are kept for
+//! the results until the next step (FMI 3.0.2, section 2.2.8).
 
 use std::collections::HashMap;
 
 use fmu_description::{Causality, ClockType, IntervalVariability, Kind, ModelDescription};
 
+use super::Instance;
 use super::access::refused;
+use super::modes::Mode;
 use super::plan::Run;
 use crate::library::v3::Component;
 use slave::CallError;
@@ -35,6 +37,14 @@ pub(super) struct Clocks {
     /// Triggered input clocks.
     triggered: Vec<u32>,
     outputs: Vec<u32>,
+    /// The clocks that tick now: from their activation to the next update of the discrete states.
+    active: Vec<u32>,
+    /// The input clocks whose model partitions have to run.
+    partitions: Vec<u32>,
+    /// The priorities of the input clocks.
+    priorities: HashMap<u32, i64>,
+    /// The input clocks that ticked in the present event.
+    event_ticks: Vec<u32>,
     /// The clocks that ticked in the last step.
     ticked: HashMap<u32, bool>,
     /// Triggered input clocks that tick at the start of the next step.
@@ -69,6 +79,7 @@ impl Clocks {
             };
             let reference = variable.value_reference;
             clocks.ticked.insert(reference, false);
+            clocks.priorities.insert(reference, attributes.priority.map_or(i64::MAX, i64::from));
             match (variable.causality, attributes.interval_variability) {
                 (Causality::Input, IntervalVariability::Triggered) => {
                     clocks.triggered.push(reference);
@@ -141,11 +152,11 @@ impl Clocks {
         !self.requested.is_empty() || self.timed.iter().any(|clock| clock.is_due(time))
     }
 
-    /// Moves the clocks that tick at `time` to their next ticks; returns their value references.
-    pub(super) fn tick(&mut self, time: f64) -> Vec<u32> {
-        let mut active = std::mem::take(&mut self.requested);
+    /// Moves the clocks that are due at `time` to their next ticks; returns their value references.
+    fn take_due(&mut self, time: f64) -> Vec<u32> {
+        let mut due = std::mem::take(&mut self.requested);
         for clock in self.timed.iter_mut().filter(|clock| clock.is_due(time)) {
-            active.push(clock.reference);
+            due.push(clock.reference);
             clock.ticks += 1;
             clock.next = clock.is_periodic().then(|| {
                 // From the count, so that rounding does not add up.
@@ -154,38 +165,69 @@ impl Clocks {
                 clock.first + ticks * clock.interval
             });
         }
-        for reference in &active {
-            self.ticked.insert(*reference, true);
-        }
-        active
+        due
     }
 
-    /// Asks which output clocks are active, in Event Mode before the discrete states are updated.
+    fn begin_tick(&mut self, reference: u32) {
+        self.ticked.insert(reference, true);
+        if !self.active.contains(&reference) {
+            self.active.push(reference);
+        }
+    }
+
+    /// Ends all ticks, after an update of the discrete states.
+    pub(super) fn end_ticks(&mut self) {
+        self.active.clear();
+    }
+
+    /// Ends the present event.
+    pub(super) fn end_event(&mut self) {
+        self.event_ticks.clear();
+    }
+
+    /// Returns the clocks whose model partitions have to run, the one of the highest priority first: the smallest
+    /// number.
+    pub(super) fn take_partitions(&mut self) -> Vec<u32> {
+        let mut due = std::mem::take(&mut self.partitions);
+        due.sort_by_key(|clock| self.priorities.get(clock).copied());
+        due
+    }
+
+    /// Whether one of `clocks` ticks now.
+    pub(super) fn is_active(&self, clocks: &[u32]) -> bool {
+        self.active.iter().any(|active| clocks.contains(active))
+    }
+
+    /// Whether a clock ticks now.
+    pub(super) fn any_active(&self) -> bool {
+        !self.active.is_empty()
+    }
+
+    /// Asks which output clocks tick, in Event Mode before the discrete states are updated.
     pub(super) fn read_outputs(&mut self, component: &mut Component) -> Result<(), CallError> {
         if self.outputs.is_empty() {
             return Ok(());
         }
         self.flags.resize(self.outputs.len(), 0);
         component.get_clock(&self.outputs, &mut self.flags)?;
-        for (reference, flag) in self.outputs.iter().zip(&self.flags) {
-            if *flag != 0 {
-                self.ticked.insert(*reference, true);
+        for place in 0..self.outputs.len() {
+            if self.flags[place] != 0 {
+                self.begin_tick(self.outputs[place]);
             }
         }
         Ok(())
     }
 
-    /// Asks for the intervals that an event at `time` may have changed; `active` ticked in it.
+    /// Asks for the intervals that an event at `time` may have changed.
     pub(super) fn ask_intervals(
         &mut self,
         component: &mut Component,
         time: f64,
-        active: &[u32],
     ) -> Result<(), CallError> {
         for clock in &mut self.timed {
             let ask = match clock.attributes.interval_variability {
                 IntervalVariability::Countdown => true,
-                IntervalVariability::Changing => active.contains(&clock.reference),
+                IntervalVariability::Changing => self.event_ticks.contains(&clock.reference),
                 _ => false,
             };
             if ask {
@@ -198,47 +240,97 @@ impl Clocks {
         Ok(())
     }
 
-    /// Stores in the buffer of a run which clocks ticked in the last step.
-    pub(super) fn read(&self, run: &mut Run) {
+    /// Stores in the buffer of a run which clocks tick `now`, or have ticked in the last step.
+    fn read(&self, run: &mut Run, now: bool) {
         for (place, reference) in run.references.iter().enumerate() {
-            let ticked = self.ticked.get(reference).copied().unwrap_or(false);
-            run.buffer.put_integer(place, ticked.into());
+            let ticked = || self.ticked.get(reference).copied().unwrap_or(false);
+            let ticks = if now { self.active.contains(reference) } else { ticked() };
+            run.buffer.put_integer(place, ticks.into());
         }
     }
 
-    /// Makes the triggered input clocks of a run tick whose value is true.
-    pub(super) fn request(&mut self, function: &'static str, run: &Run) -> Result<(), CallError> {
-        for (place, reference) in run.references.iter().enumerate() {
-            if run.buffer.integer(place) == Some(0) || self.requested.contains(reference) {
-                continue;
-            }
-            if !self.triggered.contains(reference) {
+    /// Returns the triggered input clocks of a run whose value is true.
+    fn triggered(&self, function: &'static str, run: &Run) -> Result<Vec<u32>, CallError> {
+        let all = run.references.iter().enumerate();
+        let set = all.filter(|(place, _)| run.buffer.integer(*place) != Some(0));
+        let clocks: Vec<u32> = set.map(|(_, reference)| *reference).collect();
+        match clocks.iter().find(|reference| !self.triggered.contains(reference)) {
+            None => Ok(clocks),
+            Some(reference) => {
                 let what = format!(
                     "cannot make the clock with the value reference {reference} tick, expected a \
                      triggered input clock"
                 );
-                return Err(refused(function, what));
+                Err(refused(function, what))
             }
-            self.requested.push(*reference);
         }
-        Ok(())
     }
 
     /// Returns the counters and times for a serialised state.
-    pub(super) fn state(&self) -> Vec<(u64, f64)> {
-        let state = |clock: &TimedClock| (clock.ticks, clock.next.unwrap_or(f64::NAN));
-        self.timed.iter().map(state).collect()
+    pub(super) fn state(&self) -> Vec<(u64, Option<f64>)> {
+        self.timed.iter().map(|clock| (clock.ticks, clock.next)).collect()
     }
 
-    /// Restores the counters and times of a serialised state.
-    pub(super) fn restore(&mut self, state: &[(u64, f64)]) {
-        for (clock, (ticks, next)) in self.timed.iter_mut().zip(state) {
-            (clock.ticks, clock.next) = (*ticks, Some(*next).filter(|next| !next.is_nan()));
+    /// Restores the counters and times of a serialised state; nothing ticks.
+    pub(super) fn restore(&mut self, state: &[(u64, Option<f64>)]) {
+        for (clock, &(ticks, next)) in self.timed.iter_mut().zip(state) {
+            (clock.ticks, clock.next) = (ticks, next);
         }
+        self.active.clear();
+        self.partitions.clear();
+        self.event_ticks.clear();
+        self.requested.clear();
+        self.begin_step();
+    }
+}
+
+impl Instance {
+    /// Makes the input clocks that are due tick.
+    pub(super) fn tick(&mut self) -> Result<(), CallError> {
+        if !self.state.clocks.is_due(self.state.time) {
+            return Ok(());
+        }
+        let due = self.state.clocks.take_due(self.state.time);
+        self.activate(&due)
     }
 
-    /// Returns the number of clocks that tick at times.
-    pub(super) fn timed(&self) -> usize {
-        self.timed.len()
+    /// Makes `clocks` tick in Event Mode: the FMU gets the values of their clocked inputs.
+    fn activate(&mut self, clocks: &[u32]) -> Result<(), CallError> {
+        if self.is_scheduled() {
+            self.state.clocks.partitions.extend(clocks);
+        } else {
+            self.component.activate_clocks(clocks)?;
+        }
+        for &reference in clocks {
+            self.state.clocks.begin_tick(reference);
+            self.state.clocks.event_ticks.push(reference);
+        }
+        if self.is_scheduled() { Ok(()) } else { self.set_clocked(clocks) }
+    }
+
+    /// Makes the triggered input clocks of a run tick whose value is true: now if the master handles the events,
+    /// otherwise at the start of the next step.
+    pub(super) fn let_tick(&mut self, function: &'static str, run: &Run) -> Result<(), CallError> {
+        let mut clocks = self.state.clocks.triggered(function, run)?;
+        if clocks.is_empty() {
+            return Ok(());
+        }
+        if self.hands_over && self.state.mode.is_initialized() {
+            self.enter_event()?;
+            return self.activate(&clocks);
+        }
+        clocks.retain(|clock| !self.state.clocks.requested.contains(clock));
+        self.state.clocks.requested.extend(clocks);
+        Ok(())
+    }
+
+    /// Stores in the buffer of a run which clocks tick.
+    pub(super) fn read_clocks(&mut self, run: &mut Run) -> Result<(), CallError> {
+        let now = self.hands_over && self.state.mode == Mode::Event;
+        if now {
+            self.state.clocks.read_outputs(&mut self.component)?;
+        }
+        self.state.clocks.read(run, now);
+        Ok(())
     }
 }

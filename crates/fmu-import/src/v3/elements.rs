@@ -100,6 +100,7 @@ impl NativeType {
 pub(super) struct Variable {
     pub(super) reference: u32,
     pub(super) kind: NativeType,
+    pub(super) causality: Causality,
     /// Number of elements; 1 for a scalar.
     pub(super) size: usize,
     /// Whether the variable may change in Event Mode only, once the FMU is initialised (FMI 3.0.2,
@@ -124,7 +125,7 @@ pub(crate) struct ElementView {
     base: u32,
     /// Variable and element of each reference from `base` on.
     cells: Vec<(usize, usize)>,
-    /// Whether all floating-point variables are scalars of type `Float64`.
+    /// Whether all floating-point variables are scalars of type `Float64` without clocks.
     pub(super) plain: bool,
     /// Number of elements of all variables with `event`.
     pub(super) shadows: usize,
@@ -144,7 +145,11 @@ impl ElementView {
             .collect();
         let mut builder = Builder {
             view: Self {
-                description: ModelDescription { variables: Vec::new(), ..own.clone() },
+                description: ModelDescription {
+                    variables: Vec::new(),
+                    co_simulation: own.stepped(),
+                    ..own.clone()
+                },
                 variables: Vec::new(),
                 by_reference: HashMap::new(),
                 base: 0,
@@ -352,7 +357,8 @@ impl Builder {
             view.cells.extend((0..size).map(|element| (number, element)));
         }
         let kind = NativeType::of(&variable.kind);
-        view.plain &= kind != NativeType::Float32 && !(kind == NativeType::Float64 && is_array);
+        let is_plain = !is_array && variable.clocks.is_empty();
+        view.plain &= kind != NativeType::Float32 && (kind != NativeType::Float64 || is_plain);
         let event = !(variable.causality == Causality::Input
             && variable.variability == Variability::Continuous);
         let clocks = variable.clocks.iter().filter_map(|index| {
@@ -361,6 +367,7 @@ impl Builder {
         view.variables.push(Variable {
             reference: variable.value_reference,
             kind,
+            causality: variable.causality,
             size,
             event,
             intermediate: !event

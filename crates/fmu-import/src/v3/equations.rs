@@ -2,7 +2,7 @@
 
 use super::Instance;
 use super::modes::Mode;
-use slave::{CallError, CompletedStep, EventInfo};
+use slave::{CallError, CompletedStep};
 
 impl Instance {
     pub(crate) fn number_of_continuous_states(&mut self) -> Result<usize, CallError> {
@@ -49,27 +49,8 @@ impl Instance {
         self.component.completed_integrator_step(never_back)
     }
 
-    pub(crate) fn enter_event_mode(&mut self) -> Result<(), CallError> {
-        self.enter_event()
-    }
-
-    /// Makes the clocks tick that are due, and updates the discrete states once.
-    pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
-        let time = self.state.time;
-        let active = self.tick(time)?;
-        self.active.extend(active);
-        self.state.clocks.read_outputs(&mut self.component)?;
-        let mut info = self.component.update_discrete_states()?;
-        if !info.discrete_states_need_update {
-            let active = std::mem::take(&mut self.active);
-            self.state.clocks.ask_intervals(&mut self.component, time, &active)?;
-        }
-        let events = [info.next_event_time, self.state.clocks.next()];
-        info.next_event_time = events.into_iter().flatten().reduce(f64::min);
-        Ok(info)
-    }
-
     pub(crate) fn enter_continuous_time_mode(&mut self) -> Result<(), CallError> {
+        self.state.clocks.end_event();
         self.component.enter_continuous_time_mode()?;
         self.state.mode = Mode::Step;
         Ok(())

@@ -2,9 +2,10 @@
 
 use super::Instance;
 use super::access::refused;
-use crate::library::Interface;
+use crate::library::v3::Interface;
 use fmu_description::number::seconds;
-use slave::{CallError, Failure, StepResult};
+use serde::{Deserialize, Serialize};
+use slave::{CallError, EventInfo, Failure, StepResult};
 
 use fmu_description::abi::Status;
 
@@ -18,7 +19,7 @@ const ROUNDING: f64 = 1e-9;
 const SMALLEST: f64 = 1e-6;
 
 /// The mode of the FMU.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Mode {
     #[default]
     Instantiated,
@@ -40,53 +41,92 @@ pub(super) struct State {
     pub(super) mode: Mode,
     /// `nextEventTime` in s.
     pub(super) next_event: Option<f64>,
+    /// Whether an event has happened that the master has not handled yet.
+    pub(super) event: bool,
     /// Whether the FMU has requested the end of the simulation.
     pub(super) terminate: bool,
     /// Time of the last step or event in s.
     pub(super) time: f64,
     /// Values set last of the elements that may change in Event Mode only.
     pub(super) held: Vec<Option<u64>>,
+    /// Values of clocked elements at their last tick, and for their next one.
+    pub(super) memory: super::clocked::Memory,
     pub(super) clocks: super::clocks::Clocks,
 }
 
 impl Instance {
-    /// Ends the initialization and handles the event at the start time.
+    /// Ends the initialization; handles the event at the start time, unless the master does.
     pub(super) fn end_initialization(&mut self) -> Result<(), CallError> {
         let start = self.state.time;
         self.state.clocks.start(&mut self.component, start)?;
         self.component.exit_initialization_mode()?;
-        if self.interface == Interface::ModelExchange {
-            self.state.mode = Mode::Event;
-            Ok(())
-        } else if self.event_mode {
-            self.state.mode = Mode::Event;
-            self.handle_event(self.state.time)
+        self.state.mode = if self.interface == Interface::ModelExchange || self.event_mode {
+            Mode::Event
         } else {
-            self.state.mode = Mode::Step;
-            Ok(())
-        }
+            Mode::Step
+        };
+        if self.event_mode && !self.hands_over { self.handle_event() } else { Ok(()) }
     }
 
-    /// Enters Event Mode.
+    /// Enters Event Mode, if the FMU is not in it.
     pub(super) fn enter_event(&mut self) -> Result<(), CallError> {
-        self.component.enter_event_mode()?;
-        self.state.mode = Mode::Event;
+        if self.state.mode != Mode::Event {
+            if !self.is_scheduled() {
+                self.component.enter_event_mode()?;
+            }
+            self.state.mode = Mode::Event;
+        }
+        self.state.event = false;
         Ok(())
     }
 
-    /// Handles the event at `time`: clocks tick, discrete states are updated until they do not change
-    /// any more; then enters Step Mode.
-    pub(super) fn handle_event(&mut self, time: f64) -> Result<(), CallError> {
-        if self.state.mode == Mode::Step {
-            self.enter_event()?;
+    /// Enters Event Mode; input clocks that are due tick.
+    pub(crate) fn enter_event_mode(&mut self) -> Result<(), CallError> {
+        self.enter_event()?;
+        self.tick()
+    }
+
+    /// Updates the discrete states once. Input clocks that are due tick before, all ticks end after it.
+    pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
+        self.tick()?;
+        if self.is_scheduled() {
+            return self.run_partitions();
         }
-        let active = self.tick(time)?;
+        self.state.clocks.read_outputs(&mut self.component)?;
+        self.read_clocked()?;
+        let mut info = self.component.update_discrete_states()?;
+        self.state.clocks.end_ticks();
+        if !info.discrete_states_need_update {
+            self.state.clocks.ask_intervals(&mut self.component, self.state.time)?;
+        }
+        self.state.terminate |= info.terminate_simulation;
+        self.state.next_event = info.next_event_time;
+        info.next_event_time = self.next_event();
+        Ok(info)
+    }
+
+    /// Enters Step Mode.
+    pub(crate) fn leave_event_mode(&mut self) -> Result<(), CallError> {
+        self.state.clocks.end_event();
+        if !self.is_scheduled() {
+            self.component.enter_step_mode()?;
+        }
+        self.state.mode = Mode::Step;
+        Ok(())
+    }
+
+    /// Returns the time of the next time event or tick in s.
+    pub(crate) fn next_event(&self) -> Option<f64> {
+        let events = [self.state.next_event, self.state.clocks.next()];
+        events.into_iter().flatten().reduce(f64::min)
+    }
+
+    /// Handles the event at the time reached: discrete states are updated until they do not change any more.
+    pub(super) fn handle_event(&mut self) -> Result<(), CallError> {
+        self.enter_event_mode()?;
         let mut updates = 0;
         loop {
-            self.state.clocks.read_outputs(&mut self.component)?;
-            let info = self.component.update_discrete_states()?;
-            self.state.terminate |= info.terminate_simulation;
-            self.state.next_event = info.next_event_time;
+            let info = self.update_discrete_states()?;
             updates += 1;
             if !info.discrete_states_need_update || info.terminate_simulation {
                 break;
@@ -94,40 +134,21 @@ impl Instance {
             if updates == UPDATES {
                 let what = format!(
                     "needs more than {UPDATES} updates of the discrete states at t = {} s",
-                    seconds(time)
+                    seconds(self.state.time)
                 );
                 return Err(refused("fmi3UpdateDiscreteStates", what));
             }
         }
-        self.state.clocks.ask_intervals(&mut self.component, time, &active)?;
-        self.component.enter_step_mode()?;
-        self.state.mode = Mode::Step;
-        Ok(())
+        self.leave_event_mode()
     }
 
-    /// Makes the clocks tick that are due at `time`, and returns them.
-    pub(super) fn tick(&mut self, time: f64) -> Result<Vec<u32>, CallError> {
-        if !self.state.clocks.is_due(time) {
-            return Ok(Vec::new());
-        }
-        let active = self.state.clocks.tick(time);
-        self.component.activate_clocks(&active)?;
-        self.set_deferred(&active)?;
-        Ok(active)
+    /// Hands the events over to the master; returns whether there are any.
+    pub(crate) fn hand_over_events(&mut self, stop: bool) -> bool {
+        (self.hands_over, self.stops) = (true, stop);
+        self.event_mode
     }
 
-    /// Sets the values that waited for a tick of one of the `active` clocks.
-    fn set_deferred(&mut self, active: &[u32]) -> Result<(), CallError> {
-        for run in self.plans.all_runs() {
-            if run.deferred && run.clocks.iter().any(|clock| active.contains(clock)) {
-                run.deferred = false;
-                run.buffer.set(&mut self.component, &run.references)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Steps from `time` over `size` s; handles the events within the step and at its end.
+    /// Steps from `time` over `size` s; handles the events within the step and at its end, unless the master does.
     pub(super) fn step(
         &mut self,
         time: f64,
@@ -140,10 +161,11 @@ impl Instance {
     }
 
     fn parts(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
+        self.state.time = time;
         if self.event_mode {
             self.state.clocks.begin_step();
-            if self.state.mode == Mode::Event || self.is_event_due(time, size) {
-                self.handle_event(time)?;
+            if self.state.mode == Mode::Event || self.state.event || self.is_event_due(time, size) {
+                self.handle_event()?;
             }
         }
         if self.state.terminate {
@@ -153,7 +175,7 @@ impl Instance {
         let (mut now, mut left, mut largest, mut standstills) = (time, size, f64::INFINITY, 0);
         loop {
             let limited = self.limited(now, left, rounding).min(largest);
-            let done = match self.component.do_step(now, limited, never_back) {
+            let done = match self.advance(now, limited, never_back) {
                 Ok(done) => done,
                 Err(error)
                     if error.failure == Failure::Status(Status::Discard)
@@ -180,7 +202,11 @@ impl Instance {
                 return Ok(StepResult::Part { reached, terminated: true });
             }
             if self.event_mode && (done.event || self.is_event_due(reached, size)) {
-                self.handle_event(reached)?;
+                if self.hands_over && (self.stops || reached >= end - rounding) {
+                    self.state.event = true;
+                    return Ok(StepResult::Event { reached });
+                }
+                self.handle_event()?;
                 if self.state.terminate {
                     return Ok(StepResult::Part { reached, terminated: true });
                 }
@@ -205,7 +231,7 @@ impl Instance {
         }
         let events = [self.state.next_event, self.state.clocks.next()].into_iter().flatten();
         let sizes = events.map(|event| event - now).filter(|size| *size > rounding);
-        let least = sizes.reduce(f64::min).unwrap_or(f64::INFINITY);
+        let least = sizes.fold(f64::INFINITY, f64::min);
         // A step that ends shortly before its end would leave a rest that is rounding.
         if least < left - rounding { least } else { left }
     }

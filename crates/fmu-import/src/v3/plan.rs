@@ -19,15 +19,12 @@ pub(super) struct Plan {
 /// One call: variables of one type with the same clocks, all of which may or may not change outside of
 /// events.
 #[derive(Debug)]
-#[expect(clippy::struct_excessive_bools, reason = "four independent properties")]
 pub(super) struct Run {
     pub(super) kind: NativeType,
     /// Whether the variables may change in Event Mode only.
     pub(super) event: bool,
     /// Value references of the clocks of the variables.
     pub(super) clocks: Vec<u32>,
-    /// Whether the buffer has values that wait for a tick of the clocks.
-    pub(super) deferred: bool,
     /// Value references of whole variables, for the C function.
     pub(super) references: Vec<u32>,
     /// For each value: position in the list, position among the values of the call.
@@ -82,7 +79,6 @@ fn run_for(runs: &mut Vec<Run>, variable: &Variable) -> usize {
             kind,
             event,
             clocks: clocks.clone(),
-            deferred: false,
             references: Vec::new(),
             places: Vec::new(),
             shadows: Vec::new(),
@@ -95,6 +91,19 @@ fn run_for(runs: &mut Vec<Run>, variable: &Variable) -> usize {
 }
 
 impl Run {
+    /// Returns the calls for whole `variables`.
+    pub(super) fn of_whole<'a>(variables: impl IntoIterator<Item = &'a Variable>) -> Vec<Self> {
+        let mut runs = Vec::new();
+        for variable in variables {
+            let run = run_for(&mut runs, variable);
+            runs[run].add(variable);
+        }
+        for run in &mut runs {
+            run.buffer = Buffer::new(run.kind, run.shadows.len());
+        }
+        runs
+    }
+
     /// Adds a variable and returns the place of its first element.
     fn add(&mut self, variable: &Variable) -> usize {
         self.references.push(variable.reference);
@@ -136,11 +145,6 @@ impl Plans {
 
     pub(super) fn put_back(&mut self, plan: usize, runs: Vec<Run>) {
         self.kept[plan].runs = runs;
-    }
-
-    /// Iterates over the runs of all plans.
-    pub(super) fn all_runs(&mut self) -> impl Iterator<Item = &mut Run> {
-        self.kept.iter_mut().flat_map(|plan| &mut plan.runs)
     }
 
     pub(super) fn clear(&mut self) {

@@ -1,12 +1,31 @@
 //! FMU states with what the slave knows beside them: mode, next event, clocks, values set last.
 
-use super::Instance;
-use super::access::refused;
-use super::modes::{Mode, State};
+use serde::{Deserialize, Serialize};
 use slave::CallError;
 
+use super::Instance;
+use super::access::refused;
+use super::clocked::Memory;
+use super::modes::{Mode, State};
+
 /// The first bytes of a serialised state.
-const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x01";
+const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x02";
+const SERIALIZE: &str = "fmi3SerializeFMUState";
+const DESERIALIZE: &str = "fmi3DeserializeFMUState";
+
+/// What a serialised state has beside that of the FMU.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    initialized: bool,
+    next_event: Option<f64>,
+    event: bool,
+    terminate: bool,
+    time: f64,
+    held: Vec<Option<u64>>,
+    memory: Memory,
+    /// For each clock that ticks at times: number of ticks, and time of the next one in s.
+    clocks: Vec<(u64, Option<f64>)>,
+}
 
 impl Instance {
     pub(crate) fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
@@ -30,77 +49,41 @@ impl Instance {
     pub(crate) fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         if self.state.mode == Mode::Event {
             // A serialised state is always in Step Mode.
-            self.handle_event(self.state.time)?;
+            self.handle_event()?;
         }
-        let mut bytes = MAGIC.to_vec();
-        bytes.push(u8::from(self.state.mode.is_initialized()));
-        bytes.push(self.state.terminate.into());
-        for time in [self.state.time, self.state.next_event.unwrap_or(f64::NAN)] {
-            bytes.extend(time.to_le_bytes());
-        }
-        bytes.extend((self.state.held.len() as u64).to_le_bytes());
-        for held in &self.state.held {
-            bytes.push(held.is_some().into());
-            bytes.extend(held.unwrap_or(0).to_le_bytes());
-        }
-        for (ticks, next) in self.state.clocks.state() {
-            bytes.extend(ticks.to_le_bytes());
-            bytes.extend(next.to_le_bytes());
-        }
-        bytes.extend(self.component.serialize_state()?);
-        Ok(bytes)
+        let theirs = self.component.serialize_state()?;
+        let State { mode, next_event, event, terminate, time, held, memory, clocks } = &self.state;
+        let own = Kept {
+            initialized: mode.is_initialized(),
+            next_event: *next_event,
+            event: *event,
+            terminate: *terminate,
+            time: *time,
+            held: held.clone(),
+            memory: memory.clone(),
+            clocks: clocks.state(),
+        };
+        postcard::to_extend(&(own, theirs), MAGIC.to_vec())
+            .map_err(|error| refused(SERIALIZE, format!("cannot store the state: {error}")))
     }
 
     pub(crate) fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        const NAME: &str = "fmi3DeserializeFMUState";
-        let Some((state, rest)) = self.parsed(bytes) else {
+        let read = bytes.strip_prefix(MAGIC).and_then(|rest| postcard::from_bytes(rest).ok());
+        let read = read.filter(|(own, _): &(Kept, &[u8])| {
+            own.held.len() == self.state.held.len()
+                && own.clocks.len() == self.state.clocks.state().len()
+        });
+        let Some((own, theirs)) = read else {
             let what = "cannot restore the state: it is not one of this FMU".to_owned();
-            return Err(refused(NAME, what));
+            return Err(refused(DESERIALIZE, what));
         };
-        self.component.deserialize_state(rest)?;
-        self.state = state;
+        self.component.deserialize_state(theirs)?;
+        let state = &mut self.state;
+        state.mode = if own.initialized { Mode::Step } else { Mode::Instantiated };
+        (state.next_event, state.event) = (own.next_event, own.event);
+        (state.terminate, state.time) = (own.terminate, own.time);
+        (state.held, state.memory) = (own.held, own.memory);
+        state.clocks.restore(&own.clocks);
         Ok(())
-    }
-
-    /// Returns the state of the slave and the bytes of the FMU.
-    fn parsed<'a>(&self, bytes: &'a [u8]) -> Option<(State, &'a [u8])> {
-        let mut reader = Reader { bytes: bytes.strip_prefix(MAGIC)? };
-        let mut state = State { clocks: self.state.clocks.clone(), ..State::default() };
-        state.mode = if reader.byte()? == 0 { Mode::Instantiated } else { Mode::Step };
-        state.terminate = reader.byte()? != 0;
-        state.time = f64::from_bits(reader.word()?);
-        state.next_event = Some(f64::from_bits(reader.word()?)).filter(|time| !time.is_nan());
-        if reader.word()? != self.state.held.len() as u64 {
-            return None;
-        }
-        for _ in 0..self.state.held.len() {
-            let is_known = reader.byte()? != 0;
-            let value = reader.word()?;
-            state.held.push(is_known.then_some(value));
-        }
-        let mut clocks = Vec::new();
-        for _ in 0..self.state.clocks.timed() {
-            clocks.push((reader.word()?, f64::from_bits(reader.word()?)));
-        }
-        state.clocks.restore(&clocks);
-        Some((state, reader.bytes))
-    }
-}
-
-struct Reader<'a> {
-    bytes: &'a [u8],
-}
-
-impl Reader<'_> {
-    fn byte(&mut self) -> Option<u8> {
-        let (first, rest) = self.bytes.split_first()?;
-        self.bytes = rest;
-        Some(*first)
-    }
-
-    fn word(&mut self) -> Option<u64> {
-        let (first, rest) = self.bytes.split_first_chunk::<8>()?;
-        self.bytes = rest;
-        Some(u64::from_le_bytes(*first))
     }
 }

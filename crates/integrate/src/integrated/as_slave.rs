@@ -1,20 +1,12 @@
 //! [`Integrated`] as a [`Slave`].
 
 use fmu_description::{Experiment, ModelDescription};
-use slave::{CallError, CallSink, Slave, StepResult};
+use slave::{CallError, CallSink, Events, Slave, StepResult};
 
 use super::{Integrated, Mode, TOLERANCE, failed};
 
 /// Largest difference between the start of a step and the end of the last one, relative to the step.
 const GAP: f64 = 1e-6;
-
-impl Integrated {
-    /// Prepares the change of variables that are not continuous inputs: after initialization, this takes
-    /// event mode.
-    fn prepare_change(&mut self) -> Result<(), CallError> {
-        if self.point.mode == Mode::Continuous { self.enter_event() } else { Ok(()) }
-    }
-}
 
 impl Integrated {
     /// Whether a variable that is no continuous input would get a new value.
@@ -68,13 +60,13 @@ impl Slave for Integrated {
         self.instance.enter_initialization_mode()
     }
 
-    /// Also iterates the first event and enters continuous-time mode.
+    /// Also iterates the first event and enters continuous-time mode, unless the master handles the events.
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
         self.instance.exit_initialization_mode()?;
         self.point.mode = Mode::Event;
         self.allocate()?;
         self.inputs.read(self.instance.as_mut(), self.point.time)?;
-        self.settle()
+        if self.hands_over { Ok(()) } else { self.settle() }
     }
 
     fn terminate(&mut self) -> Result<(), CallError> {
@@ -97,7 +89,7 @@ impl Slave for Integrated {
             if !self.changes_discrete(references, values) {
                 return self.set_continuous(references, values);
             }
-            self.prepare_change()?;
+            self.enter_event()?;
         }
         self.inputs.record(self.point.time, references, values);
         self.point.input_changed = true;
@@ -115,7 +107,7 @@ impl Slave for Integrated {
             if known.is_ok() && self.integers == values {
                 return Ok(());
             }
-            self.prepare_change()?;
+            self.enter_event()?;
         }
         self.instance.set_integer(references, values)
     }
@@ -137,7 +129,7 @@ impl Slave for Integrated {
             if known && !changes {
                 return Ok(());
             }
-            self.prepare_change()?;
+            self.enter_event()?;
         }
         self.instance.set_boolean(references, values)
     }
@@ -152,7 +144,7 @@ impl Slave for Integrated {
             if self.instance.get_string(references, &mut known).is_ok() && known == values {
                 return Ok(());
             }
-            self.prepare_change()?;
+            self.enter_event()?;
         }
         self.instance.set_string(references, values)
     }
@@ -167,7 +159,7 @@ impl Slave for Integrated {
             if self.instance.get_binary(references, &mut known).is_ok() && known == values {
                 return Ok(());
             }
-            self.prepare_change()?;
+            self.enter_event()?;
         }
         self.instance.set_binary(references, values)
     }
@@ -220,6 +212,16 @@ impl Slave for Integrated {
 
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         self.deserialize(bytes)
+    }
+
+    fn hand_over_events(&mut self, stop: bool) -> Result<bool, CallError> {
+        self.instance.hand_over_events(stop)?;
+        (self.hands_over, self.stops) = (true, stop);
+        Ok(true)
+    }
+
+    fn events(&mut self) -> Option<&mut dyn Events> {
+        Some(self)
     }
 
     fn log_calls(&mut self, sink: CallSink) -> bool {

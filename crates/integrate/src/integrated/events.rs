@@ -1,7 +1,7 @@
 //! Events: their iteration, and changes of variables that need one.
 
 use fmu_description::number::seconds;
-use slave::{CallError, EventInfo};
+use slave::{CallError, EventInfo, Events};
 
 use super::{Integrated, Mode, failed};
 
@@ -11,17 +11,28 @@ const ITERATIONS: usize = 1000;
 impl Integrated {
     /// Enters event mode at the present point.
     pub(super) fn enter_event(&mut self) -> Result<(), CallError> {
-        self.instance.enter_event_mode()?;
-        self.point.mode = Mode::Event;
+        self.point.event = false;
+        if self.point.mode == Mode::Continuous {
+            self.instance.enter_event_mode()?;
+            self.point.mode = Mode::Event;
+        }
         Ok(())
+    }
+
+    /// Updates the discrete states once.
+    fn update(&mut self) -> Result<EventInfo, CallError> {
+        let info = self.instance.update_discrete_states()?;
+        self.nominals_changed |= info.nominals_changed;
+        self.point.ends |= info.terminate_simulation;
+        self.point.next_event = info.next_event_time;
+        Ok(info)
     }
 
     /// Iterates the event and enters continuous-time mode, unless the FMU requests the end.
     pub(super) fn settle(&mut self) -> Result<(), CallError> {
-        let mut nominals_changed = false;
-        let mut info = EventInfo { discrete_states_need_update: true, ..EventInfo::default() };
         let mut iterations = 0;
-        while info.discrete_states_need_update {
+        while self.update()?.discrete_states_need_update && !self.point.ends {
+            iterations += 1;
             if iterations == ITERATIONS {
                 let time = seconds(self.point.time);
                 return Err(failed(format!(
@@ -29,19 +40,16 @@ impl Integrated {
                      {ITERATIONS} iterations"
                 )));
             }
-            iterations += 1;
-            info = self.instance.update_discrete_states()?;
-            nominals_changed |= info.nominals_changed;
-            if info.terminate_simulation {
-                self.point.ends = true;
-                return Ok(());
-            }
         }
-        self.point.next_event = info.next_event_time;
+        if self.point.ends { Ok(()) } else { self.leave_event() }
+    }
+
+    /// Enters continuous-time mode.
+    fn leave_event(&mut self) -> Result<(), CallError> {
         self.instance.enter_continuous_time_mode()?;
         self.point.mode = Mode::Continuous;
         self.read_point()?;
-        if nominals_changed {
+        if std::mem::take(&mut self.nominals_changed) {
             let scale = self.scale()?;
             self.stepper.set_scale(scale);
         }
@@ -65,6 +73,29 @@ impl Integrated {
         }
         self.instance.get_event_indicators(&mut self.indicators)?;
         check_indicators(self.point.time, &self.indicators)
+    }
+}
+
+impl Events for Integrated {
+    fn next_event(&mut self) -> Result<Option<f64>, CallError> {
+        Ok(self.point.next_event)
+    }
+
+    fn enter_event_mode(&mut self) -> Result<(), CallError> {
+        // In event mode already, this makes clocks tick.
+        if self.point.mode == Mode::Continuous || !self.clocks.is_empty() {
+            self.instance.enter_event_mode()?;
+        }
+        (self.point.event, self.point.mode) = (false, Mode::Event);
+        Ok(())
+    }
+
+    fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
+        self.update()
+    }
+
+    fn leave_event_mode(&mut self) -> Result<(), CallError> {
+        self.leave_event()
     }
 }
 

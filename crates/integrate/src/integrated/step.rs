@@ -42,7 +42,8 @@ fn changed(before: &[f64], after: &[f64]) -> Option<usize> {
 }
 
 impl Integrated {
-    /// Integrates to `end`, or to the time at which the FMU requests the end of the simulation.
+    /// Integrates to `end`, to an event that the master handles, or to the time at which the FMU requests the end of
+    /// the simulation.
     pub(super) fn integrate(
         &mut self,
         end: f64,
@@ -67,7 +68,15 @@ impl Integrated {
                     )));
                 }
                 self.settle()?;
-            } else if self.event_is_due(rounding)? || self.input_caused_event()? {
+            } else if self.point.event
+                || self.event_is_due(rounding)?
+                || self.input_caused_event()?
+            {
+                let reached = self.point.time;
+                let at_end = reached >= end - rounding;
+                if self.hands_over && (at_end || self.stops && reached > start) {
+                    return Ok(StepResult::Event { reached });
+                }
                 self.enter_event()?;
             } else if self.point.time >= end {
                 return Ok(StepResult::Whole);
@@ -130,11 +139,10 @@ impl Integrated {
                 done => done?,
             };
             self.point.ends |= done.terminate_simulation;
-            if done.enter_event_mode && !self.point.ends {
-                return self.enter_event();
-            }
+            self.point.event |= done.enter_event_mode;
         }
-        if event.is_some() && !self.point.ends { self.enter_event() } else { Ok(()) }
+        self.point.event |= event.is_some();
+        Ok(())
     }
 
     /// Reads the event indicators at `time` within the step from `start` to `end` into

@@ -1,12 +1,14 @@
-//! Connections of Integers, Enumerations, Booleans, Strings and binaries: inputs are held during a step.
+//! Connections whose inputs are held during a step.
 
 use std::collections::HashMap;
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use crate::fault::FaultChain;
 use crate::system::{Connection, Port, System};
 use slave::Transformation;
-use slave::{CallError, Slave, ValueType};
+use slave::{CallError, Slave};
 
 type Get<T> = fn(&mut dyn Slave, &[u32], &mut [T]) -> Result<(), CallError>;
 type Set<T> = fn(&mut dyn Slave, &[u32], &[T]) -> Result<(), CallError>;
@@ -19,7 +21,23 @@ pub(crate) struct Access<T> {
     map: fn(&T, &Transformation, &mut T),
     disturb: fn(&FaultChain, f64, &T) -> T,
     number: fn(&T) -> f64,
+    same: fn(&T, &T) -> bool,
 }
+
+/// Reals.
+pub(crate) const REALS: Access<f64> = Access {
+    get: |slave, references, values| slave.get_real(references, values),
+    set: |slave, references, values| slave.set_real(references, values),
+    map: |value, transformation, target| {
+        *target = match transformation {
+            Transformation::Linear { factor, offset } => factor * value + offset,
+            _ => *value,
+        }
+    },
+    disturb: |fault, time, value| fault.apply(time, *value),
+    number: |value| *value,
+    same: |one, other| one.to_bits() == other.to_bits(),
+};
 
 /// Integers and Enumerations.
 pub(crate) const INTEGERS: Access<i64> = Access {
@@ -33,6 +51,7 @@ pub(crate) const INTEGERS: Access<i64> = Access {
     },
     disturb: |fault, time, value| fault.apply_integer(time, *value),
     number: |value| slave::to_real(*value),
+    same: |one, other| one == other,
 };
 
 /// Booleans.
@@ -49,6 +68,7 @@ pub(crate) const BOOLEANS: Access<i32> = Access {
     },
     disturb: |fault, time, value| fault.apply_boolean(time, *value),
     number: |value| f64::from(i32::from(*value != 0)),
+    same: |one, other| (*one != 0) == (*other != 0),
 };
 
 /// Strings.
@@ -58,6 +78,7 @@ pub(crate) const STRINGS: Access<String> = Access {
     map: |value, _, target| target.clone_from(value),
     disturb: |_, _, value| value.clone(),
     number: |_| f64::NAN,
+    same: |one, other| one == other,
 };
 
 /// Binaries.
@@ -67,6 +88,7 @@ pub(crate) const BINARIES: Access<Vec<u8>> = Access {
     map: |value, _, target| target.clone_from(value),
     disturb: |_, _, value| value.clone(),
     number: |_| f64::NAN,
+    same: |one, other| one == other,
 };
 
 /// The connected inputs and outputs of one slave, of one type.
@@ -88,31 +110,48 @@ pub(crate) struct Channel<T> {
     transformations: Vec<Transformation>,
     input_ports: Vec<Port>,
     faults: Vec<Option<FaultChain>>,
-    /// Current values of the outputs.
-    pub(crate) latest: Vec<T>,
-    /// Values of the outputs at the start of the last steps, used if some slaves make steps of
-    /// several communication steps.
-    pub(crate) start: Vec<T>,
+    state: ChannelState<T>,
     /// Values for the inputs.
     values: Vec<T>,
 }
 
+/// The values of a channel that change during the run.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct ChannelState<T> {
+    /// Current values of the outputs.
+    latest: Vec<T>,
+    /// Values of the outputs at the start of the last steps, used if some slaves make steps of
+    /// several communication steps.
+    start: Vec<T>,
+    /// Values of the inputs that were set last.
+    given: Vec<T>,
+}
+
+impl<T: Clone> ChannelState<T> {
+    pub(crate) fn has_shape_of(&self, other: &Self) -> bool {
+        self.latest.len() == other.latest.len() && self.given.len() == other.given.len()
+    }
+
+    fn copy(&mut self, other: &Self) {
+        self.latest.clone_from(&other.latest);
+        self.start.clone_from(&other.start);
+        self.given.clone_from(&other.given);
+    }
+}
+
 impl<T: Clone + Default> Channel<T> {
-    /// Collects the connections between variables of type `kind`, and the additional outputs `more`.
+    /// Lays out `connections`, and the additional outputs `more`.
     pub(crate) fn new(
         system: &System,
         access: Access<T>,
-        kind: ValueType,
+        connections: &[&Connection],
         more: impl Iterator<Item = Port>,
     ) -> Self {
-        let belongs =
-            |connection: &&Connection| ValueType::of(&system.variable(connection.to).kind) == kind;
-        let connections: Vec<_> = system.connections.iter().filter(belongs).collect();
         let mut outputs: Vec<Port> =
             connections.iter().map(|connection| connection.from).chain(more).collect();
         outputs.sort_unstable_by_key(|port| (port.slave, port.variable));
         outputs.dedup();
-        let mut inputs: Vec<_> = connections.clone();
+        let mut inputs = connections.to_vec();
         inputs.sort_by_key(|connection| connection.to.slave);
         let indices: HashMap<Port, usize> =
             outputs.iter().enumerate().map(|(index, &port)| (port, index)).collect();
@@ -136,8 +175,11 @@ impl<T: Clone + Default> Channel<T> {
             transformations: inputs.iter().map(|each| each.transformation.clone()).collect(),
             input_ports: inputs.iter().map(|connection| connection.to).collect(),
             faults: vec![None; inputs.len()],
-            latest: vec![T::default(); outputs.len()],
-            start: vec![T::default(); outputs.len()],
+            state: ChannelState {
+                latest: vec![T::default(); outputs.len()],
+                start: vec![T::default(); outputs.len()],
+                given: vec![T::default(); inputs.len()],
+            },
             values: vec![T::default(); inputs.len()],
             output_ports: outputs,
         }
@@ -147,7 +189,7 @@ impl<T: Clone + Default> Channel<T> {
     pub(crate) fn value(&self, port: Port) -> Option<&T> {
         let key = |known: &Port| (known.slave, known.variable);
         let found = self.output_ports.binary_search_by_key(&key(&port), key);
-        found.ok().map(|index| &self.latest[index])
+        found.ok().map(|index| &self.state.latest[index])
     }
 
     /// Puts a fault on the connection to an input; returns false if the input has no connection.
@@ -191,13 +233,13 @@ impl<T: Clone + Default> Channel<T> {
     fn source(&self, k: usize, ahead: impl Fn(usize) -> bool) -> &T {
         let source = self.sources[k];
         let slave = self.output_ports[source].slave;
-        if ahead(slave) { &self.start[source] } else { &self.latest[source] }
+        if ahead(slave) { &self.state.start[source] } else { &self.state.latest[source] }
     }
 
     /// Makes the end values of the last step the start values of the next one.
     pub(crate) fn shift(&mut self, slave: usize) {
         let range = self.port_maps[slave].output_range.clone();
-        self.start[range.clone()].clone_from_slice(&self.latest[range]);
+        self.state.start[range.clone()].clone_from_slice(&self.state.latest[range]);
     }
 
     /// Iterates over the faults, for a checkpoint.
@@ -211,7 +253,8 @@ impl<T: Clone + Default> Channel<T> {
         for k in self.port_maps[slave].input_range.clone() {
             let source = self.sources[k];
             let is_ahead = ahead(self.output_ports[source].slave);
-            let value = if is_ahead { &self.start[source] } else { &self.latest[source] };
+            let value =
+                if is_ahead { &self.state.start[source] } else { &self.state.latest[source] };
             (self.access.map)(value, &self.transformations[k], &mut self.values[k]);
             if let Some(fault) = &self.faults[k] {
                 self.values[k] = (self.access.disturb)(fault, time, &self.values[k]);
@@ -219,13 +262,51 @@ impl<T: Clone + Default> Channel<T> {
         }
     }
 
+    /// Whether a gathered input of `slave` differs from the value that was set last.
+    pub(crate) fn has_new(&self, slave: usize) -> bool {
+        let range = self.port_maps[slave].input_range.clone();
+        range.into_iter().any(|k| !(self.access.same)(&self.values[k], &self.state.given[k]))
+    }
+
+    /// Adds the connected inputs of `slave` whose gathered value differs from the one that was set last to `ports`.
+    pub(crate) fn add_new(&self, slave: usize, ports: &mut Vec<Port>) {
+        for k in self.port_maps[slave].input_range.clone() {
+            if !(self.access.same)(&self.values[k], &self.state.given[k]) {
+                ports.push(self.input_ports[k]);
+            }
+        }
+    }
+
     /// Sets the gathered inputs.
-    pub(crate) fn set(&self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
+    pub(crate) fn set(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
         let port_map = &self.port_maps[slave];
         if port_map.inputs.is_empty() {
             return Ok(());
         }
-        (self.access.set)(instance, &port_map.inputs, &self.values[port_map.input_range.clone()])
+        let range = port_map.input_range.clone();
+        (self.access.set)(instance, &port_map.inputs, &self.values[range.clone()])?;
+        self.state.given[range.clone()].clone_from_slice(&self.values[range]);
+        Ok(())
+    }
+
+    /// Takes the gathered values of all inputs as set.
+    pub(crate) fn accept(&mut self) {
+        self.state.given.clone_from(&self.values);
+    }
+
+    /// Whether there are no connections.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.state.latest.is_empty()
+    }
+
+    /// Copies the state to `state`.
+    pub(crate) fn save(&self, state: &mut ChannelState<T>) {
+        state.copy(&self.state);
+    }
+
+    /// Restores the state from `state`.
+    pub(crate) fn restore(&mut self, state: &ChannelState<T>) {
+        self.state.copy(state);
     }
 
     /// Reads the outputs.
@@ -237,7 +318,7 @@ impl<T: Clone + Default> Channel<T> {
         (self.access.get)(
             instance,
             &port_map.outputs,
-            &mut self.latest[port_map.output_range.clone()],
+            &mut self.state.latest[port_map.output_range.clone()],
         )
     }
 }

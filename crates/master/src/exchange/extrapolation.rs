@@ -110,6 +110,8 @@ impl OutputHistory {
     pub(super) fn interpolated(&self, extrapolation: Extrapolation) -> Polynomial {
         let slope = (self.end - self.start) / self.size;
         match extrapolation {
+            // A line from the value before a jump to one after it is neither.
+            _ if self.jumps => Polynomial::held(self.end),
             Extrapolation::Hold => Polynomial::held(self.end),
             Extrapolation::Limited | Extrapolation::Linear => {
                 Polynomial { value: self.start, slope, curvature: 0.0 }

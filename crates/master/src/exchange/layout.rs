@@ -3,10 +3,11 @@
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
-use fmu_description::{Kind, Variability};
+use fmu_description::Kind;
 
 use crate::algorithm::{Algorithm, Extrapolation};
 use crate::order::Rows;
+use crate::signal_type::{SignalType, Way};
 use crate::system::{Port, System};
 use slave::Advance;
 use slave::{Transformation, ValueType};
@@ -89,6 +90,8 @@ pub(super) struct Layout {
     pub(super) curvatures: Vec<Option<u32>>,
     /// For each output, whether it depends directly on a discrete output of another slave.
     pub(super) jumping: Vec<bool>,
+    /// For each output, whether it is not continuous.
+    pub(super) discrete: Vec<bool>,
     /// Number of derivatives of all outputs, and of all inputs.
     pub(super) output_derivatives: usize,
     pub(super) input_derivatives: usize,
@@ -106,6 +109,8 @@ impl Layout {
         layout.port_maps.resize_with(count, PortMap::default);
         layout.collect_outputs(system);
         layout.collect_inputs(system);
+        let is_discrete = |port: &Port| system.signal_type(*port) != SignalType::Continuous;
+        layout.discrete = layout.output_ports.iter().map(is_discrete).collect();
         layout.find_jumping(system);
         for (slave, port_map) in layout.port_maps.iter_mut().enumerate() {
             let Some(flags) = &system.slaves[slave].1.description().co_simulation else { continue };
@@ -132,8 +137,8 @@ impl Layout {
         let mut by_slave = vec![Vec::new(); self.port_maps.len()];
         let mut integers = Vec::new();
         for connection in &system.connections {
-            let (from, to) = (connection.from, connection.to);
-            if !is_real(&system.variable(to).kind) {
+            let from = connection.from;
+            if Way::of(system, connection) != Way::Real {
                 continue;
             }
             if self.indices.insert(from, 0).is_some() {
@@ -170,7 +175,7 @@ impl Layout {
     fn collect_inputs(&mut self, system: &System) {
         let mut by_slave = vec![Vec::new(); self.port_maps.len()];
         for connection in &system.connections {
-            if is_real(&system.variable(connection.to).kind) {
+            if Way::of(system, connection) == Way::Real {
                 by_slave[connection.to.slave].push(connection);
             }
         }
@@ -188,8 +193,7 @@ impl Layout {
                 self.plain[slave] &= connection.transformation == Transformation::Identity;
                 self.factors.push(factor);
                 self.offsets.push(offset);
-                let real = is_real(&system.variable(connection.from).kind);
-                self.held.push(!real);
+                self.held.push(system.is_held(connection));
             }
             self.port_maps[slave].input_range = start..self.sources.len();
         }
@@ -198,7 +202,7 @@ impl Layout {
     /// Finds the outputs that jump with a discrete output of another slave: those that depend directly on an input
     /// that follows it, also through further slaves. An output without stated dependencies counts as smooth.
     fn find_jumping(&mut self, system: &System) {
-        let is_discrete = |port: Port| system.variable(port).variability == Variability::Discrete;
+        let is_discrete = |port: Port| system.signal_type(port) != SignalType::Continuous;
         let mut jumping: HashSet<Port> =
             self.output_ports.iter().copied().filter(|port| is_discrete(*port)).collect();
         if jumping.is_empty() {

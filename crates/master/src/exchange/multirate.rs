@@ -30,7 +30,7 @@ impl Reals {
     }
 
     /// Returns the value of an output at `time`. If its slave is ahead, the value lies on the line
-    /// between start and end of the slave's step; an Integer keeps its start value.
+    /// between start and end of the slave's step; a discrete one keeps its start value.
     pub(super) fn value_at(&self, output: usize, time: f64) -> f64 {
         let (trace, owner) = (&self.trace, self.layout.owners[output] as usize);
         let end = trace.latest[output];
@@ -38,8 +38,8 @@ impl Reals {
             None => end,
             Some((start, until)) => {
                 let value = trace.start[output];
-                let is_integer = self.layout.from_integers.iter().any(|&(_, own)| own == output);
-                let part = if is_integer { 0.0 } else { (time - start) / (until - start) };
+                let held = self.layout.discrete[output];
+                let part = if held { 0.0 } else { (time - start) / (until - start) };
                 value + part * (end - value)
             }
         }

@@ -15,6 +15,8 @@ pub enum Interpolation {
     Line,
     /// The value of the earlier point is held.
     Hold,
+    /// The value is 0 between the points; at each point with another value the signal jumps. For the ticks of a clock.
+    Points,
 }
 
 /// A sampled signal: values at points in time, ascending.
@@ -24,6 +26,7 @@ pub enum Interpolation {
 ///   with `w = (t_(i+1) - t) / (t_(i+1) - t_i)`.
 /// * If a time occurs more than once, the signal jumps; its value there is the last one.
 /// * A held value starts at its time.
+/// * The ticks of a clock are points: the value between them is 0.
 /// * Times with a relative difference of at most 1e-9 are equal.
 ///
 /// The values equal FMPy's to the last bit. The derivatives at a point differ: FMPy returns the
@@ -88,10 +91,11 @@ impl Track {
     ) -> Result<Self, TrackError> {
         check(&times, &values)?;
         let jumps = |point: &usize| match between {
-            Interpolation::Line => near(times[point - 1], times[*point]),
-            Interpolation::Hold => values[*point] - values[point - 1] != 0.0,
+            Interpolation::Line => *point > 0 && near(times[point - 1], times[*point]),
+            Interpolation::Hold => *point > 0 && values[*point] - values[point - 1] != 0.0,
+            Interpolation::Points => values[*point] != 0.0,
         };
-        let breaks = (1..times.len()).filter(jumps).map(|point| times[point]).collect();
+        let breaks = (0..times.len()).filter(jumps).map(|point| times[point]).collect();
         Ok(Self { times, values, between, breaks })
     }
 
@@ -113,6 +117,12 @@ impl Track {
         let last = times.len() - 1;
         let right = self.not_below(time, *cursor);
         *cursor = right;
+        if self.between == Interpolation::Points {
+            let around = right.saturating_sub(1)..=right.min(last);
+            let mut here = around.filter(|&point| near(times[point], time));
+            let point = here.find(|&point| values[point] != 0.0);
+            return Sample::held(point.map_or(0.0, |point| values[point]));
+        }
         if last == 0 {
             return Sample::held(values[0]);
         }
@@ -128,7 +138,7 @@ impl Track {
                 }
                 Sample::held(values[point])
             }
-            Interpolation::Line => self.on_line(time, right),
+            _ => self.on_line(time, right),
         }
     }
 

@@ -36,6 +36,8 @@ pub struct Checkpoint {
     values: Values,
     faults: Vec<FaultChain>,
     drives: Vec<DriveState>,
+    /// For each slave, the time in s of the event that its step has ended at.
+    pending: Vec<f64>,
     /// For each slave: its name, the GUID of its FMU, its serialised FMU state.
     slaves: Vec<(String, String, Vec<u8>)>,
     ended: Option<Ending>,
@@ -148,6 +150,7 @@ impl Simulation {
             values,
             faults: self.engine.exchange.faults().map(|fault| fault.clone()).collect(),
             drives: self.engine.drives.state(),
+            pending: self.engine.instants.pending.clone(),
             slaves,
             ended: self.ended,
         })
@@ -203,6 +206,8 @@ impl Simulation {
             .restore(checkpoint.drives.clone())
             .map_err(|error| SystemError::Algorithm { what: error.to_string() })?;
         self.engine.grid.resume(checkpoint.time, checkpoint.count);
+        let (system, time) = (&mut self.engine.system, checkpoint.time);
+        self.engine.instants.restore(system, &checkpoint.pending, time)?;
         self.attempted = checkpoint.attempted;
         self.ended = checkpoint.ended;
         self.control.size = checkpoint.size;

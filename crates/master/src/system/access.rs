@@ -1,11 +1,22 @@
 //! Reads and sets single variables of any type.
 
 use super::{Port, System};
+use crate::error::SystemError;
+use crate::exchange::call;
 use slave::CallError;
 use slave::Transformation;
 use slave::{Value, ValueType};
 
 impl System {
+    /// Takes over the events of the slaves that hand them over. `stop`: their steps end at the first event.
+    pub(crate) fn hand_over_events(&mut self, stop: bool, time: f64) -> Result<(), SystemError> {
+        for ((name, slave), events) in self.slaves.iter_mut().zip(&mut self.events) {
+            let handed = slave.hand_over_events(stop).map_err(|source| call(name, time, source))?;
+            *events = handed && slave.events().is_some();
+        }
+        Ok(())
+    }
+
     /// Reads the variable at `port`.
     ///
     /// # Errors

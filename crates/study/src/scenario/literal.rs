@@ -94,9 +94,11 @@ impl Literal {
                     format!("a whole number or one of {}", names.join(", "))
                 })
             }
-            (Kind::Boolean(_), Literal::Boolean(flag)) => Ok(f64::from(u8::from(*flag))),
-            (Kind::Boolean(_), _) => Err("true or false".to_owned()),
-            (Kind::String(_) | Kind::Binary(_) | Kind::Clock(_), _) => {
+            (Kind::Boolean(_) | Kind::Clock(_), Literal::Boolean(flag)) => {
+                Ok(f64::from(u8::from(*flag)))
+            }
+            (Kind::Boolean(_) | Kind::Clock(_), _) => Err("true or false".to_owned()),
+            (Kind::String(_) | Kind::Binary(_), _) => {
                 Err(format!("no number, as it is a {}", variable.kind.element()))
             }
             (kind, _) => Err(integers(kind, description)),

@@ -5,7 +5,9 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable, Variability};
+use fmu_description::{
+    Causality, IntervalVariability, Kind, ModelDescription, ScalarVariable, Variability,
+};
 use serde_spanned::Spanned;
 
 use super::{Reason, Scenario, ScenarioError};
@@ -161,6 +163,12 @@ impl<'a> Resolver<'a> {
         if causality != Causality::Input && !tunable {
             let found = format!("{} {}", variability.as_str(), causality.as_str());
             return Err(Reason::NotSettable { name: target.name, found: with_article(&found) });
+        }
+        if let Kind::Clock(clock) = &target.variable.kind
+            && clock.interval_variability != IntervalVariability::Triggered
+        {
+            let found = "a clock that ticks by itself".to_owned();
+            return Err(Reason::NotSettable { name: target.name, found });
         }
         if let Some(source) = self.names.source(target.port) {
             let source_name = self.names.name(source);

@@ -272,7 +272,9 @@ fn column_signal(
     };
     let (kind, description) = (&target.variable.kind, target.description);
     let wrong = match kind {
-        Kind::Boolean(_) => values.iter().position(|value| ![0.0, 1.0].contains(value)),
+        Kind::Boolean(_) | Kind::Clock(_) => {
+            values.iter().position(|value| ![0.0, 1.0].contains(value))
+        }
         _ if target.is_real() => values.iter().position(|value| !value.is_finite()),
         _ if kind.as_integer().is_some() => {
             values.iter().position(|&value| !fits_integer(value, kind, description))
@@ -282,14 +284,17 @@ fn column_signal(
     if let Some(row) = wrong {
         let found = format!("{} in row {} of {}", values[row], row + 1, path.display());
         let expected = match kind {
-            Kind::Boolean(_) => "0 or 1".to_owned(),
+            Kind::Boolean(_) | Kind::Clock(_) => "0 or 1".to_owned(),
             _ if target.is_real() => "a finite number".to_owned(),
             _ => integers(kind, description),
         };
         return Err(Reason::Value { name: target.name.clone(), found, expected });
     }
-    let between =
-        if hold || !target.is_continuous() { Interpolation::Hold } else { Interpolation::Line };
+    let between = match kind {
+        Kind::Clock(_) => Interpolation::Points,
+        _ if hold || !target.is_continuous() => Interpolation::Hold,
+        _ => Interpolation::Line,
+    };
     Ok(Signal::Track(Track::new(table.times.clone(), values.clone(), between)?))
 }
 

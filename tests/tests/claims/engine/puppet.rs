@@ -115,7 +115,7 @@ impl Slave for Puppet {
         let stepped = (self.way)(time, time + size);
         self.time = match stepped {
             StepResult::Whole => time + size,
-            StepResult::Part { reached, .. } => reached,
+            StepResult::Part { reached, .. } | StepResult::Event { reached } => reached,
         };
         Ok(stepped)
     }

@@ -102,6 +102,21 @@ impl Component {
         self.check(NAME, status)
     }
 
+    /// Calls `fmi3ActivateModelPartition` at `time` in s.
+    pub(crate) fn activate_model_partition(
+        &mut self,
+        clock: u32,
+        time: f64,
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmi3ActivateModelPartition";
+        let function = function!(self.activate_model_partition, NAME);
+        self.log_call(NAME, || format!("[{clock}], {time:?}"));
+        self.place.set_time(time);
+        // SAFETY: the instance is alive.
+        let status = unsafe { function(self.pointer, clock, time) };
+        self.check(NAME, status)
+    }
+
     /// Calls `fmi3GetIntervalDecimal` for one clock: interval in s, and `fmi3IntervalQualifier`.
     pub(crate) fn get_interval(&mut self, clock: u32) -> Result<(f64, c_int), CallError> {
         const NAME: &str = "fmi3GetIntervalDecimal";

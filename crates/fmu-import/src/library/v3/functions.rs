@@ -6,8 +6,8 @@
 use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;
 
-use super::super::Interface;
 use super::super::table::functions;
+use super::Interface;
 use crate::error::LoadError;
 
 /// `fmi3Instance`.
@@ -23,6 +23,11 @@ pub(super) type LogMessage = unsafe extern "C" fn(*mut c_void, Status, Text, Tex
 pub(super) type IntermediateUpdate =
     unsafe extern "C" fn(*mut c_void, f64, u8, u8, u8, u8, *mut u8, *mut f64);
 
+/// `fmi3ClockUpdateCallback`.
+pub(super) type ClockUpdate = unsafe extern "C" fn(*mut c_void);
+/// `fmi3LockPreemptionCallback`, `fmi3UnlockPreemptionCallback`.
+pub(super) type Preemption = unsafe extern "C" fn();
+
 functions! {
     get_version = "fmi3GetVersion": fn() -> Text;
     set_debug_logging = "fmi3SetDebugLogging":
@@ -31,6 +36,9 @@ functions! {
         References, usize, *mut c_void, Option<LogMessage>, Option<IntermediateUpdate>) -> Instance;
     instantiate_equations = "fmi3InstantiateModelExchange":
         fn(Text, Text, Text, bool, bool, *mut c_void, Option<LogMessage>) -> Instance;
+    instantiate_scheduled = "fmi3InstantiateScheduledExecution": fn(Text, Text, Text, bool, bool,
+        *mut c_void, Option<LogMessage>, Option<ClockUpdate>, Option<Preemption>, Option<Preemption>)
+        -> Instance;
     free_instance = "fmi3FreeInstance": fn(Instance);
     enter_initialization_mode = "fmi3EnterInitializationMode":
         fn(Instance, bool, f64, f64, bool, f64) -> Status;
@@ -89,6 +97,7 @@ functions! {
         fn(Instance, References, usize, *mut f64) -> Status;
     update_discrete_states = "fmi3UpdateDiscreteStates": fn(Instance, *mut u8, *mut u8, *mut u8,
         *mut u8, *mut u8, *mut f64) -> Status;
+    activate_model_partition = "fmi3ActivateModelPartition": fn(Instance, u32, f64) -> Status;
     do_step = "fmi3DoStep": fn(Instance, f64, f64, bool, *mut u8, *mut u8, *mut u8, *mut f64)
         -> Status;
     enter_continuous_time_mode = "fmi3EnterContinuousTimeMode": fn(Instance) -> Status;
@@ -118,6 +127,9 @@ const MODEL_EXCHANGE: [&str; 4] = [
     "fmi3UpdateDiscreteStates",
     "fmi3EnterContinuousTimeMode",
 ];
+/// Those that scheduled execution cannot do without either.
+const SCHEDULED_EXECUTION: [&str; 2] =
+    ["fmi3InstantiateScheduledExecution", "fmi3ActivateModelPartition"];
 
 impl Functions {
     /// Checks that the library exports the functions that `interface` cannot do without.
@@ -125,6 +137,7 @@ impl Functions {
         let own: &[&str] = match interface {
             Interface::CoSimulation => &CO_SIMULATION,
             Interface::ModelExchange => &MODEL_EXCHANGE,
+            Interface::ScheduledExecution => &SCHEDULED_EXECUTION,
         };
         let missing = REQUIRED.iter().chain(own).find(|function| !self.has(function));
         missing.map_or(Ok(()), |function| {

@@ -1,0 +1,40 @@
+//! The calls of event mode.
+
+use fmu_description::Version;
+use slave::{CallError, EventInfo, Events, Slave, absent};
+
+use super::LoggedSlave;
+
+/// Returns the events of a slave that has handed them over.
+fn events<S: Slave + ?Sized>(slave: &mut S) -> Result<&mut dyn Events, CallError> {
+    slave.events().ok_or_else(|| absent("fmi3EnterEventMode"))
+}
+
+impl<S: Slave + ?Sized> Events for LoggedSlave<S> {
+    fn next_event(&mut self) -> Result<Option<f64>, CallError> {
+        events(self.slave.as_mut())?.next_event()
+    }
+
+    fn enter_event_mode(&mut self) -> Result<(), CallError> {
+        let call = |slave: &mut S| events(slave)?.enter_event_mode();
+        self.plain("fmi2EnterEventMode", String::new(), call)
+    }
+
+    fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
+        let function = match self.version {
+            Version::V3 => "fmi3UpdateDiscreteStates",
+            _ => "fmi2NewDiscreteStates",
+        };
+        let call = |slave: &mut S| events(slave)?.update_discrete_states();
+        self.call((function, String::new()), call, |info| format!(" {info:?}"))
+    }
+
+    fn leave_event_mode(&mut self) -> Result<(), CallError> {
+        let function = match self.version {
+            Version::V3 => "fmi3EnterStepMode",
+            _ => "fmi2EnterContinuousTimeMode",
+        };
+        let call = |slave: &mut S| events(slave)?.leave_event_mode();
+        self.plain(function, String::new(), call)
+    }
+}

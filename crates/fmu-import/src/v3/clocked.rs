@@ -1,0 +1,174 @@
+//! Clocked variables. The FMU has their values only while one of their clocks ticks, in Event Mode, and in
+//! Initialization Mode (FMI 3.0.2, section 2.2.6): the slave remembers the outputs and locals of the last tick for
+//! who reads them later, and the inputs for the next tick.
+
+use std::collections::BTreeMap;
+
+use fmu_description::Causality;
+use serde::{Deserialize, Serialize};
+
+use super::Instance;
+use super::elements::{ElementView, NativeType};
+use super::modes::Mode;
+use super::plan::Run;
+use slave::CallError;
+
+/// The value of an element.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) enum Remembered {
+    /// The bits of a number.
+    Number(u64),
+    Text(String),
+    Bytes(Vec<u8>),
+}
+
+/// The values by the position of the element among those that may change in Event Mode only.
+pub(super) type Memory = BTreeMap<usize, Remembered>;
+
+/// A value of a variable of type String or Binary.
+pub(super) trait Listed: Clone + Default {
+    fn remembered(&self) -> Remembered;
+    fn recalled(value: &Remembered) -> Option<&Self>;
+}
+
+impl Listed for String {
+    fn remembered(&self) -> Remembered {
+        Remembered::Text(self.clone())
+    }
+
+    fn recalled(value: &Remembered) -> Option<&Self> {
+        if let Remembered::Text(text) = value { Some(text) } else { None }
+    }
+}
+
+impl Listed for Vec<u8> {
+    fn remembered(&self) -> Remembered {
+        Remembered::Bytes(self.clone())
+    }
+
+    fn recalled(value: &Remembered) -> Option<&Self> {
+        if let Remembered::Bytes(bytes) = value { Some(bytes) } else { None }
+    }
+}
+
+/// The calls for all clocked variables of an FMU.
+#[derive(Debug, Default)]
+pub(super) struct ClockedRuns {
+    /// Inputs, one variable in each.
+    inputs: Vec<Run>,
+    /// Outputs and locals.
+    others: Vec<Run>,
+}
+
+impl ClockedRuns {
+    pub(super) fn new(view: &ElementView) -> Self {
+        let clocked = || view.variables.iter().filter(|own| !own.clocks.is_empty());
+        let is_input = |own: &&super::elements::Variable| own.causality == Causality::Input;
+        let inputs = clocked().filter(is_input).flat_map(|own| Run::of_whole([own]));
+        let inputs = inputs.collect();
+        Self { inputs, others: Run::of_whole(clocked().filter(|own| !is_input(own))) }
+    }
+}
+
+impl Instance {
+    /// Whether the FMU may not be asked now for the variables of a run, nor receive them.
+    pub(super) fn is_silent(&self, run: &Run) -> bool {
+        let is_clocked = !run.clocks.is_empty() && !self.is_scheduled();
+        let ticks = || self.state.mode == Mode::Event && self.state.clocks.is_active(&run.clocks);
+        is_clocked && self.state.mode.is_initialized() && !ticks()
+    }
+
+    /// Remembers the numbers in the buffer of a run.
+    pub(super) fn remember(&mut self, run: &Run) {
+        for (place, shadow) in run.shadows.iter().enumerate() {
+            self.state.memory.insert(*shadow, Remembered::Number(run.buffer.bits(place)));
+        }
+    }
+
+    /// Puts the remembered numbers into the buffer of a run; elements without one are 0. Returns whether all have one.
+    pub(super) fn recall(&self, run: &mut Run) -> bool {
+        let mut all = true;
+        for (place, shadow) in run.shadows.iter().enumerate() {
+            let known = self.state.memory.get(shadow);
+            let bits = if let Some(Remembered::Number(bits)) = known { Some(*bits) } else { None };
+            all &= bits.is_some();
+            run.buffer.put_bits(place, bits.unwrap_or(0));
+        }
+        all
+    }
+
+    /// Remembers the Strings or binaries of a run.
+    pub(super) fn remember_list<T: Listed>(&mut self, run: &Run, values: &[T]) {
+        for (shadow, value) in run.shadows.iter().zip(values) {
+            self.state.memory.insert(*shadow, value.remembered());
+        }
+    }
+
+    /// Returns the remembered Strings or binaries of a run; `None` for an element without one.
+    pub(super) fn recall_list<T: Listed>(&self, run: &Run) -> Vec<Option<T>> {
+        let value = |shadow| self.state.memory.get(shadow).and_then(T::recalled).cloned();
+        run.shadows.iter().map(value).collect()
+    }
+
+    /// Remembers the clocked outputs and locals of the clocks that tick.
+    pub(super) fn read_clocked(&mut self) -> Result<(), CallError> {
+        if self.clocked.others.is_empty() || !self.state.clocks.any_active() {
+            return Ok(());
+        }
+        let mut runs = std::mem::take(&mut self.clocked.others);
+        let done =
+            runs.iter_mut().filter(|run| run.kind != NativeType::Clock).try_for_each(|run| {
+                if !self.state.clocks.is_active(&run.clocks) {
+                    return Ok(());
+                }
+                match run.kind {
+                    NativeType::String => {
+                        let mut values = vec![String::new(); run.shadows.len()];
+                        self.component.get_string(&run.references, &mut values)?;
+                        self.remember_list(run, &values);
+                    }
+                    NativeType::Binary => {
+                        let mut values = vec![Vec::new(); run.shadows.len()];
+                        self.component.get_binary(&run.references, &mut values)?;
+                        self.remember_list(run, &values);
+                    }
+                    _ => {
+                        run.buffer.get(&mut self.component, &run.references)?;
+                        self.remember(run);
+                    }
+                }
+                Ok(())
+            });
+        self.clocked.others = runs;
+        done
+    }
+
+    /// Passes the values that were set last to the clocked inputs of `clocks`, which have started to tick.
+    pub(super) fn set_clocked(&mut self, clocks: &[u32]) -> Result<(), CallError> {
+        let mut runs = std::mem::take(&mut self.clocked.inputs);
+        let done = runs.iter_mut().try_for_each(|run| {
+            if run.kind == NativeType::Clock || !run.clocks.iter().any(|own| clocks.contains(own)) {
+                return Ok(());
+            }
+            match run.kind {
+                NativeType::String => {
+                    let values: Option<Vec<_>> = self.recall_list(run).into_iter().collect();
+                    values.map_or(Ok(()), |all| self.component.set_string(&run.references, &all))
+                }
+                NativeType::Binary => {
+                    let values: Option<Vec<_>> = self.recall_list(run).into_iter().collect();
+                    values.map_or(Ok(()), |all| self.component.set_binary(&run.references, &all))
+                }
+                _ => {
+                    let known = self.recall(run);
+                    if !known {
+                        return Ok(());
+                    }
+                    run.buffer.set(&mut self.component, &run.references)
+                }
+            }
+        });
+        self.clocked.inputs = runs;
+        done
+    }
+}

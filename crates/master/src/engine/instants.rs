@@ -1,0 +1,313 @@
+//! Instants: the events of all slaves at one time, iterated until nothing changes.
+//!
+//! Time is superdense (E. A. Lee and H. Zheng, "Operational semantics of hybrid systems", HSCC 2005): at an event
+//! time stands still while outputs, inputs and discrete states change. All outputs are read before any input is set,
+//! so the order of the slaves does not matter.
+
+use super::Ending;
+use crate::drive::Drives;
+use crate::error::SystemError;
+use crate::exchange::{Exchange, call};
+use crate::system::System;
+use slave::{CallError, Events, absent};
+
+/// Largest number of updates of the discrete states in an instant, and of exchanges between two updates.
+const MOST: usize = 1000;
+/// Part of a step within which a time counts as its end.
+const ROUNDING: f64 = 1e-6;
+
+/// The slaves whose events the master handles.
+#[derive(Debug, Default)]
+pub(crate) struct Instants {
+    /// Their positions.
+    members: Vec<usize>,
+    /// For each slave: the time in s of its next known event if other slaves are connected to it, and of the
+    /// event at which its last step ended; otherwise infinite.
+    next: Vec<f64>,
+    pub(crate) pending: Vec<f64>,
+    connected: Vec<bool>,
+    /// For each slave, whether it is in event mode, and whether its inputs have been set since it entered it.
+    in_event: Vec<bool>,
+    set: Vec<bool>,
+    /// Values of the connected Reals before the instant.
+    before: Vec<f64>,
+}
+
+/// How an instant ended.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct InstantEnd {
+    /// The slave that requested the end of the simulation.
+    pub(crate) ending: Option<Ending>,
+    /// Whether a connected Real has jumped.
+    pub(crate) jumped: bool,
+}
+
+/// The parts of an engine that take part in an instant.
+pub(crate) struct Parts<'a> {
+    pub(crate) system: &'a mut System,
+    pub(crate) exchange: &'a mut Exchange,
+    pub(crate) drives: &'a mut Drives,
+}
+
+impl Instants {
+    /// Returns the slaves of `system` that have handed over their events. They are in event mode.
+    pub(crate) fn new(system: &System) -> Self {
+        let count = system.slaves.len();
+        let mut connected = vec![false; count];
+        for connection in &system.connections {
+            (connected[connection.from.slave], connected[connection.to.slave]) = (true, true);
+        }
+        Self {
+            members: (0..count).filter(|&slave| system.events[slave]).collect(),
+            next: vec![f64::INFINITY; count],
+            pending: vec![f64::INFINITY; count],
+            connected,
+            in_event: system.events.clone(),
+            set: vec![false; count],
+            before: Vec::new(),
+        }
+    }
+
+    /// Whether no slave has handed over its events.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.members.is_empty()
+    }
+
+    /// Whether a slave with events is connected to another one.
+    pub(crate) fn are_connected(&self) -> bool {
+        self.members.iter().any(|&slave| self.connected[slave])
+    }
+
+    /// Returns the time of the first known event within the step from `time` to `end`, all in s.
+    #[inline]
+    pub(crate) fn next_within(&self, time: f64, end: f64) -> Option<f64> {
+        let rounding = ROUNDING * (end - time);
+        let next = self.next.iter().copied().filter(|next| *next > time + rounding);
+        next.reduce(f64::min).filter(|next| *next < end - rounding)
+    }
+
+    /// Whether an instant is due at `time`: a slave has an event, a variable of it is driven and jumps, or one of
+    /// its discrete inputs has a new value.
+    pub(crate) fn is_due(&self, parts: &mut Parts<'_>, time: f64) -> bool {
+        self.pending.iter().any(|pending| *pending <= time)
+            || self.has_break(parts.drives, time)
+            || self.members.iter().any(|&slave| {
+                !parts.exchange.reals.is_ahead(slave, time)
+                    && parts.exchange.gather_at_events(slave, time)
+            })
+    }
+
+    /// Whether a driven variable of a slave with events jumps at `time`.
+    fn has_break(&self, drives: &Drives, time: f64) -> bool {
+        !drives.is_empty()
+            && drives
+                .iter()
+                .any(|drive| self.members.contains(&drive.port().slave) && drive.breaks_at(time))
+    }
+
+    /// Iterates the instant at `time`.
+    pub(crate) fn iterate(
+        &mut self,
+        parts: &mut Parts<'_>,
+        time: f64,
+    ) -> Result<InstantEnd, SystemError> {
+        parts.exchange.reals.copy_outputs(&mut self.before);
+        for slave in 0..self.pending.len() {
+            if self.pending[slave] <= time {
+                self.pending[slave] = f64::INFINITY;
+                self.enter(parts.system, slave, time)?;
+            }
+        }
+        self.drive(parts, time)?;
+        let mut update = self.in_event.contains(&true);
+        for _ in 0..MOST {
+            if !(self.exchange(parts, time)? || update) {
+                return self.leave(parts, time);
+            }
+            update = match self.update(parts, time)? {
+                Updated::Ended(ending) => {
+                    return Ok(InstantEnd { ending: Some(ending), jumped: false });
+                }
+                Updated::Again => true,
+                Updated::Settled => false,
+            };
+        }
+        Err(self.unsettled(parts, time))
+    }
+
+    fn enter(&mut self, system: &mut System, slave: usize, time: f64) -> Result<(), SystemError> {
+        at(system, slave, time, |events| events.enter_event_mode())?;
+        (self.in_event[slave], self.set[slave]) = (true, false);
+        Ok(())
+    }
+
+    /// Sets the driven variables of slaves in event mode.
+    fn drive(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<(), SystemError> {
+        if parts.drives.is_empty() {
+            return Ok(());
+        }
+        for position in 0..self.members.len() {
+            let slave = self.members[position];
+            let jumps =
+                |own: &crate::drive::Drive| own.port().slave == slave && own.breaks_at(time);
+            if !self.in_event[slave] && parts.drives.iter().any(jumps) {
+                self.enter(parts.system, slave, time)?;
+            }
+        }
+        parts.drives.write_to(parts.system, time, |slave| self.in_event[slave])?;
+        let in_event = (0..self.in_event.len()).filter(|&slave| self.in_event[slave]);
+        in_event.into_iter().try_for_each(|slave| parts.drives.tick(parts.system, slave, time))
+    }
+
+    /// Passes values and ticks until they do not change any more; returns whether any has.
+    fn exchange(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<bool, SystemError> {
+        let mut any = false;
+        // As many passes as there are slaves carry a continuous signal through all of them. An algebraic loop of
+        // such signals is left as it then is: the coupling of the next step solves it.
+        for pass in 0..MOST {
+            for slave in 0..self.in_event.len() {
+                if self.in_event[slave] {
+                    parts.exchange.read_in_event(parts.system, slave, time)?;
+                }
+            }
+            let (mut discrete, mut continuous) = (false, false);
+            for position in 0..self.members.len() {
+                let slave = self.members[position];
+                if parts.exchange.reals.is_ahead(slave, time) {
+                    continue;
+                }
+                let new = parts.exchange.gather_at_events(slave, time);
+                if new {
+                    discrete = true;
+                    if !self.in_event[slave] {
+                        self.enter(parts.system, slave, time)?;
+                    }
+                }
+                if !self.in_event[slave] {
+                    continue;
+                }
+                if new || !self.set[slave] {
+                    parts.exchange.set_at_events(parts.system, slave, time)?;
+                    self.set[slave] = true;
+                }
+                continuous |= parts.exchange.set_reals_in_event(parts.system, slave, time)?;
+            }
+            any |= discrete;
+            if !(discrete || continuous && pass < self.in_event.len()) {
+                return Ok(any);
+            }
+        }
+        Err(self.unsettled(parts, time))
+    }
+
+    /// Updates the discrete states of the slaves in event mode.
+    fn update(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<Updated, SystemError> {
+        let mut again = false;
+        for slave in 0..self.in_event.len() {
+            if !self.in_event[slave] {
+                continue;
+            }
+            let info = at(parts.system, slave, time, |events| events.update_discrete_states())?;
+            if info.terminate_simulation {
+                return Ok(Updated::Ended(Ending { slave, time }));
+            }
+            again |= info.discrete_states_need_update;
+        }
+        parts.exchange.end_ticks();
+        self.set.fill(false);
+        Ok(if again { Updated::Again } else { Updated::Settled })
+    }
+
+    /// Leaves event mode and reads the outputs.
+    fn leave(&mut self, parts: &mut Parts<'_>, time: f64) -> Result<InstantEnd, SystemError> {
+        for slave in 0..self.in_event.len() {
+            if std::mem::take(&mut self.in_event[slave]) {
+                at(parts.system, slave, time, |events| events.leave_event_mode())?;
+                self.ask_next(parts.system, slave, time)?;
+                parts.exchange.read(parts.system, slave, time)?;
+            }
+        }
+        let jumped = parts.exchange.reals.forget_jumps(&self.before);
+        Ok(InstantEnd { ending: None, jumped })
+    }
+
+    /// Asks a slave for the time of its next event.
+    fn ask_next(
+        &mut self,
+        system: &mut System,
+        slave: usize,
+        time: f64,
+    ) -> Result<(), SystemError> {
+        let next = at(system, slave, time, |events| events.next_event())?;
+        self.next[slave] = next.filter(|_| self.connected[slave]).unwrap_or(f64::INFINITY);
+        Ok(())
+    }
+
+    /// Asks all slaves for the times of their next events, after their states have been restored. `pending` are
+    /// the events that their steps have ended at.
+    pub(crate) fn restore(
+        &mut self,
+        system: &mut System,
+        pending: &[f64],
+        time: f64,
+    ) -> Result<(), SystemError> {
+        self.pending.copy_from_slice(pending);
+        for position in 0..self.members.len() {
+            self.ask_next(system, self.members[position], time)?;
+        }
+        Ok(())
+    }
+
+    /// Records that the step of `slave`, of `size` s, has ended at an event at `end` s. The communication point there
+    /// may be less by rounding.
+    pub(crate) fn expect(&mut self, slave: usize, end: f64, size: f64) {
+        self.pending[slave] = end - ROUNDING * size;
+    }
+
+    /// Forgets the events of a step that is repeated.
+    pub(crate) fn forget(&mut self) {
+        self.pending.fill(f64::INFINITY);
+    }
+
+    /// Returns the error that names what still changes.
+    #[cold]
+    fn unsettled(&self, parts: &mut Parts<'_>, time: f64) -> SystemError {
+        let in_event = self.members.iter().copied().filter(|&slave| self.in_event[slave]);
+        for slave in in_event.clone() {
+            if let Err(error) = parts.exchange.read_in_event(parts.system, slave, time) {
+                return error;
+            }
+        }
+        let mut names: Vec<String> = Vec::new();
+        for &slave in &self.members {
+            parts.exchange.gather_at_events(slave, time);
+            names.extend(parts.exchange.unsettled(parts.system, slave));
+        }
+        if names.is_empty() {
+            let states =
+                |slave: usize| format!("the discrete states of {}", parts.system.slaves[slave].0);
+            names.extend(in_event.map(states));
+        }
+        SystemError::Unsettled { time, iterations: MOST, names: names.join(", ") }
+    }
+}
+
+/// The outcome of an update.
+enum Updated {
+    /// A slave needs another one.
+    Again,
+    Settled,
+    Ended(Ending),
+}
+
+/// Performs `action` with the events of a slave.
+fn at<T>(
+    system: &mut System,
+    slave: usize,
+    time: f64,
+    action: impl FnOnce(&mut dyn Events) -> Result<T, CallError>,
+) -> Result<T, SystemError> {
+    let (name, instance) = &mut system.slaves[slave];
+    let events = instance.events().ok_or_else(|| absent("fmi3EnterEventMode"));
+    events.and_then(action).map_err(|source| call(name, time, source))
+}

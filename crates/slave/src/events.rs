@@ -1,0 +1,25 @@
+//! The trait [`Events`]: the functions by which a master handles the events of a slave.
+
+use crate::{CallError, EventInfo};
+
+/// A slave whose events its master handles, after [`Slave::hand_over_events`](crate::Slave::hand_over_events).
+///
+/// An instant is superdense (E. A. Lee and H. Zheng, HSCC 2005): all slaves are brought to it, then the master
+/// repeats at this time: read the outputs, set the inputs that follow from them, update the discrete states, until
+/// nothing changes any more (FMI 3.0.2, sections 2.3.5 and 4.2; FMI 2.0.5, section 3.2).
+#[expect(clippy::missing_errors_doc, reason = "CallError as for every function of Slave")]
+pub trait Events {
+    /// The time in s of the next event that is known before it happens: a time event, or the tick of an input clock.
+    fn next_event(&mut self) -> Result<Option<f64>, CallError>;
+
+    /// `fmi3EnterEventMode`, `fmi2EnterEventMode` at the time reached; input clocks that are due tick. In event mode
+    /// it only lets clocks tick.
+    fn enter_event_mode(&mut self) -> Result<(), CallError>;
+
+    /// `fmi3UpdateDiscreteStates`, `fmi2NewDiscreteStates`: one iteration of an event. Clocks do not tick any more
+    /// after it.
+    fn update_discrete_states(&mut self) -> Result<EventInfo, CallError>;
+
+    /// `fmi3EnterStepMode`, `fmi2EnterContinuousTimeMode`, after the last iteration of an event.
+    fn leave_event_mode(&mut self) -> Result<(), CallError>;
+}

@@ -1,0 +1,44 @@
+//! Scheduled execution of FMI 3.0 (section 5). The FMU is `tests/c/scheduled3.c`, which is strict about its calls.
+
+use tests::{Table, scheduled};
+
+/// The digits of the partitions, by hand. At 0.5 s the scenario asks a for partition 2, which comes before 1 because
+/// its priority is higher. At 1.2 s the countdowns of both end; that of a makes b's partition 2 run at the same instant.
+#[test]
+fn model_partitions_run_at_the_ticks_of_their_clocks_by_priority() {
+    let folder = tempfile::tempdir().unwrap();
+    let fmu = scheduled::write(folder.path());
+    std::fs::write(folder.path().join("in.csv"), "time,asked,u\n0,0,7\n0.5,1,7\n0.7,0,7\n")
+        .unwrap();
+    let system = format!(
+        "[fmus]\na = {fmu:?}\nb = {fmu:?}\n\
+         [[connections]]\nfrom = \"a.done\"\nto = \"b.asked\"\n\
+         [[connections]]\nfrom = \"a.sum\"\nto = \"b.u\"\n\
+         [[scenario.table]]\ncsv = \"in.csv\"\nelement = \"a\"\n"
+    );
+    let file = folder.path().join("system.toml");
+    std::fs::write(&file, system).unwrap();
+    for (number, more) in
+        [&[][..], &["--method", "jacobi", "--jobs", "2"], &["--isolate"]].into_iter().enumerate()
+    {
+        let out = folder.path().join(number.to_string());
+        let (file, out) = (file.to_str().unwrap(), out.to_str().unwrap());
+        let run = ["run", file, "--stop-time", "1.5", "--step", "0.4", "--out", out];
+        let output = tests::run(&[&run, more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let rows = Table::read(&std::path::Path::new(out).join("results.csv"));
+        let changes = |name: &str| {
+            let (times, values) = (rows.column("time"), rows.column(name));
+            let rounded = |time: f64| (1e9 * time).round() / 1e9;
+            let mut found: Vec<(f64, f64)> = times.into_iter().map(rounded).zip(values).collect();
+            found.dedup_by_key(|(_, value)| *value);
+            found
+        };
+        let order = [(0.0, 1.0), (0.5, 121.0), (1.0, 1211.0), (1.2, 12_113.0), (1.5, 121_131.0)];
+        assert_eq!(changes("a.order"), order);
+        let order = [(0.0, 1.0), (0.5, 11.0), (1.0, 111.0), (1.2, 11_132.0), (1.5, 111_321.0)];
+        assert_eq!(changes("b.order"), order);
+        assert_eq!(changes("a.sum"), [(0.0, 0.0), (0.5, 7.0)]);
+        assert_eq!(changes("b.sum"), [(0.0, 0.0), (1.2, 7.0)]);
+    }
+}
