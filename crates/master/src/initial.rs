@@ -48,8 +48,7 @@ pub(crate) fn initialise(
     let driven = scenario.drives.iter().map(Drive::port);
     let replaced: HashSet<Port> =
         connections.map(|connection| connection.to).chain(driven).collect();
-    system.confirm_settings(&replaced, start)?;
-    system.confirm_start_values(&replaced, start)
+    system.confirm_settings(&replaced, start)
 }
 
 /// Returns the experiment for one FMU: with the tolerance of its own `DefaultExperiment` if the

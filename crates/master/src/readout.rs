@@ -8,7 +8,7 @@ use crate::drive::{DriveKind, Drives, integer};
 use crate::error::SystemError;
 use crate::exchange::call;
 use crate::system::{Port, System};
-use slave::{CallError, Slave, ValueType, to_hex};
+use slave::{CallError, Slave, Value, ValueType, to_hex};
 pub use slow::{SlowState, SlowValues};
 
 /// Values of chosen variables, in one array for each type. Each array keeps the order of the
@@ -56,7 +56,10 @@ impl Readout {
             let position = readout.add(kind);
             // Only the last group of this kind can be extended, so that its range stays contiguous.
             let last = readout.reads.iter_mut().rev().find(|read| array(read.kind) == array(kind));
-            match last.filter(|read| read.slave == port.slave && read.kind == kind) {
+            let next = |read: &&mut Read| {
+                read.slave == port.slave && read.kind == kind && read.range.end == position
+            };
+            match last.filter(next) {
                 Some(read) => {
                     read.references.push(variable.value_reference);
                     read.range.end = position + 1;
@@ -71,6 +74,9 @@ impl Readout {
         }
         readout
     }
+            if readout.put_known(system.known_input(port).as_ref(), position) {
+                continue;
+            }
 
     /// Makes driven variables show the value of their signal at the time read, instead of the value
     /// that the FMU received for its last step.
@@ -121,6 +127,37 @@ impl Readout {
             ValueType::String | ValueType::Binary => self.strings.len(),
         };
         length - 1
+    }
+
+    /// Puts a value that no FMU has to be asked for to its position; returns whether there is one.
+    fn put_known(&mut self, value: Option<&Value>, position: usize) -> bool {
+        match value {
+            Some(Value::Real(value)) => self.reals[position] = *value,
+            Some(Value::Integer(value)) => self.integers[position] = *value,
+            Some(Value::Boolean(value)) => self.booleans[position] = i32::from(*value),
+            _ => return false,
+        }
+        true
+    }
+
+    /// Adds the clocks of a clocked variable.
+    fn add_clocks(&mut self, system: &System, port: Port) {
+        let position = self.present.len();
+        self.present.push(false);
+        let description = system.slaves[port.slave].1.description();
+        let clocks = system.variable(port).clocks.iter().filter_map(|own| description.at(*own));
+        let references: Vec<u32> = clocks.map(|own| own.value_reference).collect();
+        match self.clocks.last_mut() {
+            Some(last) if last.slave == port.slave && last.references == references => {
+                last.range.end = position + 1;
+            }
+            _ => self.clocks.push(ClockRead {
+                slave: port.slave,
+                flags: vec![0; references.len()],
+                references,
+                range: position..position + 1,
+            }),
+        }
     }
 
     /// Reads all values. `time` in s appears in the error message.

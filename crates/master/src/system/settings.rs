@@ -3,7 +3,7 @@
 
 use std::collections::HashSet;
 
-use fmu_description::{Causality, Initial};
+use fmu_description::{Causality, Initial, Kind};
 
 use super::{Port, System};
 use crate::error::SystemError;
@@ -70,8 +70,8 @@ impl System {
     }
 
     /// Repeats the settings that the standard allows in initialization mode (FMI 2.0.5, table
-    /// 4.2.4) and that are lost, because some FMUs reset them when they enter it. `time` in s appears in the
-    /// error message.
+    /// 4.2.4) and that are lost, because some FMUs reset them when they enter it. Inputs are not read: some FMUs
+    /// cannot. `time` in s appears in the error message.
     ///
     /// # Errors
     ///
@@ -79,13 +79,16 @@ impl System {
     pub(crate) fn repeat_settings(&mut self, time: f64) -> Result<(), SystemError> {
         for setting in self.settings.clone() {
             let variable = self.variable(setting.port);
-            let settable = variable.causality == Causality::Input
-                || variable.initial_in_force() == Some(Initial::Exact);
-            let repeated = match self.get_value(setting.port) {
-                Ok(found) if found == setting.value => continue,
-                Ok(_) if settable => self.set_value(setting.port, &setting.value),
-                Ok(_) => continue,
-                Err(error) => Err(error),
+            let exact = variable.initial_in_force() == Some(Initial::Exact);
+            let repeated = if variable.causality == Causality::Input {
+                self.set_value(setting.port, &setting.value)
+            } else {
+                match self.get_value(setting.port) {
+                    Ok(found) if exact && found != setting.value => {
+                        self.set_value(setting.port, &setting.value)
+                    }
+                    read => read.map(|_| ()),
+                }
             };
             if let Err(error) = repeated {
                 self.go_on_after(setting.port, time, error)?;
@@ -104,12 +107,12 @@ impl System {
         Ok(())
     }
 
-    /// Reads the settings back after the initialization, except the variables in `replaced`, which
+    /// Reads the settings back after the initialization, except inputs and the variables in `replaced`, which
     /// have received another value. `time` in s appears in the error message.
     ///
     /// # Errors
     ///
-    /// Returns an error if a parameter or an input has another value than the one set, or if an FMU cannot be
+    /// Returns an error if a parameter has another value than the one set, or if an FMU cannot be
     /// used any more.
     pub(crate) fn confirm_settings(
         &mut self,
@@ -117,7 +120,8 @@ impl System {
         time: f64,
     ) -> Result<(), SystemError> {
         for setting in self.settings.clone() {
-            if replaced.contains(&setting.port) {
+            let causality = self.variable(setting.port).causality;
+            if causality == Causality::Input || replaced.contains(&setting.port) {
                 continue;
             }
             let name = self.name(setting.port);
@@ -137,8 +141,7 @@ impl System {
             }
             let (value, found) = (setting.text, found.to_string());
             let error = SystemError::LostSetting { name, value, found };
-            let causality = self.variable(setting.port).causality;
-            if matches!(causality, Causality::Parameter | Causality::Input) {
+            if causality == Causality::Parameter {
                 return Err(error);
             }
             // Outputs and local variables may change at the end of the initialization.
@@ -147,53 +150,23 @@ impl System {
         Ok(())
     }
 
-    /// Warns after the initialization about parameters and inputs whose value differs from the
-    /// start value of the description, except variables that were set or are in `replaced`. `time` in s
-    /// appears in the error message.
-    ///
-    /// # Errors
-    ///
-    /// Returns an error if an FMU cannot be used any more.
-    pub(crate) fn confirm_start_values(
-        &mut self,
-        replaced: &HashSet<Port>,
-        time: f64,
-    ) -> Result<(), SystemError> {
-        let set: HashSet<Port> = self.settings.iter().map(|setting| setting.port).collect();
-        for slave in 0..self.slaves.len() {
-            let ports = (0..self.slaves[slave].1.description().variables.len())
-                .map(|variable| Port { slave, variable })
-                .filter(|port| !set.contains(port) && !replaced.contains(port));
-            let mut lost = Vec::new();
-            for port in ports.collect::<Vec<_>>() {
-                let Some(start) = self.start_value(port) else { continue };
-                match self.get_value(port) {
-                    Ok(found) if start.is_near(&found) => {}
-                    Ok(found) => {
-                        lost.push(format!("{} is {found}, not {start}", self.variable(port).name));
-                    }
-                    Err(error) => self.go_on_after(port, time, error)?,
-                }
-            }
-            if let Some(first) = lost.first() {
-                tracing::warn!(
-                    "{}: {} of its start values are not those of the model description, for \
-                     example {first}",
-                    self.slaves[slave].0,
-                    lost.len()
-                );
-            }
-        }
-        Ok(())
-    }
-
-    /// Returns the start value of a parameter or an input, if it is a number or a Boolean.
-    fn start_value(&self, port: Port) -> Option<Value> {
+    /// Returns the value of an input without a connection, as it was set or described: an FMU need not be asked for it,
+    /// and some cannot answer. `None` for others, and for texts.
+    pub(crate) fn known_input(&self, port: Port) -> Option<Value> {
         let variable = self.variable(port);
-        let causality = variable.causality;
-        if !matches!(causality, Causality::Parameter | Causality::Input) {
-            return None;
+        let free = variable.causality == Causality::Input
+            && variable.clocks.is_empty()
+            && !matches!(variable.kind, Kind::Clock(_))
+            && self.source(port).is_none();
+        let set = || self.settings.iter().find(|own| own.port == port).map(|own| &own.value);
+        let known = free.then(|| set().cloned().or_else(|| Value::start(&variable.kind))).flatten();
+        match known? {
+            #[expect(clippy::cast_possible_truncation, reason = "as the FMU holds it")]
+            Value::Real(value) if matches!(variable.kind, Kind::Float32(_)) => {
+                Some(Value::Real((value as f32).into()))
+            }
+            Value::String(_) | Value::Binary(_) => None,
+            number => Some(number),
         }
-        Value::start(&variable.kind)
     }
 }

@@ -39,15 +39,6 @@ fn a_setting_that_an_fmu_does_not_keep_ends_the_run_before_its_start_and_is_name
 }
 
 #[test]
-fn start_values_that_differ_from_the_description_give_a_warning() {
-    let run = Run::of(&[("a", &CFmu::that("other start values"))], &[]);
-    assert_eq!(run.status, Some(0), "{}", run.message);
-    run.says(&["warning: a: 2 of its start values", "t1 is 7, not 0.5"]);
-    let run = Run::of(&[("a", &CFmu::that("other start values"))], &["--set", "a.t1=1"]);
-    run.says(&["warning: a: 1 of its start values", "n is 8, not 3"]);
-}
-
-#[test]
 fn each_fmu_gets_its_own_tolerance_unless_the_user_states_one() {
     let told = |tolerance: Option<&str>| {
         let attributes = tolerance.map(|tolerance| format!("tolerance=\"{tolerance}\""));

@@ -121,7 +121,7 @@ fn the_log_of_calls_distinguishes_warnings_from_ok() {
     printed(&bench.run(&[&path, "--step", "0.5", "--stop-time", "1", "--log-calls", "calls.txt"]));
     let calls = bench.read("calls.txt");
     assert!(calls.contains("a fmi2DoStep(0.0, 0.5, true) -> fmi2Warning\n"), "{calls}");
-    assert!(calls.contains("a fmi2GetReal([0, 1]) -> fmi2Warning [1.0, 0.0]\n"), "{calls}");
+    assert!(calls.contains("a fmi2GetReal([1]) -> fmi2Warning [0.0]\n"), "{calls}");
     assert!(calls.contains("a fmi2DoStep(0.5, 0.5, true) -> fmi2Warning\n"), "{calls}");
 }
 
