@@ -9,7 +9,7 @@ use arrow_array::{
     Array as _, ArrayRef, BooleanArray, Float64Array, Int32Array, Int64Array, LargeStringArray,
     RecordBatch, RecordBatchIterator, cast::AsArray as _,
 };
-use arrow_buffer::{Buffer, OffsetBuffer, ScalarBuffer};
+use arrow_buffer::{Buffer, NullBuffer, OffsetBuffer, ScalarBuffer};
 use arrow_schema::ffi::FFI_ArrowSchema;
 use arrow_schema::{ArrowError, DataType, Field, Schema};
 use pyo3::exceptions::PyValueError;
@@ -31,10 +31,15 @@ impl Table {
     /// Takes over the memory of the columns. Their names lose `prefix`.
     pub(crate) fn new(recorded: Columns, prefix: Option<&str>) -> PyResult<Self> {
         let rows = recorded.time.len();
-        let time =
-            Column { name: TIME.to_owned(), kind: ColumnKind::Real, unit: Some("s".to_owned()) };
-        let (mut fields, mut arrays) = (vec![field(&time)], vec![reals(recorded.time)]);
+        let time = Column {
+            name: TIME.to_owned(),
+            kind: ColumnKind::Real,
+            unit: Some("s".to_owned()),
+            clocked: false,
+        };
+        let (mut fields, mut arrays) = (vec![field(&time)], vec![reals(recorded.time, None)]);
         let mut columns = vec![time];
+        let mut present = recorded.present.into_iter();
         for (mut column, values) in recorded.columns {
             let own = prefix.and_then(|prefix| column.name.strip_prefix(prefix));
             let own = own.filter(|name| *name != TIME).map(str::to_owned);
@@ -42,7 +47,8 @@ impl Table {
                 column.name = name;
             }
             fields.push(field(&column));
-            arrays.push(array(values).map_err(failed)?);
+            let nulls = if column.clocked { present.next().map(NullBuffer::from) } else { None };
+            arrays.push(array(values, nulls).map_err(failed)?);
             columns.push(column);
         }
         debug_assert!(
@@ -61,6 +67,9 @@ impl Table {
     fn recorded(&self) -> Columns {
         let arrays = self.batch.columns().iter().skip(1);
         let columns = self.columns.iter().skip(1).cloned();
+        let clocked = columns.clone().zip(arrays.clone()).filter(|(column, _)| column.clocked);
+        let there = |array: &ArrayRef| (0..array.len()).map(|row| array.is_valid(row)).collect();
+        let present = clocked.map(|(_, array)| there(array)).collect();
         Columns {
             time: self
                 .batch
@@ -69,6 +78,7 @@ impl Table {
                 .values()
                 .to_vec(),
             columns: columns.zip(arrays.map(values)).collect(),
+            present,
         }
     }
 }
@@ -86,23 +96,28 @@ fn field(column: &Column) -> Field {
         ColumnKind::String => DataType::LargeUtf8,
     };
     let unit = column.unit.clone().map(|unit| ("unit".to_owned(), unit));
-    Field::new(&column.name, kind, false).with_metadata(unit.into_iter().collect::<HashMap<_, _>>())
+    Field::new(&column.name, kind, column.clocked)
+        .with_metadata(unit.into_iter().collect::<HashMap<_, _>>())
 }
 
-fn reals(values: Vec<f64>) -> ArrayRef {
-    Arc::new(Float64Array::new(ScalarBuffer::from(values), None))
+/// Returns an array with the memory of `values`; `NumPy` sees NaN for a null.
+fn reals(mut values: Vec<f64>, nulls: Option<NullBuffer>) -> ArrayRef {
+    for (value, present) in values.iter_mut().zip(nulls.iter().flatten()) {
+        *value = if present { *value } else { f64::NAN };
+    }
+    Arc::new(Float64Array::new(ScalarBuffer::from(values), nulls))
 }
 
 /// Returns an array with the memory of `values`; Booleans become bits.
-fn array(values: Values) -> Result<ArrayRef, ArrowError> {
+fn array(values: Values, nulls: Option<NullBuffer>) -> Result<ArrayRef, ArrowError> {
     Ok(match values {
-        Values::Real(own) => reals(own),
-        Values::Integer(own) => Arc::new(Int32Array::new(ScalarBuffer::from(own), None)),
-        Values::Long(own) => Arc::new(Int64Array::new(ScalarBuffer::from(own), None)),
-        Values::Boolean(own) => Arc::new(BooleanArray::from(own)),
+        Values::Real(own) => reals(own, nulls),
+        Values::Integer(own) => Arc::new(Int32Array::new(ScalarBuffer::from(own), nulls)),
+        Values::Long(own) => Arc::new(Int64Array::new(ScalarBuffer::from(own), nulls)),
+        Values::Boolean(own) => Arc::new(BooleanArray::new(own.into(), nulls)),
         Values::String(own) => {
             let offsets = OffsetBuffer::new(ScalarBuffer::from(own.offsets));
-            Arc::new(LargeStringArray::try_new(offsets, Buffer::from_vec(own.bytes), None)?)
+            Arc::new(LargeStringArray::try_new(offsets, Buffer::from_vec(own.bytes), nulls)?)
         }
     })
 }
@@ -121,6 +136,17 @@ fn values(array: &ArrayRef) -> Values {
         }
         _ => Values::Real(array.as_primitive::<Float64Type>().values().to_vec()),
     }
+}
+
+/// Returns the numbers of an array with nulls as floating-point numbers, NaN for a null.
+fn with_gaps(array: &ArrayRef) -> ArrayRef {
+    #[expect(clippy::cast_precision_loss, reason = "as in pandas")]
+    let numbers = match values(array) {
+        Values::Integer(own) => own.into_iter().map(f64::from).collect(),
+        Values::Long(own) => own.into_iter().map(|value| value as f64).collect(),
+        _ => return array.clone(),
+    };
+    reals(numbers, array.nulls().cloned())
 }
 
 #[pymethods]
@@ -145,16 +171,22 @@ impl Table {
         self.batch.num_rows()
     }
 
-    /// The numbers of a column for `numpy.asarray`; `None` for texts and Booleans.
+    /// The numbers of a column for `numpy.asarray`; `None` for texts and Booleans. Integers with gaps are floating-point
+    /// numbers with NaN in them, as in pandas.
     fn numbers(&self, name: &str) -> Option<Numbers> {
         let array = self.batch.column(self.position(name)?).clone();
         let is_number = array.data_type().is_primitive();
+        let array = if array.null_count() > 0 { with_gaps(&array) } else { array };
         is_number.then_some(Numbers { array })
     }
 
     /// The values of a column as a list.
     fn values<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Option<Bound<'py, PyList>>> {
         let Some(position) = self.position(name) else { return Ok(None) };
+        if self.batch.column(position).null_count() > 0 {
+            let all = (0..self.batch.num_rows()).map(|row| self.value(py, name, row));
+            return Ok(Some(PyList::new(py, all.collect::<PyResult<Vec<_>>>()?)?));
+        }
         Ok(Some(match values(self.batch.column(position)) {
             Values::Real(own) => PyList::new(py, own)?,
             Values::Integer(own) => PyList::new(py, own)?,
@@ -167,13 +199,16 @@ impl Table {
         }))
     }
 
-    /// The value of a column in a row.
+    /// The value of a column in a row; `None` for a clocked variable between its ticks.
     fn value<'py>(&self, py: Python<'py>, name: &str, row: usize) -> PyResult<Bound<'py, PyAny>> {
         let position = self.position(name).ok_or_else(|| PyValueError::new_err(name.to_owned()))?;
         if row >= self.batch.num_rows() {
             return Err(PyValueError::new_err(format!("there is no row {row}")));
         }
         let one = self.batch.column(position).slice(row, 1);
+        if one.is_null(0) {
+            return Ok(py.None().into_bound(py));
+        }
         match values(&one) {
             Values::Real(own) => own[0].into_bound_py_any(py),
             Values::Integer(own) => own[0].into_bound_py_any(py),

@@ -74,7 +74,12 @@ fn run(path: &Path, step: f64, steps: u64, results: Option<&Path>) -> anyhow::Re
     let (start, clock) = (cpu(), Instant::now());
     let system = read(path)?;
     let ports = system.ports(Causality::Output);
-    let name = |port| Column { name: system.name(port), kind: ColumnKind::Real, unit: None };
+    let name = |port| Column {
+        name: system.name(port),
+        kind: ColumnKind::Real,
+        unit: None,
+        clocked: false,
+    };
     let columns: Vec<Column> = ports.iter().map(|&port| name(port)).collect();
     let mut sink = results.map(|path| create(path, &columns)).transpose()?;
     let mut readout = Readout::new(&system, &ports);
@@ -92,7 +97,7 @@ fn run(path: &Path, step: f64, steps: u64, results: Option<&Path>) -> anyhow::Re
             let time = simulation.time();
             readout.read(simulation.system(), time)?;
             let Readout { reals, integers, booleans, strings, .. } = &readout;
-            let row = Row { reals, integers, booleans, strings };
+            let row = Row { reals, integers, booleans, strings, ..Row::default() };
             sink.row(time, &row)?;
         }
     }

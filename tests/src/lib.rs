@@ -134,7 +134,7 @@ pub fn simulation(system: System, algorithm: &Algorithm, names: &[&str]) -> (Sim
     (simulation.unwrap_or_else(|error| panic!("{error}")), probe)
 }
 
-/// A table of numbers with named columns, as our CSV files hold them; lines from `#` are skipped.
+/// A table of numbers with named columns, as our CSV files hold them; an empty cell is NaN. Lines from `#` are skipped.
 pub struct Table {
     names: Vec<String>,
     rows: Vec<Vec<f64>>,
@@ -155,7 +155,8 @@ impl Table {
         let numbers = |record: Result<csv::StringRecord, csv::Error>| {
             let record = record.unwrap_or_else(|error| panic!("{error}"));
             let number = |entry: &str| {
-                entry.trim().parse().unwrap_or_else(|_| panic!("{entry:?} is no number"))
+                let entry = if entry.is_empty() { "NaN" } else { entry.trim() };
+                entry.parse().unwrap_or_else(|_| panic!("{entry:?} is no number"))
             };
             record.iter().map(number).collect()
         };

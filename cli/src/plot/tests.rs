@@ -8,7 +8,7 @@ use resvg::usvg::roxmltree::Document;
 use super::*;
 
 fn column(name: &str, kind: ColumnKind, unit: Option<&str>) -> Column {
-    Column { name: name.to_owned(), kind, unit: unit.map(str::to_owned) }
+    Column { name: name.to_owned(), kind, unit: unit.map(str::to_owned), clocked: false }
 }
 
 /// A run of 10 s: two positions in m, a force in N, a switch, a text; one sample of `plant.F` is
@@ -31,6 +31,7 @@ fn written(folder: &Path, name: &str, rows: u32) -> PathBuf {
             integers: &[],
             booleans: &[i32::from(time > 4.0 && time < 7.0)],
             strings: &["idle".to_owned()],
+            ..Row::default()
         };
         sink.row(time, &row).unwrap();
     }

@@ -25,6 +25,11 @@ pub struct Readout {
     pub booleans: Vec<i32>,
     /// Values of Strings, and of binaries as hexadecimal digits.
     pub strings: Vec<String>,
+    /// For each clocked variable, in the order of the variables, whether one of its clocks has ticked since the last
+    /// communication point, so that its value is one of this time.
+    pub present: Vec<bool>,
+    /// The clocks of these variables.
+    clocks: Vec<ClockRead>,
     /// Buffer for binaries.
     binaries: Vec<Vec<u8>>,
     /// Driven variables: index of the drive, and position of the value.
@@ -40,6 +45,15 @@ struct Read {
     range: Range<usize>,
 }
 
+/// The clocks of consecutive clocked variables that have the same ones.
+#[derive(Debug)]
+struct ClockRead {
+    slave: usize,
+    references: Vec<u32>,
+    flags: Vec<i32>,
+    range: Range<usize>,
+}
+
 /// Returns the type of the array that holds values of this type: binaries are with the Strings.
 fn array(kind: ValueType) -> ValueType {
     if kind == ValueType::Binary { ValueType::String } else { kind }
@@ -51,9 +65,15 @@ impl Readout {
     pub fn new(system: &System, ports: &[Port]) -> Self {
         let mut readout = Self { ports: ports.to_vec(), ..Self::default() };
         for &port in ports {
+            if system.is_absent_between_ticks(port) {
+                readout.add_clocks(system, port);
+            }
             let variable = system.variable(port);
             let kind = ValueType::of(&variable.kind);
             let position = readout.add(kind);
+            if readout.put_known(system.known_input(port).as_ref(), position) {
+                continue;
+            }
             // Only the last group of this kind can be extended, so that its range stays contiguous.
             let last = readout.reads.iter_mut().rev().find(|read| array(read.kind) == array(kind));
             let next = |read: &&mut Read| {
@@ -74,9 +94,6 @@ impl Readout {
         }
         readout
     }
-            if readout.put_known(system.known_input(port).as_ref(), position) {
-                continue;
-            }
 
     /// Makes driven variables show the value of their signal at the time read, instead of the value
     /// that the FMU received for its last step.
@@ -112,23 +129,6 @@ impl Readout {
         }
     }
 
-    /// Adds an element for a value and returns its position.
-    fn add(&mut self, kind: ValueType) -> usize {
-        match kind {
-            ValueType::Real => self.reals.push(0.0),
-            ValueType::Integer => self.integers.push(0),
-            ValueType::Boolean => self.booleans.push(0),
-            ValueType::String | ValueType::Binary => self.strings.push(String::new()),
-        }
-        let length = match kind {
-            ValueType::Real => self.reals.len(),
-            ValueType::Integer => self.integers.len(),
-            ValueType::Boolean => self.booleans.len(),
-            ValueType::String | ValueType::Binary => self.strings.len(),
-        };
-        length - 1
-    }
-
     /// Puts a value that no FMU has to be asked for to its position; returns whether there is one.
     fn put_known(&mut self, value: Option<&Value>, position: usize) -> bool {
         match value {
@@ -160,6 +160,23 @@ impl Readout {
         }
     }
 
+    /// Adds an element for a value and returns its position.
+    fn add(&mut self, kind: ValueType) -> usize {
+        match kind {
+            ValueType::Real => self.reals.push(0.0),
+            ValueType::Integer => self.integers.push(0),
+            ValueType::Boolean => self.booleans.push(0),
+            ValueType::String | ValueType::Binary => self.strings.push(String::new()),
+        }
+        let length = match kind {
+            ValueType::Real => self.reals.len(),
+            ValueType::Integer => self.integers.len(),
+            ValueType::Boolean => self.booleans.len(),
+            ValueType::String | ValueType::Binary => self.strings.len(),
+        };
+        length - 1
+    }
+
     /// Reads all values. `time` in s appears in the error message.
     ///
     /// # Errors
@@ -169,6 +186,11 @@ impl Readout {
         for position in 0..self.reads.len() {
             let (name, slave) = &mut system.slaves[self.reads[position].slave];
             self.read_one(position, slave.as_mut()).map_err(|source| call(name, time, source))?;
+        }
+        for ClockRead { slave, references, flags, range } in &mut self.clocks {
+            let (name, slave) = &mut system.slaves[*slave];
+            slave.get_boolean(references, flags).map_err(|source| call(name, time, source))?;
+            self.present[range.clone()].fill(flags.iter().any(|flag| *flag != 0));
         }
         Ok(())
     }

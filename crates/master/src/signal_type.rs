@@ -48,6 +48,16 @@ impl System {
         }
     }
 
+    /// Whether the variable at `port` has a value at the ticks of its clocks only. In scheduled execution it can be read at
+    /// any time.
+    #[must_use]
+    pub fn is_absent_between_ticks(&self, port: Port) -> bool {
+        let variable = self.variable(port);
+        !variable.clocks.is_empty()
+            && !matches!(variable.kind, Kind::Clock(_))
+            && self.slaves[port.slave].1.description().scheduled_execution.is_none()
+    }
+
     /// Whether the signal of a connection is held: one of its ends is not continuous.
     pub(crate) fn is_held(&self, connection: &Connection) -> bool {
         let continuous = |port| self.signal_type(port) == SignalType::Continuous;

@@ -46,7 +46,8 @@ fn processor_time() -> Duration {
 
 /// Returns the sink for the extension of `path`.
 fn ours(name: &'static str, path: PathBuf, width: usize) -> Subject {
-    let column = |k| Column { name: format!("x{k}"), kind: ColumnKind::Real, unit: None };
+    let column =
+        |k| Column { name: format!("x{k}"), kind: ColumnKind::Real, unit: None, clocked: false };
     let columns: Vec<Column> = (0..width).map(column).collect();
     let table: Vec<Vec<f64>> =
         (0..PERIOD).map(|row| (0..width).map(|column| value(row, column)).collect()).collect();

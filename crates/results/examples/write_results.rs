@@ -20,6 +20,7 @@ fn columns(numbers: bool) -> Vec<Column> {
         name: name.to_owned(),
         kind,
         unit: unit.map(str::to_owned),
+        clocked: false,
     };
     let mut columns = vec![
         column("plant.x_p", ColumnKind::Real, Some("m")),
@@ -48,8 +49,13 @@ fn give(sink: &mut dyn Sink, k: u32, bits: &mut u64, numbers: bool) -> Result<()
     let texts = [format!("row {k}, \"\u{e4}\"{}", if k.is_multiple_of(3) { "\n" } else { "" })];
     let strings: &[String] = if numbers { &[] } else { &texts };
     let integer = i32::from_ne_bytes(k.wrapping_mul(2_654_435_761).to_ne_bytes()).into();
-    let row =
-        Row { reals: &reals, integers: &[integer], booleans: &[i32::from(k % 2 == 1)], strings };
+    let row = Row {
+        reals: &reals,
+        integers: &[integer],
+        booleans: &[i32::from(k % 2 == 1)],
+        strings,
+        ..Row::default()
+    };
     sink.row(f64::from(k) * 1e-3, &row)
 }
 

@@ -20,13 +20,14 @@ const INTERVAL: Duration = Duration::from_millis(100);
 ///
 /// The first line contains the names, quoted. A Real has the fewest digits that read back as the same
 /// number (Schubfach; Giulietti 2020), NaN is `NaN`, infinity `inf`; a Boolean is 0 or 1; a String is
-/// quoted. The layout has no units.
+/// quoted; a cell without a value is empty. The layout has no units.
 #[derive(Debug)]
 pub struct CsvSink {
     path: PathBuf,
     file: File,
     widths: Widths,
-    kinds: Vec<ColumnKind>,
+    /// Type of each column, and whether it is clocked.
+    cells: Vec<(ColumnKind, bool)>,
     /// Complete lines that are not yet in the file.
     lines: Lines,
     /// Length of the file, at the end of a line.
@@ -56,7 +57,7 @@ impl CsvSink {
             path: path.to_owned(),
             file: create_file(path)?,
             widths: Widths::new(columns),
-            kinds: columns.iter().map(|column| column.kind).collect(),
+            cells: columns.iter().map(|column| (column.kind, column.clocked)).collect(),
             lines,
             written: 0,
             pace: Pace::new(INTERVAL),
@@ -91,20 +92,33 @@ impl Sink for CsvSink {
         let mut integers = row.integers.iter();
         let mut booleans = row.booleans.iter();
         let mut strings = row.strings.iter();
+        let mut present = row.present.iter();
         lines.begin(row.strings.iter().map(String::as_str));
         lines.real(time);
-        for kind in &self.kinds {
+        for (kind, clocked) in &self.cells {
             lines.push(b',');
+            let shown = !clocked || present.next().copied().unwrap_or(true);
             match kind {
-                ColumnKind::Real => reals.next().into_iter().for_each(|value| lines.real(*value)),
-                ColumnKind::Integer | ColumnKind::Long => {
-                    integers.next().into_iter().for_each(|value| lines.integer(*value));
+                ColumnKind::Real => {
+                    if let Some(value) = reals.next().filter(|_| shown) {
+                        lines.real(*value);
+                    }
                 }
-                ColumnKind::Boolean => booleans
-                    .next()
-                    .into_iter()
-                    .for_each(|value| lines.push(if *value == 0 { b'0' } else { b'1' })),
-                ColumnKind::String => strings.next().into_iter().for_each(|text| lines.quote(text)),
+                ColumnKind::Integer | ColumnKind::Long => {
+                    if let Some(value) = integers.next().filter(|_| shown) {
+                        lines.integer(*value);
+                    }
+                }
+                ColumnKind::Boolean => {
+                    if let Some(value) = booleans.next().filter(|_| shown) {
+                        lines.push(if *value == 0 { b'0' } else { b'1' });
+                    }
+                }
+                ColumnKind::String => {
+                    if let Some(text) = strings.next().filter(|_| shown) {
+                        lines.quote(text);
+                    }
+                }
             }
         }
         lines.push(b'\n');

@@ -42,6 +42,8 @@ pub struct Column {
     pub kind: ColumnKind,
     /// Unit of the values, if known.
     pub unit: Option<String>,
+    /// Whether the variable has a value at the ticks of a clock only: the cells of other rows are empty.
+    pub clocked: bool,
 }
 
 /// The type of a column: a base type of FMI 2.0, or an integer of 64 bits; an Enumeration is an Integer.
@@ -71,6 +73,8 @@ pub struct Row<'a> {
     pub booleans: &'a [i32],
     /// Values of the String columns.
     pub strings: &'a [String],
+    /// For each clocked column, in their order, whether its value is one of this row; without it, all are.
+    pub present: &'a [bool],
 }
 
 /// A writer of result rows. A sink that is dropped without [`Sink::finish`] still writes every row, if

@@ -71,6 +71,8 @@ pub struct Columns {
     pub time: Vec<f64>,
     /// The columns with their values.
     pub columns: Vec<(Column, Values)>,
+    /// For each clocked column, in their order, whether its value in each row is one of this row.
+    pub present: Vec<Vec<bool>>,
 }
 
 impl Columns {
@@ -82,7 +84,12 @@ impl Columns {
     pub fn new(columns: &[Column]) -> Result<Self, ResultsError> {
         check_names(columns)?;
         let empty = |column: &Column| (column.clone(), Values::new(column.kind));
-        Ok(Self { time: Vec::new(), columns: columns.iter().map(empty).collect() })
+        let clocked = columns.iter().filter(|column| column.clocked);
+        Ok(Self {
+            time: Vec::new(),
+            columns: columns.iter().map(empty).collect(),
+            present: clocked.map(|_| Vec::new()).collect(),
+        })
     }
 
     /// Adds a row. An integer beyond the type of its column is limited to it. A value that `row` lacks
@@ -102,6 +109,9 @@ impl Columns {
                 Values::String(own) => own.push(strings.next().map_or("", String::as_str)),
             }
         }
+        for (number, own) in self.present.iter_mut().enumerate() {
+            own.push(row.present.get(number).copied().unwrap_or(true));
+        }
     }
 
     /// Writes the rows to a file, `.csv` or `.parquet`.
@@ -113,7 +123,7 @@ impl Columns {
         let columns: Vec<_> = self.columns.iter().map(|(column, _)| column.clone()).collect();
         let mut sink = create(path, &columns)?;
         let (mut reals, mut integers) = (Vec::new(), Vec::new());
-        let (mut booleans, mut strings) = (Vec::new(), Vec::new());
+        let (mut booleans, mut strings, mut present) = (Vec::new(), Vec::new(), Vec::new());
         for (row, &time) in self.time.iter().enumerate() {
             reals.clear();
             integers.clear();
@@ -128,9 +138,11 @@ impl Columns {
                     Values::String(own) => strings.push(own.get(row).unwrap_or("").to_owned()),
                 }
             }
+            present.clear();
+            present.extend(self.present.iter().map(|own| own[row]));
             let (reals, integers) = (&reals[..], &integers[..]);
-            let (booleans, strings) = (&booleans[..], &strings[..]);
-            sink.row(time, &Row { reals, integers, booleans, strings })?;
+            let (booleans, strings, present) = (&booleans[..], &strings[..], &present[..]);
+            sink.row(time, &Row { reals, integers, booleans, strings, present })?;
         }
         sink.finish()
     }
@@ -205,7 +217,7 @@ mod tests {
     use super::*;
 
     fn column(name: &str, kind: ColumnKind) -> Column {
-        Column { name: name.to_owned(), kind, unit: None }
+        Column { name: name.to_owned(), kind, unit: None, clocked: kind == ColumnKind::Long }
     }
 
     #[test]
@@ -232,6 +244,7 @@ mod tests {
                 integers: &[i64::MAX, i64::MIN + 5],
                 booleans: &[i32::from(k == 1)],
                 strings,
+                present: &[k != 1],
             };
             sink.row(x / 3.0, &row).unwrap();
         }
@@ -240,6 +253,7 @@ mod tests {
         assert_eq!(kept.time.len(), 3);
         assert_eq!(kept.columns[0].1, Values::Real(vec![0.1, 1.1, 2.1]));
         assert_eq!(kept.columns[2].1, Values::Integer(vec![i32::MAX; 3]));
+        assert_eq!(kept.present, [[true, false, true]]);
         assert_eq!(kept.columns[3].1, Values::Boolean(vec![false, true, false]));
         let Values::String(own) = &kept.columns[1].1 else { panic!("no texts") };
         assert_eq!(

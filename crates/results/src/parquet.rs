@@ -10,7 +10,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ::parquet::basic::Encoding;
-use ::parquet::column::writer::ColumnWriter;
+use ::parquet::column::writer::{ColumnWriter, ColumnWriterImpl};
+use ::parquet::data_type::DataType;
 use ::parquet::errors::ParquetError;
 use ::parquet::file::metadata::RowGroupMetaData;
 use ::parquet::file::properties::{EnabledStatistics, WriterProperties};
@@ -32,7 +33,7 @@ const INTERVAL: Duration = Duration::from_secs(1);
 const PAGE: usize = 1 << 20;
 
 /// A sink that writes Parquet: `time` and Real as DOUBLE, Integer as INT32, Boolean as BOOLEAN, String
-/// as UTF-8; no value is null. The footer's metadata contains the units.
+/// as UTF-8; only values of clocked columns are null. The footer's metadata contains the units.
 ///
 /// Rows are collected in a block of bounded size, which becomes a row group. A single write replaces
 /// the previous footer by the row group and a new footer, so that the file is always readable. A partly
@@ -45,6 +46,8 @@ pub struct ParquetSink {
     widths: Widths,
     properties: Arc<WriterProperties>,
     footer: Footer,
+    /// For each column of the file, its number among the clocked ones.
+    clocked: Vec<Option<usize>>,
     block: Block,
     /// End of the row groups of full blocks.
     end: u64,
@@ -73,6 +76,7 @@ impl ParquetSink {
             widths: Widths::new(columns),
             properties: Arc::new(properties(columns)),
             footer: Footer::new(columns).map_err(failed)?,
+            clocked: clocked(columns),
             block: Block::new(columns),
             end: 0,
             length: 0,
@@ -149,22 +153,25 @@ impl ParquetSink {
         let mut group =
             SerializedRowGroupWriter::new(schema, self.properties.clone(), &mut bytes, 0, None);
         let mut reader = self.block.reader(rows);
+        let mut clocked = self.clocked.iter();
         while let Some(mut column) = group.next_column()? {
+            let levels = clocked.next().copied().flatten().map(|own| self.block.levels(own, rows));
+            let levels = levels.as_deref();
             match column.untyped() {
                 ColumnWriter::DoubleColumnWriter(writer) => {
-                    writer.write_batch(reader.reals(), None, None)?;
+                    write(writer, reader.reals(), levels)?;
                 }
                 ColumnWriter::Int32ColumnWriter(writer) => {
-                    writer.write_batch(reader.integers(), None, None)?;
+                    write(writer, reader.integers(), levels)?;
                 }
                 ColumnWriter::Int64ColumnWriter(writer) => {
-                    writer.write_batch(reader.longs(), None, None)?;
+                    write(writer, reader.longs(), levels)?;
                 }
                 ColumnWriter::BoolColumnWriter(writer) => {
-                    writer.write_batch(reader.booleans(), None, None)?;
+                    write(writer, reader.booleans(), levels)?;
                 }
                 ColumnWriter::ByteArrayColumnWriter(writer) => {
-                    writer.write_batch(&reader.strings(), None, None)?;
+                    write(writer, &reader.strings(), levels)?;
                 }
                 _ => return Err(ParquetError::General("a column of another type".to_owned())),
             }
@@ -212,6 +219,27 @@ impl Drop for ParquetSink {
         // No caller is left to receive the error.
         let _ = self.write_rows();
     }
+}
+
+/// Returns for each column of the file its number among the clocked ones; the time is the first column.
+fn clocked(columns: &[Column]) -> Vec<Option<usize>> {
+    let mut count = 0..;
+    let number = |column: &Column| if column.clocked { count.next() } else { None };
+    std::iter::once(None).chain(columns.iter().map(number)).collect()
+}
+
+/// Writes the values of a column; those whose level is 0 are null.
+fn write<T: DataType>(
+    writer: &mut ColumnWriterImpl<'_, T>,
+    values: &[T::T],
+    levels: Option<&[i16]>,
+) -> Result<(), ParquetError> {
+    let Some(levels) = levels else {
+        return writer.write_batch(values, None, None).map(|_| ());
+    };
+    let there = values.iter().zip(levels).filter(|(_, level)| **level > 0);
+    let there: Vec<T::T> = there.map(|(value, _)| value.clone()).collect();
+    writer.write_batch(&there, Some(levels), None).map(|_| ())
 }
 
 /// Returns the encodings: plain for numbers, which copies the memory; a dictionary for texts, which

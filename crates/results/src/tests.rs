@@ -2,7 +2,7 @@ use super::*;
 
 /// Returns a column without a unit.
 pub(super) fn column(name: &str, kind: ColumnKind) -> Column {
-    Column { name: name.to_owned(), kind, unit: None }
+    Column { name: name.to_owned(), kind, unit: None, clocked: false }
 }
 
 /// Returns two columns of each type, mixed.
@@ -29,6 +29,7 @@ pub(super) fn give(sink: &mut dyn Sink, k: i32) {
         integers: &[k.into(), i64::from(i32::MIN + k)],
         booleans: &[k % 2, 7],
         strings: &texts,
+        ..Row::default()
     };
     sink.row(f64::from(k) * 1e-3, &row).unwrap();
 }

@@ -141,8 +141,8 @@ impl Recorder {
     fn record(&mut self, simulation: &mut Simulation, time: f64) -> Result<(), Error> {
         simulation.read(&mut self.readout)?;
         self.slow.apply(simulation, &mut self.readout);
-        let Readout { reals, integers, booleans, strings, .. } = &self.readout;
-        let row = Row { reals, integers, booleans, strings };
+        let Readout { reals, integers, booleans, strings, present, .. } = &self.readout;
+        let row = Row { reals, integers, booleans, strings, present };
         let mut recording = lock(&self.recording);
         Ok(recording.sink.as_mut().map_or(Ok(()), |sink| sink.row(time, &row))?)
     }
@@ -223,7 +223,8 @@ fn column(system: &System, port: Port) -> Column {
         other if other.as_real().is_some() => ColumnKind::Real,
         _ => ColumnKind::Integer,
     };
-    Column { name: system.name(port), kind, unit: unit(system, port) }
+    let clocked = system.is_absent_between_ticks(port);
+    Column { name: system.name(port), kind, unit: unit(system, port), clocked }
 }
 
 /// Returns the unit of a variable, if it has one.

@@ -148,6 +148,11 @@ impl ElementView {
                 description: ModelDescription {
                     variables: Vec::new(),
                     co_simulation: own.stepped(),
+                    // Only of an FMU that runs by it.
+                    scheduled_execution: own
+                        .scheduled_execution
+                        .clone()
+                        .filter(|_| own.co_simulation.is_none()),
                     ..own.clone()
                 },
                 variables: Vec::new(),

@@ -136,6 +136,7 @@ fn a_row_of_any_kind_allocates_nothing() {
                 integers: &[k.into(), (-k).into()],
                 booleans: &[0, 1],
                 strings: &texts,
+                ..Row::default()
             };
             sink.row(f64::from(k), &row).unwrap();
         }

@@ -29,6 +29,9 @@ pub(super) struct Block {
     ends: Vec<usize>,
     /// Number of texts in a row.
     strings: usize,
+    /// Whether each value of the clocked columns is there, row by row, and the number of these columns.
+    present: Vec<bool>,
+    clocked: usize,
 }
 
 impl Block {
@@ -55,6 +58,8 @@ impl Block {
             texts: Vec::new(),
             ends: Vec::with_capacity(strings * room),
             strings,
+            present: Vec::new(),
+            clocked: columns.iter().filter(|column| column.clocked).count(),
         }
     }
 
@@ -75,6 +80,7 @@ impl Block {
         self.rows = 0;
         self.texts.clear();
         self.ends.clear();
+        self.present.clear();
     }
 
     /// Adds a row. The block must not be full.
@@ -102,7 +108,15 @@ impl Block {
             self.texts.extend_from_slice(text.as_bytes());
             self.ends.push(self.texts.len());
         }
+        let present = (0..self.clocked).map(|own| row.present.get(own).copied().unwrap_or(true));
+        self.present.extend(present);
         self.rows += 1;
+    }
+
+    /// Returns the definition levels of the first `rows` of a clocked column: 0 is null.
+    pub(super) fn levels(&self, clocked: usize, rows: usize) -> Vec<i16> {
+        let own = self.present.iter().skip(clocked).step_by(self.clocked.max(1));
+        own.take(rows).map(|present| i16::from(*present)).collect()
     }
 
     /// Returns a reader of the first `rows` of the columns.

@@ -34,9 +34,11 @@ pub(super) struct Footer {
 
 impl Footer {
     pub(super) fn new(columns: &[Column]) -> Result<Self, ParquetError> {
-        let mut fields = vec![field(TIME, ColumnKind::Real)?];
+        let mut fields = vec![field(TIME, ColumnKind::Real, Repetition::REQUIRED)?];
         for column in columns {
-            fields.push(field(&column.name, column.kind)?);
+            let repetition =
+                if column.clocked { Repetition::OPTIONAL } else { Repetition::REQUIRED };
+            fields.push(field(&column.name, column.kind, repetition)?);
         }
         let schema = Type::group_type_builder("results").with_fields(fields).build()?;
         let mut units = BTreeMap::from([(TIME, "s")]);
@@ -87,8 +89,8 @@ impl Footer {
     }
 }
 
-/// Returns the schema of a column without nulls.
-fn field(name: &str, kind: ColumnKind) -> Result<TypePtr, ParquetError> {
+/// Returns the schema of a column.
+fn field(name: &str, kind: ColumnKind, repetition: Repetition) -> Result<TypePtr, ParquetError> {
     let (physical, logical) = match kind {
         ColumnKind::Real => (Physical::DOUBLE, None),
         ColumnKind::Integer => (Physical::INT32, None),
@@ -97,7 +99,7 @@ fn field(name: &str, kind: ColumnKind) -> Result<TypePtr, ParquetError> {
         ColumnKind::String => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
     };
     let built = Type::primitive_type_builder(name, physical)
-        .with_repetition(Repetition::REQUIRED)
+        .with_repetition(repetition)
         .with_logical_type(logical)
         .build()?;
     Ok(Arc::new(built))

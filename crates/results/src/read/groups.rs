@@ -39,7 +39,8 @@ pub(super) fn columns(path: &Path) -> Result<Vec<Column>, ResultsError> {
                 Physical::BOOLEAN => ColumnKind::Boolean,
                 _ => ColumnKind::String,
             };
-            Ok(Column { unit: units.remove(&name), name, kind })
+            let clocked = column.max_def_level() > 0;
+            Ok(Column { unit: units.remove(&name), name, kind, clocked })
         })
         .collect()
 }

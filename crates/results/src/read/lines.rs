@@ -24,6 +24,7 @@ pub(super) fn columns(path: &Path) -> Result<Vec<Column>, ResultsError> {
         name: String::from_utf8_lossy(name).trim().to_owned(),
         kind: ColumnKind::Real,
         unit: None,
+        clocked: false,
     };
     Ok(names.iter().map(column).collect())
 }
