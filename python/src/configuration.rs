@@ -84,6 +84,7 @@ pub(crate) fn merge(base: &mut Config, changes: Config) {
     replace(&mut base.results.exclude, changes.results.exclude);
     set(&mut base.results.every, changes.results.every);
     set(&mut base.results.file, changes.results.file);
+    set(&mut base.results.bus_trace, changes.results.bus_trace);
     set(&mut base.experiment.start_time, changes.experiment.start_time);
     set(&mut base.experiment.stop_time, changes.experiment.stop_time);
     set(&mut base.experiment.tolerance, changes.experiment.tolerance);

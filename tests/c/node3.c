@@ -6,7 +6,8 @@
  * is the largest difference between its time and rx_time. If rx is less than `limit`, it sends rx + 1 in the next
  * iteration of the same event. With `announces` it states the time of its next event; else it asks for an event at
  * the end of the step that reaches it. `level` is 1 from the first message on: a discrete value without a clock;
- * at an event `level_out` is `level_in`.
+ * at an event `level_out` is `level_in`. With an `identifier` tx_data is a CAN frame with this identifier, whose one
+ * byte is the number of the message (FMI-LS-BUS 1.0); of the operations received, the frames are counted.
  *
  * It is strict: a call that is not allowed in its mode (sections 2.2.6 and 4.2) ends the process by SIGABRT. */
 #include "fmi3.h"
@@ -19,15 +20,17 @@
 #define EXPORT __attribute__((visibility("default")))
 
 enum { TX_CLOCK = 1, TX, TX_TIME, TX_DATA, RX_CLOCK, RX, RX_TIME, RX_DATA, RECEIVED, SUM, SENT, LATENCY, BYTES,
-       LEVEL, LEVEL_IN, LEVEL_OUT, PERIOD, FIRST, LIMIT, ANNOUNCES, TIME };
-enum { MOST = 256 };
+       LEVEL, LEVEL_IN, LEVEL_OUT, PERIOD, FIRST, LIMIT, ANNOUNCES, TIME, IDENTIFIER };
+enum { MOST = 256, CAN_FRAME = 17 };
 typedef enum { INSTANTIATED, INITIALIZATION, EVENT, STEP, TERMINATED } Mode;
 
 typedef struct {
     Mode mode;
     double time, period, latency, tx_time, rx_time, last;
-    int32_t tx, rx, received, sum, sent, bytes, level, level_in, level_out, first, limit, announces, answer;
+    int32_t tx, rx, received, sum, sent, bytes, level, level_in, level_out, first, limit, announces, identifier;
     size_t rx_size;
+    int32_t frames;
+    uint8_t frame[CAN_FRAME];
     bool tx_clock, rx_clock;
 } Node;
 
@@ -52,6 +55,8 @@ static void send(Node *node, int32_t number) {
     node->tx_clock = true;
     node->tx = number;
     node->tx_time = node->time;
+    uint8_t frame[CAN_FRAME] = {0x10, [4] = CAN_FRAME, [8] = (uint8_t)node->identifier, [14] = 1, [16] = (uint8_t)number};
+    memcpy(node->frame, frame, CAN_FRAME);
 }
 
 EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
@@ -114,7 +119,7 @@ EXPORT fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, bool *need_update, bo
     }
     node->level_out = node->level_in;
     if (node->rx_clock) {
-        node->received++;
+        node->received += node->identifier > 0 ? node->frames : 1;
         node->sum += node->rx;
         node->bytes += (int32_t)node->rx_size;
         node->latency = fmax(node->latency, fabs(node->time - node->rx_time));
@@ -189,6 +194,7 @@ static int32_t *integer(Node *node, fmi3ValueReference vr) {
     case FIRST: return &node->first;
     case LIMIT: return &node->limit;
     case ANNOUNCES: return &node->announces;
+    case IDENTIFIER: return &node->identifier;
     default: demand(0, "a value reference of no Int32"); return NULL;
     }
 }
@@ -246,8 +252,9 @@ EXPORT fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference *vr, si
     for (size_t k = 0; k < n; k++) {
         bool sends = vr[k] == TX_DATA;
         demand_clocked(node, sends ? node->tx_clock : node->rx_clock);
-        sizes[k] = sends ? (size_t)node->tx % MOST : node->rx_size;
-        values[k] = zeros;
+        bool frame = sends && node->identifier > 0;
+        sizes[k] = frame ? CAN_FRAME : sends ? (size_t)node->tx % MOST : node->rx_size;
+        values[k] = frame ? node->frame : zeros;
     }
     return fmi3OK;
 }
@@ -255,12 +262,15 @@ EXPORT fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference *vr, si
 EXPORT fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference *vr, size_t n, const size_t *sizes,
                                 const fmi3Binary *values, size_t m) {
     Node *node = c;
-    (void)values;
     demand(n == m, "numbers of values");
     for (size_t k = 0; k < n; k++) {
         demand(vr[k] == RX_DATA, "a value reference of no binary input");
         demand_clocked(node, node->rx_clock);
         node->rx_size = sizes[k];
+        node->frames = 0;
+        for (size_t at = 0; node->identifier > 0 && at + 8 <= sizes[k]; at += values[k][at + 4]) {
+            node->frames += values[k][at] == 0x10;
+        }
     }
     return fmi3OK;
 }

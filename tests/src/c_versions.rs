@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 
-use fmu_description::Version;
 use fmu_description::package::{Package, platforms, platforms_of};
+use fmu_description::{Version, terminals};
 
 use crate::root;
 
@@ -63,14 +63,51 @@ fn version_3(folder: &Path, token: &str, interface: &str, file: &str) -> PathBuf
     written(&package, folder, file)
 }
 
-/// Writes `source`, without its extension, as an FMU of FMI 3.0 with this description to `folder`.
-pub(crate) fn fmu_3(folder: &Path, source: &'static str, description: &str) -> PathBuf {
+/// The files of an FMU, by path.
+type Files = [(&'static str, String)];
+
+/// Writes `source`, without its extension, as an FMU of FMI 3.0 with this description and further files to `folder`.
+pub(crate) fn fmu_3(
+    folder: &Path,
+    source: &'static str,
+    description: &str,
+    files: &Files,
+) -> PathBuf {
     let mut package = Package::new(description.to_owned()).for_version(Version::V3);
     let name = source.trim_end_matches(".c");
     let library_name = format!("{name}{}", std::env::consts::DLL_SUFFIX);
     let platform = platforms_of(Version::V3)[0];
     package.add(format!("binaries/{platform}/{library_name}"), library(source));
+    for (path, content) in files {
+        package.add(*path, content.as_str());
+    }
     written(&package, folder, name)
+}
+
+/// Returns the file of terminals with a network terminal of FMI-LS-BUS: its name, and the variables `Tx_Clock`, `Tx_Data`,
+/// `Rx_Clock` and `Rx_Data`.
+pub(crate) fn transceiver(name: &str, variables: [&str; 4]) -> [(&'static str, String); 1] {
+    [(terminals::PATH, transceivers(&[(name, variables)]))]
+}
+
+pub(crate) fn transceivers(all: &[(&str, [&str; 4])]) -> String {
+    let members = ["Tx_Clock", "Tx_Data", "Rx_Clock", "Rx_Data"];
+    let member = |(member, variable): (&&str, &&str)| {
+        format!(
+            "<TerminalMemberVariable variableName=\"{variable}\" memberName=\"{member}\" variableKind=\"signal\"/>"
+        )
+    };
+    let terminal = |(name, variables): &(&str, [&str; 4])| {
+        let members: String = members.iter().zip(variables).map(member).collect();
+        format!(
+            "<Terminal name=\"{name}\" terminalKind=\"org.fmi-ls-bus.network-terminal\" \
+             matchingRule=\"org.fmi-ls-bus.transceiver\">{members}</Terminal>"
+        )
+    };
+    let terminals: String = all.iter().map(terminal).collect();
+    format!(
+        "<fmiTerminalsAndIcons fmiVersion=\"3.0\"><Terminals>{terminals}</Terminals></fmiTerminalsAndIcons>"
+    )
 }
 
 /// Writes `slave1.c` as an FMU of FMI 1.0 to `folder`; `guid` selects a misbehaviour.

@@ -2,6 +2,7 @@
 //! misbehave; linear slaves, networks of them and their exact solution.
 #![forbid(unsafe_code)]
 
+pub mod bus;
 pub mod c_fmu;
 pub mod c_versions;
 pub mod coupled;

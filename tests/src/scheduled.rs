@@ -11,7 +11,7 @@ use crate::c_versions::fmu_3;
 /// If it cannot be built or written.
 #[must_use]
 pub fn write(folder: &Path) -> PathBuf {
-    fmu_3(folder, "scheduled3.c", DESCRIPTION)
+    fmu_3(folder, "scheduled3.c", DESCRIPTION, &[])
 }
 
 const DESCRIPTION: &str = r#"<?xml version="1.0" encoding="UTF-8"?>

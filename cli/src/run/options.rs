@@ -216,6 +216,11 @@ pub(super) struct ResultsOptions {
     /// [default: plot.svg in the folder of --out]
     #[arg(long, value_name = "FILE")]
     plot_file: Option<PathBuf>,
+    /// Write the frames of the CAN buses to this file
+    ///
+    /// By FMI-LS-BUS; .log (candump), .asc or .pcapng, which Wireshark reads.
+    #[arg(long, value_name = "FILE")]
+    bus_trace: Option<PathBuf>,
     /// Also write a page with interactive plots
     ///
     /// It has statistics, the system and all warnings, too. Its name is that of the results file, with
@@ -473,6 +478,7 @@ impl Options {
             results.plot.clone_from(&self.results.plot);
         }
         put(&mut results.every, self.results.record_every);
+        put(&mut results.bus_trace, self.results.bus_trace.clone());
         let out = self.results.out.as_deref();
         let format = self.results.format.as_deref();
         // A resumed run must not overwrite the rows before the checkpoint.

@@ -83,6 +83,12 @@ pub struct ModelDescription {
     /// `ScheduledExecution` (FMI 3.0), if the FMU has this interface.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<1, _, _>")]
     pub scheduled_execution: Option<ScheduledExecution>,
+    /// The terminals of FMI 3.0, which a file of their own describes.
+    #[serde(skip)]
+    pub terminals: Vec<crate::terminals::Terminal>,
+    /// `isBusSimulationFMU` in the manifest of FMI-LS-BUS 1.0: whether the FMU is a bus to which others are connected.
+    #[serde(skip)]
+    pub is_bus_simulation: bool,
 }
 
 impl ModelDescription {

@@ -92,6 +92,16 @@ pub enum SystemError {
         /// The first element of one that is an array.
         element: Box<str>,
     },
+    /// Two terminals do not match.
+    #[error("{from} cannot be connected to {to}: {why}")]
+    Terminals {
+        /// One terminal.
+        from: String,
+        /// The other one.
+        to: String,
+        /// What does not match.
+        why: String,
+    },
     /// A structural parameter has removed an element of an array that is connected or set.
     #[error(
         "{name} is connected or set, but does not exist with the new size of its array; set the \

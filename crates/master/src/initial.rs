@@ -11,6 +11,7 @@ use crate::error::SystemError;
 use crate::exchange::call;
 use crate::fault::FaultChain;
 use crate::order::Rows;
+use crate::signal_type::SignalType;
 use crate::system::{Port, System};
 use slave::{Value, ValueType};
 use solve::{Components, Newton, Progress, Scale, Solver, components};
@@ -97,8 +98,8 @@ impl<'a> Graph<'a> {
         let mut connections: Vec<Vec<usize>> = Vec::new();
         let mut inputs: Vec<Vec<(usize, usize)>> = vec![Vec::new(); system.slaves.len()];
         for (number, connection) in system.connections.iter().chain(&system.initial).enumerate() {
-            if matches!(system.variable(connection.to).kind, Kind::Clock(_)) {
-                // Clocks tick in event mode.
+            if system.signal_type(connection.to) == SignalType::Clocked {
+                // What is clocked is sent at the ticks of its clock, in event mode.
                 continue;
             }
             let node = *nodes.entry(connection.from).or_insert_with(|| {

@@ -60,7 +60,7 @@ pub use slave::{
     Advance, Background, CallError, Failure, Slave, StepResult, Transformation, Value, ValueType,
     to_hex,
 };
-pub use system::{Connection, Port, System};
+pub use system::{Connection, EventObserver, Port, System};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -4,7 +4,8 @@ use std::collections::{HashMap, HashSet};
 
 use fmu_description::{ModelDescription, Unknown};
 
-use crate::system::System;
+use crate::signal_type::SignalType;
+use crate::system::{Connection, System};
 use solve::components;
 
 /// An order of the slaves, with their algebraic loops.
@@ -27,6 +28,7 @@ pub fn by_direct_dependencies(system: &System) -> Order {
     let edges: Vec<(usize, usize)> = system
         .connections
         .iter()
+        .filter(|connection| !is_clocked(system, connection))
         .filter(|connection| through[connection.to.slave].has(connection.to.variable))
         .map(|connection| (connection.from.slave, connection.to.slave))
         .collect();
@@ -35,6 +37,11 @@ pub fn by_direct_dependencies(system: &System) -> Order {
     let mut looped: Vec<usize> = loops.flat_map(|k| found.nodes(k)).copied().collect();
     looped.sort_unstable();
     Order { sequence: found.sequence().to_vec(), looped }
+}
+
+/// Whether a connection passes values at ticks of clocks only: within an instant, not by the order of the steps.
+fn is_clocked(system: &System, connection: &Connection) -> bool {
+    system.signal_type(connection.to) == SignalType::Clocked
 }
 
 /// A set of inputs, by position.
@@ -57,7 +64,7 @@ fn passed_through(system: &System) -> Vec<Inputs> {
     let mut through: Vec<Inputs> =
         system.slaves.iter().map(|_| Inputs::These(HashSet::new())).collect();
     let mut rows: Vec<Option<HashMap<u32, &Unknown>>> = vec![None; system.slaves.len()];
-    for connection in &system.connections {
+    for connection in system.connections.iter().filter(|own| !is_clocked(system, own)) {
         let from = connection.from;
         let description = system.slaves[from.slave].1.description();
         let rows = rows[from.slave].get_or_insert_with(|| by_index(&description.structure.outputs));

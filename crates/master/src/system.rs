@@ -4,6 +4,7 @@ mod access;
 mod arrays;
 mod connecting;
 mod settings;
+mod terminals;
 mod units;
 
 use std::collections::{HashMap, HashSet};
@@ -12,9 +13,7 @@ use fmu_description::{Causality, ModelDescription, ScalarVariable};
 
 use crate::error::SystemError;
 use fmu_description::similar::nearest;
-use slave::Slave;
-use slave::Transformation;
-use slave::Value;
+use slave::{CallError, Slave, Transformation, Value};
 
 /// A variable of a slave: position of the slave, and position of the variable in its description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -57,7 +56,12 @@ pub struct System {
     pub(crate) discrete: HashSet<Port>,
     /// For each slave, whether the master handles its events.
     pub(crate) events: Vec<bool>,
+    observer: Option<EventObserver>,
 }
+
+/// Sees a slave in event mode before each update of its discrete states, when its clocks tick: gets its position, the
+/// time in s, and the slave.
+pub type EventObserver = Box<dyn FnMut(usize, f64, &mut dyn Slave) -> Result<(), CallError> + Send>;
 
 impl System {
     /// Adds a slave.
@@ -75,6 +79,20 @@ impl System {
         self.slaves.push((name.to_owned(), slave));
         self.events.push(false);
         Ok(())
+    }
+
+    /// Lets `observer` see the events that the master handles.
+    pub fn observe_events(&mut self, observer: EventObserver) {
+        self.observer = Some(observer);
+    }
+
+    /// Shows a slave in event mode to the observer.
+    #[inline]
+    pub(crate) fn show_event(&mut self, slave: usize, time: f64) -> Result<(), SystemError> {
+        let Some(observer) = &mut self.observer else { return Ok(()) };
+        let (name, instance) = &mut self.slaves[slave];
+        let seen = observer(slave, time, instance.as_mut());
+        seen.map_err(|source| crate::exchange::call(name, time, source))
     }
 
     /// Returns the description of the variable at `port`.

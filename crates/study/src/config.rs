@@ -164,6 +164,7 @@ impl Config {
             self.system.as_mut(),
             self.results.file.as_mut(),
             self.results.plot_file.as_mut(),
+            self.results.bus_trace.as_mut(),
             self.checkpoint.file.as_mut(),
         ];
         fmus.chain(files.into_iter().flatten()).for_each(&mut change);

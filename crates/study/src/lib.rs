@@ -8,6 +8,7 @@
 
 #[cfg(feature = "load")]
 mod assemble;
+mod bus_trace;
 pub mod config;
 mod error;
 #[cfg(feature = "load")]

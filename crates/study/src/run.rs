@@ -15,6 +15,7 @@ use results::{Column, ResultsError, Sink};
 use ssp::Opened;
 
 use crate::assemble::{AssembledSystem, AssemblyOptions, assemble_with};
+use crate::bus_trace::BusTrace;
 use crate::config::{Config, Every, LoadedConfig};
 use crate::error::Error;
 use crate::plan::{Plan, plan};
@@ -113,7 +114,9 @@ impl PreparedRun {
         saved: Option<&SavedRun>,
         record: impl FnOnce(&mut Simulation, &[Port], Every, f64) -> Result<Option<Recorder>, Error>,
     ) -> Result<Run, Error> {
-        let Self { config, system, plan, ports, scenario, opened } = self;
+        let Self { config, mut system, plan, ports, scenario, opened } = self;
+        let trace = config.results.bus_trace.as_deref();
+        let trace = trace.map(|path| BusTrace::create(path, &mut system)).transpose()?;
         let text = config.render()?;
         let Plan { algorithm, experiment, .. } = &plan;
         let mut simulation = match saved {
@@ -140,6 +143,7 @@ impl PreparedRun {
             tally: RunStatistics::default(),
             config,
             plan,
+            trace,
             _opened: opened,
         })
     }
@@ -252,6 +256,7 @@ pub struct Run {
     /// recorded.
     resumed: bool,
     tally: RunStatistics,
+    trace: Option<BusTrace>,
     /// The unpacked SSP, whose folders are removed after the simulation.
     _opened: Option<Arc<Opened>>,
 }
@@ -360,6 +365,7 @@ impl Run {
     ///
     /// Returns [`Error::Results`] if the file cannot be completed.
     pub fn finish(&mut self) -> Result<Option<&Path>, Error> {
+        self.trace.as_ref().map_or(Ok(()), BusTrace::finish)?;
         match self.recorder.take() {
             Some(recorder) => recorder.finish().map(|()| self.config.results.file.as_deref()),
             None => Ok(None),

@@ -15,6 +15,7 @@ mod misbehaviour_calls;
 mod misbehaviour_isolated;
 mod misbehaviour_run;
 mod model_exchange;
+mod network;
 mod order;
 mod package;
 mod preload;

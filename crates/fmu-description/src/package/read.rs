@@ -6,8 +6,12 @@ use std::path::{Path, PathBuf};
 
 use super::archive::Archive;
 use super::{DESCRIPTION, PackageError, TemporaryFolder, file_error, platforms, platforms_of};
-use crate::description::{ModelDescription, Warning};
+use crate::description::{ModelDescription, Version, Warning};
 use crate::location::{LocationError, folder_path};
+use crate::{terminals, xml};
+
+/// The manifest of the layered standard for networks.
+const BUS_MANIFEST: &str = "extra/org.fmi-standard.fmi-ls-bus/fmi-ls-manifest.xml";
 
 /// The folders of `binaries` that the standard defines.
 const PLATFORMS: [&str; 18] = [
@@ -83,8 +87,9 @@ impl Unpacked {
         }
         let temporary = folder()?;
         archive.unpack(temporary.path(), wanted)?;
-        let (description, warnings) = describe(temporary.path(), path)?;
-        let archive_warnings = archive.warnings();
+        let (mut description, warnings) = describe(temporary.path(), path)?;
+        let mut archive_warnings = archive.warnings();
+        archive_warnings.extend(add_terminals(temporary.path(), &mut description));
         let names = archive.names().iter().filter(|name| !name.is_empty()).cloned().collect();
         let (folder, temporary) = (temporary.path().to_owned(), Some(temporary));
         Ok(Unpacked { folder, temporary, names, description, warnings, archive_warnings })
@@ -97,8 +102,9 @@ impl Unpacked {
     /// [`PackageError`] if there is no readable `modelDescription.xml`.
     pub fn in_folder(folder: &Path) -> Result<Self, PackageError> {
         let folder = folder.canonicalize().map_err(file_error("open", folder))?;
-        let (description, warnings) = describe(&folder, &folder)?;
-        let (names, archive_warnings) = (Vec::new(), Vec::new());
+        let (mut description, warnings) = describe(&folder, &folder)?;
+        let archive_warnings = add_terminals(&folder, &mut description).into_iter().collect();
+        let names = Vec::new();
         Ok(Unpacked { folder, temporary: None, names, description, warnings, archive_warnings })
     }
 
@@ -189,7 +195,8 @@ fn below(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
 fn is_needed(name: &str) -> bool {
     let mut parts = name.split('/');
     match (parts.next(), parts.next()) {
-        (Some("documentation" | "sources" | "terminalsAndIcons" | "model.png"), _) => false,
+        (Some("documentation" | "sources" | "model.png"), _) => false,
+        (Some("terminalsAndIcons"), _) => name == terminals::PATH,
         (Some("binaries"), Some(platform)) => {
             platforms().contains(&platform) || !PLATFORMS.contains(&platform)
         }
@@ -229,6 +236,32 @@ fn describe(folder: &Path, path: &Path) -> Result<(ModelDescription, Vec<Warning
     };
     ModelDescription::read(xml)
         .map_err(|source| PackageError::Description { path: path.to_owned(), source })
+}
+
+/// Adds the terminals of an FMU of FMI 3.0, and whether it is a bus, to its description; returns a warning if the
+/// terminals cannot be read.
+fn add_terminals(folder: &Path, description: &mut ModelDescription) -> Option<String> {
+    if description.version() != Version::V3 {
+        return None;
+    }
+    let manifest = start(&folder.join(BUS_MANIFEST)).ok().and_then(|xml| xml::read(&xml).ok());
+    let is_bus = |(name, value): &(String, String)| name == "isBusSimulationFMU" && value == "true";
+    description.is_bus_simulation =
+        manifest.is_some_and(|manifest| manifest.attributes.iter().any(is_bus));
+    let read = match start(&folder.join(terminals::PATH)) {
+        Ok(xml) => terminals::read(&xml).map_err(|error| error.to_string()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
+        Err(error) => Err(error.to_string()),
+    };
+    match read {
+        Ok(terminals) => {
+            description.terminals = terminals;
+            None
+        }
+        Err(error) => {
+            Some(format!("{}: {error}; the FMU is used without terminals", terminals::PATH))
+        }
+    }
 }
 
 /// Reads a file up to a length that exceeds every valid model description.

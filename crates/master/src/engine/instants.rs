@@ -207,6 +207,7 @@ impl Instants {
             if !self.in_event[slave] {
                 continue;
             }
+            parts.system.show_event(slave, time)?;
             let info = at(parts.system, slave, time, |events| events.update_discrete_states())?;
             if info.terminate_simulation {
                 return Ok(Updated::Ended(Ending { slave, time }));

@@ -64,15 +64,27 @@ impl System {
 
     /// Returns the pairs of output and input that a connection from `from` to `to` consists of, both in
     /// the form `slave.variable`: one pair for two scalars, one for each element of two arrays of equal
-    /// size.
+    /// size, or one for each pair of members of two terminals. An array of one element is as a scalar.
     ///
     /// # Errors
     ///
-    /// Returns an error if a variable does not exist or if the sizes differ.
+    /// Returns an error if a variable does not exist, if the sizes differ, or if the terminals do not match.
     pub fn pairs(&self, from: &str, to: &str) -> Result<Vec<(Port, Port)>, SystemError> {
-        let (source, target) = (self.named(from)?, self.named(to)?);
+        let (source, target) = match (self.named(from), self.named(to)) {
+            (Ok(source), Ok(target)) => (source, target),
+            (Err(error), _) | (_, Err(error)) => {
+                return self.pairs_of_terminals(from, to)?.ok_or(error);
+            }
+        };
+        let only = |named: &Named| match named {
+            Named::One(port) => Some(*port),
+            Named::Array(elements) if elements.len() == 1 => Some(elements[0].1),
+            Named::Array(_) => None,
+        };
         let pairs = match (&source, &target) {
-            (Named::One(source), Named::One(target)) => Some(vec![(*source, *target)]),
+            (Named::One(_), _) | (_, Named::One(_)) => {
+                only(&source).zip(only(&target)).map(|pair| vec![pair])
+            }
             (Named::Array(sources), Named::Array(targets)) if sources.len() == targets.len() => {
                 let partner = |indices: &String| {
                     let found = targets.iter().find(|(other, _)| other == indices);

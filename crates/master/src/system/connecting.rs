@@ -24,7 +24,8 @@ impl System {
         units_settled: bool,
     ) -> Result<(), SystemError> {
         let to_parameter = self.variable(to).causality == Causality::Parameter;
-        if !(to_parameter && self.variable(from).causality == Causality::CalculatedParameter) {
+        let calculated = self.variable(from).causality == Causality::CalculatedParameter;
+        if !(to_parameter && calculated || self.is_clock_of_time(from, to)) {
             self.expect_causality(from, Causality::Output)?;
         }
         if !to_parameter {

@@ -90,6 +90,9 @@ pub struct Results {
     /// File of the plot, `.svg` or `.png`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plot_file: Option<PathBuf>,
+    /// File of the frames of the CAN buses, `.log` (candump), `.asc` or `.pcapng`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bus_trace: Option<PathBuf>,
 }
 
 /// `[isolation]`: FMUs in separate processes.

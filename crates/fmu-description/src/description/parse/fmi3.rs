@@ -50,6 +50,8 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
         variables,
         structure,
         scheduled_execution: scheduled,
+        terminals: Vec::new(),
+        is_bus_simulation: false,
     })
 }
 

@@ -1,0 +1,62 @@
+//! Reads terminals.
+
+use super::{Terminal, TerminalMember};
+use crate::description::ParseError;
+use crate::xml::{self, Element};
+
+/// Reads the terminals of a file: all of them, nested ones after the one that they are in.
+///
+/// ```
+/// let xml = br#"<fmiTerminalsAndIcons fmiVersion="3.0"><Terminals>
+///     <Terminal name="a" matchingRule="bus"><TerminalMemberVariable variableName="x" variableKind="signal"/>
+///         <Terminal name="b" matchingRule="plug"/>
+///     </Terminal>
+/// </Terminals></fmiTerminalsAndIcons>"#;
+/// let terminals = fmu_description::terminals::read(xml).expect("well-formed");
+/// assert_eq!(terminals[1].name, "a.b");
+/// assert_eq!(terminals[0].members[0].name, "x");
+/// ```
+///
+/// # Errors
+///
+/// [`ParseError`] with line and column if the file is not well-formed.
+pub fn read(bytes: &[u8]) -> Result<Vec<Terminal>, ParseError> {
+    let root = xml::read(bytes)?;
+    let mut all = Vec::new();
+    for list in named(&root, "Terminals") {
+        add(list, "", &mut all);
+    }
+    Ok(all)
+}
+
+fn named<'a>(element: &'a Element, name: &'a str) -> impl Iterator<Item = &'a Element> {
+    element.children.iter().filter(move |child| child.name == name)
+}
+
+/// Adds the terminals within `element`.
+fn add(element: &Element, prefix: &str, all: &mut Vec<Terminal>) {
+    for own in named(element, "Terminal") {
+        let name = format!("{prefix}{}", text(own, "name").unwrap_or_default());
+        let member = |own: &Element| {
+            let variable = text(own, "variableName")?;
+            Some(TerminalMember {
+                name: text(own, "memberName").unwrap_or_else(|| variable.clone()),
+                variable,
+                kind: text(own, "variableKind").unwrap_or_default(),
+            })
+        };
+        let within = format!("{name}.");
+        all.push(Terminal {
+            name,
+            matching_rule: text(own, "matchingRule").unwrap_or_default(),
+            kind: text(own, "terminalKind"),
+            members: named(own, "TerminalMemberVariable").filter_map(member).collect(),
+        });
+        add(own, &within, all);
+    }
+}
+
+fn text(element: &Element, name: &str) -> Option<String> {
+    let found = element.attributes.iter().find(|(own, _)| own == name);
+    found.map(|(_, value)| value.clone())
+}

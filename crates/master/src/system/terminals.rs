@@ -1,0 +1,181 @@
+//! Terminals of FMI 3.0: a connection of two terminals connects their members.
+
+use fmu_description::terminals::{Terminal, TerminalMember};
+use fmu_description::{Causality, IntervalVariability, Kind};
+
+use super::{Port, System};
+use crate::error::SystemError;
+
+/// The matching rule of the layered standard for networks: `Tx` of one side with `Rx` of the other (FMI-LS-BUS 1.0,
+/// section "Bus Terminal").
+const TRANSCEIVER: &str = "org.fmi-ls-bus.transceiver";
+const RULES: &str = "plug, bus, sequence or org.fmi-ls-bus.transceiver";
+
+impl System {
+    /// Returns the slave and the terminal called `slave.terminal`.
+    fn terminal_called(&self, name: &str) -> Option<(usize, &Terminal)> {
+        name.match_indices('.').rev().find_map(|(at, _)| {
+            let slave = *self.names.get(&name[..at])?;
+            let terminals = &self.slaves[slave].1.description().terminals;
+            Some((slave, terminals.iter().find(|own| own.name == name[at + 1..])?))
+        })
+    }
+
+    /// Returns the pairs of output and input of two terminals (FMI 3.0.2, section 2.4.9.2); `None` if neither name is
+    /// one of a terminal. A member without a partner is a warning.
+    pub(super) fn pairs_of_terminals(
+        &self,
+        from: &str,
+        to: &str,
+    ) -> Result<Option<Vec<(Port, Port)>>, SystemError> {
+        let wrong = |why: String| SystemError::Terminals { from: from.into(), to: to.into(), why };
+        let (one, other) = match (self.terminal_called(from), self.terminal_called(to)) {
+            (None, None) => return Ok(None),
+            (Some(one), Some(other)) => (one, other),
+            (None, Some(_)) => return Err(wrong(format!("{from} is no terminal"))),
+            (Some(_), None) => return Err(wrong(format!("{to} is no terminal"))),
+        };
+        let mut pairs = Vec::new();
+        self.match_members(one, other, &mut pairs).map_err(wrong)?;
+        // Nested terminals of equal names.
+        let inner = |(slave, outer): (usize, &Terminal)| {
+            let prefix = format!("{}.", outer.name);
+            let all = self.slaves[slave].1.description().terminals.iter();
+            all.filter_map(move |own| Some((own.name.strip_prefix(&prefix)?.to_owned(), own)))
+                .collect::<Vec<_>>()
+        };
+        let others = inner(other);
+        for (name, own) in inner(one) {
+            if let Some((_, partner)) = others.iter().find(|(other, _)| *other == name) {
+                self.match_members((one.0, own), (other.0, partner), &mut pairs).map_err(wrong)?;
+            }
+        }
+        if pairs.is_empty() {
+            return Err(wrong("no member of one has a partner in the other".to_owned()));
+        }
+        Ok(Some(pairs))
+    }
+
+    /// Adds the pairs of the members of two terminals.
+    fn match_members(
+        &self,
+        (slave, one): (usize, &Terminal),
+        (partner, other): (usize, &Terminal),
+        pairs: &mut Vec<(Port, Port)>,
+    ) -> Result<(), String> {
+        let rule = one.matching_rule.as_str();
+        if rule != other.matching_rule {
+            let other = &other.matching_rule;
+            return Err(format!("their matchingRule differ, {rule} and {other}"));
+        }
+        if let (Some(one), Some(other)) = (&one.kind, &other.kind)
+            && one != other
+        {
+            return Err(format!("their terminalKind differ, {one} and {other}"));
+        }
+        let partner_of: &dyn Fn(usize, &TerminalMember) -> Option<usize> = match rule {
+            "plug" | "bus" => &|_, own| other.members.iter().position(|it| it.name == own.name),
+            TRANSCEIVER => &|_, own| {
+                let crossed = crossed(&own.name)?;
+                other.members.iter().position(|it| it.name == crossed)
+            },
+            "sequence" => &|position, _| Some(position).filter(|at| *at < other.members.len()),
+            "none" if one.members.is_empty() && other.members.is_empty() => &|_, _| None,
+            _ => return Err(format!("matchingRule is {rule:?}, expected {RULES}")),
+        };
+        let mut free = vec![true; other.members.len()];
+        let mut alone = Vec::new();
+        for (position, member) in one.members.iter().enumerate() {
+            let Some(at) = partner_of(position, member) else {
+                alone.push(format!("{}.{}.{}", self.slaves[slave].0, one.name, member.name));
+                continue;
+            };
+            free[at] = false;
+            self.add_pairs((slave, member), (partner, &other.members[at]), pairs)?;
+        }
+        let rest = other.members.iter().zip(free).filter(|(_, free)| *free);
+        alone.extend(
+            rest.map(|(it, _)| format!("{}.{}.{}", self.slaves[partner].0, other.name, it.name)),
+        );
+        if alone.is_empty() {
+            return Ok(());
+        }
+        let alone = alone.join(", ");
+        if rule != "bus" {
+            return Err(format!("no partner for {alone}, as the matchingRule {rule} wants"));
+        }
+        tracing::warn!("{alone} of the terminal has no partner in the other one");
+        Ok(())
+    }
+
+    /// Adds the pairs of two members, each as output and input.
+    fn add_pairs(
+        &self,
+        (slave, one): (usize, &TerminalMember),
+        (partner, other): (usize, &TerminalMember),
+        pairs: &mut Vec<(Port, Port)>,
+    ) -> Result<(), String> {
+        for own in [one, other] {
+            if own.kind != "signal" {
+                let (name, kind) = (&own.name, &own.kind);
+                return Err(format!(
+                    "the member {name} has the variableKind {kind:?}, expected signal: flows need an equation \
+                     of balance"
+                ));
+            }
+        }
+        let name = |slave: usize, own: &TerminalMember| {
+            format!("{}.{}", self.slaves[slave].0, own.variable)
+        };
+        let found = self.pairs(&name(slave, one), &name(partner, other));
+        for (first, second) in found.map_err(|error| error.to_string())? {
+            pairs.push(if self.is_source(first, second) {
+                (first, second)
+            } else if self.is_source(second, first) {
+                (second, first)
+            } else {
+                let role = |port| self.variable(port).causality.as_str();
+                return Err(format!(
+                    "{} is {} and {} is {}, expected an output and an input",
+                    self.name(first),
+                    role(first),
+                    self.name(second),
+                    role(second)
+                ));
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether a connection can lead from one variable to the other.
+    fn is_source(&self, from: Port, to: Port) -> bool {
+        let (source, target) = (self.variable(from).causality, self.variable(to).causality);
+        match (source, target) {
+            (Causality::Output, Causality::Input | Causality::Parameter)
+            | (Causality::CalculatedParameter, Causality::Parameter) => true,
+            _ => self.is_clock_of_time(from, to),
+        }
+    }
+
+    /// Whether `from` is an input clock that ticks at times, and `to` a triggered input clock: they have one source,
+    /// the master, and tick together (FMI-LS-BUS 1.0, section "Time-based Tx Clocks").
+    pub(super) fn is_clock_of_time(&self, from: Port, to: Port) -> bool {
+        let (source, target) = (self.variable(from), self.variable(to));
+        let inputs = source.causality == Causality::Input && target.causality == Causality::Input;
+        let triggered = |kind: &Kind| match kind {
+            Kind::Clock(own) => Some(own.interval_variability == IntervalVariability::Triggered),
+            _ => None,
+        };
+        inputs && triggered(&source.kind) == Some(false) && triggered(&target.kind) == Some(true)
+    }
+}
+
+/// Returns the name of the member that receives what `name` sends, or sends what it receives.
+fn crossed(name: &str) -> Option<String> {
+    let (direction, rest) = name.split_once('_')?;
+    match direction {
+        "Tx" => Some(format!("Rx_{rest}")),
+        "Rx" => Some(format!("Tx_{rest}")),
+        _ => None,
+    }
+}

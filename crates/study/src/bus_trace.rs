@@ -1,0 +1,204 @@
+//! Traces of buses: the frames that FMUs send by the layered standard for networks, FMI-LS-BUS 1.0, at their times.
+
+mod can;
+mod format;
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use fmu_description::Kind;
+use fmu_description::terminals::Terminal;
+use master::{CallError, Slave, System};
+
+use crate::error::Error;
+use can::Frame;
+use format::Format;
+
+/// The matching rule of a terminal of a network.
+const TRANSCEIVER: &str = "org.fmi-ls-bus.transceiver";
+/// Part of the `mimeType` of the operations of a CAN bus.
+const CAN: &str = "fmi-ls-bus.can";
+
+/// A terminal that sends: its variables.
+#[derive(Clone, Copy, Debug)]
+struct Sender {
+    slave: usize,
+    clock: u32,
+    data: u32,
+    /// Number of its bus.
+    bus: usize,
+}
+
+/// A trace that is being written.
+pub(crate) struct BusTrace(Arc<Mutex<Writer>>);
+
+struct Writer {
+    path: PathBuf,
+    file: BufWriter<File>,
+    format: Format,
+    /// The frames of the present instant: several terminals of a bus send the same one.
+    instant: (f64, Vec<(usize, Frame)>),
+    failed: Option<std::io::Error>,
+}
+
+impl BusTrace {
+    /// Creates the file at `path`; `.asc`, `.log` or `.pcapng` selects its format. Writes the frames of all CAN buses of
+    /// `system`: those that a simulation of the bus passes on or, if there is none, those that the nodes send.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] if the file cannot be written, if its extension is another one, or if there is no CAN bus.
+    pub(crate) fn create(path: &Path, system: &mut System) -> Result<Self, Error> {
+        let format = Format::of(path)?;
+        let senders = senders(system);
+        if senders.is_empty() {
+            return Err(Error::Invalid(format!(
+                "{}: no FMU has a terminal of a CAN bus, with matchingRule {TRANSCEIVER} and the mimeType {CAN}",
+                path.display()
+            )));
+        }
+        let file = File::create(path).map_err(Error::file("create", path))?;
+        let mut file = BufWriter::new(file);
+        let buses = 1 + senders.iter().map(|sender| sender.bus).max().unwrap_or_default();
+        format.begin(&mut file, buses).map_err(Error::file("write", path))?;
+        let instant = (f64::NAN, Vec::new());
+        let writer = Writer { path: path.to_owned(), file, format, instant, failed: None };
+        let writer = Arc::new(Mutex::new(writer));
+        let shared = writer.clone();
+        let mut bytes = [Vec::new()];
+        system.observe_events(Box::new(move |slave, time, instance| {
+            for sender in senders.iter().filter(|sender| sender.slave == slave) {
+                if sent(sender, instance, &mut bytes)? {
+                    let mut writer = shared.lock().unwrap_or_else(PoisonError::into_inner);
+                    writer.add(time, sender.bus, &bytes[0]);
+                }
+            }
+            Ok(())
+        }));
+        Ok(Self(writer))
+    }
+
+    /// Completes the file.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] if a frame could not be written.
+    pub(crate) fn finish(&self) -> Result<(), Error> {
+        let mut writer = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let path = writer.path.clone();
+        let done = writer.failed.take().map_or_else(|| writer.file.flush(), Err);
+        done.map_err(Error::file("write", &path))
+    }
+}
+
+/// Reads what a terminal sends in this event; returns whether it does.
+fn sent(
+    sender: &Sender,
+    instance: &mut dyn Slave,
+    bytes: &mut [Vec<u8>; 1],
+) -> Result<bool, CallError> {
+    let mut ticks = [0];
+    instance.get_boolean(&[sender.clock], &mut ticks)?;
+    if ticks[0] == 0 {
+        return Ok(false);
+    }
+    instance.get_binary(&[sender.data], bytes)?;
+    Ok(!bytes[0].is_empty())
+}
+
+impl Writer {
+    /// Adds the frames of the operations in `bytes`.
+    fn add(&mut self, time: f64, bus: usize, bytes: &[u8]) {
+        if self.instant.0.to_bits() != time.to_bits() {
+            self.instant = (time, Vec::new());
+        }
+        for frame in can::frames(bytes) {
+            let own = (bus, frame);
+            if self.instant.1.contains(&own) {
+                continue;
+            }
+            let written = self.format.frame(&mut self.file, time, bus, &own.1);
+            self.failed = self.failed.take().or(written.err());
+            self.instant.1.push(own);
+        }
+    }
+}
+
+/// Returns the terminals whose frames are those of the buses.
+fn senders(system: &System) -> Vec<Sender> {
+    let mut found: Vec<(Sender, (usize, String))> = Vec::new();
+    // For each terminal, the name of the variable that receives, to find its partner.
+    let mut receives: BTreeMap<(usize, String), usize> = BTreeMap::new();
+    for (slave, (_, instance)) in system.slaves.iter().enumerate() {
+        let description = instance.description();
+        let networks = description.terminals.iter().filter(|own| own.matching_rule == TRANSCEIVER);
+        for terminal in networks {
+            let variable = |name: &str| {
+                let own = member(terminal, name)?;
+                let element = format!("{own}[1]");
+                description.variable(own).or_else(|| description.variable(&element))
+            };
+            let (Some(clock), Some(data)) = (variable("Tx_Clock"), variable("Tx_Data")) else {
+                continue;
+            };
+            let is_can = matches!(&data.kind, Kind::Binary(own) if own.mime_type.as_deref().is_some_and(|mime| mime.contains(CAN)));
+            if !is_can {
+                continue;
+            }
+            if let Some(received) = variable("Rx_Data") {
+                receives.insert((slave, received.name.clone()), found.len());
+            }
+            let (clock, data_reference) = (clock.value_reference, data.value_reference);
+            let sender = Sender { slave, clock, data: data_reference, bus: found.len() };
+            found.push((sender, (slave, data.name.clone())));
+        }
+    }
+    // Terminals that are connected are on one bus, so are those of a simulation of a bus.
+    let mut links: Vec<(usize, usize)> = Vec::new();
+    for connection in &system.connections {
+        let named = |port| (system.variable(port)).name.clone();
+        let from = (connection.from.slave, named(connection.from));
+        let to = (connection.to.slave, named(connection.to));
+        let source = found.iter().position(|(_, data)| *data == from);
+        links.extend(source.zip(receives.get(&to).copied()));
+    }
+    let is_simulation = |slave: usize| system.slaves[slave].1.description().is_bus_simulation;
+    for one in 0..found.len() {
+        for other in 0..one {
+            let slave = found[one].0.slave;
+            if slave == found[other].0.slave && is_simulation(slave) {
+                links.push((one, other));
+            }
+        }
+    }
+    let mut senders: Vec<Sender> = found.into_iter().map(|(sender, _)| sender).collect();
+    let mut changed = true;
+    while std::mem::take(&mut changed) {
+        for &(one, other) in &links {
+            let least = senders[one].bus.min(senders[other].bus);
+            changed |= senders[one].bus != senders[other].bus;
+            (senders[one].bus, senders[other].bus) = (least, least);
+        }
+    }
+    let mut buses: Vec<usize> = senders.iter().map(|sender| sender.bus).collect();
+    buses.sort_unstable();
+    buses.dedup();
+    let simulated: Vec<usize> = senders
+        .iter()
+        .filter(|sender| is_simulation(sender.slave))
+        .map(|sender| sender.bus)
+        .collect();
+    senders.retain(|sender| !simulated.contains(&sender.bus) || is_simulation(sender.slave));
+    for sender in &mut senders {
+        sender.bus = buses.iter().position(|bus| *bus == sender.bus).unwrap_or_default();
+    }
+    senders
+}
+
+/// Returns the variable of a member of a terminal.
+fn member<'a>(terminal: &'a Terminal, name: &str) -> Option<&'a str> {
+    terminal.members.iter().find(|own| own.name == name).map(|own| own.variable.as_str())
+}

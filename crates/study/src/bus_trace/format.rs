@@ -1,0 +1,210 @@
+//! The formats of traces: the log of candump (can-utils), ASC (Vector), and PCAPNG with the link type of `SocketCAN`.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use super::can::{Frame, FrameKind};
+use crate::error::Error;
+
+/// The link type of `SocketCAN` (`LINKTYPE_CAN_SOCKETCAN`), with its flags in the identifier.
+const LINK_TYPE: u16 = 227;
+const EXTENDED: u32 = 0x8000_0000;
+const REMOTE: u32 = 0x4000_0000;
+const ERROR: u32 = 0x2000_0000;
+/// Error classes of `SocketCAN`: violation of the protocol on the bus (`CAN_ERR_PROT`, `CAN_ERR_BUSERROR`), with 8 bytes of data.
+const PROTOCOL: u32 = 0x88;
+/// Flags of CAN FD in `SocketCAN`: bit rate switch, error state indicator, and that it is CAN FD.
+const SWITCH: u8 = 1;
+const STATE: u8 = 2;
+const FLEXIBLE: u8 = 4;
+
+/// A format of a trace.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Format {
+    Candump,
+    Asc,
+    Pcapng,
+}
+
+impl Format {
+    /// Returns the format for the extension of a file.
+    pub(super) fn of(path: &Path) -> Result<Self, Error> {
+        match path.extension().and_then(|own| own.to_str()) {
+            Some("log") => Ok(Self::Candump),
+            Some("asc") => Ok(Self::Asc),
+            Some("pcapng") => Ok(Self::Pcapng),
+            _ => Err(Error::Invalid(format!(
+                "{}: a bus trace is written as .log (candump), .asc or .pcapng",
+                path.display()
+            ))),
+        }
+    }
+
+    /// Writes what stands before the frames.
+    pub(super) fn begin(self, file: &mut impl Write, buses: usize) -> io::Result<()> {
+        match self {
+            Self::Candump => Ok(()),
+            // Simulated time starts at the epoch.
+            Self::Asc => file.write_all(
+                b"date Thu Jan 1 12:00:00.000 am 1970\nbase hex timestamps absolute\nno internal events logged\n",
+            ),
+            Self::Pcapng => {
+                // Section header: byte order, version 1.0, unknown length.
+                let mut section = 0x1a2b_3c4d_u32.to_le_bytes().to_vec();
+                section.extend([1, 0, 0, 0]);
+                section.extend((-1_i64).to_le_bytes());
+                block(file, 0x0a0d_0d0a, &section)?;
+                for bus in 0..buses {
+                    let mut interface = LINK_TYPE.to_le_bytes().to_vec();
+                    interface.extend([0; 6]);
+                    option(&mut interface, 2, name(bus).as_bytes());
+                    // if_tsresol: 10^-9 s.
+                    option(&mut interface, 9, &[9]);
+                    option(&mut interface, 0, &[]);
+                    block(file, 1, &interface)?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// Writes a frame at `time` in s.
+    pub(super) fn frame(
+        self,
+        file: &mut impl Write,
+        time: f64,
+        bus: usize,
+        frame: &Frame,
+    ) -> io::Result<()> {
+        let Frame { identifier, extended, kind, data } = frame;
+        match self {
+            Self::Candump => {
+                write!(file, "({time:.6}) {} ", name(bus))?;
+                if *kind == FrameKind::Error {
+                    return writeln!(file, "{:08X}#{}", ERROR | PROTOCOL, "00".repeat(8));
+                }
+                if *extended {
+                    write!(file, "{identifier:08X}#")?;
+                } else {
+                    write!(file, "{identifier:03X}#")?;
+                }
+                match kind {
+                    FrameKind::Remote => return writeln!(file, "R"),
+                    FrameKind::Flexible { .. } => write!(file, "#{:X}", flags(*kind))?,
+                    _ => {}
+                }
+                digits(file, data, "")?;
+                writeln!(file)
+            }
+            Self::Asc => {
+                let suffix = if *extended { "x" } else { "" };
+                let channel = bus + 1;
+                match kind {
+                    FrameKind::Error => writeln!(file, "{time:11.6} {channel}  ErrorFrame"),
+                    FrameKind::Remote => {
+                        writeln!(file, "{time:11.6} {channel}  {identifier:X}{suffix:<8} Rx   r")
+                    }
+                    FrameKind::Data => {
+                        let length = data.len();
+                        write!(
+                            file,
+                            "{time:11.6} {channel}  {identifier:X}{suffix:<8} Rx   d {length}"
+                        )?;
+                        digits(file, data, " ")?;
+                        writeln!(file)
+                    }
+                    FrameKind::Flexible { bit_rate_switch, error_state } => {
+                        let (switch, state) = (u8::from(*bit_rate_switch), u8::from(*error_state));
+                        let (length, code) = (data.len(), length_code(data.len()));
+                        write!(
+                            file,
+                            "{time:11.6} CANFD {channel} Rx {identifier:X}{suffix} {switch} {state} {code:x} {length}"
+                        )?;
+                        digits(file, data, " ")?;
+                        writeln!(file, " 0 0 {:x} 0 0 0 0 0", 0x1000 | u32::from(switch) << 13)
+                    }
+                }
+            }
+            Self::Pcapng => packet(file, time, bus, frame),
+        }
+    }
+}
+
+/// Returns the name of a bus.
+fn name(bus: usize) -> String {
+    format!("can{bus}")
+}
+
+fn digits(file: &mut impl Write, data: &[u8], before: &str) -> io::Result<()> {
+    data.iter().try_for_each(|byte| write!(file, "{before}{byte:02X}"))
+}
+
+/// Returns the flags of a CAN FD frame.
+fn flags(kind: FrameKind) -> u8 {
+    match kind {
+        FrameKind::Flexible { bit_rate_switch, error_state } => {
+            u8::from(bit_rate_switch) * SWITCH + u8::from(error_state) * STATE
+        }
+        _ => 0,
+    }
+}
+
+/// Returns the data length code of CAN FD (ISO 11898-1): lengths above 8 have steps.
+fn length_code(length: usize) -> usize {
+    match length {
+        0..=8 => length,
+        9..=24 => 8 + (length - 5) / 4,
+        _ => 13 + (length.saturating_sub(17)) / 16,
+    }
+}
+
+/// Writes an enhanced packet block.
+fn packet(file: &mut impl Write, time: f64, bus: usize, frame: &Frame) -> io::Result<()> {
+    let mut identifier = frame.identifier | if frame.extended { EXTENDED } else { 0 };
+    let mut data = frame.data.clone();
+    let mut flags = flags(frame.kind);
+    match frame.kind {
+        FrameKind::Remote => identifier |= REMOTE,
+        FrameKind::Error => {
+            identifier = ERROR | PROTOCOL;
+            data = vec![0; 8];
+        }
+        FrameKind::Flexible { .. } => flags |= FLEXIBLE,
+        FrameKind::Data => {}
+    }
+    let length = u8::try_from(data.len()).map_err(io::Error::other)?;
+    let mut packet = identifier.to_be_bytes().to_vec();
+    packet.extend([length, flags, 0, 0]);
+    packet.extend(&data);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "simulated time")]
+    let nanoseconds = (time * 1e9).round() as u64;
+    let mut content = u32::try_from(bus).map_err(io::Error::other)?.to_le_bytes().to_vec();
+    let (high, low) = (nanoseconds >> 32, nanoseconds & 0xffff_ffff);
+    for half in [high, low, packet.len() as u64, packet.len() as u64] {
+        content.extend(u32::try_from(half).map_err(io::Error::other)?.to_le_bytes());
+    }
+    content.extend(&packet);
+    pad(&mut content);
+    block(file, 6, &content)
+}
+
+/// Writes a block of PCAPNG: its type, its length before and after the content.
+fn block(file: &mut impl Write, kind: u32, content: &[u8]) -> io::Result<()> {
+    let length = u32::try_from(content.len() + 12).map_err(io::Error::other)?.to_le_bytes();
+    file.write_all(&kind.to_le_bytes())?;
+    file.write_all(&length)?;
+    file.write_all(content)?;
+    file.write_all(&length)
+}
+
+fn option(content: &mut Vec<u8>, code: u16, value: &[u8]) {
+    content.extend(code.to_le_bytes());
+    content.extend(u16::try_from(value.len()).unwrap_or_default().to_le_bytes());
+    content.extend(value);
+    pad(content);
+}
+
+/// Fills up to a multiple of four bytes.
+fn pad(content: &mut Vec<u8>) {
+    content.resize(content.len().next_multiple_of(4), 0);
+}
