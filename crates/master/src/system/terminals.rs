@@ -129,11 +129,11 @@ impl System {
         };
         let found = self.pairs(&name(slave, one), &name(partner, other));
         for (first, second) in found.map_err(|error| error.to_string())? {
-            pairs.push(if self.is_source(first, second) {
-                (first, second)
+            if self.is_source(first, second) {
+                pairs.push((first, second));
             } else if self.is_source(second, first) {
-                (second, first)
-            } else {
+                pairs.push((second, first));
+            } else if !(self.is_parameter(first) && self.is_parameter(second)) {
                 let role = |port| self.variable(port).causality.as_str();
                 return Err(format!(
                     "{} is {} and {} is {}, expected an output and an input",
@@ -142,9 +142,15 @@ impl System {
                     self.name(second),
                     role(second)
                 ));
-            });
+            }
         }
         Ok(())
+    }
+
+    /// Whether the user sets the variable: two such members have the same meaning, but none gives the other a value.
+    fn is_parameter(&self, port: Port) -> bool {
+        let causality = self.variable(port).causality;
+        matches!(causality, Causality::Parameter | Causality::StructuralParameter)
     }
 
     /// Whether a connection can lead from one variable to the other.
