@@ -123,3 +123,41 @@ def test_a_sampled_controller_with_a_clock_runs_as_the_one_of_fmi_2(aso_ftc, roo
     assert [own.name for own in variables if own.type == "Clock"] == ["sample_clock"]
     # The angle has come to rest: 1e-10 rad, from 0.1.
     assert ends[0] == pytest.approx(ends[1], rel=1e-9, abs=1e-9)
+
+
+def test_a_clock_of_each_type_ticks_when_the_model_says(aso_ftc, root, tmp_path):
+    done = aso_ftc("pack", root / "tests/models/clock-types", "--fmi", "3", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    fmu = next(tmp_path.glob("*.fmu"))
+    assert validate_fmu(str(fmu)) == []
+    types = {own.name: own.intervalVariability for own in fmpy.read_model_description(str(fmu)).modelVariables}
+    for name in ("constant", "fixed", "tunable", "changing", "countdown", "triggered"):
+        assert types[name] == name
+    (tmp_path / "in.csv").write_text("time,beat,triggered\n0,0.2,0\n0.25,0.2,1\n0.5,0.4,0\n", encoding="utf-8")
+    system = tmp_path / "system.toml"
+    system.write_text(
+        f"[fmus]\na = {str(fmu)!r}\nb = {str(fmu)!r}\n"
+        '[[connections]]\nfrom = "a.echo"\nto = "b.triggered"\n'
+        '[[scenario.table]]\ncsv = "in.csv"\nelement = "a"\n',
+        encoding="utf-8",
+    )
+    done = aso_ftc("run", system, "--stop-time", "1", "--step", "0.1", "--set", "a.period=0.125", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    with open(tmp_path / "results.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+
+    def ticks(name):
+        return [float(row["time"]) for row in rows if row[name]]
+
+    # By hand. a: every 0.1; every 0.125; every 0.2 until 0.5, then from the tick at 0.6 on every 0.4; each interval
+    # twice the one before; 0.07 after each third tick of fixed, at 0.25, 0.625 and 1.
+    assert ticks("a.n_constant") == pytest.approx([0.1 * k for k in range(11)])
+    assert ticks("a.n_fixed") == pytest.approx([0.125 * k for k in range(9)])
+    assert ticks("a.n_tunable") == pytest.approx([0, 0.2, 0.4, 0.6, 1.0])
+    assert ticks("a.n_changing") == pytest.approx([0.05, 0.15, 0.35, 0.75])
+    assert ticks("a.n_countdown") == pytest.approx([0.32, 0.695])
+    assert ticks("a.n_triggered") == pytest.approx([0.25])
+    # b: its own period, and the countdown of a.
+    assert ticks("b.n_fixed") == pytest.approx([0.15 * k for k in range(7)])
+    assert ticks("b.n_triggered") == pytest.approx([0.32, 0.695])
+    assert [row["b.n_triggered"] for row in rows if row["b.n_triggered"]] == ["1", "2"]

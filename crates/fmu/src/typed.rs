@@ -95,6 +95,17 @@ impl Native for bool {
     }
 
     fn kind(_: Option<Self>, number: Number) -> Result<Kind, String> {
+        if let Some(variability) = number.interval_variability {
+            use IntervalVariability::{Constant, Triggered};
+            if matches!(variability, Constant | Triggered) {
+                return Err(
+                    "the interval of a timed clock is fixed, tunable, changing or a countdown"
+                        .to_owned(),
+                );
+            }
+            let interval_variability = variability;
+            return Ok(Kind::Clock(ClockType { interval_variability, ..ClockType::default() }));
+        }
         let Some(interval) = number.interval else { return Ok(Kind::Clock(ClockType::default())) };
         if !(interval > 0.0 && interval.is_finite()) {
             return Err(format!("interval {interval} s, expected more than 0"));

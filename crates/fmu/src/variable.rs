@@ -3,7 +3,7 @@
 mod declaration;
 
 use crate::typed::TypedField;
-use fmu_description::{Causality, DependencyKind, Initial, Variability};
+use fmu_description::{Causality, DependencyKind, Initial, IntervalVariability, Variability};
 
 pub(crate) use declaration::{Base, Declaration};
 
@@ -61,6 +61,8 @@ pub(crate) struct Number {
     pub(crate) nominal: Option<f64>,
     /// Interval of a periodic clock in s.
     pub(crate) interval: Option<f64>,
+    /// How the model determines the intervals of a clock.
+    pub(crate) interval_variability: Option<IntervalVariability>,
 }
 
 /// A variable of a model: name, role, attributes and the field that holds its value.
@@ -196,6 +198,31 @@ impl<M> Variable<M> {
     {
         let mut clock = Self::triggered_clock(name, description, field).input();
         clock.declaration.number.interval = Some(interval);
+        clock
+    }
+
+    /// Creates an input clock whose intervals the model determines (FMI 3.0.2, section 2.2.8): `interval` is the field
+    /// with an interval in s. The clock is otherwise as a [`Variable::periodic_clock`].
+    ///
+    /// * `Fixed` and `Tunable`: the clock is periodic, with an interval that depends on parameters; for `Tunable` they
+    ///   may change during the run, and the next tick starts the new interval.
+    /// * `Changing` and `Countdown`: [`Model::event`](crate::Model::event) sets the field to the time from now to the
+    ///   next tick. It is infinite again when the importer has read it. A clock that is `Changing` gets an interval in
+    ///   [`Model::new`](crate::Model::new) and at each tick; one that is a `Countdown` ticks only when asked to.
+    pub fn timed_clock<F, G>(
+        name: impl Into<String>,
+        description: impl Into<String>,
+        variability: IntervalVariability,
+        field: F,
+        interval: G,
+    ) -> Self
+    where
+        F: for<'a> Fn(&'a mut M) -> &'a mut bool + Send + Sync + 'static,
+        G: for<'a> Fn(&'a mut M) -> &'a mut f64 + Send + Sync + 'static,
+    {
+        let mut clock = Self::triggered_clock(name, description, field).input();
+        clock.declaration.number.interval_variability = Some(variability);
+        clock.fields.derivatives.push(Box::new(interval));
         clock
     }
 

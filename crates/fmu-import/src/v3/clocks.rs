@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 
 use fmu_description::{Causality, ClockType, IntervalVariability, Kind, ModelDescription};
+use serde::{Deserialize, Serialize};
 
 use super::Instance;
 use super::access::refused;
@@ -24,9 +25,20 @@ struct TimedClock {
     attributes: ClockType,
     /// Interval and time of the first tick in s, and number of ticks so far, if it is periodic.
     interval: f64,
+    /// The interval as numerator and denominator, so that many ticks do not drift.
+    fraction: Option<(u64, u64)>,
     first: f64,
     ticks: u64,
     /// Time of the next tick in s, if it is known.
+    next: Option<f64>,
+}
+
+/// What a serialised state has of a clock that ticks at times.
+#[derive(Serialize, Deserialize)]
+pub(super) struct TimedState {
+    interval: f64,
+    first: f64,
+    ticks: u64,
     next: Option<f64>,
 }
 
@@ -59,7 +71,35 @@ fn seconds(decimal: Option<f64>, counter: Option<u64>, resolution: Option<u64>) 
     decimal.or(counter.zip(resolution).map(fraction))
 }
 
+/// Returns a positive decimal number as numerator and denominator; `None` for one of too many digits.
+fn fraction(decimal: f64) -> Option<(u64, u64)> {
+    let text = decimal.to_string();
+    let (whole, part) = text.split_once('.').unwrap_or((&text, ""));
+    let denominator = 10_u64.checked_pow(u32::try_from(part.len()).ok()?)?;
+    Some((format!("{whole}{part}").parse().ok()?, denominator))
+}
+
 impl TimedClock {
+    /// Returns the time of the tick number `ticks`, the first one being 0: rounded once.
+    #[expect(clippy::cast_precision_loss, reason = "the nearest number")]
+    fn tick(&self, ticks: u64) -> f64 {
+        let elapsed = match self.fraction {
+            Some((numerator, denominator)) => {
+                let (total, denominator) =
+                    (u128::from(ticks) * u128::from(numerator), u128::from(denominator));
+                (total / denominator) as f64 + (total % denominator) as f64 / denominator as f64
+            }
+            None => ticks as f64 * self.interval,
+        };
+        self.first + elapsed
+    }
+
+    fn set_interval(&mut self, interval: f64) {
+        if interval.to_bits() != self.interval.to_bits() {
+            (self.interval, self.fraction) = (interval, fraction(interval));
+        }
+    }
+
     fn is_periodic(&self) -> bool {
         use IntervalVariability::{Constant, Fixed, Tunable};
         matches!(self.attributes.interval_variability, Constant | Fixed | Tunable)
@@ -88,6 +128,7 @@ impl Clocks {
                     reference,
                     attributes: attributes.clone(),
                     interval: 0.0,
+                    fraction: None,
                     first: 0.0,
                     ticks: 0,
                     next: None,
@@ -129,6 +170,9 @@ impl Clocks {
                 );
                 return Err(refused("fmi3GetIntervalDecimal", what));
             }
+            let counted = own.interval_counter.zip(own.resolution.filter(|own| *own > 0));
+            clock.fraction =
+                counted.filter(|_| own.interval_decimal.is_none()).or_else(|| fraction(interval));
             (clock.interval, clock.first, clock.ticks) = (interval, start + shift, 0);
             clock.next = Some(clock.first);
         }
@@ -158,12 +202,8 @@ impl Clocks {
         for clock in self.timed.iter_mut().filter(|clock| clock.is_due(time)) {
             due.push(clock.reference);
             clock.ticks += 1;
-            clock.next = clock.is_periodic().then(|| {
-                // From the count, so that rounding does not add up.
-                #[expect(clippy::cast_precision_loss, reason = "fewer than 2^53 ticks")]
-                let ticks = clock.ticks as f64;
-                clock.first + ticks * clock.interval
-            });
+            // From the count, so that rounding does not add up.
+            clock.next = clock.is_periodic().then(|| clock.tick(clock.ticks));
         }
         due
     }
@@ -227,13 +267,23 @@ impl Clocks {
         for clock in &mut self.timed {
             let ask = match clock.attributes.interval_variability {
                 IntervalVariability::Countdown => true,
-                IntervalVariability::Changing => self.event_ticks.contains(&clock.reference),
+                IntervalVariability::Changing | IntervalVariability::Tunable => {
+                    self.event_ticks.contains(&clock.reference)
+                }
                 _ => false,
             };
             if ask {
                 let (interval, qualifier) = component.get_interval(clock.reference)?;
-                if qualifier == CHANGED {
-                    clock.next = Some(time + interval);
+                if qualifier != CHANGED {
+                    continue;
+                }
+                clock.next = Some(time + interval);
+                if clock.is_periodic() && interval.to_bits() != clock.interval.to_bits() {
+                    // A parameter has changed the interval: the present tick is the first of the new ones.
+                    clock.set_interval(interval);
+                    (clock.first, clock.ticks) = (time, 1);
+                } else if clock.is_periodic() {
+                    clock.next = Some(clock.tick(clock.ticks));
                 }
             }
         }
@@ -267,14 +317,21 @@ impl Clocks {
     }
 
     /// Returns the counters and times for a serialised state.
-    pub(super) fn state(&self) -> Vec<(u64, Option<f64>)> {
-        self.timed.iter().map(|clock| (clock.ticks, clock.next)).collect()
+    pub(super) fn state(&self) -> Vec<TimedState> {
+        let state = |clock: &TimedClock| TimedState {
+            interval: clock.interval,
+            first: clock.first,
+            ticks: clock.ticks,
+            next: clock.next,
+        };
+        self.timed.iter().map(state).collect()
     }
 
     /// Restores the counters and times of a serialised state; nothing ticks.
-    pub(super) fn restore(&mut self, state: &[(u64, Option<f64>)]) {
-        for (clock, &(ticks, next)) in self.timed.iter_mut().zip(state) {
-            (clock.ticks, clock.next) = (ticks, next);
+    pub(super) fn restore(&mut self, state: &[TimedState]) {
+        for (clock, own) in self.timed.iter_mut().zip(state) {
+            clock.set_interval(own.interval);
+            (clock.first, clock.ticks, clock.next) = (own.first, own.ticks, own.next);
         }
         self.active.clear();
         self.partitions.clear();
@@ -332,5 +389,29 @@ impl Instance {
         }
         self.state.clocks.read(run, now);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clock(interval: f64, fraction: Option<(u64, u64)>) -> TimedClock {
+        let attributes = ClockType::default();
+        let (reference, first, ticks, next) = (1, 0.0, 0, None);
+        TimedClock { reference, attributes, interval, fraction, first, ticks, next }
+    }
+
+    /// The products of the rounded intervals are 333333.3333333333 and 700000.0000000001.
+    #[test]
+    fn ten_million_ticks_do_not_drift() {
+        let third = clock(1.0 / 30.0, Some((1, 30)));
+        assert_eq!(third.tick(10_000_000).to_bits(), (1e7 / 30.0_f64).to_bits());
+        let decimal = clock(0.07, fraction(0.07));
+        assert_eq!(decimal.tick(10_000_000).to_bits(), 700_000.0_f64.to_bits());
+        assert_eq!(decimal.tick(10_000_001).to_bits(), 700_000.07_f64.to_bits());
+        assert_eq!(fraction(2.5), Some((25, 10)));
+        assert_eq!(fraction(1e-30), None);
+        assert_eq!(clock(1e-30, None).tick(4).to_bits(), 4e-30_f64.to_bits());
     }
 }

@@ -6,10 +6,11 @@ use slave::CallError;
 use super::Instance;
 use super::access::refused;
 use super::clocked::Memory;
+use super::clocks::TimedState;
 use super::modes::{Mode, State};
 
 /// The first bytes of a serialised state.
-const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x02";
+const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x03";
 const SERIALIZE: &str = "fmi3SerializeFMUState";
 const DESERIALIZE: &str = "fmi3DeserializeFMUState";
 
@@ -23,8 +24,7 @@ struct Kept {
     time: f64,
     held: Vec<Option<u64>>,
     memory: Memory,
-    /// For each clock that ticks at times: number of ticks, and time of the next one in s.
-    clocks: Vec<(u64, Option<f64>)>,
+    clocks: Vec<TimedState>,
 }
 
 impl Instance {

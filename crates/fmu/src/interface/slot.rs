@@ -1,7 +1,7 @@
 //! Run-time data of a variable, indexed by value reference.
 
 use crate::variable::{Declaration, Field};
-use fmu_description::{Causality, Initial, Variability};
+use fmu_description::{Causality, Initial, IntervalVariability, Variability};
 use fmu_description::{call_order::settable, call_order3};
 
 /// A variable of base type `T`; its position in [`Interface`] follows from its value reference.
@@ -25,9 +25,11 @@ pub(crate) struct Slot<M, T> {
     pub(crate) settable: u16,
     /// The values of an enumeration; empty for all other types.
     pub(crate) items: Vec<i32>,
-    /// The interval of a periodic clock in s.
+    /// The interval of a periodic clock in s, and how the model determines the intervals of another one.
     pub(crate) interval: Option<f64>,
+    pub(crate) interval_variability: Option<IntervalVariability>,
     pub(crate) field: Field<M, T>,
+    /// The derivatives of a Real; the interval of a clock that the model determines.
     pub(crate) derivatives: Vec<Field<M, f64>>,
 }
 
@@ -40,6 +42,7 @@ pub(crate) struct SlotBuilder<M> {
     range: (f64, f64),
     items: Vec<i32>,
     interval: Option<f64>,
+    interval_variability: Option<IntervalVariability>,
     derivatives: Vec<Field<M, f64>>,
 }
 
@@ -57,6 +60,7 @@ impl<M> SlotBuilder<M> {
                 .map(|own| own.items.iter().map(|(_, value)| *value).collect())
                 .unwrap_or_default(),
             interval: variable.number.interval,
+            interval_variability: variable.number.interval_variability,
             derivatives,
         }
     }
@@ -86,6 +90,7 @@ impl<M> SlotBuilder<M> {
             settable: settable((self.causality, self.variability), self.initial, false),
             items: self.items,
             interval: self.interval,
+            interval_variability: self.interval_variability,
             field,
             derivatives: self.derivatives,
         });

@@ -1,4 +1,4 @@
-//! The functions for clocks. Intervals are in seconds and constant: functions that set an interval or
+//! The functions for clocks. Intervals are in seconds, and the model determines them: functions that set an interval or
 //! count parts of a second are errors for every clock.
 
 use super::super::{borrow_output, read};
@@ -65,13 +65,13 @@ refused! {
     get_shift_fraction = GetShiftFraction(_counters: *mut fmi3UInt64, _resolutions: *mut fmi3UInt64),
         "supportsFraction of the clock is false";
     set_interval_decimal = SetIntervalDecimal(_intervals: *const fmi3Float64),
-        "the interval of the clock is constant";
+        "the model determines the interval of the clock";
     set_interval_fraction = SetIntervalFraction(
         _counters: *const fmi3UInt64, _resolutions: *const fmi3UInt64
-    ), "the interval of the clock is constant";
+    ), "the model determines the interval of the clock";
     set_shift_decimal = SetShiftDecimal(_shifts: *const fmi3Float64),
-        "the interval of the clock is constant";
+        "the model determines the interval of the clock";
     set_shift_fraction = SetShiftFraction(
         _counters: *const fmi3UInt64, _resolutions: *const fmi3UInt64
-    ), "the interval of the clock is constant";
+    ), "the model determines the interval of the clock";
 }

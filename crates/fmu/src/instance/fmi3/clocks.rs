@@ -3,10 +3,11 @@
 use std::mem::MaybeUninit;
 
 use super::super::Instance;
+use crate::interface::Slot;
 use crate::model::{Failure, Model};
 use crate::typed::Native;
-use fmu_description::Causality;
 use fmu_description::abi3::{IntervalQualifier, fmi3Clock};
+use fmu_description::{Causality, IntervalVariability as Variability};
 
 impl<M: Model> Instance<M> {
     /// Lets the model tick its clocks, where event mode begins and after a clock was set.
@@ -77,40 +78,74 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi3GetIntervalDecimal`: intervals in s, which are constant.
+    /// `fmi3GetIntervalDecimal`: intervals in s.
     pub(crate) fn get_intervals(
-        &self,
+        &mut self,
         places: &[u32],
         intervals: &mut [MaybeUninit<f64>],
         qualifiers: &mut [MaybeUninit<i32>],
     ) -> Result<(), Failure> {
+        self.refresh()?;
         for ((&place, interval), qualifier) in places.iter().zip(intervals).zip(qualifiers) {
-            interval.write(self.interval(place)?);
-            qualifier.write(IntervalQualifier::Changed as i32);
+            let (found, how) = self.interval(place)?;
+            interval.write(found);
+            qualifier.write(how as i32);
         }
         Ok(())
     }
 
-    /// `fmi3GetShiftDecimal`: the first tick of every periodic clock is at the start time.
+    /// `fmi3GetShiftDecimal`, of periodic clocks: the first tick of every periodic clock is at the start time.
     pub(crate) fn get_shifts(
         &self,
         places: &[u32],
         shifts: &mut [MaybeUninit<f64>],
     ) -> Result<(), Failure> {
         for (&place, shift) in places.iter().zip(shifts) {
-            self.interval(place)?;
+            let clock = bool::slots(&self.interface.typed).get(place as usize);
+            let is_periodic = |own: &Slot<M, bool>| {
+                let variability = own.interval_variability;
+                own.interval.is_some()
+                    || matches!(variability, Some(Variability::Fixed | Variability::Tunable))
+            };
+            if !clock.is_some_and(is_periodic) {
+                let name = clock.map(|own| own.name.as_str()).unwrap_or_default();
+                return Err(Failure::Error(format!(
+                    "{name} is no periodic clock: it has no shift"
+                )));
+            }
             shift.write(0.0);
         }
         Ok(())
     }
 
-    /// Returns the interval in s of a periodic clock.
-    fn interval(&self, place: u32) -> Result<f64, Failure> {
+    /// Returns the interval of a clock in s, and whether it is a new one. That of a clock that is changing or a countdown is
+    /// new once.
+    fn interval(&mut self, place: u32) -> Result<(f64, IntervalQualifier), Failure> {
         let clock = bool::slots(&self.interface.typed).get(place as usize);
-        let interval = clock.and_then(|own| own.interval);
-        interval.ok_or_else(|| {
-            let name = clock.map(|own| own.name.as_str()).unwrap_or_default();
-            Failure::Error(format!("{name} is a triggered clock: it has no interval"))
+        if let Some(interval) = clock.and_then(|own| own.interval) {
+            return Ok((interval, IntervalQualifier::Changed));
+        }
+        let field = clock.and_then(|own| own.derivatives.first());
+        let model = &mut self.core.model;
+        Ok(match (clock.and_then(|own| own.interval_variability), field) {
+            (Some(Variability::Fixed | Variability::Tunable), Some(field)) => {
+                (*field(model), IntervalQualifier::Changed)
+            }
+            (Some(variability), Some(field)) => {
+                let interval = std::mem::replace(field(model), f64::INFINITY);
+                if interval.is_finite() {
+                    (interval, IntervalQualifier::Changed)
+                } else if variability == Variability::Countdown {
+                    (0.0, IntervalQualifier::NotYetKnown)
+                } else {
+                    (0.0, IntervalQualifier::Unchanged)
+                }
+            }
+            _ => {
+                let name = clock.map(|own| own.name.as_str()).unwrap_or_default();
+                let what = format!("{name} is a triggered clock: it has no interval");
+                return Err(Failure::Error(what));
+            }
         })
     }
 }

@@ -59,7 +59,9 @@ fn check_interval(variable: &ScalarVariable, clock: &ClockType, problems: &mut P
     let mut demand = |holds: bool, text: &str| {
         problems.demand(holds, TYPES, || format!("clock {name}: {text}"));
     };
-    demand(given || !periodic, "a periodic clock needs intervalDecimal");
+    // Section 2.4.4 wants it for every periodic clock; by section 2.2.8.2 fmi3GetInterval gives it for the others.
+    let constant = clock.interval_variability == Constant;
+    demand(given || !constant, "a constant clock needs intervalDecimal");
     demand(periodic || !given, "only a periodic clock has intervalDecimal");
     let positive = |own: f64| own > 0.0 && own.is_finite();
     demand(clock.interval_decimal.is_none_or(positive), "intervalDecimal is not positive");
