@@ -5,20 +5,16 @@
  * nodes tick: the sender gets a confirmation, the other node the frame.
  *
  * It is strict: a call that is not allowed in its mode (sections 2.2.6 and 4.2) ends the process by SIGABRT. */
-#include "fmi3.h"
+#define NAME "bus3"
+#include "strict3.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-
-#define EXPORT __attribute__((visibility("default")))
 
 /* Value references: for each node, the number of the node times 10 plus one of these. */
 enum { TX_CLOCK = 1, TX_DATA, RX_CLOCK, RX_DATA };
 enum { NODES = 2, FRAME = 32, WAITING = 16, HEAD = 16 };
 static const double bit_rate = 1e5;
-typedef enum { INSTANTIATED, INITIALIZATION, EVENT, STEP, TERMINATED } Mode;
 
 typedef struct {
     uint8_t waiting[WAITING][FRAME];
@@ -35,48 +31,20 @@ typedef struct {
     Node nodes[NODES];
 } Bus;
 
-static void demand(int allowed, const char *what) {
-    if (!allowed) {
-        fprintf(stderr, "bus3: %s\n", what);
-        abort();
-    }
-}
-
 static Node *node(Bus *bus, fmi3ValueReference vr) {
     demand(vr / 10 < NODES, "a value reference of no node");
     return &bus->nodes[vr / 10];
 }
 
-EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
+COMMON_FUNCTIONS(Bus)
 
-EXPORT fmi3Instance fmi3InstantiateCoSimulation(
-    fmi3String name, fmi3String token, fmi3String resources, bool visible, bool logging, bool event_mode,
-    bool early_return, const fmi3ValueReference *intermediate, size_t count, void *environment,
-    fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update) {
-    (void)name, (void)token, (void)resources, (void)visible, (void)logging, (void)early_return, (void)intermediate;
-    (void)count, (void)environment, (void)log, (void)update;
-    demand(event_mode, "instantiated without event mode");
+static Bus *create(void) {
     Bus *bus = calloc(1, sizeof(Bus));
     bus->sender = -1;
     return bus;
 }
 
-EXPORT void fmi3FreeInstance(fmi3Instance c) { free(c); }
-
-EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance c, bool on, size_t count, const fmi3String categories[]) {
-    (void)c, (void)on, (void)count, (void)categories;
-    return fmi3OK;
-}
-
-EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance c, bool has_tolerance, double tolerance, double start,
-                                              bool has_stop, double stop) {
-    Bus *bus = c;
-    (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
-    demand(bus->mode == INSTANTIATED, "fmi3EnterInitializationMode");
-    bus->mode = INITIALIZATION;
-    bus->time = start;
-    return fmi3OK;
-}
+INSTANTIATE_CO_SIMULATION(create)
 
 EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
     ((Bus *)c)->mode = EVENT;
@@ -144,11 +112,6 @@ EXPORT fmi3Status fmi3EnterStepMode(fmi3Instance c) {
     Bus *bus = c;
     demand(bus->mode == EVENT, "fmi3EnterStepMode");
     bus->mode = STEP;
-    return fmi3OK;
-}
-
-EXPORT fmi3Status fmi3Terminate(fmi3Instance c) {
-    ((Bus *)c)->mode = TERMINATED;
     return fmi3OK;
 }
 

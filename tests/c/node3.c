@@ -10,19 +10,15 @@
  * byte is the number of the message (FMI-LS-BUS 1.0); of the operations received, the frames are counted.
  *
  * It is strict: a call that is not allowed in its mode (sections 2.2.6 and 4.2) ends the process by SIGABRT. */
-#include "fmi3.h"
+#define NAME "node3"
+#include "strict3.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-
-#define EXPORT __attribute__((visibility("default")))
 
 enum { TX_CLOCK = 1, TX, TX_TIME, TX_DATA, RX_CLOCK, RX, RX_TIME, RX_DATA, RECEIVED, SUM, SENT, LATENCY, BYTES,
        LEVEL, LEVEL_IN, LEVEL_OUT, PERIOD, FIRST, LIMIT, ANNOUNCES, TIME, IDENTIFIER };
 enum { MOST = 256, CAN_FRAME = 17 };
-typedef enum { INSTANTIATED, INITIALIZATION, EVENT, STEP, TERMINATED } Mode;
 
 typedef struct {
     Mode mode;
@@ -35,13 +31,6 @@ typedef struct {
 } Node;
 
 static const uint8_t zeros[MOST];
-
-static void demand(int allowed, const char *what) {
-    if (!allowed) {
-        fprintf(stderr, "node3: %s\n", what);
-        abort();
-    }
-}
 
 static void demand_clocked(const Node *node, bool ticks) {
     demand(node->mode == INITIALIZATION || (node->mode == EVENT && ticks), "a clocked variable without a tick");
@@ -59,39 +48,17 @@ static void send(Node *node, int32_t number) {
     memcpy(node->frame, frame, CAN_FRAME);
 }
 
-EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
+COMMON_FUNCTIONS(Node)
 
-EXPORT fmi3Instance fmi3InstantiateCoSimulation(
-    fmi3String name, fmi3String token, fmi3String resources, bool visible, bool logging, bool event_mode,
-    bool early_return, const fmi3ValueReference *intermediate, size_t count, void *environment,
-    fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update) {
-    (void)name, (void)token, (void)resources, (void)visible, (void)logging, (void)early_return, (void)intermediate;
-    (void)count, (void)environment, (void)log, (void)update;
-    demand(event_mode, "instantiated without event mode");
-    return calloc(1, sizeof(Node));
-}
+static Node *create(void) { return calloc(1, sizeof(Node)); }
 
-EXPORT void fmi3FreeInstance(fmi3Instance c) { free(c); }
-
-EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance c, bool on, size_t count, const fmi3String categories[]) {
-    (void)c, (void)on, (void)count, (void)categories;
-    return fmi3OK;
-}
-
-EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance c, bool has_tolerance, double tolerance, double start,
-                                              bool has_stop, double stop) {
-    Node *node = c;
-    (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
-    demand(node->mode == INSTANTIATED, "fmi3EnterInitializationMode");
-    node->mode = INITIALIZATION;
-    node->time = node->last = start;
-    return fmi3OK;
-}
+INSTANTIATE_CO_SIMULATION(create)
 
 EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
     Node *node = c;
     demand(node->mode == INITIALIZATION, "fmi3ExitInitializationMode");
     node->mode = EVENT;
+    node->last = node->time;
     if (node->first) {
         send(node, ++node->sent);
     }
@@ -139,11 +106,6 @@ EXPORT fmi3Status fmi3EnterStepMode(fmi3Instance c) {
     Node *node = c;
     demand(node->mode == EVENT && !node->tx_clock && !node->rx_clock, "fmi3EnterStepMode");
     node->mode = STEP;
-    return fmi3OK;
-}
-
-EXPORT fmi3Status fmi3Terminate(fmi3Instance c) {
-    ((Node *)c)->mode = TERMINATED;
     return fmi3OK;
 }
 

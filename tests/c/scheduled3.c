@@ -6,15 +6,10 @@
  *
  * It is strict: a call that is not allowed in its mode (section 5) ends the process by SIGABRT, so does a function of
  * co-simulation, which it lacks. */
-#include "fmi3.h"
-
-#include <stdio.h>
-#include <stdlib.h>
-
-#define EXPORT __attribute__((visibility("default")))
+#define NAME "scheduled3"
+#include "strict3.h"
 
 enum { FAST = 1, ASKED, LATER, DONE, ORDER, U, SUM };
-typedef enum { INSTANTIATED, INITIALIZATION, ACTIVATION, TERMINATED } Mode;
 
 typedef struct {
     Mode mode;
@@ -26,14 +21,7 @@ typedef struct {
     fmi3PreemptionCallback lock, unlock;
 } Tasks;
 
-static void demand(int allowed, const char *what) {
-    if (!allowed) {
-        fprintf(stderr, "scheduled3: %s\n", what);
-        abort();
-    }
-}
-
-EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
+COMMON_FUNCTIONS(Tasks)
 
 EXPORT fmi3Instance fmi3InstantiateScheduledExecution(
     fmi3String name, fmi3String token, fmi3String resources, bool visible, bool logging, void *environment,
@@ -49,32 +37,10 @@ EXPORT fmi3Instance fmi3InstantiateScheduledExecution(
     return tasks;
 }
 
-EXPORT void fmi3FreeInstance(fmi3Instance c) { free(c); }
-
-EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance c, bool on, size_t count, const fmi3String categories[]) {
-    (void)c, (void)on, (void)count, (void)categories;
-    return fmi3OK;
-}
-
-EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance c, bool has_tolerance, double tolerance, double start,
-                                              bool has_stop, double stop) {
-    Tasks *tasks = c;
-    (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
-    demand(tasks->mode == INSTANTIATED, "fmi3EnterInitializationMode");
-    tasks->mode = INITIALIZATION;
-    tasks->time = start;
-    return fmi3OK;
-}
-
 EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
     Tasks *tasks = c;
     demand(tasks->mode == INITIALIZATION, "fmi3ExitInitializationMode");
     tasks->mode = ACTIVATION;
-    return fmi3OK;
-}
-
-EXPORT fmi3Status fmi3Terminate(fmi3Instance c) {
-    ((Tasks *)c)->mode = TERMINATED;
     return fmi3OK;
 }
 
