@@ -30,6 +30,9 @@ pub struct Readout {
     pub present: Vec<bool>,
     /// The clocks of these variables.
     clocks: Vec<ClockRead>,
+    /// The inputs that no FMU is asked for, with their positions, and the state of the system in which they were known.
+    known: Vec<(Port, usize)>,
+    changes: u64,
     /// Buffer for binaries.
     binaries: Vec<Vec<u8>>,
     /// Driven variables: index of the drive, and position of the value.
@@ -72,6 +75,7 @@ impl Readout {
             let kind = ValueType::of(&variable.kind);
             let position = readout.add(kind);
             if readout.put_known(system.known_input(port).as_ref(), position) {
+                readout.known.push((port, position));
                 continue;
             }
             // Only the last group of this kind can be extended, so that its range stays contiguous.
@@ -186,6 +190,13 @@ impl Readout {
         for position in 0..self.reads.len() {
             let (name, slave) = &mut system.slaves[self.reads[position].slave];
             self.read_one(position, slave.as_mut()).map_err(|source| call(name, time, source))?;
+        }
+        if !self.known.is_empty() && self.changes != system.changes {
+            self.changes = system.changes;
+            for number in 0..self.known.len() {
+                let (port, position) = self.known[number];
+                self.put_known(system.known_input(port).as_ref(), position);
+            }
         }
         for ClockRead { slave, references, flags, range } in &mut self.clocks {
             let (name, slave) = &mut system.slaves[*slave];

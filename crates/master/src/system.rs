@@ -57,6 +57,9 @@ pub struct System {
     /// For each slave, whether the master handles its events.
     pub(crate) events: Vec<bool>,
     observer: Option<EventObserver>,
+    /// Values of inputs that were set last by [`System::set_value`], and the number of these calls.
+    given: HashMap<Port, Value>,
+    pub(crate) changes: u64,
 }
 
 /// Sees a slave in event mode before each update of its discrete states, when its clocks tick: gets its position, the

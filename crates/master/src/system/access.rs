@@ -3,6 +3,7 @@
 use super::{Port, System};
 use crate::error::SystemError;
 use crate::exchange::call;
+use fmu_description::Causality;
 use slave::CallError;
 use slave::Transformation;
 use slave::{Value, ValueType};
@@ -56,7 +57,12 @@ impl System {
     ///
     /// [`CallError`] if the FMU refuses the value.
     pub fn set_value(&mut self, port: Port, value: &Value) -> Result<(), CallError> {
-        let reference = [self.variable(port).value_reference];
+        let variable = self.variable(port);
+        let (reference, causality) = ([variable.value_reference], variable.causality);
+        if causality == Causality::Input {
+            self.given.insert(port, value.clone());
+            self.changes += 1;
+        }
         let slave = &mut self.slaves[port.slave].1;
         match value {
             Value::Real(value) => slave.set_real(&reference, &[*value]),

@@ -159,7 +159,11 @@ impl System {
             && !matches!(variable.kind, Kind::Clock(_))
             && self.source(port).is_none();
         let set = || self.settings.iter().find(|own| own.port == port).map(|own| &own.value);
-        let known = free.then(|| set().cloned().or_else(|| Value::start(&variable.kind))).flatten();
+        let known = free
+            .then(|| {
+                self.given.get(&port).or_else(set).cloned().or_else(|| Value::start(&variable.kind))
+            })
+            .flatten();
         match known? {
             #[expect(clippy::cast_possible_truncation, reason = "as the FMU holds it")]
             Value::Real(value) if matches!(variable.kind, Kind::Float32(_)) => {
