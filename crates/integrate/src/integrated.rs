@@ -110,6 +110,7 @@ pub fn description_of(own: &ModelDescription) -> ModelDescription {
         provides_directional_derivative: flags.provides_directional_derivative,
         can_handle_variable_communication_step_size: true,
         can_interpolate_inputs: true,
+        has_event_mode: true,
         ..CoSimulation::default()
     });
     description

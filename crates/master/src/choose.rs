@@ -251,16 +251,29 @@ fn explain_signals(system: &System, discrete: &[Port], reasons: &mut Vec<String>
     let signal_type = |port: Port| {
         if discrete.contains(&port) { SignalType::Discrete } else { system.signal_type(port) }
     };
-    for (chosen, what) in [
-        (SignalType::Discrete, "discrete, held until they change"),
-        (SignalType::Clocked, "clocked, passed on at the ticks of their clock"),
+    let of_connection = |own: &Connection| match (signal_type(own.from), signal_type(own.to)) {
+        (SignalType::Clocked, _) | (_, SignalType::Clocked) => SignalType::Clocked,
+        (SignalType::Discrete, _) | (_, SignalType::Discrete) => SignalType::Discrete,
+        _ => SignalType::Continuous,
+    };
+    let has_events = |slave: usize| {
+        let flags = system.slaves[slave].1.description().co_simulation.as_ref();
+        flags.is_some_and(|flags| flags.has_event_mode)
+    };
+    for (chosen, events, what) in [
+        (SignalType::Discrete, true, "discrete, passed on at the event at which they change"),
+        (
+            SignalType::Discrete,
+            false,
+            "discrete, of an FMU without event mode, passed on at the next communication point",
+        ),
+        (SignalType::Clocked, true, "clocked, passed on at the ticks of their clock"),
+        (SignalType::Clocked, false, "clocked, of an FMU without event mode, which has no ticks"),
     ] {
-        let of_connection = |own: &&Connection| match (signal_type(own.from), signal_type(own.to)) {
-            (SignalType::Clocked, _) | (_, SignalType::Clocked) => chosen == SignalType::Clocked,
-            (SignalType::Discrete, _) | (_, SignalType::Discrete) => chosen == SignalType::Discrete,
-            _ => false,
-        };
-        let names = system.connections.iter().filter(of_connection);
+        let names = system
+            .connections
+            .iter()
+            .filter(|own| of_connection(own) == chosen && has_events(own.from.slave) == events);
         let names: Vec<String> = names
             .map(|own| format!("{} -> {}", system.name(own.from), system.name(own.to)))
             .collect();

@@ -443,3 +443,17 @@ mod stairs {
         }
     }
 }
+
+#[test]
+fn the_explanation_says_how_each_connection_passes_its_signal() {
+    let folder = tempfile::tempdir().unwrap();
+    let nodes = Nodes { nodes: &[("a", SENDER), ("b", RECEIVER)], links: &[("a", "b")] };
+    let system = nodes.system(&node::write(folder.path()), &[0, 1], false);
+    let reasons = choose(&system, &request(), 0.01).unwrap().reasons.join("\n");
+    for part in [
+        "discrete, passed on at the event at which they change: a.level -> b.level_in",
+        "clocked, passed on at the ticks of their clock: a.tx_clock -> b.rx_clock, a.tx -> b.rx",
+    ] {
+        assert!(reasons.contains(part), "{reasons}");
+    }
+}
