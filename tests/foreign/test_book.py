@@ -36,6 +36,7 @@ NOT_RUN = {
     "scripts/test-long runs it": 2,
     "scripts/release runs it": 2,
     "not in the registries: Reference-FMUs": 2,
+    "not in the registries: fmi-ls-bus-examples": 2,
 }
 REMARK = re.compile(rf"not run: ({'|'.join(NOT_RUN)})|ends with status \d+|runs until interrupted")
 ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+[\w/.-]*")
