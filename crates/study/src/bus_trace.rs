@@ -3,7 +3,6 @@
 mod can;
 mod format;
 
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
@@ -127,54 +126,19 @@ impl Writer {
     }
 }
 
-/// Returns the terminals whose frames are those of the buses.
+/// A terminal of a CAN bus, with the names of the variables by which it is connected.
+struct Node {
+    sender: Sender,
+    sends: String,
+    receives: Option<String>,
+}
+
+/// Returns the terminals whose frames are those of the buses: of a bus that is simulated, those of its simulation.
 fn senders(system: &System) -> Vec<Sender> {
-    let mut found: Vec<(Sender, (usize, String))> = Vec::new();
-    // For each terminal, the name of the variable that receives, to find its partner.
-    let mut receives: BTreeMap<(usize, String), usize> = BTreeMap::new();
-    for (slave, (_, instance)) in system.slaves.iter().enumerate() {
-        let description = instance.description();
-        let networks = description.terminals.iter().filter(|own| own.matching_rule == TRANSCEIVER);
-        for terminal in networks {
-            let variable = |name: &str| {
-                let own = member(terminal, name)?;
-                let element = format!("{own}[1]");
-                description.variable(own).or_else(|| description.variable(&element))
-            };
-            let (Some(clock), Some(data)) = (variable("Tx_Clock"), variable("Tx_Data")) else {
-                continue;
-            };
-            let is_can = matches!(&data.kind, Kind::Binary(own) if own.mime_type.as_deref().is_some_and(|mime| mime.contains(CAN)));
-            if !is_can {
-                continue;
-            }
-            if let Some(received) = variable("Rx_Data") {
-                receives.insert((slave, received.name.clone()), found.len());
-            }
-            let (clock, data_reference) = (clock.value_reference, data.value_reference);
-            let sender = Sender { slave, clock, data: data_reference, bus: found.len() };
-            found.push((sender, (slave, data.name.clone())));
-        }
-    }
-    // Terminals that are connected are on one bus, so are those of a simulation of a bus.
-    let mut links: Vec<(usize, usize)> = Vec::new();
-    for connection in &system.connections {
-        let named = |port| (system.variable(port)).name.clone();
-        let from = (connection.from.slave, named(connection.from));
-        let to = (connection.to.slave, named(connection.to));
-        let source = found.iter().position(|(_, data)| *data == from);
-        links.extend(source.zip(receives.get(&to).copied()));
-    }
-    let is_simulation = |slave: usize| system.slaves[slave].1.description().is_bus_simulation;
-    for one in 0..found.len() {
-        for other in 0..one {
-            let slave = found[one].0.slave;
-            if slave == found[other].0.slave && is_simulation(slave) {
-                links.push((one, other));
-            }
-        }
-    }
-    let mut senders: Vec<Sender> = found.into_iter().map(|(sender, _)| sender).collect();
+    let nodes = nodes(system);
+    let links = links(system, &nodes);
+    let mut senders: Vec<Sender> = nodes.into_iter().map(|node| node.sender).collect();
+    // Linked terminals get the same number, the least one.
     let mut changed = true;
     while std::mem::take(&mut changed) {
         for &(one, other) in &links {
@@ -186,16 +150,71 @@ fn senders(system: &System) -> Vec<Sender> {
     let mut buses: Vec<usize> = senders.iter().map(|sender| sender.bus).collect();
     buses.sort_unstable();
     buses.dedup();
-    let simulated: Vec<usize> = senders
-        .iter()
-        .filter(|sender| is_simulation(sender.slave))
-        .map(|sender| sender.bus)
-        .collect();
-    senders.retain(|sender| !simulated.contains(&sender.bus) || is_simulation(sender.slave));
+    let own = senders.iter().filter(|sender| is_simulation(system, sender.slave));
+    let simulated: Vec<usize> = own.map(|sender| sender.bus).collect();
+    senders
+        .retain(|sender| !simulated.contains(&sender.bus) || is_simulation(system, sender.slave));
     for sender in &mut senders {
         sender.bus = buses.iter().position(|bus| *bus == sender.bus).unwrap_or_default();
     }
     senders
+}
+
+fn is_simulation(system: &System, slave: usize) -> bool {
+    system.slaves[slave].1.description().is_bus_simulation
+}
+
+/// Returns all terminals of CAN buses, each as a bus of its own.
+fn nodes(system: &System) -> Vec<Node> {
+    let mut nodes = Vec::new();
+    for (slave, (_, instance)) in system.slaves.iter().enumerate() {
+        let description = instance.description();
+        for terminal in &description.terminals {
+            let variable = |name: &str| {
+                let own = member(terminal, name)?;
+                let element = format!("{own}[1]");
+                description.variable(own).or_else(|| description.variable(&element))
+            };
+            let is_can = |kind: &Kind| match kind {
+                Kind::Binary(own) => own.mime_type.as_ref().is_some_and(|mime| mime.contains(CAN)),
+                _ => false,
+            };
+            if let (Some(clock), Some(data)) = (variable("Tx_Clock"), variable("Tx_Data"))
+                && terminal.matching_rule == TRANSCEIVER
+                && is_can(&data.kind)
+            {
+                let (clock, reference) = (clock.value_reference, data.value_reference);
+                nodes.push(Node {
+                    sender: Sender { slave, clock, data: reference, bus: nodes.len() },
+                    sends: data.name.clone(),
+                    receives: variable("Rx_Data").map(|own| own.name.clone()),
+                });
+            }
+        }
+    }
+    nodes
+}
+
+/// Returns the pairs of terminals on one bus: those that are connected, and those of a simulation of a bus.
+fn links(system: &System, nodes: &[Node]) -> Vec<(usize, usize)> {
+    let mut links = Vec::new();
+    for connection in &system.connections {
+        let (from, to) = (connection.from, connection.to);
+        let (source, target) = (&system.variable(from).name, &system.variable(to).name);
+        let sends = |node: &Node| node.sender.slave == from.slave && node.sends == *source;
+        let receives =
+            |node: &Node| node.sender.slave == to.slave && node.receives.as_ref() == Some(target);
+        links.extend(nodes.iter().position(sends).zip(nodes.iter().position(receives)));
+    }
+    for (one, node) in nodes.iter().enumerate() {
+        let slave = node.sender.slave;
+        let others = nodes[..one].iter().enumerate();
+        let same = others.filter(|(_, other)| other.sender.slave == slave);
+        if is_simulation(system, slave) {
+            links.extend(same.map(|(other, _)| (one, other)));
+        }
+    }
+    links
 }
 
 /// Returns the variable of a member of a terminal.
