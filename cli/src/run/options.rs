@@ -478,7 +478,6 @@ impl Options {
             results.plot.clone_from(&self.results.plot);
         }
         put(&mut results.every, self.results.record_every);
-        put(&mut results.bus_trace, self.results.bus_trace.clone());
         let out = self.results.out.as_deref();
         let format = self.results.format.as_deref();
         // A resumed run must not overwrite the rows before the checkpoint.
@@ -498,6 +497,10 @@ impl Options {
         }
         results.file = Some(file);
         results.plot_file = Some(place(&self.results.plot_file, &results.plot_file, "plot.svg"));
+        let known = results.bus_trace.take();
+        let known =
+            known.map(|path| saved.map_or(path.clone(), |saved| resumed(&path, saved.time())));
+        results.bus_trace = self.results.bus_trace.clone().or(known);
     }
 }
 

@@ -4,7 +4,7 @@ mod can;
 mod format;
 
 use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -36,7 +36,9 @@ pub(crate) struct BusTrace(Arc<Mutex<Writer>>);
 
 struct Writer {
     path: PathBuf,
-    file: BufWriter<File>,
+    file: File,
+    /// Buffer for a frame, which is written at once: a run that is killed loses none.
+    bytes: Vec<u8>,
     format: Format,
     /// The frames of the present instant: several terminals of a bus send the same one.
     instant: (f64, Vec<(usize, Frame)>),
@@ -59,12 +61,15 @@ impl BusTrace {
                 path.display()
             )));
         }
-        let file = File::create(path).map_err(Error::file("create", path))?;
-        let mut file = BufWriter::new(file);
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        folder.map_or(Ok(()), std::fs::create_dir_all).map_err(Error::file("create", path))?;
+        let mut file = File::create(path).map_err(Error::file("create", path))?;
         let buses = 1 + senders.iter().map(|sender| sender.bus).max().unwrap_or_default();
-        format.begin(&mut file, buses).map_err(Error::file("write", path))?;
-        let instant = (f64::NAN, Vec::new());
-        let writer = Writer { path: path.to_owned(), file, format, instant, failed: None };
+        let mut bytes = Vec::new();
+        let begun = format.begin(&mut bytes, buses).and_then(|()| file.write_all(&bytes));
+        begun.map_err(Error::file("write", path))?;
+        let (path, instant) = (path.to_owned(), (f64::NAN, Vec::new()));
+        let writer = Writer { path, file, bytes, format, instant, failed: None };
         let writer = Arc::new(Mutex::new(writer));
         let shared = writer.clone();
         let mut bytes = [Vec::new()];
@@ -80,16 +85,15 @@ impl BusTrace {
         Ok(Self(writer))
     }
 
-    /// Completes the file.
+    /// Ends the trace.
     ///
     /// # Errors
     ///
     /// [`Error`] if a frame could not be written.
     pub(crate) fn finish(&self) -> Result<(), Error> {
         let mut writer = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let path = writer.path.clone();
-        let done = writer.failed.take().map_or_else(|| writer.file.flush(), Err);
-        done.map_err(Error::file("write", &path))
+        let failed = writer.failed.take();
+        failed.map_or(Ok(()), |source| Err(Error::file("write", &writer.path)(source)))
     }
 }
 
@@ -119,7 +123,9 @@ impl Writer {
             if self.instant.1.contains(&own) {
                 continue;
             }
-            let written = self.format.frame(&mut self.file, time, bus, &own.1);
+            self.bytes.clear();
+            let composed = self.format.frame(&mut self.bytes, time, bus, &own.1);
+            let written = composed.and_then(|()| self.file.write_all(&self.bytes));
             self.failed = self.failed.take().or(written.err());
             self.instant.1.push(own);
         }
@@ -217,7 +223,7 @@ fn links(system: &System, nodes: &[Node]) -> Vec<(usize, usize)> {
     links
 }
 
-/// Returns the variable of a member of a terminal.
+/// Returns the name of the variable that is the member `name` of a terminal.
 fn member<'a>(terminal: &'a Terminal, name: &str) -> Option<&'a str> {
     terminal.members.iter().find(|own| own.name == name).map(|own| own.variable.as_str())
 }
