@@ -152,10 +152,6 @@ impl Slave for PythonSlave {
         Ok(())
     }
 
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
         let start = self.start;
         let taken = self.call("start", |object| match object.getattr_opt("start")? {

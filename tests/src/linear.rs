@@ -4,7 +4,6 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use master::{CallError, Slave, StepResult};
 use nalgebra::{DMatrix, DVector};
@@ -153,18 +152,6 @@ type Done = Result<(), CallError>;
 impl Slave for Linear {
     fn description(&self) -> &ModelDescription {
         &self.description
-    }
-    fn setup_experiment(&mut self, _: &Experiment) -> Done {
-        Ok(())
-    }
-    fn enter_initialization_mode(&mut self) -> Done {
-        Ok(())
-    }
-    fn exit_initialization_mode(&mut self) -> Done {
-        Ok(())
-    }
-    fn terminate(&mut self) -> Done {
-        Ok(())
     }
 
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Done {

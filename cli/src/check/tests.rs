@@ -62,14 +62,6 @@ impl Slave for Sum {
         Ok(())
     }
 
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-
     fn terminate(&mut self) -> Result<(), CallError> {
         self.terminated = true;
         Ok(())

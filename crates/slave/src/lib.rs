@@ -37,7 +37,7 @@ pub use value::{Value, ValueType, from_hex, mapped_integer, to_hex, to_real};
 ///
 /// Arrays that belong together have the same length. A call succeeds (`fmi2OK`, `fmi2Warning`) or
 /// returns a [`CallError`]. The default implementation of an optional function returns
-/// [`Failure::Missing`].
+/// [`Failure::Missing`], that of a function which only begins or ends a mode does nothing.
 #[expect(clippy::missing_errors_doc, reason = "the trait documents the error of every function")]
 pub trait Slave: Send {
     /// Returns the model description of the FMU, in which each element of an array is a scalar variable.
@@ -67,16 +67,25 @@ pub trait Slave: Send {
     }
 
     /// `fmi2SetupExperiment`.
-    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError>;
+    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
+        let _ = experiment;
+        Ok(())
+    }
 
     /// `fmi2EnterInitializationMode`.
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError>;
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
 
     /// `fmi2ExitInitializationMode`.
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError>;
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
 
     /// `fmi2Terminate`.
-    fn terminate(&mut self) -> Result<(), CallError>;
+    fn terminate(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
 
     /// Calls `fmi2FreeInstance` now and reports its outcome, if the instance runs in its own process.
     /// No other call may follow. Any other instance is freed when it is dropped.

@@ -1,6 +1,5 @@
 //! Functions between FMUs: sums of connected values, evaluated at every communication point.
 
-use fmu_description::Experiment;
 use fmu_description::{
     Causality, CoSimulation, Kind, ModelDescription, ModelStructure, RealType, ScalarVariable,
     Unknown, Variability,
@@ -191,22 +190,6 @@ impl Slave for FunctionSlave {
     }
 
     fn set_debug_logging(&mut self, _: bool) -> Result<(), CallError> {
-        Ok(())
-    }
-
-    fn setup_experiment(&mut self, _: &Experiment) -> Result<(), CallError> {
-        Ok(())
-    }
-
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-
-    fn terminate(&mut self) -> Result<(), CallError> {
         Ok(())
     }
 

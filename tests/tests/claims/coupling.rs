@@ -53,18 +53,6 @@ impl Slave for Integrator {
     fn description(&self) -> &ModelDescription {
         &self.description
     }
-    fn setup_experiment(&mut self, _: &Experiment) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn terminate(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
         values[0] = match references {
             [1] => self.u,

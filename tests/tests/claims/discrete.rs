@@ -376,7 +376,7 @@ fn a_discrete_real_is_held_under_every_extrapolation() {
 
 /// A sampled slave without events: its discrete output is the square of the number of its steps.
 mod stairs {
-    use fmu_description::{Experiment, ModelDescription};
+    use fmu_description::ModelDescription;
     use master::{CallError, Slave, StepResult};
 
     pub(super) struct Stairs {
@@ -413,18 +413,6 @@ mod stairs {
     impl Slave for Stairs {
         fn description(&self) -> &ModelDescription {
             &self.description
-        }
-        fn setup_experiment(&mut self, _: &Experiment) -> Result<(), CallError> {
-            Ok(())
-        }
-        fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-            Ok(())
-        }
-        fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-            Ok(())
-        }
-        fn terminate(&mut self) -> Result<(), CallError> {
-            Ok(())
         }
         fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
             for (reference, value) in references.iter().zip(values) {

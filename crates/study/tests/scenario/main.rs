@@ -9,7 +9,6 @@ mod refusals;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use master::{CallError, Slave, StepResult, System};
 use study::scenario::{ResolvedScenario, Scenario, ScenarioError, Setup};
@@ -32,18 +31,6 @@ impl Listener {
 impl Slave for Listener {
     fn description(&self) -> &ModelDescription {
         &self.description
-    }
-    fn setup_experiment(&mut self, _: &Experiment) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn terminate(&mut self) -> Result<(), CallError> {
-        Ok(())
     }
     fn get_real(&mut self, _: &[u32], values: &mut [f64]) -> Result<(), CallError> {
         values.fill(0.0);

@@ -1,6 +1,5 @@
 //! Runs in which an iteration or a step control fails.
 
-use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use master::{
     Algorithm, CallError, Coupling, Simulation, Slave, StepControl, StepResult, System, SystemError,
@@ -39,18 +38,6 @@ impl Direct {
 impl Slave for Direct {
     fn description(&self) -> &ModelDescription {
         &self.description
-    }
-    fn setup_experiment(&mut self, _: &Experiment) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn terminate(&mut self) -> Result<(), CallError> {
-        Ok(())
     }
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
         for (value, &reference) in values.iter_mut().zip(references) {

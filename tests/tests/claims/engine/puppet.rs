@@ -91,15 +91,6 @@ impl Slave for Puppet {
         self.time = experiment.start_time;
         Ok(())
     }
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn terminate(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
         for (value, &reference) in values.iter_mut().zip(references) {
             *value = (self.outputs[reference as usize])(self.time);

@@ -1,6 +1,5 @@
 //! A slave with variables of all types, which allocates nothing.
 
-use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use master::{CallError, Slave, StepResult, System};
 
@@ -57,18 +56,6 @@ pub(crate) fn ring() -> System {
 impl Slave for Typed {
     fn description(&self) -> &ModelDescription {
         &self.description
-    }
-    fn setup_experiment(&mut self, _: &Experiment) -> Done {
-        Ok(())
-    }
-    fn enter_initialization_mode(&mut self) -> Done {
-        Ok(())
-    }
-    fn exit_initialization_mode(&mut self) -> Done {
-        Ok(())
-    }
-    fn terminate(&mut self) -> Done {
-        Ok(())
     }
     fn get_real(&mut self, _: &[u32], values: &mut [f64]) -> Done {
         values[0] = self.real;
