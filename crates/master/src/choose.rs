@@ -256,8 +256,8 @@ fn explain_signals(system: &System, discrete: &[Port], reasons: &mut Vec<String>
         (SignalType::Discrete, _) | (_, SignalType::Discrete) => SignalType::Discrete,
         _ => SignalType::Continuous,
     };
-    let has_events = |slave: usize| {
-        let flags = system.slaves[slave].1.description().co_simulation.as_ref();
+    let has_events = |port: Port| {
+        let flags = system.slaves[port.slave].1.description().co_simulation.as_ref();
         flags.is_some_and(|flags| flags.has_event_mode)
     };
     for (chosen, events, what) in [
@@ -265,15 +265,16 @@ fn explain_signals(system: &System, discrete: &[Port], reasons: &mut Vec<String>
         (
             SignalType::Discrete,
             false,
-            "discrete, of an FMU without event mode, passed on at the next communication point",
+            "discrete, passed on at the next communication point, as one of the FMUs has no event mode",
         ),
         (SignalType::Clocked, true, "clocked, passed on at the ticks of their clock"),
-        (SignalType::Clocked, false, "clocked, of an FMU without event mode, which has no ticks"),
+        (SignalType::Clocked, false, "clocked, but one of the FMUs has no event mode and no ticks"),
     ] {
         let names = system
             .connections
             .iter()
-            .filter(|own| of_connection(own) == chosen && has_events(own.from.slave) == events);
+            .filter(|own| of_connection(own) == chosen)
+            .filter(|own| (has_events(own.from) && has_events(own.to)) == events);
         let names: Vec<String> = names
             .map(|own| format!("{} -> {}", system.name(own.from), system.name(own.to)))
             .collect();
