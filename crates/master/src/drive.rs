@@ -256,10 +256,8 @@ impl Drives {
         for drive in self.all.iter_mut().filter(own) {
             let Some(sample) = drive.sample(time) else { continue };
             if sample.value != 0.0 && (drive.written.is_none() || drive.breaks_at(time)) {
-                let (name, instance) = &mut system.slaves[slave];
-                instance
-                    .set_boolean(&[drive.reference], &[1])
-                    .map_err(|source| call(name, time, source))?;
+                let clock = [drive.reference];
+                system.perform(slave, time, |instance| instance.set_boolean(&clock, &[1]))?;
             }
             drive.written = Some(sample);
         }

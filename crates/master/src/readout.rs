@@ -188,8 +188,8 @@ impl Readout {
     /// Returns an error if an FMU refuses a read.
     pub fn read(&mut self, system: &mut System, time: f64) -> Result<(), SystemError> {
         for position in 0..self.reads.len() {
-            let (name, slave) = &mut system.slaves[self.reads[position].slave];
-            self.read_one(position, slave.as_mut()).map_err(|source| call(name, time, source))?;
+            let slave = self.reads[position].slave;
+            system.perform(slave, time, |slave| self.read_one(position, slave))?;
         }
         if !self.known.is_empty() && self.changes != system.changes {
             self.changes = system.changes;
@@ -199,8 +199,7 @@ impl Readout {
             }
         }
         for ClockRead { slave, references, flags, range } in &mut self.clocks {
-            let (name, slave) = &mut system.slaves[*slave];
-            slave.get_boolean(references, flags).map_err(|source| call(name, time, source))?;
+            system.perform(*slave, time, |slave| slave.get_boolean(references, flags))?;
             self.present[range.clone()].fill(flags.iter().any(|flag| *flag != 0));
         }
         Ok(())

@@ -7,7 +7,7 @@
 use super::Ending;
 use crate::drive::Drives;
 use crate::error::SystemError;
-use crate::exchange::{Exchange, call};
+use crate::exchange::Exchange;
 use crate::system::System;
 use slave::{CallError, Events, absent};
 
@@ -308,7 +308,7 @@ fn at<T>(
     time: f64,
     action: impl FnOnce(&mut dyn Events) -> Result<T, CallError>,
 ) -> Result<T, SystemError> {
-    let (name, instance) = &mut system.slaves[slave];
-    let events = instance.events().ok_or_else(|| absent("fmi3EnterEventMode"));
-    events.and_then(action).map_err(|source| call(name, time, source))
+    system.perform(slave, time, |instance| {
+        instance.events().ok_or_else(|| absent("fmi3EnterEventMode")).and_then(action)
+    })
 }

@@ -1,7 +1,7 @@
 //! The exchange within an instant, in event mode: discrete and clocked inputs, ticks of clocks, and the continuous
 //! inputs of slaves in event mode.
 
-use super::{Exchange, call};
+use super::Exchange;
 use crate::error::SystemError;
 use crate::exchange::Reals;
 use crate::system::{Connection, Port, System};
@@ -106,13 +106,11 @@ impl Exchange {
         slave: usize,
         time: f64,
     ) -> Result<(), SystemError> {
-        let (name, instance) = &mut system.slaves[slave];
-        let instance = instance.as_mut();
-        self.ticks
-            .read(slave, instance)
-            .and_then(|()| self.reals.read_values(slave, instance))
-            .and_then(|()| self.read_discrete(slave, instance))
-            .map_err(|source| call(name, time, source))
+        system.perform(slave, time, |instance| {
+            self.ticks.read(slave, instance)?;
+            self.reals.read_values(slave, instance)?;
+            self.read_discrete(slave, instance)
+        })
     }
 
     /// Computes the discrete and clocked inputs of `slave` at `time`. Returns whether there is a new value or a
@@ -131,12 +129,10 @@ impl Exchange {
         slave: usize,
         time: f64,
     ) -> Result<(), SystemError> {
-        let (name, instance) = &mut system.slaves[slave];
-        let instance = instance.as_mut();
-        self.at_events
-            .set(slave, instance)
-            .and_then(|()| self.ticks.deliver(slave, instance))
-            .map_err(|source| call(name, time, source))
+        system.perform(slave, time, |instance| {
+            self.at_events.set(slave, instance)?;
+            self.ticks.deliver(slave, instance)
+        })
     }
 
     /// Sets the continuous inputs of `slave` to their values at `time` if one of them has changed; returns whether.
@@ -146,9 +142,7 @@ impl Exchange {
         slave: usize,
         time: f64,
     ) -> Result<bool, SystemError> {
-        let (name, instance) = &mut system.slaves[slave];
-        let set = self.reals.set_now(slave, instance.as_mut(), time);
-        set.map_err(|source| call(name, time, source))
+        system.perform(slave, time, |instance| self.reals.set_now(slave, instance, time))
     }
 
     /// Ends the ticks of all clocks, after an update of the discrete states.

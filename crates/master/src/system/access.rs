@@ -4,9 +4,7 @@ use super::{Port, System};
 use crate::error::SystemError;
 use crate::exchange::call;
 use fmu_description::Causality;
-use slave::CallError;
-use slave::Transformation;
-use slave::{Value, ValueType};
+use slave::{CallError, Slave, Transformation, Value, ValueType};
 
 impl System {
     /// Takes over the events of the slaves that hand them over. `stop`: their steps end at the first event.
@@ -16,6 +14,17 @@ impl System {
             *events = handed && slave.events().is_some();
         }
         Ok(())
+    }
+
+    /// Performs `action` with a slave; an error names it and `time`, in s.
+    pub(crate) fn perform<T>(
+        &mut self,
+        slave: usize,
+        time: f64,
+        action: impl FnOnce(&mut dyn Slave) -> Result<T, CallError>,
+    ) -> Result<T, SystemError> {
+        let (name, instance) = &mut self.slaves[slave];
+        action(instance.as_mut()).map_err(|source| call(name, time, source))
     }
 
     /// Reads the variable at `port`.
