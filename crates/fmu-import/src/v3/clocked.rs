@@ -71,7 +71,7 @@ impl ClockedRuns {
 }
 
 impl Instance {
-    /// Whether the FMU may not be asked now for the variables of a run, nor receive them.
+    /// Whether the variables of a run may be neither read nor set now: they are clocked, and none of their clocks ticks.
     pub(super) fn is_silent(&self, run: &Run) -> bool {
         let is_clocked = !run.clocks.is_empty() && !self.is_scheduled();
         let ticks = || self.state.mode == Mode::Event && self.state.clocks.is_active(&run.clocks);

@@ -145,7 +145,7 @@ impl Channels {
         all!(self.add_new(slave, ports););
     }
 
-    /// Takes the gathered values of all inputs as set.
+    /// Records the gathered values of all inputs as those that were set last.
     pub(super) fn accept(&mut self) {
         all!(self.accept(););
     }

@@ -150,8 +150,8 @@ impl System {
         Ok(())
     }
 
-    /// Returns the value of an input without a connection, as it was set or described: an FMU need not be asked for it,
-    /// and some cannot answer. `None` for others, and for texts.
+    /// Returns the value that was set last for an input without a connection, otherwise its start value; `None` for a
+    /// connected input, another variable or a text. The FMU is not asked, because some FMUs cannot read their inputs.
     pub(crate) fn known_input(&self, port: Port) -> Option<Value> {
         let variable = self.variable(port);
         let free = variable.causality == Causality::Input

@@ -56,7 +56,7 @@ impl System {
         Ok(Some(pairs))
     }
 
-    /// Adds the pairs of the members of two terminals.
+    /// Adds the connections between the members of two terminals to `pairs`.
     fn match_members(
         &self,
         (slave, one): (usize, &Terminal),
@@ -108,7 +108,7 @@ impl System {
         Ok(())
     }
 
-    /// Adds the pairs of two members, each as output and input.
+    /// Adds the connections between two members to `pairs`: output and input.
     fn add_pairs(
         &self,
         (slave, one): (usize, &TerminalMember),
