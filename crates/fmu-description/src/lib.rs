@@ -10,6 +10,7 @@
 //! * [`abi1`], [`abi`] (FMI 2.0) and [`abi3`] have the C types of each version.
 //! * [`unit`](mod@unit) derives base units from names, [`location`] converts paths to `fmuResourceLocation` and
 //!   back, [`documentation`] writes the documentation page of a model, [`number`] rounds numbers for messages.
+//! * [`can`] has the operations of virtual ECUs on a CAN bus.
 //!
 //! To run an FMU use `fmu-import`; to write a model use `fmu`.
 #![forbid(unsafe_code)]
@@ -19,6 +20,7 @@ pub mod abi1;
 pub mod abi3;
 pub mod call_order;
 pub mod call_order3;
+pub mod can;
 mod description;
 pub mod documentation;
 mod experiment;

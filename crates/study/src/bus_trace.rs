@@ -1,6 +1,5 @@
 //! Traces of buses: the frames that FMUs send by the layered standard for networks, FMI-LS-BUS 1.0, at their times.
 
-mod can;
 mod format;
 
 use std::fs::File;
@@ -9,15 +8,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use fmu_description::Kind;
+use fmu_description::can::{MATCHING_RULE, Operation};
 use fmu_description::terminals::Terminal;
 use master::{CallError, Slave, System};
 
 use crate::error::Error;
-use can::Frame;
 use format::Format;
 
-/// The matching rule of a terminal of a network.
-const TRANSCEIVER: &str = "org.fmi-ls-bus.transceiver";
 /// Part of the `mimeType` of the operations of a CAN bus.
 const CAN: &str = "fmi-ls-bus.can";
 
@@ -41,7 +38,7 @@ struct Writer {
     bytes: Vec<u8>,
     format: Format,
     /// The frames of the present instant: several terminals of a bus send the same one.
-    instant: (f64, Vec<(usize, Frame)>),
+    instant: (f64, Vec<(usize, Operation)>),
     failed: Option<std::io::Error>,
 }
 
@@ -57,7 +54,7 @@ impl BusTrace {
         let senders = senders(system);
         if senders.is_empty() {
             return Err(Error::Invalid(format!(
-                "{}: no FMU has a terminal of a CAN bus, with matchingRule {TRANSCEIVER} and the mimeType {CAN}",
+                "{}: no FMU has a terminal of a CAN bus, with matchingRule {MATCHING_RULE} and the mimeType {CAN}",
                 path.display()
             )));
         }
@@ -118,13 +115,13 @@ impl Writer {
         if self.instant.0.to_bits() != time.to_bits() {
             self.instant = (time, Vec::new());
         }
-        for frame in can::frames(bytes) {
-            let own = (bus, frame);
+        for operation in Operation::read(bytes) {
+            let own = (bus, operation);
             if self.instant.1.contains(&own) {
                 continue;
             }
             self.bytes.clear();
-            let composed = self.format.frame(&mut self.bytes, time, bus, &own.1);
+            let composed = self.format.operation(&mut self.bytes, time, bus, &own.1);
             let written = composed.and_then(|()| self.file.write_all(&self.bytes));
             self.failed = self.failed.take().or(written.err());
             self.instant.1.push(own);
@@ -186,7 +183,7 @@ fn nodes(system: &System) -> Vec<Node> {
                 _ => false,
             };
             if let (Some(clock), Some(data)) = (variable("Tx_Clock"), variable("Tx_Data"))
-                && terminal.matching_rule == TRANSCEIVER
+                && terminal.matching_rule == MATCHING_RULE
                 && is_can(&data.kind)
             {
                 let (clock, reference) = (clock.value_reference, data.value_reference);

@@ -3,7 +3,8 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::can::{Frame, FrameKind};
+use fmu_description::can::{Frame, FrameKind, Operation};
+
 use crate::error::Error;
 
 /// The link type of `SocketCAN` (`LINKTYPE_CAN_SOCKETCAN`), with its flags in the identifier.
@@ -68,64 +69,82 @@ impl Format {
         }
     }
 
-    /// Writes a frame at `time` in s.
-    pub(super) fn frame(
+    /// Writes what happened on a bus at `time` in s: a frame or an error.
+    pub(super) fn operation(
         self,
         file: &mut impl Write,
         time: f64,
         bus: usize,
-        frame: &Frame,
+        operation: &Operation,
     ) -> io::Result<()> {
-        let Frame { identifier, extended, kind, data } = frame;
-        match self {
-            Self::Candump => {
-                write!(file, "({time:.6}) {} ", name(bus))?;
-                if *kind == FrameKind::Error {
-                    return writeln!(file, "{:08X}#{}", ERROR | PROTOCOL, "00".repeat(8));
+        match (self, operation) {
+            (Self::Candump, Operation::Transmit(frame)) => candump(file, time, bus, frame),
+            (Self::Asc, Operation::Transmit(frame)) => asc(file, time, bus, frame),
+            (Self::Pcapng, Operation::Transmit(frame)) => {
+                let mut identifier = frame.identifier | if frame.extended { EXTENDED } else { 0 };
+                let mut flags = flags(frame.kind);
+                match frame.kind {
+                    FrameKind::Remote => identifier |= REMOTE,
+                    FrameKind::Flexible { .. } => flags |= FLEXIBLE,
+                    FrameKind::Data => {}
                 }
-                if *extended {
-                    write!(file, "{identifier:08X}#")?;
-                } else {
-                    write!(file, "{identifier:03X}#")?;
-                }
-                match kind {
-                    FrameKind::Remote => return writeln!(file, "R"),
-                    FrameKind::Flexible { .. } => write!(file, "#{:X}", flags(*kind))?,
-                    _ => {}
-                }
-                digits(file, data, "")?;
-                writeln!(file)
+                packet(file, time, bus, [identifier, u32::from(flags)], &frame.data)
             }
-            Self::Asc => {
-                let suffix = if *extended { "x" } else { "" };
-                let channel = bus + 1;
-                match kind {
-                    FrameKind::Error => writeln!(file, "{time:11.6} {channel}  ErrorFrame"),
-                    FrameKind::Remote => {
-                        writeln!(file, "{time:11.6} {channel}  {identifier:X}{suffix:<8} Rx   r")
-                    }
-                    FrameKind::Data => {
-                        let length = data.len();
-                        write!(
-                            file,
-                            "{time:11.6} {channel}  {identifier:X}{suffix:<8} Rx   d {length}"
-                        )?;
-                        digits(file, data, " ")?;
-                        writeln!(file)
-                    }
-                    FrameKind::Flexible { bit_rate_switch, error_state } => {
-                        let (switch, state) = (u8::from(*bit_rate_switch), u8::from(*error_state));
-                        let (length, code) = (data.len(), length_code(data.len()));
-                        write!(
-                            file,
-                            "{time:11.6} CANFD {channel} Rx {identifier:X}{suffix} {switch} {state} {code:x} {length}"
-                        )?;
-                        digits(file, data, " ")?;
-                        writeln!(file, " 0 0 {:x} 0 0 0 0 0", 0x1000 | u32::from(switch) << 13)
-                    }
-                }
+            (Self::Candump, Operation::BusError { .. }) => {
+                let (name, error) = (name(bus), ERROR | PROTOCOL);
+                writeln!(file, "({time:.6}) {name} {error:08X}#{}", "00".repeat(8))
             }
-            Self::Pcapng => packet(file, time, bus, frame),
+            (Self::Asc, Operation::BusError { .. }) => {
+                writeln!(file, "{time:11.6} {}  ErrorFrame", bus + 1)
+            }
+            (Self::Pcapng, Operation::BusError { .. }) => {
+                packet(file, time, bus, [ERROR | PROTOCOL, 0], &[0; 8])
+            }
+            // A confirmation is no frame on the bus.
+            _ => Ok(()),
+        }
+    }
+}
+
+fn candump(file: &mut impl Write, time: f64, bus: usize, frame: &Frame) -> io::Result<()> {
+    let Frame { identifier, extended, kind, data } = frame;
+    write!(file, "({time:.6}) {} ", name(bus))?;
+    if *extended {
+        write!(file, "{identifier:08X}#")?;
+    } else {
+        write!(file, "{identifier:03X}#")?;
+    }
+    match kind {
+        FrameKind::Remote => return writeln!(file, "R"),
+        FrameKind::Flexible { .. } => write!(file, "#{:X}", flags(*kind))?,
+        FrameKind::Data => {}
+    }
+    digits(file, data, "")?;
+    writeln!(file)
+}
+
+fn asc(file: &mut impl Write, time: f64, bus: usize, frame: &Frame) -> io::Result<()> {
+    let Frame { identifier, extended, kind, data } = frame;
+    let suffix = if *extended { "x" } else { "" };
+    let (channel, length) = (bus + 1, data.len());
+    match kind {
+        FrameKind::Remote => {
+            writeln!(file, "{time:11.6} {channel}  {identifier:X}{suffix:<8} Rx   r")
+        }
+        FrameKind::Data => {
+            write!(file, "{time:11.6} {channel}  {identifier:X}{suffix:<8} Rx   d {length}")?;
+            digits(file, data, " ")?;
+            writeln!(file)
+        }
+        FrameKind::Flexible { bit_rate_switch, error_state } => {
+            let (switch, state) = (u8::from(*bit_rate_switch), u8::from(*error_state));
+            let code = length_code(length);
+            write!(
+                file,
+                "{time:11.6} CANFD {channel} Rx {identifier:X}{suffix} {switch} {state} {code:x} {length}"
+            )?;
+            digits(file, data, " ")?;
+            writeln!(file, " 0 0 {:x} 0 0 0 0 0", 0x1000 | u32::from(switch) << 13)
         }
     }
 }
@@ -158,24 +177,18 @@ fn length_code(length: usize) -> usize {
     }
 }
 
-/// Writes an enhanced packet block.
-fn packet(file: &mut impl Write, time: f64, bus: usize, frame: &Frame) -> io::Result<()> {
-    let mut identifier = frame.identifier | if frame.extended { EXTENDED } else { 0 };
-    let mut data = frame.data.clone();
-    let mut flags = flags(frame.kind);
-    match frame.kind {
-        FrameKind::Remote => identifier |= REMOTE,
-        FrameKind::Error => {
-            identifier = ERROR | PROTOCOL;
-            data = vec![0; 8];
-        }
-        FrameKind::Flexible { .. } => flags |= FLEXIBLE,
-        FrameKind::Data => {}
-    }
+/// Writes an enhanced packet block with a frame of `SocketCAN`: identifier and flags, data.
+fn packet(
+    file: &mut impl Write,
+    time: f64,
+    bus: usize,
+    [identifier, flags]: [u32; 2],
+    data: &[u8],
+) -> io::Result<()> {
     let length = u8::try_from(data.len()).map_err(io::Error::other)?;
     let mut packet = identifier.to_be_bytes().to_vec();
-    packet.extend([length, flags, 0, 0]);
-    packet.extend(&data);
+    packet.extend([length, u8::try_from(flags).map_err(io::Error::other)?, 0, 0]);
+    packet.extend(data);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "simulated time")]
     let nanoseconds = (time * 1e9).round() as u64;
     let mut content = u32::try_from(bus).map_err(io::Error::other)?.to_le_bytes().to_vec();
