@@ -33,9 +33,17 @@ struct TimedClock {
     next: Option<f64>,
 }
 
+/// What a serialised state has of the clocks.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ClocksState {
+    timed: Vec<TimedState>,
+    /// The clocks that ticked in the last step.
+    ticked: Vec<u32>,
+}
+
 /// What a serialised state has of a clock that ticks at times.
 #[derive(Serialize, Deserialize)]
-pub(super) struct TimedState {
+struct TimedState {
     interval: f64,
     first: f64,
     ticks: u64,
@@ -316,20 +324,29 @@ impl Clocks {
         }
     }
 
-    /// Returns the counters and times for a serialised state.
-    pub(super) fn state(&self) -> Vec<TimedState> {
+    /// Returns counters, times and the ticks of the last step for a serialised state.
+    pub(super) fn state(&self) -> ClocksState {
         let state = |clock: &TimedClock| TimedState {
             interval: clock.interval,
             first: clock.first,
             ticks: clock.ticks,
             next: clock.next,
         };
-        self.timed.iter().map(state).collect()
+        let ticked = self.ticked.iter().filter(|(_, ticked)| **ticked);
+        let mut ticked: Vec<u32> = ticked.map(|(reference, _)| *reference).collect();
+        ticked.sort_unstable();
+        ClocksState { timed: self.timed.iter().map(state).collect(), ticked }
     }
 
-    /// Restores the counters and times of a serialised state; nothing ticks.
-    pub(super) fn restore(&mut self, state: &[TimedState]) {
-        for (clock, own) in self.timed.iter_mut().zip(state) {
+    /// Whether a serialised state can be one of these clocks.
+    pub(super) fn fits(&self, state: &ClocksState) -> bool {
+        state.timed.len() == self.timed.len()
+            && state.ticked.iter().all(|reference| self.ticked.contains_key(reference))
+    }
+
+    /// Restores a serialised state; nothing ticks now.
+    pub(super) fn restore(&mut self, state: &ClocksState) {
+        for (clock, own) in self.timed.iter_mut().zip(&state.timed) {
             clock.set_interval(own.interval);
             (clock.first, clock.ticks, clock.next) = (own.first, own.ticks, own.next);
         }
@@ -337,7 +354,9 @@ impl Clocks {
         self.partitions.clear();
         self.event_ticks.clear();
         self.requested.clear();
-        self.begin_step();
+        for (reference, ticked) in &mut self.ticked {
+            *ticked = state.ticked.contains(reference);
+        }
     }
 }
 

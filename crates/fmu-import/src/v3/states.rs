@@ -6,11 +6,11 @@ use slave::CallError;
 use super::Instance;
 use super::access::refused;
 use super::clocked::Memory;
-use super::clocks::TimedState;
+use super::clocks::ClocksState;
 use super::modes::{Mode, State};
 
 /// The first bytes of a serialised state.
-const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x03";
+const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x04";
 const SERIALIZE: &str = "fmi3SerializeFMUState";
 const DESERIALIZE: &str = "fmi3DeserializeFMUState";
 
@@ -24,7 +24,7 @@ struct Kept {
     time: f64,
     held: Vec<Option<u64>>,
     memory: Memory,
-    clocks: Vec<TimedState>,
+    clocks: ClocksState,
 }
 
 impl Instance {
@@ -70,8 +70,7 @@ impl Instance {
     pub(crate) fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let read = bytes.strip_prefix(MAGIC).and_then(|rest| postcard::from_bytes(rest).ok());
         let read = read.filter(|(own, _): &(Kept, &[u8])| {
-            own.held.len() == self.state.held.len()
-                && own.clocks.len() == self.state.clocks.state().len()
+            own.held.len() == self.state.held.len() && self.state.clocks.fits(&own.clocks)
         });
         let Some((own, theirs)) = read else {
             let what = "cannot restore the state: it is not one of this FMU".to_owned();
