@@ -32,10 +32,11 @@ pub(crate) struct Options {
     /// Folders of crates that end in `fmu::export!`, in or outside of this workspace; without one, the
     /// plant and the controller of the clone.
     ///
-    /// The FMU contains, besides the library: `resources`; `documentation`, with an index.html made
-    /// from the description and `documentation/model.html` unless there is one; `model.png`, or a
-    /// picture made from `documentation/model.svg`; the licences of the crate and of its
-    /// dependencies.
+    /// The FMU contains, besides the library: `resources` and `extra`; `documentation`, with an
+    /// index.html made from the description and `documentation/model.html` unless there is one;
+    /// `model.png`, or a picture made from `documentation/model.svg`; in FMI 3.0 the terminals of
+    /// `terminalsAndIcons/terminalsAndIcons.xml`, or one with all inputs and outputs; the licences of
+    /// the crate and of its dependencies.
     #[arg(value_name = "PATH")]
     crates: Vec<PathBuf>,
     /// Folder for the FMUs
@@ -218,11 +219,16 @@ fn pack_version(
         symbols::hide_other_version(&mut bytes, version);
         package.add(binaries::path_in(version, path), bytes);
     }
-    add_resources(&mut package, folder)?;
+    for name in ["resources", "extra"] {
+        let path = folder.join(name);
+        if path.is_dir() {
+            package.add_folder(name, &path)?;
+        }
+    }
     add_documentation(&mut package, folder, &description)?;
     add_picture(&mut package, folder, version)?;
     if version == Version::V3 {
-        package.add(terminals::PATH, terminals::render(&description));
+        add_terminals(&mut package, folder, &description)?;
     }
     licenses::add(&mut package, library)?;
     let path = packing.out.join(format!("{}.fmu", file_stem(&description)));
@@ -253,11 +259,31 @@ fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     fs::read(path).with_context(|| format!("cannot read {}", path.display()))
 }
 
-fn add_resources(package: &mut Package, folder: &Path) -> anyhow::Result<()> {
-    let resources = folder.join("resources");
-    if resources.is_dir() {
-        package.add_folder("resources", &resources)?;
+/// Adds the terminals of the author, or one with all inputs and outputs.
+fn add_terminals(
+    package: &mut Package,
+    folder: &Path,
+    description: &ModelDescription,
+) -> anyhow::Result<()> {
+    let file = folder.join(terminals::PATH);
+    if !file.is_file() {
+        package.add(terminals::PATH, terminals::render(description));
+        return Ok(());
     }
+    let bytes = read(&file)?;
+    let all = terminals::read(&bytes).with_context(|| file.display().to_string())?;
+    for (terminal, member) in all.iter().flat_map(|own| own.members.iter().map(move |m| (own, m))) {
+        if description.variable(&member.variable).is_none() {
+            bail!(
+                "{}: terminal {}: expected the name of a variable of {}, found `{}`",
+                file.display(),
+                terminal.name,
+                description.model_name,
+                member.variable
+            );
+        }
+    }
+    package.add(terminals::PATH, bytes);
     Ok(())
 }
 

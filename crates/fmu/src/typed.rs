@@ -142,8 +142,9 @@ impl Native for Vec<u8> {
         &all.binary
     }
 
-    fn kind(start: Option<Self>, _: Number) -> Result<Kind, String> {
-        Ok(Kind::Binary(BinaryType { start, ..BinaryType::default() }))
+    fn kind(start: Option<Self>, number: Number) -> Result<Kind, String> {
+        let mime_type = number.mime_type;
+        Ok(Kind::Binary(BinaryType { start, mime_type, ..BinaryType::default() }))
     }
 }
 

@@ -50,7 +50,7 @@ impl Enumeration {
     }
 }
 
-/// Attributes of a Real, Integer or Enumeration variable.
+/// Attributes that depend on the type of a variable.
 #[derive(Clone, Default)]
 pub(crate) struct Number {
     pub(crate) unit: Option<String>,
@@ -63,6 +63,8 @@ pub(crate) struct Number {
     pub(crate) interval: Option<f64>,
     /// How the model determines the intervals of a clock.
     pub(crate) interval_variability: Option<IntervalVariability>,
+    /// The media type of a Binary.
+    pub(crate) mime_type: Option<String>,
 }
 
 /// A variable of a model: name, role, attributes and the field that holds its value.
@@ -405,6 +407,13 @@ impl<M> Variable<M> {
     #[must_use]
     pub fn quantity(mut self, quantity: impl Into<String>) -> Self {
         self.declaration.number.quantity = Some(quantity.into());
+        self
+    }
+
+    /// Sets the media type of a [`Variable::binary`], such as `image/png` (`mimeType`).
+    #[must_use]
+    pub fn mime_type(mut self, mime_type: impl Into<String>) -> Self {
+        self.declaration.number.mime_type = Some(mime_type.into());
         self
     }
 

@@ -117,8 +117,12 @@ fn a_new_crate_with_the_files_of_its_author_is_packed_to_the_same_bytes_in_any_f
 /// Packs files of the author unchanged, with the library that is already built.
 fn packs_the_files_of_the_author(place: &Path) {
     let own = place.join("heat-pump");
-    let files =
-        ["resources/maps/a.csv", "documentation/index.html", "documentation/pictures/b.svg"];
+    let files = [
+        "resources/maps/a.csv",
+        "documentation/index.html",
+        "documentation/pictures/b.svg",
+        "extra/org.example/c.xml",
+    ];
     for path in files {
         fs::create_dir_all(own.join(path).parent().unwrap()).unwrap();
         fs::write(own.join(path), path).unwrap();
@@ -134,6 +138,29 @@ fn packs_the_files_of_the_author(place: &Path) {
     assert_eq!(fs::read(fmu.folder().join("model.png")).unwrap(), picture);
     fs::write(own.join("model.png"), "GIF89a").unwrap();
     refuses(&own, &["pack", "."], &["model.png", "expected a PNG file"]);
+    fs::write(own.join("model.png"), picture).unwrap();
+    states_the_terminals_of_the_author(&own);
+}
+
+/// In FMI 3.0 the terminals are those of the author, whose members are variables.
+fn states_the_terminals_of_the_author(own: &Path) {
+    let file = "terminalsAndIcons/terminalsAndIcons.xml";
+    fs::create_dir_all(own.join("terminalsAndIcons")).unwrap();
+    let terminals = |variable: &str| {
+        format!(
+            "<fmiTerminalsAndIcons fmiVersion=\"3.0\"><Terminals><Terminal name=\"air\" \
+             matchingRule=\"plug\"><TerminalMemberVariable variableName=\"{variable}\" \
+             memberName=\"T\" variableKind=\"signal\"/></Terminal></Terminals>\
+             </fmiTerminalsAndIcons>"
+        )
+    };
+    fs::write(own.join(file), terminals("T_outside")).unwrap();
+    let output = run_in(own, &["pack", ".", "--fmi", "3"]);
+    assert!(output.status.success(), "{}", message(&output));
+    let fmu = Unpacked::open_whole(&own.join("dist/HeatPump.fmi3.fmu")).unwrap();
+    assert_eq!(fs::read_to_string(fmu.folder().join(file)).unwrap(), terminals("T_outside"));
+    fs::write(own.join(file), terminals("T_inside")).unwrap();
+    refuses(own, &["pack", ".", "--fmi", "3"], &[file, "terminal air", "`T_inside`"]);
 }
 
 #[test]
