@@ -213,6 +213,8 @@ fn the_models_forbid_unsafe_code() {
         "examples/state-space",
         "examples/wind-turbine",
         "examples/wind-turbine-monitor",
+        "examples/can-node",
+        "examples/can-bus",
     ] {
         let entry = if model == "cli" { "src/main.rs" } else { "src/lib.rs" };
         let text = fs::read_to_string(root().join(model).join(entry)).unwrap();

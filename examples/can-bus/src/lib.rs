@@ -1,0 +1,219 @@
+//! A CAN bus for four nodes (FMI-LS-BUS 1.0): arbitration, durations of frames, acknowledgement.
+#![forbid(unsafe_code)]
+
+mod frame;
+
+use fmu::description::can::{Frame, FrameKind, MIME_TYPE, Operation};
+use fmu::{About, Event, Experiment, Failure, Model, ModelExchange, Variable as V};
+
+/// Number of terminals, `Node1` to `Node4`; they need not all be connected.
+const NODES: usize = 4;
+
+#[derive(Clone, Default, serde::Serialize, serde::Deserialize)]
+struct CanBus {
+    /// In bit/s.
+    bit_rate: f64,
+    nodes: [Node; NODES],
+    sending: Option<Sending>,
+    /// The bus is free from this time on.
+    free: f64,
+    start_time: f64,
+    frames: i32,
+    lost: i32,
+    /// Time in s in which the bus was not free.
+    busy: f64,
+    load: f64,
+}
+
+/// A terminal: what the bus sends to a node and receives from it.
+#[derive(Clone, Default, serde::Serialize, serde::Deserialize)]
+struct Node {
+    tx_clock: bool,
+    tx_data: Vec<u8>,
+    rx_clock: bool,
+    rx_data: Vec<u8>,
+    /// The frames that the node has still to send, in the order in which they came.
+    waiting: Vec<Frame>,
+}
+
+/// The frame on the bus.
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
+struct Sending {
+    node: usize,
+    /// Its index in `waiting`.
+    index: usize,
+    start: f64,
+    end: f64,
+}
+
+impl CanBus {
+    /// Duration of a number of bits in s.
+    #[expect(clippy::cast_precision_loss, reason = "a frame has few bits")]
+    fn duration(&self, bits: usize) -> f64 {
+        bits as f64 / self.bit_rate
+    }
+
+    /// Whether it is later than `end`, but for rounding.
+    fn has_come(&self, end: f64, time: f64) -> bool {
+        end <= time + 0.01 * self.duration(1)
+    }
+
+    /// Whether the frame on the bus ends.
+    fn ends(&self, time: f64) -> bool {
+        self.sending.as_ref().is_some_and(|own| self.has_come(own.end, time))
+    }
+
+    /// Takes what the nodes send. As in a mailbox of a CAN controller, a frame replaces the one with the same identifier
+    /// that its node has sent before, unless that one is on the bus.
+    fn receive(&mut self) -> Result<(), Failure> {
+        let sending = self.sending.as_ref().map(|own| (own.node, own.index));
+        for (node, own) in self.nodes.iter_mut().enumerate().filter(|(_, own)| own.rx_clock) {
+            let before = own.waiting.len();
+            for operation in Operation::read(&own.rx_data) {
+                let Operation::Transmit(frame) = operation else { continue };
+                if matches!(frame.kind, FrameKind::Flexible { .. }) || frame.data.len() > 8 {
+                    let number = node + 1;
+                    return Err(Failure::Error(format!(
+                        "Node{number} sends a frame of CAN FD; this bus simulates classical CAN"
+                    )));
+                }
+                let is_same = |(index, own): (usize, &Frame)| {
+                    own.identifier == frame.identifier
+                        && own.extended == frame.extended
+                        && sending != Some((node, index))
+                };
+                match own.waiting[..before].iter().enumerate().position(is_same) {
+                    Some(index) => {
+                        own.waiting[index] = frame;
+                        self.lost = self.lost.saturating_add(1);
+                    }
+                    None => own.waiting.push(frame),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends the frame: its sender gets a confirmation, the other nodes get the frame.
+    fn finish(&mut self) {
+        let Some(Sending { node: sender, index, start, end }) = self.sending.take() else { return };
+        let frame = self.nodes[sender].waiting.remove(index);
+        for (node, own) in self.nodes.iter_mut().enumerate() {
+            own.tx_data.clear();
+            let identifier = frame.identifier;
+            let operation = if node == sender {
+                Operation::Confirm { identifier }
+            } else {
+                Operation::Transmit(frame.clone())
+            };
+            operation.append_to(&mut own.tx_data);
+        }
+        self.free = end + self.duration(frame::INTERMISSION);
+        self.frames = self.frames.saturating_add(1);
+        self.busy += self.free - start;
+        self.load = self.busy / (self.free - self.start_time);
+    }
+
+    /// Starts the next frame if the bus is free. Frames that come at the instant at which one has started take part in
+    /// its arbitration.
+    fn start(&mut self, time: f64) {
+        let starts = self.sending.as_ref().map(|own| own.start.to_bits());
+        if starts.is_some_and(|start| start != time.to_bits()) || !self.has_come(self.free, time) {
+            return;
+        }
+        let of = |(node, own): (usize, &Node)| {
+            let place = |(index, frame)| (frame::arbitration(frame), node, index);
+            own.waiting.iter().enumerate().map(place).min()
+        };
+        let next = self.nodes.iter().enumerate().filter_map(of).min();
+        self.sending = next.map(|(_, node, index)| {
+            let length = frame::length(&self.nodes[node].waiting[index]);
+            Sending { node, index, start: time, end: time + self.duration(length) }
+        });
+    }
+}
+
+impl Model for CanBus {
+    const IDENTIFIER: &'static str = "CanBus";
+
+    fn about(&self) -> About {
+        fmu::about!(stop_time: 1.0, step_size: 0.001)
+    }
+
+    fn new(_: &std::path::Path) -> Result<Self, Failure> {
+        Ok(Self { bit_rate: 5e5, ..Self::default() })
+    }
+
+    fn variables(&self) -> Vec<V<Self>> {
+        let mut all = vec![
+            V::real("bit_rate", "Number of bits in a second", |own: &mut Self| &mut own.bit_rate)
+                .unit("1/s")
+                .range(1e3, 1e6)
+                .parameter(),
+            V::integer("frames", "Number of frames", |own: &mut Self| &mut own.frames)
+                .output(&[])
+                .exact(),
+            V::integer(
+                "lost",
+                "Number of frames replaced before they were sent",
+                |own: &mut Self| &mut own.lost,
+            )
+            .output(&[])
+            .exact(),
+            V::real("load", "Part of the time in which the bus is not free", |own: &mut Self| {
+                &mut own.load
+            })
+            .discrete()
+            .output(&[])
+            .exact(),
+        ];
+        for node in 0..NODES {
+            let name = |member: &str| format!("Node{}.{member}", node + 1);
+            let clock = |member: &str, text: &str, field: fn(&mut Node) -> &mut bool| {
+                V::triggered_clock(name(member), text, move |own: &mut Self| {
+                    field(&mut own.nodes[node])
+                })
+            };
+            let data = |member: &str, text: &str, field: fn(&mut Node) -> &mut Vec<u8>| {
+                let clock = name(&member.replace("Data", "Clock"));
+                V::binary(name(member), text, move |own: &mut Self| field(&mut own.nodes[node]))
+                    .mime_type(MIME_TYPE)
+                    .clocked_by(&[&clock])
+            };
+            all.extend([
+                clock("Tx_Clock", "The bus sends", |own| &mut own.tx_clock).output(&[]),
+                data("Tx_Data", "Operations of the bus", |own| &mut own.tx_data).output(&[]),
+                clock("Rx_Clock", "The node sends", |own| &mut own.rx_clock).input(),
+                data("Rx_Data", "Operations of the node", |own| &mut own.rx_data).input(),
+            ]);
+        }
+        all
+    }
+
+    fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
+        (self.start_time, self.free) = (experiment.start_time, experiment.start_time);
+        Ok(())
+    }
+
+    fn tick(&mut self, time: f64) {
+        let ends = self.ends(time);
+        self.nodes.iter_mut().for_each(|own| own.tx_clock = ends);
+    }
+
+    fn event(&mut self, time: f64) -> Result<Event, Failure> {
+        self.receive()?;
+        if self.ends(time) {
+            self.finish();
+        }
+        self.start(time);
+        let waits = self.nodes.iter().any(|own| !own.waiting.is_empty());
+        let end = self.sending.as_ref().map(|own| own.end);
+        Ok(Event { next_event_time: end.or(waits.then_some(self.free)), ..Event::default() })
+    }
+
+    fn model_exchange(&self) -> Option<ModelExchange> {
+        Some(ModelExchange::default())
+    }
+}
+
+fmu::export!(CanBus);

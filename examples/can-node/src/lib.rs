@@ -1,0 +1,201 @@
+//! A node of a CAN bus (FMI-LS-BUS 1.0): packs its inputs into the messages of `resources/network.dbc` that it sends, and
+//! unpacks those that it receives. The parameter `node` says which of the nodes of the file it is.
+#![forbid(unsafe_code)]
+
+mod network;
+
+use fmu::description::can::{Frame, FrameKind, MIME_TYPE, Operation};
+use fmu::{About, Event, Experiment, Failure, Model, ModelExchange, Variable as V};
+
+use network::{Message, Signal};
+
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
+struct CanNode {
+    nodes: Vec<String>,
+    messages: Vec<Message>,
+    /// One of `nodes`.
+    node: String,
+    /// For each message its signals, to send and as received.
+    send: Vec<Vec<f64>>,
+    received: Vec<Vec<f64>>,
+    /// Number of times that each message was sent.
+    count: Vec<u32>,
+    start_time: f64,
+    tx_clock: bool,
+    tx_data: Vec<u8>,
+    rx_clock: bool,
+    rx_data: Vec<u8>,
+}
+
+impl CanNode {
+    /// Time at which this node sends a message next, in s; infinite for those of other nodes.
+    fn next(&self, message: usize) -> f64 {
+        let own = &self.messages[message];
+        if own.transmitter != self.node {
+            return f64::INFINITY;
+        }
+        self.start_time + own.start_delay + f64::from(self.count[message]) * own.cycle_time
+    }
+
+    fn is_due(&self, message: usize, time: f64) -> bool {
+        self.next(message) <= time + 1e-9 * self.messages[message].cycle_time
+    }
+
+    fn sends(&self, time: f64) -> bool {
+        (0..self.messages.len()).any(|message| self.is_due(message, time))
+    }
+
+    /// Composes the messages that are due.
+    fn compose(&mut self, time: f64) -> Result<(), Failure> {
+        self.tx_data.clear();
+        for (index, message) in self.messages.iter().enumerate() {
+            if !self.is_due(index, time) {
+                continue;
+            }
+            let mut data = vec![0; message.length];
+            for (signal, &value) in message.signals.iter().zip(&self.send[index]) {
+                if !value.is_finite() {
+                    let name = &signal.name;
+                    return Err(Failure::Error(format!("{name} = {value}, expected a number")));
+                }
+                signal.pack(value, &mut data);
+            }
+            let Message { identifier, extended, .. } = *message;
+            let frame = Frame { identifier, extended, kind: FrameKind::Data, data };
+            Operation::Transmit(frame).append_to(&mut self.tx_data);
+            self.count[index] = self.count[index].saturating_add(1);
+        }
+        Ok(())
+    }
+
+    /// Unpacks the messages that have arrived. Those of other networks, and those that are too short, are left alone.
+    fn receive(&mut self) {
+        for operation in Operation::read(&self.rx_data) {
+            let Operation::Transmit(frame) = operation else { continue };
+            let is_its = |own: &Message| {
+                own.identifier == frame.identifier
+                    && own.extended == frame.extended
+                    && own.length <= frame.data.len()
+                    && own.transmitter != self.node
+            };
+            let Some(index) = self.messages.iter().position(is_its) else { continue };
+            let signals = self.messages[index].signals.iter();
+            for (value, signal) in self.received[index].iter_mut().zip(signals) {
+                *value = signal.unpack(&frame.data);
+            }
+        }
+    }
+}
+
+impl Model for CanNode {
+    const IDENTIFIER: &'static str = "CanNode";
+
+    fn about(&self) -> About {
+        fmu::about!(stop_time: 1.0, step_size: 0.001)
+    }
+
+    fn new(resources: &std::path::Path) -> Result<Self, Failure> {
+        let failure = |error: String| Failure::Error(format!("network.dbc: {error}"));
+        let text = std::fs::read_to_string(resources.join("network.dbc"))
+            .map_err(|error| failure(error.to_string()))?;
+        let (nodes, messages) = network::read(&text).map_err(failure)?;
+        let zeros: Vec<_> = messages.iter().map(|own| vec![0.0; own.signals.len()]).collect();
+        Ok(Self {
+            node: nodes.first().cloned().unwrap_or_default(),
+            count: vec![0; messages.len()],
+            nodes,
+            messages,
+            send: zeros.clone(),
+            received: zeros,
+            start_time: 0.0,
+            tx_clock: false,
+            tx_data: Vec::new(),
+            rx_clock: false,
+            rx_data: Vec::new(),
+        })
+    }
+
+    fn variables(&self) -> Vec<V<Self>> {
+        let names = self.nodes.join(", ");
+        let text = format!("The node of the network that this FMU is: {names}");
+        let mut all = vec![V::string("node", text, |own: &mut Self| &mut own.node).parameter()];
+        let with_unit = |variable: V<Self>, signal: &Signal| match signal.unit.as_str() {
+            "" => variable,
+            unit => variable.unit(unit),
+        };
+        for (index, message) in self.messages.iter().enumerate() {
+            for (position, signal) in message.signals.iter().enumerate() {
+                let text = |verb| format!("{verb} in {}: {}", message.name, signal.description);
+                let send = V::real(
+                    format!("send.{}", signal.name),
+                    text("Sent"),
+                    move |own: &mut Self| &mut own.send[index][position],
+                );
+                let received = V::real(
+                    format!("received.{}", signal.name),
+                    text("Received"),
+                    move |own: &mut Self| &mut own.received[index][position],
+                );
+                all.push(with_unit(send.input(), signal));
+                all.push(with_unit(received.discrete().output(&[]).exact(), signal));
+            }
+        }
+        let clock = |name: &str, text: &str, field: fn(&mut Self) -> &mut bool| {
+            V::triggered_clock(format!("CanChannel.{name}_Clock"), text, field)
+        };
+        let data = |name: &str, text: &str, field: fn(&mut Self) -> &mut Vec<u8>| {
+            let data = V::binary(format!("CanChannel.{name}_Data"), text, field);
+            data.mime_type(MIME_TYPE).clocked_by(&[&format!("CanChannel.{name}_Clock")])
+        };
+        all.extend([
+            clock("Tx", "The node sends", |own| &mut own.tx_clock).output(&[]),
+            data("Tx", "Operations sent", |own| &mut own.tx_data).output(&[]),
+            clock("Rx", "The node receives", |own| &mut own.rx_clock).input(),
+            data("Rx", "Operations received", |own| &mut own.rx_data).input(),
+        ]);
+        all
+    }
+
+    fn check(&self) -> Result<(), Failure> {
+        if !self.nodes.contains(&self.node) {
+            let (names, found) = (self.nodes.join(", "), &self.node);
+            return Err(Failure::Error(format!("node: expected one of {names}, found `{found}`")));
+        }
+        let never = |own: &&Message| own.transmitter == self.node && own.cycle_time <= 0.0;
+        self.messages.iter().find(never).map_or(Ok(()), |own| {
+            let (name, node) = (&own.name, &self.node);
+            Err(Failure::Error(format!(
+                "network.dbc: message {name} of {node}: expected a GenMsgCycleTime above 0"
+            )))
+        })
+    }
+
+    fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
+        self.start_time = experiment.start_time;
+        Ok(())
+    }
+
+    fn tick(&mut self, time: f64) {
+        self.tx_clock = self.sends(time);
+    }
+
+    fn event(&mut self, time: f64) -> Result<Event, Failure> {
+        if self.rx_clock {
+            self.receive();
+        }
+        if self.sends(time) {
+            self.compose(time)?;
+        }
+        let next = (0..self.messages.len()).map(|message| self.next(message));
+        let next = next.fold(f64::INFINITY, f64::min);
+        Ok(Event { next_event_time: next.is_finite().then_some(next), ..Event::default() })
+    }
+
+    fn model_exchange(&self) -> Option<ModelExchange> {
+        Some(ModelExchange::default())
+    }
+}
+
+fmu::export!(CanNode);
+#[cfg(test)]
+mod tests;
