@@ -66,7 +66,7 @@ struct Report<'a> {
 pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
     let unpacked = Unpacked::open_whole(&options.fmu)?;
     let (here, findings) = findings(options, &unpacked)?;
-    let answer = Answer::new(here, &findings);
+    let answer = Answer::new(here, &unpacked.description, &findings);
     let count = |severity| findings.iter().filter(|own| own.severity == severity).count();
     let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
     let notes = count(Severity::Note);

@@ -227,8 +227,9 @@ def answer(aso_ftc, path, *more):
 
 def test_the_report_starts_with_how_the_fmu_ran(aso_ftc, packed):
     done = aso_ftc("check", packed["plant"])
-    first, second, *_ = done.stdout.splitlines()
+    first, signals, second, *_ = done.stdout.splitlines()
     assert re.fullmatch(r"runs in this master: yes, 10 steps of \S+ s from t = 0 s .* its own start values", first)
+    assert signals.startswith("continuous inputs and outputs: u, f_a, x_p, theta"), signals
     assert second == "no tool is known to refuse it"
     here, tools = answer(aso_ftc, packed["plant"], "--no-run")
     assert here == {"runs": "not-tried", "reason": "--no-run"} and not tools

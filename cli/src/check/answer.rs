@@ -4,9 +4,14 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use fmu_description::number::seconds;
+use fmu_description::{Causality, ModelDescription, ScalarVariable};
+use master::SignalType;
 use serde::Serialize;
 
 use super::finding::{Finding, Tool};
+
+/// Number of names shown of each type.
+const SHOWN: usize = 8;
 
 /// Result of a trial run in this master.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -69,16 +74,66 @@ impl fmt::Display for ToolRefusal {
     }
 }
 
+/// The names of the inputs and outputs of each type.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct Signals {
+    continuous: Vec<String>,
+    discrete: Vec<String>,
+    clocked: Vec<String>,
+}
+
+impl Signals {
+    fn of(description: &ModelDescription) -> Self {
+        let mut signals = Self::default();
+        let is_signal =
+            |own: &&ScalarVariable| matches!(own.causality, Causality::Input | Causality::Output);
+        for variable in description.variables.iter().filter(is_signal) {
+            let names = match SignalType::of(variable) {
+                SignalType::Continuous => &mut signals.continuous,
+                SignalType::Discrete => &mut signals.discrete,
+                SignalType::Clocked => &mut signals.clocked,
+            };
+            names.push(variable.name.clone());
+        }
+        signals
+    }
+}
+
+impl fmt::Display for Signals {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (what, names) in [
+            (SignalType::Continuous, &self.continuous),
+            (SignalType::Discrete, &self.discrete),
+            (SignalType::Clocked, &self.clocked),
+        ] {
+            let shown = &names[..names.len().min(SHOWN)];
+            if !shown.is_empty() {
+                write!(formatter, "{what} inputs and outputs: {}", shown.join(", "))?;
+                match names.len() - shown.len() {
+                    0 => writeln!(formatter)?,
+                    more => writeln!(formatter, " and {more} more")?,
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
 /// The summary.
 #[derive(Debug, Serialize)]
 pub(super) struct Answer {
     pub(super) here: TrialResult,
+    signals: Signals,
     pub(super) not_in: Vec<ToolRefusal>,
 }
 
 impl Answer {
-    /// Creates the summary from the trial and the findings.
-    pub(super) fn new(here: TrialResult, findings: &[Finding]) -> Self {
+    /// Creates the summary from the trial, the description and the findings.
+    pub(super) fn new(
+        here: TrialResult,
+        description: &ModelDescription,
+        findings: &[Finding],
+    ) -> Self {
         let mut tools: BTreeMap<Tool, ToolRefusal> = BTreeMap::new();
         for finding in findings {
             for &tool in &finding.stops {
@@ -87,13 +142,15 @@ impl Answer {
                 known.or_insert_with(|| ToolRefusal { tool, reason: reason(), more: 0 });
             }
         }
-        Self { here, not_in: tools.into_values().collect() }
+        let signals = Signals::of(description);
+        Self { here, signals, not_in: tools.into_values().collect() }
     }
 }
 
 impl fmt::Display for Answer {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(formatter, "runs in this master: {}", self.here)?;
+        write!(formatter, "{}", self.signals)?;
         for elsewhere in &self.not_in {
             writeln!(formatter, "does not run in {elsewhere}")?;
         }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use fmu_description::{Kind, Variability};
+use fmu_description::{Kind, ScalarVariable, Variability};
 use slave::ValueType;
 
 use crate::system::{Connection, Port, System};
@@ -28,23 +28,29 @@ impl fmt::Display for SignalType {
     }
 }
 
-impl System {
-    /// Returns the type of the variable at `port`: clocked if it has clocks, discrete if it is no floating-point
-    /// number, if its variability is not continuous, or if the user has said so.
+impl SignalType {
+    /// Returns the type of a variable by its description: clocked if it has clocks, discrete if it is no floating-point
+    /// number or if its variability is not continuous.
     #[must_use]
-    pub fn signal_type(&self, port: Port) -> SignalType {
-        let variable = self.variable(port);
-        if matches!(variable.kind, Kind::Clock(_)) || !variable.clocks.is_empty() {
-            return SignalType::Clocked;
-        }
+    pub fn of(variable: &ScalarVariable) -> Self {
         let is_real = ValueType::of(&variable.kind) == ValueType::Real;
-        if is_real
-            && variable.variability == Variability::Continuous
-            && !self.discrete.contains(&port)
-        {
+        if matches!(variable.kind, Kind::Clock(_)) || !variable.clocks.is_empty() {
+            SignalType::Clocked
+        } else if is_real && variable.variability == Variability::Continuous {
             SignalType::Continuous
         } else {
             SignalType::Discrete
+        }
+    }
+}
+
+impl System {
+    /// Returns the type of the variable at `port`: discrete if the user has said so, else that of its description.
+    #[must_use]
+    pub fn signal_type(&self, port: Port) -> SignalType {
+        match SignalType::of(self.variable(port)) {
+            SignalType::Continuous if self.discrete.contains(&port) => SignalType::Discrete,
+            described => described,
         }
     }
 
