@@ -204,7 +204,7 @@ fn the_answer_states_the_trial_or_the_reason_of_its_failure() {
     assert_eq!(here.to_string(), expected);
     let (here, all) = tried(Fault::Step);
     assert_eq!(here.to_string(), "no: fmi2DoStep: returned fmi2Error at t = 0.625 s");
-    let answer = Answer::new(here, &all).to_string();
+    let answer = Answer::new(here, &ModelDescription::default(), &all).to_string();
     assert!(answer.ends_with("no other tool is known to refuse it"), "{answer}");
 }
 
