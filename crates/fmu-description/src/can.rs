@@ -176,7 +176,9 @@ mod tests {
         assert_eq!(read(&all[..40]), expected[..1]);
         assert_eq!(read(&[0; 8]), []);
         let mut written = Vec::new();
-        expected.iter().for_each(|operation| operation.append_to(&mut written));
+        for operation in &expected {
+            operation.append_to(&mut written);
+        }
         assert_eq!(written, all[configuration.len()..]);
     }
 }

@@ -180,7 +180,7 @@ fn bits(order: ByteOrder, start: usize, size: usize) -> Vec<usize> {
         ByteOrder::LittleEndian => (0..size).rev().map(|bit| start.saturating_add(bit)).collect(),
         ByteOrder::BigEndian => {
             let next = |place: &usize| {
-                Some(if place % 8 == 0 { place.saturating_add(15) } else { place - 1 })
+                Some(if place.is_multiple_of(8) { place.saturating_add(15) } else { place - 1 })
             };
             std::iter::successors(Some(start), next).take(size).collect()
         }

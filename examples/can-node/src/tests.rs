@@ -32,13 +32,15 @@ fn values_are_rounded_to_the_factor_and_limited_to_the_bits() {
         " SG_ signed : 0|8@1- (0.5,10) [0|0] \"\" B\n SG_ unsigned : 8|8@1+ (0.5,10) [0|0] \"\" B",
     ))
     .unwrap();
-    let through = |signal: usize, value: f64| {
-        let mut bytes = [0; 8];
-        messages[0].signals[signal].pack(value, &mut bytes);
-        messages[0].signals[signal].unpack(&bytes)
-    };
-    assert_eq!([-1e9, 3.2, 1e9].map(|value| through(0, value)), [-54.0, 3.0, 73.5]);
-    assert_eq!([-1e9, 13.3, 1e9].map(|value| through(1, value)), [10.0, 13.5, 137.5]);
+    let expected =
+        [[(-1e9, -54.0), (3.2, 3.0), (1e9, 73.5)], [(-1e9, 10.0), (13.3, 13.5), (1e9, 137.5)]];
+    for (signal, values) in messages[0].signals.iter().zip(expected) {
+        for (value, expected) in values {
+            let mut bytes = [0; 8];
+            signal.pack(value, &mut bytes);
+            assert_eq!(signal.unpack(&bytes).to_bits(), f64::to_bits(expected), "{value}");
+        }
+    }
 }
 
 #[test]
