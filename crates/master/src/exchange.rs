@@ -70,12 +70,12 @@ impl Exchange {
     /// it refuses.
     pub(crate) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
         let reals = Reals::new(system, algorithm, refusing);
-        let to_reals = reals.integer_sources().iter().map(|(port, _)| *port);
+        let to_reals: Vec<Port> = reals.integer_sources().iter().map(|(port, _)| *port).collect();
         let along = |way| -> Vec<&Connection> {
             system.connections.iter().filter(|own| Way::of(system, own) == way).collect()
         };
-        let held = Channels::new(system, &along(Way::Held), to_reals);
-        let at_events = Channels::new(system, &along(Way::AtEvents), std::iter::empty());
+        let held = Channels::new(system, &along(Way::Held), &to_reals);
+        let at_events = Channels::new(system, &along(Way::AtEvents), &[]);
         let ticks = Ticks::new(system, &along(Way::Tick));
         Self { reals, held, at_events, ticks, allow_nan: algorithm.allow_nan, faulty: false }
     }
@@ -123,8 +123,8 @@ impl Exchange {
         if self.faulty {
             self.reals.commit(time);
             let ahead = |slave| self.reals.is_ahead(slave, time);
-            self.held.commit(time, ahead);
-            self.at_events.commit(time, ahead);
+            self.held.commit(time, &ahead);
+            self.at_events.commit(time, &ahead);
         }
     }
 
@@ -164,7 +164,7 @@ impl Exchange {
             let ahead = |source| {
                 self.reals.is_ahead(source, self.reals.source_time(slave, source, time, size))
             };
-            self.held.gather(slave, time, ahead);
+            self.held.gather(slave, time, &ahead);
         }
     }
 

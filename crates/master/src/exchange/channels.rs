@@ -57,21 +57,16 @@ macro_rules! all {
 
 impl Channels {
     /// Lays out `connections`, by the types of their inputs. `more` are Integer outputs to read as well.
-    pub(super) fn new(
-        system: &System,
-        connections: &[&Connection],
-        more: impl Iterator<Item = Port>,
-    ) -> Self {
+    pub(super) fn new(system: &System, connections: &[&Connection], more: &[Port]) -> Self {
         let of = |kind: ValueType| -> Vec<&Connection> {
             let own = |own: &&&Connection| ValueType::of(&system.variable(own.to).kind) == kind;
             connections.iter().filter(own).copied().collect()
         };
-        let none = std::iter::empty;
-        let reals = Channel::new(system, REALS, &of(ValueType::Real), none());
+        let reals = Channel::new(system, REALS, &of(ValueType::Real), &[]);
         let integers = Channel::new(system, INTEGERS, &of(ValueType::Integer), more);
-        let booleans = Channel::new(system, BOOLEANS, &of(ValueType::Boolean), none());
-        let strings = Channel::new(system, STRINGS, &of(ValueType::String), none());
-        let binaries = Channel::new(system, BINARIES, &of(ValueType::Binary), none());
+        let booleans = Channel::new(system, BOOLEANS, &of(ValueType::Boolean), &[]);
+        let strings = Channel::new(system, STRINGS, &of(ValueType::String), &[]);
+        let binaries = Channel::new(system, BINARIES, &of(ValueType::Binary), &[]);
         let empty = reals.is_empty()
             && integers.is_empty()
             && booleans.is_empty()
@@ -99,10 +94,10 @@ impl Channels {
     }
 
     /// Records the undisturbed values in the faults at the final communication point `time`.
-    pub(super) fn commit(&mut self, time: f64, ahead: impl Fn(usize) -> bool) {
-        self.reals.commit(time, &ahead);
-        self.integers.commit(time, &ahead);
-        self.booleans.commit(time, &ahead);
+    pub(super) fn commit(&mut self, time: f64, ahead: &dyn Fn(usize) -> bool) {
+        self.reals.commit(time, ahead);
+        self.integers.commit(time, ahead);
+        self.booleans.commit(time, ahead);
     }
 
     /// Returns the first time after `after` at which a fault starts or ends.
@@ -127,8 +122,8 @@ impl Channels {
 
     /// Computes the inputs of `slave` at `time`. Slaves for which `ahead` is true contribute the value at the
     /// start of their step.
-    pub(super) fn gather(&mut self, slave: usize, time: f64, ahead: impl Fn(usize) -> bool) {
-        all!(self.gather(slave, time, &ahead););
+    pub(super) fn gather(&mut self, slave: usize, time: f64, ahead: &dyn Fn(usize) -> bool) {
+        all!(self.gather(slave, time, ahead););
     }
 
     /// Whether a gathered input of `slave` differs from the value that was set last.

@@ -100,9 +100,8 @@ struct PortMap {
     output_range: Range<usize>,
 }
 
-/// All connections of one type.
-pub(crate) struct Channel<T> {
-    access: Access<T>,
+/// The connections of one type, without their values.
+struct Wiring {
     port_maps: Vec<PortMap>,
     output_ports: Vec<Port>,
     /// For each input, the index of its output and the transformation of the connection.
@@ -110,6 +109,12 @@ pub(crate) struct Channel<T> {
     transformations: Vec<Transformation>,
     input_ports: Vec<Port>,
     faults: Vec<Option<FaultChain>>,
+}
+
+/// All connections of one type.
+pub(crate) struct Channel<T> {
+    access: Access<T>,
+    wiring: Wiring,
     state: ChannelState<T>,
     /// Values for the inputs.
     values: Vec<T>,
@@ -139,16 +144,10 @@ impl<T: Clone> ChannelState<T> {
     }
 }
 
-impl<T: Clone + Default> Channel<T> {
-    /// Lays out `connections`, and the additional outputs `more`.
-    pub(crate) fn new(
-        system: &System,
-        access: Access<T>,
-        connections: &[&Connection],
-        more: impl Iterator<Item = Port>,
-    ) -> Self {
-        let mut outputs: Vec<Port> =
-            connections.iter().map(|connection| connection.from).chain(more).collect();
+impl Wiring {
+    fn new(system: &System, connections: &[&Connection], more: &[Port]) -> Self {
+        let outputs = connections.iter().map(|connection| connection.from);
+        let mut outputs: Vec<Port> = outputs.chain(more.iter().copied()).collect();
         outputs.sort_unstable_by_key(|port| (port.slave, port.variable));
         outputs.dedup();
         let mut inputs = connections.to_vec();
@@ -169,53 +168,77 @@ impl<T: Clone + Default> Channel<T> {
             port_map.input_range = start..end;
         }
         Self {
-            access,
             port_maps,
             sources: inputs.iter().map(|connection| indices[&connection.from]).collect(),
             transformations: inputs.iter().map(|each| each.transformation.clone()).collect(),
             input_ports: inputs.iter().map(|connection| connection.to).collect(),
             faults: vec![None; inputs.len()],
-            state: ChannelState {
-                latest: vec![T::default(); outputs.len()],
-                start: vec![T::default(); outputs.len()],
-                given: vec![T::default(); inputs.len()],
-            },
-            values: vec![T::default(); inputs.len()],
             output_ports: outputs,
         }
+    }
+
+    /// Returns the index of an input.
+    fn input(&self, input: Port) -> Option<usize> {
+        self.input_ports.iter().position(|&port| port == input)
+    }
+
+    fn set_fault(&mut self, input: Port, fault: &FaultChain) -> bool {
+        let place = self.input(input);
+        place.map(|k| self.faults[k] = Some(fault.clone())).is_some()
+    }
+
+    fn next_break(&self, after: f64) -> Option<f64> {
+        let faults = self.faults.iter().flatten();
+        faults.filter_map(|fault| fault.next_break(after)).reduce(f64::min)
+    }
+}
+
+impl<T: Clone + Default> Channel<T> {
+    /// Lays out `connections`, and the additional outputs `more`.
+    pub(crate) fn new(
+        system: &System,
+        access: Access<T>,
+        connections: &[&Connection],
+        more: &[Port],
+    ) -> Self {
+        let wiring = Wiring::new(system, connections, more);
+        let (outputs, inputs) = (wiring.output_ports.len(), wiring.input_ports.len());
+        let defaults = |count: usize| vec![T::default(); count];
+        let (latest, start, given) = (defaults(outputs), defaults(outputs), defaults(inputs));
+        let state = ChannelState { latest, start, given };
+        Self { access, wiring, state, values: defaults(inputs) }
     }
 
     /// Returns the current value of a connected output.
     pub(crate) fn value(&self, port: Port) -> Option<&T> {
         let key = |known: &Port| (known.slave, known.variable);
-        let found = self.output_ports.binary_search_by_key(&key(&port), key);
+        let found = self.wiring.output_ports.binary_search_by_key(&key(&port), key);
         found.ok().map(|index| &self.state.latest[index])
     }
 
     /// Puts a fault on the connection to an input; returns false if the input has no connection.
     pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultChain) -> bool {
-        let Some(k) = self.input_ports.iter().position(|&port| port == input) else {
-            return false;
-        };
-        self.faults[k] = Some(fault.clone());
-        true
+        self.wiring.set_fault(input, fault)
     }
 
     /// Returns the faults on the connection to an input.
     pub(crate) fn fault(&self, input: Port) -> Option<&FaultChain> {
-        let k = self.input_ports.iter().position(|&port| port == input)?;
-        self.faults[k].as_ref()
+        self.wiring.input(input).and_then(|k| self.wiring.faults[k].as_ref())
     }
 
     /// Records the undisturbed values in the faults at the final communication point `time`. Slaves
     /// for which `ahead` is true contribute the value at the start of their step.
-    pub(crate) fn commit(&mut self, time: f64, ahead: impl Fn(usize) -> bool) {
-        for k in 0..self.faults.len() {
-            if self.faults[k].is_some() {
+    pub(crate) fn commit(&mut self, time: f64, ahead: &dyn Fn(usize) -> bool) {
+        for k in 0..self.wiring.faults.len() {
+            if self.wiring.faults[k].is_some() {
                 let mut value = T::default();
-                (self.access.map)(self.source(k, &ahead), &self.transformations[k], &mut value);
+                (self.access.map)(
+                    self.source(k, ahead),
+                    &self.wiring.transformations[k],
+                    &mut value,
+                );
                 let number = (self.access.number)(&value);
-                if let Some(fault) = &mut self.faults[k] {
+                if let Some(fault) = &mut self.wiring.faults[k] {
                     fault.commit(time, number);
                 }
             }
@@ -224,39 +247,38 @@ impl<T: Clone + Default> Channel<T> {
 
     /// Returns the first time after `after` at which a fault starts or ends.
     pub(crate) fn next_break(&self, after: f64) -> Option<f64> {
-        let faults = self.faults.iter().flatten();
-        faults.filter_map(|fault| fault.next_break(after)).reduce(f64::min)
+        self.wiring.next_break(after)
     }
 
     /// Returns the source value of the input at index `k`: the value at the start of the source's
     /// step if the source is `ahead`, otherwise the latest one.
-    fn source(&self, k: usize, ahead: impl Fn(usize) -> bool) -> &T {
-        let source = self.sources[k];
-        let slave = self.output_ports[source].slave;
+    fn source(&self, k: usize, ahead: &dyn Fn(usize) -> bool) -> &T {
+        let source = self.wiring.sources[k];
+        let slave = self.wiring.output_ports[source].slave;
         if ahead(slave) { &self.state.start[source] } else { &self.state.latest[source] }
     }
 
     /// Makes the end values of the last step the start values of the next one.
     pub(crate) fn shift(&mut self, slave: usize) {
-        let range = self.port_maps[slave].output_range.clone();
+        let range = self.wiring.port_maps[slave].output_range.clone();
         self.state.start[range.clone()].clone_from_slice(&self.state.latest[range]);
     }
 
     /// Iterates over the faults, for a checkpoint.
     pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultChain> {
-        self.faults.iter_mut().flatten()
+        self.wiring.faults.iter_mut().flatten()
     }
 
     /// Computes the inputs of `slave` for a step from `time`. Slaves for which `ahead` is true
     /// contribute the value at the start of their step.
-    pub(crate) fn gather(&mut self, slave: usize, time: f64, ahead: impl Fn(usize) -> bool) {
-        for k in self.port_maps[slave].input_range.clone() {
-            let source = self.sources[k];
-            let is_ahead = ahead(self.output_ports[source].slave);
+    pub(crate) fn gather(&mut self, slave: usize, time: f64, ahead: &dyn Fn(usize) -> bool) {
+        for k in self.wiring.port_maps[slave].input_range.clone() {
+            let source = self.wiring.sources[k];
+            let is_ahead = ahead(self.wiring.output_ports[source].slave);
             let value =
                 if is_ahead { &self.state.start[source] } else { &self.state.latest[source] };
-            (self.access.map)(value, &self.transformations[k], &mut self.values[k]);
-            if let Some(fault) = &self.faults[k] {
+            (self.access.map)(value, &self.wiring.transformations[k], &mut self.values[k]);
+            if let Some(fault) = &self.wiring.faults[k] {
                 self.values[k] = (self.access.disturb)(fault, time, &self.values[k]);
             }
         }
@@ -264,22 +286,22 @@ impl<T: Clone + Default> Channel<T> {
 
     /// Whether a gathered input of `slave` differs from the value that was set last.
     pub(crate) fn has_new(&self, slave: usize) -> bool {
-        let range = self.port_maps[slave].input_range.clone();
+        let range = self.wiring.port_maps[slave].input_range.clone();
         range.into_iter().any(|k| !(self.access.same)(&self.values[k], &self.state.given[k]))
     }
 
     /// Adds the connected inputs of `slave` whose gathered value differs from the one that was set last to `ports`.
     pub(crate) fn add_new(&self, slave: usize, ports: &mut Vec<Port>) {
-        for k in self.port_maps[slave].input_range.clone() {
+        for k in self.wiring.port_maps[slave].input_range.clone() {
             if !(self.access.same)(&self.values[k], &self.state.given[k]) {
-                ports.push(self.input_ports[k]);
+                ports.push(self.wiring.input_ports[k]);
             }
         }
     }
 
     /// Sets the gathered inputs.
     pub(crate) fn set(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let port_map = &self.port_maps[slave];
+        let port_map = &self.wiring.port_maps[slave];
         if port_map.inputs.is_empty() {
             return Ok(());
         }
@@ -311,7 +333,7 @@ impl<T: Clone + Default> Channel<T> {
 
     /// Reads the outputs.
     pub(crate) fn read(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let port_map = &self.port_maps[slave];
+        let port_map = &self.wiring.port_maps[slave];
         if port_map.outputs.is_empty() {
             return Ok(());
         }

@@ -117,7 +117,7 @@ impl Exchange {
     /// tick for them.
     pub(crate) fn gather_at_events(&mut self, slave: usize, time: f64) -> bool {
         if !self.at_events.is_empty() {
-            self.at_events.gather(slave, time, |source| self.reals.is_ahead(source, time));
+            self.at_events.gather(slave, time, &|source| self.reals.is_ahead(source, time));
         }
         self.at_events.has_new(slave) || self.ticks.has_due(slave)
     }
