@@ -18,6 +18,11 @@ pub(crate) struct Options {
     /// Subtract a second results file
     #[arg(long, value_name = "RESULTS")]
     against: Option<PathBuf>,
+    /// Show the frames of a bus trace
+    ///
+    /// As `run --bus-trace NAME.log` writes it, in the form of candump.
+    #[arg(long, value_name = "FILE")]
+    bus_trace: Option<PathBuf>,
     /// Show these variables only
     ///
     /// By name or pattern (`plant.*`); may be repeated.
@@ -42,6 +47,7 @@ pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
     }
     let mut inputs: Vec<(&str, &Path)> = vec![("the results file", &options.results)];
     inputs.extend(options.against.as_deref().map(|path| ("--against", path)));
+    inputs.extend(options.bus_trace.as_deref().map(|path| ("--bus-trace", path)));
     check_distinct(&inputs, &[("--out", &out)])?;
     if !options.force {
         check_own(&out, &identity(&options.results))?;
@@ -51,6 +57,7 @@ pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
         against: options.against.as_deref(),
         variables: &options.variables,
         units: &[],
+        bus_trace: options.bus_trace.as_deref(),
         run: None,
     })?;
     if let (Some(largest), Some(other)) = (page.differences.first(), &options.against) {

@@ -59,6 +59,8 @@ struct Started {
     units: Vec<(String, String)>,
     /// What the report says about the run, if one is requested.
     report: Option<report::Run>,
+    /// The trace of the buses that the report can show.
+    bus_trace: Option<PathBuf>,
     /// The pacing by the clock, if one is requested.
     pace: Option<RealTime>,
     /// The live view, if one is requested.
@@ -91,13 +93,15 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     describe(options, system, plan, by_name);
     let units = units(system, ports);
     let report = options.results.report.then(|| facts::facts(system, plan));
+    let is_shown = |path: &PathBuf| path.extension().is_some_and(|own| own == "log");
+    let bus_trace = config.results.bus_trace.clone().filter(is_shown);
     let ports = prepared.ports.clone();
     let mut run = prepared.start(saved.as_ref())?;
     let pace = options.time.real_time.map(RealTime::new);
     let factor = pace.as_ref().map(|pace| pace.overruns().factor);
     let open = |start| Live::open(&mut run, &ports, factor, start, &here);
     let live = options.watching.live.map(open).transpose()?;
-    Ok(Some(Started { run, here, units, report, pace, live }))
+    Ok(Some(Started { run, here, units, report, bus_trace, pace, live }))
 }
 
 /// Prints the connections and, if variables are connected `by_name`, the inputs without one.
@@ -288,6 +292,7 @@ impl Started {
             against: None,
             variables: &[],
             units: &self.units,
+            bus_trace: self.bus_trace.as_deref(),
             run: Some(&run),
         })?;
         let out = file.with_extension("html");

@@ -139,6 +139,41 @@ def test_a_file_with_an_unknown_compression_is_refused_with_what_helps(aso_ftc, 
     assert done.returncode == 2 and "compressed by zstd; expected Snappy" in done.stderr
 
 
+TRACE = """(0.001000) can0 100#0102
+(0.001500) can0 00000101#
+(0.002000) can0 100#0102
+(0.005000) can0 100##1AA
+(0.005000) can1 100#R
+(0.006000) can0 20000088#0000000000000000
+"""
+
+
+def test_the_frames_of_a_bus_trace_are_counted_and_drawn_at_their_times(aso_ftc, write, tmp_path):
+    trace = tmp_path / "trace.log"
+    trace.write_text(TRACE, encoding="utf-8")
+    page, _ = report(aso_ftc, write("own.csv", frame()), "--bus-trace", trace)
+    found = table(page, "frames")
+    assert set(found) == {"can0 100", "can0 00000101", "can1 100", "can0 error"}
+    times = np.array([0.001, 0.002, 0.005])
+    gaps = 1e3 * np.diff(times)
+    assert found["can0 100"] == pytest.approx([3, times[0], times[-1], gaps.min(), gaps.mean(), gaps.max()])
+    assert found["can1 100"][:3] == [1, 0.005, 0.005] and np.isnan(found["can1 100"][3:]).all()
+    curve = curves(page)["can0 100"]
+    assert curve["dots"] and not curves(page)["a"]["dots"]
+    assert np.allclose(curve["own"], [times[1:], gaps])
+
+
+def test_a_line_of_a_trace_that_is_no_frame_is_named(aso_ftc, write, tmp_path):
+    trace = tmp_path / "trace.asc"
+    trace.write_text("\n date Thu Jan 1\n", encoding="utf-8")
+    done = aso_ftc("report", write("own.csv", frame()), "--bus-trace", trace)
+    assert done.returncode == 2
+    for part in ("trace.asc: line 2", "date Thu Jan 1", "--bus-trace NAME.log"):
+        assert part in done.stderr, done.stderr
+    done = aso_ftc("report", write("own.csv", frame()), "--bus-trace", tmp_path / "none.log")
+    assert done.returncode == 2 and "none.log" in done.stderr
+
+
 @pytest.fixture(scope="module")
 def of_a_run(aso_ftc, tmp_path_factory):
     """The page of a run with a warning."""

@@ -1,11 +1,12 @@
 //! The report of a run: one HTML file, which needs no other file and no network.
 //!
 //! [`page`] reads a results file and writes interactive plots, statistics of each variable and, if it
-//! is given a second results file, the difference of both. [`Run`] adds what only the run itself knows:
+//! is given a second results file, the difference of both; of a bus trace, the frames. [`Run`] adds what only the run itself knows:
 //! the system as a graph, the algorithm and the messages.
 #![forbid(unsafe_code)]
 
 mod difference;
+mod frames;
 mod graph;
 mod page;
 mod plots;
@@ -34,6 +35,8 @@ pub struct Request<'a> {
     pub variables: &'a [String],
     /// The units of variables for files without units, such as CSV: name and unit.
     pub units: &'a [(String, String)],
+    /// A trace of the buses in the form of candump, whose frames are shown.
+    pub bus_trace: Option<&'a Path>,
     /// The run, if it is known.
     pub run: Option<&'a Run>,
 }
@@ -100,6 +103,27 @@ pub enum Error {
         /// The file.
         file: String,
     },
+    /// A bus trace cannot be read.
+    #[error("{file}: {source}")]
+    Trace {
+        /// The file.
+        file: String,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// A line of a bus trace is no frame.
+    #[error(
+        "{file}: line {line}: expected a frame as candump writes it, such as \
+         `(0.001200) can0 101#0080`, found `{found}`; `--bus-trace NAME.log` writes such a trace"
+    )]
+    Frame {
+        /// The file.
+        file: String,
+        /// The number of the line.
+        line: usize,
+        /// Its start.
+        found: String,
+    },
     /// The two files have nothing in common.
     #[error("{file} and {other} have no variable in common")]
     Apart {
@@ -136,13 +160,16 @@ pub fn page(request: &Request<'_>) -> Result<Page, Error> {
     {
         return Err(Error::Apart { file: name(request.results), other: name(other) });
     }
-    let plots = plots::plots(&columns, &statistics, &traces, compared.as_ref());
+    let frames = request.bus_trace.map(frames::read).transpose()?;
+    let mut plots = plots::plots(&columns, &statistics, &traces, compared.as_ref());
+    plots.extend(plots::of_frames(frames.as_deref().unwrap_or_default()));
     let content = page::Content {
         request,
         columns: &columns,
         statistics: &statistics,
         texts: &texts,
         left_out,
+        frames: frames.as_deref(),
     };
     let html = page::render(&content, &plots, compared.as_ref());
     Ok(Page { html, differences: compared.map_or_else(Vec::new, |found| found.differences) })

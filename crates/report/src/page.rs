@@ -1,10 +1,13 @@
 //! The HTML document.
 
+use std::path::Path;
+
 use figure::interactive::{COLOURS, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, UPLOT_STYLE};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use results::Column;
 
 use crate::difference::Compared;
+use crate::frames::Message;
 use crate::plots::Plot;
 use crate::statistics::Statistics;
 use crate::{Request, Run, graph, identity};
@@ -25,6 +28,8 @@ pub(crate) struct Content<'a> {
     pub(crate) texts: &'a [String],
     /// Number of variables that are not shown.
     pub(crate) left_out: usize,
+    /// The messages of the bus trace, if there is one.
+    pub(crate) frames: Option<&'a [Message]>,
 }
 
 pub(crate) fn render(content: &Content<'_>, plots: &[Plot], compared: Option<&Compared>) -> String {
@@ -64,6 +69,7 @@ pub(crate) fn render(content: &Content<'_>, plots: &[Plot], compared: Option<&Co
                     }
                     @if let Some(compared) = compared { (differences(compared, other.as_deref().unwrap_or_default())) }
                     (statistics(content))
+                    @if let (Some(messages), Some(file)) = (content.frames, request.bus_trace) { (frames(messages, file)) }
                     @if let Some(run) = request.run { (system(run)) (messages(run)) }
                 }
                 footer {
@@ -170,6 +176,41 @@ fn statistics(content: &Content<'_>) -> Markup {
                 }
             }
             p.said { "Mean and rms are over time: integrals by the trapezoidal rule, divided by the length of the run." }
+        }
+    }
+}
+
+fn frames(messages: &[Message], file: &Path) -> Markup {
+    html! {
+        section aria-labelledby="frames" {
+            h2 #frames { "Frames on the bus" }
+            @if messages.is_empty() { p { "There is no frame in " (file.display()) "." } }
+            div.scroll tabindex="0" role="region" aria-labelledby="frames" {
+                table {
+                    thead {
+                        tr {
+                            th scope="col" { "bus and identifier" }
+                            @for title in ["frames", "first at t in s", "last at t in s", "shortest interval in ms", "mean in ms", "longest in ms"] {
+                                th.number scope="col" { (title) }
+                            }
+                        }
+                    }
+                    tbody {
+                        @for own in messages.iter().take(LISTED) {
+                            tr {
+                                th scope="row" { (own.name) }
+                                td.number title=(own.count) { (own.count) }
+                                @for value in [own.first, own.last, 1e3 * own.shortest, 1e3 * own.mean(), 1e3 * own.longest] { (number(value)) }
+                            }
+                        }
+                    }
+                }
+            }
+            @if messages.len() > LISTED { p { "and " (messages.len() - LISTED) " more identifiers." } }
+            p.said {
+                "From " (file.display()) ". In the plots each frame but the first is a dot: its height is the time since the frame before with the same \
+                 identifier, so that a late or lost frame stands out. Of long traces, the shortest and the longest interval of each short time are shown."
+            }
         }
     }
 }

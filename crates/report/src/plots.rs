@@ -4,6 +4,7 @@ use results::{Column, Envelope};
 use serde::Serialize;
 
 use crate::difference::Compared;
+use crate::frames::Message;
 use crate::statistics::Statistics;
 
 /// Largest number of curves in a plot: the number of colours.
@@ -39,6 +40,8 @@ pub(crate) struct Curve {
     name: String,
     /// Whether the value is held between two points.
     holds: bool,
+    /// Whether the points are not connected.
+    dots: bool,
     own: Points,
     other: Option<Points>,
     difference: Option<Points>,
@@ -62,6 +65,7 @@ pub(crate) fn plots(
         let curve = Curve {
             name: column.name.clone(),
             holds: crate::holds(column),
+            dots: false,
             own: points(trace, limit),
             other: pair.map(|(other, _)| points(other, limit)),
             difference: pair.map(|(_, difference)| points(difference, limit)),
@@ -74,6 +78,25 @@ pub(crate) fn plots(
         }
     }
     plots
+}
+
+/// The times between the frames of each message; the messages follow each other.
+pub(crate) fn of_frames(messages: &[Message]) -> Vec<Plot> {
+    let limit = (POINTS / messages.len().max(1)).clamp(LEAST, MOST);
+    let curve = |message: &Message| Curve {
+        name: message.name.clone(),
+        holds: false,
+        dots: true,
+        own: points(&message.intervals, limit),
+        other: None,
+        difference: None,
+    };
+    let unit = "ms since the frame before";
+    let plot = |group: &[Message]| {
+        let curves = group.iter().map(curve).collect();
+        Plot { unit: unit.to_owned(), curves, size: 0.0 }
+    };
+    messages.chunks(CURVES).map(plot).collect()
 }
 
 /// A variable over time: all rows of a short run, the envelope of a longer one.

@@ -122,7 +122,7 @@ class LinkedAxis {
   }
 
   /* Draws a plot into an element. `data`: the places, then the values of each curve; null is a gap, undefined is
-     bridged. `curves`: name, colour, and optionally width, dash, `holds`. `marks`: `x` or `y`, colour, dash.
+     bridged. `curves`: name, colour, and optionally width, dash, `holds`, `dots`. `marks`: `x` or `y`, colour, dash.
      `scale` enlarges lines and text, for a picture that is shown smaller. */
   plot(element, data, { label, height, curves, marks = [], isLogarithmic = false, fromZero = false, write = String,
     name = "", scale = 1 }) {
@@ -169,8 +169,8 @@ class LinkedAxis {
           width: (curve.width ?? 1.6) * scale,
           dash: curve.dash?.map((length) => length * scale),
           spanGaps: false,
-          points: { show: false },
-          paths: curve.holds ? uPlot.paths.stepped({ align: 1 }) : uPlot.paths.linear(),
+          points: { show: curve.dots ?? false, size: 5 * scale, fill: colour(curve.colour) },
+          paths: curve.dots ? () => null : curve.holds ? uPlot.paths.stepped({ align: 1 }) : uPlot.paths.linear(),
           value: cell,
         })),
       ],

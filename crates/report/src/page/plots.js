@@ -67,8 +67,8 @@
       plots.push(axis.plot(figure, merged(all.map((curve) => curve.points)), {
         label: group.unit,
         height: HEIGHT,
-        curves: all.map(({ name, ink, holds, dashed }) =>
-          ({ name, colour: `--ink-${ink + 1}`, holds, dash: dashed ? [7, 5] : undefined })),
+        curves: all.map(({ name, ink, holds, dots, dashed }) =>
+          ({ name, colour: `--ink-${ink + 1}`, holds, dots, dash: dashed ? [7, 5] : undefined })),
         name: `${shown === "difference" ? "Difference of " : ""}${names} over time`,
         scale: isPaper ? 2 : 1,
       }));

@@ -1,0 +1,84 @@
+//! The frames of a bus trace in the form of candump, by bus and identifier.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+
+use crate::plots::Trace;
+use crate::{Error, name};
+
+/// The flag of an error frame.
+const ERROR: u32 = 0x2000_0000;
+
+/// The frames with one identifier on one bus.
+pub(crate) struct Message {
+    /// Bus and identifier, as in the file.
+    pub(crate) name: String,
+    pub(crate) count: usize,
+    pub(crate) first: f64,
+    pub(crate) last: f64,
+    /// Shortest and longest time between two frames in s; NaN for one frame.
+    pub(crate) shortest: f64,
+    pub(crate) longest: f64,
+    /// The time since the frame before in ms, over time.
+    pub(crate) intervals: Trace,
+}
+
+impl Message {
+    fn new(name: String, time: f64) -> Self {
+        let (shortest, longest) = (f64::NAN, f64::NAN);
+        let intervals = Trace::default();
+        Self { name, count: 1, first: time, last: time, shortest, longest, intervals }
+    }
+
+    fn push(&mut self, time: f64) {
+        let interval = time - self.last;
+        // The other operand where one is NaN.
+        self.shortest = self.shortest.min(interval);
+        self.longest = self.longest.max(interval);
+        self.intervals.push(time, 1e3 * interval);
+        self.count += 1;
+        self.last = time;
+    }
+
+    /// Returns the mean time between two frames in s.
+    #[expect(clippy::cast_precision_loss, reason = "fewer than 2^53 frames")]
+    pub(crate) fn mean(&self) -> f64 {
+        (self.last - self.first) / (self.count as f64 - 1.0)
+    }
+}
+
+/// Reads a trace: lines `(time) bus identifier#data`.
+pub(crate) fn read(path: &Path) -> Result<Vec<Message>, Error> {
+    let unreadable = |source| Error::Trace { file: name(path), source };
+    let mut messages: BTreeMap<(String, String), Message> = BTreeMap::new();
+    for (number, line) in BufReader::new(File::open(path).map_err(unreadable)?).lines().enumerate()
+    {
+        let line = line.map_err(unreadable)?;
+        if line.trim().is_empty() {
+            continue;
+        }
+        let (time, bus, identifier) = parse(&line).ok_or_else(|| {
+            let file = name(path);
+            Error::Frame { file, line: number + 1, found: line.chars().take(80).collect() }
+        })?;
+        let known = messages.entry((bus.to_owned(), identifier.to_owned()));
+        known
+            .and_modify(|message| message.push(time))
+            .or_insert_with(|| Message::new(format!("{bus} {identifier}"), time));
+    }
+    Ok(messages.into_values().collect())
+}
+
+/// Returns time, bus and identifier of a line.
+fn parse(line: &str) -> Option<(f64, &str, &str)> {
+    let (time, rest) = line.trim_start().strip_prefix('(')?.split_once(')')?;
+    let (bus, frame) = rest.trim().split_once(char::is_whitespace)?;
+    let (identifier, _) = frame.trim().split_once('#')?;
+    // As SocketCAN marks them.
+    let flags = u32::from_str_radix(identifier, 16).ok()?;
+    let identifier = if flags & ERROR == 0 { identifier } else { "error" };
+    let time: f64 = time.trim().parse().ok()?;
+    time.is_finite().then_some((time, bus, identifier))
+}
