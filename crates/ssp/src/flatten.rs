@@ -245,7 +245,9 @@ fn side(tree: &Tree, system: usize, end: &End, warnings: &mut Vec<String>) -> Re
     let vertex = tree.vertex(node, &end.connector);
     let connector = tree.connector(vertex.node, &vertex.connector);
     let kind = connector.and_then(|connector| connector.kind_of_value.as_ref());
-    if let Some(words) = kind.and_then(Type::beyond_fmi2) {
+    if let Some(words) = kind.and_then(Type::beyond_fmi2)
+        && tree.is_before_fmi3(vertex.node)
+    {
         let name = tree.name(&vertex);
         return Err(format!(
             "{name} is {words}, which FMI 2.0 does not have, so it cannot be connected"
@@ -253,6 +255,9 @@ fn side(tree: &Tree, system: usize, end: &End, warnings: &mut Vec<String>) -> Re
     }
     let stated = tree.connector(node, &end.connector).map(|connector| connector.kind);
     let of_system = end.element.is_none();
+    if tree.is_terminal(&vertex) {
+        return Ok(Side { vertex, kind: ConnectorKind::Unspecified, of_system });
+    }
     let Some(variable) = tree.variable(&vertex) else {
         if tree.description(node).is_some() {
             return Err(format!("the FMU has no variable {}", tree.name(&vertex)));

@@ -139,7 +139,12 @@ fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
             let vertex = Vertex { node: index, connector: connector.name.clone() };
             let name = tree.name(&vertex);
             let kind = connector.kind_of_value.as_ref();
-            if let Some(words) = kind.and_then(Type::beyond_fmi2) {
+            if tree.is_terminal(&vertex) {
+                continue;
+            }
+            if let Some(words) = kind.and_then(Type::beyond_fmi2)
+                && tree.is_before_fmi3(vertex.node)
+            {
                 warnings.push(format!("{name} is {words}, which FMI 2.0 does not have: skipped"));
                 continue;
             }

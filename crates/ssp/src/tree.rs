@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::rc::Rc;
 
 use fmu_description::package::{TemporaryFolder, Unpacked};
-use fmu_description::{ModelDescription, Position, ScalarVariable};
+use fmu_description::{ModelDescription, Position, ScalarVariable, Version};
 
 use super::conversion::Measure;
 use super::source::Base;
@@ -122,6 +122,17 @@ impl Tree {
     /// Returns the FMU variable of a connector.
     pub(super) fn variable(&self, vertex: &Vertex) -> Option<&ScalarVariable> {
         self.description(vertex.node)?.variable(&vertex.connector)
+    }
+
+    /// Whether the FMU of a node cannot have the types of FMI 3.0.
+    pub(super) fn is_before_fmi3(&self, node: usize) -> bool {
+        self.description(node).is_some_and(|own| own.version() != Version::V3)
+    }
+
+    /// Whether a connector is a terminal of its FMU, which stands for the variables that are its members.
+    pub(super) fn is_terminal(&self, vertex: &Vertex) -> bool {
+        let terminals = self.description(vertex.node).map(|own| own.terminals.iter());
+        terminals.is_some_and(|mut all| all.any(|own| own.name == vertex.connector))
     }
 
     /// Returns the connector as its file declares it.

@@ -45,12 +45,65 @@ fn two_terminals_connect_their_members_and_a_frame_arrives_when_it_is_sent() {
     );
     for isolate in [&[][..], &["--isolate"]] {
         let trace = folder.path().join("trace.log").display().to_string();
-        run(folder.path(), &system, &[&["--bus-trace", &trace], isolate].concat());
+        run(folder.path(), &system, &[&["--bus-trace", &trace, "--report"], isolate].concat());
         near(&increases(folder.path(), "b.received"), &[0.003, 0.006, 0.009]);
         near(&increases(folder.path(), "a.received"), &[]);
         let frames = "(0.003000) can0 001#01\n(0.006000) can0 001#02\n(0.009000) can0 001#03\n";
         assert_eq!(std::fs::read_to_string(&trace).unwrap(), frames);
+        let page = std::fs::read_to_string(folder.path().join("out/results.html")).unwrap();
+        assert!(page.contains("Frames on the bus") && page.contains("can0 001"));
     }
+}
+
+/// A system structure connects terminals by their names, or the clocks and binaries that are their members.
+#[test]
+fn a_system_structure_connects_terminals_and_clocked_binaries() {
+    let folder = tempfile::tempdir().unwrap();
+    let fmu = node::write(folder.path());
+    let source = fmu.file_name().unwrap().to_str().unwrap().to_owned();
+    let members = [
+        ("a", "tx_clock", "rx_clock"),
+        ("a", "tx_data", "rx_data"),
+        ("b", "tx_clock", "rx_clock"),
+        ("b", "tx_data", "rx_data"),
+    ];
+    let by_member = |&(from, output, input): &(&str, &str, &str)| {
+        let to = if from == "a" { "b" } else { "a" };
+        connection(from, output, to, input)
+    };
+    let by_member: String = members.iter().map(by_member).collect();
+    for connections in [connection("a", "can", "b", "can"), by_member] {
+        let component = |name: &str| {
+            format!(
+                "<ssd:Component name=\"{name}\" source=\"{source}\"><ssd:Connectors>\
+                 <ssd:Connector name=\"tx_data\" kind=\"output\"><ssc:Binary/></ssd:Connector>\
+                 <ssd:Connector name=\"rx_data\" kind=\"input\"><ssc:Binary/></ssd:Connector>\
+                 <ssd:Connector name=\"tx_clock\" kind=\"output\"/><ssd:Connector name=\"rx_clock\" kind=\"input\"/>\
+                 <ssd:Connector name=\"can\" kind=\"inout\"/></ssd:Connectors></ssd:Component>"
+            )
+        };
+        let structure = format!(
+            "<ssd:SystemStructureDescription \
+             xmlns:ssd=\"http://ssp-standard.org/SSP1/SystemStructureDescription\" \
+             xmlns:ssc=\"http://ssp-standard.org/SSP1/SystemStructureCommon\" name=\"s\" version=\"1.0\">\
+             <ssd:System name=\"root\"><ssd:Elements>{}{}</ssd:Elements>\
+             <ssd:Connections>{connections}</ssd:Connections></ssd:System></ssd:SystemStructureDescription>",
+            component("a"),
+            component("b")
+        );
+        std::fs::write(folder.path().join("SystemStructure.ssd"), structure).unwrap();
+        let system = "system = \"SystemStructure.ssd\"\n[settings]\na.identifier = 1\na.period = 0.003\nb.identifier = 2\n";
+        let message = run(folder.path(), system, &[]);
+        assert!(!message.contains("warning"), "{message}");
+        near(&increases(folder.path(), "b.received"), &[0.003, 0.006, 0.009]);
+    }
+}
+
+fn connection(from: &str, output: &str, to: &str, input: &str) -> String {
+    format!(
+        "<ssd:Connection startElement=\"{from}\" startConnector=\"{output}\" endElement=\"{to}\" \
+         endConnector=\"{input}\"/>"
+    )
 }
 
 /// Both nodes send at 3 ms. Identifier 1 wins; 2 follows when the bus is free.

@@ -132,7 +132,7 @@ impl System {
                 if is_array(from) || is_array(to) {
                     self.pairs(&name(from), &name(to))
                 } else {
-                    Err(error)
+                    self.pairs_of_terminals(&name(from), &name(to))?.ok_or(error)
                 }
             }
         }

@@ -8,7 +8,7 @@ use crate::error::SystemError;
 
 /// The matching rule of the layered standard for networks: `Tx` of one side with `Rx` of the other (FMI-LS-BUS 1.0,
 /// section "Bus Terminal").
-const TRANSCEIVER: &str = "org.fmi-ls-bus.transceiver";
+const TRANSCEIVER: &str = fmu_description::can::MATCHING_RULE;
 const RULES: &str = "plug, bus, sequence or org.fmi-ls-bus.transceiver";
 
 impl System {
