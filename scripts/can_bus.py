@@ -90,7 +90,7 @@ def couple(controller, folder, text=None, bit_rate=500_000, settings=(), stop_ti
     command = [COMMAND, "run", SYSTEM, "--fmu", f"controller={controller}", "--stop-time", str(stop_time)]
     command += ["--fmu", f"plant_node={node}", "--fmu", f"controller_node={node}"]
     command += ["--results", folder / "results.csv", "--bus-trace", folder / "trace.log"]
-    for setting in [f"bus.bit_rate={bit_rate}", *settings]:
+    for setting in [f"plant_node.bit_rate={bit_rate}", f"controller_node.bit_rate={bit_rate}", *settings]:
         command += ["--set", setting]
     command += options
     done = subprocess.run(command, check=False, capture_output=True, text=True)

@@ -14,10 +14,13 @@ const TRANSMIT: u32 = 0x10;
 const FD_TRANSMIT: u32 = 0x11;
 const CONFIRM: u32 = 0x20;
 const BUS_ERROR: u32 = 0x31;
+const CONFIGURATION: u32 = 0x40;
+/// Parameter of a configuration: the bit rate of classical CAN.
+const BIT_RATE: u8 = 1;
 /// Length of code and length of an operation.
 const HEADER: usize = 8;
 
-/// An operation that concerns a frame.
+/// An operation.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Operation {
@@ -27,6 +30,11 @@ pub enum Operation {
     Confirm {
         /// Identifier of the frame.
         identifier: u32,
+    },
+    /// A node states its bit rate, before it sends its first frame.
+    Configure {
+        /// In bit/s.
+        bit_rate: u32,
     },
     /// An error on the bus ended the frame with this identifier.
     BusError {
@@ -85,23 +93,26 @@ impl Operation {
     ///
     /// If the frame has more than 65,535 bytes.
     pub fn append_to(&self, bytes: &mut Vec<u8>) {
-        let (code, identifier, rest) = match self {
+        let (code, arguments) = match self {
             Operation::Transmit(frame) => {
                 let code = match frame.kind {
                     FrameKind::Flexible { .. } => FD_TRANSMIT,
                     FrameKind::Data | FrameKind::Remote => TRANSMIT,
                 };
-                (code, frame.identifier, frame.arguments())
+                (code, [&frame.identifier.to_le_bytes()[..], &frame.arguments()].concat())
             }
-            Operation::Confirm { identifier } => (CONFIRM, *identifier, Vec::new()),
+            Operation::Confirm { identifier } => (CONFIRM, identifier.to_le_bytes().to_vec()),
+            Operation::Configure { bit_rate } => {
+                (CONFIGURATION, [&[BIT_RATE][..], &bit_rate.to_le_bytes()].concat())
+            }
             // Error code, error flag, whether the node is the sender.
-            Operation::BusError { identifier } => (BUS_ERROR, *identifier, vec![5, 1, 0]),
+            Operation::BusError { identifier } => {
+                (BUS_ERROR, [&identifier.to_le_bytes()[..], &[5, 1, 0]].concat())
+            }
         };
-        let length = u32::try_from(HEADER + 4 + rest.len()).expect("a short frame");
-        for number in [code, length, identifier] {
-            bytes.extend(number.to_le_bytes());
-        }
-        bytes.extend(rest);
+        let length = u32::try_from(HEADER + arguments.len()).expect("a short frame");
+        bytes.extend([code, length].map(u32::to_le_bytes).as_flattened());
+        bytes.extend(arguments);
     }
 }
 
@@ -125,6 +136,10 @@ impl Frame {
 
 /// Returns the operation with these arguments.
 fn operation(code: u32, arguments: &[u8]) -> Option<Operation> {
+    if code == CONFIGURATION {
+        let bit_rate = number(arguments, 1).filter(|_| arguments[0] == BIT_RATE)?;
+        return Some(Operation::Configure { bit_rate });
+    }
     let identifier = number(arguments, 0)?;
     let flag = |at: usize| arguments.get(at).map(|flag| *flag != 0);
     let data = |at: usize| {
@@ -161,24 +176,27 @@ mod tests {
         let transmit = [0x10, 0, 0, 0, 20, 0, 0, 0, 1, 0, 0, 0, 0, 0, 4, 0, 1, 2, 3, 4];
         let flexible = [0x11, 0, 0, 0, 18, 0, 0, 0, 0xff, 0xff, 0xff, 0x1f, 1, 1, 0, 1, 0, 0x7f];
         let confirm = [0x20, 0, 0, 0, 12, 0, 0, 0, 7, 0, 0, 0];
+        let discarded = [0x40, 0, 0, 0, 10, 0, 0, 0, 3, 2];
         let all = [&configuration[..], &transmit, &flexible, &confirm].concat();
         let data =
             Frame { identifier: 1, extended: false, kind: FrameKind::Data, data: vec![1, 2, 3, 4] };
         let kind = FrameKind::Flexible { bit_rate_switch: true, error_state: false };
         let long = Frame { identifier: 0x1fff_ffff, extended: true, kind, data: vec![0x7f] };
         let expected = [
+            Operation::Configure { bit_rate: 100_000 },
             Operation::Transmit(data),
             Operation::Transmit(long),
             Operation::Confirm { identifier: 7 },
         ];
         let read = |bytes: &[u8]| Operation::read(bytes).collect::<Vec<_>>();
         assert_eq!(read(&all), expected);
-        assert_eq!(read(&all[..40]), expected[..1]);
+        assert_eq!(read(&all[..40]), expected[..2]);
+        assert_eq!(read(&[&discarded[..], &confirm].concat()), expected[3..]);
         assert_eq!(read(&[0; 8]), []);
         let mut written = Vec::new();
         for operation in &expected {
             operation.append_to(&mut written);
         }
-        assert_eq!(written, all[configuration.len()..]);
+        assert_eq!(written, all);
     }
 }

@@ -11,8 +11,10 @@ const NODES: usize = 4;
 
 #[derive(Clone, Default, serde::Serialize, serde::Deserialize)]
 struct CanBus {
-    /// In bit/s.
+    /// In bit/s; 0: as the nodes state it.
     bit_rate: f64,
+    /// The bit rate of the bus; 0 until a node has stated it.
+    rate: f64,
     nodes: [Node; NODES],
     sending: Option<Sending>,
     /// The bus is free from this time on.
@@ -50,12 +52,12 @@ impl CanBus {
     /// Duration of a number of bits in s.
     #[expect(clippy::cast_precision_loss, reason = "a frame has few bits")]
     fn duration(&self, bits: usize) -> f64 {
-        bits as f64 / self.bit_rate
+        bits as f64 / self.rate
     }
 
     /// Whether it is later than `end`, but for rounding.
     fn has_come(&self, end: f64, time: f64) -> bool {
-        end <= time + 0.01 * self.duration(1)
+        end <= time + if self.rate > 0.0 { 0.01 * self.duration(1) } else { 0.0 }
     }
 
     /// Whether the frame on the bus ends.
@@ -70,9 +72,28 @@ impl CanBus {
         for (node, own) in self.nodes.iter_mut().enumerate().filter(|(_, own)| own.rx_clock) {
             let before = own.waiting.len();
             for operation in Operation::read(&own.rx_data) {
-                let Operation::Transmit(frame) = operation else { continue };
+                let number = node + 1;
+                let frame = match operation {
+                    Operation::Transmit(frame) => frame,
+                    Operation::Configure { bit_rate } => {
+                        let (stated, own) = (f64::from(bit_rate), &mut self.rate);
+                        if *own == 0.0 {
+                            *own = stated;
+                        } else if (stated - *own).abs() > 0.5 {
+                            return Err(Failure::Error(format!(
+                                "Node{number} has {stated} bit/s, expected that of the bus, {own} bit/s"
+                            )));
+                        }
+                        continue;
+                    }
+                    _ => continue,
+                };
+                if self.rate == 0.0 {
+                    return Err(Failure::Error(format!(
+                        "Node{number} sends before a node has stated its bit rate; set bit_rate"
+                    )));
+                }
                 if matches!(frame.kind, FrameKind::Flexible { .. }) || frame.data.len() > 8 {
-                    let number = node + 1;
                     return Err(Failure::Error(format!(
                         "Node{number} sends a frame of CAN FD; this bus simulates classical CAN"
                     )));
@@ -141,15 +162,17 @@ impl Model for CanBus {
     }
 
     fn new(_: &std::path::Path) -> Result<Self, Failure> {
-        Ok(Self { bit_rate: 5e5, ..Self::default() })
+        Ok(Self::default())
     }
 
     fn variables(&self) -> Vec<V<Self>> {
         let mut all = vec![
-            V::real("bit_rate", "Number of bits in a second", |own: &mut Self| &mut own.bit_rate)
-                .unit("1/s")
-                .range(1e3, 1e6)
-                .parameter(),
+            V::real("bit_rate", "Bits in a second; 0: as the nodes state it", |own: &mut Self| {
+                &mut own.bit_rate
+            })
+            .unit("1/s")
+            .range(0.0, 1e6)
+            .parameter(),
             V::integer("frames", "Number of frames", |own: &mut Self| &mut own.frames)
                 .output(&[])
                 .exact(),
@@ -192,6 +215,7 @@ impl Model for CanBus {
 
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
         (self.start_time, self.free) = (experiment.start_time, experiment.start_time);
+        self.rate = self.bit_rate;
         Ok(())
     }
 

@@ -15,6 +15,9 @@ struct CanNode {
     messages: Vec<Message>,
     /// One of `nodes`.
     node: String,
+    /// In bit/s, which the node states before its first frame.
+    bit_rate: f64,
+    is_configured: bool,
     /// For each message its signals, to send and as received.
     send: Vec<Vec<f64>>,
     received: Vec<Vec<f64>>,
@@ -42,12 +45,21 @@ impl CanNode {
     }
 
     fn sends(&self, time: f64) -> bool {
-        (0..self.messages.len()).any(|message| self.is_due(message, time))
+        !self.is_configured || (0..self.messages.len()).any(|message| self.is_due(message, time))
     }
 
-    /// Composes the messages that are due.
+    /// Composes the messages that are due, and first of all the configuration.
     fn compose(&mut self, time: f64) -> Result<(), Failure> {
         self.tx_data.clear();
+        if !std::mem::replace(&mut self.is_configured, true) {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "its range is 1e3 to 1e6"
+            )]
+            let bit_rate = self.bit_rate.round() as u32;
+            Operation::Configure { bit_rate }.append_to(&mut self.tx_data);
+        }
         for (index, message) in self.messages.iter().enumerate() {
             if !self.is_due(index, time) {
                 continue;
@@ -103,6 +115,8 @@ impl Model for CanNode {
         Ok(Self {
             node: nodes.first().cloned().unwrap_or_default(),
             count: vec![0; messages.len()],
+            bit_rate: 5e5,
+            is_configured: false,
             nodes,
             messages,
             send: zeros.clone(),
@@ -118,7 +132,13 @@ impl Model for CanNode {
     fn variables(&self) -> Vec<V<Self>> {
         let names = self.nodes.join(", ");
         let text = format!("The node of the network that this FMU is: {names}");
-        let mut all = vec![V::string("node", text, |own: &mut Self| &mut own.node).parameter()];
+        let mut all = vec![
+            V::string("node", text, |own: &mut Self| &mut own.node).parameter(),
+            V::real("bit_rate", "Number of bits in a second", |own: &mut Self| &mut own.bit_rate)
+                .unit("1/s")
+                .range(1e3, 1e6)
+                .parameter(),
+        ];
         let with_unit = |variable: V<Self>, signal: &Signal| match signal.unit.as_str() {
             "" => variable,
             unit => variable.unit(unit),
