@@ -107,7 +107,7 @@ impl Operation {
             }
             // Error code, error flag, whether the node is the sender.
             Operation::BusError { identifier } => {
-                (BUS_ERROR, [&identifier.to_le_bytes()[..], &[5, 1, 0]].concat())
+                (BUS_ERROR, [&identifier.to_le_bytes()[..], &[4, 1, 0]].concat())
             }
         };
         let length = u32::try_from(HEADER + arguments.len()).expect("a short frame");
