@@ -1,8 +1,8 @@
 //! The report of a run: one HTML file, which needs no other file and no network.
 //!
 //! [`page`] reads a results file and writes interactive plots, statistics of each variable and, if it
-//! is given a second results file, the difference of both; of a bus trace, the frames. [`Run`] adds what only the run itself knows:
-//! the system as a graph, the algorithm and the messages.
+//! is given a second results file, the difference of both; of a bus trace, the frames. [`Run`] adds what
+//! only the run itself knows: the system as a graph, the algorithm and the messages.
 #![forbid(unsafe_code)]
 
 mod difference;

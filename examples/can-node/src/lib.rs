@@ -5,6 +5,7 @@
 mod network;
 
 use fmu::description::can::{Frame, FrameKind, MIME_TYPE, Operation};
+use fmu::description::unit::Unit;
 use fmu::{About, Event, Experiment, Failure, Model, ModelExchange, Variable as V};
 
 use network::{Message, Signal};
@@ -139,23 +140,22 @@ impl Model for CanNode {
                 .range(1e3, 1e6)
                 .parameter(),
         ];
-        let with_unit = |variable: V<Self>, signal: &Signal| match signal.unit.as_str() {
-            "" => variable,
-            unit => variable.unit(unit),
+        // DBC files state any text as unit; FMI has those that are known.
+        let with_unit = |variable: V<Self>, signal: &Signal| match Unit::parse(&signal.unit) {
+            Ok(_) if !signal.unit.is_empty() => variable.unit(&signal.unit),
+            _ => variable,
         };
         for (index, message) in self.messages.iter().enumerate() {
             for (position, signal) in message.signals.iter().enumerate() {
-                let text = |verb| format!("{verb} in {}: {}", message.name, signal.description);
-                let send = V::real(
-                    format!("send.{}", signal.name),
-                    text("Sent"),
-                    move |own: &mut Self| &mut own.send[index][position],
-                );
-                let received = V::real(
-                    format!("received.{}", signal.name),
-                    text("Received"),
-                    move |own: &mut Self| &mut own.received[index][position],
-                );
+                let text = |verb| format!("{verb}: {} [{}]", signal.description, signal.unit);
+                let name = format!("{}.{}", message.name, signal.name);
+                let send = V::real(format!("send.{name}"), text("Sent"), move |own: &mut Self| {
+                    &mut own.send[index][position]
+                });
+                let received =
+                    V::real(format!("received.{name}"), text("Received"), move |own: &mut Self| {
+                        &mut own.received[index][position]
+                    });
                 all.push(with_unit(send.input(), signal));
                 all.push(with_unit(received.discrete().output(&[]).exact(), signal));
             }
