@@ -46,7 +46,9 @@ enum Raw {
 pub(crate) fn read(text: &str) -> Result<(Vec<String>, Vec<Message>), String> {
     let file = Dbc::try_from(text).map_err(|error| error.to_string())?;
     let nodes = file.nodes.iter().map(|node| node.0.clone()).collect();
-    let messages = file.messages.iter().map(|own| message(&file, own));
+    // A message of no bytes holds the signals that are in no message (VECTOR__INDEPENDENT_SIG_MSG).
+    let messages = file.messages.iter().filter(|own| own.size > 0);
+    let messages = messages.map(|own| message(&file, own));
     Ok((nodes, messages.collect::<Result<_, _>>()?))
 }
 
