@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::path::PathBuf;
-use std::process::{Command, ExitCode};
+use std::process::Command;
 
 /// The interpreter that is asked for the package, unless the variable [`VARIABLE`] names another.
 const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
@@ -71,7 +71,7 @@ impl Options {
 }
 
 /// Runs `python3 -m aso_ftc campaign` and returns its exit status.
-pub(crate) fn campaign(options: &Options) -> ExitCode {
+pub(crate) fn campaign(options: &Options) -> u8 {
     let python = std::env::var_os(VARIABLE).unwrap_or_else(|| PYTHON.into());
     let shown = python.to_string_lossy().into_owned();
     let found = Command::new(&python)
@@ -98,18 +98,18 @@ pub(crate) fn campaign(options: &Options) -> ExitCode {
         ),
     };
     eprintln!("error: {sentence}");
-    ExitCode::from(2)
+    2
 }
 
 /// Becomes the other program, so that it gets Ctrl-C alone.
 #[cfg(unix)]
-fn replaced(mut command: Command) -> std::io::Result<ExitCode> {
+fn replaced(mut command: Command) -> std::io::Result<u8> {
     Err(std::os::unix::process::CommandExt::exec(&mut command))
 }
 
 /// Runs the other program to its end.
 #[cfg(not(unix))]
-fn replaced(mut command: Command) -> std::io::Result<ExitCode> {
+fn replaced(mut command: Command) -> std::io::Result<u8> {
     let code = command.status()?.code().and_then(|code| u8::try_from(code).ok());
-    Ok(ExitCode::from(code.unwrap_or(1)))
+    Ok(code.unwrap_or(1))
 }

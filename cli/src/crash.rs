@@ -4,24 +4,24 @@
 use fmu_description::package::remove_temporary_folders;
 use fmu_import::crash::{self, Cause, Ending};
 
-use crate::run;
+use crate::{logging, run};
 
 /// Exit status after the first step (1) and before it (2).
-const LOST: u8 = 1;
-const NOT_STARTED: u8 = 2;
-const ADVICE: &str = "with --isolate each FMU runs in a separate process, and its crash is an error of \
+pub(crate) const LOST: u8 = 1;
+pub(crate) const NOT_STARTED: u8 = 2;
+pub(crate) const ADVICE: &str = "with --isolate each FMU runs in a separate process, and its crash is an error of \
                       the run";
 
 /// Installs the handler, which reports the end and keeps the results so far.
 pub(crate) fn watch() {
-    if let Err(error) = crash::watch(ADVICE, end) {
+    if let Err(error) = crash::watch(ADVICE, logging::use_memory_of_thread, end) {
         tracing::warn!("crashes of FMUs cannot be reported: {error}");
     }
 }
 
 /// Reports the end, completes the results, removes temporary files; returns the exit status.
 fn end(ending: &Ending) -> u8 {
-    let interrupted = ending.cause == Cause::GivenUp;
+    let interrupted = matches!(ending.cause, Cause::GivenUp(_));
     if interrupted && ending.calls.is_empty() {
         tracing::error!("the run was interrupted");
     } else if interrupted {
@@ -40,8 +40,8 @@ fn end(ending: &Ending) -> u8 {
     }
     remove_temporary_folders();
     if interrupted {
-        run::INTERRUPTED
-    } else if run::has_started() {
+        run::interrupted()
+    } else if crash::has_begun_steps() {
         LOST
     } else {
         NOT_STARTED

@@ -1,8 +1,8 @@
 //! `aso-ftc`: exports the fault-tolerant controller and the friction pendulum as FMUs, couples
 //! FMUs, and repeats the experiment of Patton and Klinkhieo (2009).
 //!
-//! Exit status: 0 success; 1 a claim does not hold or a run failed; 2 wrong usage or bad input; 130
-//! a run was interrupted.
+//! Exit status: 0 success; 1 a claim does not hold or a run failed; 2 wrong usage or bad input; 128 and the
+//! number of the signal if one ended a run.
 #![forbid(unsafe_code)]
 
 #[macro_use]
@@ -27,6 +27,8 @@ mod reproduce;
 mod run;
 mod scenario;
 mod summary;
+#[cfg(target_os = "linux")]
+mod supervise;
 #[cfg(test)]
 mod tests;
 mod worker;
@@ -99,16 +101,22 @@ fn main() -> ExitCode {
         return status;
     }
     let verb = Arguments::parse().verb;
+    #[cfg(target_os = "linux")]
+    if let Command::Run(options) = &verb
+        && let Some(status) = supervise::supervise(options)
+    {
+        return status;
+    }
     if !matches!(verb, Command::Run(_)) {
         logging::start(0, false);
     }
     crash::watch();
     let status = perform(verb);
-    fmu_import::crash::done();
-    status
+    fmu_import::crash::done(status);
+    ExitCode::from(status)
 }
 
-fn perform(verb: Command) -> ExitCode {
+fn perform(verb: Command) -> u8 {
     let done = match verb {
         Command::Reproduce(options) => reproduce::reproduce(&options),
         Command::Pack(options) => pack::pack(&options),
@@ -125,11 +133,11 @@ fn perform(verb: Command) -> ExitCode {
         Command::Man(options) => manual::man(&options, Arguments::command()).map(|()| true),
     };
     match done {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
+        Ok(true) => 0,
+        Ok(false) => 1,
         Err(error) => {
             eprintln!("error: {}", files::sentence(error.as_ref()));
-            ExitCode::from(2)
+            2
         }
     }
 }

@@ -9,7 +9,6 @@ mod progress;
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use anyhow::{Context, bail};
 use fmu_description::number;
@@ -22,7 +21,7 @@ use study::{
 
 use crate::logging;
 use crate::plot;
-pub(crate) use interrupt::{STATUS as INTERRUPTED, has_started};
+pub(crate) use interrupt::status as interrupted;
 use live::Live;
 pub(crate) use options::{AlgorithmOptions, Options, setting};
 use progress::Progress;
@@ -31,9 +30,10 @@ use progress::Progress;
 const LISTED: usize = 20;
 
 /// Couples FMUs and writes the results. Exit status: 0 the run reached its end, 1 it failed after
-/// the first step, 2 it failed before, 130 it was interrupted.
-pub(crate) fn run(options: &Options) -> ExitCode {
-    logging::start(options.watching.verbose, options.watching.log_json);
+/// the first step, 2 it failed before, 128 + the number of the signal
+/// that ended it.
+pub(crate) fn run(options: &Options) -> u8 {
+    options.start_logging();
     if options.results.report {
         logging::collect();
     }
@@ -41,11 +41,11 @@ pub(crate) fn run(options: &Options) -> ExitCode {
         tracing::warn!("{}", files::sentence(error.as_ref()));
     }
     match prepare(options) {
-        Ok(None) => ExitCode::SUCCESS,
+        Ok(None) => 0,
         Ok(Some(started)) => started.go(),
         Err(error) => {
             tracing::error!("{}", files::sentence(error.as_ref()));
-            ExitCode::from(2)
+            2
         }
     }
 }
@@ -127,11 +127,13 @@ pub(crate) fn advance(
     run: &mut Run,
     mut watch: impl FnMut(&mut Run) -> Result<ControlFlow<()>, Error>,
 ) -> RunEnd {
-    interrupt::start();
+    fmu_import::crash::begin_steps();
     let mut progress = Progress::new(run.simulation.time(), run.plan.stop);
     let ended = run.advance_open(|run| {
         let flow = watch(run)?;
         progress.show(run.simulation.time());
+        #[cfg(unix)]
+        fmu_import::crash::end_copy();
         let raised = interrupt::is_raised();
         if raised || run.simulation.is_finished() {
             interrupt::notice();
@@ -205,7 +207,7 @@ fn units(system: &System, ports: &[Port]) -> Vec<(String, String)> {
 }
 
 impl Started {
-    fn go(mut self) -> ExitCode {
+    fn go(mut self) -> u8 {
         let start = self.run.simulation.time();
         let ended = match (&mut self.pace, &mut self.live) {
             (None, None) => advance(&mut self.run, |_| Ok(ControlFlow::Continue(()))),
@@ -255,7 +257,7 @@ impl Started {
                 let more = more.unwrap_or_default();
                 told = format!("the run was interrupted at t = {shown} s{more}");
                 tracing::error!("{told}");
-                interrupt::STATUS
+                interrupt::status()
             }
             RunEnd::Failed(error) => {
                 let error = error.sentence();
@@ -270,9 +272,9 @@ impl Started {
         let reported = written.and_then(|file| self.report(file.as_deref(), outcome, status != 0));
         if let Err(error) = reported {
             tracing::error!("{}", files::sentence(error.as_ref()));
-            return ExitCode::from(status.max(1));
+            return status.max(1);
         }
-        ExitCode::from(status)
+        status
     }
 
     /// Whether the live view has stopped the run.

@@ -147,6 +147,7 @@ fmi2Status misbehave(Slave *slave, const char *function) {
     memcpy(deed, slave->behaviour, (size_t)(in - slave->behaviour));
     talk(slave, deed);
     meddle(deed);
+    meddle_with_process(deed);
     if (strcmp(deed, "forget") == 0) {
         slave->t1 = 0.5;
         slave->n = 3;

@@ -78,6 +78,9 @@ void say(const Slave *slave, fmi2Status status, const char *text);
 fmi2Status refuse(Slave *slave, const char *text);
 /* Does the misbehaviour that `behaviour` names for this function; returns the status to return. */
 fmi2Status misbehave(Slave *slave, const char *function);
+
+/* Does what ends the process, or lets something end it later. */
+void meddle_with_process(const char *deed);
 /* Whether the misbehaviour of repeatedly called functions has started. */
 int due(const Slave *slave);
 /* Ends the process if the call is forbidden. */

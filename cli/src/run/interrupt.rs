@@ -1,25 +1,30 @@
-//! Handles Ctrl-C and SIGTERM: the run ends after the current step, or without it if the step does
-//! not return.
+//! Handles Ctrl-C and the signals by which systems announce the end: the run ends after the current step, or
+//! without it if the step does not return.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use fmu_import::crash;
 
-/// Exit status of a run that was interrupted.
-pub(crate) const STATUS: u8 = 130;
-
-/// Time limit of the current step after the signal.
-const PATIENCE: Duration = Duration::from_millis(800);
-/// Interval of checks whether FMU calls return after that.
+/// Time limit of a call of an FMU, and of a whole step, after the signal.
+const CALL: Duration = Duration::from_millis(800);
+const STEP: Duration = Duration::from_secs(5);
+/// Interval of checks whether calls return.
 const LOOK: Duration = Duration::from_millis(50);
+/// A second signal within this time is the first one, sent to a process and to its group.
+const TOGETHER: Duration = Duration::from_millis(200);
 
 static LISTENING: AtomicBool = AtomicBool::new(false);
-static RAISED: AtomicBool = AtomicBool::new(false);
+/// The number of the signal that has arrived; 0: none.
+static RAISED: AtomicU8 = AtomicU8::new(0);
 static NOTICED: AtomicBool = AtomicBool::new(false);
-static STARTED: AtomicBool = AtomicBool::new(false);
+
+/// Exit status of a run that a signal has ended: 128 and the number of the signal.
+pub(crate) fn status() -> u8 {
+    128 + RAISED.load(Ordering::Relaxed)
+}
 
 /// Starts to handle signals: the first one ends the run soon, a second one ends the process at
 /// once.
@@ -27,31 +32,65 @@ pub(super) fn listen() -> anyhow::Result<()> {
     if LISTENING.swap(true, Ordering::Relaxed) {
         return Ok(());
     }
-    let raised = || {
-        if RAISED.swap(true, Ordering::Relaxed) {
-            crash::give_up();
-            crash::leave(STATUS);
-        }
-        // If the thread cannot start, only the step itself and a second signal end the run.
-        let _ = thread::Builder::new().name("interrupt".to_owned()).spawn(wait);
-    };
-    ctrlc::set_handler(raised).context("signals cannot be handled")
+    handle_signals().context("signals cannot be handled")
 }
 
-/// Waits for the end of the run, and ends the process if an FMU call does not return.
-fn wait() {
-    thread::sleep(PATIENCE);
-    if !NOTICED.load(Ordering::Relaxed) {
-        crash::give_up();
+#[cfg(unix)]
+fn handle_signals() -> anyhow::Result<()> {
+    use fmu_import::crash::ENDING_SIGNALS;
+    use signal_hook::consts::SIGHUP;
+    use signal_hook::iterator::Signals;
+
+    let chosen =
+        ENDING_SIGNALS.iter().filter(|signal| **signal != SIGHUP || !crash::ignores_hangup());
+    let mut signals = Signals::new(chosen)?;
+    let wait = move || {
+        for signal in signals.forever() {
+            raise(u8::try_from(signal).unwrap_or(0));
+        }
+    };
+    thread::Builder::new().name("signals".to_owned()).spawn(wait)?;
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn handle_signals() -> anyhow::Result<()> {
+    /// The number of SIGINT elsewhere.
+    const INTERRUPT: u8 = 2;
+    Ok(ctrlc::set_handler(|| raise(INTERRUPT))?)
+}
+
+/// Acts on a signal.
+fn raise(signal: u8) {
+    /// When the first signal arrived.
+    static FIRST: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
+    if RAISED.compare_exchange(0, signal, Ordering::Relaxed, Ordering::Relaxed).is_err() {
+        if FIRST.get_or_init(Instant::now).elapsed() > TOGETHER {
+            crash::give_up(None);
+            crash::leave(status());
+        }
+        return;
     }
-    // Writing results, plots and checkpoints may take time; FMU calls may not.
-    let mut before = Vec::new();
+    FIRST.get_or_init(Instant::now);
+    // If the thread cannot start, only the step itself and a second signal end the run.
+    let _ = thread::Builder::new().name("interrupt".to_owned()).spawn(wait);
+}
+
+/// Waits for the end of the run, and ends the process if an FMU call does not return, or the step takes too
+/// long. Writing results, plots and checkpoints may take longer.
+fn wait() {
+    let start = Instant::now();
+    let (mut before, mut since) = (Vec::new(), start);
     loop {
         let calls = crash::calls();
-        if !calls.is_empty() && calls == before {
-            crash::give_up();
+        if calls.is_empty() || calls != before {
+            (before, since) = (calls, Instant::now());
+        } else if since.elapsed() >= CALL {
+            crash::give_up(Some(CALL));
         }
-        before = calls;
+        if start.elapsed() > STEP && !NOTICED.load(Ordering::Relaxed) {
+            crash::give_up(None);
+        }
         thread::sleep(LOOK);
     }
 }
@@ -59,17 +98,7 @@ fn wait() {
 /// Whether a signal has arrived.
 #[inline]
 pub(super) fn is_raised() -> bool {
-    RAISED.load(Ordering::Relaxed)
-}
-
-/// Records that the first step starts.
-pub(super) fn start() {
-    STARTED.store(true, Ordering::Relaxed);
-}
-
-/// Whether the first step has started.
-pub(crate) fn has_started() -> bool {
-    STARTED.load(Ordering::Relaxed)
+    RAISED.load(Ordering::Relaxed) != 0
 }
 
 /// Records that the steps have ended and only the final work remains.

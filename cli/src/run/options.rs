@@ -13,7 +13,7 @@ use study::{
 };
 
 use super::live::LiveStart;
-use crate::models;
+use crate::{logging, models};
 
 /// Default folder of the results.
 const OUT: &str = "results/run";
@@ -245,6 +245,12 @@ struct SafetyOptions {
     /// Address space of the process of each FMU, in bytes or as in 512MiB, 2GiB.
     #[arg(long, value_name = "BYTES", value_parser = str::parse::<Memory>)]
     memory_limit: Option<Memory>,
+    /// Run in this process alone, for debuggers
+    ///
+    /// By default a small process supervises the run: it passes signals on, and says which FMU was last if one
+    /// ends the process of the run.
+    #[arg(long)]
+    pub(super) in_process: bool,
     /// Save the state of the run to this file
     ///
     /// At the end of the run, and when it is interrupted.
@@ -364,6 +370,16 @@ fn put<T>(value: &mut Option<T>, over: Option<T>) {
 }
 
 impl Options {
+    /// Whether the run shall have no supervising process.
+    pub(crate) fn is_in_process(&self) -> bool {
+        self.safety.in_process
+    }
+
+    /// Starts logging as the options say.
+    pub(crate) fn start_logging(&self) {
+        logging::start(self.watching.verbose, self.watching.log_json);
+    }
+
     /// Returns the configuration of the file or the checkpoint, with the options of the command
     /// line, and the checkpoint.
     pub(super) fn load(&self) -> anyhow::Result<(LoadedConfig, Option<SavedRun>)> {

@@ -14,7 +14,7 @@ use zip::result::ZipError;
 use crate::description::{ParseError, Version};
 
 pub use read::{Unpacked, unpack_archive};
-pub use temporary::{TemporaryFolder, remove_temporary_folders};
+pub use temporary::{TemporaryFolder, remove_abandoned_folders, remove_temporary_folders};
 pub use write::Package;
 
 /// Name of the file at the root of the archive that describes the FMU.

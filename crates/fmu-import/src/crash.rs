@@ -13,28 +13,31 @@ mod signals;
 use std::fmt::{self, Write as _};
 use std::io;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicI32, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, AtomicUsize, Ordering};
 use std::thread::Thread;
 use std::time::Duration;
 
 use fmu_description::number::seconds;
 
 pub use place::Name;
-pub(crate) use place::{Place, Slot, last_of_this_thread};
+pub(crate) use place::{Place, RECORD, Slot, last_of_this_thread};
+#[cfg(unix)]
+pub use signals::{ENDING_SIGNALS, end_copy, ignores_hangup};
 
 /// How long the program's crash function may take.
 const REPORT_LIMIT: Duration = Duration::from_secs(5);
 
 /// Whether the end of the process has started.
 static ENDING: AtomicBool = AtomicBool::new(false);
-/// Whether the program has finished its work and may call `exit`.
-static DONE: AtomicBool = AtomicBool::new(false);
-/// The cause of the end: the number of a signal, [`EXIT`] or [`GIVEN_UP`]; 0 before.
+/// The cause of the end: the number of a signal, [`EXIT`], [`GIVEN_UP`] or [`UNWOUND`]; 0 before.
 static CAUSE: AtomicI32 = AtomicI32::new(0);
 const EXIT: i32 = -1;
 const GIVEN_UP: i32 = -2;
+const UNWOUND: i32 = -3;
 /// The argument of `exit`.
 static STATUS: AtomicI32 = AtomicI32::new(0);
+/// The time in ms that [`give_up`] states; 0: none.
+static WAITED: AtomicU64 = AtomicU64::new(0);
 /// The address of the slot that the crashed thread entered last.
 static PLACE: AtomicUsize = AtomicUsize::new(0);
 /// The thread that runs the program's crash function.
@@ -61,8 +64,11 @@ pub enum Cause {
     Signal(i32),
     /// A call of `exit`, with its status if it is known.
     Exit(Option<i32>),
-    /// A call of [`give_up`].
-    GivenUp,
+    /// A call of [`give_up`], with the time for which a call had not returned after the signal, if that was the
+    /// reason.
+    GivenUp(Option<Duration>),
+    /// A function of an FMU did not return: an exception, `pthread_exit` or a cancellation left it.
+    Unwound,
 }
 
 /// The cause of the end of the process and the FMU calls involved.
@@ -106,7 +112,15 @@ fn write_ending(
         }
         Cause::Exit(Some(status)) => write!(out, " ended the process by exit({status})"),
         Cause::Exit(None) => out.write_str(" ended the process by exit"),
-        Cause::GivenUp => out.write_str(" does not return"),
+        Cause::GivenUp(None) => out.write_str(" had not returned"),
+        Cause::GivenUp(Some(waited)) => {
+            let waited = waited.as_secs_f64();
+            write!(out, " has not returned within {waited} s after the signal")
+        }
+        Cause::Unwound => out.write_str(
+            " was left by an exception of C++, by pthread_exit or by the cancellation of its thread, which \
+             no function of an FMU may let out",
+        ),
     }
 }
 
@@ -128,11 +142,15 @@ fn signal_text(_: i32) -> &'static str {
 /// runs `last`. If `last` itself crashes, because the FMU overwrote the memory of the program, one line
 /// with the cause and `advice` goes to standard error. Only the first call of `watch` has an effect.
 ///
+/// The thread calls `prepare` at its start. It should use what `last` uses of the memory of a thread: the first
+/// use takes a lock of the dynamic linker, which an FMU that crashes in a constructor of its library holds.
+///
 /// # Errors
 ///
 /// [`io::Error`] if the operating system refuses the thread or a signal handler.
 pub fn watch(
     advice: &'static str,
+    prepare: impl FnOnce() + Send + 'static,
     last: impl FnOnce(&Ending) -> u8 + Send + 'static,
 ) -> io::Result<()> {
     if REPORTER.get().is_some() {
@@ -142,6 +160,7 @@ pub fn watch(
     let report = move || {
         #[cfg(unix)]
         signals::mark_reporter();
+        prepare();
         while CAUSE.load(Ordering::Acquire) == 0 {
             std::thread::park();
         }
@@ -168,7 +187,11 @@ fn cause() -> Cause {
             Cause::Exit(Some(STATUS.load(Ordering::Relaxed)))
         }
         EXIT => Cause::Exit(None),
-        GIVEN_UP => Cause::GivenUp,
+        GIVEN_UP => {
+            let waited = WAITED.load(Ordering::Relaxed);
+            Cause::GivenUp((waited > 0).then(|| Duration::from_millis(waited)))
+        }
+        UNWOUND => Cause::Unwound,
         signal => Cause::Signal(signal),
     }
 }
@@ -177,6 +200,12 @@ fn cause() -> Cause {
 struct Line {
     bytes: [u8; 1024],
     length: usize,
+}
+
+impl Line {
+    const fn new() -> Self {
+        Self { bytes: [b'\n'; 1024], length: 0 }
+    }
 }
 
 impl fmt::Write for Line {
@@ -191,17 +220,19 @@ impl fmt::Write for Line {
 
 /// Returns the message for a crash function that crashes or does not return.
 fn fallback_message() -> Line {
-    let mut line = Line { bytes: [b'\n'; 1024], length: 0 };
+    let mut line = Line::new();
     // A line that is too long is cut.
     let _ = write_fallback(&mut line);
-    line.length = (line.length + 1).min(line.bytes.len());
     line
 }
 
 fn write_fallback(line: &mut Line) -> fmt::Result {
     line.write_str("error: ")?;
     write_ending(line, place::calls(PLACE.load(Ordering::Relaxed)), cause())?;
-    line.write_str("; this program could not shut down properly: the last results may be lost; ")?;
+    if has_begun_steps() {
+        line.write_str("; this program could not shut down properly: the last rows may be lost")?;
+    }
+    line.write_str("; ")?;
     line.write_str(ADVICE.get().copied().unwrap_or_default())
 }
 
@@ -218,19 +249,55 @@ fn start_report(cause: i32, place: usize) -> bool {
     true
 }
 
-/// Ends the process as after a crash, for a program whose FMU does not return. This function returns
-/// only if [`watch`] was not called.
-pub fn give_up() {
+/// Ends the process as after a crash, for a program whose FMU does not return, after it has `waited` since a
+/// signal. This function returns only if [`watch`] was not called.
+pub fn give_up(waited: Option<Duration>) {
     if REPORTER.get().is_some() {
+        let waited = waited.map_or(0, |waited| waited.as_millis());
+        WAITED.store(u64::try_from(waited).unwrap_or(u64::MAX), Ordering::Relaxed);
         start_report(GIVEN_UP, 0);
         std::thread::sleep(REPORT_LIMIT);
         leave(1);
     }
 }
 
-/// Marks the work of the program as finished: a later `exit` is not reported as an FMU's.
-pub fn done() {
-    DONE.store(true, Ordering::Relaxed);
+/// Ends the process if a call of the instance that is about to be dropped has not returned: then the stack
+/// is unwound by what left that call, and nothing of the FMU may be called any more.
+pub(crate) fn check_returned(slot: &Slot) {
+    if slot.is_entered() && !std::thread::panicking() && REPORTER.get().is_some() {
+        start_report(UNWOUND, std::ptr::from_ref(slot).addr());
+        std::thread::sleep(REPORT_LIMIT);
+        leave(1);
+    }
+}
+
+/// Marks the work of the program as finished, with this exit status: a later `exit` is not reported as an
+/// FMU's.
+pub fn done(status: u8) {
+    #[cfg(unix)]
+    if signals::is_copy() {
+        return;
+    }
+    RECORD.done.store(i32::from(status) + 1, Ordering::Release);
+    #[cfg(target_os = "linux")]
+    crate::supervise::wake();
+}
+
+/// Whether the program has finished its work.
+#[cfg(unix)]
+fn is_done() -> bool {
+    RECORD.done.load(Ordering::Acquire) != 0
+}
+
+/// Records that the first step starts.
+pub fn begin_steps() {
+    RECORD.started.store(true, Ordering::Relaxed);
+}
+
+/// Whether the first step has started.
+#[must_use]
+pub fn has_begun_steps() -> bool {
+    RECORD.started.load(Ordering::Relaxed)
 }
 
 /// Returns the FMU calls that have not returned.
@@ -241,6 +308,7 @@ pub fn calls() -> Vec<Call> {
 
 /// Ends the process at once, without running destructors of the program or of an FMU.
 pub fn leave(status: u8) -> ! {
+    done(status);
     #[cfg(unix)]
     signals::leave(status.into());
     #[cfg(not(unix))]

@@ -4,7 +4,8 @@
 //! returns an [`Instance`], which implements [`slave::Slave`]. [`isolate`] runs each instance in a
 //! separate process: a crash of the FMU ends only that process.
 //!
-//! [`crash`] reports a crash of an FMU that runs in the process of the program.
+//! [`crash`] reports a crash of an FMU that runs in the process of the program; [`supervise`], on Linux, has
+//! a second process watch the program.
 #![deny(unsafe_code)]
 
 mod call_log;
@@ -15,6 +16,8 @@ mod fmu;
 mod instance;
 pub mod isolate;
 mod library;
+#[cfg(target_os = "linux")]
+pub mod supervise;
 mod v1;
 mod v2;
 mod v3;

@@ -26,7 +26,7 @@ use fmu_description::abi::{
 };
 use libloading::Library as Handle;
 
-use crate::crash::{Place, Slot};
+use crate::crash::{self, Place, Slot};
 use crate::error::LoadError;
 use functions::Functions;
 pub(crate) use log::Names;
@@ -326,6 +326,7 @@ impl Drop for Component {
         if self.pointer.is_null() {
             return;
         }
+        crash::check_returned(&self.place);
         if self.abandoned || self.library.corrupted.load(Ordering::Relaxed) {
             // The instance may still use the library, the callbacks and the sink: they are leaked.
             std::mem::forget((self.library.clone(), self.callbacks.clone(), self.sink.clone()));

@@ -7,6 +7,7 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use super::ledger::Ledger;
 use super::pace::Pace;
 use super::{Column, ColumnKind, ResultsError, Row, Sink, TIME, Widths, check_names, create_file};
 use lines::Lines;
@@ -32,6 +33,8 @@ pub struct CsvSink {
     lines: Lines,
     /// Length of the file, at the end of a line.
     written: u64,
+    /// Keeps the lines for the process that supervises this one, if there is one.
+    ledger: Option<Ledger>,
     pace: Pace,
 }
 
@@ -53,9 +56,11 @@ impl CsvSink {
             lines.quote(&column.name);
         }
         lines.push(b'\n');
+        let file = create_file(path)?;
         let mut sink = Self {
             path: path.to_owned(),
-            file: create_file(path)?,
+            ledger: Ledger::enter(path, &file),
+            file,
             widths: Widths::new(columns),
             cells: columns.iter().map(|column| (column.kind, column.clocked)).collect(),
             lines,
@@ -66,12 +71,19 @@ impl CsvSink {
         Ok(sink)
     }
 
+    fn enter_written(&self, is_complete: bool) {
+        if let Some(ledger) = self.ledger {
+            ledger.written(self.written, is_complete);
+        }
+    }
+
     /// Appends the lines to the file; after a failure the file keeps its former content.
     fn write_rows(&mut self) -> Result<(), ResultsError> {
         match self.file.write_all(self.lines.bytes()) {
             Ok(()) => {
                 self.written += self.lines.bytes().len() as u64;
                 self.lines.clear();
+                self.enter_written(false);
                 Ok(())
             }
             Err(source) => {
@@ -87,6 +99,7 @@ impl CsvSink {
 impl Sink for CsvSink {
     fn row(&mut self, time: f64, row: &Row<'_>) -> Result<(), ResultsError> {
         self.widths.check(row)?;
+        let start = self.lines.bytes().len();
         let lines = &mut self.lines;
         let mut reals = row.reals.iter();
         let mut integers = row.integers.iter();
@@ -122,11 +135,9 @@ impl Sink for CsvSink {
             }
         }
         lines.push(b'\n');
-        if self.lines.bytes().len() >= BUFFER || self.pace.due() {
-            self.write_rows()
-        } else {
-            Ok(())
-        }
+        let rows = self.lines.bytes();
+        let is_kept = self.ledger.is_none_or(|ledger| ledger.keep(rows, start));
+        if rows.len() >= BUFFER || !is_kept || self.pace.due() { self.write_rows() } else { Ok(()) }
     }
 
     fn flush(&mut self) -> Result<(), ResultsError> {
@@ -134,7 +145,9 @@ impl Sink for CsvSink {
     }
 
     fn finish(mut self: Box<Self>) -> Result<(), ResultsError> {
-        self.write_rows()
+        self.write_rows()?;
+        self.enter_written(true);
+        Ok(())
     }
 }
 

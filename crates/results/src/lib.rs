@@ -9,6 +9,7 @@
 mod csv;
 mod decimation;
 mod envelope;
+pub mod ledger;
 mod memory;
 mod pace;
 mod parquet;

@@ -13,6 +13,7 @@ mod linearise;
 mod misbehaviour;
 mod misbehaviour_calls;
 mod misbehaviour_isolated;
+mod misbehaviour_process;
 mod misbehaviour_run;
 mod model_exchange;
 mod network;

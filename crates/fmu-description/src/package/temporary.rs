@@ -79,6 +79,11 @@ pub fn remove_temporary_folders() {
     }
 }
 
+/// Removes the folders that processes have left which were killed.
+pub fn remove_abandoned_folders() {
+    remove_abandoned(&std::env::temp_dir());
+}
+
 /// Locks the folder at `path`; an error if another process has locked or removed it.
 #[cfg(unix)]
 fn lock(path: &Path) -> io::Result<Option<File>> {

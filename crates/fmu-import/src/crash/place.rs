@@ -6,7 +6,9 @@ use std::fmt;
 use std::ops::Deref;
 use std::ptr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{
+    AtomicBool, AtomicI32, AtomicPtr, AtomicU8, AtomicU64, AtomicUsize, Ordering,
+};
 
 use super::Call;
 
@@ -15,9 +17,38 @@ const SLOT_COUNT: usize = 4096;
 /// Bytes of an instance's name that reports show.
 const NAME_LENGTH: usize = 96;
 
-/// The slots of all instances. They are static because an FMU may overwrite the heap before it
-/// crashes. Instances beyond [`SLOT_COUNT`] share the last slot.
-static SLOTS: [Slot; SLOT_COUNT] = [const { Slot::new() }; SLOT_COUNT];
+/// What is known of this process when it ends. It is static because an FMU may overwrite the heap before
+/// it crashes.
+pub(crate) static RECORD: Record = Record {
+    slots: [const { Slot::new() }; SLOT_COUNT],
+    used: AtomicUsize::new(0),
+    started: AtomicBool::new(false),
+    done: AtomicI32::new(0),
+    copies: AtomicUsize::new(0),
+};
+
+/// The calls of all instances and how far the program is. It fills whole pages, of at most 64 KiB each, which
+/// a supervisor shares with this process.
+#[repr(C, align(65536))]
+pub(crate) struct Record {
+    /// The slots of the instances. Those beyond [`SLOT_COUNT`] share the last slot.
+    slots: [Slot; SLOT_COUNT],
+    /// The number of slots from the first one on that were ever taken.
+    used: AtomicUsize,
+    /// Whether the first step has started.
+    pub(super) started: AtomicBool,
+    /// The exit status with which the program ends, plus 1; 0 while it works.
+    pub(crate) done: AtomicI32,
+    /// The number of copies of this process that FMUs made by `fork` and that went on as the program.
+    pub(super) copies: AtomicUsize,
+}
+
+impl Record {
+    /// The slots that were ever taken.
+    fn used(&self) -> &[Slot] {
+        &self.slots[..self.used.load(Ordering::Acquire).min(SLOT_COUNT)]
+    }
+}
 
 thread_local! {
     /// Address of the slot that this thread entered last; a signal handler reads it.
@@ -74,8 +105,11 @@ pub(crate) struct Place {
 impl Place {
     /// Claims a slot for a new instance.
     pub(crate) fn new(instance: &str) -> Arc<Self> {
-        let free = SLOTS.iter().find(|slot| !slot.taken.swap(true, Ordering::AcqRel));
-        let slot = free.unwrap_or(&SLOTS[SLOT_COUNT - 1]);
+        let mut slots = RECORD.slots.iter();
+        let free = slots.position(|slot| !slot.taken.swap(true, Ordering::AcqRel));
+        let index = free.unwrap_or(SLOT_COUNT - 1);
+        let slot = &RECORD.slots[index];
+        RECORD.used.fetch_max(index + 1, Ordering::AcqRel);
         let bytes = instance.as_bytes();
         for (place, byte) in slot.name.iter().zip(bytes) {
             place.store(*byte, Ordering::Relaxed);
@@ -139,14 +173,22 @@ impl Slot {
         f64::from_bits(self.time.load(Ordering::Relaxed))
     }
 
+    /// Whether a call has not returned.
+    pub(crate) fn is_entered(&self) -> bool {
+        !self.function.load(Ordering::Relaxed).is_null()
+    }
+
+    fn name(&self) -> Name {
+        let bytes = self.name.each_ref().map(|byte| byte.load(Ordering::Relaxed));
+        Name { bytes, length: self.length.load(Ordering::Relaxed).min(NAME_LENGTH) }
+    }
+
     /// Returns the call that the instance executes.
     fn call(&self) -> Option<Call> {
         let function = self.function.load(Ordering::Relaxed);
         // SAFETY: null, or the address of the static reference passed to `enter`.
         let function = *unsafe { function.as_ref() }?;
-        let bytes = self.name.each_ref().map(|byte| byte.load(Ordering::Relaxed));
-        let instance = Name { bytes, length: self.length.load(Ordering::Relaxed).min(NAME_LENGTH) };
-        Some(Call { instance, function, time: self.time() })
+        Some(Call { instance: self.name(), function, time: self.time() })
     }
 
     /// Returns whether `address` is the address of this slot.
@@ -168,11 +210,18 @@ pub(crate) fn last_of_this_thread() -> usize {
     LAST.try_with(Cell::get).unwrap_or(0)
 }
 
+/// Returns the name of the instance that has the slot at `address`.
+#[cfg(unix)]
+pub(super) fn instance(address: usize) -> Option<Name> {
+    RECORD.used().iter().find(|slot| slot.is_at(address)).map(Slot::name)
+}
+
 /// Returns the call that the slot at `address` executes. Without such a slot or call, returns the
 /// current calls of all instances. Does not allocate.
 pub(super) fn calls(address: usize) -> impl Iterator<Item = Call> {
-    let own = SLOTS.iter().find(|slot| slot.is_at(address) && slot.call().is_some());
-    SLOTS
+    let slots = RECORD.used();
+    let own = slots.iter().find(|slot| slot.is_at(address) && slot.call().is_some());
+    slots
         .iter()
         .filter(move |slot| own.is_none_or(|own| ptr::eq(own, *slot)))
         .filter_map(Slot::call)

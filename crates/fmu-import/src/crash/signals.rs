@@ -5,16 +5,18 @@
 #![expect(unsafe_code, reason = "signal handlers")]
 
 use std::cell::Cell;
+use std::fmt::Write as _;
 use std::io;
 use std::mem::MaybeUninit;
-use std::ptr::null_mut;
-use std::sync::atomic::{AtomicI32, Ordering};
+use std::ptr::{null, null_mut};
+use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use libc::{c_int, c_void, siginfo_t};
 
 use super::{
-    DONE, EXIT, REPORT_LIMIT, STATUS, fallback_message, last_of_this_thread, start_report,
+    EXIT, Line, RECORD, REPORT_LIMIT, STATUS, fallback_message, is_done, last_of_this_thread,
+    place, start_report,
 };
 
 /// The signals that end a process, each with its name and meaning.
@@ -25,6 +27,16 @@ pub(super) const FATAL: [(c_int, &str); 6] = [
     (libc::SIGILL, "SIGILL: an invalid instruction"),
     (libc::SIGABRT, "SIGABRT: abort was called"),
     (libc::SIGSYS, "SIGSYS: an invalid system call"),
+];
+/// The signals by which users and systems end a program or announce its end.
+pub const ENDING_SIGNALS: [c_int; 7] = [
+    libc::SIGINT,
+    libc::SIGTERM,
+    libc::SIGHUP,
+    libc::SIGUSR1,
+    libc::SIGUSR2,
+    libc::SIGXCPU,
+    libc::SIGALRM,
 ];
 /// Size in bytes of the alternate signal stack, which serves after a stack overflow.
 const STACK: usize = 1 << 16;
@@ -37,10 +49,63 @@ thread_local! {
 /// Identifier of the process that called `watch`; processes forked by an FMU are not handled.
 static PROCESS: AtomicI32 = AtomicI32::new(0);
 
+/// In a copy of the process that `fork` has made, the address of the slot that its thread had entered last.
+static FORKED_BY: AtomicUsize = AtomicUsize::new(NOT_FORKED);
+const NOT_FORKED: usize = usize::MAX;
+
 /// Returns whether an FMU forked this process.
 fn is_forked() -> bool {
     // SAFETY: no conditions.
     unsafe { libc::getpid() != PROCESS.load(Ordering::Relaxed) }
+}
+
+/// Whether SIGHUP is ignored, as `nohup` asks for.
+#[must_use]
+pub fn ignores_hangup() -> bool {
+    let mut action = MaybeUninit::<libc::sigaction>::zeroed();
+    // SAFETY: asks only; all zeros is a valid value of the structure.
+    let action = unsafe {
+        libc::sigaction(libc::SIGHUP, null(), action.as_mut_ptr());
+        action.assume_init()
+    };
+    action.sa_sigaction == libc::SIG_IGN
+}
+
+/// Whether this process is a copy that `fork` has made.
+#[inline]
+pub(super) fn is_copy() -> bool {
+    FORKED_BY.load(Ordering::Relaxed) != NOT_FORKED
+}
+
+/// Ends this process if it is a copy that an FMU made by `fork` and that goes on as the program.
+#[inline]
+pub fn end_copy() {
+    if is_copy() {
+        say_and_end();
+    }
+}
+
+#[cold]
+fn say_and_end() -> ! {
+    if RECORD.copies.fetch_add(1, Ordering::Relaxed) > 0 {
+        leave(0);
+    }
+    let mut line = Line::new();
+    let name = place::instance(FORKED_BY.load(Ordering::Relaxed));
+    // A line that is too long is cut.
+    let _ = write!(
+        line,
+        "warning: {}: the FMU has forked this process, and both went on with the run; the copy is ended, with all \
+         that the FMU wanted in it",
+        name.as_deref().unwrap_or("the program")
+    );
+    line.print();
+    leave(0)
+}
+
+/// Runs in a copy of the process that `fork` has made.
+extern "C" fn on_fork() {
+    FORKED_BY.store(last_of_this_thread(), Ordering::Relaxed);
 }
 
 /// Marks the calling thread as the one that runs the program's crash function.
@@ -53,6 +118,10 @@ pub(super) fn mark_reporter() {
 pub(super) fn install() -> io::Result<()> {
     // SAFETY: no conditions.
     PROCESS.store(unsafe { libc::getpid() }, Ordering::Relaxed);
+    // SAFETY: a function that may run in the copy of a process: it stores to an atomic.
+    if unsafe { libc::pthread_atfork(None, None, Some(on_fork)) } != 0 {
+        return Err(io::Error::last_os_error());
+    }
     let stack = Box::leak(vec![0_u8; STACK].into_boxed_slice());
     let stack = libc::stack_t { ss_sp: stack.as_mut_ptr().cast(), ss_flags: 0, ss_size: STACK };
     // SAFETY: the memory is never freed.
@@ -76,7 +145,7 @@ fn check(result: c_int) -> io::Result<()> {
 }
 
 extern "C" fn on_signal(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
-    if is_forked() {
+    if is_forked() || is_done() {
         // SAFETY: restores the default; the signal is delivered when this handler returns.
         unsafe {
             libc::signal(signal, libc::SIG_DFL);
@@ -94,10 +163,17 @@ fn wait() -> ! {
     if !IS_REPORTER.try_with(Cell::get).unwrap_or(false) {
         std::thread::sleep(REPORT_LIMIT + Duration::from_secs(1));
     }
-    let line = fallback_message();
-    // SAFETY: `line.length` bytes to read.
-    unsafe { libc::write(libc::STDERR_FILENO, line.bytes.as_ptr().cast(), line.length) };
-    leave(1)
+    fallback_message().print();
+    super::leave(1)
+}
+
+impl Line {
+    /// Prints the line on standard error.
+    fn print(&mut self) {
+        self.length = (self.length + 1).min(self.bytes.len());
+        // SAFETY: `length` bytes to read.
+        unsafe { libc::write(libc::STDERR_FILENO, self.bytes.as_ptr().cast(), self.length) };
+    }
 }
 
 pub(super) fn leave(status: c_int) -> ! {
@@ -107,7 +183,7 @@ pub(super) fn leave(status: c_int) -> ! {
 
 /// Handles a call of `exit`, by the program at its end or by an FMU.
 fn exit_called(status: c_int) {
-    if DONE.load(Ordering::Relaxed) || is_forked() {
+    if is_done() || is_forked() {
         return;
     }
     STATUS.store(status, Ordering::Relaxed);

@@ -13,6 +13,7 @@ use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, wa
 
 use super::output::Output;
 use super::{STARTED_BY, WORKER};
+use crate::supervise::signal_name;
 use slave::Failure;
 
 /// Pause between two checks whether the process has ended.
@@ -110,36 +111,7 @@ impl Drop for Process {
 
 fn failure(status: ExitStatus) -> Failure {
     match (status.signal(), status.code()) {
-        (Some(signal), _) => Failure::Killed(signal, name(signal)),
+        (Some(signal), _) => Failure::Killed(signal, signal_name(signal)),
         (None, code) => Failure::Exited(code.unwrap_or(-1)),
     }
-}
-
-/// Returns the name of a signal.
-fn name(signal: i32) -> &'static str {
-    let known = [
-        (Signal::HUP, "SIGHUP"),
-        (Signal::INT, "SIGINT"),
-        (Signal::QUIT, "SIGQUIT"),
-        (Signal::ILL, "SIGILL"),
-        (Signal::TRAP, "SIGTRAP"),
-        (Signal::ABORT, "SIGABRT"),
-        (Signal::BUS, "SIGBUS"),
-        (Signal::FPE, "SIGFPE"),
-        (Signal::KILL, "SIGKILL"),
-        (Signal::USR1, "SIGUSR1"),
-        (Signal::SEGV, "SIGSEGV"),
-        (Signal::USR2, "SIGUSR2"),
-        (Signal::PIPE, "SIGPIPE"),
-        (Signal::ALARM, "SIGALRM"),
-        (Signal::TERM, "SIGTERM"),
-        (Signal::XCPU, "SIGXCPU"),
-        (Signal::XFSZ, "SIGXFSZ"),
-        (Signal::VTALARM, "SIGVTALRM"),
-        (Signal::PROF, "SIGPROF"),
-        (Signal::IO, "SIGIO"),
-        (Signal::SYS, "SIGSYS"),
-    ];
-    let found = known.iter().find(|(known, _)| known.as_raw() == signal);
-    found.map_or("no common one", |(_, name)| name)
 }

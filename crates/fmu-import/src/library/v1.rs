@@ -19,7 +19,7 @@ use libloading::Library as Handle;
 use super::calls::{function, same_length};
 use super::log::{Names, Sink, logger};
 use super::{c_string, calloc, free, load};
-use crate::crash::Place;
+use crate::crash::{self, Place};
 use crate::error::LoadError;
 use functions::{Callbacks, Functions, Instance};
 use slave::{CallError, Failure, absent};
@@ -143,6 +143,7 @@ impl Drop for Component {
         if self.pointer.is_null() {
             return;
         }
+        crash::check_returned(&self.place);
         if self.abandoned || self.library.corrupted.load(Ordering::Relaxed) {
             // The instance may still use the library and the sink: they are leaked.
             std::mem::forget((self.library.clone(), self.sink.clone()));

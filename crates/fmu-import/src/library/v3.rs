@@ -23,7 +23,7 @@ use libloading::Library as Handle;
 
 use super::log::{Sink, receive_message};
 use super::{c_string, load};
-use crate::crash::Place;
+use crate::crash::{self, Place};
 use crate::error::LoadError;
 use functions::{ClockUpdate, Functions, Instance, IntermediateUpdate, Preemption, State};
 use intermediate::Inputs;
@@ -229,6 +229,7 @@ impl Drop for Component {
         if self.pointer.is_null() {
             return;
         }
+        crash::check_returned(&self.place);
         if self.library.corrupted.load(Ordering::Relaxed) {
             // The instance may still use the library and the sink: they are leaked.
             std::mem::forget((self.library.clone(), self.sink.clone()));

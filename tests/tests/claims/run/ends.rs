@@ -27,10 +27,10 @@ fn interrupted(bench: &Bench, signal: &str, stop: &str, more: &[&str]) -> Output
 
 #[test]
 fn an_interrupted_run_keeps_complete_rows_and_says_where_it_stopped() {
-    for signal in ["-INT", "-TERM"] {
+    for (signal, status) in [("-INT", 130), ("-TERM", 143)] {
         let bench = Bench::new();
         let output = interrupted(&bench, signal, "1e6", &[]);
-        fails(&output, 130, &["the run was interrupted at t = "]);
+        fails(&output, status, &["the run was interrupted at t = "]);
         assert!(!said(&output).contains("--resume"), "there is no checkpoint to go on from");
         let text = bench.read("out/results.csv");
         let rows = whole_rows(&text);

@@ -1,0 +1,332 @@
+//! Supervision: the program works in a child process, and this one only waits and sees how the child ends.
+//!
+//! [`split`] is for programs, before they start a thread. What an FMU does to its process, from `_exit` to a
+//! signal handler of its own, then leaves one process that can say which FMU, function and time was last.
+#![expect(unsafe_code, reason = "fork, signals, and a page of memory that two processes share")]
+
+use std::fmt;
+use std::io;
+use std::mem::MaybeUninit;
+use std::ptr::{from_ref, null_mut};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use libc::{c_int, pid_t, siginfo_t, sigset_t};
+
+use rustix::process::Signal;
+
+use crate::crash::{self, Call, ENDING_SIGNALS, RECORD, ignores_hangup};
+
+/// How long the process may take to end after its work, and to end the call that it is in after a signal.
+const AFTER_WORK: Duration = Duration::from_secs(1);
+const AFTER_SIGNAL: Duration = Duration::from_secs(8);
+/// The interval of checks while one of these times passes.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Number of words of memory that both processes share for the program: 2 MiB, of which only what is used
+/// takes memory.
+const WORDS: usize = 1 << 18;
+static MEMORY: OnceLock<&'static [AtomicU64]> = OnceLock::new();
+
+/// The process that supervises this one; 0 if none does.
+static SUPERVISOR: AtomicI32 = AtomicI32::new(0);
+
+/// How the process of the program ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// With this exit status.
+    Exited(i32),
+    /// By this signal.
+    Killed(i32),
+    /// It was killed because an FMU kept it from ending.
+    Stuck,
+}
+
+impl fmt::Display for End {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            End::Exited(status) => write!(formatter, "ended the process with exit status {status}"),
+            End::Killed(signal) => {
+                write!(formatter, "ended the process by signal {signal} ({})", signal_name(*signal))
+            }
+            End::Stuck => formatter.write_str("kept the process from ending, and was killed"),
+        }
+    }
+}
+
+/// What is known of the process of the program at its end.
+#[derive(Clone, Debug)]
+pub struct Ended {
+    /// How it ended.
+    pub end: End,
+    /// The exit status that the program chose; `None` if it was ended before.
+    pub status: Option<u8>,
+    /// The calls of FMUs that had not returned.
+    pub calls: Vec<Call>,
+    /// Whether the first step had started.
+    pub has_begun_steps: bool,
+}
+
+/// Splits the program into two processes. Returns `None` in the one that shall do the work, and at the end of
+/// that one what is known of it in the other. Call it before the program starts a thread.
+///
+/// # Errors
+///
+/// [`io::Error`] if the operating system refuses the memory or the process; the caller can work without.
+pub fn split() -> io::Result<Option<Ended>> {
+    share_record()?;
+    share_memory()?;
+    let signals = Signals::blocked()?;
+    // SAFETY: no conditions.
+    let supervisor = unsafe { libc::getpid() };
+    // SAFETY: this process has one thread.
+    match unsafe { libc::fork() } {
+        -1 => {
+            let error = io::Error::last_os_error();
+            signals.restore();
+            Err(error)
+        }
+        0 => {
+            signals.restore();
+            SUPERVISOR.store(supervisor, Ordering::Relaxed);
+            end_with(supervisor);
+            Ok(None)
+        }
+        child => Ok(Some(Watch { child, signals, told: None }.end())),
+    }
+}
+
+/// Puts memory that a forked process shares in place of the pages of [`RECORD`], which are zero yet.
+fn share_record() -> io::Result<()> {
+    let (protection, flags) = (
+        libc::PROT_READ | libc::PROT_WRITE,
+        libc::MAP_SHARED | libc::MAP_ANONYMOUS | libc::MAP_FIXED,
+    );
+    let (address, length) = (from_ref(&RECORD).cast_mut().cast(), size_of_val(&RECORD));
+    // SAFETY: the pages of a static that is aligned to pages and fills them, and of which no thread holds a
+    // reference yet; its fields are atomics, for which zeros are the values that they have.
+    let mapped = unsafe { libc::mmap(address, length, protection, flags, -1, 0) };
+    if mapped == libc::MAP_FAILED { Err(io::Error::last_os_error()) } else { Ok(()) }
+}
+
+/// Maps zeros that a forked process shares.
+fn share_memory() -> io::Result<()> {
+    let (protection, flags) =
+        (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_SHARED | libc::MAP_ANONYMOUS);
+    let length = WORDS * size_of::<AtomicU64>();
+    // SAFETY: a new mapping at an address that the system chooses.
+    let mapped = unsafe { libc::mmap(null_mut(), length, protection, flags, -1, 0) };
+    if mapped == libc::MAP_FAILED {
+        return Err(io::Error::last_os_error());
+    }
+    // SAFETY: a mapping of this length, aligned to pages and never unmapped; both processes access it by
+    // atomics only, for which zeros are valid.
+    let words = unsafe { std::slice::from_raw_parts(mapped.cast::<AtomicU64>(), WORDS) };
+    // Set once: a program splits once.
+    let _ = MEMORY.set(words);
+    Ok(())
+}
+
+/// Returns memory of zeros that the process of the program and its supervisor share, for the program's use;
+/// `None` in a program that was not split.
+#[must_use]
+pub fn memory() -> Option<&'static [AtomicU64]> {
+    MEMORY.get().copied()
+}
+
+/// Lets this process end as soon as its supervisor ends.
+fn end_with(supervisor: pid_t) {
+    // SAFETY: no conditions.
+    unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) };
+    // SAFETY: no conditions.
+    if unsafe { libc::getppid() } != supervisor {
+        crash::leave(1);
+    }
+}
+
+/// Tells the supervisor that the program has finished its work.
+pub(crate) fn wake() {
+    let supervisor = SUPERVISOR.load(Ordering::Relaxed);
+    // SAFETY: the parent of this process, if it is the supervisor still.
+    if supervisor != 0 && unsafe { libc::getppid() } == supervisor {
+        // SAFETY: a signal that the supervisor waits for.
+        unsafe { libc::kill(supervisor, libc::SIGCHLD) };
+    }
+}
+
+/// The signals that the supervisor waits for, blocked meanwhile.
+struct Signals {
+    waited: sigset_t,
+    former: sigset_t,
+}
+
+impl Signals {
+    fn blocked() -> io::Result<Self> {
+        let (mut waited, mut former) = (MaybeUninit::zeroed(), MaybeUninit::zeroed());
+        let hangup = ignores_hangup();
+        // SAFETY: sets of signals to write to, and numbers of signals.
+        unsafe {
+            libc::sigemptyset(waited.as_mut_ptr());
+            let chosen =
+                ENDING_SIGNALS.into_iter().filter(|signal| *signal != libc::SIGHUP || !hangup);
+            for signal in chosen.chain([libc::SIGCHLD, libc::SIGTSTP]) {
+                libc::sigaddset(waited.as_mut_ptr(), signal);
+            }
+            if libc::sigprocmask(libc::SIG_BLOCK, waited.as_ptr(), former.as_mut_ptr()) != 0 {
+                return Err(io::Error::last_os_error());
+            }
+            Ok(Self { waited: waited.assume_init(), former: former.assume_init() })
+        }
+    }
+
+    fn restore(&self) {
+        // SAFETY: the set that this process had.
+        unsafe { libc::sigprocmask(libc::SIG_SETMASK, &raw const self.former, null_mut()) };
+    }
+
+    /// Waits for one of the signals, up to `limit`; returns its number, and whether the kernel sent it to the
+    /// whole process group, as it does with the keys of a terminal.
+    fn wait(&self, limit: Option<Duration>) -> Option<(c_int, bool)> {
+        let mut info = MaybeUninit::<siginfo_t>::zeroed();
+        let time = limit.map(|limit| libc::timespec {
+            tv_sec: limit.as_secs().cast_signed(),
+            tv_nsec: limit.subsec_nanos().into(),
+        });
+        let time = time.as_ref().map_or(std::ptr::null(), from_ref);
+        // SAFETY: a set, a structure to write to, and null or a time.
+        let signal = unsafe { libc::sigtimedwait(&raw const self.waited, info.as_mut_ptr(), time) };
+        // SAFETY: all zeros is a valid value of the structure.
+        let by_kernel = unsafe { info.assume_init() }.si_code > 0;
+        (signal > 0).then_some((signal, by_kernel))
+    }
+}
+
+/// The supervision of one process.
+struct Watch {
+    child: pid_t,
+    signals: Signals,
+    /// When the first ending signal was passed on, and the calls at the last change.
+    told: Option<(Instant, Vec<Call>)>,
+}
+
+impl Watch {
+    /// Waits for the end of the process.
+    fn end(mut self) -> Ended {
+        let mut done: Option<Instant> = None;
+        let end = loop {
+            if let Some(end) = self.reap() {
+                break end;
+            }
+            if chosen_status().is_some() && done.is_none() {
+                done = Some(Instant::now());
+            }
+            let is_late = done.is_some_and(|since| since.elapsed() > AFTER_WORK);
+            if is_late || self.is_stuck() {
+                self.send(libc::SIGKILL);
+                self.wait_for_end();
+                break End::Stuck;
+            }
+            let limit = (done.is_some() || self.told.is_some()).then_some(LOOK);
+            if let Some((signal, by_kernel)) = self.signals.wait(limit) {
+                self.pass_on(signal, by_kernel);
+            }
+        };
+        Ended {
+            end,
+            status: chosen_status(),
+            calls: crash::calls(),
+            has_begun_steps: crash::has_begun_steps(),
+        }
+    }
+
+    fn pass_on(&mut self, signal: c_int, by_kernel: bool) {
+        match signal {
+            libc::SIGCHLD => {}
+            libc::SIGTSTP => {
+                self.send(libc::SIGSTOP);
+                // SAFETY: this process stops until it gets SIGCONT.
+                unsafe { libc::raise(libc::SIGSTOP) };
+                self.send(libc::SIGCONT);
+            }
+            _ => {
+                // SAFETY: no conditions.
+                let together = unsafe { libc::getpgid(self.child) == libc::getpgrp() };
+                let by_terminal = by_kernel && [libc::SIGINT, libc::SIGHUP].contains(&signal);
+                if !(by_terminal && together) {
+                    self.send(signal);
+                }
+                self.told.get_or_insert_with(|| (Instant::now(), crash::calls()));
+            }
+        }
+    }
+
+    /// Whether the process has been in the same calls for long since it was told to end.
+    fn is_stuck(&mut self) -> bool {
+        let Some((since, calls)) = &mut self.told else { return false };
+        let now = crash::calls();
+        if now.is_empty() || now != *calls {
+            (*since, *calls) = (Instant::now(), now);
+        }
+        since.elapsed() > AFTER_SIGNAL
+    }
+
+    fn send(&self, signal: c_int) {
+        // SAFETY: a child that has not been waited for.
+        unsafe { libc::kill(self.child, signal) };
+    }
+
+    fn wait_for_end(&self) {
+        let mut status = 0;
+        // SAFETY: a status to write to.
+        while unsafe { libc::waitpid(self.child, &raw mut status, 0) } == -1
+            && io::Error::last_os_error().kind() == io::ErrorKind::Interrupted
+        {}
+    }
+
+    fn reap(&self) -> Option<End> {
+        let mut status = 0;
+        // SAFETY: a status to write to.
+        match unsafe { libc::waitpid(self.child, &raw mut status, libc::WNOHANG) } {
+            0 => None,
+            -1 => Some(End::Exited(-1)),
+            _ if libc::WIFSIGNALED(status) => Some(End::Killed(libc::WTERMSIG(status))),
+            _ if libc::WIFEXITED(status) => Some(End::Exited(libc::WEXITSTATUS(status))),
+            _ => None,
+        }
+    }
+}
+
+/// The exit status that the program chose.
+fn chosen_status() -> Option<u8> {
+    u8::try_from(RECORD.done.load(Ordering::Acquire) - 1).ok()
+}
+
+/// Returns the name of a signal.
+pub(crate) fn signal_name(signal: i32) -> &'static str {
+    let known = [
+        (Signal::HUP, "SIGHUP"),
+        (Signal::INT, "SIGINT"),
+        (Signal::QUIT, "SIGQUIT"),
+        (Signal::ILL, "SIGILL"),
+        (Signal::TRAP, "SIGTRAP"),
+        (Signal::ABORT, "SIGABRT"),
+        (Signal::BUS, "SIGBUS"),
+        (Signal::FPE, "SIGFPE"),
+        (Signal::KILL, "SIGKILL"),
+        (Signal::USR1, "SIGUSR1"),
+        (Signal::SEGV, "SIGSEGV"),
+        (Signal::USR2, "SIGUSR2"),
+        (Signal::PIPE, "SIGPIPE"),
+        (Signal::ALARM, "SIGALRM"),
+        (Signal::TERM, "SIGTERM"),
+        (Signal::XCPU, "SIGXCPU"),
+        (Signal::XFSZ, "SIGXFSZ"),
+        (Signal::VTALARM, "SIGVTALRM"),
+        (Signal::PROF, "SIGPROF"),
+        (Signal::IO, "SIGIO"),
+        (Signal::SYS, "SIGSYS"),
+    ];
+    let found = known.iter().find(|(known, _)| known.as_raw() == signal);
+    found.map_or("no common one", |(_, name)| name)
+}

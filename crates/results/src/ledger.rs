@@ -1,0 +1,284 @@
+//! What another process can know of the results file that this process writes: where it is, how much of it
+//! is written, and the rows that are not. So the rows survive the process.
+
+use std::fs::{File, Metadata};
+use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Number of words that [`share`] needs at least.
+pub const WORDS: usize = ROWS + (1 << 16);
+
+/// The places in the memory: the numbers, then the bytes of the path, then those of the rows.
+const STATE: usize = 0;
+const DEVICE: usize = 1;
+const INODE: usize = 2;
+/// Length of the file in bytes, at the end of a row.
+const LENGTH: usize = 3;
+/// Number of bytes of whole rows that follow in the file.
+const PENDING: usize = 4;
+const PATH_LENGTH: usize = 5;
+const PATH: usize = 6;
+/// The longest path of the system, in words.
+const PATH_WORDS: usize = 512;
+const ROWS: usize = PATH + PATH_WORDS;
+
+const OPEN: u64 = 1;
+const COMPLETE: u64 = 2;
+
+/// Bytes of a word.
+const WORD: usize = size_of::<u64>();
+
+static SHARED: OnceLock<&'static [AtomicU64]> = OnceLock::new();
+
+/// Lets the first results file from now on be known to the process that shares `memory`, whose words are zero.
+/// Only the first call has an effect.
+pub fn share(memory: &'static [AtomicU64]) {
+    if memory.len() >= WORDS {
+        let _ = SHARED.set(memory);
+    }
+}
+
+/// The side of the process that writes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ledger(&'static [AtomicU64]);
+
+impl Ledger {
+    /// Enters a new file; `None` if there is no shared memory, or another file has it.
+    #[cfg(unix)]
+    pub(crate) fn enter(path: &Path, file: &File) -> Option<Self> {
+        use std::os::unix::ffi::OsStrExt as _;
+        use std::os::unix::fs::MetadataExt as _;
+
+        let memory = SHARED.get()?;
+        let path = std::path::absolute(path).ok()?;
+        let path = path.as_os_str().as_bytes();
+        let metadata = file.metadata().ok().filter(Metadata::is_file)?;
+        if path.len() > PATH_WORDS * WORD || memory[INODE].load(Ordering::Relaxed) != 0 {
+            return None;
+        }
+        let ledger = Self(memory);
+        ledger.set(INODE, metadata.ino());
+        ledger.set(DEVICE, metadata.dev());
+        put(&memory[PATH..ROWS], 0, path);
+        ledger.set(PATH_LENGTH, path.len() as u64);
+        ledger.set(STATE, OPEN);
+        Some(ledger)
+    }
+
+    /// Elsewhere no process shares the memory.
+    #[cfg(not(unix))]
+    pub(crate) fn enter(_: &Path, _: &File) -> Option<Self> {
+        None
+    }
+
+    fn set(self, place: usize, value: u64) {
+        self.0[place].store(value, Ordering::Release);
+    }
+
+    /// Records that the file has this length, and that no rows are pending.
+    pub(crate) fn written(self, length: u64, is_complete: bool) {
+        self.set(PENDING, 0);
+        self.set(LENGTH, length);
+        if is_complete {
+            self.set(STATE, COMPLETE);
+        }
+    }
+
+    /// Keeps the row that begins at `start` of the `rows` that the file lacks. Returns false if the memory is
+    /// full: then the rows belong into the file.
+    #[inline]
+    pub(crate) fn keep(self, rows: &[u8], start: usize) -> bool {
+        let fits = rows.len() <= (self.0.len() - ROWS) * WORD;
+        if fits {
+            put(&self.0[ROWS..], start, rows);
+            self.set(PENDING, rows.len() as u64);
+        }
+        fits
+    }
+}
+
+/// Stores the bytes from `start` on, by whole words.
+#[inline]
+fn put(words: &[AtomicU64], start: usize, bytes: &[u8]) {
+    let first = start / WORD;
+    let (whole, rest) = bytes[first * WORD..].as_chunks::<WORD>();
+    for (word, bytes) in words[first..].iter().zip(whole) {
+        word.store(u64::from_le_bytes(*bytes), Ordering::Relaxed);
+    }
+    if !rest.is_empty() {
+        let mut last = [0; WORD];
+        last[..rest.len()].copy_from_slice(rest);
+        words[first + whole.len()].store(u64::from_le_bytes(last), Ordering::Relaxed);
+    }
+}
+
+/// The first `length` bytes of the words.
+fn bytes(words: &[AtomicU64], length: u64) -> Vec<u8> {
+    let length = usize::try_from(length).unwrap_or(usize::MAX);
+    let words = words.iter().take(length.div_ceil(WORD));
+    let mut bytes: Vec<u8> =
+        words.flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes()).collect();
+    bytes.truncate(length);
+    bytes
+}
+
+/// A results file after the end of the process that wrote it.
+#[derive(Debug)]
+pub struct LeftFile {
+    /// Its absolute path.
+    pub path: PathBuf,
+    /// Whether the process had completed it.
+    pub was_complete: bool,
+    /// What it lacks; `None` if it has all rows.
+    pub damage: Option<String>,
+}
+
+/// Completes the file that the ended process wrote: appends the rows that it had recorded and not written.
+/// Returns `None` if it wrote none.
+#[must_use]
+pub fn complete(memory: &[AtomicU64]) -> Option<LeftFile> {
+    let value = |place: usize| memory[place].load(Ordering::Acquire);
+    let state = value(STATE);
+    if state != OPEN && state != COMPLETE {
+        return None;
+    }
+    let path = path_of(bytes(&memory[PATH..ROWS], value(PATH_LENGTH)));
+    let rows = bytes(&memory[ROWS..], value(PENDING));
+    let identity = (value(DEVICE), value(INODE));
+    let damage = match append(&path, identity, value(LENGTH), &rows) {
+        Ok(damage) => damage,
+        Err(error) => Some(format!("its last rows cannot be written: {error}")),
+    };
+    Some(LeftFile { path, was_complete: state == COMPLETE, damage })
+}
+
+#[cfg(unix)]
+fn path_of(bytes: Vec<u8>) -> PathBuf {
+    use std::os::unix::ffi::OsStringExt as _;
+    std::ffi::OsString::from_vec(bytes).into()
+}
+
+#[cfg(not(unix))]
+fn path_of(bytes: Vec<u8>) -> PathBuf {
+    String::from_utf8_lossy(&bytes).into_owned().into()
+}
+
+/// Appends the `rows` that the file of this identity, of which `length` bytes were written, lacks. Returns what
+/// is wrong with the file.
+fn append(
+    path: &Path,
+    identity: (u64, u64),
+    length: u64,
+    rows: &[u8],
+) -> io::Result<Option<String>> {
+    let mut file = match File::options().read(true).write(true).open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return Ok(Some("it was removed during the run".to_owned()));
+        }
+        Err(error) => return Err(error),
+    };
+    let metadata = file.metadata()?;
+    if identity_of(&metadata) != identity {
+        return Ok(Some("another file took its place during the run".to_owned()));
+    }
+    let (found, whole) = (metadata.len(), length + rows.len() as u64);
+    if found < length || found > whole {
+        return Ok(Some(format!(
+            "it has {found} bytes where the run wrote {length}: something else wrote to it"
+        )));
+    }
+    // The process may have ended while it wrote the rows.
+    let (there, missing) = rows.split_at(usize::try_from(found - length).unwrap_or(0));
+    let mut written = vec![0; there.len()];
+    file.seek(SeekFrom::Start(length))?;
+    file.read_exact(&mut written)?;
+    if written != there {
+        return Ok(Some("its last rows are not those of the run".to_owned()));
+    }
+    file.write_all(missing)?;
+    Ok(None)
+}
+
+#[cfg(unix)]
+fn identity_of(metadata: &Metadata) -> (u64, u64) {
+    use std::os::unix::fs::MetadataExt as _;
+    (metadata.dev(), metadata.ino())
+}
+
+#[cfg(not(unix))]
+fn identity_of(_: &Metadata) -> (u64, u64) {
+    (0, 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn memory() -> Vec<AtomicU64> {
+        std::iter::repeat_with(|| AtomicU64::new(0)).take(ROWS + 64).collect()
+    }
+
+    /// Memory as a process leaves it that wrote `length` bytes to a file and had `rows` pending.
+    fn left(path: &Path, length: u64, rows: &[u8]) -> Vec<AtomicU64> {
+        let memory = memory();
+        let (device, inode) = identity_of(&std::fs::metadata(path).unwrap());
+        let name = path.to_str().unwrap().as_bytes();
+        put(&memory[PATH..ROWS], 0, name);
+        put(&memory[ROWS..], 0, rows);
+        let numbers = [
+            (STATE, OPEN),
+            (DEVICE, device),
+            (INODE, inode),
+            (LENGTH, length),
+            (PENDING, rows.len() as u64),
+            (PATH_LENGTH, name.len() as u64),
+        ];
+        for (place, number) in numbers {
+            memory[place].store(number, Ordering::Relaxed);
+        }
+        memory
+    }
+
+    #[test]
+    fn bytes_are_kept_from_any_start() {
+        let rows = b"time,x\n0,1\n0.5,22\n1,333\n";
+        let memory = memory();
+        for (start, end) in [(0, 7), (7, 11), (11, 18), (18, 24)] {
+            put(&memory[ROWS..], start, &rows[..end]);
+            assert_eq!(bytes(&memory[ROWS..], end as u64), &rows[..end]);
+        }
+    }
+
+    #[test]
+    fn the_rows_that_a_file_lacks_are_appended_even_if_a_part_was_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("results.csv");
+        for there in ["", "1,", "1,2\n", "1,2\n3,4\n"] {
+            std::fs::write(&path, format!("a,b\n{there}")).unwrap();
+            let left = complete(&left(&path, 4, b"1,2\n3,4\n")).unwrap();
+            assert_eq!((left.damage, left.was_complete), (None, false), "{there:?}");
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), "a,b\n1,2\n3,4\n");
+        }
+    }
+
+    #[test]
+    fn a_file_that_something_else_changed_is_named_and_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("results.csv");
+        for (text, reason) in
+            [("a,", "has 2 bytes"), ("a,b\n9,9\n", "not those"), ("a,b\n1,2\n3,4\n5", "13 bytes")]
+        {
+            std::fs::write(&path, text).unwrap();
+            let damage = complete(&left(&path, 4, b"1,2\n3,4\n")).unwrap().damage.unwrap();
+            assert!(damage.contains(reason), "{damage}");
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+        }
+        let memory = left(&path, 4, b"1,2\n");
+        std::fs::remove_file(&path).unwrap();
+        assert!(complete(&memory).unwrap().damage.unwrap().contains("removed"));
+        assert!(complete(&self::memory()).is_none());
+    }
+}
