@@ -2,14 +2,12 @@
 
 mod lines;
 
-use std::fs::File;
-use std::io::{Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
-use super::ledger::Ledger;
+use super::output::OutputFile;
 use super::pace::Pace;
-use super::{Column, ColumnKind, ResultsError, Row, Sink, TIME, Widths, check_names, create_file};
+use super::{Column, ColumnKind, ResultsError, Row, Sink, TIME, Widths, check_names};
 use lines::Lines;
 
 /// Number of buffered bytes at which the sink writes to the file.
@@ -24,17 +22,12 @@ const INTERVAL: Duration = Duration::from_millis(100);
 /// quoted; a cell without a value is empty. The layout has no units.
 #[derive(Debug)]
 pub struct CsvSink {
-    path: PathBuf,
-    file: File,
+    file: OutputFile,
     widths: Widths,
     /// Type of each column, and whether it is clocked.
     cells: Vec<(ColumnKind, bool)>,
     /// Complete lines that are not yet in the file.
     lines: Lines,
-    /// Length of the file, at the end of a line.
-    written: u64,
-    /// Keeps the lines for the process that supervises this one, if there is one.
-    ledger: Option<Ledger>,
     pace: Pace,
 }
 
@@ -56,43 +49,27 @@ impl CsvSink {
             lines.quote(&column.name);
         }
         lines.push(b'\n');
-        let file = create_file(path)?;
         let mut sink = Self {
-            path: path.to_owned(),
-            ledger: Ledger::enter(path, &file),
-            file,
+            file: OutputFile::create(path)?,
             widths: Widths::new(columns),
             cells: columns.iter().map(|column| (column.kind, column.clocked)).collect(),
             lines,
-            written: 0,
             pace: Pace::new(INTERVAL),
         };
         sink.write_rows()?;
         Ok(sink)
     }
 
-    fn enter_written(&self, is_complete: bool) {
-        if let Some(ledger) = self.ledger {
-            ledger.written(self.written, is_complete);
-        }
-    }
-
     /// Appends the lines to the file; after a failure the file keeps its former content.
     fn write_rows(&mut self) -> Result<(), ResultsError> {
-        match self.file.write_all(self.lines.bytes()) {
-            Ok(()) => {
-                self.written += self.lines.bytes().len() as u64;
-                self.lines.clear();
-                self.enter_written(false);
-                Ok(())
-            }
-            Err(source) => {
-                // A reader could take an incomplete line for a row. A pipe cannot be truncated.
-                let _ = self.file.set_len(self.written);
-                let _ = self.file.seek(SeekFrom::Start(self.written));
-                Err(ResultsError::Write { path: self.path.clone(), source })
-            }
+        self.file.verify()?;
+        if self.lines.bytes().is_empty() {
+            return Ok(());
         }
+        self.file.append(self.lines.bytes())?;
+        self.lines.clear();
+        self.file.record(false);
+        Ok(())
     }
 }
 
@@ -136,7 +113,7 @@ impl Sink for CsvSink {
         }
         lines.push(b'\n');
         let rows = self.lines.bytes();
-        let is_kept = self.ledger.is_none_or(|ledger| ledger.keep(rows, start));
+        let is_kept = self.file.keep(rows, start);
         if rows.len() >= BUFFER || !is_kept || self.pace.due() { self.write_rows() } else { Ok(()) }
     }
 
@@ -146,7 +123,8 @@ impl Sink for CsvSink {
 
     fn finish(mut self: Box<Self>) -> Result<(), ResultsError> {
         self.write_rows()?;
-        self.enter_written(true);
+        self.file.verify_path()?;
+        self.file.record(true);
         Ok(())
     }
 }

@@ -1,11 +1,13 @@
 //! What another process can know of the results file that this process writes: where it is, how much of it
 //! is written, and the rows that are not. So the rows survive the process.
 
-use std::fs::{File, Metadata};
+use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::output::Identity;
 
 /// Number of words that [`share`] needs at least.
 pub const WORDS: usize = ROWS + (1 << 16);
@@ -45,32 +47,20 @@ pub fn share(memory: &'static [AtomicU64]) {
 pub(crate) struct Ledger(&'static [AtomicU64]);
 
 impl Ledger {
-    /// Enters a new file; `None` if there is no shared memory, or another file has it.
-    #[cfg(unix)]
-    pub(crate) fn enter(path: &Path, file: &File) -> Option<Self> {
-        use std::os::unix::ffi::OsStrExt as _;
-        use std::os::unix::fs::MetadataExt as _;
-
+    /// Enters a new file at this absolute path; `None` if there is no shared memory, or another file has it.
+    pub(crate) fn enter(path: &Path, identity: Identity) -> Option<Self> {
         let memory = SHARED.get()?;
-        let path = std::path::absolute(path).ok()?;
-        let path = path.as_os_str().as_bytes();
-        let metadata = file.metadata().ok().filter(Metadata::is_file)?;
-        if path.len() > PATH_WORDS * WORD || memory[INODE].load(Ordering::Relaxed) != 0 {
+        let path = path.as_os_str().as_encoded_bytes();
+        if path.len() > PATH_WORDS * WORD || memory[STATE].load(Ordering::Relaxed) != 0 {
             return None;
         }
         let ledger = Self(memory);
-        ledger.set(INODE, metadata.ino());
-        ledger.set(DEVICE, metadata.dev());
+        ledger.set(DEVICE, identity.device);
+        ledger.set(INODE, identity.inode);
         put(&memory[PATH..ROWS], 0, path);
         ledger.set(PATH_LENGTH, path.len() as u64);
         ledger.set(STATE, OPEN);
         Some(ledger)
-    }
-
-    /// Elsewhere no process shares the memory.
-    #[cfg(not(unix))]
-    pub(crate) fn enter(_: &Path, _: &File) -> Option<Self> {
-        None
     }
 
     fn set(self, place: usize, value: u64) {
@@ -146,7 +136,7 @@ pub fn complete(memory: &[AtomicU64]) -> Option<LeftFile> {
     }
     let path = path_of(bytes(&memory[PATH..ROWS], value(PATH_LENGTH)));
     let rows = bytes(&memory[ROWS..], value(PENDING));
-    let identity = (value(DEVICE), value(INODE));
+    let identity = Identity { device: value(DEVICE), inode: value(INODE) };
     let damage = match append(&path, identity, value(LENGTH), &rows) {
         Ok(damage) => damage,
         Err(error) => Some(format!("its last rows cannot be written: {error}")),
@@ -167,12 +157,7 @@ fn path_of(bytes: Vec<u8>) -> PathBuf {
 
 /// Appends the `rows` that the file of this identity, of which `length` bytes were written, lacks. Returns what
 /// is wrong with the file.
-fn append(
-    path: &Path,
-    identity: (u64, u64),
-    length: u64,
-    rows: &[u8],
-) -> io::Result<Option<String>> {
+fn append(path: &Path, identity: Identity, length: u64, rows: &[u8]) -> io::Result<Option<String>> {
     let mut file = match File::options().read(true).write(true).open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -181,13 +166,13 @@ fn append(
         Err(error) => return Err(error),
     };
     let metadata = file.metadata()?;
-    if identity_of(&metadata) != identity {
+    if Identity::new(&metadata) != identity {
         return Ok(Some("another file took its place during the run".to_owned()));
     }
     let (found, whole) = (metadata.len(), length + rows.len() as u64);
     if found < length || found > whole {
         return Ok(Some(format!(
-            "it has {found} bytes where the run wrote {length}: something else wrote to it"
+            "it has {found} bytes where the run wrote {length}: something else wrote to it, or the last write was not finished"
         )));
     }
     // The process may have ended while it wrote the rows.
@@ -202,17 +187,6 @@ fn append(
     Ok(None)
 }
 
-#[cfg(unix)]
-fn identity_of(metadata: &Metadata) -> (u64, u64) {
-    use std::os::unix::fs::MetadataExt as _;
-    (metadata.dev(), metadata.ino())
-}
-
-#[cfg(not(unix))]
-fn identity_of(_: &Metadata) -> (u64, u64) {
-    (0, 0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -224,7 +198,7 @@ mod tests {
     /// Memory as a process leaves it that wrote `length` bytes to a file and had `rows` pending.
     fn left(path: &Path, length: u64, rows: &[u8]) -> Vec<AtomicU64> {
         let memory = memory();
-        let (device, inode) = identity_of(&std::fs::metadata(path).unwrap());
+        let Identity { device, inode } = Identity::new(&std::fs::metadata(path).unwrap());
         let name = path.to_str().unwrap().as_bytes();
         put(&memory[PATH..ROWS], 0, name);
         put(&memory[ROWS..], 0, rows);

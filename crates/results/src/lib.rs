@@ -11,13 +11,13 @@ mod decimation;
 mod envelope;
 pub mod ledger;
 mod memory;
+mod output;
 mod pace;
 mod parquet;
 mod read;
 mod select;
 
 use std::collections::HashSet;
-use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -149,6 +149,46 @@ pub enum ResultsError {
         /// Error of the operating system.
         source: io::Error,
     },
+    /// The file has another length than the rows that were written.
+    #[error(
+        "{}: the file has {found} bytes, expected {expected}: an FMU or another program has changed it \
+         during the run. With --isolate no FMU reaches the files of the command",
+        path.display()
+    )]
+    Length {
+        /// The file.
+        path: PathBuf,
+        /// Number of bytes that were written.
+        expected: u64,
+        /// Number of bytes in the file.
+        found: u64,
+    },
+    /// The position of the open file was moved, and its content perhaps overwritten.
+    #[error(
+        "{}: an FMU has used the descriptor of this file and may have overwritten rows. With --isolate \
+         no FMU reaches the files of the command",
+        path.display()
+    )]
+    Overwritten {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The path does not lead to the file that was written.
+    #[error("{}: the file was deleted, moved or replaced during the run", path.display())]
+    Gone {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The process is a copy of the one that writes the file.
+    #[error(
+        "{}: an FMU has duplicated the process of the run (fork) and returned in both; only the first \
+         process writes the results",
+        path.display()
+    )]
+    Forked {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file cannot be read, or its content does not match its extension.
     #[error("cannot read {}: {reason}", path.display())]
     Read {
@@ -263,52 +303,6 @@ impl Widths {
             }
         }
         Ok(())
-    }
-}
-
-/// Creates an empty file, and its folder if that is missing. No other process can write the file while
-/// it is open.
-fn create_file(path: &Path) -> Result<File, ResultsError> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let failed = |source| ResultsError::Write { path: path.to_owned(), source };
-    folder.map_or(Ok(()), fs::create_dir_all).map_err(failed)?;
-    let file = open_alone(path).map_err(failed)?;
-    let file = file.ok_or_else(|| ResultsError::InUse { path: path.to_owned() })?;
-    let length = file.metadata().map_err(failed)?.len();
-    if length > 0 {
-        tracing::info!("{}: replaces the results of an earlier run", path.display());
-        file.set_len(0).map_err(failed)?;
-    }
-    Ok(file)
-}
-
-/// Opens a file for exclusive writing without changing its content; `None` if another process has it
-/// open for writing. The lock is released when the process ends, even by a crash.
-#[cfg(not(windows))]
-fn open_alone(path: &Path) -> io::Result<Option<File>> {
-    let file = File::options().write(true).create(true).truncate(false).open(path)?;
-    // Several processes may share a device or a pipe.
-    if !file.metadata()?.is_file() {
-        return Ok(Some(file));
-    }
-    match file.try_lock() {
-        // The file system has no locks: assume that the file is free.
-        Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(Some(file)),
-        Err(fs::TryLockError::WouldBlock) => Ok(None),
-    }
-}
-
-/// Opens a file for exclusive writing, as on other systems. Readers may open it at the same time.
-#[cfg(windows)]
-fn open_alone(path: &Path) -> io::Result<Option<File>> {
-    use std::os::windows::fs::OpenOptionsExt as _;
-    const FILE_SHARE_READ: u32 = 1;
-    const ERROR_SHARING_VIOLATION: i32 = 32;
-    let mut options = File::options();
-    options.write(true).create(true).truncate(false).share_mode(FILE_SHARE_READ);
-    match options.open(path) {
-        Err(error) if error.raw_os_error() == Some(ERROR_SHARING_VIOLATION) => Ok(None),
-        opened => opened.map(Some),
     }
 }
 

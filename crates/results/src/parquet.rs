@@ -3,9 +3,7 @@
 mod block;
 mod footer;
 
-use std::fs::File;
-use std::io::{Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -18,8 +16,9 @@ use ::parquet::file::properties::{EnabledStatistics, WriterProperties};
 use ::parquet::file::writer::{SerializedRowGroupWriter, TrackedWrite};
 use ::parquet::schema::types::ColumnPath;
 
+use super::output::OutputFile;
 use super::pace::Pace;
-use super::{Column, ColumnKind, ResultsError, Row, Sink, TIME, Widths, check_names, create_file};
+use super::{Column, ColumnKind, ResultsError, Row, Sink, TIME, Widths, check_names};
 use block::Block;
 use footer::Footer;
 
@@ -41,8 +40,7 @@ const PAGE: usize = 1 << 20;
 /// the last successful write.
 #[derive(Debug)]
 pub struct ParquetSink {
-    path: PathBuf,
-    file: File,
+    file: OutputFile,
     widths: Widths,
     properties: Arc<WriterProperties>,
     footer: Footer,
@@ -51,8 +49,6 @@ pub struct ParquetSink {
     block: Block,
     /// End of the row groups of full blocks.
     end: u64,
-    /// Length of the file.
-    length: u64,
     /// Number of rows of the present block that are in the file.
     written: usize,
     /// Buffer for the next write, reused to save allocations.
@@ -71,27 +67,27 @@ impl ParquetSink {
         check_names(columns)?;
         let failed = |source| write_error(path, source);
         let mut sink = Self {
-            path: path.to_owned(),
-            file: create_file(path)?,
+            file: OutputFile::create(path)?,
             widths: Widths::new(columns),
             properties: Arc::new(properties(columns)),
             footer: Footer::new(columns).map_err(failed)?,
             clocked: clocked(columns),
             block: Block::new(columns),
             end: 0,
-            length: 0,
             written: 0,
             bytes: MAGIC.to_vec(),
             pace: Pace::new(INTERVAL),
         };
         sink.footer.append(&mut sink.bytes, None).map_err(failed)?;
         sink.write()?;
+        sink.file.record(false);
         sink.end = MAGIC.len() as u64;
         Ok(sink)
     }
 
     /// Writes the rows of the block and the footer; starts the next block if this one is full.
     fn write_rows(&mut self) -> Result<(), ResultsError> {
+        self.file.verify()?;
         let rows = self.block.rows();
         if rows == self.written && !self.block.is_full() {
             return Ok(());
@@ -102,6 +98,7 @@ impl ParquetSink {
             return Err(error);
         }
         self.written = rows;
+        self.file.record(false);
         if self.block.is_full() {
             self.footer.keep(group);
             self.end += size;
@@ -114,10 +111,10 @@ impl ParquetSink {
     /// Encodes the first `rows` of the block as a row group, followed by the footer, to `bytes`. Returns the
     /// metadata of the row group and its size.
     fn compose(&mut self, rows: usize) -> Result<(RowGroupMetaData, u64), ResultsError> {
-        let group = self.encode(rows).map_err(|source| write_error(&self.path, source))?;
+        let group = self.encode(rows).map_err(|source| write_error(self.file.path(), source))?;
         let size = self.bytes.len() as u64;
         let done = self.footer.append(&mut self.bytes, Some(group.clone()));
-        done.map_err(|source| write_error(&self.path, source))?;
+        done.map_err(|source| write_error(self.file.path(), source))?;
         Ok((group, size))
     }
 
@@ -125,7 +122,8 @@ impl ParquetSink {
     /// space on the disk. If it also fails, the file keeps the row groups of full blocks, with a shorter
     /// footer.
     fn restore_end(&mut self) {
-        let _ = self.file.set_len(self.length);
+        let length = self.file.length();
+        let _ = self.file.set_length(length);
         let composed = match self.written {
             0 => {
                 self.bytes.clear();
@@ -136,7 +134,7 @@ impl ParquetSink {
         if composed && self.write().is_ok() {
             return;
         }
-        let _ = self.file.set_len(self.end);
+        let _ = self.file.set_length(self.end);
         self.bytes.clear();
         if self.footer.append(&mut self.bytes, None).is_ok() {
             // The caller reports the error of the write instead.
@@ -184,14 +182,8 @@ impl ParquetSink {
 
     /// Writes `bytes` after the row groups of full blocks, as the end of the file.
     fn write(&mut self) -> Result<(), ResultsError> {
-        let length = self.end + self.bytes.len() as u64;
-        self.file
-            .seek(SeekFrom::Start(self.end))
-            .and_then(|_| self.file.write_all(&self.bytes))
-            .and_then(|()| if length < self.length { self.file.set_len(length) } else { Ok(()) })
-            .map_err(|source| ResultsError::Write { path: self.path.clone(), source })?;
-        self.length = length;
-        Ok(())
+        self.file.write_at(self.end, &self.bytes)?;
+        self.file.set_length(self.end + self.bytes.len() as u64)
     }
 }
 
@@ -210,7 +202,10 @@ impl Sink for ParquetSink {
     }
 
     fn finish(mut self: Box<Self>) -> Result<(), ResultsError> {
-        self.write_rows()
+        self.write_rows()?;
+        self.file.verify_path()?;
+        self.file.record(true);
+        Ok(())
     }
 }
 

@@ -1,3 +1,5 @@
+use std::fs;
+
 use super::*;
 
 /// Returns a column without a unit.

@@ -1,4 +1,4 @@
-use std::fs;
+use std::fs::{self, File};
 
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
 use ::parquet::record::Field;

@@ -1,0 +1,279 @@
+//! The file that a sink writes.
+//!
+//! An FMU in the process of the master can close or replace the descriptor of the file, move its
+//! position, change or delete the file, or duplicate the process. So each write is verified first.
+
+use std::fs::{self, File, Metadata};
+use std::io::{self, Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+use std::process;
+
+use super::ResultsError;
+use super::ledger::Ledger;
+
+/// Smallest number of the descriptor of a results file. Programs that close or reuse descriptors that
+/// are not theirs begin with the small ones.
+#[cfg(unix)]
+const DESCRIPTOR: i32 = 512;
+
+/// Device and number of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Identity {
+    pub(super) device: u64,
+    pub(super) inode: u64,
+}
+
+impl Identity {
+    #[cfg(unix)]
+    pub(super) fn new(metadata: &Metadata) -> Self {
+        use std::os::unix::fs::MetadataExt as _;
+        Self { device: metadata.dev(), inode: metadata.ino() }
+    }
+
+    /// The same for all files: while the file is open, nobody can delete or replace it.
+    #[cfg(not(unix))]
+    pub(super) fn new(_: &Metadata) -> Self {
+        Self { device: 0, inode: 0 }
+    }
+}
+
+/// An open file with the length that its writer expects.
+#[derive(Debug)]
+pub(super) struct OutputFile {
+    /// The path as it was given, for messages.
+    path: PathBuf,
+    /// The same path if the current folder changes.
+    absolute: PathBuf,
+    file: File,
+    identity: Identity,
+    /// Whether this is a regular file, with a length and a position.
+    regular: bool,
+    /// The process that has created the file.
+    process: u32,
+    length: u64,
+    ledger: Option<Ledger>,
+}
+
+impl OutputFile {
+    /// Creates an empty file, and its folder if that is missing. No other process can write the file
+    /// while it is open.
+    pub(super) fn create(path: &Path) -> Result<Self, ResultsError> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let failed = |source| ResultsError::Write { path: path.to_owned(), source };
+        folder.map_or(Ok(()), fs::create_dir_all).map_err(failed)?;
+        let file = open_alone(path, true).map_err(failed)?;
+        let file = file.ok_or_else(|| ResultsError::InUse { path: path.to_owned() })?;
+        let metadata = file.metadata().map_err(failed)?;
+        if metadata.len() > 0 {
+            tracing::info!("{}: replaces the results of an earlier run", path.display());
+            file.set_len(0).map_err(failed)?;
+        }
+        let absolute = std::path::absolute(path).map_err(failed)?;
+        let identity = Identity::new(&metadata);
+        Ok(Self {
+            path: path.to_owned(),
+            ledger: metadata.is_file().then(|| Ledger::enter(&absolute, identity)).flatten(),
+            absolute,
+            file: lifted(file),
+            identity,
+            regular: metadata.is_file(),
+            process: process::id(),
+            length: 0,
+        })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Length of the file that the writer expects.
+    pub(super) fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// Checks that the file is the one that was created, with the content that was written, and that
+    /// this process has created it.
+    ///
+    /// Opens the file again if only the descriptor is lost. Cuts off what others have appended.
+    pub(super) fn verify(&mut self) -> Result<(), ResultsError> {
+        if process::id() != self.process {
+            return Err(ResultsError::Forked { path: self.path.clone() });
+        }
+        let metadata = self.file.metadata().ok();
+        let metadata = metadata.filter(|metadata| Identity::new(metadata) == self.identity);
+        let metadata = match metadata {
+            Some(metadata) => metadata,
+            None => self.reopen()?,
+        };
+        if !self.regular {
+            return Ok(());
+        }
+        if links(&metadata) == 0 {
+            return Err(ResultsError::Gone { path: self.path.clone() });
+        }
+        let found = metadata.len();
+        let position = (&self.file).stream_position().map_err(|error| self.failed(error))?;
+        if found == self.length && position == self.length {
+            return Ok(());
+        }
+        if found >= self.length {
+            // The rows that are not yet in the file can then be added.
+            let length = self.length;
+            self.set_length(length)?;
+        }
+        Err(if found == self.length {
+            ResultsError::Overwritten { path: self.path.clone() }
+        } else {
+            ResultsError::Length { path: self.path.clone(), expected: self.length, found }
+        })
+    }
+
+    /// Opens the file again after its descriptor was closed or replaced; returns its metadata.
+    fn reopen(&mut self) -> Result<Metadata, ResultsError> {
+        let gone = || ResultsError::Gone { path: self.path.clone() };
+        if !self.regular {
+            return Err(gone());
+        }
+        let file = open_alone(&self.absolute, false).ok().flatten().ok_or_else(gone)?;
+        let metadata = file.metadata().map_err(|error| self.failed(error))?;
+        if Identity::new(&metadata) != self.identity {
+            return Err(gone());
+        }
+        let mut file = lifted(file);
+        file.seek(SeekFrom::Start(self.length)).map_err(|error| self.failed(error))?;
+        // The number of the former descriptor may be that of a file of the FMU by now.
+        forget(std::mem::replace(&mut self.file, file));
+        tracing::warn!(
+            "{}: an FMU has closed or replaced the descriptor of this file, which was opened again; no \
+             row is lost. With --isolate no FMU reaches the files of the command",
+            self.path.display()
+        );
+        Ok(metadata)
+    }
+
+    /// Appends to the file, after [`Self::verify`]. After a failure the file keeps its former content.
+    pub(super) fn append(&mut self, bytes: &[u8]) -> Result<(), ResultsError> {
+        if let Err(error) = self.file.write_all(bytes) {
+            // A reader could take an incomplete line for a row. A pipe cannot be truncated.
+            let length = self.length;
+            let _ = self.set_length(length);
+            return Err(self.failed(error));
+        }
+        self.length += bytes.len() as u64;
+        Ok(())
+    }
+
+    /// Writes at `offset`; the position of the file is at the end of `bytes` then.
+    pub(super) fn write_at(&mut self, offset: u64, bytes: &[u8]) -> Result<(), ResultsError> {
+        let sought = self.file.seek(SeekFrom::Start(offset));
+        sought.and_then(|_| self.file.write_all(bytes)).map_err(|error| self.failed(error))
+    }
+
+    /// Sets the length of the file, and its position to the end.
+    pub(super) fn set_length(&mut self, length: u64) -> Result<(), ResultsError> {
+        self.file.set_len(length).map_err(|error| self.failed(error))?;
+        self.file.seek(SeekFrom::Start(length)).map_err(|error| self.failed(error))?;
+        self.length = length;
+        Ok(())
+    }
+
+    /// Checks that the path still leads to the file.
+    pub(super) fn verify_path(&self) -> Result<(), ResultsError> {
+        let leads = || {
+            let (named, written) = (fs::metadata(&self.absolute)?, self.file.metadata()?);
+            // Some network file systems number their files anew.
+            let alike = || {
+                Ok::<_, io::Error>(
+                    named.len() == written.len() && named.modified()? == written.modified()?,
+                )
+            };
+            Ok::<_, io::Error>(Identity::new(&named) == self.identity || alike()?)
+        };
+        if !self.regular || leads().unwrap_or(false) {
+            Ok(())
+        } else {
+            Err(ResultsError::Gone { path: self.path.clone() })
+        }
+    }
+
+    /// Records for a supervising process that all rows are in the file.
+    pub(super) fn record(&self, is_complete: bool) {
+        if let Some(ledger) = self.ledger {
+            ledger.written(self.length, is_complete);
+        }
+    }
+
+    /// Keeps the row that begins at `start` of the `rows` that the file lacks, for a supervising process. Returns
+    /// false if the rows belong into the file now.
+    #[inline]
+    pub(super) fn keep(&self, rows: &[u8], start: usize) -> bool {
+        self.ledger.is_none_or(|ledger| ledger.keep(rows, start))
+    }
+
+    fn failed(&self, source: io::Error) -> ResultsError {
+        ResultsError::Write { path: self.path.clone(), source }
+    }
+}
+
+#[cfg(unix)]
+fn links(metadata: &Metadata) -> u64 {
+    std::os::unix::fs::MetadataExt::nlink(metadata)
+}
+
+#[cfg(not(unix))]
+fn links(_: &Metadata) -> u64 {
+    1
+}
+
+/// Gives up a file without closing its descriptor.
+#[cfg(unix)]
+fn forget(file: File) {
+    let _ = std::os::fd::IntoRawFd::into_raw_fd(file);
+}
+
+#[cfg(not(unix))]
+fn forget(_: File) {}
+
+/// Moves the descriptor of a file to a high number, if the process may have one.
+#[cfg(unix)]
+fn lifted(file: File) -> File {
+    rustix::io::fcntl_dupfd_cloexec(&file, DESCRIPTOR).map_or(file, File::from)
+}
+
+#[cfg(not(unix))]
+fn lifted(file: File) -> File {
+    file
+}
+
+/// Opens a file for exclusive writing without changing its content; `None` if another process has it
+/// open for writing. The lock is released when the process ends, even by a crash.
+#[cfg(not(windows))]
+fn open_alone(path: &Path, create: bool) -> io::Result<Option<File>> {
+    let file = File::options().write(true).create(create).truncate(false).open(path)?;
+    // Several processes may share a device or a pipe.
+    if !file.metadata()?.is_file() {
+        return Ok(Some(file));
+    }
+    match file.try_lock() {
+        // The file system has no locks: assume that the file is free.
+        Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(Some(file)),
+        Err(fs::TryLockError::WouldBlock) => Ok(None),
+    }
+}
+
+/// Opens a file for exclusive writing, as on other systems. Readers may open it at the same time.
+#[cfg(windows)]
+fn open_alone(path: &Path, create: bool) -> io::Result<Option<File>> {
+    use std::os::windows::fs::OpenOptionsExt as _;
+    const FILE_SHARE_READ: u32 = 1;
+    const ERROR_SHARING_VIOLATION: i32 = 32;
+    let mut options = File::options();
+    options.write(true).create(create).truncate(false).share_mode(FILE_SHARE_READ);
+    match options.open(path) {
+        Err(error) if error.raw_os_error() == Some(ERROR_SHARING_VIOLATION) => Ok(None),
+        opened => opened.map(Some),
+    }
+}
+
+#[cfg(test)]
+mod tests;
