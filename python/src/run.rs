@@ -209,6 +209,13 @@ fn prepare(
     loaded: LoadedConfig,
     slaves: Vec<(String, Box<dyn Slave>)>,
 ) -> Result<PreparedRun, study::Error> {
+    #[cfg(unix)]
+    if loaded.config.isolation.isolate != Some(true)
+        && let Ok(here) = std::env::current_dir()
+    {
+        // Without it, a crash is not explained.
+        let _ = fmu_import::crash::leave_file(&here);
+    }
     let worker = WORKER.get().map(PathBuf::as_path);
     let options = AssemblyOptions { store: Some(&STORE.0), worker, ..AssemblyOptions::default() };
     PreparedRun::with_slaves(loaded, &options, slaves)

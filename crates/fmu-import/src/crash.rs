@@ -12,8 +12,8 @@ mod signals;
 
 use std::fmt::{self, Write as _};
 use std::io;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::thread::Thread;
 use std::time::Duration;
 
@@ -22,7 +22,7 @@ use fmu_description::number::seconds;
 pub use place::Name;
 pub(crate) use place::{Place, RECORD, Slot, last_of_this_thread};
 #[cfg(unix)]
-pub use signals::{ENDING_SIGNALS, end_copy, ignores_hangup};
+pub use signals::{ENDING_SIGNALS, end_copy, ignores_hangup, leave_file};
 
 /// How long the program's crash function may take.
 const REPORT_LIMIT: Duration = Duration::from_secs(5);
@@ -42,6 +42,14 @@ static WAITED: AtomicU64 = AtomicU64::new(0);
 static PLACE: AtomicUsize = AtomicUsize::new(0);
 /// The thread that runs the program's crash function.
 static REPORTER: OnceLock<Thread> = OnceLock::new();
+
+/// The last failure, for the case that the process crashes before the program reports it.
+static BEFORE: Mutex<Option<String>> = Mutex::new(None);
+
+/// Notes a failure that the program is about to report: an FMU that crashes when it is freed would hide it.
+pub fn note(failure: String) {
+    *BEFORE.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
+}
 
 /// Advice for the line on standard error if the program's crash function fails.
 static ADVICE: OnceLock<&'static str> = OnceLock::new();
@@ -78,6 +86,8 @@ pub struct Ending {
     pub cause: Cause,
     /// The call that caused the end; if it is unknown, all calls that have not returned.
     pub calls: Vec<Call>,
+    /// The last failure before it, which may be the reason for it.
+    pub before: Option<String>,
 }
 
 impl fmt::Display for Call {
@@ -88,7 +98,8 @@ impl fmt::Display for Call {
 
 impl fmt::Display for Ending {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_ending(formatter, self.calls.iter().cloned(), self.cause)
+        write_ending(formatter, self.calls.iter().cloned(), self.cause)?;
+        self.before.as_ref().map_or(Ok(()), |before| write!(formatter, "; before that, {before}"))
     }
 }
 
@@ -177,7 +188,10 @@ pub fn watch(
 
 /// Collects the cause of the end and the calls involved.
 fn ending() -> Ending {
-    Ending { cause: cause(), calls: place::calls(PLACE.load(Ordering::Relaxed)).collect() }
+    let calls = place::calls(PLACE.load(Ordering::Relaxed)).collect();
+    // A thread that will never continue may hold the lock.
+    let before = BEFORE.try_lock().ok().and_then(|mut before| before.take());
+    Ending { cause: cause(), calls, before }
 }
 
 /// Reads the cause of the end.
@@ -224,6 +238,18 @@ fn fallback_message() -> Line {
     // A line that is too long is cut.
     let _ = write_fallback(&mut line);
     line
+}
+
+/// Writes what is known of a crash of a program that called [`leave_file`].
+#[cfg(unix)]
+fn write_crash(line: &mut Line, signal: i32, place: usize) -> fmt::Result {
+    line.write_str("aso_ftc: ")?;
+    write_ending(line, place::calls(place), Cause::Signal(signal))?;
+    line.write_str("; FMUs that ran in this process:")?;
+    for name in place::instances() {
+        write!(line, " {name}")?;
+    }
+    line.write_str("; isolate=True runs each FMU in a process of its own")
 }
 
 fn write_fallback(line: &mut Line) -> fmt::Result {

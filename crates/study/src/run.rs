@@ -9,6 +9,7 @@ use std::time::Instant;
 
 use fmu_description::Version;
 use fmu_description::similar::slip;
+use fmu_import::crash;
 use master::drive::Drive;
 use master::{Port, Scenario, Simulation, Slave, SlowState, System, SystemError};
 use results::{Column, ResultsError, Sink};
@@ -127,7 +128,8 @@ impl PreparedRun {
             tracing::warn!("{early}");
         }
         let start = experiment.start_time;
-        let mut recorder = record(&mut simulation, &ports, plan.every, start)?;
+        let recorder = record(&mut simulation, &ports, plan.every, start);
+        let mut recorder = recorder.inspect_err(|error| crash::note(error.sentence()))?;
         let due = saved.and_then(|saved| saved.due(plan.every));
         if let (Some(recorder), Some(saved)) = (&mut recorder, saved) {
             recorder.restore(&mut simulation, saved.slow())?;

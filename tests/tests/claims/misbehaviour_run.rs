@@ -356,3 +356,12 @@ fn a_time_limit_without_isolation_gives_a_warning() {
     let run = Run::pair(&CFmu::well_behaved(), &["--isolate", "--time-limit", "5"]);
     assert_eq!(run.message, "");
 }
+
+#[test]
+fn a_crash_when_an_fmu_is_freed_does_not_hide_why_the_run_ended() {
+    let fmu = CFmu::that("crash in fmi2FreeInstance");
+    // Writing the results fails because the name is that of a folder.
+    let run = Run::pair(&fmu, &["--results", "."]);
+    assert_eq!(run.status, Some(2), "{}", run.message);
+    run.says(&["fmi2FreeInstance crashed with signal 11", "before that,", "results are written as"]);
+}

@@ -10,6 +10,9 @@ use std::sync::atomic::{
     AtomicBool, AtomicI32, AtomicPtr, AtomicU8, AtomicU64, AtomicUsize, Ordering,
 };
 
+use fmu_description::abi::Status;
+use slave::{CallError, Failure};
+
 use super::Call;
 
 /// Number of instances with a slot of their own.
@@ -130,6 +133,16 @@ impl Place {
     }
 }
 
+impl Place {
+    /// Notes an error of the instance, and returns it.
+    pub(crate) fn failed(&self, error: CallError) -> CallError {
+        if !matches!(error.failure, Failure::Status(Status::Discard | Status::Pending)) {
+            super::note(format!("{}: {error}", self.instance));
+        }
+        error
+    }
+}
+
 impl Deref for Place {
     type Target = Slot;
 
@@ -208,6 +221,12 @@ impl Drop for Place {
 #[inline]
 pub(crate) fn last_of_this_thread() -> usize {
     LAST.try_with(Cell::get).unwrap_or(0)
+}
+
+/// Returns the names of all instances that there were, as far as no other took their slots.
+#[cfg(unix)]
+pub(super) fn instances() -> impl Iterator<Item = Name> {
+    RECORD.used().iter().map(Slot::name)
 }
 
 /// Returns the name of the instance that has the slot at `address`.

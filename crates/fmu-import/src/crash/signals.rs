@@ -5,10 +5,13 @@
 #![expect(unsafe_code, reason = "signal handlers")]
 
 use std::cell::Cell;
+use std::ffi::CString;
 use std::fmt::Write as _;
 use std::io;
 use std::mem::MaybeUninit;
+use std::path::Path;
 use std::ptr::{null, null_mut};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering};
 use std::time::Duration;
 
@@ -126,11 +129,7 @@ pub(super) fn install() -> io::Result<()> {
     let stack = libc::stack_t { ss_sp: stack.as_mut_ptr().cast(), ss_flags: 0, ss_size: STACK };
     // SAFETY: the memory is never freed.
     check(unsafe { libc::sigaltstack(&raw const stack, null_mut()) })?;
-    // SAFETY: all zeros is a valid value of this structure.
-    let mut action: libc::sigaction = unsafe { MaybeUninit::zeroed().assume_init() };
-    let handler: extern "C" fn(c_int, *mut siginfo_t, *mut c_void) = on_signal;
-    action.sa_sigaction = handler as usize;
-    action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;
+    let action = action(on_signal);
     for (signal, _) in FATAL {
         // SAFETY: the handler has the signature of SA_SIGINFO and is async-signal-safe.
         check(unsafe { libc::sigaction(signal, &raw const action, null_mut()) })?;
@@ -138,6 +137,15 @@ pub(super) fn install() -> io::Result<()> {
     // SAFETY: no handler is installed.
     unsafe { libc::signal(libc::SIGXFSZ, libc::SIG_IGN) };
     on_end_of_process()
+}
+
+/// The action of a handler, on the alternate stack if there is one.
+fn action(handler: extern "C" fn(c_int, *mut siginfo_t, *mut c_void)) -> libc::sigaction {
+    // SAFETY: all zeros is a valid value of this structure.
+    let mut action: libc::sigaction = unsafe { MaybeUninit::zeroed().assume_init() };
+    action.sa_sigaction = handler as usize;
+    action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;
+    action
 }
 
 fn check(result: c_int) -> io::Result<()> {
@@ -173,6 +181,62 @@ impl Line {
         self.length = (self.length + 1).min(self.bytes.len());
         // SAFETY: `length` bytes to read.
         unsafe { libc::write(libc::STDERR_FILENO, self.bytes.as_ptr().cast(), self.length) };
+    }
+}
+
+/// Where [`leave_file`] lets a crash be written.
+static LEFT: OnceLock<CString> = OnceLock::new();
+
+/// Lets a crash of this process leave a file in `folder` that names the FMU, function and time, for a program
+/// that is not ours to end: it ends afterwards as it would have. Signals that the program handles are left to
+/// it. Only the first call has an effect, and none does in a program that calls [`super::watch`].
+///
+/// # Errors
+///
+/// [`io::Error`] if the operating system refuses a signal handler.
+pub fn leave_file(folder: &Path) -> io::Result<()> {
+    if super::REPORTER.get().is_some() {
+        return Ok(());
+    }
+    let name = format!("aso-ftc-crash-{}.txt", std::process::id());
+    let path = CString::new(folder.join(name).into_os_string().into_encoded_bytes())?;
+    if LEFT.set(path).is_err() {
+        return Ok(());
+    }
+    for (signal, _) in FATAL {
+        let mut former = action(write_file);
+        // SAFETY: asks for the present handler.
+        check(unsafe { libc::sigaction(signal, null(), &raw mut former) })?;
+        if former.sa_sigaction == libc::SIG_DFL {
+            let action = action(write_file);
+            // SAFETY: the handler has the signature of SA_SIGINFO and is async-signal-safe.
+            check(unsafe { libc::sigaction(signal, &raw const action, null_mut()) })?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes the file of [`leave_file`]; then the signal acts as by default.
+extern "C" fn write_file(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
+    if let Some(path) = LEFT.get().filter(|_| !is_copy()) {
+        let mut line = Line::new();
+        // A line that is too long is cut.
+        let _ = super::write_crash(&mut line, signal, last_of_this_thread());
+        line.print();
+        let flags = libc::O_WRONLY | libc::O_CREAT | libc::O_TRUNC | libc::O_CLOEXEC;
+        // SAFETY: a terminated path, and `length` bytes to read.
+        unsafe {
+            let file = libc::open(path.as_ptr(), flags, 0o666);
+            if file >= 0 {
+                libc::write(file, line.bytes.as_ptr().cast(), line.length);
+                libc::close(file);
+            }
+        }
+    }
+    // SAFETY: restores the default; the signal is delivered when this handler returns.
+    unsafe {
+        libc::signal(signal, libc::SIG_DFL);
+        libc::raise(signal);
     }
 }
 

@@ -313,6 +313,6 @@ impl Component {
     /// Returns the error of a call, with the instance's recent messages.
     #[cold]
     pub(crate) fn failed(&self, function: &'static str, failure: Failure) -> CallError {
-        CallError { function, failure, messages: self.sink.take() }
+        self.place.failed(CallError { function, failure, messages: self.sink.take() })
     }
 }
