@@ -312,13 +312,34 @@ MISBEHAVING = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-def test_isolated_runs_that_crash_or_hang_are_recorded_by_their_kind(campaign, tmp_path):
-    sources = [str(ROOT / "tests" / "c" / f"{name}.c") for name in ("deeds", "life", "steps", "values")]
+@pytest.fixture
+def misbehaving(tmp_path):
+    """Writes an FMU that does what its parameter `behaviour` says; returns its path."""
+    names = ("deeds", "life", "process", "steps", "values")
+    sources = [str(ROOT / "tests" / "c" / f"{name}.c") for name in names]
     words = ["cc", "-std=c11", "-shared", "-fPIC", "-o", str(tmp_path / "slave.so"), *sources, "-lm"]
     subprocess.run(words, check=True)
     with zipfile.ZipFile(tmp_path / "Slave.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", MISBEHAVING)
         archive.write(tmp_path / "slave.so", "binaries/linux64/slave.so")
+    return tmp_path / "Slave.fmu"
+
+
+def test_a_crash_in_this_process_leaves_a_file_that_names_fmu_function_and_time(misbehaving, tmp_path):
+    text = (
+        "import aso_ftc as af\n"
+        f"af.System({{'fmus': {{'slave': {str(misbehaving)!r}}}}}).run(stop_time=1.0, step=0.1,"
+        " start_values={'slave.behaviour': 'crash in fmi2DoStep'})\n"
+    )
+    ended = subprocess.run([sys.executable, "-I", "-c", text], cwd=tmp_path, capture_output=True, text=True)
+    assert ended.returncode == -signal.SIGSEGV, ended.stderr
+    (left,) = tmp_path.glob("aso-ftc-crash-*.txt")
+    said = left.read_text(encoding="utf-8")
+    assert said in ended.stderr
+    assert "slave at t = 0.5 s: fmi2DoStep crashed with signal 11 (SIGSEGV" in said and "isolate=True" in said
+
+
+def test_isolated_runs_that_crash_or_hang_are_recorded_by_their_kind(campaign, misbehaving, tmp_path):
     (tmp_path / "system.toml").write_text('[fmus]\nslave = "Slave.fmu"\n', encoding="utf-8")
     text = (
         'system = "system.toml"\nisolate = true\ntime-limit = 2.0\nruns-per-task = 2\n'
