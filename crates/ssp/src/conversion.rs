@@ -22,21 +22,23 @@ pub(super) struct Measure {
 }
 
 impl Measure {
-    /// Creates the measure of a type stated in a file with these definitions.
-    pub(super) fn stated(kind: Option<&Type>, definitions: &Definitions) -> Self {
+    /// Creates the measure of a stated type. The first of `scopes` that defines its name counts.
+    pub(super) fn stated(kind: Option<&Type>, scopes: &[&Definitions]) -> Self {
         match kind {
-            Some(Type::Real(Some(unit))) => Measure::unit(unit, definitions),
+            Some(Type::Real(Some(unit))) => Measure::unit(unit, scopes),
             Some(Type::Enumeration(name)) => {
-                let known = definitions.enumerations.iter().find(|each| each.name == *name);
+                let mut all = scopes.iter().flat_map(|each| &each.enumerations);
+                let known = all.find(|each| each.name == *name);
                 Measure { unit: None, items: known.map(|each| each.items.clone()) }
             }
             _ => Measure::default(),
         }
     }
 
-    /// Creates the measure of a unit that `definitions` may define.
-    pub(super) fn unit(name: &str, definitions: &Definitions) -> Self {
-        let base = definitions.units.iter().find(|unit| unit.name == name).map(|unit| unit.base);
+    /// Creates the measure of a unit, defined by the first of `scopes` that knows its name.
+    pub(super) fn unit(name: &str, scopes: &[&Definitions]) -> Self {
+        let mut all = scopes.iter().flat_map(|each| &each.units);
+        let base = all.find(|unit| unit.name == name).map(|unit| unit.base);
         Measure { unit: Some((name.to_owned(), base)), items: None }
     }
 

@@ -28,6 +28,29 @@ pub(super) struct Edge {
     at: Position,
 }
 
+impl Edge {
+    /// Appends the conversion of this connection, and those between the unit that a component states
+    /// and the unit that the system structure which is its source states for the same connector.
+    fn convert(&self, tree: &Tree, chain: ConversionChain) -> Result<ConversionChain, String> {
+        let outside = |vertex: &Vertex| {
+            let stated = (self.system != vertex.node).then(|| tree.measure_outside(vertex));
+            stated.flatten()
+        };
+        let boundary = Conversion::default();
+        let chain = match outside(&self.from) {
+            Some(stated) => chain.append(&boundary, stated)?,
+            None => chain,
+        };
+        let inside = tree.measure(&self.to);
+        match outside(&self.to) {
+            Some(stated) => {
+                chain.append(&self.conversion, stated.or(inside.clone()))?.append(&boundary, inside)
+            }
+            None => chain.append(&self.conversion, inside),
+        }
+    }
+}
+
 /// An end of a connection: its connector, and whether the connector belongs to the system itself.
 struct Side {
     vertex: Vertex,
@@ -162,7 +185,7 @@ impl Flow {
     ) -> Result<ConversionChain, SspError> {
         let mut chain = ConversionChain::from(start);
         for edge in path {
-            chain = chain.append(&edge.conversion, tree.measure(&edge.to)).map_err(|sentence| {
+            chain = edge.convert(tree, chain).map_err(|sentence| {
                 let (from, to) = (tree.name(&edge.from), tree.name(&edge.to));
                 at(tree, edge.system, edge.at, format!("from {from} to {to}: {sentence}"))
             })?;
@@ -170,10 +193,12 @@ impl Flow {
         Ok(chain)
     }
 
-    /// Returns the links between FMUs, in the order of the connections that end at an FMU.
+    /// Returns the links between FMUs, in the order of the connections that end at an FMU. Warns about
+    /// inputs whose source nothing drives, unless `is_set` says that a parameter binding sets them.
     pub(super) fn links(
         &self,
         tree: &Tree,
+        is_set: impl Fn(&Vertex) -> bool,
         warnings: &mut Vec<String>,
     ) -> Result<Vec<Link>, SspError> {
         let mut links = Vec::new();
@@ -184,8 +209,11 @@ impl Flow {
             let path = self.upstream(tree, &edge.to)?;
             let source = path.first().map_or(&edge.from, |first| &first.from);
             if !matches!(tree.nodes[source.node].content, Content::Fmu(_)) {
-                let (input, source) = (tree.name(&edge.to), tree.name(source));
-                warnings.push(format!("{input} is connected to {source}, which nothing drives"));
+                if !is_set(&edge.to) {
+                    let (input, source) = (tree.name(&edge.to), tree.name(source));
+                    warnings
+                        .push(format!("{input} is connected to {source}, which nothing drives"));
+                }
                 continue;
             }
             let chain = Self::convert_along(tree, &path, tree.measure(source))?;

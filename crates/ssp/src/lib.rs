@@ -97,8 +97,12 @@ pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspErr
     let mut warnings = std::mem::take(&mut tree.warnings);
     check_connectors(&tree, &mut warnings);
     let flow = Flow::new(&tree, &mut warnings)?;
-    let links = flow.links(&tree, &mut warnings)?;
     let mut settings = parameters::settings(&tree, &flow, &mut warnings)?;
+    let is_set = |input: &Vertex| {
+        let mut of_node = settings.get(&input.node).into_iter().flatten();
+        of_node.any(|setting| setting.variable == input.connector)
+    };
+    let links = flow.links(&tree, is_set, &mut warnings)?;
     let experiment = document.structure.experiment.unwrap_or_default();
     let (mut elements, mut steps, mut names) = (Vec::new(), Vec::new(), HashSet::new());
     for (index, node) in tree.nodes.iter().enumerate() {

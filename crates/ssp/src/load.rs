@@ -30,8 +30,8 @@ struct Place<'a> {
     parent: Option<usize>,
     path: String,
     depth: usize,
-    /// The bindings of the component that refers to a system, and the file that contains them.
-    outer: Option<(&'a [ParameterBinding], &'a Rc<File>)>,
+    /// The component that refers to a system, and the file that contains it.
+    outer: Option<(&'a ElementBase, &'a Rc<File>)>,
 }
 
 /// Reads the SSD or the SSP at `path` and all files that it refers to.
@@ -85,6 +85,7 @@ impl Loader {
             file: file.clone(),
             at: base.at.0,
             connectors: base.connectors.clone(),
+            outside: None,
             connections: Vec::new(),
             bindings: Vec::new(),
             step_size: None,
@@ -112,7 +113,8 @@ impl Loader {
         self.tree.nodes[node].connections.clone_from(&system.connections);
         let mut bindings = self.bindings(&system.base.bindings, file, None)?;
         if let Some((outer, outer_file)) = outer {
-            bindings.extend(self.bindings(outer, outer_file, Some(&file.base))?);
+            self.tree.nodes[node].outside = Some((outer.connectors.clone(), outer_file.clone()));
+            bindings.extend(self.bindings(&outer.bindings, outer_file, Some(&file.base))?);
         }
         self.tree.nodes[node].bindings = bindings;
         for dictionary in &system.dictionaries {
@@ -141,7 +143,7 @@ impl Loader {
     ) -> Result<usize, SspError> {
         let (file, at) = (&document.file, component.base.at.0);
         let here = |sentence: String| semantic_error(at, sentence).in_file(&file.shown);
-        let place = Place { outer: Some((&component.base.bindings, file)), ..place };
+        let place = Place { outer: Some((&component.base, file)), ..place };
         if let Some(id) = component.source.strip_prefix('#') {
             let system = with_id(&document.structure.system, id);
             let system = system.ok_or_else(|| here(format!("no system has the id {id:?}")))?;

@@ -165,7 +165,8 @@ impl Binder<'_> {
                 )
             };
             let measure = self.tree.measure(&target);
-            let value = Value::of(parameter, &binding.values.definitions);
+            let scopes = [&binding.values.definitions, &binding.file.definitions];
+            let value = Value::of(parameter, &scopes);
             let (value, warnings) = value.convert(&entry.conversion, measure).map_err(wrong)?;
             let name = self.tree.name(&target);
             self.warnings.extend(warnings.iter().map(|text| format!("setting of {name}: {text}")));

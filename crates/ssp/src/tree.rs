@@ -44,6 +44,8 @@ pub(super) struct Node {
     /// Position of the element in that file.
     pub(super) at: Position,
     pub(super) connectors: Vec<Connector>,
+    /// The connectors of the component that refers to this system, and the file that contains them.
+    pub(super) outside: Option<(Vec<Connector>, Rc<File>)>,
     pub(super) connections: Vec<Connection>,
     pub(super) bindings: Vec<Binding>,
     /// Step in s that an annotation proposes.
@@ -146,7 +148,7 @@ impl Tree {
         let node = &self.nodes[vertex.node];
         let connector = self.connector(vertex.node, &vertex.connector);
         let kind = connector.and_then(|connector| connector.kind_of_value.as_ref());
-        let stated = Measure::stated(kind, &node.file.definitions);
+        let stated = Measure::stated(kind, &[&node.file.definitions]);
         let own = self.variable(vertex).zip(self.description(vertex.node));
         let own = own.map(|(variable, fmu)| Measure::of_variable(variable, fmu));
         (stated, own.unwrap_or_default())
@@ -157,6 +159,14 @@ impl Tree {
     pub(super) fn measure(&self, vertex: &Vertex) -> Measure {
         let (stated, own) = self.measures(vertex);
         stated.or(own)
+    }
+
+    /// Returns the unit or enumeration that the component states whose source is the system of this
+    /// connector, if there is such a component.
+    pub(super) fn measure_outside(&self, vertex: &Vertex) -> Option<Measure> {
+        let (connectors, file) = self.nodes[vertex.node].outside.as_ref()?;
+        let connector = connectors.iter().find(|each| each.name == vertex.connector)?;
+        Some(Measure::stated(connector.kind_of_value.as_ref(), &[&file.definitions]))
     }
 
     /// Returns the name of a connector for messages.

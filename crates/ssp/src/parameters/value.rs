@@ -34,10 +34,11 @@ impl Value {
         Value { number, measure }
     }
 
-    pub(super) fn of(parameter: &Parameter, definitions: &Definitions) -> Self {
+    /// Returns the value of a parameter; `scopes` may define its unit and its enumeration.
+    pub(super) fn of(parameter: &Parameter, scopes: &[&Definitions]) -> Self {
         let (number, measure) = match &parameter.value {
             ParameterValue::Real(value, unit) => {
-                let unit = unit.as_ref().map(|unit| Measure::unit(unit, definitions));
+                let unit = unit.as_ref().map(|unit| Measure::unit(unit, scopes));
                 (Number::Real(*value), unit.unwrap_or_default())
             }
             ParameterValue::Integer(value) => (Number::Integer(*value), Measure::default()),
@@ -45,7 +46,7 @@ impl Value {
             ParameterValue::String(text) => (Number::Text(text.clone()), Measure::default()),
             ParameterValue::Enumeration(item, name) => {
                 let kind = name.as_ref().map(|name| Type::Enumeration(name.clone()));
-                let measure = Measure::stated(kind.as_ref(), definitions);
+                let measure = Measure::stated(kind.as_ref(), scopes);
                 (Number::Item(item.clone(), number_of(item, measure.items.as_deref())), measure)
             }
             ParameterValue::Binary(_) => (Number::Binary, Measure::default()),

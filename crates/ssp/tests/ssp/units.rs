@@ -154,3 +154,114 @@ fn a_transformation_of_another_type_than_its_target_is_refused() {
     );
     assert_eq!(connected("Integer", "Real", linear, "").unwrap(), ["a.y -> b.u * 5.0 + 0.0"]);
 }
+
+/// A binding of one parameter of the set, which defines nothing itself.
+fn set(name: &str, value: &str) -> String {
+    format!(
+        r#"<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues><ssv:ParameterSet version="1.0" name="set"><ssv:Parameters><ssv:Parameter name="{name}">{value}</ssv:Parameter></ssv:Parameters></ssv:ParameterSet></ssd:ParameterValues></ssd:ParameterBinding></ssd:ParameterBindings>"#
+    )
+}
+
+const DEG: &str = r#"<ssd:Units><ssc:Unit name="deg"><ssc:BaseUnit rad="1" factor="0.017453292519943295"/></ssc:Unit></ssd:Units>"#;
+const DEGREES: &str = r#"<ssv:Real value="18" unit="deg"/>"#;
+const EIGHTEEN_DEG: f64 = std::f64::consts::PI / 10.0;
+
+/// The value of the first setting and the warnings.
+fn first_setting(opened: &ssp::Opened) -> (f64, &[String]) {
+    (opened.assembly.elements[0].settings[0].value.parse().unwrap(), &opened.warnings)
+}
+
+#[test]
+fn an_inline_parameter_set_uses_the_definitions_of_the_enclosing_file() {
+    let bench = Bench::new();
+    bench.fmu("a.fmu", &format!("p parameter {}\ng parameter Integer", real("rad")));
+    let component = component("c", "a.fmu", "", &set("p", DEGREES));
+    let opened = bench.open(&root(&component, ""), DEG).unwrap();
+    assert_eq!(first_setting(&opened), (EIGHTEEN_DEG, &[][..]));
+    // The binding of the system around it.
+    let binding = set("c.p", DEGREES);
+    let system = binding + &root(&crate::bench::component("c", "a.fmu", "", ""), "");
+    assert_eq!(first_setting(&bench.open(&system, DEG).unwrap()), (EIGHTEEN_DEG, &[][..]));
+    // A parameter set in a file of its own that lacks the definition.
+    let parameter = format!(r#"<ssv:Parameter name="p">{DEGREES}</ssv:Parameter>"#);
+    bench.file("p.ssv", crate::bench::ssv(&parameter));
+    let binding =
+        r#"<ssd:ParameterBindings><ssd:ParameterBinding source="p.ssv"/></ssd:ParameterBindings>"#;
+    let component = crate::bench::component("c", "a.fmu", "", binding);
+    let opened = bench.open(&root(&component, ""), DEG).unwrap();
+    assert_eq!(first_setting(&opened), (EIGHTEEN_DEG, &[][..]));
+    // An enumeration, whose item becomes its number.
+    let enumerations = r#"<ssd:Enumerations><ssc:Enumeration name="Mode"><ssc:Item name="fast" value="7"/></ssc:Enumeration></ssd:Enumerations>"#;
+    let item = set("g", r#"<ssv:Enumeration name="Mode" value="fast"/>"#);
+    let component = crate::bench::component("c", "a.fmu", "", &item);
+    let opened = bench.open(&root(&component, ""), enumerations).unwrap();
+    assert_eq!(first_setting(&opened), (7.0, &[][..]));
+}
+
+#[test]
+fn each_file_of_nested_structures_has_its_own_units() {
+    let bench = Bench::new();
+    bench.fmu("a.fmu", &format!("p parameter {}", real("rad")));
+    let inner = component("c", "a.fmu", "", &set("p", DEGREES));
+    bench.file("inner.ssd", crate::bench::ssd(&root(&inner, ""), DEG));
+    // Outside, a unit of the same name is another one.
+    let other = DEG.replace("0.017453292519943295", "100");
+    let nested = |binding: &str| {
+        root(
+            &format!(
+                r#"<ssd:Component name="s" source="inner.ssd" type="application/x-ssp-definition">{binding}</ssd:Component>"#
+            ),
+            "",
+        )
+    };
+    let opened = bench.open(&nested(""), &other).unwrap();
+    assert_eq!(first_setting(&opened), (EIGHTEEN_DEG, &[][..]));
+    let opened = bench.open(&nested(&set("c.p", DEGREES)), &other).unwrap();
+    assert_eq!(first_setting(&opened), (1800.0, &[][..]));
+}
+
+#[test]
+fn a_connector_of_a_nested_file_has_the_units_of_both_files() {
+    // Outside, the connectors are in deg; inside, nothing is stated, so the FMU's rad.
+    let bench = Bench::new();
+    bench.fmu("a.fmu", "y output Real");
+    bench.fmu("b.fmu", &format!("u input {}\nx output {}", real("rad"), real("rad")));
+    let inner = component("b", "b.fmu", "u input\nx output", "");
+    let connections = connection("u", "b.u", "", "") + &connection("b.x", "x", "", "");
+    let inner = crate::bench::connectors("u input\nx output <ssc:Real unit=\"rad\"/>")
+        + &root(&inner, &connections);
+    let radian =
+        r#"<ssd:Units><ssc:Unit name="rad"><ssc:BaseUnit rad="1"/></ssc:Unit></ssd:Units>"#;
+    bench.file("inner.ssd", crate::bench::ssd(&inner, radian));
+    let lines = "u input <ssc:Real unit=\"deg\"/>\nx output <ssc:Real unit=\"deg\"/>";
+    let nested = component("s", "inner.ssd", lines, "")
+        .replace("<ssd:Component ", r#"<ssd:Component type="application/x-ssp-definition" "#);
+    bench.fmu("c.fmu", "u input Real");
+    let elements =
+        component("a", "a.fmu", "y output", "") + &nested + &component("c", "c.fmu", "u input", "");
+    let connections = connection("a.y", "s.u", "", "") + &connection("s.x", "c.u", "", "");
+    let opened = bench.open(&root(&elements, &connections), DEG).unwrap();
+    let found = links(&opened.assembly);
+    assert_eq!(
+        found,
+        ["s.b.x -> c.u * 57.29577951308232 + 0.0", "a.y -> s.b.u * 0.017453292519943295 + 0.0"]
+    );
+    assert_eq!(opened.warnings, [""; 0]);
+}
+
+#[test]
+fn a_connector_that_a_parameter_binding_sets_is_driven() {
+    let bench = Bench::new();
+    bench.fmu("a.fmu", &format!("p parameter {}", real("m")));
+    let component = component("c", "a.fmu", "p parameter", "");
+    let units = r#"<ssd:Units><ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="0.001"/></ssc:Unit></ssd:Units>"#;
+    let system = |binding: &str| {
+        crate::bench::connectors("P parameter <ssc:Real unit=\"mm\"/>")
+            + binding
+            + &root(&component, &connection("P", "c.p", "", ""))
+    };
+    let opened = bench.open(&system(&set("P", r#"<ssv:Real value="250"/>"#)), units).unwrap();
+    assert_eq!(first_setting(&opened), (0.25, &[][..]));
+    let opened = bench.open(&system(""), units).unwrap();
+    assert_eq!(opened.warnings, ["c.p is connected to P, which nothing drives"]);
+}
