@@ -6,6 +6,14 @@ use fmu::{Model, Simulation};
 
 use super::StateSpace;
 
+/// An importer that reads the description in one pass knows the extents of each array.
+#[test]
+fn the_structural_parameters_precede_the_arrays_that_they_size() {
+    let description = fmu::describe_3::<StateSpace>(Path::new("resources")).unwrap();
+    let names: Vec<_> = description.variables.iter().map(|own| own.name.as_str()).collect();
+    assert_eq!(names[..5], ["time", "n", "m", "p", "A"]);
+}
+
 #[test]
 fn the_variables_keep_the_rules_of_the_standard() {
     assert_eq!(fmu::problems::<StateSpace>(Path::new("resources")), Ok(vec![]));

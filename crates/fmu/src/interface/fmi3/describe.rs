@@ -97,6 +97,12 @@ fn value_of(own: &ScalarVariable) -> (bool, &'static str, u32) {
     (own.causality == Causality::Independent, element, own.value_reference)
 }
 
+/// Whether the variable precedes the others: time, and the structural parameters, because fmusim 0.0.39 crashes
+/// if an array precedes the parameter that is its extent. The standard states no order.
+fn is_early(own: &ScalarVariable) -> bool {
+    matches!(own.causality, Causality::Independent | Causality::StructuralParameter)
+}
+
 fn same_attributes(alias: &ScalarVariable, of: &ScalarVariable) -> bool {
     let kind = |own: &ScalarVariable| match without_start(&own.kind) {
         Kind::Real(real) => Kind::Real(RealType { reinit: false, ..real }),
@@ -147,7 +153,9 @@ impl Builder {
             main != position && same_attributes(&old[position], &old[main])
         };
         self.places = vec![(0, 0); old.len()];
-        for block in blocks(old, |own| group(own).len() > 1) {
+        let mut blocks = blocks(old, |own| group(own).len() > 1);
+        blocks.sort_by_key(|block| !is_early(&old[block.start]));
+        for block in blocks {
             if block.count == 1 && block.extents.is_empty() && is_alias(block.start) {
                 continue;
             }
