@@ -97,6 +97,23 @@ pub(crate) struct IntermediateUpdate {
 unsafe impl Send for IntermediateUpdate {}
 
 impl IntermediateUpdate {
+    /// A callback that sets nothing.
+    #[cfg(test)]
+    pub(crate) fn silent() -> Self {
+        unsafe extern "C" fn nothing(
+            _: fmi3InstanceEnvironment,
+            _: f64,
+            _: u8,
+            _: u8,
+            _: u8,
+            _: u8,
+            _: *mut u8,
+            _: *mut f64,
+        ) {
+        }
+        Self { environment: std::ptr::null_mut(), function: nothing }
+    }
+
     /// Asks for the inputs at `time`; the importer can neither read outputs nor return early.
     fn ask(self, time: f64) {
         let (mut return_requested, mut return_time) = (0, time);

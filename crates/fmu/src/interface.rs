@@ -13,7 +13,7 @@ use crate::model::{Failure, Model};
 use crate::typed::Slots;
 use crate::variable::{Access, Base, Declaration, Enumeration, Fields, Number, Variable};
 use describe::{describe_aliases, describe_variables, keep_derivative};
-use fmu_description::call_order::settable;
+use fmu_description::call_order::{InterfaceType, settable};
 use fmu_description::call_order3;
 use fmu_description::location::NO_FOLDER;
 use fmu_description::{
@@ -302,7 +302,7 @@ fn is_of_3(variable: &ScalarVariable) -> bool {
 /// Same as [`describe`].
 pub fn describe_3<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
     let (mut interface, description) = Interface::new(&mut new_model::<M>(resources)?)?;
-    Ok(interface.convert(&description)?.1)
+    Ok(interface.convert(&description, InterfaceType::CoSimulation)?.1)
 }
 
 impl<M> Interface<M> {
@@ -331,8 +331,8 @@ impl<M> Interface<M> {
         expressible_in_2(description)
     }
 
-    /// Converts to FMI 3.0: the GUID becomes the `instantiationToken`, and continuous states may be set
-    /// in event mode unless an event changes them (section 2.3.5).
+    /// Converts to FMI 3.0: the GUID becomes the `instantiationToken`, and in model exchange continuous states
+    /// may be set in event mode unless an event changes them (section 2.3.5).
     ///
     /// # Errors
     ///
@@ -341,6 +341,7 @@ impl<M> Interface<M> {
     pub(crate) fn convert(
         &mut self,
         description: &ModelDescription,
+        interface_type: InterfaceType,
     ) -> Result<(fmi3::Table, ModelDescription), Failure> {
         let indicators = self.event_indicators.unwrap_or_default();
         let (table, mut converted) = fmi3::describe(description, indicators);
@@ -361,7 +362,8 @@ impl<M> Interface<M> {
             }
         }
         for slot in &mut self.reals {
-            let is_state = slot.is_state.then_some(slot.is_reinitialised);
+            let is_state = slot.is_state && interface_type == InterfaceType::ModelExchange;
+            let is_state = is_state.then_some(slot.is_reinitialised);
             let role = (slot.causality, slot.variability);
             slot.settable = call_order3::settable(role, slot.initial, is_state);
         }
@@ -394,7 +396,8 @@ pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Fail
 pub fn problems<M: Model>(resources: &std::path::Path) -> Result<Vec<Problem>, Failure> {
     let (mut interface, description) = Interface::new(&mut new_model::<M>(resources)?)?;
     if description.variables.iter().any(is_of_3) {
-        return Ok(interface.convert(&description)?.1.problems());
+        let (_, converted) = interface.convert(&description, InterfaceType::CoSimulation)?;
+        return Ok(converted.problems());
     }
     Ok(description.problems())
 }

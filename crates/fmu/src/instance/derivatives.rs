@@ -34,6 +34,15 @@ impl<M: Model> Instance<M> {
         })
     }
 
+    /// Checks that the model has derivatives.
+    pub(super) fn provides_derivatives() -> Result<(), Failure> {
+        if M::PROVIDES_DIRECTIONAL_DERIVATIVE {
+            return Ok(());
+        }
+        let message = "not available: the model description offers no directional derivatives";
+        Err(Failure::Error(message.to_owned()))
+    }
+
     /// Computes `(dh/dv) delta` and passes the components to `write`, in the order of the unknowns.
     pub(super) fn directional_derivative(
         &mut self,
@@ -41,10 +50,7 @@ impl<M: Model> Instance<M> {
         (knowns, delta): (&[u32], &[f64]),
         mut write: impl FnMut(f64),
     ) -> Result<(), Failure> {
-        if !M::PROVIDES_DIRECTIONAL_DERIVATIVE {
-            let message = "not available: providesDirectionalDerivative is false";
-            return Err(Failure::Error(message.to_owned()));
-        }
+        Self::provides_derivatives()?;
         self.refresh()?;
         let initializing = self.core.state == State::InitializationMode;
         for &reference in unknowns {

@@ -14,6 +14,7 @@ use super::{Instance, check_guid};
 use crate::ffi::{Callbacks, IntermediateUpdate};
 use crate::interface::fmi3::{Dependency, Table, Type};
 use crate::model::{Event, Failure, Model};
+use fmu_description::ModelDescription;
 use fmu_description::call_order::{InterfaceType, State};
 
 pub(crate) use derivatives::Jacobian;
@@ -48,8 +49,9 @@ pub(crate) struct Instantiation<'a> {
     pub(crate) logging_on: bool,
     pub(crate) event_mode_used: bool,
     pub(crate) early_return_allowed: bool,
-    /// The importer's callback, and the variables that it intends to set.
-    pub(crate) intermediate: Option<(IntermediateUpdate, &'a [u32])>,
+    pub(crate) intermediate: Option<IntermediateUpdate>,
+    /// The variables that the importer intends to access in intermediate update mode.
+    pub(crate) required: &'a [u32],
 }
 
 impl<M: Model> Instance<M> {
@@ -59,7 +61,7 @@ impl<M: Model> Instance<M> {
             || new_model::<M>(made.resources),
             callbacks,
             |interface, description| {
-                let (table, _) = interface.convert(description)?;
+                let (table, converted) = interface.convert(description, made.interface_type)?;
                 if !interface.offers_exchange() {
                     if made.interface_type == InterfaceType::ModelExchange {
                         return Err(Failure::Error(
@@ -73,14 +75,12 @@ impl<M: Model> Instance<M> {
                     }
                 }
                 check_guid::<M>(interface.guid, "instantiationToken", made.token, made.resources)?;
+                check_required(made.required, &converted)?;
                 let indicators = vec![0.0; interface.event_indicators.unwrap_or_default()];
-                let wanted = |(update, required): (IntermediateUpdate, &[u32])| {
-                    let sets = |name: &str| interface.interpolates(name);
-                    let is_set = required.iter().any(|own| table.name(*own).is_some_and(sets));
-                    is_set
-                        .then(|| Box::new(Intermediate::new(update, interface.interpolated.len())))
-                };
-                let intermediate = made.intermediate.and_then(wanted);
+                let inputs = interface.interpolated.len();
+                let intermediate = made.intermediate.filter(|_| !made.required.is_empty());
+                let intermediate =
+                    intermediate.map(|update| Box::new(Intermediate::new(update, inputs)));
                 Ok(Some(Box::new(Session {
                     table,
                     event_mode_used: made.event_mode_used,
@@ -225,6 +225,18 @@ impl<M: Model> Instance<M> {
         self.located_in_arrays(kind, references, count, body)
     }
 
+    /// [`Instance::located`] for a function that sets.
+    pub(crate) fn set_located(
+        &mut self,
+        kind: Type,
+        references: &[u32],
+        count: usize,
+        set: impl FnOnce(&mut Self, &[u32]) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        self.session()?.table.check_settable(references)?;
+        self.located(kind, references, count, set)
+    }
+
     /// [`Instance::located`] for a function that reads.
     pub(crate) fn read_located(
         &mut self,
@@ -255,6 +267,22 @@ impl<M: Model> Instance<M> {
         self.session_mut()?.places = places;
         done
     }
+}
+
+/// Checks that the variables that the importer intends to access in intermediate update mode are marked for
+/// it (section 2.3.1).
+fn check_required(required: &[u32], description: &ModelDescription) -> Result<(), Failure> {
+    for &reference in required {
+        let own = description.variables.iter().find(|own| own.value_reference == reference);
+        if own.is_none_or(|own| !own.intermediate_update) {
+            let name = own.map_or("no variable", |own| &own.name);
+            return Err(Failure::Error(format!(
+                "requiredIntermediateVariables has the value reference {reference} of {name}, expected \
+                 variables with intermediateUpdate = true"
+            )));
+        }
+    }
+    Ok(())
 }
 
 #[cold]

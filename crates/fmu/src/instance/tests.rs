@@ -7,6 +7,7 @@ mod exchange;
 mod fmi3;
 mod layout;
 mod pendulum;
+mod refusals;
 mod steps;
 
 use std::path::Path;

@@ -66,6 +66,8 @@ pub(crate) struct Entry {
     first: u32,
     /// Number of elements.
     count: u32,
+    /// Whether the variable is calculated, and has the value of one that may be set.
+    is_calculated: bool,
 }
 
 /// The variables by value reference of FMI 3.0, and what they depend on.
@@ -105,9 +107,19 @@ impl Table {
         variables(self) == variables(other)
     }
 
-    /// Returns the name of a variable.
-    pub(crate) fn name(&self, reference: u32) -> Option<&str> {
-        self.entries.get(reference as usize).map(|entry| entry.name.as_str())
+    /// Checks that no variable is calculated whose value that of another variable is.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] with the name of the first such variable.
+    pub(crate) fn check_settable(&self, references: &[u32]) -> Result<(), Failure> {
+        let entries = || references.iter().filter_map(|own| self.entries.get(*own as usize));
+        match entries().find(|entry| entry.is_calculated) {
+            None => Ok(()),
+            Some(Entry { name, .. }) => {
+                Err(Failure::Error(format!("{name} must not be set: it has initial = calculated")))
+            }
+        }
     }
 
     /// Appends the value references of FMI 2.0 of all elements of the variables to `places`, in

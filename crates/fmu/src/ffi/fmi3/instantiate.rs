@@ -14,42 +14,45 @@ use fmu_description::abi3::{
 use fmu_description::call_order::InterfaceType;
 use fmu_description::location::NO_FOLDER;
 
-/// The strings of `fmi3InstantiateXXX`.
-struct Strings {
+/// The strings of `fmi3InstantiateXXX` and `requiredIntermediateVariables`.
+struct Pointers {
     name: fmi3String,
     token: fmi3String,
     resources: fmi3String,
+    required: *const fmi3ValueReference,
+    required_count: usize,
 }
 
-/// Returns token and folder of resources; a null or empty path means that the importer has none.
-unsafe fn read_strings(strings: &Strings) -> Result<(String, PathBuf), Failure> {
-    // SAFETY: null or zero-terminated by the standard.
+/// Returns token, folder of resources and required intermediate variables; a null or empty path means that
+/// the importer has no resources.
+unsafe fn read_pointers<'a>(own: &Pointers) -> Result<(String, PathBuf, &'a [u32]), Failure> {
+    // SAFETY: strings are null or zero-terminated, and the array has the stated length, by the standard.
     unsafe {
-        let name = text(strings.name, "instanceName")?;
+        let name = text(own.name, "instanceName")?;
         if name.trim().is_empty() {
             return Err(Failure::Error("instanceName is empty".to_owned()));
         }
-        let token = text(strings.token, "instantiationToken")?;
-        let folder = if strings.resources.is_null() {
+        let token = text(own.token, "instantiationToken")?;
+        let folder = if own.resources.is_null() {
             String::new()
         } else {
-            text(strings.resources, "resourcePath")?
+            text(own.resources, "resourcePath")?
         };
         let folder = if folder.is_empty() { NO_FOLDER } else { &folder };
-        Ok((token, Path::new(folder).to_owned()))
+        Ok((token, Path::new(folder).to_owned(), read(own.required, own.required_count)?))
     }
 }
 
 /// Makes an instance, or logs why there is none.
 unsafe fn instantiate<M: Model>(
     function: &str,
-    strings: &Strings,
+    pointers: &Pointers,
     callbacks: &Callbacks,
     made: &Instantiation<'_>,
 ) -> fmi3Instance {
-    // SAFETY: strings as the standard demands them.
-    let instance = unsafe { read_strings(strings) }.and_then(|(token, resources)| {
-        let made = Instantiation { token: &token, resources: &resources, ..*made };
+    // SAFETY: strings and array as the standard demands them.
+    let instance = unsafe { read_pointers(pointers) }.and_then(|(token, resources, required)| {
+        let made = Instantiation { token: &token, resources: &resources, required, ..*made };
         Instance::<M>::new_3(&made, callbacks.clone())
     });
     match instance {
@@ -75,6 +78,7 @@ fn instantiation(interface_type: InterfaceType, logging_on: fmi3Boolean) -> Inst
         event_mode_used: false,
         early_return_allowed: false,
         intermediate: None,
+        required: &[],
     }
 }
 
@@ -89,10 +93,11 @@ pub unsafe fn instantiate_model_exchange<M: Model>(
     log: Option<fmi3LogMessageCallback>,
 ) -> fmi3Instance {
     let callbacks = Callbacks::Version3 { environment, log };
-    let strings = Strings { name, token, resources };
+    let pointers =
+        Pointers { name, token, resources, required: std::ptr::null(), required_count: 0 };
     let made = instantiation(InterfaceType::ModelExchange, logging_on);
     // SAFETY: strings as the standard demands them.
-    unsafe { instantiate::<M>("fmi3InstantiateModelExchange", &strings, &callbacks, &made) }
+    unsafe { instantiate::<M>("fmi3InstantiateModelExchange", &pointers, &callbacks, &made) }
 }
 
 /// The importer may set inputs within a step; `requiredIntermediateVariables` names those inputs.
@@ -107,24 +112,22 @@ pub unsafe fn instantiate_co_simulation<M: Model>(
     event_mode_used: fmi3Boolean,
     early_return_allowed: fmi3Boolean,
     required: *const fmi3ValueReference,
-    n_required: usize,
+    required_count: usize,
     environment: fmi3InstanceEnvironment,
     log: Option<fmi3LogMessageCallback>,
     intermediate_update: Option<fmi3IntermediateUpdateCallback>,
 ) -> fmi3Instance {
     let callbacks = Callbacks::Version3 { environment, log };
-    let strings = Strings { name, token, resources };
-    // SAFETY: an array of the stated length by the standard.
-    let required = unsafe { read(required, n_required) }.unwrap_or_default();
-    let update = |function| (IntermediateUpdate { environment, function }, required);
+    let pointers = Pointers { name, token, resources, required, required_count };
+    let update = |function| IntermediateUpdate { environment, function };
     let made = Instantiation {
         intermediate: intermediate_update.map(update),
         event_mode_used: event_mode_used != 0,
         early_return_allowed: early_return_allowed != 0,
         ..instantiation(InterfaceType::CoSimulation, logging_on)
     };
-    // SAFETY: strings as the standard demands them.
-    unsafe { instantiate::<M>("fmi3InstantiateCoSimulation", &strings, &callbacks, &made) }
+    // SAFETY: strings and array as the standard demands them.
+    unsafe { instantiate::<M>("fmi3InstantiateCoSimulation", &pointers, &callbacks, &made) }
 }
 
 /// Scheduled execution is refused.

@@ -24,7 +24,7 @@ macro_rules! values {
             });
             $set = $setter(
                 vr: *const fmi3ValueReference, n: usize, values: *const $c, n_values: usize
-            ), instance => instance.located(Type::$type, read(vr, n)?, n_values, |instance, places| {
+            ), instance => instance.set_located(Type::$type, read(vr, n)?, n_values, |instance, places| {
                 instance.$write(places, read(values, n_values)?)
             });)*
         }
@@ -57,7 +57,7 @@ entry_points_3! {
     });
     set_string = SetString(
         vr: *const fmi3ValueReference, n: usize, values: *const fmi3String, n_values: usize
-    ), instance => instance.located(Type::String, read(vr, n)?, n_values, |instance, places| {
+    ), instance => instance.set_located(Type::String, read(vr, n)?, n_values, |instance, places| {
         instance.set_string(places, &texts(values, n_values)?)
     });
     get_binary = GetBinary(
@@ -73,7 +73,7 @@ entry_points_3! {
     set_binary = SetBinary(
         vr: *const fmi3ValueReference, n: usize, sizes: *const usize, values: *const fmi3Binary,
         n_values: usize
-    ), instance => instance.located(Type::Binary, read(vr, n)?, n_values, |instance, places| {
+    ), instance => instance.set_located(Type::Binary, read(vr, n)?, n_values, |instance, places| {
         let given = read(sizes, n_values)?.iter().zip(read(values, n_values)?);
         let values = given.map(|(&size, &bytes)| Ok(read(bytes, size)?.to_vec()));
         instance.set_typed(places, &values.collect::<Result<Vec<Vec<u8>>, Failure>>()?)

@@ -69,7 +69,7 @@ impl<M: Model> Instance<M> {
     /// Lays the variables out for these values of the structural parameters.
     pub(super) fn lay_out(&mut self, structural: Vec<u64>) -> Result<(), Failure> {
         let (mut interface, description) = Interface::new(&mut self.core.model)?;
-        let (table, _) = interface.convert(&description)?;
+        let (table, _) = interface.convert(&description, self.core.interface_type)?;
         interface.guid = self.interface.guid;
         let inputs = interface.interpolated.len();
         let session = self.session_mut()?;

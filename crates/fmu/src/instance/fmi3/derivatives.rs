@@ -39,6 +39,7 @@ impl<M: Model> Instance<M> {
         knowns: &[u32],
         to: &mut [MaybeUninit<f64>],
     ) -> Result<(), Failure> {
+        Self::provides_derivatives()?;
         for (&known, place) in knowns.iter().zip(to) {
             let (mut sum, mut seed) = (0.0, seed.iter());
             self.directional_derivative(unknowns, (&[known], &[1.0]), |entry| {

@@ -19,7 +19,7 @@ use fmu_description::{Dimension, Elements, ModelDescription};
 
 /// x' = A x + u with a 2 x 2 matrix A, as a model without a step; the event at x[1] = 2 ends nothing.
 #[derive(Clone, Serialize, Deserialize)]
-struct Linear {
+pub(super) struct Linear {
     a: Vec<f64>,
     x: Vec<f64>,
     rates: Vec<f64>,
@@ -106,7 +106,11 @@ fn reference(name: &str) -> u32 {
     description().variable(name).unwrap().value_reference
 }
 
-fn made<M: Model>(kind: InterfaceType, events: bool, early: bool) -> Result<Instance<M>, Failure> {
+pub(super) fn made<M: Model>(
+    kind: InterfaceType,
+    events: bool,
+    early: bool,
+) -> Result<Instance<M>, Failure> {
     let token = describe_3::<M>(Path::new("")).unwrap().guid;
     let made = Instantiation {
         interface_type: kind,
@@ -116,11 +120,12 @@ fn made<M: Model>(kind: InterfaceType, events: bool, early: bool) -> Result<Inst
         event_mode_used: events,
         early_return_allowed: early,
         intermediate: None,
+        required: &[],
     };
     Instance::new_3(&made, Callbacks::silent())
 }
 
-fn initialized(kind: InterfaceType, events: bool) -> Instance<Linear> {
+pub(super) fn initialized(kind: InterfaceType, events: bool) -> Instance<Linear> {
     let mut instance = made(kind, events, events).unwrap();
     let done = [
         instance.call(Function::EnterInitializationMode, Instance::enter_initialization_mode),
@@ -141,7 +146,7 @@ fn get(instance: &mut Instance<Linear>, names: &[&str], count: usize) -> (Status
     (status, values)
 }
 
-fn set(instance: &mut Instance<Linear>, name: &str, values: &[f64]) -> Status {
+pub(super) fn set(instance: &mut Instance<Linear>, name: &str, values: &[f64]) -> Status {
     instance.call(Function::SetFloat64, |i| {
         i.located(Type::Float64, &[reference(name)], values.len(), |i, places| {
             i.set_float64(places, values)

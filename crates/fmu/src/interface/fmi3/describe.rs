@@ -164,14 +164,15 @@ impl Builder {
             let aliases: Vec<_> = aliases
                 .filter(|&other| is_alias(other) && main(&old[other]) == block.start)
                 .collect();
-            self.add_block(&block, elements);
+            let is_calculated = main(&elements[0]) != block.start && !elements[0].has_start();
+            self.add_block(&block, elements, is_calculated);
             for position in aliases {
                 self.add_alias(&old[position], position, &block.name);
             }
         }
     }
 
-    fn add_block(&mut self, block: &Block, elements: &[ScalarVariable]) {
+    fn add_block(&mut self, block: &Block, elements: &[ScalarVariable], is_calculated: bool) {
         let reference = u32::try_from(self.entries.len()).unwrap_or(u32::MAX);
         let first = &elements[0];
         let index = self.next_index();
@@ -184,6 +185,7 @@ impl Builder {
             kind: kind_of(&first.kind),
             first: place(first),
             count: u32::try_from(block.count).unwrap_or(u32::MAX),
+            is_calculated,
         });
         let start_elements = starts(elements).filter(|_| block.count > 1);
         let stated = start_elements.is_some();
@@ -393,6 +395,7 @@ fn add_indicators(
             kind: Type::Float64,
             first: place,
             count: 1,
+            is_calculated: false,
         });
         variables.push(ScalarVariable {
             name,
