@@ -54,6 +54,14 @@ impl Callbacks {
         Self::Version3 { environment: std::ptr::null_mut(), log: None }
     }
 
+    /// Whether the importer receives a message with this status whatever its logging settings are.
+    ///
+    /// FMI 3.0.2 says that `fmi3Error` and a failed instantiation are explained, and that nothing is logged
+    /// while `loggingOn` is false (section 2.3.1). Its next release lets errors through.
+    pub(crate) fn needs(&self, status: Status) -> bool {
+        matches!(self, Self::Version3 { .. }) && matches!(status, Status::Error | Status::Fatal)
+    }
+
     /// Sends a message to the importer's logger. The format string of FMI 2.0 is `%s`; `#`, by which the
     /// standard marks value references, is doubled.
     pub(crate) fn log(&self, status: Status, category: &str, message: &str) {

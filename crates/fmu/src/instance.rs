@@ -300,7 +300,7 @@ impl<M: Model> Instance<M> {
         drop(hook_guard);
     }
 
-    /// Logs a message if its category is selected.
+    /// Logs a message if its category is selected or its status needs an explanation.
     fn log(&self, status: Status, category: &str, message: &str) {
         log(&self.callbacks, self.categories.as_deref(), status, category, message);
     }
@@ -467,7 +467,8 @@ fn log(
     category: &str,
     message: &str,
 ) {
-    if chosen.is_none_or(|names| names.iter().any(|name| name == category)) {
+    let is_chosen = chosen.is_none_or(|names| names.iter().any(|name| name == category));
+    if is_chosen || callbacks.needs(status) {
         callbacks.log(status, category, message);
     }
 }

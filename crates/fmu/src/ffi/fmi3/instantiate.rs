@@ -61,9 +61,7 @@ unsafe fn instantiate<M: Model>(
             into_component(instance)
         }
         Err(failure) => {
-            if made.logging_on {
-                callbacks.log(Status::Error, "logStatusError", &format!("{function}: {failure}"));
-            }
+            callbacks.log(Status::Error, "logStatusError", &format!("{function}: {failure}"));
             std::ptr::null_mut()
         }
     }
@@ -138,20 +136,18 @@ pub unsafe fn instantiate_scheduled_execution<M: Model>(
     _token: fmi3String,
     _resources: fmi3String,
     _visible: fmi3Boolean,
-    logging_on: fmi3Boolean,
+    _logging_on: fmi3Boolean,
     environment: fmi3InstanceEnvironment,
     log: Option<fmi3LogMessageCallback>,
     _clock_update: Option<fmi3ClockUpdateCallback>,
     _lock_preemption: Option<fmi3LockPreemptionCallback>,
     _unlock_preemption: Option<fmi3UnlockPreemptionCallback>,
 ) -> fmi3Instance {
-    if logging_on != 0 {
-        let message = format!(
-            "fmi3InstantiateScheduledExecution: {} offers no scheduled execution",
-            M::IDENTIFIER
-        );
-        Callbacks::Version3 { environment, log }.log(Status::Error, "logStatusError", &message);
-    }
+    let message = format!(
+        "fmi3InstantiateScheduledExecution: {} offers no scheduled execution",
+        M::IDENTIFIER
+    );
+    Callbacks::Version3 { environment, log }.log(Status::Error, "logStatusError", &message);
     std::ptr::null_mut()
 }
 

@@ -1,7 +1,7 @@
 //! Variables of the types that FMI 2.0 does not have, by the C functions of FMI 3.0.
 #![expect(clippy::float_cmp, reason = "values that are set and read back")]
 
-use std::ffi::CString;
+use std::ffi::{CStr, CString};
 use std::path::Path;
 use std::ptr::{null, null_mut};
 
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::ffi::{Callbacks, fmi3 as c};
 use crate::instance::Instance;
 use crate::{Failure, Model, Variables, describe, describe_3, problems};
-use fmu_description::abi3::fmi3Instance;
+use fmu_description::abi3::{fmi3Instance, fmi3InstanceEnvironment, fmi3String};
 use fmu_description::call_order::InterfaceType;
 use fmu_description::{Dimension, Elements, Kind, ModelDescription};
 
@@ -89,6 +89,61 @@ fn instance() -> fmi3Instance {
     };
     assert!(!instance.is_null());
     instance
+}
+
+/// Appends status and text to the vector in the environment.
+unsafe extern "C" fn record(
+    environment: fmi3InstanceEnvironment,
+    status: i32,
+    _: fmi3String,
+    message: fmi3String,
+) {
+    // SAFETY: the environment is the vector below, and the text ends with zero.
+    unsafe {
+        let text = CStr::from_ptr(message).to_string_lossy().into_owned();
+        (*environment.cast::<Vec<(i32, String)>>()).push((status, text));
+    }
+}
+
+#[test]
+fn an_error_and_a_failed_instantiation_are_explained_although_logging_is_off() {
+    let token = CString::new(description().guid).unwrap();
+    let mut messages = Vec::<(i32, String)>::new();
+    let environment = (&raw mut messages).cast();
+    let make = |token: &CStr| {
+        // SAFETY: strings that end with zero; a callback that fits its environment.
+        unsafe {
+            c::instantiate_co_simulation::<Types>(
+                c"types".as_ptr(),
+                token.as_ptr(),
+                null(),
+                0,
+                0,
+                0,
+                0,
+                null(),
+                0,
+                environment,
+                Some(record),
+                None,
+            )
+        }
+    };
+    assert!(make(c"another").is_null());
+    let own = make(&token);
+    let a = reference("a");
+    // SAFETY: an instance, freed once, and one value each.
+    unsafe {
+        let set = |value: f32| c::set_float32::<Types>(own, &raw const a, 1, &raw const value, 1);
+        assert_eq!(set(9.0), DISCARD, "which is no error");
+        assert_eq!(c::set_uint8::<Types>(own, &raw const a, 1, &1, 1), ERROR);
+        c::free_instance::<Types>(own);
+    }
+    let parts = ["another", "a of type Float32, expected a UInt8"];
+    assert_eq!(messages.len(), parts.len(), "{messages:?}");
+    for ((status, text), part) in messages.iter().zip(parts) {
+        assert!(*status == ERROR && text.contains(part), "{text}");
+    }
 }
 
 /// Sets values of one type and reads them back.
