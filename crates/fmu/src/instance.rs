@@ -49,6 +49,10 @@ pub(crate) struct Core<M: Model> {
     sloped: bool,
     /// FMI 3.0: the time of the next event in s, as the last event stated it.
     next_event: Option<f64>,
+    /// Model exchange: the earliest time in s to which the importer may go back, and the time of the last
+    /// completed integrator step.
+    earliest: f64,
+    completed: f64,
 }
 
 /// Lays the variables out for values of the structural parameters.
@@ -92,11 +96,11 @@ impl<M: Model> Core<M> {
             unchecked: true,
             sloped: false,
             next_event: None,
+            earliest: 0.0,
+            completed: 0.0,
         }
     }
-}
 
-impl<M: Model> Core<M> {
     /// Checks that `time` is not after `stopTime`, if `stopTime` is defined (section 2.1.6).
     fn before_stop(&self, time: f64) -> Result<(), Failure> {
         match self.experiment.stop_time.filter(|stop| time > stop + time_tolerance(*stop)) {
@@ -339,7 +343,8 @@ impl<M: Model> Instance<M> {
             return Err(Failure::Error(format!("tolerance is {value}, expected more than 0")));
         }
         self.core.experiment = experiment;
-        self.core.time = start_time;
+        let core = &mut self.core;
+        (core.time, core.earliest, core.completed) = (start_time, start_time, start_time);
         Ok(())
     }
 

@@ -19,15 +19,20 @@ fn check_length(what: &str, found: usize, expected: usize) -> Result<(), Failure
 impl<M: Model> Instance<M> {
     /// `fmi2EnterEventMode`.
     pub(crate) fn enter_event_mode(&mut self) -> Result<(), Failure> {
-        self.core.before_stop(self.core.time)?;
-        self.core.state = State::EventMode;
-        self.core.stale = true;
+        let core = &mut self.core;
+        core.before_stop(core.time)?;
+        core.state = State::EventMode;
+        (core.earliest, core.stale) = (core.time, true);
         Ok(())
     }
 
     /// `fmi2CompletedIntegratorStep`.
-    pub(crate) fn completed_integrator_step(&self) -> Result<(), Failure> {
-        self.core.before_stop(self.core.time)
+    pub(crate) fn completed_integrator_step(&mut self) -> Result<(), Failure> {
+        let core = &mut self.core;
+        core.before_stop(core.time)?;
+        core.earliest = core.earliest.max(core.completed);
+        core.completed = core.time;
+        Ok(())
     }
 
     /// Handles an event: `fmi2NewDiscreteStates`, `fmi3UpdateDiscreteStates`.
@@ -64,7 +69,9 @@ impl<M: Model> Instance<M> {
 
     /// `fmi2SetTime`. Allowed in event mode only for an FMU without continuous states (condition 8).
     ///
-    /// An integrator may evaluate the model after `stopTime`; a step or an event there is an error.
+    /// The importer may go back to the second last completed step, not over an event (FMI 3.0.2, section 3.2.1).
+    /// Integrators that interpolate, such as those of FMPy and fmusim, evaluate the model after `stopTime`; a
+    /// completed step or an event there is an error.
     pub(crate) fn set_time(&mut self, time: f64) -> Result<(), Failure> {
         if self.core.state == State::EventMode && !self.interface.states.is_empty() {
             let message = "allowed in EventMode only for an FMU without continuous states";
@@ -73,9 +80,12 @@ impl<M: Model> Instance<M> {
         if !time.is_finite() {
             return Err(Failure::Error(format!("time is {time}, expected a time in s")));
         }
-        let start = self.core.experiment.start_time;
-        if time < start - time_tolerance(start) {
-            return Err(Failure::Error(format!("{time} s is before startTime {start} s")));
+        let earliest = self.core.earliest;
+        if time < earliest - time_tolerance(earliest) {
+            return Err(Failure::Error(format!(
+                "{time} s is before {earliest} s, the time of the start, of the last event or of the second \
+                 last completed integrator step"
+            )));
         }
         self.core.time = time;
         self.core.stale = true;

@@ -44,6 +44,10 @@ fn set(instance: &mut Instance<Pendulum>, reference: u32, value: f64) -> Status 
     instance.call(Function::SetReal, |own| own.set_real(&[reference], &[value]))
 }
 
+fn set_time(instance: &mut Instance<Pendulum>, time: f64) -> Status {
+    instance.call(Function::SetTime, |own| own.set_time(time))
+}
+
 fn set_side(instance: &mut Instance<Pendulum>, value: i32) -> Status {
     instance.call(Function::SetInteger, |own| own.set_integer(&[0], &[value]))
 }
@@ -293,4 +297,31 @@ fn an_integrator_may_look_past_stop_time_but_complete_no_step_there() {
             assert_eq!(instance.call(function, body), expected, "{function:?} at {time}");
         }
     }
+}
+
+#[test]
+fn an_importer_goes_back_to_the_second_last_completed_step_and_never_over_an_event() {
+    let complete = |instance: &mut Instance<Pendulum>, time: f64| {
+        assert_eq!(set_time(instance, time), Status::OK);
+        ok(instance, Function::CompletedIntegratorStep, |own| {
+            own.completed_integrator_step().unwrap();
+        });
+    };
+    let back = |instance: &Instance<Pendulum>, time: f64| {
+        let mut other = pendulum(InterfaceType::ModelExchange);
+        let snapshot = instance.snapshot();
+        ok(&mut other, Function::SetFMUstate, |own| own.restore(&snapshot).unwrap());
+        set_time(&mut other, time)
+    };
+    let mut instance = continuous();
+    complete(&mut instance, 0.5);
+    assert_eq!(back(&instance, 0.0), Status::OK);
+    complete(&mut instance, 1.0);
+    assert_eq!([back(&instance, 0.5), back(&instance, 0.4)], [Status::OK, Status::Error]);
+    assert_eq!(set_time(&mut instance, 0.75), Status::OK);
+    ok(&mut instance, Function::EnterEventMode, |own| own.enter_event_mode().unwrap());
+    ok(&mut instance, Function::EnterContinuousTimeMode, Instance::enter_continuous_time_mode);
+    assert_eq!([back(&instance, 0.75), back(&instance, 0.74)], [Status::OK, Status::Error]);
+    instance.reset().unwrap();
+    assert_eq!(instance.core.earliest, 0.0);
 }
