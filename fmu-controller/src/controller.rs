@@ -176,7 +176,9 @@ impl AsoController {
         if let (Some(detector), Some(own)) = (&self.detector, &self.design.detection)
             && detector.has_too_many_samples(own, step.end())
         {
-            return Err(too_many_samples(step.start, step.end()));
+            let (start, end) = (step.start, step.end());
+            let message = format!("too many samples are due from {start} to {end} s");
+            return Err(Failure::Error(message));
         }
         let resolution = clock_rounding(step.end());
         let until_on = self.design.t_on - step.start;
@@ -261,11 +263,8 @@ impl AsoController {
     }
 
     /// Takes the samples that are due until `end`, with the measurements given at `start`, in s.
-    fn sample(&mut self, start: f64, end: f64) -> Result<(), Failure> {
-        let Some(mut sampler) = self.sampler.take_if(|sampler| !sampler.has_too_many_samples(end))
-        else {
-            return Err(too_many_samples(start, end));
-        };
+    fn sample(&mut self, start: f64, end: f64) {
+        let Some(mut sampler) = self.sampler.take() else { return };
         while let Some(offset) = sampler.time_to_sample(start, end) {
             if !sampler.is_at_start() {
                 self.reconfigure(sampler.next_instant(), Some(&mut sampler));
@@ -284,12 +283,7 @@ impl AsoController {
             self.set_losses();
         }
         self.sampler = Some(sampler);
-        Ok(())
     }
-}
-
-fn too_many_samples(start: f64, end: f64) -> Failure {
-    Failure::Error(format!("too many samples are due from {start} to {end} s"))
 }
 
 /// The rounding error in s to expect of an importer that adds up its steps to `time`.
@@ -400,7 +394,8 @@ impl Model for AsoController {
         self.reconfigurator.start();
         if let Some(sampler) = &mut self.sampler {
             sampler.start(time, &self.values.z);
-            return self.sample(time, time);
+            self.sample(time, time);
+            return Ok(());
         }
         self.mode = self.free_mode(self.is_compensating(time));
         self.evaluate(time, 0.0);
@@ -411,7 +406,8 @@ impl Model for AsoController {
     /// form: the exporter integrates the derivatives.
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
         if self.sampler.is_some() {
-            return self.sample(step.start, step.end());
+            self.sample(step.start, step.end());
+            return Ok(());
         }
         if self.design.schedule.is_some() {
             self.is_integrated = true;
@@ -426,7 +422,7 @@ impl Model for AsoController {
         if self.sampler.is_none() {
             return self.step(step).map(|()| None);
         }
-        self.sample(step.start, step.start)?;
+        self.sample(step.start, step.start);
         Ok(self.sampler.as_ref().and_then(|sampler| sampler.next_until(step.end())))
     }
 
@@ -522,7 +518,7 @@ impl Model for AsoController {
 
     fn event(&mut self, time: f64) -> Result<Event, Failure> {
         if self.sampler.is_some() {
-            self.sample(time, time)?;
+            self.sample(time, time);
             let next_event_time = self.sampler.as_ref().map(Sampler::next_instant);
             return Ok(Event { next_event_time, ..Event::default() });
         }

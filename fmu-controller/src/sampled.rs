@@ -35,8 +35,6 @@ use crate::signals::{OperatingPoint, Signals, Values};
 /// The part of the sample time by which a sample may be early: an importer adds up its steps with
 /// rounding.
 const TOLERANCE: f64 = 1e-4;
-/// The most samples in one step.
-const MOST_SAMPLES: f64 = 1e7;
 
 /// Clock and state of a sampled controller.
 #[derive(Clone, Serialize, Deserialize)]
@@ -100,11 +98,6 @@ impl Sampler {
         let elapsed = self.next * self.period;
         let due = elapsed <= end - self.start + TOLERANCE * self.period;
         due.then_some(elapsed - (start - self.start))
-    }
-
-    /// Whether more samples are due until `end` than one step may take.
-    pub(crate) fn has_too_many_samples(&self, end: f64) -> bool {
-        (end - self.start) / self.period - self.next > MOST_SAMPLES
     }
 
     /// Takes the next sample, `offset` s after the measurements in `values` were given: computes z, e

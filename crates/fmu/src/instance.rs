@@ -47,7 +47,7 @@ pub(crate) struct Core<M: Model> {
     unchecked: bool,
     /// Whether an input derivative is set for the next step.
     sloped: bool,
-    /// FMI 3.0: the time of the next event in s, as the last event stated it.
+    /// The time of the next event in s, as the last event stated it.
     next_event: Option<f64>,
     /// Model exchange: the earliest time in s to which the importer may go back, and the time of the last
     /// completed integrator step.
@@ -165,8 +165,7 @@ impl<M: Model> Instance<M> {
             let messages = fresh.log().map(Log::take).unwrap_or_default();
             let (mut interface, mut description) = Interface::new(&mut fresh)?;
             let session = session(&mut interface, &mut description)?;
-            let tolerance = description.default_experiment.and_then(|own| own.tolerance);
-            let stepper = Stepper::new(&interface, tolerance);
+            let stepper = Stepper::new(&interface, description.default_experiment);
             let core = Core::new(fresh.clone(), InterfaceType::CoSimulation);
             Ok(move |hook_guard| Self {
                 core,
@@ -405,6 +404,7 @@ impl<M: Model> Instance<M> {
         let step = communication_step(core.time, start, size)?;
         let end = start + size;
         core.before_stop(end)?;
+        self.stepper.check_size(step.size)?;
         core.check()?;
         match core.model.step(&step) {
             Ok(()) => {}

@@ -111,6 +111,9 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     /// follow their polynomials. A model without states needs no step either: only its events happen,
     /// and `update` runs at the end.
     ///
+    /// A step is at most as long as 1e7 steps of the default experiment, which are 1 s if it states none, or
+    /// 1e7 intervals of a periodic clock; the exporter discards a longer one.
+    ///
     /// # Errors
     ///
     /// [`Failure::Incomplete`] or [`Failure::Terminated`] if the model stopped before the end at a known

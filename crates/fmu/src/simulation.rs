@@ -29,8 +29,7 @@ impl<M: Model> Simulation<M> {
     pub fn new(resources: &Path) -> Result<Self, Failure> {
         let mut model = new_model::<M>(resources)?;
         let (interface, description) = Interface::new(&mut model)?;
-        let tolerance = description.default_experiment.and_then(|own| own.tolerance);
-        let stepper = Stepper::new(&interface, tolerance);
+        let stepper = Stepper::new(&interface, description.default_experiment);
         let experiment = Experiment::default();
         Ok(Self { model, interface, stepper, experiment, time: 0.0, is_started: false })
     }
@@ -70,13 +69,15 @@ impl<M: Model> Simulation<M> {
     ///
     /// # Errors
     ///
-    /// The failures of [`Model::step`] or, if the model has no step of its own, of its equations.
+    /// The failures of [`Model::step`] or, if the model has no step of its own, of its equations;
+    /// [`Failure::Discard`] for a step as long as 1e7 steps of the default experiment.
     pub fn step(&mut self, size: f64) -> Result<(), Failure> {
         if !self.is_started {
             self.start(Experiment::default())?;
         }
         let step = Step { start: self.time, size };
         let Self { model, interface, stepper, experiment, .. } = self;
+        stepper.check_size(size)?;
         match model.step(&step) {
             Err(Failure::Unsolved) => stepper.run(model, interface, &step, experiment.tolerance)?,
             done => done?,

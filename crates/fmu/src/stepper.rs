@@ -3,9 +3,14 @@
 use crate::interface::Interface;
 use crate::model::{Failure, Model, Step};
 use crate::solver::{Integrator, Reached, System};
+use fmu_description::DefaultExperiment;
 
 /// Most events in one communication step.
 const EVENT_LIMIT: u32 = 10_000;
+
+/// Most steps of the default experiment in one communication step. A model that samples or integrates with
+/// shorter steps of its own would not return from a much longer one.
+const LONGEST: f64 = 1e7;
 
 /// Most calls of [`Model::event`] at one event.
 const ITERATION_LIMIT: u32 = 1000;
@@ -26,6 +31,8 @@ pub(crate) struct Stepper {
     integrator: Integrator,
     /// The relative tolerance if the importer defines none.
     tolerance: Option<f64>,
+    /// The longest communication step in s.
+    longest: f64,
     has_equations: bool,
     state: Vec<f64>,
     /// The inputs with derivatives at the start of the step.
@@ -33,16 +40,43 @@ pub(crate) struct Stepper {
 }
 
 impl Stepper {
-    pub(crate) fn new<M>(interface: &Interface<M>, tolerance: Option<f64>) -> Self {
+    pub(crate) fn new<M>(interface: &Interface<M>, experiment: Option<DefaultExperiment>) -> Self {
+        let experiment = experiment.unwrap_or_default();
+        let unit = experiment.step_size.unwrap_or(1.0).min(interface.shortest_interval());
         let nominals = interface.nominals();
         let indicators = interface.event_indicators.unwrap_or_default();
         Self {
-            tolerance,
+            tolerance: experiment.tolerance,
+            longest: LONGEST * unit,
             has_equations: !nominals.is_empty() || indicators > 0,
             state: vec![0.0; nominals.len()],
             inputs: vec![0.0; interface.interpolated.len()],
             integrator: Integrator::new(nominals, indicators),
         }
+    }
+
+    /// Checks the size of a communication step in s, before the model sees it.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Discard`] if it is too long.
+    #[inline]
+    pub(crate) fn check_size(&self, size: f64) -> Result<(), Failure> {
+        if size <= self.longest { Ok(()) } else { Err(too_long(size, self.longest)) }
+    }
+
+    /// Checks that the importer handles an event at `time` in s before too many are due since `next`, the
+    /// time in s of the next one.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] if it is too late.
+    pub(crate) fn check_delay(&self, next: f64, time: f64) -> Result<(), Failure> {
+        if time - next <= self.longest {
+            return Ok(());
+        }
+        let message = format!("{time:e} s is too long after {next} s, the time of the next event");
+        Err(Failure::Error(message))
     }
 
     /// Advances the model over the step: handles the event at its start, and then integrates from event
@@ -160,6 +194,14 @@ impl Stepper {
         let reached = reached.map_err(|failure| stopped(failure, time))?;
         shown.map(|()| reached).map_err(|failure| stopped(failure, time))
     }
+}
+
+#[cold]
+fn too_long(size: f64, longest: f64) -> Failure {
+    Failure::Discard(format!(
+        "communicationStepSize is {size:e} s, expected at most {longest:e} s: {LONGEST:e} steps of the \
+         default experiment, or intervals of a clock"
+    ))
 }
 
 /// Returns the failure of a step that reached `time`, which a call that does only a part must name.

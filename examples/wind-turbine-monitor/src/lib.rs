@@ -104,7 +104,7 @@ impl Model for WindTurbineMonitor {
 
     fn about(&self) -> About {
         let description = "Detects and isolates faults of the wind turbine benchmark".to_owned();
-        About { description, ..fmu::about!() }
+        About { description, ..fmu::about!(stop_time: 4400.0, step_size: PERIOD) }
     }
 
     fn new(_resources: &std::path::Path) -> Result<Self, Failure> {

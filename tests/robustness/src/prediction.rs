@@ -98,6 +98,10 @@ pub struct Core {
     pub start: f64,
     pub stop: Option<f64>,
     pub time: f64,
+    /// The times to which the importer may go back and of the last completed step, and that of the next event.
+    pub earliest: f64,
+    pub completed: f64,
+    pub next_event: Option<f64>,
     pub ended: bool,
     pub values: Values,
 }
@@ -106,7 +110,18 @@ impl Core {
     pub fn new(exchange: bool) -> Self {
         let values = Values::new();
         let state = State::Instantiated;
-        Self { exchange, state, start: 0.0, stop: None, time: 0.0, ended: false, values }
+        Self {
+            exchange,
+            state,
+            start: 0.0,
+            stop: None,
+            time: 0.0,
+            earliest: 0.0,
+            completed: 0.0,
+            next_event: None,
+            ended: false,
+            values,
+        }
     }
 
     /// The statuses that the call may return; `verdict` is the set that its arguments allow.
@@ -148,6 +163,12 @@ impl Core {
     /// Whether a step may end there: not beyond `stopTime`, if it is defined (section 2.1.6).
     pub fn is_before_stop(&self, time: f64) -> bool {
         self.stop.is_none_or(|stop| time <= stop + 1e-9 * stop.abs().max(1.0))
+    }
+
+    /// Whether an event may be handled now: not past `stopTime`, and not long after the event that was due.
+    pub fn takes_event(&self) -> bool {
+        let delay = self.next_event.map_or(0.0, |next| self.time - next);
+        self.is_before_stop(self.time) && delay <= 1e7
     }
 
     /// Whether the Real may be set now: the variables of `machine.rs` by section 2.2.7 and the

@@ -6,7 +6,7 @@ use super::{Instance, time_tolerance};
 use crate::ffi::filled;
 use crate::model::{Event, Failure, Model};
 use fmu_description::abi::{Status, fmi2EventInfo};
-use fmu_description::call_order::State;
+use fmu_description::call_order::{InterfaceType, State};
 
 /// Checks that the length of an array is as the model description states.
 fn check_length(what: &str, found: usize, expected: usize) -> Result<(), Failure> {
@@ -21,6 +21,9 @@ impl<M: Model> Instance<M> {
     pub(crate) fn enter_event_mode(&mut self) -> Result<(), Failure> {
         let core = &mut self.core;
         core.before_stop(core.time)?;
+        if core.interface_type == InterfaceType::ModelExchange {
+            self.stepper.check_delay(core.next_event.unwrap_or(core.time), core.time)?;
+        }
         core.state = State::EventMode;
         (core.earliest, core.stale) = (core.time, true);
         Ok(())
@@ -40,7 +43,7 @@ impl<M: Model> Instance<M> {
         let core = &mut self.core;
         core.check()?;
         let event = core.model.event(core.time)?;
-        core.stale = true;
+        (core.next_event, core.stale) = (event.next_event_time, true);
         if let Some(reason) = &event.terminate_simulation {
             let message = format!("the simulation ends at t = {} s: {reason}", self.core.time);
             self.log(Status::OK, "logEvents", &message);
@@ -73,9 +76,12 @@ impl<M: Model> Instance<M> {
     /// Integrators that interpolate, such as those of FMPy and fmusim, evaluate the model after `stopTime`; a
     /// completed step or an event there is an error.
     pub(crate) fn set_time(&mut self, time: f64) -> Result<(), Failure> {
-        if self.core.state == State::EventMode && !self.interface.states.is_empty() {
-            let message = "allowed in EventMode only for an FMU without continuous states";
-            return Err(Failure::Error(message.to_owned()));
+        if self.core.state == State::EventMode {
+            if !self.interface.states.is_empty() {
+                let message = "allowed in EventMode only for an FMU without continuous states";
+                return Err(Failure::Error(message.to_owned()));
+            }
+            self.stepper.check_delay(self.core.next_event.unwrap_or(self.core.time), time)?;
         }
         if !time.is_finite() {
             return Err(Failure::Error(format!("time is {time}, expected a time in s")));

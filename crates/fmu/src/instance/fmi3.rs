@@ -158,8 +158,8 @@ impl<M: Model> Instance<M> {
         if self.core.interface_type == InterfaceType::CoSimulation && !self.uses_event_mode() {
             return Err(Failure::Error("eventModeUsed is false".to_owned()));
         }
-        self.core.next_event = None;
         self.enter_event_mode()?;
+        self.core.next_event = None;
         self.tick();
         Ok(())
     }
@@ -167,7 +167,6 @@ impl<M: Model> Instance<M> {
     /// `fmi3UpdateDiscreteStates`.
     pub(crate) fn update_discrete_states_3(&mut self) -> Result<Event, Failure> {
         let event = self.update_discrete_states()?;
-        self.core.next_event = event.next_event_time;
         self.clear_clocks();
         if event.new_discrete_states_needed {
             self.tick();

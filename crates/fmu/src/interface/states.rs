@@ -1,6 +1,7 @@
 //! The continuous states of a model as vectors.
 
 use super::Interface;
+use crate::typed::Native;
 
 impl<M> Interface<M> {
     /// Copies the continuous states of the model to `to`.
@@ -22,6 +23,12 @@ impl<M> Interface<M> {
         for (state, value) in self.states.iter().zip(to) {
             *value = *(self.reals[state.derivative].field)(model);
         }
+    }
+
+    /// Returns the shortest interval of the periodic clocks in s; infinity without one.
+    pub(crate) fn shortest_interval(&self) -> f64 {
+        let clocks = bool::slots(&self.typed);
+        clocks.iter().filter_map(|clock| clock.interval).fold(f64::INFINITY, f64::min)
     }
 
     /// Returns the nominal values of the continuous states.

@@ -189,15 +189,3 @@ fn steps_and_events_allocate_nothing() {
         assert_eq!(allocations.count_total, 0, "{of:?}");
     }
 }
-
-#[test]
-fn a_step_of_too_many_samples_is_refused() {
-    let (model, _) = tamed(SAMPLED[0]);
-    let mut model = ready(model);
-    for size in [1.1e6, 1e300] {
-        let message = model.step(&Step { start: 0.0, size }).unwrap_err().to_string();
-        assert!(message.contains("too many samples"), "{message}");
-    }
-    assert!(model.event(1e9).is_err());
-    model.step(&Step { start: 0.0, size: 1.0 }).unwrap();
-}

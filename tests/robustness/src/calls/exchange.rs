@@ -12,8 +12,9 @@ use crate::importer::Importer;
 use crate::prediction::{DISCARD, ERROR, OK};
 
 pub(super) fn enter_event_mode(call: &mut Call) -> Outcome {
-    let fine = call.core.is_before_stop(call.core.time);
-    Outcome::if_fine(call.importer.enter_event_mode(), fine).to(State::EventMode)
+    let fine = call.core.takes_event();
+    Outcome::if_fine(call.importer.enter_event_mode(), fine)
+        .with(|core, _| (core.state, core.earliest) = (State::EventMode, core.time))
 }
 
 pub(super) fn enter_continuous_time_mode(call: &mut Call) -> Outcome {
@@ -25,6 +26,7 @@ pub(super) fn new_discrete_states(call: &mut Call) -> Outcome {
     let status = call.importer.new_discrete_states(&mut info);
     let next = info.items[0].next_event_time;
     Outcome::if_fine(status, usable(&info))
+        .with(move |core, _| core.next_event = Some(next))
         .claim(next == call.core.time + 1.0, || format!("next event at {next}"))
 }
 
@@ -33,18 +35,22 @@ pub(super) fn completed_integrator_step(call: &mut Call) -> Outcome {
     let status = call.importer.completed_integrator_step(&mut enter, &mut terminate);
     let fine = usable(&enter) && usable(&terminate) && call.core.is_before_stop(call.core.time);
     Outcome::if_fine(status, fine)
+        .with(|core, _| {
+            core.earliest = core.earliest.max(core.completed);
+            core.completed = core.time;
+        })
         .claim((enter.items[0], terminate.items[0]) == (0, 0), || "an event".to_owned())
 }
 
 pub(super) fn set_time(call: &mut Call) -> Outcome {
     let core = call.core;
     let ahead = core.time + f64::from(call.choice.byte() % 32);
-    let odd = [f64::NAN, f64::INFINITY, core.start - 1.0, 1e12];
+    let odd = [f64::NAN, f64::INFINITY, core.start - 1.0, core.earliest - 0.5, core.earliest, 1e12];
     let time = if call.choice.rarely() { call.choice.of(&odd) } else { ahead };
     let status = call.importer.set_time(time);
     // Condition 8 of section 3.2.3: in event mode only without continuous states.
     let here = core.state == State::ContinuousTimeMode;
-    let fine = here && time.is_finite() && time >= core.start;
+    let fine = here && time.is_finite() && time >= core.earliest;
     Outcome::if_fine(status, fine).with(move |core, _| core.time = time)
 }
 

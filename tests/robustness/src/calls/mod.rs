@@ -162,6 +162,7 @@ fn setup_experiment(call: &mut Call) -> Outcome {
         && tolerance.is_none_or(|tolerance| tolerance > 0.0);
     Outcome::if_fine(status, fine).with(move |core, _| {
         (core.start, core.time, core.stop) = (start, start, stop);
+        (core.earliest, core.completed) = (start, start);
     })
 }
 

@@ -83,8 +83,7 @@ impl<M: Model> Instance<M> {
         if let Some(intermediate) = &mut session.intermediate {
             intermediate.resize(inputs);
         }
-        let tolerance = description.default_experiment.and_then(|own| own.tolerance);
-        self.stepper = Stepper::new(&interface, tolerance);
+        self.stepper = Stepper::new(&interface, description.default_experiment);
         self.interface = interface;
         self.direction = None;
         Ok(())

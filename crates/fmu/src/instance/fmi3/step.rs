@@ -63,6 +63,7 @@ impl<M: Model> Instance<M> {
         let step = communication_step(core.time, start, size)?;
         let end = start + size;
         core.before_stop(end)?;
+        self.stepper.check_size(step.size)?;
         core.check()?;
         let stop = match core.model.step_to_event(&step) {
             Ok(None) => Stop { time: end, is_event: false },

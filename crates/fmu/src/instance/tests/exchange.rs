@@ -325,3 +325,14 @@ fn an_importer_goes_back_to_the_second_last_completed_step_and_never_over_an_eve
     instance.reset().unwrap();
     assert_eq!(instance.core.earliest, 0.0);
 }
+
+#[test]
+fn an_event_that_the_importer_handles_too_late_is_an_error_before_the_model_sees_it() {
+    for (time, expected) in [(1e7, Status::OK), (1e300, Status::Error)] {
+        let mut instance = continuous();
+        instance.core.next_event = Some(1.0);
+        assert_eq!(set_time(&mut instance, time), Status::OK);
+        let status = instance.call(Function::EnterEventMode, Instance::enter_event_mode);
+        assert_eq!(status, expected, "{time}");
+    }
+}

@@ -32,6 +32,16 @@ fn impossible_steps_are_errors() {
 }
 
 #[test]
+fn a_step_of_more_than_1e7_default_steps_is_discarded_before_the_model_sees_it() {
+    for size in [1.1e7, 1e300] {
+        let mut instance = started_at(0.0);
+        assert_eq!(step(&mut instance, 0.0, size), Status::Discard, "{size}");
+        assert_eq!((instance.core.model.count, instance.last_successful_time()), (0, 0.0));
+    }
+    assert_eq!(step(&mut started_at(0.0), 0.0, 1e7), Status::OK);
+}
+
+#[test]
 fn a_step_that_stops_half_way_tells_the_time_reached() {
     let mut instance = initialized();
     set(&mut instance, DRIVE, 50.0);
