@@ -1,7 +1,7 @@
 //! Initialisation of the connected system: settings, outputs in the order of their dependencies,
 //! algebraic loops.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use fmu_description::Experiment;
 use fmu_description::{DefaultExperiment, Kind, ModelDescription};
@@ -47,8 +47,8 @@ pub(crate) fn initialise(
     }
     let connections = system.connections.iter().chain(&system.initial);
     let driven = scenario.drives.iter().map(Drive::port);
-    let replaced: HashSet<Port> =
-        connections.map(|connection| connection.to).chain(driven).collect();
+    let replaced = connections.map(|connection| connection.to).chain(driven);
+    let replaced = replaced.map(|port| system.holder(port)).collect();
     system.confirm_settings(&replaced, start)
 }
 

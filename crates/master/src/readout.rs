@@ -2,6 +2,7 @@
 
 mod slow;
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::drive::{DriveKind, Drives, integer};
@@ -102,14 +103,20 @@ impl Readout {
     /// Makes driven variables show the value of their signal at the time read, instead of the value
     /// that the FMU received for its last step.
     pub(crate) fn follow(&mut self, drives: &Drives, system: &System) {
-        let kind = |port: Port| array(ValueType::of(&system.variable(port).kind));
-        let ports = &self.ports;
         self.driven.clear();
-        for (number, drive) in drives.iter().enumerate() {
-            if let Some(at) = ports.iter().position(|port| *port == drive.port()) {
-                let same = |port: &&Port| kind(**port) == kind(drive.port());
-                self.driven.push((number, ports[..at].iter().filter(same).count()));
+        let numbers = drives.iter().enumerate();
+        let numbers: HashMap<Port, usize> =
+            numbers.map(|(number, drive)| (system.holder(drive.port()), number)).collect();
+        if numbers.is_empty() {
+            return;
+        }
+        let mut lengths = [0; 5];
+        for &port in &self.ports {
+            let position = &mut lengths[array(ValueType::of(&system.variable(port).kind)) as usize];
+            if let Some(&number) = numbers.get(&system.holder(port)) {
+                self.driven.push((number, *position));
             }
+            *position += 1;
         }
     }
 

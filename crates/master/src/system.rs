@@ -46,18 +46,21 @@ pub struct System {
     pub(crate) initial: Vec<Connection>,
     /// Values that the FMUs receive during initialisation.
     pub(crate) settings: Vec<settings::Setting>,
+    /// Positions of the settings, by the variable that holds the value.
+    setting_positions: HashMap<Port, usize>,
     /// Variables of each slave by name.
     variables: Vec<HashMap<String, usize>>,
     /// Slaves by name.
     names: HashMap<String, usize>,
-    /// Index of the connection of each input.
+    /// Index of the connection of each input, by the variable that holds the value.
     sources: HashMap<Port, usize>,
     /// Variables that the user says are discrete.
     pub(crate) discrete: HashSet<Port>,
     /// For each slave, whether the master handles its events.
     pub(crate) events: Vec<bool>,
     observer: Option<EventObserver>,
-    /// Values of inputs that were set last by [`System::set_value`], and the number of these calls.
+    /// Values of inputs that were set last by [`System::set_value`], by the variable that holds the value, and
+    /// the number of these calls.
     given: HashMap<Port, Value>,
     pub(crate) changes: u64,
 }
@@ -185,7 +188,7 @@ impl System {
         for from in self.ports(Causality::Output) {
             let Some(same) = inputs.get(&self.variable(from).name) else { continue };
             for &to in same {
-                if from.slave != to.slave && !self.sources.contains_key(&to) {
+                if from.slave != to.slave && self.source(to).is_none() {
                     self.connect_ports(from, to, Transformation::Identity, false)?;
                 }
             }
@@ -279,10 +282,18 @@ impl System {
         self.slaves.iter().enumerate().flat_map(of).collect()
     }
 
-    /// Returns the connection that ends at `input`.
+    /// Returns the connection that ends at `input` or at an alias of it.
     #[must_use]
     pub fn source(&self, input: Port) -> Option<&Connection> {
-        self.sources.get(&input).map(|&position| &self.connections[position])
+        self.connections.get(*self.sources.get(&self.holder(input))?)
+    }
+
+    /// Returns the variable that holds the value of `port`: the variable of which it is an alias, otherwise itself.
+    pub(crate) fn holder(&self, port: Port) -> Port {
+        let variable = self.variable(port);
+        let of = variable.alias_of.as_ref().filter(|_| !variable.negated);
+        let of = of.and_then(|name| self.variables[port.slave].get(name));
+        of.map_or(port, |&variable| Port { variable, ..port })
     }
 
     /// Parses `text` as a value of the variable at `port`.

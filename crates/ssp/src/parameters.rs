@@ -5,7 +5,7 @@ mod value;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use fmu_description::{Causality, Initial, ScalarVariable, Variability};
+use fmu_description::{Causality, Initial, ScalarVariable};
 
 use super::error::{SspError, semantic_error};
 use super::flatten::Flow;
@@ -233,11 +233,11 @@ impl Binder<'_> {
             return Err(format!("the FMU has no variable {name}"));
         };
         if !settable(variable) {
-            let causality = variable.causality.as_str();
-            self.warnings.push(format!(
-                "{name} is {causality} and {} without a start value: its setting is ignored",
-                variable.variability.as_str()
-            ));
+            let what = variable.never_set().map(str::to_owned).unwrap_or_else(|| {
+                let (causality, variability) = (variable.causality, variable.variability);
+                format!("{} and {} without a start value", causality.as_str(), variability.as_str())
+            });
+            self.warnings.push(format!("{name} is {what}: its setting is ignored"));
             return Ok(());
         }
         let items = tree.measure(target).items;
@@ -280,8 +280,7 @@ fn find(tree: &Tree, node: usize, name: &str, found: &mut Vec<Vertex>) {
 /// start value.
 fn settable(variable: &ScalarVariable) -> bool {
     let initial = variable.initial_in_force();
-    variable.variability != Variability::Constant
-        && variable.causality != Causality::Independent
+    variable.never_set().is_none()
         && (variable.causality == Causality::Input
             || variable.has_start()
             || matches!(initial, Some(Initial::Exact | Initial::Approx)))

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
 
 mod ahead;
+mod aliases;
 mod background;
 mod breaks;
 mod changes;

@@ -249,7 +249,10 @@ impl System {
             moved(&mut setting.port)?;
         }
         let connections = self.connections.iter().enumerate();
-        self.sources = connections.map(|(position, own)| (own.to, position)).collect();
+        self.sources = connections.map(|(position, own)| (self.holder(own.to), position)).collect();
+        let settings = self.settings.iter().enumerate();
+        self.setting_positions =
+            settings.map(|(position, own)| (self.holder(own.port), position)).collect();
         Ok(())
     }
 }

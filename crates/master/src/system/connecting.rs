@@ -41,7 +41,7 @@ impl System {
             }
         };
         let first = if to_parameter {
-            self.initial.iter().find(|known| known.to == to)
+            self.initial.iter().find(|known| self.holder(known.to) == self.holder(to))
         } else {
             self.source(to)
         };
@@ -57,7 +57,7 @@ impl System {
         if to_parameter {
             self.initial.push(connection);
         } else {
-            self.sources.insert(to, self.connections.len());
+            self.sources.insert(self.holder(to), self.connections.len());
             self.connections.push(connection);
         }
         Ok(())

@@ -2,6 +2,7 @@
 //! initialisation.
 
 use std::collections::HashSet;
+use std::collections::hash_map::Entry;
 
 use fmu_description::{Causality, Initial, Kind};
 
@@ -51,11 +52,20 @@ impl System {
             return self.configure(port, &value, text);
         }
         let setting = Setting { port, value, text: text.to_owned() };
-        match self.settings.iter_mut().find(|known| known.port == port) {
-            Some(known) => *known = setting,
-            None => self.settings.push(setting),
+        match self.setting_positions.entry(self.holder(port)) {
+            Entry::Occupied(known) => self.settings[*known.get()] = setting,
+            Entry::Vacant(position) => {
+                position.insert(self.settings.len());
+                self.settings.push(setting);
+            }
         }
         Ok(())
+    }
+
+    /// Returns the value that the user has set for the variable at `port` or for an alias of it.
+    pub(crate) fn setting(&self, port: Port) -> Option<&Value> {
+        let position = self.setting_positions.get(&self.holder(port))?;
+        Some(&self.settings[*position].value)
     }
 
     /// Sets all settings; call it after `fmi2SetupExperiment`.
@@ -107,8 +117,8 @@ impl System {
         Ok(())
     }
 
-    /// Reads the settings back after the initialization, except inputs and the variables in `replaced`, which
-    /// have received another value. `time` in s appears in the error message.
+    /// Reads the settings back after the initialization, except inputs and the variables whose holders are in
+    /// `replaced`, which have received another value. `time` in s appears in the error message.
     ///
     /// # Errors
     ///
@@ -121,7 +131,7 @@ impl System {
     ) -> Result<(), SystemError> {
         for setting in self.settings.clone() {
             let causality = self.variable(setting.port).causality;
-            if causality == Causality::Input || replaced.contains(&setting.port) {
+            if causality == Causality::Input || replaced.contains(&self.holder(setting.port)) {
                 continue;
             }
             let name = self.name(setting.port);
@@ -153,12 +163,13 @@ impl System {
     /// Returns the value that was set last for an input without a connection, otherwise its start value; `None` for a
     /// connected input, another variable or a text. The FMU is not asked, because some FMUs cannot read their inputs.
     pub(crate) fn known_input(&self, port: Port) -> Option<Value> {
+        let port = self.holder(port);
         let variable = self.variable(port);
         let free = variable.causality == Causality::Input
             && variable.clocks.is_empty()
             && !matches!(variable.kind, Kind::Clock(_))
             && self.source(port).is_none();
-        let set = || self.settings.iter().find(|own| own.port == port).map(|own| &own.value);
+        let set = || self.setting(port);
         let known = free
             .then(|| {
                 self.given.get(&port).or_else(set).cloned().or_else(|| Value::start(&variable.kind))

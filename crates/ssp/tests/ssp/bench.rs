@@ -102,7 +102,8 @@ const UNITS: &str = r#"<UnitDefinitions>
 <SimpleType name="Speed"><Enumeration><Item name="slow" value="10"/><Item name="fast" value="20"/></Enumeration></SimpleType>
 </TypeDefinitions>"#;
 
-/// The XML of an FMU, one variable for each line `name causality type [attributes of the type]`.
+/// The XML of an FMU, one variable for each line `name causality type [attributes of the type]`; the
+/// causality `constant` is a local constant.
 pub(crate) fn description(model: &str, lines: &str) -> String {
     let (mut variables, mut outputs) = (String::new(), String::new());
     for (reference, line) in lines.lines().map(str::trim).filter(|l| !l.is_empty()).enumerate() {
@@ -114,10 +115,12 @@ pub(crate) fn description(model: &str, lines: &str) -> String {
             let _ = write!(outputs, r#"<Unknown index="{}"/>"#, reference + 1);
         }
         let variability = match (causality, kind) {
+            ("constant", _) => "constant",
             ("parameter" | "calculatedParameter", _) => "fixed",
             (_, "Real") => "continuous",
             _ => "discrete",
         };
+        let causality = if causality == "constant" { "local" } else { causality };
         let needs_start = matches!(causality, "input" | "parameter");
         let start = match kind {
             _ if !needs_start => "",

@@ -11,6 +11,7 @@ const VARIABLES: &str = r#"p parameter Real unit="m"
  u input Real unit="m"
  y output Real
  z output Real start="1"
+ k constant Real start="9"
  sub.p parameter Real"#;
 
 fn real(name: &str, value: &str) -> String {
@@ -171,14 +172,18 @@ fn names_of_items_are_mapped_without_their_numbers() {
 
 #[test]
 fn variables_without_a_start_value_are_left_alone_with_a_word() {
-    let (found, warnings) =
-        of_component(&[binding("", &(real("y", "1") + &real("z", "2") + &real("w", "3")), "")])
-            .unwrap();
+    let (found, warnings) = of_component(&[binding(
+        "",
+        &["y", "z", "w", "k"].map(|name| real(name, "2")).concat(),
+        "",
+    )])
+    .unwrap();
     assert_eq!(found, ["c.z = 2.0"]);
     assert_eq!(
         warnings,
         [
             "c.y is output and continuous without a start value: its setting is ignored",
+            "c.k is a constant: its setting is ignored",
             "parameter set \"set\": c has no w: ignored"
         ]
     );
