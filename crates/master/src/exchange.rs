@@ -26,6 +26,7 @@ use crate::algorithm::Algorithm;
 use crate::engine::Task;
 use crate::error::SystemError;
 use crate::fault::FaultChain;
+use crate::limits::Watch;
 use crate::signal_type::Way;
 use crate::system::{Connection, Port, System};
 use channels::{Channels, ChannelsState};
@@ -46,6 +47,7 @@ pub(crate) struct Exchange {
     allow_nan: bool,
     /// Whether any connection has a fault.
     faulty: bool,
+    watch: Watch,
 }
 
 /// The values of all connected outputs, saved to repeat a step or for a checkpoint.
@@ -77,7 +79,9 @@ impl Exchange {
         let held = Channels::new(system, &along(Way::Held), &to_reals);
         let at_events = Channels::new(system, &along(Way::AtEvents), &[]);
         let ticks = Ticks::new(system, &along(Way::Tick));
-        Self { reals, held, at_events, ticks, allow_nan: algorithm.allow_nan, faulty: false }
+        let watch = Watch::new(system, |port| reals.output(port));
+        let allow_nan = algorithm.allow_nan;
+        Self { reals, held, at_events, ticks, allow_nan, faulty: false, watch }
     }
 
     /// Puts faults on connections; each fault is given with the input of its connection.
@@ -117,9 +121,15 @@ impl Exchange {
         reals.or_else(|| self.held.fault(input)).or_else(|| self.at_events.fault(input))
     }
 
-    /// Records the undisturbed values in the faults; the communication point `time` is final.
+    /// Records the undisturbed values in the faults, and checks the limits of inputs; the communication point `time` is
+    /// final.
     #[inline]
     pub(crate) fn commit(&mut self, time: f64) {
+        if !self.watch.is_empty() {
+            let (held, at_events) = (&self.held.integers, &self.at_events.integers);
+            let integer = |port| held.value(port).or_else(|| at_events.value(port)).copied();
+            self.watch.check(time, self.reals.outputs(), integer);
+        }
         if self.faulty {
             self.reals.commit(time);
             let ahead = |slave| self.reals.is_ahead(slave, time);

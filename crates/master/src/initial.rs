@@ -10,6 +10,7 @@ use crate::drive::{Drive, Scenario};
 use crate::error::SystemError;
 use crate::exchange::call;
 use crate::fault::FaultChain;
+use crate::limits::check_start;
 use crate::order::Rows;
 use crate::signal_type::SignalType;
 use crate::system::{Port, System};
@@ -49,6 +50,7 @@ pub(crate) fn initialise(
     let driven = scenario.drives.iter().map(Drive::port);
     let replaced = connections.map(|connection| connection.to).chain(driven);
     let replaced = replaced.map(|port| system.holder(port)).collect();
+    check_start(system);
     system.confirm_settings(&replaced, start)
 }
 

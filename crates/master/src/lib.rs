@@ -36,6 +36,7 @@ mod exchange;
 pub mod fault;
 mod grid;
 mod initial;
+mod limits;
 mod order;
 mod probe;
 mod readout;

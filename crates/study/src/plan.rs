@@ -3,7 +3,7 @@
 use crate::error::Error;
 use fmu_description::DefaultExperiment;
 use fmu_description::Experiment;
-use fmu_description::number::seconds;
+use fmu_description::number::{rounded, seconds};
 use master::{
     Algorithm, AlgorithmRequest, Coupling, Extrapolation, Method, StepControl, System,
     by_direct_dependencies, choose,
@@ -17,6 +17,8 @@ use crate::config::{Config, ConnectionEntry, Every, Solver};
 const ROWS: f64 = 1e4;
 /// Default length of a run in s if no stop time is stated, as in FMPy.
 const LENGTH: f64 = 1.0;
+/// Smallest number of spacings of times that a step has without a warning.
+const STEP_RESOLUTION: f64 = 50.0;
 /// Largest relative distance of a proposed step from a multiple of the communication step.
 const NEAR: f64 = 1e-6;
 
@@ -49,6 +51,7 @@ pub fn plan(config: &mut Config, assembled: &AssembledSystem) -> Result<Plan, Er
     let chosen = choose(system, &config.algorithm, stop - start)?;
     reasons.extend(chosen.reasons);
     let algorithm = chosen.algorithm;
+    warn_of_resolution(algorithm.step, start.abs().max(stop.abs()));
     let tolerance = config.experiment.tolerance.as_ref().map(|tolerance| *tolerance.get_ref());
     explain_tolerances(system, tolerance, &mut reasons);
     explain_interfaces(&assembled.integrated, &mut reasons);
@@ -99,6 +102,19 @@ fn check_step(request: &AlgorithmRequest) -> Result<(), Error> {
             Err(Error::Invalid(format!("the communication step is {step} s, expected more than 0")))
         }
         _ => Ok(()),
+    }
+}
+
+/// Warns if `step` is so small that rounding at the time `latest`, both in s, changes it by a percent or more.
+fn warn_of_resolution(step: f64, latest: f64) {
+    let resolution = latest.next_up() - latest;
+    if step < STEP_RESOLUTION * resolution {
+        tracing::warn!(
+            "the step of {step:e} s is near or below the resolution of time: at t = {} s, times differ by at least \
+             {} s, so steps become longer and shorter than stated; a start time nearer to 0 or a larger --step helps",
+            seconds(latest),
+            rounded(resolution, 3)
+        );
     }
 }
 

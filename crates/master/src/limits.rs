@@ -1,0 +1,214 @@
+//! Warns about values that a variable does not allow: beyond min and max, or no item of its enumeration.
+
+use std::collections::HashMap;
+
+use fmu_description::number::{rounded, seconds};
+use fmu_description::{IntegerType, Kind, ModelDescription, RealType, ScalarVariable, SimpleType};
+
+use crate::system::{Port, System};
+use slave::{Transformation, Value};
+
+/// Part of the limit, or of the nominal value if this is larger, by which a value may exceed the limit: rounding.
+const ROUNDING: f64 = 1e-9;
+/// Largest number of variables that a warning names, and of connected inputs that are reported.
+const NAMED: usize = 5;
+/// Digits of a value in a message.
+const DIGITS: usize = 6;
+
+/// The values that a variable allows.
+#[derive(Clone, Debug)]
+struct Limits {
+    min: f64,
+    max: f64,
+    tolerance: f64,
+    /// The items of an enumeration; empty for another type.
+    items: Vec<(String, i64)>,
+}
+
+/// The types of an FMU by name.
+type Types<'a> = HashMap<&'a str, &'a SimpleType>;
+
+fn types(description: &ModelDescription) -> Types<'_> {
+    description.types.iter().map(|own| (own.name.as_str(), own)).collect()
+}
+
+impl Limits {
+    /// Returns the limits that the variable or its declared type states, `None` if every value is allowed.
+    fn of(variable: &ScalarVariable, types: &Types<'_>) -> Option<Self> {
+        let declared = variable.kind.declared_type().and_then(|name| types.get(name));
+        let (min, max, nominal) = match (variable.kind.as_real(), variable.kind.as_integer()) {
+            (Some(own), _) => {
+                let declared = declared.and_then(|declared| declared.kind.as_real());
+                let stated = |of: fn(&RealType) -> Option<f64>| of(own).or_else(|| of(declared?));
+                (stated(|own| own.min), stated(|own| own.max), stated(|own| own.nominal))
+            }
+            (_, Some(own)) => {
+                let declared = declared.and_then(|declared| declared.kind.as_integer());
+                let stated = |of: fn(&IntegerType) -> Option<i128>| {
+                    #[expect(clippy::cast_precision_loss, reason = "rounds to the nearest number")]
+                    of(own).or_else(|| of(declared?)).map(|limit| limit as f64)
+                };
+                (stated(|own| own.min), stated(|own| own.max), Some(0.0))
+            }
+            _ => return None,
+        };
+        let is_enumeration = matches!(variable.kind, Kind::Enumeration(_));
+        let items = declared.filter(|_| is_enumeration).map(|declared| declared.items.clone());
+        let items = items.unwrap_or_default();
+        if min.is_none() && max.is_none() && items.is_empty() {
+            return None;
+        }
+        let (min, max) = (min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY));
+        Some(Self { min, max, tolerance: ROUNDING * nominal.unwrap_or(1.0).abs(), items })
+    }
+
+    /// Says why `value` is not allowed; `None` if it is.
+    fn refuse(&self, value: f64) -> Option<String> {
+        let rounding = |limit: f64| self.tolerance.max(ROUNDING * limit.abs());
+        #[expect(clippy::cast_precision_loss, reason = "the numbers of items are small")]
+        let is_item = |(_, number): &(String, i64)| *number as f64 == value;
+        if !self.items.is_empty() && !self.items.iter().any(is_item) {
+            let items = self.items.iter().map(|(name, number)| format!("{name} = {number}"));
+            let mut items: Vec<_> = items.take(NAMED + 1).collect();
+            if items.len() > NAMED {
+                items[NAMED] = "...".to_owned();
+            }
+            return Some(format!("no item of its enumeration, {}", items.join(", ")));
+        }
+        if value < self.min - rounding(self.min) {
+            return Some(format!("below its min, {}", rounded(self.min, DIGITS)));
+        }
+        let above = value > self.max + rounding(self.max);
+        above.then(|| format!("above its max, {}", rounded(self.max, DIGITS)))
+    }
+}
+
+/// Returns a value as a number; `None` for a text.
+fn number(value: &Value) -> Option<f64> {
+    match value {
+        Value::Real(value) => Some(*value),
+        Value::Integer(value) => Some(slave::to_real(*value)),
+        _ => None,
+    }
+}
+
+/// Warns about settings, and about start values in the descriptions, that their variables do not allow.
+pub(crate) fn check_start(system: &System) {
+    let (mut set, mut started) = (Vec::new(), Vec::new());
+    for (slave, (_, instance)) in system.slaves.iter().enumerate() {
+        let description = instance.description();
+        let types = types(description);
+        for (variable, own) in description.variables.iter().enumerate() {
+            let port = Port { slave, variable };
+            if own.alias_of.is_some() || system.source(port).is_some() {
+                continue;
+            }
+            let Some(limits) = Limits::of(own, &types) else { continue };
+            let setting = system.setting(port);
+            let value = setting.cloned().or_else(|| Value::start(&own.kind));
+            let Some(value) = value.as_ref().and_then(number) else { continue };
+            if let Some(why) = limits.refuse(value) {
+                let list = if setting.is_some() { &mut set } else { &mut started };
+                list.push((port, value, why));
+            }
+        }
+    }
+    for (list, what) in [(set, "settings"), (started, "start values in the model descriptions")] {
+        let named = list.iter().take(NAMED).map(|(port, value, why)| {
+            format!("{} = {} is {why}", system.name(*port), rounded(*value, DIGITS))
+        });
+        let named: Vec<_> = named.collect();
+        if !named.is_empty() {
+            let rest = list.len() - named.len();
+            let more = if rest > 0 { format!("; and {rest} more") } else { String::new() };
+            tracing::warn!("{what} that their variables do not allow: {}{more}", named.join("; "));
+        }
+    }
+}
+
+/// A connected input with limits.
+struct Watched {
+    name: String,
+    source: Source,
+    transformation: Transformation,
+    limits: Limits,
+}
+
+/// The output that an input is connected to.
+enum Source {
+    /// At this position of the connected Reals.
+    Real(usize),
+    Integer(Port),
+}
+
+impl Watched {
+    /// Returns the value of the input.
+    fn value(&self, reals: &[f64], integer: impl Fn(Port) -> Option<i64>) -> Option<f64> {
+        let value = match self.source {
+            Source::Real(position) => *reals.get(position)?,
+            Source::Integer(port) => slave::to_real(match &self.transformation {
+                Transformation::Integer(pairs) => slave::mapped_integer(pairs, integer(port)?),
+                _ => integer(port)?,
+            }),
+        };
+        match self.transformation {
+            Transformation::Linear { factor, offset } => Some(factor * value + offset),
+            _ => Some(value),
+        }
+    }
+}
+
+/// The connected inputs with limits that have had allowed values only.
+#[derive(Default)]
+pub(crate) struct Watch {
+    watched: Vec<Watched>,
+    reported: usize,
+}
+
+impl Watch {
+    /// Watches the connected inputs of `system` that state limits. `position` is the position of an output among the
+    /// connected Reals.
+    pub(crate) fn new(system: &System, position: impl Fn(Port) -> Option<usize>) -> Self {
+        let types: Vec<_> = system.slaves.iter().map(|(_, own)| types(own.description())).collect();
+        let watched = system.connections.iter().filter_map(|connection| {
+            let (from, to) = (connection.from, connection.to);
+            let limits = Limits::of(system.variable(to), &types[to.slave])?;
+            let source = position(from).map_or(Source::Integer(from), Source::Real);
+            let (name, transformation) = (system.name(to), connection.transformation.clone());
+            Some(Watched { name, source, transformation, limits })
+        });
+        Self { watched: watched.collect(), reported: 0 }
+    }
+
+    /// Whether all inputs are reported.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.watched.is_empty()
+    }
+
+    /// Warns once about each input that gets a value that it does not allow at the communication point `time`, in s.
+    /// `reals` are the connected Reals; `integer` returns the value of an Integer output.
+    pub(crate) fn check(
+        &mut self,
+        time: f64,
+        reals: &[f64],
+        integer: impl Fn(Port) -> Option<i64>,
+    ) {
+        let reported = &mut self.reported;
+        self.watched.retain(|own| {
+            let Some(value) = own.value(reals, &integer) else { return true };
+            let Some(why) = own.limits.refuse(value) else { return true };
+            *reported += 1;
+            let last = if *reported == NAMED { "; further inputs are not reported" } else { "" };
+            tracing::warn!(
+                "{} gets {} at t = {} s by its connection, which is {why}{last}",
+                own.name,
+                rounded(value, DIGITS),
+                seconds(time)
+            );
+            false
+        });
+        if *reported >= NAMED {
+            self.watched.clear();
+        }
+    }
+}
