@@ -216,7 +216,7 @@ fn pack_version(
         None => vec![own_library(library, &description)?],
     };
     for (path, mut bytes) in libraries {
-        symbols::hide_other_version(&mut bytes, version);
+        symbols::hide_unneeded(&mut bytes, version, resources.is_dir());
         package.add(binaries::path_in(version, path), bytes);
     }
     for name in ["resources", "extra"] {

@@ -102,7 +102,8 @@ def load(path):
         function.restype = None if name == "FreeInstance" else c_int
     library.fmi2GetTypesPlatform.restype = library.fmi2GetVersion.restype = c_char_p
     library.fmi2Instantiate.argtypes, library.fmi2Instantiate.restype = INSTANTIATE, c_void_p
-    library.fmuDescribe.argtypes = [c_char_p, c_void_p, SINK]
+    if hasattr(library, "fmuDescribe"):
+        library.fmuDescribe.argtypes = [c_char_p, c_void_p, SINK]
     return library
 
 
