@@ -115,3 +115,15 @@ def test_a_step_that_times_do_not_resolve_is_a_warning(tmp_path, library):
     assert said[0].startswith(warning), said
     status, said = run(tmp_path, fmu, "--start-time", "1e9", "--stop-time", "1000000001", "--step", "0.1")
     assert (status, said) == (0, [])
+
+
+def test_a_legal_file_beyond_a_limit_runs_if_it_is_trusted(tmp_path, library):
+    """A table of zeros, which is as small in an archive as an attack; a configuration that is too long."""
+    fmu = written(tmp_path, library, more=[("resources/table.bin", 100 << 20)])
+    long = tmp_path / "system.toml"
+    long.write_text(f'fmus = {{ m = "{fmu}" }}\n# {" " * (64 << 20)}')
+    for file, expected in [(fmu, "unpacked bytes"), (long, "67108864 bytes")]:
+        status, said = run(tmp_path, file, *SECOND)
+        assert status == 2 and expected in said[0], said
+        assert "protects memory and disk" in said[0] and "ASO_FTC_TRUST_FILES=1 lifts it" in said[0]
+        assert run(tmp_path, file, *SECOND, trusted=True) == (0, [])

@@ -8,6 +8,7 @@
 //!   standard that a description breaks; [`ModelDescription::to_xml`] writes one.
 //! * `package` (feature `package`) unpacks and writes `.fmu` archives.
 //! * [`abi1`], [`abi`] (FMI 2.0) and [`abi3`] have the C types of each version.
+//! * [`limits`] protect memory and disk against files that are too large.
 //! * [`unit`](mod@unit) derives base units from names, [`location`] converts paths to `fmuResourceLocation` and
 //!   back, [`documentation`] writes the documentation page of a model, [`number`] rounds numbers for messages.
 //! * [`can`] has the operations of virtual ECUs on a CAN bus.
@@ -24,6 +25,7 @@ pub mod can;
 mod description;
 pub mod documentation;
 mod experiment;
+pub mod limits;
 pub mod location;
 pub mod number;
 #[cfg(feature = "package")]

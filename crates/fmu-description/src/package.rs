@@ -59,7 +59,7 @@ pub enum PackageError {
         found: String,
     },
     /// The archive exceeds a limit of this crate.
-    #[error("{}: expected at most {limit} {unit}, found more", path.display())]
+    #[error("{}: expected at most {limit} {unit}, found more{help}", path.display())]
     Limit {
         /// The archive.
         path: PathBuf,
@@ -67,6 +67,8 @@ pub enum PackageError {
         limit: u64,
         /// The limited quantity.
         unit: &'static str,
+        /// [`crate::limits::HELP`] if the limit can be lifted, otherwise empty.
+        help: &'static str,
     },
     /// The model description cannot be read.
     #[error("modelDescription.xml of {}", path.display())]

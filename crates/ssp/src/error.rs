@@ -55,12 +55,14 @@ pub enum SspError {
     #[error(transparent)]
     Package(Box<PackageError>),
     /// The file exceeds a limit of the reader.
-    #[error("expected at most {limit} {what}, found more")]
+    #[error("expected at most {limit} {what}, found more{help}")]
     Limit {
         /// The limit.
         limit: usize,
         /// The limited quantity.
         what: &'static str,
+        /// [`fmu_description::limits::HELP`] if the limit can be lifted, otherwise empty.
+        help: &'static str,
     },
     /// A file, element or variable is missing or unsuitable.
     #[error("{what}: expected {expected}, found {found}")]

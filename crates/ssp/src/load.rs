@@ -7,6 +7,7 @@ use std::path::Path;
 use std::rc::Rc;
 
 use fmu_description::Position;
+use fmu_description::limits::{HELP, exceeds};
 use fmu_description::package::Unpacked;
 
 use super::error::{SspError, semantic_error};
@@ -61,11 +62,15 @@ struct Loader {
 impl Loader {
     fn count(&mut self, parts: usize) -> Result<(), SspError> {
         self.parts = self.parts.saturating_add(parts).saturating_add(1);
-        if self.tree.nodes.len() > ELEMENTS {
-            return Err(SspError::Limit { limit: ELEMENTS, what: "elements" });
+        if exceeds(self.tree.nodes.len(), ELEMENTS) {
+            return Err(SspError::Limit { limit: ELEMENTS, what: "elements", help: HELP });
         }
-        if self.parts > PARTS {
-            return Err(SspError::Limit { limit: PARTS, what: "connectors and parameters" });
+        if exceeds(self.parts, PARTS) {
+            return Err(SspError::Limit {
+                limit: PARTS,
+                what: "connectors and parameters",
+                help: HELP,
+            });
         }
         Ok(())
     }

@@ -7,6 +7,7 @@ use std::collections::HashSet;
 use std::str::FromStr;
 
 use fmu_description::Position;
+use fmu_description::limits::{HELP, exceeds};
 use fmu_description::xml::{self, is_character};
 use quick_xml::name::{Namespace, NamespaceResolver, QName, ResolveResult};
 
@@ -40,11 +41,11 @@ pub(super) struct Node {
 /// Reads a file whose root element is `root` in the namespace that ends in `space`. Also returns
 /// warnings with positions about broken rules and unknown content.
 pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<String>), SspError> {
-    if bytes.len() > CAPACITY {
-        return Err(SspError::Limit { limit: CAPACITY, what: "bytes" });
+    if exceeds(bytes.len(), CAPACITY) {
+        return Err(SspError::Limit { limit: CAPACITY, what: "bytes", help: HELP });
     }
-    if bytes.split(|byte| *byte == b'<').count() > TAGS {
-        return Err(SspError::Limit { limit: TAGS, what: "tags" });
+    if exceeds(bytes.split(|byte| *byte == b'<').count(), TAGS) {
+        return Err(SspError::Limit { limit: TAGS, what: "tags", help: HELP });
     }
     let element = xml::read(bytes)?;
     let required = format!("{NAMESPACE}{space}");

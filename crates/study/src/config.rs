@@ -22,6 +22,10 @@ pub use ordered::{Ordered, Settings};
 pub use tables::{CheckpointSettings, ConnectionEntry, Experiment, Isolation, Results};
 
 use files::{Place, PlaceError, Source};
+use fmu_description::limits::{HELP, in_force};
+
+/// Largest size of a file in bytes. Reading takes 40 times as much memory.
+const LARGEST_FILE: u64 = 64 << 20;
 
 /// The content of a `system.toml`. Settings that are not stated are chosen for the system.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -84,8 +88,14 @@ impl LoadedConfig {
     ///
     /// # Errors
     ///
-    /// Returns an error if the file cannot be read or is not a valid `system.toml`.
+    /// Returns an error if the file cannot be read, is larger than [`LARGEST_FILE`] or is not a valid
+    /// `system.toml`.
     pub fn read(path: &Path) -> Result<Self, Error> {
+        let length = std::fs::metadata(path).map_or(0, |found| found.len());
+        if length > in_force(LARGEST_FILE) {
+            let sentence = format!("expected at most {LARGEST_FILE} bytes, found {length}{HELP}");
+            return Err(Error::Invalid(format!("{}: {sentence}", path.display())));
+        }
         let source = Source::read(path).map_err(Error::file("read", path))?;
         let config = parse(source.text(), path)?;
         Ok(Self { config, source: Some(source) })

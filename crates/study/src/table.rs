@@ -9,8 +9,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use csv::{ByteRecord, ReaderBuilder, Trim};
+use fmu_description::limits::{HELP, in_force};
 
-/// Largest size of a file in bytes.
+/// Largest size of a file in bytes, unless [`fmu_description::limits`] are lifted.
 pub const LARGEST_FILE: u64 = 256 << 20;
 /// Longest quotation in a message, in characters.
 const LONGEST_QUOTATION: usize = 40;
@@ -43,7 +44,7 @@ pub enum TableError {
     #[error(transparent)]
     Unreadable(#[from] std::io::Error),
     /// The file is larger than [`LARGEST_FILE`].
-    #[error("the file is larger than {LARGEST_FILE} bytes")]
+    #[error("the file is larger than {LARGEST_FILE} bytes{HELP}")]
     Large,
     /// The file is not UTF-8 text.
     #[error("line {line}: expected UTF-8 text, found other bytes")]
@@ -132,8 +133,9 @@ pub enum TableError {
 /// Returns [`TableError`] if the file cannot be read, is too large, or is not a valid table.
 pub fn read(path: &Path) -> Result<Table, TableError> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LARGEST_FILE {
+    let limit = in_force(LARGEST_FILE);
+    File::open(path)?.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
         return Err(TableError::Large);
     }
     parse(&bytes)

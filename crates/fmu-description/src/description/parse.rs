@@ -15,6 +15,7 @@ mod xml;
 use std::fmt;
 
 use super::{ModelDescription, Version};
+use crate::limits::{HELP, exceeds};
 use attributes::{Node, WHITE_SPACE};
 pub use warning::Warning;
 use warning::Warnings;
@@ -22,7 +23,7 @@ use xml::Element;
 
 /// The root element of an XML file, read with the limits for a model description.
 pub(crate) fn read_xml(bytes: &[u8]) -> Result<crate::xml::Element, ParseError> {
-    if bytes.len() > ModelDescription::MOST_BYTES {
+    if exceeds(bytes.len(), ModelDescription::MOST_BYTES) {
         return Err(ParseError::Length { limit: ModelDescription::MOST_BYTES });
     }
     let (text, _) = encoding::decode(bytes)?;
@@ -59,7 +60,7 @@ pub enum ParseError {
         found: String,
     },
     /// The file is too long.
-    #[error("expected at most {limit} bytes, found more")]
+    #[error("expected at most {limit} bytes, found more{HELP}")]
     Length {
         /// The limit in bytes.
         limit: usize,
@@ -80,7 +81,7 @@ pub enum ParseError {
         at: Position,
     },
     /// The file has more nesting or more attributes than the limit.
-    #[error("{at}: expected at most {limit} {what}, found more")]
+    #[error("{at}: expected at most {limit} {what}, found more{help}")]
     Limit {
         /// The position.
         at: Position,
@@ -88,6 +89,8 @@ pub enum ParseError {
         what: &'static str,
         /// The limit.
         limit: usize,
+        /// [`HELP`] if the limit can be lifted, otherwise empty.
+        help: &'static str,
     },
     /// The file is of an unknown version of the standard.
     #[error("{at}: expected fmiVersion 1.0, 2.0 or 3.0, found {found:?}")]
@@ -126,8 +129,8 @@ pub enum ParseError {
 }
 
 impl ModelDescription {
-    /// Maximum size in bytes of a file that is read.
-    pub const MOST_BYTES: usize = 128 << 20;
+    /// Maximum size in bytes of a file that is read, unless [`crate::limits`] are lifted.
+    pub const MOST_BYTES: usize = 512 << 20;
 
     /// Reads `modelDescription.xml` as [`ModelDescription::read`] does, without warnings.
     ///
@@ -175,7 +178,7 @@ impl ModelDescription {
     /// [`ParseError`] with line and column, expected and actual content.
     pub fn read(xml: impl AsRef<[u8]>) -> Result<(ModelDescription, Vec<Warning>), ParseError> {
         let bytes = xml.as_ref();
-        if bytes.len() > Self::MOST_BYTES {
+        if exceeds(bytes.len(), Self::MOST_BYTES) {
             return Err(ParseError::Length { limit: Self::MOST_BYTES });
         }
         let (text, not_utf8) = encoding::decode(bytes)?;

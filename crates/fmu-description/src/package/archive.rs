@@ -11,6 +11,8 @@ use zip::read::ZipFile;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
+use crate::limits::{HELP, exceeds, in_force};
+
 use super::{PackageError, archive_error, file_error, paths};
 
 /// Maximum number of entries.
@@ -43,7 +45,8 @@ impl<R: Read> Read for Metered<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.inner.read(buffer)?;
         let left = self.left.get().checked_sub(u64::try_from(count).unwrap_or(u64::MAX));
-        let left = left.ok_or_else(|| io::Error::other("the list of entries is too long"))?;
+        let left =
+            left.ok_or_else(|| io::Error::other(format!("the list of entries is too long{HELP}")))?;
         self.left.set(left);
         Ok(count)
     }
@@ -72,11 +75,12 @@ impl Archive {
     pub(super) fn open(path: &Path) -> Result<Self, PackageError> {
         let file = File::open(path).map_err(file_error("open", path))?;
         let length = file.metadata().map_err(file_error("read", path))?.len();
-        let left = Rc::new(Cell::new(DIRECTORY));
+        let left = Rc::new(Cell::new(in_force(DIRECTORY)));
         let reader = Metered { inner: BufReader::new(file), left: left.clone() };
         let zip = ZipArchive::new(reader).map_err(archive_error(path))?;
         left.set(u64::MAX);
         let capacity = BASE.saturating_add(RATIO.saturating_mul(length)).min(CAPACITY);
+        let capacity = in_force(capacity);
         let (path, names) = (path.to_owned(), Vec::new());
         let mut archive = Self { zip, path, names, renamed: None, capacity };
         archive.look()?;
@@ -84,7 +88,7 @@ impl Archive {
     }
 
     fn look(&mut self) -> Result<(), PackageError> {
-        if self.zip.len() > ENTRIES {
+        if exceeds(self.zip.len(), ENTRIES) {
             return Err(self.limit(ENTRIES as u64, "entries"));
         }
         let mut total = 0_u64;
@@ -105,7 +109,7 @@ impl Archive {
             self.names.push(name);
         }
         if total > self.capacity {
-            return Err(self.limit(self.capacity, "bytes"));
+            return Err(self.limit(self.capacity, "unpacked bytes"));
         }
         if self.renamed.is_some() && has_duplicates(&self.names) {
             return Err(self.wrong(ZipError::InvalidArchive(DUPLICATE.into())));
@@ -174,8 +178,8 @@ impl Archive {
                 return Err(PackageError::Entry { entry: name.clone(), expected });
             }
             let entry = self.zip.by_index(index);
-            let limit =
-                || PackageError::Limit { path: self.path.clone(), limit: capacity, unit: "bytes" };
+            let (path, unit) = (self.path.clone(), "unpacked bytes");
+            let limit = || PackageError::Limit { path, limit: capacity, unit, help: HELP };
             // The list of entries may state a wrong size, so the limit applies to the bytes
             // written.
             let written = write_entry(entry.map_err(archive_error(&self.path))?, &target, left)?;
@@ -189,7 +193,7 @@ impl Archive {
     }
 
     fn limit(&self, limit: u64, unit: &'static str) -> PackageError {
-        PackageError::Limit { path: self.path.clone(), limit, unit }
+        PackageError::Limit { path: self.path.clone(), limit, unit, help: HELP }
     }
 }
 

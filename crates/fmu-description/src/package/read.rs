@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::archive::Archive;
 use super::{DESCRIPTION, PackageError, TemporaryFolder, file_error, platforms, platforms_of};
 use crate::description::{ModelDescription, Version, Warning};
+use crate::limits::in_force;
 use crate::location::{LocationError, folder_path};
 use crate::{terminals, xml};
 
@@ -267,7 +268,7 @@ fn add_terminals(folder: &Path, description: &mut ModelDescription) -> Option<St
 /// Reads a file up to a length that exceeds every valid model description.
 fn start(file: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let most = u64::try_from(ModelDescription::MOST_BYTES).unwrap_or(u64::MAX);
+    let most = in_force(u64::try_from(ModelDescription::MOST_BYTES).unwrap_or(u64::MAX));
     fs::File::open(file)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
     Ok(bytes)
 }

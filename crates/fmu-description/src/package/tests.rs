@@ -332,5 +332,5 @@ fn no_more_is_unpacked_than_the_limit() {
     };
     unpack("out", total).unwrap();
     let error = unpack("less", total - 1).unwrap_err();
-    assert!(matches!(error, PackageError::Limit { unit: "bytes", .. }), "{error}");
+    assert!(matches!(error, PackageError::Limit { unit: "unpacked bytes", .. }), "{error}");
 }

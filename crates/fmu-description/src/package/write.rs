@@ -149,7 +149,7 @@ impl Package {
         let count = u64::try_from(self.entries.len()).unwrap_or(u64::MAX);
         for (found, limit, unit) in [(total, CAPACITY, "bytes"), (count, ENTRIES, "files")] {
             if found > limit {
-                return Err(PackageError::Limit { path: target.to_owned(), limit, unit });
+                return Err(PackageError::Limit { path: target.to_owned(), limit, unit, help: "" });
             }
         }
         Ok(())

@@ -6,6 +6,7 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use fmu_description::limits::in_force;
 use fmu_description::package::{PackageError, TemporaryFolder, Unpacked, unpack_archive};
 
 use crate::error::SspError;
@@ -202,7 +203,7 @@ impl Files {
         };
         let file = fs::File::open(&target.path).map_err(failed)?;
         let mut bytes = Vec::new();
-        file.take(CAPACITY + 1).read_to_end(&mut bytes).map_err(failed)?;
+        file.take(in_force(CAPACITY).saturating_add(1)).read_to_end(&mut bytes).map_err(failed)?;
         let (content, warnings) = read(&bytes).map_err(|error| error.in_file(&target.shown))?;
         self.warn(&target.shown, target.warning.clone());
         self.warn(&target.shown, warnings);
@@ -261,7 +262,9 @@ fn with_shown_path(error: PackageError, target: &Target) -> SspError {
             PackageError::File { action, path, source }
         }
         PackageError::Archive { source, .. } => PackageError::Archive { path, source },
-        PackageError::Limit { limit, unit, .. } => PackageError::Limit { path, limit, unit },
+        PackageError::Limit { limit, unit, help, .. } => {
+            PackageError::Limit { path, limit, unit, help }
+        }
         PackageError::Description { source, .. } => PackageError::Description { path, source },
         error => {
             return SspError::In { file: path, reason: Box::new(error.into()) };

@@ -118,7 +118,7 @@ fn collect(
 fn zip(target: &Path, entries: &[(&str, &[u8])]) -> Result<Vec<u8>, SspError> {
     let total = entries.iter().fold(0_usize, |sum, (_, bytes)| sum.saturating_add(bytes.len()));
     if total > CAPACITY {
-        return Err(SspError::Limit { limit: CAPACITY, what: "bytes in an archive" });
+        return Err(SspError::Limit { limit: CAPACITY, what: "bytes in an archive", help: "" });
     }
     let wrong = |error: ZipError| {
         SspError::from(PackageError::Archive { path: target.to_owned(), source: error.into() })

@@ -173,7 +173,7 @@ fn systems_that_contain_themselves_are_refused_soon() {
     let levels: String = (0..40).map(level).collect();
     let last = r#"<ssd:System name="s40" id="i40"/>"#;
     let text = bench.refusal(&root(&(levels + last), ""), "");
-    assert_eq!(text, "expected at most 100000 elements, found more");
+    assert!(text.starts_with("expected at most 100000 elements, found more; this limit"), "{text}");
 }
 
 #[test]

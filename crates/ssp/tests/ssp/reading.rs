@@ -167,10 +167,10 @@ fn nesting_and_size_are_bounded() {
     assert!(text.ends_with("expected at most 64 levels of nested elements, found more"), "{text}");
     let many = ssd(&"<x/>".repeat(4_000_000), "");
     let text = read_ssd(many.as_bytes()).unwrap_err().to_string();
-    assert_eq!(text, "expected at most 4000000 tags, found more");
+    assert!(text.starts_with("expected at most 4000000 tags, found more; this limit"), "{text}");
     let large = ssd(&" ".repeat(65 << 20), "");
     let text = read_ssd(large.as_bytes()).unwrap_err().to_string();
-    assert_eq!(text, "expected at most 67108864 bytes, found more");
+    assert!(text.starts_with("expected at most 67108864 bytes, found more; this limit"), "{text}");
 }
 
 #[test]

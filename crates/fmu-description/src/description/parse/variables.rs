@@ -8,6 +8,7 @@ use super::structure::{index, indices};
 use crate::description::{
     Causality, IntegerType, Kind, RealType, ScalarVariable, SimpleType, Variability,
 };
+use crate::limits::{HELP, exceeds};
 
 const KINDS: [&str; 5] = ["Real", "Integer", "Boolean", "String", "Enumeration"];
 const CAUSALITIES: [&str; 6] =
@@ -55,9 +56,9 @@ pub(super) fn variables(
 ) -> Result<Vec<ScalarVariable>, ParseError> {
     let types: Types<'_> = types.iter().map(|own| (own.name.as_str(), own)).collect();
     let elements: Vec<Node<'_>> = list.children_named("ScalarVariable").collect();
-    if elements.len() > VARIABLES {
+    if exceeds(elements.len(), VARIABLES) {
         let at = list.element.at;
-        return Err(ParseError::Limit { at, what: "variables", limit: VARIABLES });
+        return Err(ParseError::Limit { at, what: "variables", limit: VARIABLES, help: HELP });
     }
     let mut variables = Vec::with_capacity(elements.len());
     for element in &elements {

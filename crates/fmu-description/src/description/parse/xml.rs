@@ -12,13 +12,14 @@ use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
 
 use super::{ParseError, Position};
+use crate::limits::{HELP, exceeds};
 
 /// Maximum nesting; a model description needs 5.
 const DEPTH: usize = 64;
 /// Maximum number of attributes of one element; the standard has 15 at most.
 const ATTRIBUTES: usize = 256;
-/// Maximum number of elements; a variable needs 2.
-const ELEMENTS: usize = 3_000_000;
+/// Maximum number of elements; an output needs 4.
+const ELEMENTS: usize = 4_000_000;
 /// Maximum number of attributes of all elements together.
 const ALL_ATTRIBUTES: usize = 12_000_000;
 
@@ -86,7 +87,8 @@ impl<'a> Tree<'a> {
     /// Checks that an element at `at`, or `inner` levels below, is not too deep.
     fn go_down(&self, at: Position, inner: usize) -> Result<(), ParseError> {
         if self.open.len() + inner >= DEPTH {
-            return Err(limit(at, "levels of nested elements", DEPTH));
+            let what = "levels of nested elements";
+            return Err(ParseError::Limit { at, what, limit: DEPTH, help: "" });
         }
         Ok(())
     }
@@ -134,7 +136,7 @@ impl<'a> Tree<'a> {
     ) -> Result<Element<'a>, ParseError> {
         self.go_down(at, 0)?;
         self.elements += 1;
-        if self.elements > ELEMENTS {
+        if exceeds(self.elements, ELEMENTS) {
             return Err(limit(at, "elements", ELEMENTS));
         }
         let length = tag.name().as_ref().len();
@@ -142,7 +144,7 @@ impl<'a> Tree<'a> {
         let name = inner.get(..length).unwrap_or_default();
         let mut attributes = Vec::new();
         for attribute in Attributes::new(inner, length) {
-            if attributes.len() == ATTRIBUTES {
+            if exceeds(attributes.len() + 1, ATTRIBUTES) {
                 return Err(limit(at, "attributes", ATTRIBUTES));
             }
             let wrong =
@@ -154,7 +156,7 @@ impl<'a> Tree<'a> {
             attributes.push((attribute.key.into_inner(), value));
         }
         self.attributes += attributes.len();
-        if self.attributes > ALL_ATTRIBUTES {
+        if exceeds(self.attributes, ALL_ATTRIBUTES) {
             return Err(limit(at, "attributes in all", ALL_ATTRIBUTES));
         }
         Ok(Element { name, text: "", attributes, children: Vec::new(), at })
@@ -162,7 +164,7 @@ impl<'a> Tree<'a> {
 }
 
 fn limit(at: Position, what: &'static str, limit: usize) -> ParseError {
-    ParseError::Limit { at, what, limit }
+    ParseError::Limit { at, what, limit, help: HELP }
 }
 
 /// Reads the root element of `text`. Skips annotations of FMI.

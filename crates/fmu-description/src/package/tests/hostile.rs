@@ -33,7 +33,7 @@ fn a_bomb_is_refused_by_its_ratio_before_anything_is_written() {
     assert!(bomb.len() < 100_000);
     let error = opened(&bomb).unwrap_err();
     assert!(
-        matches!(error, PackageError::Limit { unit: "bytes", limit, .. }
+        matches!(error, PackageError::Limit { unit: "unpacked bytes", limit, .. }
         if limit == (64 << 20) + 100 * bomb.len() as u64),
         "{error}"
     );

@@ -11,6 +11,7 @@ use crate::description::parse::variables::{
 use crate::description::{
     Causality, Initial, ModelStructure, ScalarVariable, SimpleType, Unknown, Variability,
 };
+use crate::limits::{HELP, exceeds};
 
 const VARIABILITIES: [&str; 4] = ["constant", "parameter", "discrete", "continuous"];
 const CAUSALITIES: [&str; 4] = ["input", "output", "internal", "none"];
@@ -22,9 +23,9 @@ pub(super) fn read(
 ) -> Result<(Vec<ScalarVariable>, ModelStructure), ParseError> {
     let types: Types<'_> = types.iter().map(|own| (own.name.as_str(), own)).collect();
     let elements: Vec<Node<'_>> = list.children_named("ScalarVariable").collect();
-    if elements.len() > VARIABLES {
+    if exceeds(elements.len(), VARIABLES) {
         let at = list.element.at;
-        return Err(ParseError::Limit { at, what: "variables", limit: VARIABLES });
+        return Err(ParseError::Limit { at, what: "variables", limit: VARIABLES, help: HELP });
     }
     let mut variables = Vec::with_capacity(elements.len());
     for element in &elements {

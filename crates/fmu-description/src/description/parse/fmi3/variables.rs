@@ -10,8 +10,12 @@ use crate::description::parse::variables::{
     VARIABILITIES, VARIABLES, check_names, check_references,
 };
 use crate::description::{
-    Causality, Dimension, Elements, Kind, ModelDescription, ScalarVariable, SimpleType, Variability,
+    Causality, Dimension, Elements, Kind, ScalarVariable, SimpleType, Variability,
 };
+use crate::limits::{HELP, exceeds};
+
+/// Maximum size in bytes of what aliases inherit from their variables.
+const ALIASES: usize = 128 << 20;
 
 const CAUSALITIES: [&str; 7] = [
     "parameter",
@@ -45,16 +49,16 @@ pub(super) fn read(
         for element in element.children_named("Alias") {
             let alias = alias(element, &variables[position])?;
             inherited += weight(&alias);
-            if inherited > ModelDescription::MOST_BYTES {
-                let (at, limit) = (element.element.at, ModelDescription::MOST_BYTES);
-                return Err(ParseError::Limit { at, what: "bytes of aliases", limit });
+            if exceeds(inherited, ALIASES) {
+                let (at, limit) = (element.element.at, ALIASES);
+                return Err(ParseError::Limit { at, what: "bytes of aliases", limit, help: HELP });
             }
             elements.push(element);
             variables.push(alias);
         }
-        if variables.len() > VARIABLES {
+        if exceeds(variables.len(), VARIABLES) {
             let at = list.element.at;
-            return Err(ParseError::Limit { at, what: "variables", limit: VARIABLES });
+            return Err(ParseError::Limit { at, what: "variables", limit: VARIABLES, help: HELP });
         }
     }
     check_names(&elements, &variables)?;
