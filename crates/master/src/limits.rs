@@ -65,13 +65,13 @@ impl Limits {
     /// Says why `value` is not allowed; `None` if it is.
     fn refuse(&self, value: f64) -> Option<String> {
         let rounding = |limit: f64| self.tolerance.max(ROUNDING * limit.abs());
-        #[expect(clippy::cast_precision_loss, reason = "the numbers of items are small")]
-        let is_item = |(_, number): &(String, i64)| *number as f64 == value;
+        let is_item =
+            |(_, number): &(String, i64)| slave::to_real(*number).total_cmp(&value).is_eq();
         if !self.items.is_empty() && !self.items.iter().any(is_item) {
             let items = self.items.iter().map(|(name, number)| format!("{name} = {number}"));
-            let mut items: Vec<_> = items.take(NAMED + 1).collect();
-            if items.len() > NAMED {
-                items[NAMED] = "...".to_owned();
+            let mut items: Vec<_> = items.take(NAMED).collect();
+            if items.len() < self.items.len() {
+                items.push("...".to_owned());
             }
             return Some(format!("no item of its enumeration, {}", items.join(", ")));
         }

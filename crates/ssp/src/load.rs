@@ -48,7 +48,13 @@ pub(super) fn load(path: &Path, variant: Option<&str>) -> Result<(Tree, Rc<Docum
     loader.system(&document.structure.system, &document, place)?;
     let Loader { mut tree, files, .. } = loader;
     let Finished { fmus, shown, folders, warnings } = files.finish();
-    tree = Tree { fmus, shown, folders, warnings, ..tree };
+    let variables = fmus.iter().map(|fmu| {
+        // A name that two variables have stands for the first one.
+        let all = fmu.description.variables.iter().enumerate().rev();
+        all.map(|(position, variable)| (variable.name.clone(), position)).collect()
+    });
+    let variables = variables.collect();
+    tree = Tree { fmus, variables, shown, folders, warnings, ..tree };
     Ok((tree, document))
 }
 
@@ -82,6 +88,8 @@ impl Loader {
         file: &Rc<File>,
     ) -> Result<usize, SspError> {
         self.count(base.connectors.len())?;
+        let positions = base.connectors.iter().enumerate().rev();
+        let positions = positions.map(|(position, own)| (own.name.clone(), position)).collect();
         self.tree.nodes.push(Node {
             path: place.path,
             parent: place.parent,
@@ -90,6 +98,7 @@ impl Loader {
             file: file.clone(),
             at: base.at.0,
             connectors: base.connectors.clone(),
+            connector_positions: positions,
             outside: None,
             connections: Vec::new(),
             bindings: Vec::new(),

@@ -3,6 +3,7 @@
 
 mod value;
 
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use fmu_description::{Causality, Initial, ScalarVariable};
@@ -31,6 +32,7 @@ pub(super) fn settings(
         targets: targets_by_source(flow),
         flow,
         settings: Settings::new(),
+        positions: HashMap::new(),
         warnings,
     };
     // The tree lists a system before its content; the sort is stable.
@@ -63,6 +65,8 @@ struct Binder<'a> {
     flow: &'a Flow,
     targets: HashMap<&'a Vertex, Vec<&'a Vertex>>,
     settings: Settings,
+    /// Positions of the settings in the lists of their nodes.
+    positions: HashMap<Vertex, usize>,
     warnings: &'a mut Vec<String>,
 }
 
@@ -233,10 +237,17 @@ impl Binder<'_> {
             return Err(format!("the FMU has no variable {name}"));
         };
         if !settable(variable) {
-            let what = variable.never_set().map(str::to_owned).unwrap_or_else(|| {
-                let (causality, variability) = (variable.causality, variable.variability);
-                format!("{} and {} without a start value", causality.as_str(), variability.as_str())
-            });
+            let what = variable.never_set().map_or_else(
+                || {
+                    let (causality, variability) = (variable.causality, variable.variability);
+                    format!(
+                        "{} and {} without a start value",
+                        causality.as_str(),
+                        variability.as_str()
+                    )
+                },
+                str::to_owned,
+            );
             self.warnings.push(format!("{name} is {what}: its setting is ignored"));
             return Ok(());
         }
@@ -244,9 +255,12 @@ impl Binder<'_> {
         let text = value.number.text(&variable.kind, items.as_deref())?;
         let setting = Setting { variable: variable.name.clone(), value: text };
         let settings = self.settings.entry(target.node).or_default();
-        match settings.iter_mut().find(|known| known.variable == setting.variable) {
-            Some(known) => *known = setting,
-            None => settings.push(setting),
+        match self.positions.entry(target.clone()) {
+            Entry::Occupied(known) => settings[*known.get()] = setting,
+            Entry::Vacant(position) => {
+                position.insert(settings.len());
+                settings.push(setting);
+            }
         }
         Ok(())
     }

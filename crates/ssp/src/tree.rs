@@ -20,6 +20,8 @@ pub(super) struct Tree {
     pub(super) nodes: Vec<Node>,
     /// The FMUs; components of the same FMU share one entry.
     pub(super) fmus: Vec<Unpacked>,
+    /// Positions of the variables of each FMU by name.
+    pub(super) variables: Vec<HashMap<String, usize>>,
     /// Names of the FMUs for messages.
     pub(super) shown: Vec<PathBuf>,
     /// Folders of the unpacked SSPs.
@@ -44,6 +46,8 @@ pub(super) struct Node {
     /// Position of the element in that file.
     pub(super) at: Position,
     pub(super) connectors: Vec<Connector>,
+    /// Positions of the connectors by name.
+    pub(super) connector_positions: HashMap<String, usize>,
     /// The connectors of the component that refers to this system, and the file that contains them.
     pub(super) outside: Option<(Vec<Connector>, Rc<File>)>,
     pub(super) connections: Vec<Connection>,
@@ -123,7 +127,9 @@ impl Tree {
 
     /// Returns the FMU variable of a connector.
     pub(super) fn variable(&self, vertex: &Vertex) -> Option<&ScalarVariable> {
-        self.description(vertex.node)?.variable(&vertex.connector)
+        let Content::Fmu(fmu) = self.nodes[vertex.node].content else { return None };
+        let position = *self.variables[fmu].get(&vertex.connector)?;
+        self.fmus[fmu].description.variables.get(position)
     }
 
     /// Whether the FMU of a node cannot have the types of FMI 3.0.
@@ -139,7 +145,8 @@ impl Tree {
 
     /// Returns the connector as its file declares it.
     pub(super) fn connector(&self, node: usize, name: &str) -> Option<&Connector> {
-        self.nodes[node].connectors.iter().find(|connector| connector.name == name)
+        let node = &self.nodes[node];
+        node.connector_positions.get(name).map(|&position| &node.connectors[position])
     }
 
     /// Returns the unit or enumeration of a connector: as the file states it, and as the FMU states
