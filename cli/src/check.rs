@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
+use fmu_description::ModelDescription;
 use fmu_description::package::Unpacked;
-use fmu_description::{ModelDescription, Version};
 use fmu_import::isolate::{self, IsolateError, Isolated, Package};
 use fmu_import::{Fmu, Instance};
 use serde::Serialize;
@@ -127,15 +127,11 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
     }
     let not_tried = |reason: &str| Some(TrialResult::NotTried { reason: reason.to_owned() });
     let own = &unpacked.description;
-    let exchange = own.model_exchange.as_ref().filter(|_| own.version() != Version::V1);
     let simulation = own.stepped().map(|own| (own.model_identifier, own.needs_execution_tool));
+    let exchange = own.model_exchange.as_ref();
     let exchange = exchange.map(|own| (own.model_identifier.clone(), own.needs_execution_tool));
     let is_simulation = simulation.is_some();
-    let Some((identifier, needs_tool)) = simulation.or(exchange) else {
-        return not_tried(
-            "it is for model exchange of FMI 1.0, which `aso-ftc run` does not offer",
-        );
-    };
+    let (identifier, needs_tool) = simulation.or(exchange)?;
     if !is_simulation && cfg!(not(target_os = "linux")) {
         return not_tried("it is for model exchange only, which is tried on Linux only");
     }

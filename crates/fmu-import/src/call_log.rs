@@ -106,6 +106,14 @@ const NAMES: [(&str, &str, &str); 9] = [
     ("fmi2EnterInitializationMode", "fmi3EnterInitializationMode", "fmiInitializeSlave"),
 ];
 
+/// Functions of FMI 1.0 for model exchange with other names than in FMI 2.0.
+const MODELS: [(&str, &str); 4] = [
+    ("fmi2Terminate", "fmiTerminate"),
+    ("fmi2EnterInitializationMode", "fmiInitialize"),
+    ("fmi2NewDiscreteStates", "fmiEventUpdate"),
+    ("fmi2GetNominalsOfContinuousStates", "fmiGetNominalContinuousStates"),
+];
+
 impl<S: Slave + ?Sized> LoggedSlave<S> {
     /// Logs that `function` has created the instance of this `kind`.
     fn created(&self, (function, kind): (&str, &str)) {
@@ -126,6 +134,12 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
 
     /// Returns the name of a function of FMI 2.0 in the version of the FMU.
     fn spelt(&self, function: &str) -> String {
+        if self.version == Version::V1 && self.slave.description().model_exchange.is_some() {
+            let known = MODELS.iter().find(|(own, _)| *own == function);
+            if let Some((_, name)) = known {
+                return (*name).to_owned();
+            }
+        }
         let known = NAMES.iter().find(|(own, ..)| *own == function);
         match (self.version, known) {
             (Version::V3, Some((_, name, _))) | (Version::V1, Some((_, _, name))) => {

@@ -233,7 +233,8 @@ impl Fmu {
                 let location = file_uri(unpacked.folder())?;
                 let (guid, names) = (&description.guid, self.names());
                 let component = library.instantiate(name, guid, &location, names).map_err(hint)?;
-                Ok(Inner::V1(Box::new(crate::v1::Instance::new(component, description))))
+                let interface = Interface::CoSimulation;
+                Ok(Inner::V1(Box::new(crate::v1::Instance::new(component, description, interface))))
             }
             Some(CoSimulation::V3(library)) => {
                 let resources = resource_path(&unpacked.resources());
@@ -282,12 +283,7 @@ impl Fmu {
                 return Err(FmuError::Version {
                     model: description.model_name.clone(),
                     version: description.version(),
-                    expected: match (interface, description.version()) {
-                        (Interface::ModelExchange, Version::V1) => {
-                            "FMI 2.0 or 3.0 for model exchange"
-                        }
-                        _ => "FMI 2.0 for access to its C functions",
-                    },
+                    expected: "FMI 2.0 for access to its C functions",
                 });
             }
             (Interface::CoSimulation, Some(CoSimulation::V2(library)), _) => library.clone(),
@@ -322,9 +318,9 @@ fn open_library(
     model_identifier: &str,
 ) -> Result<CoSimulation, FmuError> {
     let library = match description.version() {
-        Version::V1 => {
-            v1::Library::open(path, model_identifier).map(Arc::new).map(CoSimulation::V1)
-        }
+        Version::V1 => v1::Library::open(path, model_identifier, Interface::CoSimulation)
+            .map(Arc::new)
+            .map(CoSimulation::V1),
         Version::V2 => {
             Library::open(path, Interface::CoSimulation).map(Arc::new).map(CoSimulation::V2)
         }

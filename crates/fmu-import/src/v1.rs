@@ -1,18 +1,21 @@
-//! FMUs of FMI 1.0 for co-simulation (stand-alone) as slaves.
+//! FMUs of FMI 1.0 for co-simulation (stand-alone) and for model exchange as slaves.
 //!
-//! FMI 1.0 has no initialization mode: `fmiInitializeSlave` is called when the master enters it. Values
+//! FMI 1.0 has no initialization mode: `fmiInitializeSlave` or `fmiInitialize` is called when the master enters it. Values
 //! set before are start values; afterwards inputs can be set, and parameters are fixed.
+
+mod equations;
 
 use std::collections::{HashMap, HashSet};
 use std::ffi::{c_char, c_int};
 
 use fmu_description::{Causality, Experiment, ModelDescription};
 
+use crate::library::Interface;
 use crate::library::v1::Component;
 use crate::v2::narrow;
-use slave::{CallError, ValueType};
+use slave::{CallError, EventInfo, ValueType};
 
-/// A co-simulation instance of an FMU of FMI 1.0 in this process.
+/// An instance of an FMU of FMI 1.0 in this process.
 pub(crate) struct Instance {
     pub(crate) component: Component,
     experiment: Experiment,
@@ -29,6 +32,9 @@ pub(crate) struct Instance {
     description: ModelDescription,
     integers: Vec<c_int>,
     booleans: Vec<c_char>,
+    /// For model exchange: the result of `fmiInitialize`, until a value is set or the event is updated.
+    initialized: Option<EventInfo>,
+    interface: Interface,
 }
 
 /// Returns a number for a type, as a key.
@@ -64,7 +70,11 @@ fn separate_negated(description: &mut ModelDescription) -> HashMap<u32, u32> {
 }
 
 impl Instance {
-    pub(crate) fn new(component: Component, description: &ModelDescription) -> Self {
+    pub(crate) fn new(
+        component: Component,
+        description: &ModelDescription,
+        interface: Interface,
+    ) -> Self {
         let mut description = description.clone();
         let negated = separate_negated(&mut description);
         let inputs = description.variables.iter().filter(|own| own.causality == Causality::Input);
@@ -80,12 +90,15 @@ impl Instance {
             description,
             integers: Vec::new(),
             booleans: Vec::new(),
+            initialized: None,
+            interface,
         }
     }
 
     /// Whether the FMU takes the values: between initialization and first step only those of inputs.
     /// The master repeats settings there; the FMU has them already.
-    fn takes(&self, kind: ValueType, references: &[u32]) -> bool {
+    fn takes(&mut self, kind: ValueType, references: &[u32]) -> bool {
+        self.initialized = None;
         !self.settled || references.iter().all(|own| self.inputs.contains(&(key(kind), *own)))
     }
 
@@ -94,8 +107,14 @@ impl Instance {
     }
 
     pub(crate) fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        let Experiment { start_time, stop_time, .. } = self.experiment;
-        self.component.initialize(start_time, stop_time)?;
+        let Experiment { start_time, stop_time, tolerance } = self.experiment;
+        match self.interface {
+            Interface::CoSimulation => self.component.initialize(start_time, stop_time)?,
+            Interface::ModelExchange => {
+                self.component.set_time(start_time)?;
+                self.initialized = Some(self.component.initialize_model(tolerance)?);
+            }
+        }
         self.settled = true;
         Ok(())
     }

@@ -41,6 +41,9 @@ pub struct ModelExchange {
     /// `providesPerElementDependencies` (FMI 3.0).
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<4, _, _>")]
     pub provides_per_element_dependencies: bool,
+    /// `numberOfContinuousStates` (FMI 1.0); the later versions list the derivatives in `ModelStructure`.
+    #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<5, _, _>")]
+    pub number_of_continuous_states: u32,
 }
 
 /// `CoSimulation`: identifier and capability flags (FMI 2.0.5, section 4.3.1;

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use fmu_description::Version;
-use slave::{CallError, CompletedStep, EventInfo, ModelExchange, absent};
+use slave::{CallError, CompletedStep, EventInfo, ModelExchange};
 
-use super::{Fmu, FmuError, resource_path, with_tool_hint};
+use super::{Fmu, FmuError, file_uri, resource_path, with_tool_hint};
 use crate::instance::{Inner, Instance};
-use crate::library::{Interface, v3};
+use crate::library::{Interface, v1, v3};
 
 impl Fmu {
     /// Creates a model-exchange instance called `name`.
@@ -15,20 +15,33 @@ impl Fmu {
     /// # Errors
     ///
     /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`FmuError::Load`] with the FMU's messages
-    /// if the FMU does not instantiate; [`FmuError::NoInterface`] without model exchange;
-    /// [`FmuError::Version`] for FMI 1.0.
+    /// if the FMU does not instantiate; [`FmuError::NoInterface`] without model exchange.
     pub fn instantiate_equations(&self, name: &str) -> Result<Box<dyn ModelExchange>, FmuError> {
         let description = self.description();
         let flags = description.model_exchange.as_ref();
         let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
         let only = once.then(|| self.occupy(name)).transpose()?;
-        let inner = if description.version() == Version::V3 {
-            Inner::V3(Box::new(self.equations_of_version_3(name)?))
-        } else {
-            let component = self.component(Interface::ModelExchange, name)?;
-            Inner::V2(crate::v2::Instance::new(component))
+        let inner = match description.version() {
+            Version::V1 => Inner::V1(Box::new(self.equations_of_version_1(name)?)),
+            Version::V2 => {
+                let component = self.component(Interface::ModelExchange, name)?;
+                Inner::V2(crate::v2::Instance::new(component))
+            }
+            Version::V3 => Inner::V3(Box::new(self.equations_of_version_3(name)?)),
         };
         Ok(Box::new(Instance::new(inner, only, self.clone())))
+    }
+
+    fn equations_of_version_1(&self, name: &str) -> Result<crate::v1::Instance, FmuError> {
+        let (unpacked, description) = (&self.content.unpacked, self.description());
+        let Some(flags) = &description.model_exchange else {
+            return Err(FmuError::NoInterface { path: unpacked.folder().to_owned() });
+        };
+        let (identifier, interface) = (&flags.model_identifier, Interface::ModelExchange);
+        let library = v1::Library::open(&unpacked.library(identifier)?, identifier, interface)?;
+        let (location, names) = (file_uri(unpacked.folder())?, self.names());
+        let component = Arc::new(library).instantiate(name, &description.guid, &location, names)?;
+        Ok(crate::v1::Instance::new(component, description, interface))
     }
 
     fn equations_of_version_3(&self, name: &str) -> Result<crate::v3::Instance, FmuError> {
@@ -52,7 +65,7 @@ macro_rules! equations {
         match &mut $own.inner {
             Inner::V2(own) => own.component.$method($($argument),*),
             Inner::V3(own) => own.$method($($argument),*),
-            Inner::V1(_) => Err(absent("model exchange of FMI 1.0")),
+            Inner::V1(own) => own.$method($($argument),*),
         }
     };
 }
@@ -60,8 +73,12 @@ macro_rules! equations {
 impl ModelExchange for Instance {
     fn number_of_continuous_states(&mut self) -> Result<usize, CallError> {
         match &mut self.inner {
+            Inner::V1(own) => {
+                let flags = own.description().model_exchange.as_ref();
+                Ok(flags.map_or(0, |flags| flags.number_of_continuous_states as usize))
+            }
             Inner::V3(own) => own.number_of_continuous_states(),
-            _ => Ok(self.fmu().description().structure.derivatives.len()),
+            Inner::V2(_) => Ok(self.fmu().description().structure.derivatives.len()),
         }
     }
 

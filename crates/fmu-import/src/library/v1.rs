@@ -1,8 +1,9 @@
-//! The library of an FMU of FMI 1.0 for co-simulation (stand-alone): loading, instantiation, calls.
+//! The library of an FMU of FMI 1.0, co-simulation (stand-alone) or model exchange: loading, instantiation, calls.
 //!
 //! The functions have the model identifier as prefix. [`Component`] has one method for each C function.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
+mod equations;
 mod functions;
 mod step;
 
@@ -18,18 +19,19 @@ use libloading::Library as Handle;
 
 use super::calls::{function, same_length};
 use super::log::{Names, Sink, logger};
-use super::{c_string, calloc, free, load};
+use super::{Interface, c_string, calloc, free, load};
 use crate::crash::{self, Place};
 use crate::error::LoadError;
-use functions::{Callbacks, Functions, Instance};
+use functions::{Callbacks, Functions, Instance, ModelCallbacks};
 use slave::{CallError, Failure, absent};
 
 /// The type of an FMU whose library runs in this process (FMI 1.0 for co-simulation, section 3.4.1).
 const MIME_TYPE: &CStr = c"application/x-fmu-sharedlibrary";
 
-/// A loaded library with the functions of FMI 1.0 for co-simulation.
+/// A loaded library with the functions of FMI 1.0 for one interface.
 pub(crate) struct Library {
     functions: Functions,
+    interface: Interface,
     path: PathBuf,
     /// An instance returned `fmiFatal`: no function of any instance may be called.
     corrupted: AtomicBool,
@@ -37,8 +39,12 @@ pub(crate) struct Library {
 }
 
 impl Library {
-    /// Loads the library and checks its version and that it can run in co-simulation.
-    pub(crate) fn open(path: &Path, model_identifier: &str) -> Result<Self, LoadError> {
+    /// Loads the library and checks its version and that it can run with `interface`.
+    pub(crate) fn open(
+        path: &Path,
+        model_identifier: &str,
+        interface: Interface,
+    ) -> Result<Self, LoadError> {
         let handle = load(path)?;
         let functions = Functions::load(&handle, &format!("{model_identifier}_"));
         // SAFETY: takes no argument and returns a static string.
@@ -54,12 +60,12 @@ impl Library {
                 expected: "1.0",
             });
         }
-        functions.require(path, model_identifier)?;
+        functions.require(path, model_identifier, interface)?;
         let corrupted = AtomicBool::new(false);
-        Ok(Self { functions, path: path.to_owned(), corrupted, _handle: handle })
+        Ok(Self { functions, interface, path: path.to_owned(), corrupted, _handle: handle })
     }
 
-    /// Calls `fmiInstantiateSlave`. `location` is the URI of the unpacked FMU.
+    /// Calls `fmiInstantiateSlave` or `fmiInstantiateModel`. `location` is the URI of the unpacked FMU.
     pub(crate) fn instantiate(
         self: &Arc<Self>,
         name: &str,
@@ -67,31 +73,42 @@ impl Library {
         location: &str,
         names: Names,
     ) -> Result<Component, LoadError> {
-        const NAME: &str = "fmiInstantiateSlave";
+        let function: &'static &'static str = match self.interface {
+            Interface::CoSimulation => &"fmiInstantiateSlave",
+            Interface::ModelExchange => &"fmiInstantiateModel",
+        };
         let place = Place::new(name);
         let sink = Sink::new(&place, Some(names));
-        let callbacks = Callbacks {
+        let callbacks = ModelCallbacks {
             logger: Some(logger()),
             allocate_memory: Some(calloc),
             free_memory: Some(free),
-            step_finished: None,
         };
         let (c_name, c_guid, c_location) = (c_string(name), c_string(guid), c_string(location));
-        place.enter(&NAME);
-        // SAFETY: terminated strings, and callbacks by value.
-        let pointer = self.functions.instantiate.map_or(std::ptr::null_mut(), |function| unsafe {
-            function(
-                c_name.as_ptr(),
-                c_guid.as_ptr(),
-                c_location.as_ptr(),
-                MIME_TYPE.as_ptr(),
-                0.0,
-                0,
-                0,
-                callbacks,
-                0,
-            )
-        });
+        let null = std::ptr::null_mut();
+        place.enter(function);
+        let pointer = match self.interface {
+            // SAFETY: terminated strings, and callbacks by value.
+            Interface::CoSimulation => self.functions.instantiate.map_or(null, |function| unsafe {
+                function(
+                    c_name.as_ptr(),
+                    c_guid.as_ptr(),
+                    c_location.as_ptr(),
+                    MIME_TYPE.as_ptr(),
+                    0.0,
+                    0,
+                    0,
+                    Callbacks { functions: callbacks, step_finished: None },
+                    0,
+                )
+            }),
+            Interface::ModelExchange => {
+                // SAFETY: terminated strings, and callbacks by value.
+                self.functions.instantiate_model.map_or(null, |function| unsafe {
+                    function(c_name.as_ptr(), c_guid.as_ptr(), callbacks, 0)
+                })
+            }
+        };
         place.leave();
         let component = Component {
             pointer,
@@ -110,12 +127,12 @@ impl Library {
         let reason =
             if messages.is_empty() { "it gave no reason".to_owned() } else { messages.join("; ") };
         let (path, instance) = (self.path.clone(), name.to_owned());
-        Err(LoadError::Instantiate { path, function: NAME, instance, reason })
+        Err(LoadError::Instantiate { path, function, instance, reason })
     }
 }
 
-/// An instance of an FMU of FMI 1.0 and its C functions. Dropping it calls `fmiFreeSlaveInstance`; the
-/// library stays loaded until then.
+/// An instance of an FMU of FMI 1.0 and its C functions. Dropping it calls `fmiFreeSlaveInstance` or
+/// `fmiFreeModelInstance`; the library stays loaded until then.
 pub(crate) struct Component {
     pointer: Instance,
     /// A copy of the library's function table.
@@ -149,8 +166,12 @@ impl Drop for Component {
             std::mem::forget((self.library.clone(), self.sink.clone()));
             return;
         }
-        if let Some(free_instance) = self.functions.free_instance {
-            self.place.enter(&"fmiFreeSlaveInstance");
+        let (function, name): (_, &'static &'static str) = match self.library.interface {
+            Interface::CoSimulation => (self.functions.free_instance, &"fmiFreeSlaveInstance"),
+            Interface::ModelExchange => (self.functions.free_model, &"fmiFreeModelInstance"),
+        };
+        if let Some(free_instance) = function {
+            self.place.enter(name);
             // SAFETY: the instance is alive and not used again.
             unsafe { free_instance(self.pointer) };
             self.place.leave();
@@ -209,9 +230,12 @@ impl Component {
         self.check(NAME, status)
     }
 
-    /// Calls `fmiTerminateSlave`.
+    /// Calls `fmiTerminateSlave` or `fmiTerminate`.
     pub(crate) fn terminate(&mut self) -> Result<(), CallError> {
         const NAME: &str = "fmiTerminateSlave";
+        if self.library.interface == Interface::ModelExchange {
+            return self.terminate_model();
+        }
         let function = function!(self.terminate, NAME);
         // SAFETY: the instance is alive.
         let status = unsafe { function(self.pointer) };

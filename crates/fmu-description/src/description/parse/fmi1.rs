@@ -1,4 +1,4 @@
-//! Reads a model description of FMI 1.0 with the interface for co-simulation.
+//! Reads a model description of FMI 1.0.
 
 mod variables;
 
@@ -24,6 +24,9 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
         implementation.map(|own| co_simulation(own, identifier.clone())).transpose()?;
     let model_exchange = co_simulation.is_none().then(|| ModelExchange {
         model_identifier: identifier.clone(),
+        number_of_continuous_states: root
+            .optional_unsigned("numberOfContinuousStates")
+            .unwrap_or(0),
         ..ModelExchange::default()
     });
     Ok(ModelDescription {

@@ -1,4 +1,4 @@
-//! The C functions of FMI 1.0 for co-simulation: names and signatures.
+//! The C functions of FMI 1.0: names and signatures.
 
 use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;
@@ -7,6 +7,7 @@ use fmu_description::abi::{
     fmi2CallbackAllocateMemory, fmi2CallbackFreeMemory, fmi2CallbackLogger,
 };
 
+use super::super::Interface;
 use super::super::table::functions;
 use crate::error::LoadError;
 
@@ -18,15 +19,34 @@ type Text = *const c_char;
 /// `fmiBoolean`: a `char`, 0 is false.
 type Boolean = c_char;
 
-/// `fmiCallbackFunctions`, passed by value. The types of the functions are those of FMI 2.0; the first
-/// argument of the logger is the component.
+/// `fmiCallbackFunctions` of model exchange, passed by value, and the start of that of co-simulation. The types of
+/// the functions are those of FMI 2.0; the first argument of the logger is the component.
 #[derive(Clone, Copy)]
 #[repr(C)]
-pub(super) struct Callbacks {
+pub(super) struct ModelCallbacks {
     pub(super) logger: Option<fmi2CallbackLogger>,
     pub(super) allocate_memory: Option<fmi2CallbackAllocateMemory>,
     pub(super) free_memory: Option<fmi2CallbackFreeMemory>,
+}
+
+/// `fmiCallbackFunctions` of co-simulation, passed by value.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub(super) struct Callbacks {
+    pub(super) functions: ModelCallbacks,
     pub(super) step_finished: Option<unsafe extern "C" fn(Instance, Status)>,
+}
+
+/// `fmiEventInfo`.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+pub(super) struct EventInfo {
+    pub(super) iteration_converged: Boolean,
+    pub(super) state_value_references_changed: Boolean,
+    pub(super) state_values_changed: Boolean,
+    pub(super) terminate_simulation: Boolean,
+    pub(super) upcoming_time_event: Boolean,
+    pub(super) next_event_time: f64,
 }
 
 functions! {
@@ -53,16 +73,46 @@ functions! {
     cancel_step = "fmiCancelStep": fn(Instance) -> Status;
     get_status = "fmiGetStatus": fn(Instance, c_int, *mut Status) -> Status;
     get_real_status = "fmiGetRealStatus": fn(Instance, c_int, *mut f64) -> Status;
+    instantiate_model = "fmiInstantiateModel": fn(Text, Text, ModelCallbacks, Boolean) -> Instance;
+    free_model = "fmiFreeModelInstance": fn(Instance);
+    initialize_model = "fmiInitialize": fn(Instance, Boolean, f64, *mut EventInfo) -> Status;
+    terminate_model = "fmiTerminate": fn(Instance) -> Status;
+    set_time = "fmiSetTime": fn(Instance, f64) -> Status;
+    set_continuous_states = "fmiSetContinuousStates": fn(Instance, *const f64, usize) -> Status;
+    get_continuous_states = "fmiGetContinuousStates": fn(Instance, *mut f64, usize) -> Status;
+    get_derivatives = "fmiGetDerivatives": fn(Instance, *mut f64, usize) -> Status;
+    get_event_indicators = "fmiGetEventIndicators": fn(Instance, *mut f64, usize) -> Status;
+    get_nominals = "fmiGetNominalContinuousStates": fn(Instance, *mut f64, usize) -> Status;
+    completed_integrator_step = "fmiCompletedIntegratorStep":
+        fn(Instance, *mut Boolean) -> Status;
+    event_update = "fmiEventUpdate": fn(Instance, Boolean, *mut EventInfo) -> Status;
 }
 
 /// The functions without which no FMU can run in co-simulation.
-const REQUIRED: [&str; 4] =
+const SIMULATION: [&str; 4] =
     ["fmiInstantiateSlave", "fmiFreeSlaveInstance", "fmiInitializeSlave", "fmiDoStep"];
+/// The functions without which no FMU can run in model exchange.
+const EXCHANGE: [&str; 5] = [
+    "fmiInstantiateModel",
+    "fmiFreeModelInstance",
+    "fmiInitialize",
+    "fmiSetTime",
+    "fmiEventUpdate",
+];
 
 impl Functions {
-    /// Checks that the library exports the functions that co-simulation cannot do without.
-    pub(super) fn require(&self, path: &Path, prefix: &str) -> Result<(), LoadError> {
-        let missing = REQUIRED.iter().find(|function| !self.has(function));
+    /// Checks that the library exports the functions that the interface cannot do without.
+    pub(super) fn require(
+        &self,
+        path: &Path,
+        prefix: &str,
+        interface: Interface,
+    ) -> Result<(), LoadError> {
+        let required = match interface {
+            Interface::CoSimulation => &SIMULATION[..],
+            Interface::ModelExchange => &EXCHANGE,
+        };
+        let missing = required.iter().find(|function| !self.has(function));
         missing.map_or(Ok(()), |function| {
             let function = format!("{prefix}_{function}");
             Err(LoadError::Missing { path: path.to_owned(), function })

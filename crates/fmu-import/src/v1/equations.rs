@@ -1,0 +1,56 @@
+//! The functions of model exchange (FMI 1.0 for model exchange, section 3). FMI 1.0 has no modes: `fmiEventUpdate` is an
+//! event as a whole.
+
+use super::Instance;
+use slave::{CallError, CompletedStep, EventInfo};
+
+impl Instance {
+    pub(crate) fn set_time(&mut self, time: f64) -> Result<(), CallError> {
+        self.component.set_time(time)
+    }
+
+    pub(crate) fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), CallError> {
+        self.component.set_continuous_states(states)
+    }
+
+    pub(crate) fn get_continuous_states(&mut self, states: &mut [f64]) -> Result<(), CallError> {
+        self.component.get_continuous_states(states)
+    }
+
+    pub(crate) fn get_derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), CallError> {
+        self.component.get_derivatives(derivatives)
+    }
+
+    pub(crate) fn get_event_indicators(&mut self, values: &mut [f64]) -> Result<(), CallError> {
+        self.component.get_event_indicators(values)
+    }
+
+    pub(crate) fn get_nominals(&mut self, nominals: &mut [f64]) -> Result<(), CallError> {
+        self.component.get_nominals(nominals)
+    }
+
+    pub(crate) fn completed_integrator_step(
+        &mut self,
+        _never_back: bool,
+    ) -> Result<CompletedStep, CallError> {
+        self.component.completed_integrator_step()
+    }
+
+    #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "as in the later versions")]
+    pub(crate) fn enter_event_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+
+    /// Calls `fmiEventUpdate`. Directly after `fmiInitialize`, whose result says the same, there is no event.
+    pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
+        match self.initialized.take() {
+            Some(info) if !info.discrete_states_need_update => Ok(info),
+            _ => self.component.event_update(),
+        }
+    }
+
+    #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "as in the later versions")]
+    pub(crate) fn enter_continuous_time_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+}
