@@ -148,6 +148,7 @@ fmi2Status misbehave(Slave *slave, const char *function) {
     talk(slave, deed);
     meddle(deed);
     meddle_with_process(deed);
+    meddle_with_files(deed);
     if (strcmp(deed, "forget") == 0) {
         slave->t1 = 0.5;
         slave->n = 3;

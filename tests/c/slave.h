@@ -4,9 +4,9 @@
  * output with a step. Without a connection y is the time since the start.
  *
  * Its parameter `behaviour` selects the misbehaviour. "DEED in FUNCTION" does that deed when that
- * function is called, in fmi2DoStep and fmi2GetReal from the time `t1` on; deeds.c defines the
- * deeds. The other behaviours are implemented where they act, most in steps.c. As fmi2Instantiate
- * gets no parameters, the GUID is the start value of `behaviour`.
+ * function is called, in fmi2DoStep and fmi2GetReal from the time `t1` on; deeds.c and files.c
+ * define the deeds. The other behaviours are implemented where they act, most in steps.c. As
+ * fmi2Instantiate gets no parameters, the GUID is the start value of `behaviour`.
  *
  * It is strict: a call that section 4.2.4 forbids in its state ends the process by SIGABRT.
  *
@@ -81,6 +81,8 @@ fmi2Status misbehave(Slave *slave, const char *function);
 
 /* Does what ends the process, or lets something end it later. */
 void meddle_with_process(const char *deed);
+/* Does it if `deed` is one of files.c. */
+void meddle_with_files(const char *deed);
 /* Whether the misbehaviour of repeatedly called functions has started. */
 int due(const Slave *slave);
 /* Ends the process if the call is forbidden. */

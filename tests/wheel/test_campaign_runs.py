@@ -315,7 +315,7 @@ MISBEHAVING = """<?xml version="1.0" encoding="UTF-8"?>
 @pytest.fixture
 def misbehaving(tmp_path):
     """Writes an FMU that does what its parameter `behaviour` says; returns its path."""
-    names = ("deeds", "life", "process", "steps", "values")
+    names = ("deeds", "files", "life", "process", "steps", "values")
     sources = [str(ROOT / "tests" / "c" / f"{name}.c") for name in names]
     words = ["cc", "-std=c11", "-shared", "-fPIC", "-o", str(tmp_path / "slave.so"), *sources, "-lm"]
     subprocess.run(words, check=True)

@@ -12,6 +12,7 @@ mod engine;
 mod linearise;
 mod misbehaviour;
 mod misbehaviour_calls;
+mod misbehaviour_files;
 mod misbehaviour_isolated;
 mod misbehaviour_process;
 mod misbehaviour_run;
