@@ -4,9 +4,12 @@ The example write_results writes a table whose Reals have the bits of a random g
 generator is here in Python: every number must be read with the same bits.
 """
 
+import io
 import json
 import os
+import random
 import subprocess
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -43,14 +46,24 @@ def expected(rows=ROWS):
 
 
 @pytest.fixture(scope="module")
-def write_results(root):
-    """Runs the example, which is built unless scripts/test has built it; returns its exit status."""
-    folder = os.environ.get("BUILT_PROGRAMS")
-    if folder is None:
-        cargo = ["cargo", "build", "--release", "--locked", "--package", "cosim-results"]
-        subprocess.run([*cargo, "--example", "write_results"], cwd=root, check=True)
-        folder = root / "target" / "release"
-    program = Path(folder) / "examples" / "write_results"
+def example(root):
+    """The path of an example, which is built unless scripts/test has built it."""
+
+    def path(name):
+        folder = os.environ.get("BUILT_PROGRAMS")
+        if folder is None:
+            cargo = ["cargo", "build", "--release", "--locked", "--package", "cosim-results"]
+            subprocess.run([*cargo, "--example", name], cwd=root, check=True)
+            folder = root / "target" / "release"
+        return Path(folder) / "examples" / name
+
+    return path
+
+
+@pytest.fixture(scope="module")
+def write_results(example):
+    """Runs the example; returns its exit status."""
+    program = example("write_results")
     return lambda *arguments: subprocess.run([program, *arguments], capture_output=True).returncode
 
 
@@ -156,3 +169,38 @@ def test_a_crash_leaves_every_row_up_to_the_flush_before_it(write_results, tmp_p
     assert csv.read_bytes().endswith(b"\n")
     found = pd.read_parquet(parquet)
     assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
+
+
+# A few columns that are written in full blocks, and so many that a partial block takes several writes.
+@pytest.mark.parametrize(("columns", "pause"), [(400, 0), (1000, 0.0005)])
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_a_kill_at_any_instant_leaves_a_file_without_the_rows_of_the_last_second_at_most(
+    example, tmp_path, ending, columns, pause
+):
+    program, instants = example("write_until_killed"), random.Random(columns)
+    for _ in range(int(os.environ.get("KILLS", "3"))):
+        file, times = tmp_path / f"a.{ending}", tmp_path / "times"
+        file.unlink(missing_ok=True)
+        with times.open("wb") as out:
+            run = subprocess.Popen([program, file, str(columns), str(pause)], stdout=out)
+        while times.stat().st_size == 0:
+            time.sleep(0.001)
+        time.sleep(instants.uniform(0.1, 2))
+        run.kill()
+        run.wait()
+        given = np.fromfile(times)
+        names = ["time", f"x[{columns - 1}]"]
+        if ending == "csv":
+            # The last line can be a part.
+            text = file.read_bytes()
+            whole = io.BytesIO(text[: text.rindex(b"\n") + 1])
+            table = pl.read_csv(whole, columns=names)
+        else:
+            table = pl.from_arrow(pq.read_table(file, columns=names))
+            assert pl.read_parquet(file, columns=names).equals(table)
+        rows = np.arange(len(table), dtype=float)
+        assert np.array_equal(table[names[0]].to_numpy(), rows)
+        assert np.array_equal(table[names[1]].to_numpy(), rows + (columns - 1) / 1024)
+        # The row that is in work is among the times or not. A write on a busy machine takes a while.
+        lost = given[len(table) : len(given)]
+        assert len(lost) == 0 or given[-1] - lost[0] < 1, f"{len(lost)} of {len(given)} rows"

@@ -11,8 +11,7 @@ use fmu_description::package::{Package, platforms};
 
 use crate::root;
 
-const SOURCES: [&str; 6] =
-    ["deeds.c", "files.c", "life.c", "process.c", "steps.c", "values.c"];
+const SOURCES: [&str; 6] = ["deeds.c", "files.c", "life.c", "process.c", "steps.c", "values.c"];
 
 /// Libraries that this process has built, by the definitions given to the compiler.
 static LIBRARIES: Mutex<BTreeMap<Vec<String>, Vec<u8>>> = Mutex::new(BTreeMap::new());

@@ -137,11 +137,12 @@ pub fn complete(memory: &[AtomicU64]) -> Option<LeftFile> {
     let path = path_of(bytes(&memory[PATH..ROWS], value(PATH_LENGTH)));
     let rows = bytes(&memory[ROWS..], value(PENDING));
     let identity = Identity { device: value(DEVICE), inode: value(INODE) };
-    let damage = match append(&path, identity, value(LENGTH), &rows) {
+    let was_complete = state == COMPLETE;
+    let damage = match append(&path, identity, was_complete, value(LENGTH), &rows) {
         Ok(damage) => damage,
         Err(error) => Some(format!("its last rows cannot be written: {error}")),
     };
-    Some(LeftFile { path, was_complete: state == COMPLETE, damage })
+    Some(LeftFile { path, was_complete, damage })
 }
 
 #[cfg(unix)]
@@ -157,7 +158,13 @@ fn path_of(bytes: Vec<u8>) -> PathBuf {
 
 /// Appends the `rows` that the file of this identity, of which `length` bytes were written, lacks. Returns what
 /// is wrong with the file.
-fn append(path: &Path, identity: Identity, length: u64, rows: &[u8]) -> io::Result<Option<String>> {
+fn append(
+    path: &Path,
+    identity: Identity,
+    was_complete: bool,
+    length: u64,
+    rows: &[u8],
+) -> io::Result<Option<String>> {
     let mut file = match File::options().read(true).write(true).open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -170,10 +177,15 @@ fn append(path: &Path, identity: Identity, length: u64, rows: &[u8]) -> io::Resu
         return Ok(Some("another file took its place during the run".to_owned()));
     }
     let (found, whole) = (metadata.len(), length + rows.len() as u64);
-    if found < length || found > whole {
+    // The last write of a Parquet file, which has no rows here, may be unfinished: the one before it counts.
+    let is_unfinished = found > whole && rows.is_empty() && !was_complete;
+    if found < length || found > whole && !is_unfinished {
         return Ok(Some(format!(
-            "it has {found} bytes where the run wrote {length}: something else wrote to it, or the last write was not finished"
+            "it has {found} bytes where the run wrote {length}: something else wrote to it"
         )));
+    }
+    if rows.is_empty() {
+        return Ok(None);
     }
     // The process may have ended while it wrote the rows.
     let (there, missing) = rows.split_at(usize::try_from(found - length).unwrap_or(0));

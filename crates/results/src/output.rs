@@ -52,18 +52,32 @@ pub(super) struct OutputFile {
     process: u32,
     length: u64,
     ledger: Option<Ledger>,
+    /// Whether the file was opened again, of which one warning tells.
+    reopened: bool,
+    /// The changes of the file, if a test collects them.
+    #[cfg(test)]
+    pub(super) changes: Option<Vec<Change>>,
+}
+
+/// A change of a file, by one call of the operating system.
+#[cfg(test)]
+#[derive(Debug)]
+pub(super) enum Change {
+    Bytes(u64, Vec<u8>),
+    Length(u64),
 }
 
 impl OutputFile {
     /// Creates an empty file, and its folder if that is missing. No other process can write the file
     /// while it is open.
     pub(super) fn create(path: &Path) -> Result<Self, ResultsError> {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let failed = |source| ResultsError::Write { path: path.to_owned(), source };
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         folder.map_or(Ok(()), fs::create_dir_all).map_err(failed)?;
         let file = open_alone(path, true).map_err(failed)?;
         let file = file.ok_or_else(|| ResultsError::InUse { path: path.to_owned() })?;
         let metadata = file.metadata().map_err(failed)?;
+        let regular = metadata.is_file();
         if metadata.len() > 0 {
             tracing::info!("{}: replaces the results of an earlier run", path.display());
             file.set_len(0).map_err(failed)?;
@@ -72,13 +86,16 @@ impl OutputFile {
         let identity = Identity::new(&metadata);
         Ok(Self {
             path: path.to_owned(),
-            ledger: metadata.is_file().then(|| Ledger::enter(&absolute, identity)).flatten(),
+            ledger: regular.then(|| Ledger::enter(&absolute, identity)).flatten(),
             absolute,
             file: lifted(file),
             identity,
-            regular: metadata.is_file(),
+            regular,
             process: process::id(),
             length: 0,
+            reopened: false,
+            #[cfg(test)]
+            changes: None,
         })
     }
 
@@ -143,18 +160,20 @@ impl OutputFile {
         file.seek(SeekFrom::Start(self.length)).map_err(|error| self.failed(error))?;
         // The number of the former descriptor may be that of a file of the FMU by now.
         forget(std::mem::replace(&mut self.file, file));
-        tracing::warn!(
-            "{}: an FMU has closed or replaced the descriptor of this file, which was opened again; no \
-             row is lost. With --isolate no FMU reaches the files of the command",
-            self.path.display()
-        );
+        if !std::mem::replace(&mut self.reopened, true) {
+            tracing::warn!(
+                "{}: an FMU has closed or replaced the descriptor of this file, which was opened again; \
+                 no row is lost. With --isolate no FMU reaches the files of the command",
+                self.path.display()
+            );
+        }
         Ok(metadata)
     }
 
     /// Appends to the file, after [`Self::verify`]. After a failure the file keeps its former content.
     pub(super) fn append(&mut self, bytes: &[u8]) -> Result<(), ResultsError> {
         if let Err(error) = self.file.write_all(bytes) {
-            // A reader could take an incomplete line for a row. A pipe cannot be truncated.
+            // A reader could take an incomplete line for a row.
             let length = self.length;
             let _ = self.set_length(length);
             return Err(self.failed(error));
@@ -165,12 +184,20 @@ impl OutputFile {
 
     /// Writes at `offset`; the position of the file is at the end of `bytes` then.
     pub(super) fn write_at(&mut self, offset: u64, bytes: &[u8]) -> Result<(), ResultsError> {
+        #[cfg(test)]
+        if let Some(changes) = &mut self.changes {
+            changes.push(Change::Bytes(offset, bytes.to_vec()));
+        }
         let sought = self.file.seek(SeekFrom::Start(offset));
         sought.and_then(|_| self.file.write_all(bytes)).map_err(|error| self.failed(error))
     }
 
     /// Sets the length of the file, and its position to the end.
     pub(super) fn set_length(&mut self, length: u64) -> Result<(), ResultsError> {
+        #[cfg(test)]
+        if let Some(changes) = &mut self.changes {
+            changes.push(Change::Length(length));
+        }
         self.file.set_len(length).map_err(|error| self.failed(error))?;
         self.file.seek(SeekFrom::Start(length)).map_err(|error| self.failed(error))?;
         self.length = length;

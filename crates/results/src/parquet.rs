@@ -2,6 +2,7 @@
 
 mod block;
 mod footer;
+mod tail;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -21,26 +22,27 @@ use super::pace::Pace;
 use super::{Column, ColumnKind, ResultsError, Row, Sink, TIME, Widths, check_names};
 use block::Block;
 use footer::Footer;
+use tail::Tail;
 
 pub(super) use footer::units;
 
 /// The first and the last bytes of a Parquet file.
 const MAGIC: &[u8] = b"PAR1";
 /// Longest time that a row stays in memory only, while further rows arrive.
-const INTERVAL: Duration = Duration::from_secs(1);
+const INTERVAL: Duration = Duration::from_millis(500);
 /// Size of a page of a column in bytes.
 const PAGE: usize = 1 << 20;
 
 /// A sink that writes Parquet: `time` and Real as DOUBLE, Integer as INT32, Boolean as BOOLEAN, String
 /// as UTF-8; only values of clocked columns are null. The footer's metadata contains the units.
 ///
-/// Rows are collected in a block of bounded size, which becomes a row group. A single write replaces
-/// the previous footer by the row group and a new footer, so that the file is always readable. A partly
-/// filled block is written again by the next write. If the disk is full, the file keeps the content of
-/// the last successful write.
+/// Rows are collected in a block of bounded size, which becomes a row group. A partly filled block is
+/// written again by the next write. The file is readable at every instant, also if the process is
+/// killed during a write or the disk is full: then it has the rows of the last complete write. Until it
+/// is finished it may have unused bytes between the row groups, at most 48 MiB.
 #[derive(Debug)]
 pub struct ParquetSink {
-    file: OutputFile,
+    tail: Tail,
     widths: Widths,
     properties: Arc<WriterProperties>,
     footer: Footer,
@@ -51,7 +53,7 @@ pub struct ParquetSink {
     end: u64,
     /// Number of rows of the present block that are in the file.
     written: usize,
-    /// Buffer for the next write, reused to save allocations.
+    /// Buffer for the row group of the next write, reused to save allocations.
     bytes: Vec<u8>,
     pace: Pace,
 }
@@ -66,41 +68,61 @@ impl ParquetSink {
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, ResultsError> {
         check_names(columns)?;
         let failed = |source| write_error(path, source);
-        let mut sink = Self {
-            file: OutputFile::create(path)?,
+        let mut footer = Footer::new(columns).map_err(failed)?;
+        let first = footer.render(None).map_err(failed)?;
+        let tail = Tail::create(OutputFile::create(path)?, first)?;
+        tail.file.record(false);
+        Ok(Self {
+            end: tail.start(),
+            tail,
             widths: Widths::new(columns),
             properties: Arc::new(properties(columns)),
-            footer: Footer::new(columns).map_err(failed)?,
+            footer,
             clocked: clocked(columns),
             block: Block::new(columns),
-            end: 0,
             written: 0,
-            bytes: MAGIC.to_vec(),
+            bytes: Vec::new(),
             pace: Pace::new(INTERVAL),
-        };
-        sink.footer.append(&mut sink.bytes, None).map_err(failed)?;
-        sink.write()?;
-        sink.file.record(false);
-        sink.end = MAGIC.len() as u64;
-        Ok(sink)
+        })
     }
 
-    /// Writes the rows of the block and the footer; starts the next block if this one is full.
-    fn write_rows(&mut self) -> Result<(), ResultsError> {
-        self.file.verify()?;
-        let rows = self.block.rows();
-        if rows == self.written && !self.block.is_full() {
+    /// Writes the rows of the block and the footer; starts the next block if this one is full. With
+    /// `last`, the file has no unused bytes then.
+    fn write_rows(&mut self, last: bool) -> Result<(), ResultsError> {
+        self.tail.file.verify()?;
+        let (rows, full) = (self.block.rows(), self.block.is_full());
+        let is_behind = self.tail.start() > self.end;
+        if rows == self.written && !full && !(last && is_behind) {
             return Ok(());
         }
-        let (group, size) = self.compose(rows)?;
-        if let Err(error) = self.write() {
-            self.restore_end();
-            return Err(error);
+        let path = self.tail.file.path().to_owned();
+        let failed = |error| write_error(&path, error);
+        let group = self.encode(rows).map_err(failed)?;
+        let in_front = footer::moved(&group, self.end).map_err(failed)?;
+        let footer = self.footer.render(Some(in_front.clone())).map_err(failed)?;
+        // The end of the tail is rounded up.
+        let end = self.end + (self.bytes.len() + footer.len() + 8) as u64;
+        let fits = end <= self.tail.start();
+        let is_partial = self.written > 0;
+        // The next tail, or this one again, then fits in front.
+        let behind = self.tail.file.length().max(end);
+        if !fits && !is_partial {
+            self.tail.move_footer(behind)?;
+        } else if !fits {
+            let group = footer::moved(&group, behind).map_err(failed)?;
+            let footer = self.footer.render(Some(group)).map_err(failed)?;
+            self.tail.replace(behind, &self.bytes, footer)?;
+            self.written = rows;
         }
-        self.written = rows;
-        self.file.record(false);
-        if self.block.is_full() {
-            self.footer.keep(group);
+        if fits || !is_partial || full || last {
+            self.tail.replace(self.end, &self.bytes, footer)?;
+            self.written = rows;
+        }
+        self.tail.file.record(false);
+        if full {
+            let size = self.bytes.len() as u64;
+            self.footer.keep(in_front);
+            self.tail.keep(size);
             self.end += size;
             self.block.clear();
             self.written = 0;
@@ -108,43 +130,8 @@ impl ParquetSink {
         Ok(())
     }
 
-    /// Encodes the first `rows` of the block as a row group, followed by the footer, to `bytes`. Returns the
-    /// metadata of the row group and its size.
-    fn compose(&mut self, rows: usize) -> Result<(RowGroupMetaData, u64), ResultsError> {
-        let group = self.encode(rows).map_err(|source| write_error(self.file.path(), source))?;
-        let size = self.bytes.len() as u64;
-        let done = self.footer.append(&mut self.bytes, Some(group.clone()));
-        done.map_err(|source| write_error(self.file.path(), source))?;
-        Ok((group, size))
-    }
-
-    /// Restores the end of the file, which a failed write has overwritten. This needs no additional
-    /// space on the disk. If it also fails, the file keeps the row groups of full blocks, with a shorter
-    /// footer.
-    fn restore_end(&mut self) {
-        let length = self.file.length();
-        let _ = self.file.set_length(length);
-        let composed = match self.written {
-            0 => {
-                self.bytes.clear();
-                self.footer.append(&mut self.bytes, None).is_ok()
-            }
-            rows => self.compose(rows).is_ok(),
-        };
-        if composed && self.write().is_ok() {
-            return;
-        }
-        let _ = self.file.set_length(self.end);
-        self.bytes.clear();
-        if self.footer.append(&mut self.bytes, None).is_ok() {
-            // The caller reports the error of the write instead.
-            let _ = self.write();
-        }
-        self.written = 0;
-    }
-
-    /// Encodes the first `rows` of the block as a row group to `bytes`.
-    fn encode(&mut self, rows: usize) -> Result<RowGroupMetaData, ParquetError> {
+    /// Encodes the first `rows` of the block as a row group to `bytes`; returns its metadata for offset 0.
+    fn encode(&mut self, rows: usize) -> Result<Arc<RowGroupMetaData>, ParquetError> {
         self.bytes.clear();
         let mut bytes = TrackedWrite::new(std::mem::take(&mut self.bytes));
         let schema = self.footer.schema();
@@ -177,13 +164,7 @@ impl ParquetSink {
         }
         let metadata = group.close()?;
         self.bytes = bytes.into_inner()?;
-        footer::moved(&metadata, self.end)
-    }
-
-    /// Writes `bytes` after the row groups of full blocks, as the end of the file.
-    fn write(&mut self) -> Result<(), ResultsError> {
-        self.file.write_at(self.end, &self.bytes)?;
-        self.file.set_length(self.end + self.bytes.len() as u64)
+        Ok(metadata)
     }
 }
 
@@ -191,20 +172,20 @@ impl Sink for ParquetSink {
     fn row(&mut self, time: f64, row: &Row<'_>) -> Result<(), ResultsError> {
         self.widths.check(row)?;
         if self.block.is_full() {
-            self.write_rows()?;
+            self.write_rows(false)?;
         }
         self.block.push(time, row);
-        if self.block.is_full() || self.pace.due() { self.write_rows() } else { Ok(()) }
+        if self.block.is_full() || self.pace.due() { self.write_rows(false) } else { Ok(()) }
     }
 
     fn flush(&mut self) -> Result<(), ResultsError> {
-        self.write_rows()
+        self.write_rows(false)
     }
 
     fn finish(mut self: Box<Self>) -> Result<(), ResultsError> {
-        self.write_rows()?;
-        self.file.verify_path()?;
-        self.file.record(true);
+        self.write_rows(true)?;
+        self.tail.file.verify_path()?;
+        self.tail.file.record(true);
         Ok(())
     }
 }
@@ -212,7 +193,7 @@ impl Sink for ParquetSink {
 impl Drop for ParquetSink {
     fn drop(&mut self) {
         // No caller is left to receive the error.
-        let _ = self.write_rows();
+        let _ = self.write_rows(true);
     }
 }
 

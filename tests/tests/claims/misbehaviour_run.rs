@@ -363,5 +363,9 @@ fn a_crash_when_an_fmu_is_freed_does_not_hide_why_the_run_ended() {
     // Writing the results fails because the name is that of a folder.
     let run = Run::pair(&fmu, &["--results", "."]);
     assert_eq!(run.status, Some(2), "{}", run.message);
-    run.says(&["fmi2FreeInstance crashed with signal 11", "before that,", "results are written as"]);
+    run.says(&[
+        "fmi2FreeInstance crashed with signal 11",
+        "before that,",
+        "results are written as",
+    ]);
 }

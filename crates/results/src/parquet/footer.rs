@@ -2,7 +2,7 @@
 //!
 //! The writer of the crate `parquet` writes a footer only when the file is closed, and without a
 //! footer a Parquet file is unreadable: a run that is killed would lose all rows. So this module
-//! keeps the positions of the row groups and writes a footer with every write. (Arrow IPC streams
+//! keeps the positions of the row groups and renders a footer for every write. (Arrow IPC streams
 //! need no footer, but most tools that read results expect Parquet.)
 
 use std::collections::BTreeMap;
@@ -63,12 +63,11 @@ impl Footer {
         self.groups.push(group);
     }
 
-    /// Appends the footer with all row groups so far and an optional further one.
-    pub(super) fn append(
+    /// Renders the footer with all row groups so far and an optional further one.
+    pub(super) fn render(
         &mut self,
-        bytes: &mut Vec<u8>,
         last: Option<RowGroupMetaData>,
-    ) -> Result<(), ParquetError> {
+    ) -> Result<Vec<u8>, ParquetError> {
         let kept = self.groups.len();
         let mut groups = std::mem::take(&mut self.groups);
         groups.extend(last);
@@ -82,10 +81,11 @@ impl Footer {
             None,
         );
         let all = ParquetMetaData::new(file, groups);
-        let done = ParquetMetaDataWriter::new(bytes, &all).finish();
+        let mut bytes = Vec::new();
+        let done = ParquetMetaDataWriter::new(&mut bytes, &all).finish();
         self.groups = all.into_builder().take_row_groups();
         self.groups.truncate(kept);
-        done
+        done.map(|()| bytes)
     }
 }
 

@@ -1,8 +1,10 @@
 use std::fs::{self, File};
+use std::io::{Seek as _, SeekFrom, Write as _};
 
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
 use ::parquet::record::Field;
 
+use super::super::output::Change;
 use super::super::tests::{column, give, mixed};
 use super::*;
 
@@ -136,6 +138,67 @@ fn a_killed_run_leaves_the_rows_up_to_its_last_write() {
     // A killed process runs no destructor.
     std::mem::forget(sink);
     assert_eq!(times(&path).len(), 10);
+}
+
+/// A kill can divide a write between two pages of memory only.
+#[test]
+fn a_run_that_is_killed_during_a_write_leaves_a_file_with_the_rows_of_the_write_before() {
+    const MEMORY_PAGE: u64 = 4096;
+    let folder = tempfile::tempdir().unwrap();
+    // Few flushes, so that full row groups follow each other, and many, which replace a partial one.
+    for (count, interval) in [(300_000, 90_000), (9000, 700)] {
+        let path = folder.path().join("a.parquet");
+        let mut sink = ParquetSink::create(&path, &[column("x", ColumnKind::Real)]).unwrap();
+        sink.tail.file.changes = Some(Vec::new());
+        let killed = folder.path().join("killed.parquet");
+        fs::copy(&path, &killed).unwrap();
+        for k in 0..count {
+            sink.row(f64::from(k), &Row { reals: &[0.5], ..Row::default() }).unwrap();
+            if k % interval == 0 {
+                sink.flush().unwrap();
+            }
+        }
+        sink.write_rows(true).unwrap();
+        let file = File::options().write(true).open(&killed).unwrap();
+        let mut present = 0;
+        let mut states = 0;
+        let mut check = |is_read: bool| {
+            let reader = SerializedFileReader::new(File::open(&killed).unwrap()).unwrap();
+            let rows = reader.metadata().file_metadata().num_rows();
+            assert!(rows >= present, "{rows} rows after {present}");
+            if rows > present || is_read {
+                let times = super::super::Table::open(&killed).unwrap().column(0).unwrap();
+                let expected = (0..i32::try_from(rows).unwrap()).map(f64::from);
+                assert!(times.into_iter().eq(expected), "{rows} rows");
+            }
+            present = rows;
+            states += 1;
+        };
+        for change in sink.tail.file.changes.iter().flatten() {
+            match change {
+                Change::Length(length) => file.set_len(*length).unwrap(),
+                Change::Bytes(offset, bytes) => {
+                    let mut done = 0;
+                    while done < bytes.len() {
+                        let at = offset + done as u64;
+                        let room = usize::try_from(MEMORY_PAGE - at % MEMORY_PAGE).unwrap();
+                        let end = bytes.len().min(done + room);
+                        write_at(&file, at, &bytes[done..end]);
+                        done = end;
+                        check(false);
+                    }
+                }
+            }
+            check(true);
+        }
+        assert_eq!((present, states > 100), (count.into(), true), "{states} states");
+        assert_eq!(fs::read(&path).unwrap(), fs::read(&killed).unwrap());
+    }
+}
+
+fn write_at(mut file: &File, offset: u64, bytes: &[u8]) {
+    file.seek(SeekFrom::Start(offset)).unwrap();
+    file.write_all(bytes).unwrap();
 }
 
 #[test]

@@ -1,0 +1,93 @@
+//! The end of a Parquet file: its last row group and its footer, replaced so that the file is readable
+//! at every instant, whenever the process is killed.
+//!
+//! The last eight bytes of a file are the length L of the footer and `PAR1`. A reader takes the L bytes
+//! before them, decodes the metadata at their start, and ignores what follows the metadata. So one
+//! write of eight bytes, at a multiple of eight, replaces one footer by another; a kill cannot divide
+//! it, as it can a longer write, after each page of memory.
+//!
+//! A new tail behind the present one first gets its last eight bytes, with the L that leads to the
+//! present footer; then all bytes before them; then its own L. A new tail that fits in front of the
+//! present one is written, and the file is then cut behind it.
+
+use super::{MAGIC, OutputFile, ResultsError};
+
+/// Number of bytes of the length of the footer and of [`MAGIC`]. The end of each tail is a multiple.
+const LINK: usize = 8;
+
+/// A file with a footer.
+#[derive(Debug)]
+pub(super) struct Tail {
+    pub(super) file: OutputFile,
+    /// Start of the present tail, and of its footer.
+    start: u64,
+    footer_start: u64,
+    /// The present footer, including its last eight bytes.
+    footer: Vec<u8>,
+}
+
+impl Tail {
+    /// Writes the first footer of an empty file.
+    pub(super) fn create(mut file: OutputFile, footer: Vec<u8>) -> Result<Self, ResultsError> {
+        let start = MAGIC.len() as u64;
+        file.append(MAGIC)?;
+        let mut tail = Self { file, start, footer_start: start, footer: Vec::new() };
+        tail.replace(start, &[], footer)?;
+        Ok(tail)
+    }
+
+    /// Start of the present tail. A new tail must end before it or begin behind the end of the file.
+    pub(super) fn start(&self) -> u64 {
+        self.start
+    }
+
+    /// Removes the first `size` bytes, which are a full row group now, from the tail.
+    pub(super) fn keep(&mut self, size: u64) {
+        self.start += size;
+    }
+
+    /// Moves the present footer, without a row group, to `offset` behind the end of the file.
+    pub(super) fn move_footer(&mut self, offset: u64) -> Result<(), ResultsError> {
+        let footer = self.footer.clone();
+        self.replace(offset, &[], footer)
+    }
+
+    /// Replaces the present tail. After a failure the present one is still there.
+    pub(super) fn replace(
+        &mut self,
+        offset: u64,
+        group: &[u8],
+        footer: Vec<u8>,
+    ) -> Result<(), ResultsError> {
+        let length = self.file.length();
+        let content = offset + (group.len() + footer.len()) as u64;
+        let end = content.next_multiple_of(LINK as u64);
+        let start = end - footer.len() as u64;
+        let written = self.write(offset, group, start, &footer);
+        if let Err(error) = written.and_then(|()| self.file.set_length(end)) {
+            let _ = self.file.set_length(length);
+            return Err(error);
+        }
+        (self.start, self.footer_start, self.footer) = (offset, start, footer);
+        Ok(())
+    }
+
+    fn write(
+        &mut self,
+        offset: u64,
+        group: &[u8],
+        start: u64,
+        footer: &[u8],
+    ) -> Result<(), ResultsError> {
+        let (metadata, link) = footer.split_at(footer.len() - LINK);
+        let place = start + metadata.len() as u64;
+        if place >= self.file.length()
+            && let Ok(back) = u32::try_from(place - self.footer_start)
+        {
+            self.file.write_at(place, &[&back.to_le_bytes(), MAGIC].concat())?;
+        }
+        self.file.write_at(offset, group)?;
+        self.file.write_at(start, metadata)?;
+        self.file.write_at(place, link)
+    }
+}
