@@ -6,6 +6,7 @@ use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError, Weak};
+use std::thread;
 use std::time::Duration;
 
 use fmu_description::{Causality, Kind};
@@ -15,16 +16,55 @@ use results::{self, Column, ColumnKind, Decimation, Due, ResultsError, Row, Sele
 use crate::config::Every;
 
 /// All open results files, so that they can be completed when the process ends.
-static FILES: Mutex<Vec<Weak<Mutex<Recording>>>> = Mutex::new(Vec::new());
+static FILES: Mutex<Files> = Mutex::new(Files { open: Vec::new(), is_watched: false });
+/// Longest time that a row stays in memory while the run makes no further one.
+const STALL: Duration = Duration::from_millis(250);
 /// Number of attempts to lock a file when the process ends, and the pause between them.
 const TRIES: u32 = 50;
 const PAUSE: Duration = Duration::from_millis(10);
+
+struct Files {
+    open: Vec<Weak<Mutex<Recording>>>,
+    /// Whether [`write_stalled`] runs.
+    is_watched: bool,
+}
+
+impl Files {
+    /// Returns the open files.
+    fn open(&mut self) -> Vec<Arc<Mutex<Recording>>> {
+        self.open.retain(|file| file.strong_count() > 0);
+        self.open.iter().filter_map(Weak::upgrade).collect()
+    }
+}
 
 /// An open results file. The end of the process can take it over.
 struct Recording {
     path: PathBuf,
     /// `None` after the file was completed.
     sink: Option<Box<dyn Sink>>,
+    /// Whether a row was recorded since the last look of [`write_stalled`], and whether rows were before.
+    recent: bool,
+    pending: bool,
+    /// The error of a write by [`write_stalled`].
+    failed: Option<ResultsError>,
+}
+
+impl Recording {
+    fn new(sink: Box<dyn Sink>) -> Self {
+        let (path, sink) = (PathBuf::new(), Some(sink));
+        Self { path, sink, recent: false, pending: false, failed: None }
+    }
+
+    fn row(&mut self, time: f64, row: &Row<'_>) -> Result<(), ResultsError> {
+        self.recent = true;
+        self.failed.take().map_or(Ok(()), Err)?;
+        self.sink.as_mut().map_or(Ok(()), |sink| sink.row(time, row))
+    }
+
+    fn flush(&mut self) -> Result<(), ResultsError> {
+        self.failed.take().map_or(Ok(()), Err)?;
+        self.sink.as_mut().map_or(Ok(()), |sink| sink.flush())
+    }
 }
 
 /// The recorder of a run: writes variables to a results file at given intervals.
@@ -53,8 +93,12 @@ impl Recorder {
         let Some(recorder) = recorder else { return Ok(None) };
         path.clone_into(&mut lock(&recorder.recording).path);
         let mut files = FILES.lock().unwrap_or_else(PoisonError::into_inner);
-        files.retain(|file| file.strong_count() > 0);
-        files.push(Arc::downgrade(&recorder.recording));
+        files.open.push(Arc::downgrade(&recorder.recording));
+        if !files.is_watched {
+            // Without the thread, rows are written with the next row only.
+            let watch = thread::Builder::new().name("results".to_owned()).spawn(write_stalled);
+            files.is_watched = watch.is_ok();
+        }
         drop(files);
         Ok(Some(recorder))
     }
@@ -82,8 +126,7 @@ impl Recorder {
         let system = simulation.system();
         let columns: Vec<_> = ports.iter().map(|&port| column(system, port)).collect();
         let (due, readout) = (Due::new(decimation, start), simulation.readout(&ports));
-        let sink = Some(make(&columns)?);
-        let recording = Arc::new(Mutex::new(Recording { path: PathBuf::new(), sink }));
+        let recording = Arc::new(Mutex::new(Recording::new(make(&columns)?)));
         Ok(Some(Self { recording, due, readout, slow }))
     }
 
@@ -143,8 +186,7 @@ impl Recorder {
         self.slow.apply(simulation, &mut self.readout);
         let Readout { reals, integers, booleans, strings, present, .. } = &self.readout;
         let row = Row { reals, integers, booleans, strings, present };
-        let mut recording = lock(&self.recording);
-        Ok(recording.sink.as_mut().map_or(Ok(()), |sink| sink.row(time, &row))?)
+        Ok(lock(&self.recording).row(time, &row)?)
     }
 
     /// Writes all rows recorded so far to the file.
@@ -153,7 +195,7 @@ impl Recorder {
     ///
     /// [`Error`] with the reason.
     pub fn flush(&mut self) -> Result<(), Error> {
-        Ok(lock(&self.recording).sink.as_mut().map_or(Ok(()), |sink| sink.flush())?)
+        Ok(lock(&self.recording).flush()?)
     }
 
     /// Completes the file.
@@ -162,8 +204,42 @@ impl Recorder {
     ///
     /// [`Error`] with the reason.
     pub fn finish(self) -> Result<(), Error> {
-        let sink = lock(&self.recording).sink.take();
-        Ok(sink.map_or(Ok(()), Sink::finish)?)
+        let mut recording = lock(&self.recording);
+        let failed = recording.failed.take().map_or(Ok(()), Err);
+        let finished = recording.sink.take().map_or(Ok(()), Sink::finish);
+        Ok(failed.and(finished)?)
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        // Now, and not when `write_stalled` lets go of the recording.
+        drop(lock(&self.recording).sink.take());
+    }
+}
+
+/// Writes the rows of files whose run has made no row for some time: an FMU may take long for its step,
+/// or for ever, and nobody knows how the process ends. Returns when no file is open.
+fn write_stalled() {
+    loop {
+        thread::sleep(STALL);
+        let mut files = FILES.lock().unwrap_or_else(PoisonError::into_inner);
+        let open = files.open();
+        files.is_watched = !open.is_empty();
+        drop(files);
+        if open.is_empty() {
+            return;
+        }
+        for file in open {
+            // The run is writing.
+            let Ok(mut recording) = file.try_lock() else { continue };
+            let was_recent = std::mem::take(&mut recording.recent);
+            if !was_recent && recording.pending {
+                let flushed = recording.flush();
+                recording.failed = flushed.err();
+            }
+            recording.pending = was_recent;
+        }
     }
 }
 
@@ -185,7 +261,7 @@ fn lock(recording: &Mutex<Recording>) -> MutexGuard<'_, Recording> {
 /// result. No recorder writes a row afterwards.
 pub fn keep_results() -> Vec<(PathBuf, Result<(), ResultsError>)> {
     let files = match FILES.try_lock() {
-        Ok(files) => files.iter().filter_map(Weak::upgrade).collect(),
+        Ok(mut files) => files.open(),
         Err(_) => Vec::new(),
     };
     files.iter().filter_map(|file| keep(file)).collect()
