@@ -1,5 +1,5 @@
-//! FMUs in C under `aso-ftc run`, in its own process, that reach for the results file or for the
-//! process of the run: no row is missing or wrong in silence.
+//! FMUs in C under `aso-ftc run`, in its own process, that reach for the results file:
+//! no row is missing or wrong in silence.
 #![cfg(target_os = "linux")]
 
 use tests::c_fmu::CFmu;
@@ -43,14 +43,6 @@ fn results_that_an_fmu_changes_or_moves_end_the_run_with_a_sentence() {
             run.expect(1, TO_T1);
         }
     }
-}
-
-#[test]
-fn a_copy_of_the_process_writes_no_row() {
-    let run = run("return twice", &[]);
-    run.expect(0, ALL);
-    assert_eq!(run.numbers("time").len(), ALL, "{}", run.message);
-    run.says(&["error", "an FMU has duplicated the process of the run"]);
 }
 
 #[test]
