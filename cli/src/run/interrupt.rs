@@ -37,20 +37,7 @@ pub(super) fn listen() -> anyhow::Result<()> {
 
 #[cfg(unix)]
 fn handle_signals() -> anyhow::Result<()> {
-    use fmu_import::crash::ENDING_SIGNALS;
-    use signal_hook::consts::SIGHUP;
-    use signal_hook::iterator::Signals;
-
-    let chosen =
-        ENDING_SIGNALS.iter().filter(|signal| **signal != SIGHUP || !crash::ignores_hangup());
-    let mut signals = Signals::new(chosen)?;
-    let wait = move || {
-        for signal in signals.forever() {
-            raise(u8::try_from(signal).unwrap_or(0));
-        }
-    };
-    thread::Builder::new().name("signals".to_owned()).spawn(wait)?;
-    Ok(())
+    Ok(crash::on_ending_signal(|signal| raise(u8::try_from(signal).unwrap_or(0)))?)
 }
 
 #[cfg(not(unix))]

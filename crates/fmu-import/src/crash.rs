@@ -21,8 +21,10 @@ use fmu_description::number::seconds;
 
 pub use place::Name;
 pub(crate) use place::{Place, RECORD, Slot, last_of_this_thread};
+#[cfg(target_os = "linux")]
+pub(crate) use signals::{ENDING_SIGNALS, ignores_hangup};
 #[cfg(unix)]
-pub use signals::{ENDING_SIGNALS, end_copy, ignores_hangup, leave_file};
+pub use signals::{end_copy, leave_file, on_ending_signal};
 
 /// How long the program's crash function may take.
 const REPORT_LIMIT: Duration = Duration::from_secs(5);

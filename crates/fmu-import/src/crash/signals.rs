@@ -13,6 +13,7 @@ use std::path::Path;
 use std::ptr::{null, null_mut};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering};
+use std::thread::Thread;
 use std::time::Duration;
 
 use libc::{c_int, c_void, siginfo_t};
@@ -32,7 +33,7 @@ pub(super) const FATAL: [(c_int, &str); 6] = [
     (libc::SIGSYS, "SIGSYS: an invalid system call"),
 ];
 /// The signals by which users and systems end a program or announce its end.
-pub const ENDING_SIGNALS: [c_int; 7] = [
+pub(crate) const ENDING_SIGNALS: [c_int; 7] = [
     libc::SIGINT,
     libc::SIGTERM,
     libc::SIGHUP,
@@ -63,8 +64,7 @@ fn is_forked() -> bool {
 }
 
 /// Whether SIGHUP is ignored, as `nohup` asks for.
-#[must_use]
-pub fn ignores_hangup() -> bool {
+pub(crate) fn ignores_hangup() -> bool {
     let mut action = MaybeUninit::<libc::sigaction>::zeroed();
     // SAFETY: asks only; all zeros is a valid value of the structure.
     let action = unsafe {
@@ -72,6 +72,46 @@ pub fn ignores_hangup() -> bool {
         action.assume_init()
     };
     action.sa_sigaction == libc::SIG_IGN
+}
+
+/// The last ending signal that the thread of [`on_ending_signal`] has not seen yet; 0: none.
+static ARRIVED: AtomicI32 = AtomicI32::new(0);
+static WAITING: OnceLock<Thread> = OnceLock::new();
+
+/// Calls `react` with the number of each signal of [`ENDING_SIGNALS`], in a thread of its own. No descriptor is
+/// involved, because an FMU may close those that it did not open. Only the first call has an effect.
+///
+/// # Errors
+///
+/// [`io::Error`] if the operating system refuses the thread or a signal handler.
+pub fn on_ending_signal(react: impl Fn(c_int) + Send + 'static) -> io::Result<()> {
+    let wait = move || {
+        loop {
+            match ARRIVED.swap(0, Ordering::AcqRel) {
+                0 => std::thread::park(),
+                signal => react(signal),
+            }
+        }
+    };
+    let waiting = std::thread::Builder::new().name("signals".to_owned()).spawn(wait)?;
+    if WAITING.set(waiting.thread().clone()).is_err() {
+        return Ok(());
+    }
+    let is_handled = |signal: &&c_int| **signal != libc::SIGHUP || !ignores_hangup();
+    for signal in ENDING_SIGNALS.iter().filter(is_handled) {
+        let mut action = action(on_arrival);
+        action.sa_flags |= libc::SA_RESTART;
+        // SAFETY: the handler has the signature of SA_SIGINFO and is async-signal-safe.
+        check(unsafe { libc::sigaction(*signal, &raw const action, null_mut()) })?;
+    }
+    Ok(())
+}
+
+extern "C" fn on_arrival(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
+    ARRIVED.store(signal, Ordering::Release);
+    if let Some(waiting) = WAITING.get() {
+        waiting.unpark();
+    }
 }
 
 /// Whether this process is a copy that `fork` has made.
