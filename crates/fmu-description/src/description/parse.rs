@@ -170,7 +170,7 @@ impl ModelDescription {
     /// malformed or too large, value references that two inputs or parameters share, names of two
     /// outputs, types that refer to types. [`ModelDescription::problems`] checks further rules.
     ///
-    /// Limits: 128 MiB, 3,000,000 elements, 12,000,000 attributes, 1,000,000 variables. Cost:
+    /// [Limits](crate::limits): 512 MiB, 4,000,000 elements, 12,000,000 attributes, 1,000,000 variables. Cost:
     /// linear in the length of the file. At most 1000 warnings are kept.
     ///
     /// # Errors
