@@ -10,9 +10,10 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::models;
-use crate::outputs::{Outputs, check_distinct, check_own};
+use crate::outputs::{Outputs, check_own};
 use anyhow::Context;
 use design::{Design, Language, Precision};
+use files::check_distinct;
 use progress::Bar;
 
 #[derive(clap::Args)]

@@ -1,5 +1,4 @@
-//! The files that a command writes: never over an input, over the files of others only on request,
-//! all or none.
+//! The files that a command writes: over the files of others only on request, all or none.
 
 use std::ffi::OsString;
 use std::io::Read as _;
@@ -104,60 +103,6 @@ fn beside(path: &Path, mark: &str) -> PathBuf {
         name.push(extension);
     }
     path.with_file_name(name)
-}
-
-/// Checks that no output is an input or another output: not the same file by another path, by a
-/// link, or by a name in other case. Each path comes with the option or argument that names it.
-pub(crate) fn check_distinct(
-    inputs: &[(&str, &Path)],
-    outputs: &[(&str, &Path)],
-) -> anyhow::Result<()> {
-    for (index, (output, path)) in outputs.iter().enumerate() {
-        for (input, other) in inputs {
-            if same_file(path, other) {
-                bail!(
-                    "{output} {} would overwrite {input} {}; choose another name",
-                    path.display(),
-                    other.display()
-                );
-            }
-        }
-        for (other, other_path) in &outputs[..index] {
-            if same_file(path, other_path) {
-                bail!("{other} and {output} name the same file, {}", path.display());
-            }
-        }
-    }
-    Ok(())
-}
-
-fn same_file(one: &Path, other: &Path) -> bool {
-    let name = |path: &Path| resolved(path).to_string_lossy().to_lowercase();
-    name(one) == name(other) || same_by_link(one, other)
-}
-
-/// The path without links and relative parts; the file itself need not exist.
-fn resolved(path: &Path) -> PathBuf {
-    if let Ok(found) = fs::canonicalize(path) {
-        return found;
-    }
-    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    match (absolute.parent(), absolute.file_name()) {
-        (Some(folder), Some(name)) => resolved(folder).join(name),
-        _ => absolute,
-    }
-}
-
-#[cfg(unix)]
-fn same_by_link(one: &Path, other: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt as _;
-    let number = |path: &Path| fs::metadata(path).map(|found| (found.dev(), found.ino())).ok();
-    number(one).is_some_and(|own| number(other) == Some(own))
-}
-
-#[cfg(not(unix))]
-fn same_by_link(_: &Path, _: &Path) -> bool {
-    false
 }
 
 /// Checks that an output does not exist, or contains `identity`.

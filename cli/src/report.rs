@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
+use files::check_distinct;
 use fmu_description::number::seconds;
 use report::{Request, identity};
 
-use crate::outputs::{check_distinct, check_own};
+use crate::outputs::check_own;
 
 #[derive(clap::Args)]
 pub(crate) struct Options {

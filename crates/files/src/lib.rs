@@ -1,13 +1,16 @@
 //! Input files whose errors point at the place, and atomic output files.
 //!
 //! [`document`] reads TOML: each value knows its name and its place in the text. [`whole`] writes a
-//! file beside its target and renames it. [`sentence`] joins an error and its causes.
+//! file beside its target and renames it. [`check_distinct`] refuses an output that is an
+//! input. [`sentence`] joins an error and its causes.
 #![forbid(unsafe_code)]
 
+mod distinct;
 pub mod document;
 mod sentence;
 pub mod whole;
 
+pub use distinct::{OutputConflict, check_distinct};
 pub use document::{Entry, Place, PlaceError, Source, Table};
 pub use sentence::sentence;
 

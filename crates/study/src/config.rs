@@ -168,6 +168,42 @@ impl Config {
         done
     }
 
+    /// Checks that a run writes no file that it reads, and no file twice. `inputs` and `outputs` are
+    /// files that the configuration does not name, each with its role.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error that names both files.
+    pub fn check_outputs(
+        &self,
+        inputs: &[(&str, &Path)],
+        outputs: &[(&str, &Path)],
+    ) -> Result<(), Error> {
+        let signals = self.scenario.signal.iter();
+        let signals = signals.filter_map(|signal| signal.get_ref().csv.as_ref());
+        let signals = signals.map(|csv| ("the signal", Path::new(csv.get_ref().file.get_ref())));
+        let tables = self.scenario.table.iter();
+        let tables = tables.map(|table| ("the table", Path::new(table.get_ref().csv.get_ref())));
+        let fmus = self.fmus.0.iter().map(|(_, path)| ("the FMU", path.as_path()));
+        let system = self.system.iter().map(|path| ("the system", path.as_path()));
+        let libraries = self.preload.iter().map(|path| ("the library", Path::new(path)));
+        let read = inputs.iter().copied().chain(fmus).chain(system).chain(libraries);
+        let read: Vec<_> = read.chain(signals).chain(tables).collect();
+        let results = &self.results;
+        let is_recorded = results.every != Some(Every::Never);
+        let is_plotted = is_recorded && !results.plot.is_empty();
+        let files = [
+            ("the results file", results.file.as_ref().filter(|_| is_recorded)),
+            ("the plot", results.plot_file.as_ref().filter(|_| is_plotted)),
+            ("the bus trace", results.bus_trace.as_ref()),
+            ("the checkpoint", self.checkpoint.file.as_ref()),
+        ];
+        let files =
+            files.iter().filter_map(|(role, path)| Some((*role, path.map(PathBuf::as_path)?)));
+        let written: Vec<_> = files.chain(outputs.iter().copied()).collect();
+        Ok(files::check_distinct(&read, &written)?)
+    }
+
     fn each_path(&mut self, mut change: impl FnMut(&mut PathBuf)) {
         let fmus = self.fmus.0.iter_mut().map(|(_, path)| path);
         let files = [

@@ -36,6 +36,9 @@ pub enum Error {
     /// Results cannot be written.
     #[error(transparent)]
     Results(#[from] ResultsError),
+    /// A file that the run would write is one that it reads, or another one that it writes.
+    #[error(transparent)]
+    Outputs(#[from] files::OutputConflict),
     /// A file cannot be read or written.
     #[error("cannot {action} {}", path.display())]
     File {
