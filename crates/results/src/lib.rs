@@ -27,6 +27,9 @@ pub use csv::CsvSink;
 pub use decimation::{Decimation, Due};
 pub use envelope::Envelope;
 pub use memory::{Columns, MemorySink, Recorded, Texts, Values};
+#[cfg(unix)]
+pub use output::reserve_standard_output;
+pub use output::{STANDARD_OUTPUT, is_stream};
 pub use parquet::ParquetSink;
 pub use read::Table;
 pub use select::{Selection, SelectionError};
@@ -248,7 +251,7 @@ impl Format {
 }
 
 /// Creates a result file, and its folder if that is missing. The extension `.csv` or `.parquet` selects
-/// the format.
+/// the format. A pipe or a device takes CSV only, and needs no extension.
 ///
 /// # Errors
 ///
@@ -256,7 +259,16 @@ impl Format {
 /// name, [`ResultsError::InUse`] if another run is writing the file, [`ResultsError::Write`] if the
 /// file cannot be created.
 pub fn create(path: &Path, columns: &[Column]) -> Result<Box<dyn Sink>, ResultsError> {
-    Ok(match Format::of(path)? {
+    let is_stream = is_stream(path);
+    let format = match Format::of(path) {
+        Err(_) if is_stream => Format::Csv,
+        Ok(Format::Parquet) if is_stream => {
+            let source = io::Error::other("a pipe or a device takes CSV only");
+            return Err(ResultsError::Write { path: path.to_owned(), source });
+        }
+        other => other?,
+    };
+    Ok(match format {
         Format::Csv => Box::new(CsvSink::create(path, columns)?),
         Format::Parquet => Box::new(ParquetSink::create(path, columns)?),
     })

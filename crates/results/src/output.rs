@@ -11,6 +11,15 @@ use std::process;
 use super::ResultsError;
 use super::ledger::Ledger;
 
+#[cfg(unix)]
+mod stream;
+
+#[cfg(unix)]
+pub use stream::reserve_standard_output;
+
+/// Path of standard output; [`super::create`] writes CSV to it.
+pub const STANDARD_OUTPUT: &str = "/dev/stdout";
+
 /// Smallest number of the descriptor of a results file. Programs that close or reuse descriptors that
 /// are not theirs begin with the small ones.
 #[cfg(unix)]
@@ -72,13 +81,22 @@ impl OutputFile {
     /// while it is open.
     pub(super) fn create(path: &Path) -> Result<Self, ResultsError> {
         let failed = |source| ResultsError::Write { path: path.to_owned(), source };
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        folder.map_or(Ok(()), fs::create_dir_all).map_err(failed)?;
-        let file = open_alone(path, true).map_err(failed)?;
-        let file = file.ok_or_else(|| ResultsError::InUse { path: path.to_owned() })?;
+        #[cfg(unix)]
+        let stream = stream::open(path).map_err(failed)?;
+        #[cfg(not(unix))]
+        let stream = None;
+        let is_stream = stream.is_some();
+        let file = if let Some(stream) = stream {
+            stream
+        } else {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            folder.map_or(Ok(()), fs::create_dir_all).map_err(failed)?;
+            let file = open_alone(path, true).map_err(failed)?;
+            file.ok_or_else(|| ResultsError::InUse { path: path.to_owned() })?
+        };
         let metadata = file.metadata().map_err(failed)?;
-        let regular = metadata.is_file();
-        if metadata.len() > 0 {
+        let regular = metadata.is_file() && !is_stream;
+        if regular && metadata.len() > 0 {
             tracing::info!("{}: replaces the results of an earlier run", path.display());
             file.set_len(0).map_err(failed)?;
         }
@@ -172,6 +190,11 @@ impl OutputFile {
 
     /// Appends to the file, after [`Self::verify`]. After a failure the file keeps its former content.
     pub(super) fn append(&mut self, bytes: &[u8]) -> Result<(), ResultsError> {
+        #[cfg(unix)]
+        if !self.regular {
+            let written = stream::write(&mut self.file, bytes, &self.path);
+            return written.map_err(|error| self.failed(error));
+        }
         if let Err(error) = self.file.write_all(bytes) {
             // A reader could take an incomplete line for a row.
             let length = self.length;
@@ -272,15 +295,18 @@ fn lifted(file: File) -> File {
     file
 }
 
+/// Whether the path leads to a pipe or a device, which takes CSV only and cannot be read again.
+#[must_use]
+pub fn is_stream(path: &Path) -> bool {
+    path == Path::new(STANDARD_OUTPUT)
+        || fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+}
+
 /// Opens a file for exclusive writing without changing its content; `None` if another process has it
 /// open for writing. The lock is released when the process ends, even by a crash.
 #[cfg(not(windows))]
 fn open_alone(path: &Path, create: bool) -> io::Result<Option<File>> {
     let file = File::options().write(true).create(create).truncate(false).open(path)?;
-    // Several processes may share a device or a pipe.
-    if !file.metadata()?.is_file() {
-        return Ok(Some(file));
-    }
     match file.try_lock() {
         // The file system has no locks: assume that the file is free.
         Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(Some(file)),
