@@ -100,7 +100,10 @@ fn main() -> ExitCode {
     if let Some(status) = worker::worker() {
         return status;
     }
-    let verb = Arguments::parse().verb;
+    let verb = match output::parse::<Arguments>() {
+        Ok(Arguments { verb }) => verb,
+        Err(status) => return ExitCode::from(status),
+    };
     #[cfg(target_os = "linux")]
     if let Command::Run(options) = &verb
         && let Some(status) = supervise::supervise(options)
@@ -112,6 +115,7 @@ fn main() -> ExitCode {
     }
     crash::watch();
     let status = perform(verb);
+    let status = output::finish(status);
     fmu_import::crash::done(status);
     ExitCode::from(status)
 }

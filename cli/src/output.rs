@@ -1,5 +1,5 @@
-//! Prints to standard output and standard error, which a reader may have closed, as `| head` does.
-//! The command then continues without output.
+//! Prints to standard output and standard error. If a reader has closed one of them, as `| head` does,
+//! the command continues without output; if it fails, as on a full disk, the exit status says so.
 //!
 //! The macros replace those of the standard library, which panic in this case. The words `error:` and
 //! `warning:` at the start of a text have the colours of clap's errors, unless the stream is no
@@ -7,7 +7,7 @@
 
 use std::fmt::Arguments;
 use std::io::{self, Write as _};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use anstream::stream::{AsLockedWrite, RawStream};
 use anstream::{AutoStream, ColorChoice};
@@ -35,6 +35,35 @@ const WORDS: [(&str, Style); 2] = [
     ("warning:", AnsiColor::Yellow.on_default().bold()),
 ];
 
+/// The first error of standard output or standard error, if it was not closed by its reader.
+static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
+
+fn note(done: io::Result<()>) {
+    if let Err(error) = done
+        && error.kind() != io::ErrorKind::BrokenPipe
+    {
+        FAILED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+    }
+}
+
+/// Parses the arguments of the command; prints help, or what is wrong with them.
+pub(crate) fn parse<P: clap::Parser>() -> Result<P, u8> {
+    P::try_parse().map_err(|error| {
+        note(error.print());
+        finish(u8::try_from(error.exit_code()).unwrap_or(2))
+    })
+}
+
+/// Returns the exit status of the command: not 0 if a part of what it printed is lost.
+pub(crate) fn finish(status: u8) -> u8 {
+    note(io::stdout().flush());
+    let Some(failed) = FAILED.lock().unwrap_or_else(PoisonError::into_inner).take() else {
+        return status;
+    };
+    eprintln!("error: the output is not complete: {failed}");
+    status.max(1)
+}
+
 /// Prints to standard output.
 pub(crate) fn out(text: Arguments<'_>) {
     static CHOICE: OnceLock<ColorChoice> = OnceLock::new();
@@ -51,8 +80,7 @@ pub(crate) fn error(text: Arguments<'_>) {
 /// written, because the environment cannot be read while a crash is handled.
 fn write(stream: impl RawStream + AsLockedWrite, choice: &OnceLock<ColorChoice>, text: &str) {
     let choice = choice.get_or_init(|| AutoStream::choice(&stream));
-    // Printing fails only if the reader has closed the stream.
-    let _ = AutoStream::new(stream, *choice).write_all(coloured(text).as_bytes());
+    note(AutoStream::new(stream, *choice).write_all(coloured(text).as_bytes()));
 }
 
 fn coloured(text: &str) -> String {

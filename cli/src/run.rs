@@ -14,9 +14,10 @@ use anyhow::{Context, bail};
 use fmu_description::number;
 use fmu_import::CallLog;
 use master::{Coupling, Port, System, by_direct_dependencies};
-use results::Selection;
+use results::{STANDARD_OUTPUT, Selection, is_stream};
 use study::{
-    AssemblyOptions, Config, Error, Every, Plan, PreparedRun, RealTime, Run, RunEnd, RunStatistics,
+    AssemblyOptions, Config, Error, Every, LoadedConfig, Plan, PreparedRun, RealTime, Run, RunEnd,
+    RunStatistics,
 };
 
 use crate::logging;
@@ -42,7 +43,18 @@ pub(crate) fn run(options: &Options) -> u8 {
     }
     match prepare(options) {
         Ok(None) => 0,
-        Ok(Some(started)) => started.go(),
+        Ok(Some(started)) => {
+            let log = started.log_calls.clone();
+            let status = started.go();
+            // The last calls free the instances.
+            match log.map(|(log, path)| (log.check(), path)) {
+                Some((Err(error), path)) => {
+                    tracing::error!("{}: calls are missing: {error}", path.display());
+                    status.max(1)
+                }
+                _ => status,
+            }
+        }
         Err(error) => {
             tracing::error!("{}", files::sentence(error.as_ref()));
             2
@@ -65,11 +77,14 @@ struct Started {
     pace: Option<RealTime>,
     /// The live view, if one is requested.
     live: Option<Live>,
+    /// The log of calls and its path, if one is requested.
+    log_calls: Option<(CallLog, PathBuf)>,
 }
 
 /// Prepares and starts the run; `None` if only the configuration was requested.
 fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     let (loaded, saved) = options.load()?;
+    check_outputs(options, &loaded)?;
     // An FMU may change the current folder.
     let here = std::env::current_dir().context("the current folder")?;
     let log_calls = options.watching.log_calls.as_deref().map(open_call_log).transpose()?;
@@ -101,7 +116,35 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     let factor = pace.as_ref().map(|pace| pace.overruns().factor);
     let open = |start| Live::open(&mut run, &ports, factor, start, &here);
     let live = options.watching.live.map(open).transpose()?;
-    Ok(Some(Started { run, here, units, report, bus_trace, pace, live }))
+    let log_calls = log_calls.zip(options.watching.log_calls.clone());
+    Ok(Some(Started { run, here, units, report, bus_trace, pace, live, log_calls }))
+}
+
+/// Checks that no output is an input, and reserves standard output for the results if they go there.
+fn check_outputs(options: &Options, loaded: &LoadedConfig) -> anyhow::Result<()> {
+    let config = &loaded.config;
+    let results = config.results.file.as_deref();
+    let page = results.filter(|_| options.results.report).map(|file| file.with_extension("html"));
+    let outputs =
+        [("--log-calls", options.watching.log_calls.as_deref()), ("the report", page.as_deref())];
+    let outputs = outputs.iter().filter_map(|(role, path)| Some((*role, (*path)?)));
+    let source = loaded.source.as_ref().map(|source| ("the configuration", source.path()));
+    config.check_outputs(source.as_slice(), &outputs.collect::<Vec<_>>())?;
+    let Some(results) = results.filter(|file| is_stream(file)) else { return Ok(()) };
+    for (option, given) in
+        [("--report", options.results.report), ("--plot", !config.results.plot.is_empty())]
+    {
+        if given {
+            bail!("{option} reads the results again, and {} is no file", results.display());
+        }
+    }
+    if results == Path::new(STANDARD_OUTPUT) && !options.watching.print_config {
+        #[cfg(unix)]
+        results::reserve_standard_output().context("standard output")?;
+        #[cfg(not(unix))]
+        bail!("--results - needs a Unix system");
+    }
+    Ok(())
 }
 
 /// Prints the connections and, if variables are connected `by_name`, the inputs without one.
@@ -269,10 +312,24 @@ impl Started {
         if let Some(live) = self.live.take() {
             live.end(&told, &self.here);
         }
-        let reported = written.and_then(|file| self.report(file.as_deref(), outcome, status != 0));
-        if let Err(error) = reported {
-            tracing::error!("{}", files::sentence(error.as_ref()));
-            return status.max(1);
+        let traced = self.run.finish_trace().map_err(anyhow::Error::from);
+        let mut outputs = vec![traced];
+        match written {
+            Ok(Some(file)) => {
+                outputs.push(self.draw(&file));
+                outputs.push(self.report(&file, outcome, status != 0));
+            }
+            Ok(None) => {}
+            Err(error) => outputs.push(Err(error)),
+        }
+        let mut status = status;
+        for error in outputs.into_iter().filter_map(Result::err) {
+            let sentence = files::sentence(error.as_ref());
+            // The run may have ended with this error.
+            if !told.contains(&sentence) {
+                tracing::error!("{sentence}");
+            }
+            status = status.max(1);
         }
         status
     }
@@ -284,10 +341,8 @@ impl Started {
     }
 
     /// Writes the report, if one is requested.
-    fn report(&mut self, file: Option<&Path>, outcome: String, failed: bool) -> anyhow::Result<()> {
-        let (Some(run), Some(file)) = (self.report.take(), file) else {
-            return Ok(());
-        };
+    fn report(&mut self, file: &Path, outcome: String, failed: bool) -> anyhow::Result<()> {
+        let Some(run) = self.report.take() else { return Ok(()) };
         let run = report::Run { outcome, failed, messages: logging::collected(), ..run };
         let page = report::page(&report::Request {
             results: file,
@@ -300,7 +355,7 @@ impl Started {
         let out = file.with_extension("html");
         files::whole::write(&out, page.html.as_bytes())
             .with_context(|| format!("cannot write {}", out.display()))?;
-        println!("{}", out.strip_prefix(&self.here).unwrap_or(&out).display());
+        self.show(&out);
         Ok(())
     }
 
@@ -319,32 +374,39 @@ impl Started {
         );
     }
 
-    /// Completes the results, draws the plot, and prints the files written; returns the results file.
+    /// Completes the results, and prints the files written; returns the results file.
     fn write(&mut self, ended: &RunEnd) -> anyhow::Result<Option<PathBuf>> {
-        let written = |path: &Path| {
-            println!("{}", path.strip_prefix(&self.here).unwrap_or(path).display());
-        };
-        let results = &self.run.config.results;
-        let picture = results.plot_file.clone().filter(|_| !results.plot.is_empty());
-        let plotted = results.plot.clone();
         let file = self.run.finish()?.map(Path::to_owned);
-        if let Some(file) = &file {
-            written(file);
-            if let Some(picture) = picture {
-                let unit = |name: &str| {
-                    let known = self.units.iter().find(|(known, _)| known == name);
-                    known.map(|(_, unit)| unit.clone())
-                };
-                plot::plot_with_units(file, &plotted, &unit, &picture)?;
-                written(&picture);
-            }
+        if let Some(file) = file.as_deref().filter(|file| !is_stream(file)) {
+            self.show(file);
         }
         if let (Some(file), false) =
             (self.run.checkpoint_file(), matches!(ended, RunEnd::Failed(_)))
         {
-            written(file);
+            self.show(file);
         }
         Ok(file)
+    }
+
+    /// Prints the name of a file that was written.
+    fn show(&self, path: &Path) {
+        println!("{}", path.strip_prefix(&self.here).unwrap_or(path).display());
+    }
+
+    /// Draws the plot of the results in `file`, if one is requested.
+    fn draw(&self, file: &Path) -> anyhow::Result<()> {
+        let results = &self.run.config.results;
+        let Some(picture) = results.plot_file.as_deref().filter(|_| !results.plot.is_empty())
+        else {
+            return Ok(());
+        };
+        let unit = |name: &str| {
+            let known = self.units.iter().find(|(known, _)| known == name);
+            known.map(|(_, unit)| unit.clone())
+        };
+        plot::plot_with_units(file, &results.plot, &unit, picture)?;
+        self.show(picture);
+        Ok(())
     }
 }
 

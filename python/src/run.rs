@@ -260,7 +260,7 @@ fn run(
     let settings = run.config.render()?;
     let Run { simulation, .. } = &run;
     let (time, tally) = (simulation.time(), run.tally());
-    let finished = run.finish().map(|_| ());
+    let finished = run.finish().map(|_| ()).and(run.finish_trace());
     let reasons = std::mem::take(&mut run.plan.reasons);
     drop(run);
     finished?;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use fmu_description::number::seconds;
 use master::{AlgorithmRequest, Coupling, Extrapolation, Method, StepControl};
+use results::{STANDARD_OUTPUT, is_stream};
 use toml::Spanned;
 
 use study::{
@@ -182,7 +183,7 @@ pub(super) struct ResultsOptions {
     /// Folder for all files [default: results/run]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// File of the results, .csv or .parquet
+    /// File of the results, .csv or .parquet; - is CSV on stdout
     ///
     /// [default: results.csv in the folder of --out]
     #[arg(long, value_name = "FILE")]
@@ -396,7 +397,7 @@ impl Options {
         put(&mut config.isolation.memory_limit, self.safety.memory_limit);
         put(&mut config.checkpoint.file, self.safety.checkpoint.clone());
         put(&mut config.checkpoint.every, placed(self.safety.checkpoint_every));
-        self.put_results(config, saved.as_ref());
+        self.put_results(config, saved.as_ref())?;
         check_numbers(config)?;
         Ok((loaded, saved))
     }
@@ -482,7 +483,7 @@ impl Options {
         self.system.inputs.first().is_some_and(|path| is_fmu(path))
     }
 
-    fn put_results(&self, config: &mut Config, saved: Option<&SavedRun>) {
+    fn put_results(&self, config: &mut Config, saved: Option<&SavedRun>) -> anyhow::Result<()> {
         let results = &mut config.results;
         if !self.results.record.is_empty() {
             results.record.clone_from(&self.results.record);
@@ -508,8 +509,17 @@ impl Options {
             saved.map_or(path.clone(), |saved| resumed(&path, saved.time()))
         };
         let mut file = place(&self.results.results, &results.file, "results.csv");
-        if let Some(format) = format {
-            file.set_extension(format);
+        if file == Path::new("-") {
+            file = PathBuf::from(STANDARD_OUTPUT);
+        }
+        match format {
+            Some("parquet") if is_stream(&file) => {
+                bail!("--format parquet: {} is no file, expected csv", file.display())
+            }
+            Some(format) if !is_stream(&file) => {
+                file.set_extension(format);
+            }
+            _ => {}
         }
         results.file = Some(file);
         results.plot_file = Some(place(&self.results.plot_file, &results.plot_file, "plot.svg"));
@@ -517,6 +527,7 @@ impl Options {
         let known =
             known.map(|path| saved.map_or(path.clone(), |saved| resumed(&path, saved.time())));
         results.bus_trace = self.results.bus_trace.clone().or(known);
+        Ok(())
     }
 }
 

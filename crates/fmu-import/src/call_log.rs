@@ -7,7 +7,7 @@ use std::fmt::{Debug, Write as _};
 use std::fs::File;
 use std::io::{self, Write as _};
 use std::path::Path;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use fmu_description::Experiment;
 use fmu_description::{ModelDescription, Version};
@@ -20,7 +20,14 @@ use slave::{CallError, Events, ModelExchange, Slave, StepResult};
 /// last line names the function that crashed.
 #[derive(Clone, Debug)]
 pub struct CallLog {
-    file: Arc<Mutex<File>>,
+    output: Arc<Mutex<Output>>,
+}
+
+#[derive(Debug)]
+struct Output {
+    file: File,
+    /// The first error, after which nothing is written.
+    failed: Option<io::Error>,
 }
 
 impl CallLog {
@@ -30,7 +37,8 @@ impl CallLog {
     ///
     /// [`io::Error`] if the file cannot be created.
     pub fn create(path: &Path) -> io::Result<Self> {
-        Ok(Self { file: Arc::new(Mutex::new(File::create(path)?)) })
+        let output = Output { file: File::create(path)?, failed: None };
+        Ok(Self { output: Arc::new(Mutex::new(output)) })
     }
 
     /// Wraps `slave` so that its calls are logged under the name `instance`.
@@ -63,23 +71,34 @@ impl CallLog {
 
     /// Wraps an instance, which logs its C calls itself if it can.
     fn wrap<S: Slave + ?Sized>(&self, instance: &str, mut slave: Box<S>) -> LoggedSlave<S> {
-        let (file, name, mut starts_line) = (self.clone(), instance.to_owned(), true);
+        let (log, name, mut starts_line) = (self.clone(), instance.to_owned(), true);
         let direct = slave.log_calls(Box::new(move |text| {
             if starts_line {
-                file.write(&format!("{name} "));
+                log.write(&format!("{name} "));
             }
             starts_line = text.ends_with('\n');
-            file.write(text);
+            log.write(text);
         }));
         let version = slave.description().version();
         LoggedSlave { log: self.clone(), instance: instance.to_owned(), slave, direct, version }
     }
 
-    /// Appends `text`. A write error is ignored: a debugging aid does not end a run.
+    /// Appends `text`. A write error ends the log, but no run: it is a debugging aid.
     fn write(&self, text: &str) {
-        if let Ok(mut file) = self.file.lock() {
-            let _ = file.write_all(text.as_bytes());
+        let mut output = self.output.lock().unwrap_or_else(PoisonError::into_inner);
+        if output.failed.is_none() {
+            output.failed = output.file.write_all(text.as_bytes()).err();
         }
+    }
+
+    /// Checks that each call so far is in the file.
+    ///
+    /// # Errors
+    ///
+    /// [`io::Error`], the first one, if a call could not be written.
+    pub fn check(&self) -> io::Result<()> {
+        let mut output = self.output.lock().unwrap_or_else(PoisonError::into_inner);
+        output.failed.take().map_or(Ok(()), Err)
     }
 }
 

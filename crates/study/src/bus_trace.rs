@@ -117,13 +117,13 @@ impl Writer {
         }
         for operation in Operation::read(bytes) {
             let own = (bus, operation);
-            if self.instant.1.contains(&own) {
+            if self.failed.is_some() || self.instant.1.contains(&own) {
                 continue;
             }
             self.bytes.clear();
             let composed = self.format.operation(&mut self.bytes, time, bus, &own.1);
             let written = composed.and_then(|()| self.file.write_all(&self.bytes));
-            self.failed = self.failed.take().or(written.err());
+            self.failed = written.err();
             self.instant.1.push(own);
         }
     }

@@ -369,10 +369,18 @@ impl Run {
     ///
     /// Returns [`Error::Results`] if the file cannot be completed.
     pub fn finish(&mut self) -> Result<Option<&Path>, Error> {
-        self.trace.as_ref().map_or(Ok(()), BusTrace::finish)?;
         match self.recorder.take() {
             Some(recorder) => recorder.finish().map(|()| self.config.results.file.as_deref()),
             None => Ok(None),
         }
+    }
+
+    /// Completes the trace of the buses, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error that names the file if a frame could not be written.
+    pub fn finish_trace(&mut self) -> Result<(), Error> {
+        self.trace.take().map_or(Ok(()), |trace| trace.finish())
     }
 }

@@ -9,6 +9,8 @@ mod library;
 mod messages;
 
 #[cfg(unix)]
+mod outputs;
+#[cfg(unix)]
 mod process;
 
 use std::fs;
