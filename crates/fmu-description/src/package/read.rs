@@ -93,7 +93,10 @@ impl Unpacked {
         archive_warnings.extend(add_terminals(temporary.path(), &mut description));
         let names = archive.names().iter().filter(|name| !name.is_empty()).cloned().collect();
         let (folder, temporary) = (temporary.path().to_owned(), Some(temporary));
-        Ok(Unpacked { folder, temporary, names, description, warnings, archive_warnings })
+        let mut unpacked =
+            Unpacked { folder, temporary, names, description, warnings, archive_warnings };
+        unpacked.warn_of_other_names();
+        Ok(unpacked)
     }
 
     /// Uses the FMU that is already unpacked in `folder`.
@@ -106,7 +109,10 @@ impl Unpacked {
         let (mut description, warnings) = describe(&folder, &folder)?;
         let archive_warnings = add_terminals(&folder, &mut description).into_iter().collect();
         let names = Vec::new();
-        Ok(Unpacked { folder, temporary: None, names, description, warnings, archive_warnings })
+        let mut unpacked =
+            Unpacked { folder, temporary: None, names, description, warnings, archive_warnings };
+        unpacked.warn_of_other_names();
+        Ok(unpacked)
     }
 
     /// The folder with `modelDescription.xml`, as an absolute path.
@@ -140,7 +146,8 @@ impl Unpacked {
     }
 
     /// The path of the shared library `model_identifier` for the platform of this program, in a folder
-    /// that the version of the FMU has ([`platforms_of`]).
+    /// that the version of the FMU has ([`platforms_of`]). If there is none, but exactly one library with
+    /// another name, its path; [`Unpacked::archive_warnings`] names it.
     ///
     /// # Errors
     ///
@@ -149,16 +156,62 @@ impl Unpacked {
         let name = format!("{model_identifier}{}", std::env::consts::DLL_SUFFIX);
         let binaries = self.folder().join("binaries");
         let platforms = platforms_of(self.description.version());
-        let candidates = platforms.iter().map(|platform| binaries.join(platform).join(&name));
-        candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
+        let mut candidates = platforms.iter().map(|platform| binaries.join(platform).join(&name));
+        let library = candidates.find(|path| path.is_file()).or_else(|| self.only_library());
+        library.ok_or_else(|| {
             let wanted: Vec<String> =
                 platforms.iter().map(|platform| format!("binaries/{platform}/{name}")).collect();
             let found = self.libraries();
+            let mut found =
+                if found.is_empty() { "no library".to_owned() } else { found.join(", ") };
+            if self.has_sources() {
+                found.push_str("; its source code is in sources/, which --compile builds");
+            }
             PackageError::Missing {
                 expected: format!("the library {}", wanted.join(" or ")),
-                found: if found.is_empty() { "no library".to_owned() } else { found.join(", ") },
+                found,
             }
         })
+    }
+
+    /// The only library in the folders of this platform.
+    fn only_library(&self) -> Option<PathBuf> {
+        let binaries = self.folder().join("binaries");
+        let suffix = std::env::consts::DLL_SUFFIX;
+        let mut libraries = platforms_of(self.description.version())
+            .iter()
+            .flat_map(|platform| below(&binaries.join(platform)))
+            .filter(|path| path.to_string_lossy().ends_with(suffix) && path.is_file());
+        libraries.next().filter(|_| libraries.next().is_none())
+    }
+
+    /// Adds a warning for each library that is used although its name is not the model identifier.
+    fn warn_of_other_names(&mut self) {
+        let description = &self.description;
+        let simulation = description.stepped().map(|own| own.model_identifier);
+        let exchange = description.model_exchange.as_ref().map(|own| own.model_identifier.clone());
+        let mut identifiers: Vec<String> = simulation.into_iter().chain(exchange).collect();
+        identifiers.dedup();
+        for identifier in identifiers {
+            let Ok(library) = self.library(&identifier) else { continue };
+            let expected = format!("{identifier}{}", std::env::consts::DLL_SUFFIX);
+            let name = library.file_name().unwrap_or_default().to_string_lossy();
+            if name != expected {
+                let folder = library.parent().and_then(Path::file_name).unwrap_or_default();
+                self.archive_warnings.push(format!(
+                    "binaries/{0}/{name} is used, the only library there; expected \
+                     binaries/{0}/{expected}, by modelIdentifier",
+                    folder.to_string_lossy()
+                ));
+            }
+        }
+    }
+
+    /// Whether the FMU has source code.
+    #[must_use]
+    pub fn has_sources(&self) -> bool {
+        self.names.iter().any(|name| name.starts_with("sources/"))
+            || self.folder().join("sources").is_dir()
     }
 
     /// The files two levels below `binaries`, in any case of that name; at most 20, sorted.
