@@ -23,6 +23,7 @@ use fmu_description::ModelDescription;
 use fmu_description::package::Unpacked;
 use fmu_import::isolate::{self, IsolateError, Isolated, Package};
 use fmu_import::{Fmu, Instance};
+use master::Slave as _;
 use serde::Serialize;
 
 use answer::{Answer, TrialResult};
@@ -40,6 +41,11 @@ pub(crate) struct Options {
     /// Check the files only, do not run the FMU
     #[arg(long)]
     no_run: bool,
+    /// Run the FMU for the time of its default experiment
+    ///
+    /// By default, 10 steps are made.
+    #[arg(long, conflicts_with = "no_run")]
+    thorough: bool,
     /// Time limit of a call of the FMU in s
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0, allow_negative_numbers = true)]
     time_limit: f64,
@@ -135,7 +141,10 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
     if !is_simulation && cfg!(not(target_os = "linux")) {
         return not_tried("it is for model exchange only, which is tried on Linux only");
     }
-    if needs_tool {
+    // With its libraries, an FMU of PythonFMU needs nothing beside it.
+    let is_python = |tool: &str| tool.starts_with("PythonFMU");
+    let alone = own.generation_tool.as_deref().is_some_and(is_python);
+    if needs_tool && !alone && options.preload.is_empty() {
         let tool = unpacked.description.generation_tool.as_deref().unwrap_or("the exporting tool");
         let reason = format!("it needs {tool} beside it (needsExecutionTool)");
         return Some(TrialResult::NotTried { reason });
@@ -168,9 +177,10 @@ fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, V
         fmu = Some(opened);
         let mut instance = instance?;
         instance.set_time_limit(Some(limit));
+        instance.guard_arrays();
         Ok(instance)
     };
-    Ok(behaviour::check(&as_stepped(&unpacked.description), &mut make))
+    Ok(behaviour::check(&as_stepped(&unpacked.description), options.thorough, &mut make))
 }
 
 /// Returns the description of an FMU with the steps of its scheduled execution, if it has no co-simulation.
@@ -186,15 +196,21 @@ fn isolated(
     limit: Duration,
 ) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let package = Package::open(unpacked.folder())?;
-    let preload = options.preload.clone();
+    let (preload, thorough) = (options.preload.clone(), options.thorough);
     let own = as_stepped(&unpacked.description);
     let exchange = own.co_simulation.is_none();
     let integration = exchange.then(|| isolate::Integration {
         options: integrate::Method::default().name().to_owned(),
         describe: integrate::description_of,
     });
-    let options =
-        isolate::Options { time_limit: Some(limit), preload, integration, ..Default::default() };
+    let options = isolate::Options {
+        time_limit: Some(limit),
+        preload,
+        strict_binding: true,
+        guard_arrays: true,
+        integration,
+        ..Default::default()
+    };
     let description = if exchange { integrate::description_of(&own) } else { own };
     let description = &description;
     let flags = description.co_simulation.as_ref();
@@ -215,10 +231,12 @@ fn isolated(
             }
         })
     };
-    let (here, mut found) = behaviour::check(description, &mut make);
+    let (here, mut found) = behaviour::check(description, thorough, &mut make);
     if exchange {
         // The rules are those of co-simulation.
-        found.clear();
+        found.retain(|finding| {
+            finding.severity == Severity::Error && matches!(here, TrialResult::No { .. })
+        });
     }
     broken.map_or(Ok((here, found)), |error| Err(error.into()))
 }

@@ -12,6 +12,11 @@
 
 enum { FLOOD = 1000000, LONG = 1000000, LEAK = 1 << 16 };
 
+#ifdef MISSING
+/* No library defines it. */
+extern void MISSING(void);
+#endif
+
 /* Whether some instance returned fmi2Fatal: then no function of any instance may be called (section 2.1.3). */
 static int corrupted;
 
@@ -131,11 +136,41 @@ static void meddle(const char *deed) {
         if (chdir("/") != 0) {
             abort();
         }
+    } else if (strcmp(deed, "change the environment") == 0) {
+        setenv("SLAVE_WAS_HERE", "1", 1);
+    } else if (strcmp(deed, "join the group of the parent") == 0) {
+        setpgid(0, getpgid(getppid()));
+    } else if (strcmp(deed, "call a missing function") == 0) {
+#ifdef MISSING
+        MISSING();
+#endif
     } else if (strcmp(deed, "leak") == 0) {
         char *volatile lost = malloc(LEAK);
         memset(lost, 1, LEAK);
     }
 }
+
+#ifdef ON_LOAD
+__attribute__((constructor)) static void load(void) {
+    meddle(ON_LOAD);
+}
+#endif
+
+#ifdef ON_UNLOAD
+__attribute__((destructor)) static void unload(void) {
+    meddle(ON_UNLOAD);
+}
+#endif
+
+#ifdef AT_EXIT
+static void end(void) {
+    meddle(AT_EXIT);
+}
+
+__attribute__((constructor)) static void register_end(void) {
+    atexit(end);
+}
+#endif
 
 fmi2Status misbehave(Slave *slave, const char *function) {
     static const char *const statuses[] = { "warn", "discard", "fail", "fail fatally", "stay pending" };

@@ -54,6 +54,12 @@ EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference referenc
             values[k] = -INFINITY;
         }
     }
+    if (due(slave) && is(slave, "write past the array")) {
+        values[count] = 1;
+    }
+    if (due(slave) && is(slave, "write before the array")) {
+        values[-1] = 1;
+    }
     return due(slave) ? misbehave(slave, "fmi2GetReal")
                       : is(slave, "warn everywhere") ? fmi2Warning : fmi2OK;
 }
@@ -66,6 +72,12 @@ EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference referenc
             return refuse(slave, "there is no such Real to set");
         }
         *(references[k] == INPUT ? &slave->now.u : &slave->t1) = values[k];
+    }
+    if (count > 0 && is(slave, "change constant values")) {
+        ((fmi2Real *)values)[0] += 1;
+    }
+    if (count > 0 && is(slave, "change constant references")) {
+        ((fmi2ValueReference *)references)[count - 1] = FIRST_PARAMETER;
     }
     return misbehave(slave, "fmi2SetReal");
 }
@@ -232,6 +244,11 @@ EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
 EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
     (void)state;
     *size = sizeof(Values);
+    if (is(c, "endless state")) {
+        *size = (size_t)-1;
+    } else if (is(c, "huge state")) {
+        *size = (size_t)3 << 30;
+    }
     return misbehave(c, "fmi2SerializedFMUstateSize");
 }
 

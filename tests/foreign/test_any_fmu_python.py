@@ -1,6 +1,7 @@
 """FMUs that PythonFMU exported, coupled by our master.
 
-Their libraries expect Python in the process: without --preload the error says so, with it they run.
+Their libraries expect Python in the process: that of the python3 in PATH is loaded, or that of --preload.
+Where there is none, the error says so.
 """
 
 import os
@@ -87,8 +88,21 @@ def test_variables_of_every_type_of_pythonfmu_are_recorded(
     assert even == [k % 2 == 0 for k in range(9)]
 
 
-def test_without_python_in_the_process_the_error_explains_preload(aso_ftc, loop, tmp_path):
+@pytest.mark.parametrize("more", [[], ["--isolate"]])
+def test_the_library_of_the_python3_in_path_is_loaded_without_an_option(
+    aso_ftc, loop, preload, tmp_path, more  # noqa: F811
+):
     fmus, links = loop
-    message = run(aso_ftc, tmp_path, fmus, STEP, 1, links=links, status=2)
-    assert "undefined symbol" in message, "what the loader said"
-    assert "--preload" in message and "libpython" in message
+    path = f"{os.path.dirname(sys.executable)}{os.pathsep}{os.environ['PATH']}"
+    environment = {**ENVIRONMENT, "PATH": path}
+    own = run(aso_ftc, tmp_path, fmus, STEP, 1, *more, links=links, env=environment)
+    assert own == run(aso_ftc, tmp_path, fmus, STEP, 1, *preload, links=links, env=ENVIRONMENT)
+
+
+def test_without_a_python_the_last_line_of_the_error_is_the_cause(aso_ftc, loop, tmp_path):
+    fmus, links = loop
+    nowhere = {**os.environ, "PATH": str(tmp_path)}
+    message = run(aso_ftc, tmp_path, fmus, STEP, 1, links=links, status=2, env=nowhere)
+    last = message.strip().splitlines()[-1]
+    assert "undefined symbol" in last and "python3" in last, "what the loader said"
+    assert "--preload" in last and "needsExecutionTool" not in last

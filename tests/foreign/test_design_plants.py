@@ -156,7 +156,8 @@ def test_an_fmu_whose_library_is_missing_names_the_option_and_one_that_fails_to_
     if shared_python() is None:
         pytest.skip("this machine has no shared libpython")
     (tmp_path / "plant.toml").write_text(CART.replace("PLANT", str(cart)), encoding="utf-8")
-    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml")
+    nowhere = {**os.environ, "PATH": str(tmp_path)}
+    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml", env=nowhere)
     assert done.returncode == 2 and "plant.toml:1:9: " in done.stderr and "--preload" in done.stderr
     text = CART.replace("PLANT", str(cart)) + 'preload = "libnothing.so"\n'
     (tmp_path / "plant.toml").write_text(text, encoding="utf-8")

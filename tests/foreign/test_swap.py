@@ -95,14 +95,6 @@ def test_the_aso_controller_brings_a_pendulum_of_pythonfmu_to_rest(run, foreign,
     assert abs(table["controller.f_hat"][end]).max() < 1e-6, "there is no friction to estimate"
 
 
-@pytest.mark.parametrize("role", ["plant", "controller"])
-def test_without_python_in_the_process_the_error_explains_preload(run, foreign, role):
-    name = {"plant": "CartPendulum.fmu", "controller": "LqrController.fmu"}[role]
-    message = run(**{role: foreign / name}, status=2)
-    assert "--preload" in message and "libpython" in message
-    assert "undefined symbol" in message, "what the loader said"
-
-
 def test_a_missing_library_to_preload_is_refused_by_name_and_reason(run):
     message = run("--preload", "libnowhere.so.7", status=2)
     assert "libnowhere.so.7" in message

@@ -24,6 +24,9 @@ pub struct CFmu {
     definitions: Vec<String>,
     root_attributes: String,
     experiment: String,
+    library_name: String,
+    /// Whether it has source code in the place of a library.
+    in_source: bool,
     /// Further variables, as XML.
     variables: String,
     /// Units of u and y.
@@ -47,6 +50,8 @@ impl CFmu {
             definitions: Vec::new(),
             root_attributes: String::new(),
             experiment: String::new(),
+            library_name: "slave".to_owned(),
+            in_source: false,
             variables: String::new(),
             units: None,
         }
@@ -76,6 +81,35 @@ impl CFmu {
     pub fn without(mut self, functions: &[&str]) -> Self {
         let renamed = functions.iter().map(|function| format!("-D{function}=left_out_{function}"));
         self.definitions.extend(renamed);
+        self
+    }
+
+    /// The same, whose library calls this function, which no library defines, in the deed "call a missing
+    /// function".
+    #[must_use]
+    pub fn calling(mut self, function: &str) -> Self {
+        self.definitions.push(format!("-DMISSING={function}"));
+        self
+    }
+
+    /// The same, whose library does this deed at a `moment`: `ON_LOAD`, `ON_UNLOAD`, or `AT_EXIT`.
+    #[must_use]
+    pub fn doing(mut self, deed: &str, moment: &str) -> Self {
+        self.definitions.push(format!("-D{moment}=\"{deed}\""));
+        self
+    }
+
+    /// The same, with another name of its library than the model identifier.
+    #[must_use]
+    pub fn in_library(mut self, name: &str) -> Self {
+        name.clone_into(&mut self.library_name);
+        self
+    }
+
+    /// The same, with source code in the place of a library.
+    #[must_use]
+    pub fn in_source(mut self) -> Self {
+        self.in_source = true;
         self
     }
 
@@ -148,7 +182,16 @@ impl CFmu {
     pub fn write(&self, folder: &Path, name: &str) -> PathBuf {
         let mut package = Package::new(self.description());
         let suffix = std::env::consts::DLL_SUFFIX;
-        package.add(format!("binaries/{}/slave{suffix}", platforms()[0]), self.library());
+        if self.in_source {
+            for file in SOURCES.iter().chain(&["slave.h", "fmi2.h"]) {
+                let text = fs::read(root().join("tests/c").join(file));
+                let text = text.unwrap_or_else(|error| panic!("{error}"));
+                package.add(format!("sources/{file}"), text);
+            }
+        } else {
+            let name = &self.library_name;
+            package.add(format!("binaries/{}/{name}{suffix}", platforms()[0]), self.library());
+        }
         let path = folder.join(name).with_extension("fmu");
         package.write(&path).unwrap_or_else(|error| panic!("{error}"));
         path
@@ -160,6 +203,12 @@ impl CFmu {
         let flags = flags.concat();
         let (behaviour, attributes) = (&self.behaviour, &self.root_attributes);
         let experiment = &self.experiment;
+        let files = SOURCES.map(|file| format!("<File name=\"{file}\"/>")).concat();
+        let sources = if self.in_source {
+            format!("<SourceFiles>{files}</SourceFiles>")
+        } else {
+            String::new()
+        };
         let (mut variables, mut units) = (variables(behaviour), String::new());
         if let Some(known) = &self.units {
             let unit = |name: &String| format!("<Unit name=\"{name}\"/>");
@@ -180,7 +229,7 @@ impl CFmu {
         format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
              <fmiModelDescription fmiVersion=\"2.0\" modelName=\"Slave\" guid=\"{behaviour}\"\
-             {attributes}>\n<CoSimulation modelIdentifier=\"slave\"{flags}/>\n\
+             {attributes}>\n<CoSimulation modelIdentifier=\"slave\"{flags}>{sources}</CoSimulation>\n\
              {units}<TypeDefinitions><SimpleType name=\"Mode\"><Enumeration><Item name=\"off\" \
              value=\"1\"/><Item name=\"on\" value=\"2\"/></Enumeration></SimpleType>\
              </TypeDefinitions>\n{experiment}<ModelVariables>\n{variables}</ModelVariables>\n\

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use fmu_description::number::seconds;
-use fmu_description::{Experiment, ModelDescription, Version};
-use master::{CallError, Failure, Slave, StepResult};
+use fmu_description::{Causality, Experiment, ModelDescription, ScalarVariable, Version};
+use master::{CallError, Failure, Slave, StepResult, ValueType};
 
 use super::answer::TrialResult;
 use super::finding::Severity::{Error, Note, Warning};
@@ -29,14 +29,19 @@ pub(super) type MakeInstance<'a, S> = dyn FnMut(&str, Option<S>) -> anyhow::Resu
 /// The outputs at each communication point of a trial, including the start.
 type Trajectory = Vec<Vec<Value>>;
 
-/// Runs the FMU of `description`, with instances created by `make`; returns the result and the
+/// Runs the FMU of `description`, if `thorough` for the time of its default experiment, with instances created by `make`; returns the result and the
 /// findings.
 pub(super) fn check<S: Slave>(
     description: &ModelDescription,
+    thorough: bool,
     make: &mut MakeInstance<'_, S>,
 ) -> (TrialResult, Vec<Finding>) {
     let here = TrialResult::No { reason: String::new() };
-    let mut trial = Trial { description, make, here, findings: Findings::about(Part::Behaviour) };
+    let (changes, findings) = (BTreeSet::new(), Findings::about(Part::Behaviour));
+    let mut trial = Trial { description, count: STEPS, make, here, changes, findings };
+    if thorough {
+        trial.count = trial.steps_of_experiment();
+    }
     let ((), told) = MessageRecorder::during(|| trial.run());
     trial.categories(&told.categories);
     if told.messages > FLOOD {
@@ -49,9 +54,13 @@ pub(super) fn check<S: Slave>(
 
 struct Trial<'a, S> {
     description: &'a ModelDescription,
+    /// Number of steps of the first two instances.
+    count: u32,
     make: &'a mut MakeInstance<'a, S>,
     /// Result of the first instance.
     here: TrialResult,
+    /// What the FMU has changed in its process.
+    changes: BTreeSet<String>,
     findings: Findings,
 }
 
@@ -88,6 +97,7 @@ impl<S: Slave> Trial<'_, S> {
             }
         }
         self.unknown_reference();
+        self.settings();
         self.step_past_stop_time();
         self.states();
     }
@@ -101,7 +111,7 @@ impl<S: Slave> Trial<'_, S> {
             step: self.step_size(),
             start: self.start_time(),
             tolerance: self.tolerance(),
-            but: in_part.filter(|_| steps < STEPS).map(|own| own.what.clone()),
+            but: in_part.filter(|_| steps < self.count).map(|own| own.what.clone()),
         };
     }
 
@@ -137,6 +147,7 @@ impl<S: Slave> Trial<'_, S> {
             .setup_experiment(&experiment)
             .and_then(|()| slave.enter_initialization_mode())
             .and_then(|()| slave.exit_initialization_mode());
+        self.process(&mut slave, "up to the end of the initialization");
         match done {
             Ok(()) => Some(slave),
             Err(error) => {
@@ -155,7 +166,12 @@ impl<S: Slave> Trial<'_, S> {
             Some(error) => self.failed(error, "when an instance is made", "2.1.5"),
             None => {
                 let why = "No importer can use it here.";
-                self.findings.add(Error, "fmi2Instantiate", format!("{error:#}"), (why, "2.1.5"));
+                let what = format!("{error:#}");
+                let unresolved = what.contains("undefined symbol");
+                self.findings.add(Error, "fmi2Instantiate", what, (why, "2.1.5"));
+                if unresolved {
+                    self.findings.stopping(&[Tool::Fmpy]);
+                }
             }
         }
     }
@@ -201,7 +217,9 @@ impl<S: Slave> Trial<'_, S> {
         if name == "first" {
             self.start_values(&mut slave)?;
         }
-        let trajectory = self.steps(&mut slave, 0)?;
+        let trajectory = self.steps(&mut slave, 0, self.count);
+        self.process(&mut slave, "in its steps");
+        let trajectory = trajectory?;
         if name == "first" {
             self.numbers(&trajectory);
         }
@@ -224,10 +242,29 @@ impl<S: Slave> Trial<'_, S> {
         Some((trajectory, slave))
     }
 
-    /// Returns the outputs now and after each step from communication point `from`.
-    fn steps(&mut self, slave: &mut S, from: u32) -> Option<Trajectory> {
+    /// Returns the number of steps from the start to the stop time of the default experiment.
+    fn steps_of_experiment(&self) -> u32 {
+        let stop = self.description.default_experiment.and_then(|own| own.stop_time);
+        let count = stop.map(|stop| ((stop - self.start_time()) / self.step_size()).round());
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
+        count.map_or(STEPS, |count| (count as u32).max(1))
+    }
+
+    /// Adds a finding for each thing that the FMU has changed for its whole process.
+    fn process(&mut self, slave: &mut S, when: &str) {
+        for change in slave.process_changes().unwrap_or_default() {
+            if self.changes.insert(change.clone()) {
+                let why = "In the process of an importer it changes this for all others.";
+                let what = format!("changes {change} {when}");
+                self.findings.add(Warning, "process", what, (why, ""));
+            }
+        }
+    }
+
+    /// Returns the outputs now and after each of `count` steps from communication point `from`.
+    fn steps(&mut self, slave: &mut S, from: u32, count: u32) -> Option<Trajectory> {
         let mut trajectory = vec![self.read(slave)?];
-        for k in from..from + STEPS {
+        for k in from..from + count {
             match slave.do_step(self.time(k), self.step_size(), true) {
                 Ok(StepResult::Whole | StepResult::Event { .. }) => {
                     trajectory.push(self.read(slave)?);
@@ -323,6 +360,26 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
+    /// Sets inputs to their present values. An FMU may refuse that, but must change nothing of the importer.
+    fn settings(&mut self) {
+        let inputs = |own: &&ScalarVariable| own.causality == Causality::Input;
+        let is_real = |own: &&ScalarVariable| ValueType::of(&own.kind) == ValueType::Real;
+        let inputs = self.description.variables.iter().filter(inputs).filter(is_real);
+        let references: Vec<u32> = inputs.take(LOOKED_AT).map(|own| own.value_reference).collect();
+        if references.is_empty() {
+            return;
+        }
+        let Some(mut slave) = self.initialized("inputs", None, None) else { return };
+        let mut values = vec![0.0; references.len()];
+        let read = slave.get_real(&references, &mut values);
+        let done = read.and_then(|()| slave.set_real(&references, &values));
+        if let Err(error) = done
+            && gone(&error)
+        {
+            self.failed(&error, "for inputs at their present values", "2.1.7");
+        }
+    }
+
     /// Checks that a step beyond a defined stop time is an error.
     fn step_past_stop_time(&mut self) {
         let (start, size) = (self.start_time(), self.step_size());
@@ -350,7 +407,10 @@ impl<S: Slave> Trial<'_, S> {
         }
         let serialize = flags.can_serialize_fmu_state;
         let Some(mut slave) = self.initialized("states", None, None) else { return };
-        if self.steps(&mut slave, 0).is_none_or(|trajectory| trajectory.len() <= STEPS as usize) {
+        if self
+            .steps(&mut slave, 0, STEPS)
+            .is_none_or(|trajectory| trajectory.len() <= STEPS as usize)
+        {
             return;
         }
         if let Err(error) = slave.save_state(0) {
@@ -362,7 +422,7 @@ impl<S: Slave> Trial<'_, S> {
                 return self.failed(&error, "though canSerializeFMUstate is true", "2.1.8");
             }
         };
-        let Some(first) = self.steps(&mut slave, STEPS) else { return };
+        let Some(first) = self.steps(&mut slave, STEPS, STEPS) else { return };
         if let Err(error) = slave.restore_state(0) {
             return self.failed(&error, "for a state of the same instance", "2.1.8");
         }
@@ -377,7 +437,7 @@ impl<S: Slave> Trial<'_, S> {
 
     /// Repeats the steps and compares the outputs; returns whether the steps could be made.
     fn again(&mut self, slave: &mut S, first: &Trajectory, function: &str) -> bool {
-        let second = self.steps(slave, STEPS);
+        let second = self.steps(slave, STEPS, STEPS);
         let apart = second.as_ref().map_or(0.0, |second| distance(first, second));
         if apart > 0.0 {
             let what = format!(

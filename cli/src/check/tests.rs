@@ -154,7 +154,7 @@ fn tried(fault: Fault) -> (TrialResult, Vec<Finding>) {
             terminated: false,
         })
     };
-    behaviour::check(&description, &mut make)
+    behaviour::check(&description, false, &mut make)
 }
 
 #[test]
@@ -212,7 +212,7 @@ fn the_answer_states_the_trial_or_the_reason_of_its_failure() {
 fn a_failed_instantiation_is_one_finding() {
     let description = ModelDescription::parse(XML).unwrap();
     let mut make = |_: &str, _: Option<Sum>| -> anyhow::Result<Sum> { anyhow::bail!("no licence") };
-    let (here, all) = behaviour::check(&description, &mut make);
+    let (here, all) = behaviour::check(&description, false, &mut make);
     assert_eq!(here, TrialResult::No { reason: "fmi2Instantiate: no licence".to_owned() });
     assert!(all.iter().all(|own| own.place == "fmi2Instantiate" && own.what == "no licence"));
     assert_eq!(all.len(), 1, "{all:#?}");

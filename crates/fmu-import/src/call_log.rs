@@ -79,6 +79,7 @@ impl CallLog {
             starts_line = text.ends_with('\n');
             log.write(text);
         }));
+        slave.guard_arrays();
         let version = slave.description().version();
         LoggedSlave { log: self.clone(), instance: instance.to_owned(), slave, direct, version }
     }
@@ -431,6 +432,10 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let call = |slave: &mut S| slave.deserialize_state(bytes);
         self.plain("fmi2DeSerializeFMUstate", format!("{} bytes", bytes.len()), call)
+    }
+
+    fn guard_arrays(&mut self) {
+        self.slave.guard_arrays();
     }
 
     fn hand_over_events(&mut self, stop: bool) -> Result<bool, CallError> {

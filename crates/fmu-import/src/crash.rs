@@ -42,6 +42,11 @@ static STATUS: AtomicI32 = AtomicI32::new(0);
 static WAITED: AtomicU64 = AtomicU64::new(0);
 /// The address of the slot that the crashed thread entered last.
 static PLACE: AtomicUsize = AtomicUsize::new(0);
+/// Activities besides functions of the standard. The dynamic linker is locked meanwhile: no other
+/// thread can start, or initialise what it destroys at its end.
+pub(crate) const LOADING: &str = "loading the library";
+pub(crate) const UNLOADING: &str = "unloading the library";
+
 /// The thread that runs the program's crash function.
 static REPORTER: OnceLock<Thread> = OnceLock::new();
 
@@ -94,7 +99,12 @@ pub struct Ending {
 
 impl fmt::Display for Call {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{} at t = {} s: {}", self.instance, seconds(self.time), self.function)
+        formatter.write_str(&self.instance)?;
+        // Loading and unloading a library have no time.
+        if ![LOADING, UNLOADING].contains(&self.function) {
+            write!(formatter, " at t = {} s", seconds(self.time))?;
+        }
+        write!(formatter, ": {}", self.function)
     }
 }
 
@@ -170,10 +180,13 @@ pub fn watch(
         return Ok(());
     }
     ADVICE.get_or_init(|| advice);
+    let (ready, started) = std::sync::mpsc::channel();
     let report = move || {
         #[cfg(unix)]
         signals::mark_reporter();
         prepare();
+        // Fails only if the thread of the program has ended.
+        let _ = ready.send(());
         while CAUSE.load(Ordering::Acquire) == 0 {
             std::thread::park();
         }
@@ -183,6 +196,8 @@ pub fn watch(
     if REPORTER.set(reporter.thread().clone()).is_err() {
         return Ok(());
     }
+    // A library that crashes while it is loaded blocks the start of threads.
+    let _ = started.recv();
     #[cfg(unix)]
     signals::install()?;
     Ok(())
@@ -332,6 +347,12 @@ pub fn has_begun_steps() -> bool {
 #[must_use]
 pub fn calls() -> Vec<Call> {
     place::calls(0).collect()
+}
+
+/// Returns the call of an FMU that this thread executes.
+#[cfg(all(target_os = "linux", target_env = "gnu", target_pointer_width = "64"))]
+pub(crate) fn call_of_this_thread() -> Option<Call> {
+    place::calls(last_of_this_thread()).next()
 }
 
 /// Ends the process at once, without running destructors of the program or of an FMU.

@@ -14,7 +14,7 @@ pub enum LoadError {
         /// The message of the operating system's loader.
         message: String,
         /// How to solve the problem; empty if unknown.
-        hint: &'static str,
+        hint: String,
     },
     /// A function is missing.
     #[error("{path}: the function {function} is missing")]

@@ -13,7 +13,7 @@ use fmu_description::{Kind, ModelDescription, Version};
 
 use crate::error::LoadError;
 use crate::instance::{Inner, Instance};
-use crate::library::{Component, Interface, Library, Names, v1, v3};
+use crate::library::{Binding, Component, Interface, Library, Loading, Names, v1, v3};
 
 /// Why an FMU could not be opened or instantiated.
 #[derive(Debug, thiserror::Error)]
@@ -65,7 +65,7 @@ pub enum FmuError {
         path: PathBuf,
     },
     /// The library fails; a possible cause is `needsExecutionTool`.
-    #[error("{source}\nneedsExecutionTool is true: the FMU may need {tool} to be installed")]
+    #[error("the FMU may need {tool} to be installed (needsExecutionTool is true)\n{source}")]
     NeedsTool {
         /// `generationTool`, or a description if the attribute is absent.
         tool: String,
@@ -103,6 +103,9 @@ struct Content {
     /// The library for co-simulation or scheduled execution; `None` if the FMU offers model exchange only.
     library: Option<CoSimulation>,
     unpacked: Unpacked,
+    /// The name of its file, for messages about its library.
+    name: String,
+    binding: Binding,
     /// Whether an FMU that allows one instance only has it.
     instantiated: AtomicBool,
     /// Positions of variables by type and value reference; filled at the first message that needs one.
@@ -142,7 +145,18 @@ impl Fmu {
     pub fn open_quietly(path: &Path) -> Result<Self, FmuError> {
         let unpacked =
             if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
-        Self::load(path, unpacked)
+        Self::load(path, unpacked, Binding::Lenient)
+    }
+
+    /// Opens an FMU like [`Fmu::open_quietly`], but refuses a library with functions that no library
+    /// defines.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`Fmu::open_any`].
+    #[cfg(target_os = "linux")]
+    pub(crate) fn open_strictly(folder: &Path) -> Result<Self, FmuError> {
+        Self::load(folder, Unpacked::in_folder(folder)?, Binding::Strict)
     }
 
     /// Opens an FMU like [`Fmu::open`], but also accepts one that offers model exchange only.
@@ -160,10 +174,11 @@ impl Fmu {
         for warning in &unpacked.warnings {
             tracing::warn!("{}: {warning}", path.display());
         }
-        Self::load(path, unpacked)
+        Self::load(path, unpacked, Binding::Lenient)
     }
 
-    fn load(path: &Path, unpacked: Unpacked) -> Result<Self, FmuError> {
+    fn load(path: &Path, unpacked: Unpacked, binding: Binding) -> Result<Self, FmuError> {
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let description = &unpacked.description;
         let stepped = description.stepped();
         if stepped.is_none() && description.model_exchange.is_none() {
@@ -171,11 +186,13 @@ impl Fmu {
         }
         let library = stepped.map(|flags| {
             let library = unpacked.library(&flags.model_identifier)?;
-            open_library(description, &library, &flags.model_identifier)
+            let loading = Loading { path: &library, fmu: &name, binding };
+            open_library(description, &loading, &flags.model_identifier)
         });
         let library = library.transpose()?;
         let (instantiated, names) = (AtomicBool::new(false), OnceLock::new());
-        Ok(Self { content: Arc::new(Content { library, unpacked, instantiated, names }) })
+        let content = Content { library, unpacked, name, binding, instantiated, names };
+        Ok(Self { content: Arc::new(content) })
     }
 
     /// Returns the model description.
@@ -250,6 +267,11 @@ impl Fmu {
         }
     }
 
+    /// The library at `path` as it is to be loaded.
+    fn loading<'a>(&'a self, path: &'a Path) -> Loading<'a> {
+        Loading { path, fmu: &self.content.name, binding: self.content.binding }
+    }
+
     /// Returns the lookup of variable names for messages. Of several aliases it gives the one declared
     /// first.
     fn names(&self) -> Names {
@@ -289,7 +311,7 @@ impl Fmu {
             (Interface::CoSimulation, Some(CoSimulation::V2(library)), _) => library.clone(),
             (Interface::ModelExchange, _, Some(flags)) => {
                 let library = unpacked.library(&flags.model_identifier)?;
-                let library = Library::open(&library, interface);
+                let library = Library::open(&self.loading(&library), interface);
                 Arc::new(library.map_err(|error| with_tool_hint(description, error))?)
             }
             _ => return Err(FmuError::NoInterface { path: unpacked.folder().to_owned() }),
@@ -314,18 +336,18 @@ fn letter(kind: &Kind) -> char {
 /// Opens the library for co-simulation in the version of the FMU.
 fn open_library(
     description: &ModelDescription,
-    path: &Path,
+    loading: &Loading<'_>,
     model_identifier: &str,
 ) -> Result<CoSimulation, FmuError> {
     let library = match description.version() {
-        Version::V1 => v1::Library::open(path, model_identifier, Interface::CoSimulation)
+        Version::V1 => v1::Library::open(loading, model_identifier, Interface::CoSimulation)
             .map(Arc::new)
             .map(CoSimulation::V1),
         Version::V2 => {
-            Library::open(path, Interface::CoSimulation).map(Arc::new).map(CoSimulation::V2)
+            Library::open(loading, Interface::CoSimulation).map(Arc::new).map(CoSimulation::V2)
         }
         Version::V3 => {
-            v3::Library::open(path, stepped(description)).map(Arc::new).map(CoSimulation::V3)
+            v3::Library::open(loading, stepped(description)).map(Arc::new).map(CoSimulation::V3)
         }
     };
     library.map_err(|error| with_tool_hint(description, error))

@@ -309,6 +309,14 @@ impl Slave for Instance {
         }
     }
 
+    fn guard_arrays(&mut self) {
+        match &mut self.inner {
+            Inner::V1(own) => own.component.guard_arrays(),
+            Inner::V2(own) => own.component.guard_arrays(),
+            Inner::V3(own) => own.guard_arrays(),
+        }
+    }
+
     fn take_warning(&mut self) -> bool {
         match &mut self.inner {
             Inner::V1(own) => own.component.take_warning(),

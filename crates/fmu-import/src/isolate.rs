@@ -76,6 +76,10 @@ pub struct Options {
     pub memory_limit: Option<u64>,
     /// Libraries that the worker loads before the FMU, as [`crate::preload`] does.
     pub preload: Vec<OsString>,
+    /// Whether to refuse an FMU whose library has functions that no library defines.
+    pub strict_binding: bool,
+    /// Whether the FMU gets copies of arrays, with canaries ([`Slave::guard_arrays`]).
+    pub guard_arrays: bool,
     /// Whether to call `fmi2SetDebugLogging` if the FMU has it.
     pub logging: bool,
     /// The program that becomes the worker; `None`: this program.

@@ -3,17 +3,24 @@
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 mod calls;
+mod canary;
 mod foreign;
 mod functions;
+mod load;
 mod log;
+mod python;
 mod states;
 mod step;
+#[cfg(target_os = "linux")]
+mod surroundings;
 mod table;
+#[cfg(all(target_os = "linux", target_env = "gnu", target_pointer_width = "64"))]
+mod unresolved;
 pub(crate) mod v1;
 pub(crate) mod v3;
 
 use std::cell::Cell;
-use std::ffi::{CStr, CString, OsStr, c_char, c_int, c_void};
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,84 +31,20 @@ use fmu_description::abi::{
     CO_SIMULATION, DESCRIBE, DESCRIBE_3, DescribeSink, MODEL_EXCHANGE, Status,
     fmi2CallbackFunctions, fmi2Component, fmi2FMUstate, fmi2Status,
 };
-use libloading::Library as Handle;
 
 use crate::crash::{self, Place, Slot};
 use crate::error::LoadError;
+use canary::Guarded;
+pub(crate) use canary::check_number;
 use functions::Functions;
+use load::Handle;
+pub use load::preload;
+pub(crate) use load::{Binding, Loading};
 pub(crate) use log::Names;
 use log::Sink;
 use slave::{CallError, Failure};
-
-const PYTHON: &str = "\nThe library expects that the process has loaded Python, as libraries exported \
-    by PythonFMU do: load it first with --preload, for example --preload libpython3.11.so.1.0";
-
-/// Returns the message of the operating system.
-fn reason(error: &libloading::Error) -> String {
-    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
-}
-
-/// Opens a library.
-#[cfg(not(windows))]
-fn open(path: &Path) -> Result<Handle, libloading::Error> {
-    // SAFETY: runs the initialisers of the library, which is what the user asked for.
-    unsafe { Handle::new(path) }
-}
-
-/// Opens a library. The system searches its dependencies in the folder of the library first.
-#[cfg(windows)]
-fn open(path: &Path) -> Result<Handle, libloading::Error> {
-    use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
-    // The flag requires an absolute path with the separators of Windows.
-    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    // SAFETY: runs the initialisers of the library, which is what the user asked for.
-    unsafe { Library::load_with_flags(path, LOAD_WITH_ALTERED_SEARCH_PATH) }.map(Handle::from)
-}
-
-fn load(path: &Path) -> Result<Handle, LoadError> {
-    let place = Place::new(&path.display().to_string());
-    place.enter(&"loading the library");
-    let opened = open(path);
-    place.leave();
-    opened.map_err(|error| {
-        let message = reason(&error);
-        let python = message
-            .split("undefined symbol: ")
-            .nth(1)
-            .is_some_and(|symbol| symbol.trim_start_matches('_').starts_with("Py"));
-        let hint = if python { PYTHON } else { "" };
-        LoadError::Refused { path: path.to_owned(), message, hint }
-    })
-}
-
-/// Loads `library` for the lifetime of the process. On Unix its symbols are visible to all libraries
-/// loaded later (`RTLD_GLOBAL`).
-///
-/// # Errors
-///
-/// [`LoadError::Refused`] if the operating system does not find or does not load the library.
-pub fn preload(library: &OsStr) -> Result<(), LoadError> {
-    #[cfg(unix)]
-    // SAFETY: runs the initialisers of the library, which is what the user asked for.
-    let opened = unsafe {
-        use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_NOW};
-        Library::open(Some(library), RTLD_NOW | RTLD_GLOBAL)
-    };
-    #[cfg(not(unix))]
-    // SAFETY: runs the initialisers of the library, which is what the user asked for.
-    let opened = unsafe { Handle::new(library) };
-    match opened {
-        Ok(handle) => {
-            std::mem::forget(handle);
-            Ok(())
-        }
-        Err(error) => Err(LoadError::Refused {
-            path: PathBuf::from(library),
-            message: reason(&error),
-            hint: "",
-        }),
-    }
-}
+#[cfg(target_os = "linux")]
+pub(crate) use surroundings::Surroundings;
 
 /// Returns the model description that a library exported by `fmu::export!` generates.
 ///
@@ -127,7 +70,8 @@ pub fn describe_as(path: &Path, resources: &Path, version: Version) -> Result<St
         }
     }
     type Describe = unsafe extern "C" fn(*const c_char, *mut c_void, DescribeSink) -> c_int;
-    let handle = load(path)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let handle = Loading::of(path, &name).load()?;
     let name = if version == Version::V3 { DESCRIBE_3 } else { DESCRIBE };
     // SAFETY: `fmu::export!` gives this name this signature.
     let describe = unsafe { handle.get::<Describe>(name.as_bytes()) }
@@ -177,8 +121,9 @@ pub(crate) struct Library {
 
 impl Library {
     /// Loads the library and checks that it has the functions of `interface`.
-    pub(crate) fn open(path: &Path, interface: Interface) -> Result<Self, LoadError> {
-        let handle = load(path)?;
+    pub(crate) fn open(loading: &Loading<'_>, interface: Interface) -> Result<Self, LoadError> {
+        let path = loading.path;
+        let handle = loading.load()?;
         let functions = Functions::load(&handle, "");
         // SAFETY: takes no argument and returns a static string.
         let version = functions
@@ -246,6 +191,7 @@ impl Library {
             time_limit: None,
             abandoned: false,
             warned: Cell::new(false),
+            guards: false,
             callbacks,
             library: self.clone(),
         };
@@ -313,6 +259,8 @@ pub struct Component {
     abandoned: bool,
     /// Whether a call has returned `fmi2Warning`.
     warned: Cell<bool>,
+    /// Whether calls get copies of arrays, with canaries.
+    guards: bool,
     callbacks: Arc<fmi2CallbackFunctions>,
     library: Arc<Library>,
 }
@@ -374,6 +322,25 @@ impl Component {
     /// Calls by [`Component::pass`] are not counted.
     pub fn take_warning(&mut self) -> bool {
         self.warned.take()
+    }
+
+    /// Lets the calls from now on get copies of arrays, with canaries. [`Component::pass`] does not.
+    pub fn guard_arrays(&mut self) {
+        self.guards = true;
+    }
+
+    /// As [`Component::check`], for a call that may have been guarded.
+    #[inline]
+    fn check_guarded(
+        &self,
+        function: &'static str,
+        (status, violation): Guarded,
+    ) -> Result<(), CallError> {
+        let done = self.check(function, status);
+        match violation {
+            None => done,
+            Some(what) => Err(self.failed(function, Failure::InvalidAnswer(what))),
+        }
     }
 
     /// Returns the error of a call, with the instance's recent messages.

@@ -285,6 +285,10 @@ impl Instance {
         self.component.log_calls(sink);
     }
 
+    pub(crate) fn guard_arrays(&mut self) {
+        self.component.guard_arrays();
+    }
+
     pub(crate) fn take_warning(&mut self) -> bool {
         self.component.take_warning()
     }

@@ -273,6 +273,21 @@ pub trait Slave: Send {
         false
     }
 
+    /// Lets the FMU get copies of arrays in its calls from now on, with canaries around them: a write past
+    /// an array or into a constant one is an error of the call. Does nothing if the slave calls no C
+    /// functions in this process.
+    fn guard_arrays(&mut self) {}
+
+    /// Returns what the FMU has changed for its whole process, a phrase each: environment, working
+    /// directory, rounding mode, locale, process group. Empty unless the FMU is alone in a process.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the process of the FMU has ended.
+    fn process_changes(&mut self) -> Result<Vec<String>, CallError> {
+        Ok(Vec::new())
+    }
+
     /// Whether a call has returned `fmi2Warning` since the last call of this function. False if this
     /// is unknown, as for an instance in another process.
     fn take_warning(&mut self) -> bool {

@@ -129,3 +129,51 @@ fn faults_outside_of_the_fmu_are_errors_of_the_command() {
         assert!(parts.iter().all(|part| said.contains(part)), "{said}");
     }
 }
+
+#[test]
+fn a_write_beside_an_array_or_into_a_constant_one_is_an_error() {
+    for (behaviour, function, sentence) in [
+        ("write past the array", "fmi2GetReal", "wrote past the end of its array of values"),
+        ("write before the array", "fmi2GetReal", "wrote before the start of its array of values"),
+        ("change constant values", "fmi2SetReal", "changed its constant array of values"),
+        (
+            "change constant references",
+            "fmi2SetReal",
+            "changed its constant array of value references",
+        ),
+    ] {
+        let (status, found) = new(behaviour, &[]);
+        assert_eq!(status, Some(1), "{found:#?}");
+        let error = found.iter().find(|own| text(own, "where") == function).unwrap();
+        assert!(text(error, "what").contains(sentence), "{error:#?}");
+    }
+}
+
+#[test]
+fn what_an_fmu_changes_for_its_whole_process_is_a_warning() {
+    for (deed, change) in [
+        ("change the folder", "the working directory from "),
+        ("change the locale", "the locale from "),
+        ("round up", "the rounding mode from to nearest to upward"),
+        ("change the environment", "the environment variable SLAVE_WAS_HERE"),
+        ("join the group of the parent", "the process group from "),
+    ] {
+        for function in ["fmi2Instantiate", "fmi2DoStep"] {
+            let (_, found) = new(&format!("{deed} in {function}"), &[]);
+            let is_change = |own: &&Value| text(own, "where") == "process";
+            let finding = found.iter().find(is_change).unwrap_or_else(|| panic!("{found:#?}"));
+            assert_eq!(text(finding, "severity"), "warning");
+            assert!(text(finding, "what").contains(change), "{finding:#?}");
+        }
+    }
+}
+
+#[test]
+fn a_thorough_check_runs_the_default_experiment() {
+    let late = CFmu::that("crash in fmi2DoStep").experiment("stopTime=\"1\" stepSize=\"0.015625\"");
+    let (_, short) = check(&late, &[]);
+    let crash = |own: &Value| text(own, "what").contains("SIGSEGV");
+    assert!(!short.iter().any(crash), "{short:#?}");
+    let (status, long) = check(&late, &["--thorough"]);
+    assert!(status == Some(1) && long.iter().any(crash), "{long:#?}");
+}

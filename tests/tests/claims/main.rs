@@ -14,6 +14,7 @@ mod misbehaviour;
 mod misbehaviour_calls;
 mod misbehaviour_files;
 mod misbehaviour_isolated;
+mod misbehaviour_loading;
 mod misbehaviour_process;
 mod misbehaviour_run;
 mod model_exchange;

@@ -7,7 +7,7 @@ use slave::{CallError, CompletedStep, EventInfo, ModelExchange};
 
 use super::{Fmu, FmuError, file_uri, resource_path, with_tool_hint};
 use crate::instance::{Inner, Instance};
-use crate::library::{Interface, v1, v3};
+use crate::library::{Interface, check_number, v1, v3};
 
 impl Fmu {
     /// Creates a model-exchange instance called `name`.
@@ -38,7 +38,10 @@ impl Fmu {
             return Err(FmuError::NoInterface { path: unpacked.folder().to_owned() });
         };
         let (identifier, interface) = (&flags.model_identifier, Interface::ModelExchange);
-        let library = v1::Library::open(&unpacked.library(identifier)?, identifier, interface)?;
+        let hint = |error| with_tool_hint(description, error);
+        let library = unpacked.library(identifier)?;
+        let library = v1::Library::open(&self.loading(&library), identifier, interface);
+        let library = library.map_err(hint)?;
         let (location, names) = (file_uri(unpacked.folder())?, self.names());
         let component = Arc::new(library).instantiate(name, &description.guid, &location, names)?;
         Ok(crate::v1::Instance::new(component, description, interface))
@@ -52,7 +55,8 @@ impl Fmu {
         let hint = |error| with_tool_hint(description, error);
         let interface = v3::Interface::ModelExchange;
         let library = unpacked.library(&flags.model_identifier)?;
-        let library = Arc::new(v3::Library::open(&library, interface).map_err(hint)?);
+        let library =
+            Arc::new(v3::Library::open(&self.loading(&library), interface).map_err(hint)?);
         let resources = resource_path(&unpacked.resources());
         let resources = resources.as_deref();
         crate::v3::Instance::new(&library, description, interface, name, resources).map_err(hint)
@@ -83,10 +87,14 @@ impl ModelExchange for Instance {
     }
 
     fn number_of_event_indicators(&mut self) -> Result<usize, CallError> {
-        match &mut self.inner {
-            Inner::V3(own) => own.number_of_event_indicators(),
-            _ => Ok(self.fmu().description().number_of_event_indicators.unwrap_or(0) as usize),
+        if let Inner::V3(own) = &mut self.inner {
+            return own.number_of_event_indicators();
         }
+        let count = self.fmu().description().number_of_event_indicators.unwrap_or(0);
+        check_number(count as usize).map_err(|failure| {
+            let function = "numberOfEventIndicators";
+            CallError { function, failure, messages: Vec::new() }
+        })
     }
 
     fn begin_communication_step(&mut self) {

@@ -124,6 +124,10 @@ impl Slave for Isolated {
         Ok(())
     }
 
+    fn process_changes(&mut self) -> Result<Vec<String>, CallError> {
+        self.request(&Request::ProcessChanges)
+    }
+
     fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
         self.request(&Request::SetDebugLogging(on))
     }

@@ -152,6 +152,8 @@ impl Isolated {
             folder: package.folder().as_os_str().as_bytes(),
             name,
             logging: options.logging,
+            strict_binding: options.strict_binding,
+            guard_arrays: options.guard_arrays,
             memory_limit: options.memory_limit.unwrap_or(0),
             preload: options.preload.iter().map(|library| library.as_bytes()).collect(),
             integration: options.integration.as_ref().map(|own| own.options.as_str()),

@@ -54,6 +54,8 @@ pub(super) enum Request<'a> {
     EnterEventMode,
     UpdateDiscreteStates,
     LeaveEventMode,
+    /// What the FMU has changed in the process.
+    ProcessChanges,
     Free,
 }
 
@@ -64,6 +66,8 @@ pub(super) struct Open<'a> {
     pub(super) folder: &'a [u8],
     pub(super) name: &'a str,
     pub(super) logging: bool,
+    pub(super) strict_binding: bool,
+    pub(super) guard_arrays: bool,
     /// Bytes; 0: no limit.
     pub(super) memory_limit: u64,
     #[serde(borrow)]
@@ -76,7 +80,9 @@ impl Request<'_> {
     /// Returns the function that the errors of the request name.
     pub(super) fn function(&self) -> Function {
         match self {
-            Request::Open(_) | Request::Renew { .. } => Function::Instantiate,
+            Request::Open(_) | Request::Renew { .. } | Request::ProcessChanges => {
+                Function::Instantiate
+            }
             Request::SetDebugLogging(_) => Function::SetDebugLogging,
             Request::SetupExperiment(_) => Function::SetupExperiment,
             Request::EnterInitializationMode => Function::EnterInitializationMode,
@@ -234,6 +240,8 @@ mod tests {
                 folder: b"/tmp/\xff",
                 name: "grün",
                 logging,
+                strict_binding: true,
+                guard_arrays: true,
                 memory_limit,
                 preload,
                 integration: Some("stiff"),

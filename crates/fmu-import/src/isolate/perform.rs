@@ -44,14 +44,26 @@ pub(super) struct Maker {
     pub(super) fmu: Fmu,
     /// The integrator and its options, for model exchange.
     pub(super) integration: Option<(Integrator, String)>,
+    /// Whether the instances get copies of arrays, with canaries.
+    pub(super) guards: bool,
 }
 
 impl Maker {
     pub(super) fn make(&self, name: &str) -> Result<Box<dyn Slave>, FmuError> {
         match &self.integration {
-            None => Ok(Box::new(self.fmu.instantiate(name)?)),
+            None => {
+                let mut instance = self.fmu.instantiate(name)?;
+                if self.guards {
+                    instance.guard_arrays();
+                }
+                Ok(Box::new(instance))
+            }
             Some((integrator, options)) => {
-                Ok(integrator(self.fmu.instantiate_equations(name)?, options))
+                let mut instance = self.fmu.instantiate_equations(name)?;
+                if self.guards {
+                    instance.guard_arrays();
+                }
+                Ok(integrator(instance, options))
             }
         }
     }
@@ -195,7 +207,7 @@ impl Executor {
             }
             Request::EnterEventMode => events(instance.as_mut()).and_then(Events::enter_event_mode),
             Request::LeaveEventMode => events(instance.as_mut()).and_then(Events::leave_event_mode),
-            Request::Open(_) | Request::Renew { .. } | Request::Free => {
+            Request::Open(_) | Request::Renew { .. } | Request::ProcessChanges | Request::Free => {
                 Err(super::worker::invalid_command(request.function()))
             }
         };

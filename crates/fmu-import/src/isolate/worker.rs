@@ -26,6 +26,7 @@ use super::perform::{CommandResult, Executor, MESSAGE, Maker, VALUES, reply};
 use super::words::{Reader, Writer};
 use super::{Integrator, IsolateError, STARTED_BY, WorkerError, memory};
 use crate::Fmu;
+use crate::library::Surroundings;
 use slave::{CallError, Failure};
 
 /// Whether this process has become a worker.
@@ -118,6 +119,7 @@ fn serve(channel: &mut Channel, integrator: Option<Integrator>) -> Result<(), Wo
         integrator,
         executor: None,
         request: Vec::new(),
+        before: Surroundings::now(),
         answer: Vec::new(),
         freed: false,
     };
@@ -145,6 +147,8 @@ struct Worker {
     executor: Option<Executor>,
     /// The bytes of the next request that have arrived.
     request: Vec<u8>,
+    /// The surroundings before the FMU was loaded.
+    before: Surroundings,
     /// The bytes of the last answer.
     answer: Vec<u8>,
     /// Whether the master has freed the instance for good.
@@ -191,6 +195,10 @@ impl Worker {
                 let renewed = self.renew(maker, name, logging);
                 reply(Ok(renewed), &mut self.answer);
             }
+            (Some(Request::ProcessChanges), _) => {
+                let changes = self.before.changes(&Surroundings::now());
+                reply(Ok(changes), &mut self.answer);
+            }
             (Some(Request::Free), executor) => {
                 *executor = None;
                 self.freed = true;
@@ -207,7 +215,8 @@ impl Worker {
 
     /// Loads and instantiates the FMU.
     fn open(&mut self, arguments: &Open<'_>) -> Result<Opening, CallError> {
-        let Open { folder, name, logging, memory_limit, preload, integration } = arguments;
+        let Open { folder, name, logging, memory_limit, preload, integration, .. } = arguments;
+        let guards = arguments.guard_arrays;
         if *memory_limit > 0
             && let Err(error) = memory::limit(&self.shared, *memory_limit)
         {
@@ -225,9 +234,14 @@ impl Worker {
             (Some(options), Some(integrator)) => Some((integrator, (*options).to_owned())),
             (Some(_), None) => return Ok(Opening::Refused(NO_INTEGRATOR.to_owned())),
         };
-        let opened = Fmu::open_quietly(Path::new(OsStr::from_bytes(folder)));
+        let folder = Path::new(OsStr::from_bytes(folder));
+        let opened = if arguments.strict_binding {
+            Fmu::open_strictly(folder)
+        } else {
+            Fmu::open_quietly(folder)
+        };
         Ok(match opened {
-            Ok(fmu) => self.create(Maker { fmu, integration }, name, *logging),
+            Ok(fmu) => self.create(Maker { fmu, integration, guards }, name, *logging),
             Err(error) => Opening::Refused(with_causes(&error)),
         })
     }

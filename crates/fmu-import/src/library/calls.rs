@@ -5,7 +5,7 @@ use std::ffi::CStr;
 
 use fmu_description::abi::{fmi2Boolean, fmi2EventInfo};
 
-use super::{Component, c_string};
+use super::{Component, c_string, canary};
 use slave::{CallError, CompletedStep, EventInfo, absent};
 
 /// Evaluates to the C function in `$field` and marks it as entered; returns an error from the caller
@@ -48,18 +48,6 @@ calls! {
     enter_initialization_mode() = "fmi2EnterInitializationMode"();
     exit_initialization_mode() = "fmi2ExitInitializationMode"();
     terminate() = "fmi2Terminate"();
-    get_real(references: &[u32], values: &mut [f64]) =
-        "fmi2GetReal"(references.as_ptr(), same_length(references, values), values.as_mut_ptr());
-    set_real(references: &[u32], values: &[f64]) =
-        "fmi2SetReal"(references.as_ptr(), same_length(references, values), values.as_ptr());
-    get_integer(references: &[u32], values: &mut [i32]) =
-        "fmi2GetInteger"(references.as_ptr(), same_length(references, values), values.as_mut_ptr());
-    set_integer(references: &[u32], values: &[i32]) =
-        "fmi2SetInteger"(references.as_ptr(), same_length(references, values), values.as_ptr());
-    get_boolean(references: &[u32], values: &mut [i32]) =
-        "fmi2GetBoolean"(references.as_ptr(), same_length(references, values), values.as_mut_ptr());
-    set_boolean(references: &[u32], values: &[i32]) =
-        "fmi2SetBoolean"(references.as_ptr(), same_length(references, values), values.as_ptr());
     set_real_input_derivatives(references: &[u32], orders: &[i32], values: &[f64]) =
         "fmi2SetRealInputDerivatives"(references.as_ptr(), same_length(references, values),
             orders[..references.len()].as_ptr(), values.as_ptr());
@@ -68,16 +56,78 @@ calls! {
             orders[..references.len()].as_ptr(), values.as_mut_ptr());
     enter_event_mode() = "fmi2EnterEventMode"();
     enter_continuous_time_mode() = "fmi2EnterContinuousTimeMode"();
-    set_continuous_states(values: &[f64]) =
-        "fmi2SetContinuousStates"(values.as_ptr(), values.len());
-    get_continuous_states(values: &mut [f64]) =
-        "fmi2GetContinuousStates"(values.as_mut_ptr(), values.len());
-    get_derivatives(values: &mut [f64]) =
-        "fmi2GetDerivatives"(values.as_mut_ptr(), values.len());
-    get_nominals(values: &mut [f64]) =
-        "fmi2GetNominalsOfContinuousStates"(values.as_mut_ptr(), values.len());
-    get_event_indicators(values: &mut [f64]) =
-        "fmi2GetEventIndicators"(values.as_mut_ptr(), values.len());
+}
+
+/// Defines the methods of the types whose values are copied.
+macro_rules! values {
+    ($($get:ident $set:ident: $type:ty = $get_name:literal $set_name:literal;)*) => {
+        impl Component {
+            $(#[doc = concat!("Calls `", $get_name, "`.")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK`
+            /// nor `fmi2Warning`.
+            #[inline]
+            pub fn $get(&mut self, references: &[u32], values: &mut [$type]) -> Result<(), CallError> {
+                let function = function!(self.$get, $get_name);
+                let count = same_length(references, values);
+                // SAFETY: the instance is alive; as many references as values.
+                let call = |list, array| unsafe { function(self.pointer, list, count, array) };
+                self.check_guarded($get_name, canary::read(self.guards, references, values, call))
+            }
+
+            #[doc = concat!("Calls `", $set_name, "`.")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK`
+            /// nor `fmi2Warning`.
+            #[inline]
+            pub fn $set(&mut self, references: &[u32], values: &[$type]) -> Result<(), CallError> {
+                let function = function!(self.$set, $set_name);
+                let count = same_length(references, values);
+                // SAFETY: the instance is alive; as many references as values.
+                let call = |list, array| unsafe { function(self.pointer, list, count, array) };
+                self.check_guarded($set_name, canary::write(self.guards, references, values, call))
+            })*
+        }
+    };
+}
+
+values! {
+    get_real set_real: f64 = "fmi2GetReal" "fmi2SetReal";
+    get_integer set_integer: i32 = "fmi2GetInteger" "fmi2SetInteger";
+    get_boolean set_boolean: i32 = "fmi2GetBoolean" "fmi2SetBoolean";
+}
+
+/// Defines the methods that fill a vector.
+macro_rules! vectors {
+    ($($method:ident = $name:literal;)*) => {
+        impl Component {
+            $(#[doc = concat!("Calls `", $name, "`.")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK`
+            /// nor `fmi2Warning`.
+            #[inline]
+            pub fn $method(&mut self, values: &mut [f64]) -> Result<(), CallError> {
+                let function = function!(self.$method, $name);
+                let count = values.len();
+                // SAFETY: the instance is alive; a place for each value.
+                let call = |array| unsafe { function(self.pointer, array, count) };
+                self.check_guarded($name, canary::fill(self.guards, values, call))
+            })*
+        }
+    };
+}
+
+vectors! {
+    get_continuous_states = "fmi2GetContinuousStates";
+    get_derivatives = "fmi2GetDerivatives";
+    get_nominals = "fmi2GetNominalsOfContinuousStates";
+    get_event_indicators = "fmi2GetEventIndicators";
 }
 
 /// Returns the common length of both slices.
@@ -88,6 +138,21 @@ pub(super) fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
 }
 
 impl Component {
+    /// Calls `fmi2SetContinuousStates`.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
+    #[inline]
+    pub fn set_continuous_states(&mut self, values: &[f64]) -> Result<(), CallError> {
+        const NAME: &str = "fmi2SetContinuousStates";
+        let function = function!(self.set_continuous_states, NAME);
+        // SAFETY: the instance is alive; `values.len()` values.
+        let call = |array| unsafe { function(self.pointer, array, values.len()) };
+        self.check_guarded(NAME, canary::send(self.guards, values, call))
+    }
+
     /// Calls `fmi2SetDebugLogging` for all categories.
     ///
     /// # Errors
@@ -135,9 +200,8 @@ impl Component {
         let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
         let pointers: Vec<_> = values.iter().map(|value| value.as_ptr()).collect();
         // SAFETY: the instance is alive; as many references as terminated strings.
-        let status =
-            unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_ptr()) };
-        self.check(NAME, status)
+        let call = |list, array| unsafe { function(self.pointer, list, count, array) };
+        self.check_guarded(NAME, canary::write(self.guards, references, &pointers, call))
     }
 
     /// Calls `fmi2GetString` and copies the strings.
@@ -156,9 +220,8 @@ impl Component {
         let count = same_length(references, values);
         let mut pointers = vec![std::ptr::null(); count];
         // SAFETY: the instance is alive; as many references as pointers to write.
-        let status =
-            unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_mut_ptr()) };
-        self.check(NAME, status)?;
+        let call = |list, array| unsafe { function(self.pointer, list, count, array) };
+        self.check_guarded(NAME, canary::read(self.guards, references, &mut pointers, call))?;
         self.place.enter(&NAME);
         for (value, pointer) in values.iter_mut().zip(pointers) {
             value.clear();

@@ -5,8 +5,8 @@ use std::ptr::null_mut;
 
 use fmu_description::abi::fmi2FMUstate;
 
-use super::Component;
 use super::calls::function;
+use super::{Component, canary};
 use slave::{CallError, Failure, absent};
 
 impl Component {
@@ -87,8 +87,9 @@ impl Component {
         // SAFETY: the instance is alive, the state is its own.
         let status = unsafe { function(self.pointer, state, &raw mut size) };
         self.check(SIZE, status)?;
+        let mut bytes =
+            canary::bytes_of_state(size).map_err(|failure| self.failed(SIZE, failure))?;
         let function = function!(self.serialize_state, NAME);
-        let mut bytes = vec![0_u8; size];
         // SAFETY: the instance is alive, the state is its own; `size` bytes to write to.
         let status =
             unsafe { function(self.pointer, state, bytes.as_mut_ptr().cast(), bytes.len()) };

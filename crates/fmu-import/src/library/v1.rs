@@ -9,17 +9,17 @@ mod step;
 
 use std::cell::Cell;
 use std::ffi::{CStr, c_char, c_int};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use fmu_description::abi::Status;
-use libloading::Library as Handle;
 
 use super::calls::{function, same_length};
+use super::canary::{self, Guarded};
 use super::log::{Names, Sink, logger};
-use super::{Interface, c_string, calloc, free, load};
+use super::{Handle, Interface, Loading, c_string, calloc, free};
 use crate::crash::{self, Place};
 use crate::error::LoadError;
 use functions::{Callbacks, Functions, Instance, ModelCallbacks};
@@ -41,11 +41,12 @@ pub(crate) struct Library {
 impl Library {
     /// Loads the library and checks its version and that it can run with `interface`.
     pub(crate) fn open(
-        path: &Path,
+        loading: &Loading<'_>,
         model_identifier: &str,
         interface: Interface,
     ) -> Result<Self, LoadError> {
-        let handle = load(path)?;
+        let path = loading.path;
+        let handle = loading.load()?;
         let functions = Functions::load(&handle, &format!("{model_identifier}_"));
         // SAFETY: takes no argument and returns a static string.
         let version = functions
@@ -118,6 +119,7 @@ impl Library {
             time_limit: None,
             abandoned: false,
             warned: Cell::new(false),
+            guards: false,
             library: self.clone(),
         };
         if !pointer.is_null() {
@@ -148,6 +150,8 @@ pub(crate) struct Component {
     abandoned: bool,
     /// Whether a call has returned `fmiWarning`.
     warned: Cell<bool>,
+    /// Whether calls get copies of arrays, with canaries.
+    guards: bool,
     library: Arc<Library>,
 }
 
@@ -197,6 +201,25 @@ impl Component {
         let failure =
             Status::from_c(status).map_or(Failure::UnknownStatus(status), Failure::Status);
         Err(self.failed(function, failure))
+    }
+
+    /// Lets the calls from now on get copies of arrays, with canaries.
+    pub(crate) fn guard_arrays(&mut self) {
+        self.guards = true;
+    }
+
+    /// As [`Component::check`], for a call that may have been guarded.
+    #[inline]
+    fn check_guarded(
+        &self,
+        function: &'static str,
+        (status, violation): Guarded,
+    ) -> Result<(), CallError> {
+        let done = self.check(function, status);
+        match violation {
+            None => done,
+            Some(what) => Err(self.failed(function, Failure::InvalidAnswer(what))),
+        }
     }
 
     /// Returns whether a call has returned `fmiWarning` since the last call of this function.
@@ -335,10 +358,8 @@ macro_rules! values {
                 let function = function!(self.$get, $get_name);
                 let count = same_length(references, values);
                 // SAFETY: the instance is alive; as many references as values.
-                let status = unsafe {
-                    function(self.pointer, references.as_ptr(), count, values.as_mut_ptr())
-                };
-                self.check($get_name, status)
+                let call = |list, array| unsafe { function(self.pointer, list, count, array) };
+                self.check_guarded($get_name, canary::read(self.guards, references, values, call))
             }
 
             #[doc = concat!("Calls `", $set_name, "`.")]
@@ -351,10 +372,8 @@ macro_rules! values {
                 let function = function!(self.$set, $set_name);
                 let count = same_length(references, values);
                 // SAFETY: the instance is alive; as many references as values.
-                let status = unsafe {
-                    function(self.pointer, references.as_ptr(), count, values.as_ptr())
-                };
-                self.check($set_name, status)
+                let call = |list, array| unsafe { function(self.pointer, list, count, array) };
+                self.check_guarded($set_name, canary::write(self.guards, references, values, call))
             })*
         }
     };

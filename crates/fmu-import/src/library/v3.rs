@@ -14,15 +14,15 @@ mod values;
 
 use std::cell::{Cell, RefCell};
 use std::ffi::{CStr, c_void};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use fmu_description::abi::Status;
-use libloading::Library as Handle;
 
+use super::canary::Guarded;
 use super::log::{Sink, receive_message};
-use super::{c_string, load};
+use super::{Handle, Loading, c_string};
 use crate::crash::{self, Place};
 use crate::error::LoadError;
 use functions::{ClockUpdate, Functions, Instance, IntermediateUpdate, Preemption, State};
@@ -86,8 +86,9 @@ pub(crate) struct Instantiation<'a> {
 
 impl Library {
     /// Loads the library and checks its version and that it has the functions of `interface`.
-    pub(crate) fn open(path: &Path, interface: Interface) -> Result<Self, LoadError> {
-        let handle = load(path)?;
+    pub(crate) fn open(loading: &Loading<'_>, interface: Interface) -> Result<Self, LoadError> {
+        let path = loading.path;
+        let handle = loading.load()?;
         let functions = Functions::load(&handle, "");
         // SAFETY: takes no argument and returns a static string.
         let version = functions
@@ -184,6 +185,7 @@ impl Library {
             sink,
             saved: Vec::new(),
             warned: Cell::new(false),
+            guards: false,
             call_sink: RefCell::new(None),
             inputs: Box::default(),
             library: self.clone(),
@@ -213,6 +215,8 @@ pub(crate) struct Component {
     saved: Vec<State>,
     /// Whether a call has returned `fmi3Warning`.
     warned: Cell<bool>,
+    /// Whether calls get copies of arrays, with canaries.
+    guards: bool,
     /// Receives a text for each call, if calls are logged.
     call_sink: RefCell<Option<CallSink>>,
     /// The courses of the inputs within the present step.
@@ -277,6 +281,26 @@ impl Component {
             sink(&format!(" -> {name}{}\n", results()));
         }
         self.check_status(function, status)
+    }
+
+    /// Lets the calls from now on get copies of arrays, with canaries.
+    pub(crate) fn guard_arrays(&mut self) {
+        self.guards = true;
+    }
+
+    /// As [`Component::check_results`], for a call that may have been guarded.
+    #[inline]
+    fn check_guarded(
+        &self,
+        function: &'static str,
+        (status, violation): Guarded,
+        results: impl FnOnce() -> String,
+    ) -> Result<(), CallError> {
+        let done = self.check_results(function, status, results);
+        match violation {
+            None => done,
+            Some(what) => Err(self.failed(function, Failure::InvalidAnswer(what))),
+        }
     }
 
     /// Marks the call as returned and converts its status to a result.

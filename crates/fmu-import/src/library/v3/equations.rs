@@ -2,6 +2,7 @@
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use super::super::calls::function;
+use super::super::canary;
 use super::Component;
 use slave::{CallError, CompletedStep, absent};
 
@@ -14,9 +15,11 @@ macro_rules! vectors {
             pub(crate) fn $method(&mut self, values: &mut [f64]) -> Result<(), CallError> {
                 let function = function!(self.$method, $name);
                 self.log_call($name, String::new);
+                let count = values.len();
                 // SAFETY: the instance is alive; a place for each value.
-                let status = unsafe { function(self.pointer, values.as_mut_ptr(), values.len()) };
-                self.check_results($name, status, || format!(" {values:?}"))
+                let call = |array| unsafe { function(self.pointer, array, count) };
+                let done = canary::fill(self.guards, values, call);
+                self.check_guarded($name, done, || format!(" {values:?}"))
             })*
         }
     };
@@ -41,7 +44,7 @@ macro_rules! numbers {
                 // SAFETY: the instance is alive; one place for the number.
                 let status = unsafe { function(self.pointer, &raw mut count) };
                 self.check_results($name, status, || format!(" {count}"))?;
-                Ok(count)
+                canary::check_number(count).map_err(|failure| self.failed($name, failure))
             })*
         }
     };
@@ -72,8 +75,8 @@ impl Component {
         let function = function!(self.set_continuous_states, NAME);
         self.log_call(NAME, || format!("{states:?}"));
         // SAFETY: the instance is alive; `states.len()` values.
-        let status = unsafe { function(self.pointer, states.as_ptr(), states.len()) };
-        self.check(NAME, status)
+        let call = |array| unsafe { function(self.pointer, array, states.len()) };
+        self.check_guarded(NAME, canary::send(self.guards, states, call), String::new)
     }
 
     /// Calls `fmi3CompletedIntegratorStep`.

@@ -4,6 +4,7 @@
 use std::ptr::null_mut;
 
 use super::super::calls::function;
+use super::super::canary;
 use super::{Component, State};
 use slave::{CallError, Failure, absent};
 
@@ -74,9 +75,10 @@ impl Component {
         // SAFETY: the instance is alive, the state is its own.
         let status = unsafe { function(self.pointer, state, &raw mut size) };
         self.check(SIZE, status)?;
+        let mut bytes =
+            canary::bytes_of_state(size).map_err(|failure| self.failed(SIZE, failure))?;
         let function = function!(self.serialize_state, NAME);
         self.log_call(NAME, String::new);
-        let mut bytes = vec![0_u8; size];
         // SAFETY: the instance is alive, the state is its own; `size` bytes to write to.
         let status = unsafe { function(self.pointer, state, bytes.as_mut_ptr(), bytes.len()) };
         self.check(NAME, status)?;

@@ -3,8 +3,8 @@
 
 use std::ffi::CStr;
 
-use super::super::c_string;
 use super::super::calls::function;
+use super::super::{c_string, canary};
 use super::Component;
 use slave::{CallError, absent};
 
@@ -23,10 +23,9 @@ macro_rules! values {
                 self.log_call($get_name, || format!("{references:?}"));
                 let (count, length) = (references.len(), values.len());
                 // SAFETY: the instance is alive; both pointers come with their number of values.
-                let status = unsafe {
-                    function(self.pointer, references.as_ptr(), count, values.as_mut_ptr(), length)
-                };
-                self.check_results($get_name, status, || format!(" {values:?}"))
+                let call = |list, array| unsafe { function(self.pointer, list, count, array, length) };
+                let done = canary::read(self.guards, references, values, call);
+                self.check_guarded($get_name, done, || format!(" {values:?}"))
             }
 
             #[doc = concat!("Calls `", $set_name, "`.")]
@@ -40,10 +39,9 @@ macro_rules! values {
                 self.log_call($set_name, || format!("{references:?}, {values:?}"));
                 let (count, length) = (references.len(), values.len());
                 // SAFETY: the instance is alive; both pointers come with their number of values.
-                let status = unsafe {
-                    function(self.pointer, references.as_ptr(), count, values.as_ptr(), length)
-                };
-                self.check($set_name, status)
+                let call = |list, array| unsafe { function(self.pointer, list, count, array, length) };
+                let done = canary::write(self.guards, references, values, call);
+                self.check_guarded($set_name, done, String::new)
             })*
         }
     };
@@ -77,10 +75,9 @@ impl Component {
         let pointers: Vec<_> = values.iter().map(|text| text.as_ptr()).collect();
         let (count, length) = (references.len(), pointers.len());
         // SAFETY: the instance is alive; both pointers come with their number of values.
-        let status = unsafe {
-            function(self.pointer, references.as_ptr(), count, pointers.as_ptr(), length)
-        };
-        self.check(NAME, status)
+        let call = |list, array| unsafe { function(self.pointer, list, count, array, length) };
+        let done = canary::write(self.guards, references, &pointers, call);
+        self.check_guarded(NAME, done, String::new)
     }
 
     /// Calls `fmi3GetString` and copies the strings.
@@ -95,10 +92,9 @@ impl Component {
         let mut pointers = vec![std::ptr::null(); values.len()];
         let (count, length) = (references.len(), pointers.len());
         // SAFETY: the instance is alive; both pointers come with their number of values.
-        let status = unsafe {
-            function(self.pointer, references.as_ptr(), count, pointers.as_mut_ptr(), length)
-        };
-        self.check(NAME, status)?;
+        let call = |list, array| unsafe { function(self.pointer, list, count, array, length) };
+        let done = canary::read(self.guards, references, &mut pointers, call);
+        self.check_guarded(NAME, done, String::new)?;
         self.place.enter(&NAME);
         for (value, pointer) in values.iter_mut().zip(pointers) {
             value.clear();
@@ -165,6 +161,10 @@ impl Component {
         self.place.enter(&NAME);
         for (value, (pointer, size)) in values.iter_mut().zip(pointers.into_iter().zip(sizes)) {
             value.clear();
+            if let Err(failure) = canary::check_size(size, "binary value") {
+                self.place.leave();
+                return Err(self.failed(NAME, failure));
+            }
             if size > 0 && !pointer.is_null() {
                 // SAFETY: the FMU returns `size` bytes at `pointer`, which live until the next call.
                 value.extend_from_slice(unsafe { std::slice::from_raw_parts(pointer, size) });

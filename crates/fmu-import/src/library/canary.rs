@@ -1,0 +1,231 @@
+//! Canaries: copies of the arrays that an FMU gets, with a pattern before and after each.
+//!
+//! An FMU that writes past an array, or into a constant one, changes memory of the program, unseen. With
+//! guards a call gets copies, which are compared after it; without, it gets the arrays themselves.
+#![expect(unsafe_code, reason = "arrays as bytes")]
+
+use std::ffi::{c_char, c_int};
+
+use slave::Failure;
+
+/// Number of elements before and after a copy.
+const MARGIN: usize = 8;
+/// Every byte of these elements.
+const PATTERN: u8 = 0xa5;
+/// Largest number of bytes of a state or a binary value, as a protection against wrong numbers.
+const MOST_BYTES: usize = 1 << 30;
+/// Largest number of states or event indicators, as a protection against wrong numbers.
+const MOST_NUMBERS: usize = 1 << 20;
+
+const REFERENCES: &str = "value references";
+const VALUES: &str = "values";
+
+/// A type whose values may have any bits.
+pub(super) trait Plain: Copy {}
+
+macro_rules! plain {
+    ($($type:ty)*) => { $(impl Plain for $type {})* };
+}
+plain! { f32 f64 i8 u8 i16 u16 i32 u32 i64 u64 usize *const c_char *const u8 }
+
+/// The status of a call, and what it did to its arrays against the standard.
+pub(super) type Guarded = (c_int, Option<String>);
+
+/// A copy of an array between two margins.
+struct Fence<T> {
+    memory: Vec<T>,
+    what: &'static str,
+}
+
+impl<T: Plain> Fence<T> {
+    fn new(values: &[T], what: &'static str) -> Self {
+        let count = values.len() + 2 * MARGIN;
+        let mut memory = Vec::with_capacity(count);
+        let start: *mut T = memory.as_mut_ptr();
+        // SAFETY: `count` places; the values are written between the margins; any bits are a value.
+        unsafe {
+            start.write_bytes(PATTERN, count);
+            start.add(MARGIN).copy_from_nonoverlapping(values.as_ptr(), values.len());
+            memory.set_len(count);
+        }
+        Self { memory, what }
+    }
+
+    /// The array of the call.
+    fn start(&mut self) -> *mut T {
+        self.memory[MARGIN..].as_mut_ptr()
+    }
+
+    /// The values after the call.
+    fn values(&self) -> &[T] {
+        &self.memory[MARGIN..self.memory.len() - MARGIN]
+    }
+
+    /// What the call did beside the array.
+    fn escaped(&self) -> Option<String> {
+        let is_clean = |part: &[T]| bytes(part).iter().all(|byte| *byte == PATTERN);
+        let end = self.memory.len() - MARGIN;
+        let place = match (is_clean(&self.memory[..MARGIN]), is_clean(&self.memory[end..])) {
+            (true, true) => return None,
+            (true, false) => "past the end",
+            (false, _) => "before the start",
+        };
+        Some(format!("wrote {place} of its array of {}", self.what))
+    }
+
+    /// What the call did to the array, whose values are constant.
+    fn changed(&self, values: &[T]) -> Option<String> {
+        let is_same = bytes(self.values()) == bytes(values);
+        let changed = (!is_same).then(|| format!("changed its constant array of {}", self.what));
+        changed.or_else(|| self.escaped())
+    }
+}
+
+fn bytes<T: Plain>(values: &[T]) -> &[u8] {
+    // SAFETY: the types have no padding.
+    unsafe { std::slice::from_raw_parts(values.as_ptr().cast(), size_of_val(values)) }
+}
+
+/// Makes a call that reads variables.
+#[inline]
+pub(super) fn read<T: Plain>(
+    guards: bool,
+    references: &[u32],
+    values: &mut [T],
+    call: impl FnOnce(*const u32, *mut T) -> c_int,
+) -> Guarded {
+    if !guards {
+        return (call(references.as_ptr(), values.as_mut_ptr()), None);
+    }
+    let (mut list, mut array) = (Fence::new(references, REFERENCES), Fence::new(values, VALUES));
+    let status = call(list.start(), array.start());
+    values.copy_from_slice(array.values());
+    (status, list.changed(references).or_else(|| array.escaped()))
+}
+
+/// Makes a call that sets variables.
+#[inline]
+pub(super) fn write<T: Plain>(
+    guards: bool,
+    references: &[u32],
+    values: &[T],
+    call: impl FnOnce(*const u32, *const T) -> c_int,
+) -> Guarded {
+    if !guards {
+        return (call(references.as_ptr(), values.as_ptr()), None);
+    }
+    let (mut list, mut array) = (Fence::new(references, REFERENCES), Fence::new(values, VALUES));
+    let status = call(list.start(), array.start());
+    (status, list.changed(references).or_else(|| array.changed(values)))
+}
+
+/// Makes a call that fills an array.
+#[inline]
+pub(super) fn fill<T: Plain>(
+    guards: bool,
+    values: &mut [T],
+    call: impl FnOnce(*mut T) -> c_int,
+) -> Guarded {
+    read(guards, &[], values, |_, values| call(values))
+}
+
+/// Makes a call with a constant array.
+#[inline]
+pub(super) fn send<T: Plain>(
+    guards: bool,
+    values: &[T],
+    call: impl FnOnce(*const T) -> c_int,
+) -> Guarded {
+    write(guards, &[], values, |_, values| call(values))
+}
+
+/// Returns `size` zero bytes for a state of the size that the FMU states.
+pub(super) fn bytes_of_state(size: usize) -> Result<Vec<u8>, Failure> {
+    check_size(size, "state")?;
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(size).map_err(|_| {
+        Failure::InvalidAnswer(format!(
+            "returned {size} bytes as the size of a state, but there is no memory for them"
+        ))
+    })?;
+    bytes.resize(size, 0);
+    Ok(bytes)
+}
+
+/// Checks the size in bytes that an FMU states for `what`.
+pub(super) fn check_size(size: usize, what: &str) -> Result<(), Failure> {
+    if size <= MOST_BYTES {
+        return Ok(());
+    }
+    Err(Failure::InvalidAnswer(format!(
+        "returned {size} bytes as the size of a {what}, expected at most {MOST_BYTES}, a protection \
+         against wrong numbers"
+    )))
+}
+
+/// Checks a number of states or event indicators that an FMU states.
+pub(crate) fn check_number(count: usize) -> Result<usize, Failure> {
+    if count <= MOST_NUMBERS {
+        return Ok(count);
+    }
+    Err(Failure::InvalidAnswer(format!(
+        "returned the number {count}, expected at most {MOST_NUMBERS}, a protection against wrong numbers"
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_violations_the_values_pass_in_both_directions() {
+        let mut values = [1.0, 2.0];
+        for guards in [false, true] {
+            let done = read(guards, &[7, 8], &mut values, |list, array| {
+                // SAFETY: as many as stated.
+                unsafe { array.add(1).write(f64::from(*list.add(1))) };
+                3
+            });
+            assert_eq!((done, values), ((3, None), [1.0, 8.0]));
+        }
+    }
+
+    #[test]
+    fn each_write_beside_or_into_a_constant_array_is_named() {
+        let found = |list_at: Option<isize>, array_at: Option<isize>, constant: bool| {
+            let call = |list: *mut u32, array: *mut f64| {
+                // SAFETY: within the margins.
+                unsafe {
+                    list_at.inspect(|at| list.offset(*at).write(9));
+                    array_at.inspect(|at| array.offset(*at).write(9.0));
+                }
+                0
+            };
+            let mut values = [1.0, f64::NAN];
+            let done = if constant {
+                write(true, &[7, 8], &values, |list, array| call(list.cast_mut(), array.cast_mut()))
+            } else {
+                read(true, &[7, 8], &mut values, |list, array| call(list.cast_mut(), array))
+            };
+            done.1.unwrap_or_default()
+        };
+        assert_eq!(found(None, None, true), "");
+        assert_eq!(found(None, Some(1), false), "");
+        assert_eq!(found(None, Some(2), false), "wrote past the end of its array of values");
+        assert_eq!(found(None, Some(-1), false), "wrote before the start of its array of values");
+        assert_eq!(found(None, Some(1), true), "changed its constant array of values");
+        let references = "changed its constant array of value references";
+        assert_eq!(found(Some(0), None, true), references);
+        assert_eq!(found(Some(1), None, false), references);
+    }
+
+    #[test]
+    fn impossible_sizes_are_refused() {
+        assert_eq!(bytes_of_state(3).unwrap(), [0; 3]);
+        for size in [MOST_BYTES + 1, 3 << 30, usize::MAX] {
+            let Err(Failure::InvalidAnswer(what)) = bytes_of_state(size) else { panic!("{size}") };
+            assert!(what.contains(&size.to_string()), "{what}");
+        }
+        assert!(check_number(10).is_ok() && check_number(usize::MAX).is_err());
+    }
+}
