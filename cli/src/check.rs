@@ -32,6 +32,7 @@ use finding::Finding;
 pub(crate) use finding::Severity;
 
 #[derive(clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "options of a command")]
 pub(crate) struct Options {
     /// The FMU
     fmu: PathBuf,
@@ -54,6 +55,9 @@ pub(crate) struct Options {
     /// Its symbols are visible to the FMU. May be repeated.
     #[arg(long, value_name = "LIBRARY")]
     preload: Vec<OsString>,
+    /// Build the library of an FMU that has source code only
+    #[arg(long, conflicts_with = "no_run")]
+    compile: bool,
 }
 
 /// The JSON object of `--json`.
@@ -105,6 +109,10 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResu
     findings.extend(binaries::check(&read, unpacked.entries(), description));
     sections::renumber(&mut findings, description.version());
     findings.extend(description::check(description, &unpacked.warnings));
+    let compiled = options.compile.then(|| fmu_import::compile(&options.fmu)).transpose()?;
+    let compiled = compiled.filter(|path| *path != options.fmu);
+    let compiled = compiled.map(|path| Unpacked::open(&path)).transpose()?;
+    let unpacked = compiled.as_ref().unwrap_or(unpacked);
     let here = if let Some(here) = without_trial(options, unpacked) {
         here
     } else {

@@ -8,7 +8,7 @@
 * :func:`simulate` runs one FMU, :class:`System` connects several.
 * :class:`Results` holds the rows of a run for NumPy, Arrow, pandas, polars and xarray.
 * :func:`design` designs a fault-tolerant controller.
-* :func:`check` and :func:`read_model_description` look at an FMU.
+* :func:`check` and :func:`read_model_description` look at an FMU; :func:`compile` builds its library.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from ._errors import (
 )
 from ._paper import fmus, paper, reproduce
 from ._results import Results
-from ._simulate import CheckReport, check, simulate
+from ._simulate import CheckReport, check, compile, simulate
 from ._slave import Slave
 from ._system import Cancel, Simulation, System, fault
 
@@ -66,6 +66,7 @@ __all__ = [
     "check",
     "clear",
     "command",
+    "compile",
     "design",
     "fault",
     "fmus",

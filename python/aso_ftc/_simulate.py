@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Union
 
+from . import _core
 from ._command import command
 from ._errors import ConfigurationError, FmuError
 from ._results import Results
@@ -189,3 +190,22 @@ def check(fmu: PathLike, *, run: bool = True, time_limit: float = 30.0) -> Check
     data = json.loads(done.stdout)
     counts = {name: data[name] for name in ("errors", "warnings", "notes")}
     return CheckReport(ok=done.returncode == 0, findings=data["findings"], data=data, **counts)
+
+
+def compile(fmu: PathLike) -> Path:
+    """Build the library of an FMU for this platform from the FMU's source code.
+
+    The compiler is the one that the environment variable ``CC`` names, or the first of cc, gcc and clang.
+    The built FMU is kept in the user's cache folder and used again.
+
+    Args:
+        fmu: an FMU, as an archive or a folder.
+
+    Returns:
+        The path of the built FMU; the path of ``fmu`` itself if it has a library for this platform.
+
+    Raises:
+        FmuError: the FMU has neither a library nor source code, there is no compiler, or the compiler
+            refuses the source code.
+    """
+    return Path(_core.compile(os.fspath(fmu)))

@@ -8,7 +8,7 @@ use pyo3::IntoPyObjectExt as _;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
-use crate::error;
+use crate::error::{self, Exception};
 use crate::run::guarded;
 
 /// Most elements of an array whose start values are listed.
@@ -26,6 +26,14 @@ pub(crate) fn read_model_description(py: Python<'_>, path: PathBuf) -> PyResult<
     let warnings: Vec<_> = unpacked.archive_warnings.iter().cloned().chain(warnings).collect();
     described.set_item("warnings", warnings)?;
     Ok(described)
+}
+
+/// Returns the path of an FMU with a library for this platform, built if it has source code only.
+#[pyfunction]
+pub(crate) fn compile(py: Python<'_>, path: PathBuf) -> PyResult<PathBuf> {
+    let compiled = guarded(py, || fmu_import::compile(&path))?;
+    compiled
+        .map_err(|error| Exception::new("FmuError", "Compile", files::sentence(&error)).raise(py))
 }
 
 fn describe<'py>(py: Python<'py>, own: &ModelDescription) -> PyResult<Bound<'py, PyDict>> {

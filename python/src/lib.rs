@@ -27,7 +27,7 @@ mod _core {
     #[pymodule_export]
     use super::configuration::{check_configuration, parse_toml, read_configuration, render_toml};
     #[pymodule_export]
-    use super::description::read_model_description;
+    use super::description::{compile, read_model_description};
     #[pymodule_export]
     use super::designed::{Designed, design_file, design_plant};
     #[pymodule_export]

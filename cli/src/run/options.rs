@@ -154,6 +154,11 @@ struct SystemOptions {
     /// Its symbols are visible to the FMUs. May be repeated.
     #[arg(long, value_name = "LIBRARY")]
     preload: Vec<String>,
+    /// Build the libraries of FMUs that have source code only
+    ///
+    /// A C compiler builds what has no library for this platform; the result is kept in the cache folder.
+    #[arg(long)]
+    compile: bool,
 }
 
 #[derive(clap::Args)]
@@ -475,6 +480,7 @@ impl Options {
             config.settings.push(name.clone(), value.clone());
         }
         config.preload.extend(self.system.preload.iter().cloned());
+        config.compile |= self.system.compile;
         Ok(())
     }
 

@@ -9,6 +9,7 @@
 #![deny(unsafe_code)]
 
 mod call_log;
+mod compile;
 pub mod crash;
 mod described;
 mod error;
@@ -23,6 +24,7 @@ mod v2;
 mod v3;
 
 pub use call_log::{CallLog, LoggedSlave};
+pub use compile::{CompileError, compile};
 pub use described::{DescriptionError, described_as};
 pub use error::LoadError;
 pub use fmu::{Fmu, FmuError};

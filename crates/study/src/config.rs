@@ -37,6 +37,9 @@ pub struct Config {
     /// Shared libraries loaded first, whose symbols are visible to the FMUs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub preload: Vec<String>,
+    /// Whether the libraries of FMUs that have source code only are built.
+    #[serde(skip_serializing_if = "is_default")]
+    pub compile: bool,
     /// Paths of FMUs by name.
     #[serde(skip_serializing_if = "Ordered::is_empty")]
     pub fmus: Ordered<PathBuf>,

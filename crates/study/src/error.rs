@@ -33,6 +33,10 @@ pub enum Error {
     #[cfg(feature = "load")]
     #[error(transparent)]
     Library(#[from] fmu_import::LoadError),
+    /// The library of an FMU cannot be built.
+    #[cfg(feature = "load")]
+    #[error(transparent)]
+    Compile(#[from] fmu_import::CompileError),
     /// Results cannot be written.
     #[error(transparent)]
     Results(#[from] ResultsError),

@@ -1,7 +1,7 @@
 //! Instances of the FMUs of a system: their interface, their process.
 
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use fmu_description::ModelDescription;
@@ -49,6 +49,7 @@ pub(crate) fn instantiate(
         memory_limit,
         preload,
         logging,
+        guard_arrays: options.log_calls.is_some(),
         executable,
         ..Default::default()
     };
@@ -58,7 +59,7 @@ pub(crate) fn instantiate(
     for element in elements {
         let name = &element.name;
         let stated = stated_interface(element, config);
-        let content = opening.open(element, config.isolation.isolate == Some(true))?;
+        let content = opening.open(element, config)?;
         let interface = choose_interface(element, content.description(), config, stated)?;
         let method = (interface == Interface::ModelExchange)
             .then(|| config.solver.get(name).copied().unwrap_or_default());
@@ -178,13 +179,17 @@ struct Opening<'a> {
 
 impl<'a> Opening<'a> {
     /// Returns the FMU of an element.
-    fn open(&mut self, element: &'a Element, isolate: bool) -> Result<Content, Error> {
+    fn open(&mut self, element: &'a Element, config: &Config) -> Result<Content, Error> {
+        let isolate = config.isolation.isolate == Some(true);
         if let Some(content) = self.opened.get(&element.fmu) {
             return Ok(content.clone());
         }
-        let opening = || if isolate { open_package(element) } else { open_fmu(element) };
+        let compiled = config.compile.then(|| compiled(element)).transpose()?;
+        let path = compiled.as_ref().unwrap_or(&element.fmu);
+        let opening =
+            || if isolate { open_package(element, path) } else { open_fmu(element, path) };
         let content = match self.store {
-            Some(store) => store.fmu(&element.fmu, isolate, opening)?,
+            Some(store) => store.fmu(path, isolate, opening)?,
             None => opening()?,
         };
         self.opened.insert(&element.fmu, content.clone());
@@ -256,10 +261,16 @@ impl<'a> Opening<'a> {
     }
 }
 
+/// Returns the FMU of an element with a library for this platform, built if it has source code only.
+fn compiled(element: &Element) -> Result<PathBuf, Error> {
+    let compiled = fmu_import::compile(&element.fmu);
+    compiled.map_err(|error| as_shown(Error::from(error).within(&element.name), element))
+}
+
 /// Opens the FMU of an element for separate processes. Warnings about an FMU in an SSP were already
 /// logged when the SSP was opened.
-fn open_package(element: &Element) -> Result<Content, Error> {
-    let opened = isolate::Package::open(&element.fmu);
+fn open_package(element: &Element, path: &Path) -> Result<Content, Error> {
+    let opened = isolate::Package::open(path);
     let package = opened.map_err(|error| Error::from(error).within(&element.name))?;
     for warning in package.warnings().filter(|_| element.shown.is_none()) {
         tracing::warn!("{}: {warning}", element.fmu.display());
@@ -268,10 +279,10 @@ fn open_package(element: &Element) -> Result<Content, Error> {
 }
 
 /// Opens the FMU of an element in this process, with warnings as [`open_package`].
-fn open_fmu(element: &Element) -> Result<Content, Error> {
+fn open_fmu(element: &Element, path: &Path) -> Result<Content, Error> {
     let opened = match &element.shown {
-        Some(_) => Fmu::open_quietly(&element.fmu),
-        None => Fmu::open_any(&element.fmu),
+        Some(_) => Fmu::open_quietly(path),
+        None => Fmu::open_any(path),
     };
     let opened = opened.map(Content::Loaded);
     opened.map_err(|error| as_shown(Error::from(error).within(&element.name), element))

@@ -25,6 +25,7 @@ mod preload;
 mod programs;
 mod run;
 mod scheduled;
+mod source_code;
 mod step_hints;
 mod tidy;
 mod versions;

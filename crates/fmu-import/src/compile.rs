@@ -1,0 +1,348 @@
+//! Builds the library of an FMU for this platform from the FMU's source code.
+
+mod description;
+
+use std::fs;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use fmu_description::package::{Package, PackageError, TemporaryFolder, Unpacked, platforms_of};
+use fmu_description::{ModelDescription, Version, package};
+
+use description::{BuildConfiguration, SourceFileSet};
+
+/// The header files of the standard, which FMUs leave out.
+const HEADERS: [(&str, &str); 6] = [
+    ("fmi2FunctionTypes.h", include_str!("../headers/fmi2FunctionTypes.h")),
+    ("fmi2Functions.h", include_str!("../headers/fmi2Functions.h")),
+    ("fmi2TypesPlatform.h", include_str!("../headers/fmi2TypesPlatform.h")),
+    ("fmi3FunctionTypes.h", include_str!("../headers/fmi3FunctionTypes.h")),
+    ("fmi3Functions.h", include_str!("../headers/fmi3Functions.h")),
+    ("fmi3PlatformTypes.h", include_str!("../headers/fmi3PlatformTypes.h")),
+];
+/// The parts of an FMU that a built one has, apart from its model description.
+const PARTS: [&str; 4] = ["binaries", "resources", "terminalsAndIcons", "extra"];
+/// The number of the way in which libraries are built here: another way needs another number, as built FMUs
+/// are kept.
+const RECIPE: u32 = 1;
+/// Longest part of the output of a compiler that an error quotes.
+const OUTPUT: usize = 4000;
+
+/// Why the library of an FMU cannot be built.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CompileError {
+    /// The FMU cannot be read or written, or has no source code.
+    #[error(transparent)]
+    Package(Box<PackageError>),
+    /// A file of the FMU does not say how the library is built.
+    #[error("{}: {reason}", path.display())]
+    Description {
+        /// The FMU.
+        path: PathBuf,
+        /// What is missing or wrong.
+        reason: String,
+    },
+    /// There is no compiler.
+    #[error("{}: no compiler for {language} here: tried {tried}; the variable {variable} names one", path.display())]
+    NoCompiler {
+        /// The FMU.
+        path: PathBuf,
+        /// The language.
+        language: &'static str,
+        /// The programs that were tried.
+        tried: String,
+        /// The environment variable that names the compiler.
+        variable: &'static str,
+    },
+    /// The compiler refuses the source code.
+    #[error("{}: {command} failed: {output}", path.display())]
+    Failed {
+        /// The FMU.
+        path: PathBuf,
+        /// The program and the file.
+        command: String,
+        /// The start of its messages.
+        output: String,
+    },
+    /// A file cannot be read or written.
+    #[error("cannot {action} {}", path.display())]
+    File {
+        /// The operation.
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// The reason given by the system.
+        source: io::Error,
+    },
+}
+
+impl From<PackageError> for CompileError {
+    fn from(error: PackageError) -> Self {
+        CompileError::Package(Box::new(error))
+    }
+}
+
+fn file_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> CompileError {
+    let path = path.to_owned();
+    move |source| CompileError::File { action, path, source }
+}
+
+/// Returns an FMU with the content of the FMU at `path` and a library for this platform.
+///
+/// If the FMU has a library for this platform, returns `path`. Otherwise the library is built from the
+/// folder `sources` of the FMU, as its `buildDescription.xml` states or, in FMI 2.0, the elements
+/// `SourceFiles`, by the compiler in the variable `CC` (C++: `CXX`) or the first one found. The built FMU is kept in
+/// the user's cache folder and used again for the same content and compiler.
+///
+/// # Errors
+///
+/// [`CompileError`] if the FMU cannot be read, has neither a library nor source code, if there is no
+/// compiler, or if the compiler refuses the source code.
+pub fn compile(path: &Path) -> Result<PathBuf, CompileError> {
+    let unpacked =
+        if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open_whole(path)? };
+    let identifiers = identifiers(&unpacked.description);
+    let refused = identifiers.iter().find_map(|identifier| unpacked.library(identifier).err());
+    let Some(refused) = refused else { return Ok(path.to_owned()) };
+    if !unpacked.has_sources() {
+        return Err(refused.into());
+    }
+    let build = Build::new(path, &unpacked)?;
+    let target = cache().join(build.key(&identifiers)?).join(file_name(path));
+    if !target.is_file() {
+        let mut package = content(&unpacked)?;
+        let platform = platforms_of(unpacked.description.version()).first().copied();
+        for identifier in &identifiers {
+            let library = build.library(identifier)?;
+            let name = format!("{identifier}{}", std::env::consts::DLL_SUFFIX);
+            package.add(format!("binaries/{}/{name}", platform.unwrap_or_default()), library);
+        }
+        package.write(&target)?;
+        tracing::info!("{}: built from its source code: {}", path.display(), target.display());
+    }
+    Ok(target)
+}
+
+/// Returns the names of the libraries of an FMU.
+fn identifiers(description: &ModelDescription) -> Vec<String> {
+    let simulation = description.stepped().map(|own| own.model_identifier);
+    let exchange = description.model_exchange.as_ref().map(|own| own.model_identifier.clone());
+    let mut identifiers: Vec<String> = simulation.into_iter().chain(exchange).collect();
+    identifiers.dedup();
+    identifiers
+}
+
+/// Returns the name of the built FMU.
+fn file_name(path: &Path) -> String {
+    let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    format!("{}.fmu", path.file_stem().unwrap_or_default().to_string_lossy())
+}
+
+/// Returns the folder for built FMUs.
+fn cache() -> PathBuf {
+    let variable = |name: &str| std::env::var_os(name).filter(|own| !own.is_empty());
+    let home = || variable("HOME").map(PathBuf::from);
+    let user = if cfg!(windows) {
+        variable("LOCALAPPDATA").map(PathBuf::from)
+    } else {
+        let stated = variable("XDG_CACHE_HOME").map(PathBuf::from);
+        let own = if cfg!(target_os = "macos") { "Library/Caches" } else { ".cache" };
+        stated.or_else(|| home().map(|home| home.join(own)))
+    };
+    user.unwrap_or_else(std::env::temp_dir).join("aso-ftc").join("compiled")
+}
+
+/// Returns the FMU without source code and documentation.
+fn content(unpacked: &Unpacked) -> Result<Package, CompileError> {
+    let file = unpacked.folder().join(package::DESCRIPTION);
+    let xml = fs::read_to_string(&file).map_err(file_error("read", &file))?;
+    let mut content = Package::new(xml).for_version(unpacked.description.version());
+    for part in PARTS {
+        let folder = unpacked.folder().join(part);
+        if folder.is_dir() {
+            content.add_folder(part, &folder)?;
+        }
+    }
+    Ok(content)
+}
+
+/// A compiler: its command and the text by which it presents itself.
+struct Compiler {
+    words: Vec<String>,
+    version: String,
+}
+
+impl Compiler {
+    fn find(path: &Path, cpp: bool) -> Result<Self, CompileError> {
+        let (variable, known, language) = if cpp {
+            ("CXX", ["c++", "g++", "clang++"], "C++")
+        } else {
+            ("CC", ["cc", "gcc", "clang"], "C")
+        };
+        let stated = std::env::var(variable).ok().filter(|own| !own.trim().is_empty());
+        let tried = stated.map_or_else(|| known.map(str::to_owned).to_vec(), |own| vec![own]);
+        let compilers = tried.iter().filter_map(|command| {
+            let words: Vec<String> = command.split_whitespace().map(str::to_owned).collect();
+            let output =
+                Command::new(&words[0]).args(&words[1..]).arg("--version").output().ok()?;
+            let version = String::from_utf8_lossy(&output.stdout).into_owned();
+            output.status.success().then_some(Self { words, version })
+        });
+        let mut compilers = compilers;
+        compilers.next().ok_or_else(|| CompileError::NoCompiler {
+            path: path.to_owned(),
+            language,
+            tried: tried.join(", "),
+            variable,
+        })
+    }
+
+    fn command(&self) -> Command {
+        let mut command = Command::new(&self.words[0]);
+        command.args(&self.words[1..]);
+        command
+    }
+}
+
+/// What is needed to build the libraries of an FMU.
+struct Build<'a> {
+    path: &'a Path,
+    sources: PathBuf,
+    version: Version,
+    configurations: Vec<BuildConfiguration>,
+    /// The compilers for C and, if it is needed, for C++.
+    c: Compiler,
+    cpp: Option<Compiler>,
+}
+
+impl<'a> Build<'a> {
+    fn new(path: &'a Path, unpacked: &Unpacked) -> Result<Self, CompileError> {
+        let configurations = description::read(unpacked.folder());
+        let configurations = configurations
+            .map_err(|reason| CompileError::Description { path: path.to_owned(), reason })?;
+        let mut sets = configurations.iter().flat_map(|own| &own.sets);
+        let has_cpp = sets.any(SourceFileSet::is_cpp);
+        Ok(Self {
+            path,
+            sources: unpacked.folder().join("sources"),
+            version: unpacked.description.version(),
+            c: Compiler::find(path, false)?,
+            cpp: has_cpp.then(|| Compiler::find(path, true)).transpose()?,
+            configurations,
+        })
+    }
+
+    /// Returns a name for the content of the FMU and the compilers.
+    fn key(&self, identifiers: &[String]) -> Result<String, CompileError> {
+        let mut hasher = DefaultHasher::new();
+        (RECIPE, std::env::consts::ARCH, std::env::consts::OS).hash(&mut hasher);
+        identifiers.hash(&mut hasher);
+        for compiler in [Some(&self.c), self.cpp.as_ref()].into_iter().flatten() {
+            (&compiler.words, &compiler.version).hash(&mut hasher);
+        }
+        if let Some(folder) = self.sources.parent() {
+            hash_folder(folder, &mut hasher).map_err(file_error("read", folder))?;
+        }
+        Ok(format!("{:016x}", hasher.finish()))
+    }
+
+    /// Builds the library `identifier`.
+    fn library(&self, identifier: &str) -> Result<Vec<u8>, CompileError> {
+        let is_own = |own: &&BuildConfiguration| own.model_identifier == identifier;
+        let configuration = self.configurations.iter().find(is_own);
+        // Some FMUs state a former identifier.
+        let only = || self.configurations.first().filter(|_| self.configurations.len() == 1);
+        let configuration = configuration.or_else(only).ok_or_else(|| {
+            let reason = format!("no source files of {identifier} are stated");
+            CompileError::Description { path: self.path.to_owned(), reason }
+        })?;
+        let folder = TemporaryFolder::new()
+            .map_err(file_error("create a folder in", &std::env::temp_dir()))?;
+        let headers = folder.path().join("headers");
+        fs::create_dir(&headers).map_err(file_error("create", &headers))?;
+        for (name, text) in HEADERS {
+            let file = headers.join(name);
+            fs::write(&file, text).map_err(file_error("write", &file))?;
+        }
+        let mut objects = Vec::new();
+        for set in &configuration.sets {
+            for file in &set.files {
+                let object = folder.path().join(format!("{}.o", objects.len()));
+                self.object(set, file, (&headers, &object))?;
+                objects.push(object);
+            }
+        }
+        let linker =
+            self.cpp.as_ref().filter(|_| configuration.sets.iter().any(SourceFileSet::is_cpp));
+        let library = folder.path().join(format!("library{}", std::env::consts::DLL_SUFFIX));
+        let mut command = linker.unwrap_or(&self.c).command();
+        command.arg("-shared").arg("-o").arg(&library).args(&objects);
+        command.args(configuration.libraries.iter().map(|name| format!("-l{name}"))).arg("-lm");
+        self.run(&mut command, "linking")?;
+        fs::read(&library).map_err(file_error("read", &library))
+    }
+
+    /// Compiles a source file.
+    fn object(
+        &self,
+        set: &SourceFileSet,
+        file: &str,
+        (headers, object): (&Path, &Path),
+    ) -> Result<(), CompileError> {
+        let compiler = self.cpp.as_ref().filter(|_| set.is_cpp()).unwrap_or(&self.c);
+        let mut command = compiler.command();
+        command.current_dir(&self.sources).args(["-c", "-fPIC", "-O2", "-w"]);
+        command.args(set.standard().map(|standard| format!("-std={standard}")));
+        command.arg("-I").arg(&self.sources);
+        for folder in &set.include_folders {
+            command.arg("-I").arg(self.sources.join(folder));
+        }
+        // The headers of the FMU come first.
+        command.arg("-I").arg(headers);
+        // The functions of a shared library have no prefix.
+        command.arg(match self.version {
+            Version::V3 => "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
+            _ => "-DFMI2_FUNCTION_PREFIX=",
+        });
+        command.args(set.definitions.iter().map(|(name, value)| match value {
+            Some(value) => format!("-D{name}={value}"),
+            None => format!("-D{name}"),
+        }));
+        command.arg("-o").arg(object).arg(self.sources.join(file));
+        self.run(&mut command, file)
+    }
+
+    fn run(&self, command: &mut Command, what: &str) -> Result<(), CompileError> {
+        let program = command.get_program().to_string_lossy().into_owned();
+        let output = command.output().map_err(file_error("start", Path::new(&program)))?;
+        if output.status.success() {
+            return Ok(());
+        }
+        let messages = String::from_utf8_lossy(&output.stderr)
+            .replace(&format!("{}/", self.sources.display()), "");
+        Err(CompileError::Failed {
+            path: self.path.to_owned(),
+            command: format!("{program} for {what}"),
+            output: messages.chars().take(OUTPUT).collect::<String>().trim().to_owned(),
+        })
+    }
+}
+
+/// Hashes the names and contents of all files of a folder.
+fn hash_folder(folder: &Path, hasher: &mut DefaultHasher) -> io::Result<()> {
+    let mut paths: Vec<PathBuf> =
+        fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<io::Result<_>>()?;
+    paths.sort();
+    for path in paths {
+        path.file_name().hash(hasher);
+        if path.is_dir() {
+            hash_folder(&path, hasher)?;
+        } else {
+            fs::read(&path)?.hash(hasher);
+        }
+    }
+    Ok(())
+}

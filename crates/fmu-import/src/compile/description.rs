@@ -1,0 +1,148 @@
+//! How the library of an FMU is built: `sources/buildDescription.xml` (FMI 3.0.2, section 2.5.1.3), or the
+//! elements `SourceFiles` of FMI 2.0.
+
+use std::fs;
+use std::path::{Component, Path};
+
+use fmu_description::package::DESCRIPTION;
+use fmu_description::xml::{self, Element};
+
+/// `BuildConfiguration`: how one library is built.
+pub(super) struct BuildConfiguration {
+    pub(super) model_identifier: String,
+    pub(super) sets: Vec<SourceFileSet>,
+    /// Libraries of the system.
+    pub(super) libraries: Vec<String>,
+}
+
+/// `SourceFileSet`: source files that are compiled alike.
+#[derive(Default)]
+pub(super) struct SourceFileSet {
+    language: Option<String>,
+    /// Paths below `sources`.
+    pub(super) files: Vec<String>,
+    /// `PreprocessorDefinition`: names and values.
+    pub(super) definitions: Vec<(String, Option<String>)>,
+    /// Paths below `sources`.
+    pub(super) include_folders: Vec<String>,
+}
+
+impl SourceFileSet {
+    /// Whether the files are C++.
+    pub(super) fn is_cpp(&self) -> bool {
+        let is_cpp = |file: &String| {
+            let extension = Path::new(file).extension().unwrap_or_default();
+            ["cpp", "cc", "cxx"].iter().any(|own| extension.eq_ignore_ascii_case(own))
+        };
+        match &self.language {
+            Some(language) => language.starts_with("C++"),
+            None => self.files.iter().any(is_cpp),
+        }
+    }
+
+    /// The value of the compiler's option `-std`: `C99` is `gnu99`, as extensions of a compiler are common.
+    pub(super) fn standard(&self) -> Option<String> {
+        let language = self.language.as_deref()?.to_ascii_lowercase();
+        let year = language.strip_prefix('c')?;
+        let is_year = !year.is_empty() && year.trim_start_matches('+').parse::<u32>().is_ok();
+        is_year.then(|| format!("gnu{year}"))
+    }
+}
+
+/// Whether a stated file is no header, which is only included.
+fn is_source(path: &String) -> bool {
+    let extension = Path::new(path).extension().unwrap_or_default();
+    !["h", "hh", "hpp", "hxx", "inc"].iter().any(|own| extension.eq_ignore_ascii_case(own))
+}
+
+/// Reads how the libraries of the FMU in `folder` are built; returns what is missing or wrong.
+pub(super) fn read(folder: &Path) -> Result<Vec<BuildConfiguration>, String> {
+    let file = folder.join("sources/buildDescription.xml");
+    let configurations = if file.is_file() {
+        let root = root(&file)?;
+        children(&root, "BuildConfiguration").map(configuration).collect::<Result<Vec<_>, _>>()?
+    } else {
+        let root = root(&folder.join(DESCRIPTION))?;
+        let interfaces = root.children.iter().filter(|own| {
+            ["CoSimulation", "ModelExchange"].contains(&own.name.as_str())
+                && children(own, "SourceFiles").next().is_some()
+        });
+        interfaces.map(source_files).collect::<Result<Vec<_>, _>>()?
+    };
+    if configurations.is_empty() {
+        return Err(
+            "expected sources/buildDescription.xml, or in FMI 2.0 the element SourceFiles of an \
+                    interface, which say how its source code is built; found neither"
+                .to_owned(),
+        );
+    }
+    Ok(configurations)
+}
+
+fn root(file: &Path) -> Result<Element, String> {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let bytes = fs::read(file).map_err(|error| format!("{name}: {error}"))?;
+    xml::read(&bytes).map_err(|error| format!("{name}: {error}"))
+}
+
+fn children<'a>(element: &'a Element, name: &'a str) -> impl Iterator<Item = &'a Element> {
+    element.children.iter().filter(move |own| own.name == name)
+}
+
+fn attribute(element: &Element, name: &str) -> Option<String> {
+    let found = element.attributes.iter().find(|(own, _)| own == name);
+    found.map(|(_, value)| value.clone())
+}
+
+/// Returns the attribute `name`, a path below `sources`.
+fn path(element: &Element) -> Result<String, String> {
+    let path = attribute(element, "name").unwrap_or_default();
+    let mut parts = Path::new(&path).components();
+    let is_inside = !path.is_empty()
+        && parts.all(|own| matches!(own, Component::Normal(_) | Component::CurDir));
+    let expected = "expected the path of a file or folder below sources";
+    is_inside.then_some(path.clone()).ok_or(format!("{}: found {path:?}, {expected}", element.name))
+}
+
+/// Returns the paths of the files to compile.
+fn sources<'a>(files: impl Iterator<Item = &'a Element>) -> Result<Vec<String>, String> {
+    let paths = files.map(path).collect::<Result<Vec<_>, _>>()?;
+    Ok(paths.into_iter().filter(is_source).collect())
+}
+
+fn configuration(element: &Element) -> Result<BuildConfiguration, String> {
+    let set = |own: &Element| -> Result<SourceFileSet, String> {
+        let definition = |own: &Element| {
+            Some((attribute(own, "name")?, attribute(own, "value").filter(|own| !own.is_empty())))
+        };
+        let is_used = |own: &&Element| attribute(own, "optional").as_deref() != Some("true");
+        Ok(SourceFileSet {
+            language: attribute(own, "language").filter(|own| !own.is_empty()),
+            files: sources(children(own, "SourceFile"))?,
+            definitions: children(own, "PreprocessorDefinition")
+                .filter(is_used)
+                .filter_map(definition)
+                .collect(),
+            include_folders: children(own, "IncludeDirectory")
+                .map(path)
+                .collect::<Result<_, _>>()?,
+        })
+    };
+    let libraries = children(element, "Library").filter_map(|own| attribute(own, "name"));
+    Ok(BuildConfiguration {
+        model_identifier: attribute(element, "modelIdentifier").unwrap_or_default(),
+        sets: children(element, "SourceFileSet").map(set).collect::<Result<_, _>>()?,
+        libraries: libraries.collect(),
+    })
+}
+
+/// Returns the configuration of an interface of FMI 2.0.
+fn source_files(element: &Element) -> Result<BuildConfiguration, String> {
+    let files = children(element, "SourceFiles").flat_map(|own| children(own, "File"));
+    let set = SourceFileSet { files: sources(files)?, ..SourceFileSet::default() };
+    Ok(BuildConfiguration {
+        model_identifier: attribute(element, "modelIdentifier").unwrap_or_default(),
+        sets: vec![set],
+        libraries: Vec::new(),
+    })
+}

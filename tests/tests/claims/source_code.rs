@@ -1,0 +1,74 @@
+//! `--compile`: FMUs with source code in the place of a library.
+#![cfg(target_os = "linux")]
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use tests::c_fmu::CFmu;
+
+/// Runs the command in `folder`, with a cache in it.
+fn run(folder: &Path, compiler: &str, arguments: &[&str]) -> Output {
+    let mut command = Command::new(tests::command());
+    command.current_dir(folder).env("XDG_CACHE_HOME", folder.join("cache")).env("CC", compiler);
+    command.args(arguments).output().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    let parts = [&output.stdout, &output.stderr];
+    parts.map(|part| String::from_utf8_lossy(part).into_owned()).concat()
+}
+
+const RUN: [&str; 6] = ["run", "slave.fmu", "--stop-time", "1", "--step", "0.0625"];
+
+#[test]
+fn without_the_option_the_refusal_mentions_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let _ = CFmu::well_behaved().in_source().write(folder.path(), "slave");
+    let output = run(folder.path(), "cc", &RUN);
+    let said = said(&output);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("no library") && said.contains("--compile"), "{said}");
+}
+
+#[test]
+fn a_built_fmu_gives_the_results_of_its_library_and_is_built_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str| std::fs::read(folder.path().join(name).join("results.csv")).unwrap();
+    let _ = CFmu::well_behaved().write(folder.path(), "slave");
+    assert!(run(folder.path(), "cc", &[&RUN[..], &["--out", "a"]].concat()).status.success());
+    let _ = CFmu::well_behaved().in_source().write(folder.path(), "slave");
+    let mut built = Vec::new();
+    for more in [&["--out", "b"][..], &["--out", "c", "--isolate"]] {
+        let output = run(folder.path(), "cc", &[&RUN[..], &["--compile"], more].concat());
+        assert!(output.status.success(), "{}", said(&output));
+        assert_eq!(read("a"), read(more[1]));
+        let kept = std::fs::read_dir(folder.path().join("cache/aso-ftc/compiled")).unwrap();
+        built.push(kept.map(|entry| entry.unwrap().file_name()).collect::<Vec<_>>());
+    }
+    assert!(built[0].len() == 1 && built[0] == built[1], "{built:?}");
+}
+
+#[test]
+fn check_tries_a_built_fmu() {
+    let folder = tempfile::tempdir().unwrap();
+    let _ = CFmu::well_behaved().in_source().write(folder.path(), "slave");
+    let answer = said(&run(folder.path(), "cc", &["check", "slave.fmu"]));
+    assert!(answer.contains("runs in this master: no") && answer.contains("--compile"), "{answer}");
+    let answer = said(&run(folder.path(), "cc", &["check", "--compile", "slave.fmu"]));
+    assert!(answer.contains("runs in this master: yes"), "{answer}");
+}
+
+#[test]
+fn a_missing_compiler_and_wrong_code_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let _ = CFmu::well_behaved().in_source().write(folder.path(), "slave");
+    let compile = [&RUN[..], &["--compile"]].concat();
+    let output = run(folder.path(), "no-such-compiler", &compile);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("no-such-compiler"), "{}", said(&output));
+    assert!(said(&output).contains("the variable CC names one"), "{}", said(&output));
+    let output = run(folder.path(), "cc -Dfmi2Component=struct", &compile);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("failed") && said(&output).contains("deeds.c"));
+}
