@@ -182,7 +182,8 @@ impl Archive {
             let limit = || PackageError::Limit { path, limit: capacity, unit, help: HELP };
             // The list of entries may state a wrong size, so the limit applies to the bytes
             // written.
-            let written = write_entry(entry.map_err(archive_error(&self.path))?, &target, left)?;
+            let entry = entry.map_err(archive_error(&self.path))?;
+            let written = write_entry(&self.path, entry, &target, left)?;
             left = left.checked_sub(written).ok_or_else(limit)?;
         }
         Ok(())
@@ -229,8 +230,23 @@ fn file_and_folder(names: &[String]) -> Option<String> {
     None
 }
 
-/// Writes one file, and stops after `limit` + 1 bytes whatever size the archive states.
+/// A reader that remembers whether its last error came from the operating system.
+struct Source<R> {
+    inner: R,
+    failed: bool,
+}
+
+impl<R: Read> Read for Source<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.inner.read(buffer);
+        self.failed = count.as_ref().is_err_and(|error| error.raw_os_error().is_some());
+        count
+    }
+}
+
+/// Writes one file of `archive`, and stops after `limit` + 1 bytes whatever size the archive states.
 fn write_entry(
+    archive: &Path,
     entry: ZipFile<'_, Metered<BufReader<File>>>,
     target: &Path,
     limit: u64,
@@ -242,9 +258,12 @@ fn write_entry(
     let file = File::create_new(target).map_err(file_error("create", target))?;
     let size = usize::try_from(entry.size()).unwrap_or(usize::MAX).clamp(1, BUFFER);
     let mut file = BufWriter::with_capacity(size, file);
-    let written = io::copy(&mut entry.take(limit.saturating_add(1)), &mut file);
-    let written = written.and_then(|count| file.flush().map(|()| count));
-    let written = written.map_err(file_error("unpack", target))?;
+    let mut source = Source { inner: entry.take(limit.saturating_add(1)), failed: false };
+    let copied = io::copy(&mut source, &mut file);
+    let written = copied.and_then(|count| file.flush().map(|()| count)).map_err(|error| {
+        let (action, path) = if source.failed { ("read", archive) } else { ("unpack", target) };
+        file_error(action, path)(error)
+    })?;
     #[cfg(unix)]
     if executable {
         use std::os::unix::fs::PermissionsExt as _;
