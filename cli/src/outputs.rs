@@ -44,24 +44,18 @@ impl Outputs {
     /// Gives all files their names. If one cannot have its name, the files that were there before
     /// get theirs back.
     pub(crate) fn commit(mut self) -> anyhow::Result<()> {
-        let mut done: Vec<(PathBuf, Option<PathBuf>)> = Vec::new();
+        let mut done: Vec<Replaced> = Vec::new();
         for Staged { partial, path } in &self.files {
-            match replace(partial, path) {
-                Ok(old) => done.push((path.clone(), old)),
+            match Replaced::new(partial, path) {
+                Ok(replaced) => done.push(replaced),
                 Err(error) => {
-                    for (path, old) in done.into_iter().rev() {
-                        // What fails here leaves the old file under its temporary name.
-                        let _ = match old {
-                            Some(old) => fs::rename(old, path),
-                            None => fs::remove_file(path),
-                        };
-                    }
-                    return Err(error).with_context(|| format!("cannot write {}", path.display()));
+                    let new: String = done.into_iter().rev().filter_map(Replaced::undo).collect();
+                    bail!("cannot write {}: {error}{new}", path.display());
                 }
             }
         }
-        for (_, old) in done {
-            let _ = old.map(fs::remove_file);
+        for Replaced { before, .. } in done {
+            let _ = before.map(fs::remove_file);
         }
         self.files.clear();
         Ok(())
@@ -77,21 +71,50 @@ impl Drop for Outputs {
     }
 }
 
-/// Renames `partial` to `path`; returns the temporary name of the file that was there.
-fn replace(partial: &Path, path: &Path) -> io::Result<Option<PathBuf>> {
-    let old = beside(path, "old");
-    let before = match fs::rename(path, &old) {
-        Ok(()) => Some(old),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => None,
-        Err(error) => return Err(error),
-    };
-    if let Err(error) = fs::rename(partial, path) {
-        if let Some(old) = before {
-            let _ = fs::rename(old, path);
-        }
-        return Err(error);
+/// A file with new content, and the temporary name of the file that was there before.
+struct Replaced {
+    path: PathBuf,
+    before: Option<PathBuf>,
+}
+
+impl Replaced {
+    /// Renames `partial` to `path`, under which there is a complete file at every instant.
+    fn new(partial: &Path, path: &Path) -> io::Result<Self> {
+        let replaced = Self { path: path.to_owned(), before: second_name(path)? };
+        fs::rename(partial, path).inspect_err(|_| {
+            let _ = replaced.before.as_ref().map(fs::remove_file);
+        })?;
+        Ok(replaced)
     }
-    Ok(before)
+
+    /// Gives the former file its name back; if that fails, returns the end of a sentence about it.
+    fn undo(self) -> Option<String> {
+        let Self { path, before } = self;
+        let undone = match &before {
+            Some(before) => fs::rename(before, &path),
+            None => fs::remove_file(&path),
+        };
+        let before =
+            before.map(|before| format!(", its former content is in {}", before.display()));
+        undone.err().map(|_| format!("; {} is new{}", path.display(), before.unwrap_or_default()))
+    }
+}
+
+/// Gives the file at `path`, if there is one, a second, temporary name: a link, or a copy where the
+/// file system has no links.
+fn second_name(path: &Path) -> io::Result<Option<PathBuf>> {
+    let before = beside(path, "old");
+    match fs::hard_link(path, &before) {
+        Ok(()) => Ok(Some(before)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(_) => match fs::copy(path, &before) {
+            Ok(_) => Ok(Some(before)),
+            Err(error) => {
+                let _ = fs::remove_file(&before);
+                Err(error)
+            }
+        },
+    }
 }
 
 /// A temporary name in the same folder, with the same extension.
