@@ -58,12 +58,16 @@ fn line(package: &Crate) -> String {
 fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
     let stated = package.license_file().map(PathBuf::from).filter(|path| path.is_file());
     for folder in package.manifest_path.as_std_path().ancestors().skip(1) {
-        let Ok(manifest) = fs::read_to_string(folder.join("Cargo.toml")) else { continue };
+        let manifest = folder.join("Cargo.toml");
+        if !manifest.is_file() {
+            continue;
+        }
+        let unread = || format!("cannot read {}", manifest.display());
+        let manifest: toml::Table = fs::read_to_string(&manifest).with_context(unread)?.parse()?;
         let mut found = named(folder)?;
         found.extend(stated.clone());
         found.sort();
         found.dedup();
-        let manifest: toml::Table = manifest.parse()?;
         if !found.is_empty() || manifest.contains_key("workspace") {
             return Ok(found);
         }
