@@ -80,6 +80,7 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Er
 
 /// Designs the controller for `file` with another law for the estimates of the faults.
 pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDesign, crate::Error> {
+    crate::threads::start()?;
     let linear = LinearPlant::of(file)?;
     feedthrough::check(file, &linear)?;
     let mut warnings = check_limits(file, &linear)?;

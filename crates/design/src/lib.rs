@@ -50,6 +50,7 @@ pub mod schedule;
 mod signals;
 #[cfg(test)]
 mod tests;
+mod threads;
 mod tracking;
 mod variants;
 mod worst_case;
