@@ -1,7 +1,6 @@
 //! `aso-ftc completions` and `aso-ftc man`: what a package of the command installs beside it.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap_complete::Shell;
@@ -40,14 +39,10 @@ pub(crate) fn man(options: &ManOptions, command: clap::Command) -> anyhow::Resul
         print!("{}", pages[0].1);
         return Ok(());
     };
-    let write = |path: &Path, text: &str| {
-        fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
-    };
-    fs::create_dir_all(folder)
-        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     for (name, text) in pages {
         let path = folder.join(name);
-        write(&path, &text)?;
+        files::whole::write(&path, text.as_bytes())
+            .with_context(|| format!("cannot write {}", path.display()))?;
         println!("{}", path.display());
     }
     Ok(())

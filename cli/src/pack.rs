@@ -173,7 +173,7 @@ fn update_descriptions(root: &Path) -> anyhow::Result<()> {
                 fmu_import::described_as(&library.file, &resources, model, version)?;
             let name = format!("{}.xml", file_stem(&description));
             let target = root.join("modelDescription").join(name);
-            fs::write(&target, &xml)
+            files::whole::write(&target, xml.as_bytes())
                 .with_context(|| format!("cannot write {}", target.display()))?;
         }
     }

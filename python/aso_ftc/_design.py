@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import warnings
@@ -234,8 +235,15 @@ class Controller:
         for name, text in files:
             path = os.path.join(os.fspath(folder), name)
             os.makedirs(os.path.dirname(path), exist_ok=True)
-            with open(path, "w", encoding="ascii", newline="\n") as file:
-                file.write(text)
+            temporary = f"{path}.{os.getpid()}.tmp"
+            try:
+                with open(temporary, "w", encoding="ascii", newline="\n") as file:
+                    file.write(text)
+                os.replace(temporary, path)
+            except OSError:
+                with contextlib.suppress(OSError):
+                    os.remove(temporary)
+                raise
             paths.append(path)
         for note in notes:
             warnings.warn(note, stacklevel=3)
