@@ -208,4 +208,4 @@ def compile(fmu: PathLike) -> Path:
         FmuError: the FMU has neither a library nor source code, there is no compiler, or the compiler
             refuses the source code.
     """
-    return Path(_core.compile(os.fspath(fmu)))
+    return _core.compile(os.fspath(fmu))
