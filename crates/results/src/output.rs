@@ -84,7 +84,7 @@ impl OutputFile {
         #[cfg(unix)]
         let stream = stream::open(path).map_err(failed)?;
         #[cfg(not(unix))]
-        let stream = None;
+        let stream: Option<File> = None;
         let is_stream = stream.is_some();
         let file = if let Some(stream) = stream {
             stream
