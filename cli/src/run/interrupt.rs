@@ -1,8 +1,9 @@
 //! Handles Ctrl-C and the signals by which systems announce the end: the run ends after the current step, or
 //! without it if the step does not return.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-use std::thread;
+use std::thread::{self, Thread};
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
@@ -20,6 +21,8 @@ static LISTENING: AtomicBool = AtomicBool::new(false);
 /// The number of the signal that has arrived; 0: none.
 static RAISED: AtomicU8 = AtomicU8::new(0);
 static NOTICED: AtomicBool = AtomicBool::new(false);
+/// The thread of [`wait`].
+static WAITING: OnceLock<Thread> = OnceLock::new();
 
 /// Exit status of a run that a signal has ended: 128 and the number of the signal.
 pub(crate) fn status() -> u8 {
@@ -32,6 +35,10 @@ pub(super) fn listen() -> anyhow::Result<()> {
     if LISTENING.swap(true, Ordering::Relaxed) {
         return Ok(());
     }
+    // Started now: while a library is loaded, no thread can start.
+    let waiting = thread::Builder::new().name("interrupt".to_owned()).spawn(wait);
+    let waiting = waiting.context("signals cannot be handled")?;
+    let _ = WAITING.set(waiting.thread().clone());
     handle_signals().context("signals cannot be handled")
 }
 
@@ -50,7 +57,7 @@ fn handle_signals() -> anyhow::Result<()> {
 /// Acts on a signal.
 fn raise(signal: u8) {
     /// When the first signal arrived.
-    static FIRST: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
+    static FIRST: OnceLock<Instant> = OnceLock::new();
     if RAISED.compare_exchange(0, signal, Ordering::Relaxed, Ordering::Relaxed).is_err() {
         if FIRST.get_or_init(Instant::now).elapsed() > TOGETHER {
             crash::give_up(None);
@@ -59,13 +66,17 @@ fn raise(signal: u8) {
         return;
     }
     FIRST.get_or_init(Instant::now);
-    // If the thread cannot start, only the step itself and a second signal end the run.
-    let _ = thread::Builder::new().name("interrupt".to_owned()).spawn(wait);
+    if let Some(waiting) = WAITING.get() {
+        waiting.unpark();
+    }
 }
 
-/// Waits for the end of the run, and ends the process if an FMU call does not return, or the step takes too
+/// Waits for a signal, then for the end of the run, and ends the process if an FMU call does not return, or the step takes too
 /// long. Writing results, plots and checkpoints may take longer.
 fn wait() {
+    while !is_raised() {
+        thread::park();
+    }
     let start = Instant::now();
     let (mut before, mut since) = (Vec::new(), start);
     loop {
