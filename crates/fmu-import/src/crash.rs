@@ -307,11 +307,18 @@ pub fn give_up(waited: Option<Duration>) {
 /// Ends the process if a call of the instance that is about to be dropped has not returned: then the stack
 /// is unwound by what left that call, and nothing of the FMU may be called any more.
 pub(crate) fn check_returned(slot: &Slot) {
-    if slot.is_entered() && !std::thread::panicking() && REPORTER.get().is_some() {
-        start_report(UNWOUND, std::ptr::from_ref(slot).addr());
-        std::thread::sleep(REPORT_LIMIT);
-        leave(1);
+    if !slot.is_entered() || std::thread::panicking() {
+        return;
     }
+    let address = std::ptr::from_ref(slot).addr();
+    if REPORTER.get().is_none() {
+        let calls = place::calls(address).collect();
+        eprintln!("error: {}", Ending { cause: Cause::Unwound, calls, before: None });
+        std::process::abort();
+    }
+    start_report(UNWOUND, address);
+    std::thread::sleep(REPORT_LIMIT);
+    leave(1);
 }
 
 /// Marks the work of the program as finished, with this exit status: a later `exit` is not reported as an

@@ -26,7 +26,7 @@ fn an_fmu_that_ends_the_process_in_a_step_is_named_and_no_row_is_lost() {
 fn an_exception_and_the_end_of_the_thread_in_a_function_are_named_with_the_function() {
     for deed in ["throw", "end the thread"] {
         let fmu = CFmu::that(&format!("{deed} in fmi2DoStep"));
-        for more in [&[][..], &["--in-process"]] {
+        for more in [&[][..], &["--in-process"], &["--isolate"]] {
             let run = Run::pair(&fmu, more);
             run.expect(1, TO_T1);
             run.says(&[PLACE, "was left by an exception of C++, by pthread_exit"]);
