@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
+use anyhow::Context as _;
 use fmu_description::{ModelDescription, Version};
 use zip::CompressionMethod;
 use zip::read::ZipFile;
@@ -45,9 +46,11 @@ pub(super) fn check(
             (why, SECTION),
         );
     }
-    let mut archive = zip::ZipArchive::new(BufReader::new(File::open(path)?))?;
+    let unread = || format!("cannot read {}", path.display());
+    let file = File::open(path).with_context(unread)?;
+    let mut archive = zip::ZipArchive::new(BufReader::new(file)).with_context(unread)?;
     for index in 0..archive.len() {
-        entry(&archive.by_index_raw(index)?, &mut findings);
+        entry(&archive.by_index_raw(index).with_context(unread)?, &mut findings);
     }
     if let Err(error) = archive.validate_header_consistency() {
         let why = "Tools that read an archive front to back see other files than those that use its list.";
