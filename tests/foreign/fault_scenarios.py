@@ -188,6 +188,7 @@ def scenarios():
             *("--results", "r.csv", "--report", "--plot", "*.y", "--plot-file", "p.svg"),
             outputs=["r.csv", "r.html", "p.svg"],
         ),
+        run("calls", "--results", "r.csv", "--log-calls", "calls.log", outputs=["r.csv", "calls.log"]),
         run("isolated", "--results", "r.csv", "--isolate", outputs=["r.csv"]),
         design(),
         pack(),
