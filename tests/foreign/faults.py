@@ -207,16 +207,17 @@ class Bench:
             return [f"no end within {LIMIT} s"]
         broken = []
         # The standard library of Rust panics if a thread gets no stack for signal handlers, and if it cannot read
-        # the output of a process.
-        in_std = (kind.calls == "map" and "alternative" in run.err) or run.path.startswith("pipe:")
-        if "panicked at" in run.err and not in_std:
+        # the output of a process; zlib-rs, if it gets no memory.
+        foreign = (kind.calls == "map" and "alternative" in run.err) or run.path.startswith("pipe:")
+        foreign |= kind.calls == "memory" and "MemError" in run.err
+        if "panicked at" in run.err and not foreign:
             broken.append("a panic")
         done = run.status == self.scenario.status
         for name in self.scenario.outputs:
             state = self.state(name, slot)
             if state not in ({"whole"} if done else {"whole", "as before", "its start"}):
                 broken.append(f"{name} is {state}")
-        if not done and not in_std:
+        if not done and not foreign:
             broken += self.unnamed(run, kind, slot)
             # Rust ends a process that has no memory by abort, after a sentence.
             if run.status < 0 and kind.calls != "memory":
