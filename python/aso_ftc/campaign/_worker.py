@@ -113,7 +113,10 @@ def pack(path: str) -> tuple[str, bytes]:
     """Return the name and the content of a file; of a folder a tar archive."""
     own = Path(path)
     if own.is_file():
-        return own.name, own.read_bytes()
+        try:
+            return own.name, own.read_bytes()
+        except OSError as error:
+            raise Error(f"cannot read {path}: {error.strerror}") from error
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w") as archive:
         archive.add(own, arcname=own.name)
