@@ -91,7 +91,7 @@ impl LoadedConfig {
     ///
     /// # Errors
     ///
-    /// Returns an error if the file cannot be read, is larger than [`LARGEST_FILE`] or is not a valid
+    /// Returns an error if the file cannot be read, is larger than 64 MiB or is not a valid
     /// `system.toml`.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let length = std::fs::metadata(path).map_or(0, |found| found.len());
