@@ -78,8 +78,9 @@ pub(crate) fn ignores_hangup() -> bool {
 static ARRIVED: AtomicI32 = AtomicI32::new(0);
 static WAITING: OnceLock<Thread> = OnceLock::new();
 
-/// Calls `react` with the number of each signal of [`ENDING_SIGNALS`], in a thread of its own. No descriptor is
-/// involved, because an FMU may close those that it did not open. Only the first call has an effect.
+/// Calls `react` with the number of each signal that ends a program or announces its end, in a thread of its
+/// own. No descriptor is involved, because an FMU may close those that it did not open. Only the first call has
+/// an effect.
 ///
 /// # Errors
 ///
