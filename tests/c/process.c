@@ -18,6 +18,12 @@ static void crash(void) {
     *nowhere = 0;
 }
 
+static void hang(void) {
+    for (;;) {
+        pause();
+    }
+}
+
 /* Functions of the C library that the program calls when it exits. */
 static void at_exit(void (*function)(void)) {
     on_exit((void (*)(int, void *))function, NULL);
@@ -45,6 +51,8 @@ void meddle_with_process(const char *deed) {
         atexit(leave_with_7);
     } else if (strcmp(deed, "crash when unloaded") == 0) {
         atexit(crash);
+    } else if (strcmp(deed, "hang when unloaded") == 0) {
+        atexit(hang);
     } else if (strcmp(deed, "abort at exit") == 0) {
         at_exit(abort);
     } else if (strcmp(deed, "hang at exit") == 0) {

@@ -13,6 +13,7 @@ mod signals;
 use std::fmt::{self, Write as _};
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::thread::Thread;
 use std::time::Duration;
@@ -31,11 +32,12 @@ const REPORT_LIMIT: Duration = Duration::from_secs(5);
 
 /// Whether the end of the process has started.
 static ENDING: AtomicBool = AtomicBool::new(false);
-/// The cause of the end: the number of a signal, [`EXIT`], [`GIVEN_UP`] or [`UNWOUND`]; 0 before.
+/// The cause of the end: the number of a signal, [`EXIT`], [`GIVEN_UP`], [`UNWOUND`] or [`OVERDUE`]; 0 before.
 static CAUSE: AtomicI32 = AtomicI32::new(0);
 const EXIT: i32 = -1;
 const GIVEN_UP: i32 = -2;
 const UNWOUND: i32 = -3;
+const OVERDUE: i32 = -4;
 /// The argument of `exit`.
 static STATUS: AtomicI32 = AtomicI32::new(0);
 /// The time in ms that [`give_up`] states; 0: none.
@@ -82,6 +84,8 @@ pub enum Cause {
     /// A call of [`give_up`], with the time for which a call had not returned after the signal, if that was the
     /// reason.
     GivenUp(Option<Duration>),
+    /// The library of an FMU was not unloaded in time.
+    Overdue,
     /// A function of an FMU did not return: an exception, `pthread_exit` or a cancellation left it.
     Unwound,
 }
@@ -140,6 +144,7 @@ fn write_ending(
             let waited = waited.as_secs_f64();
             write!(out, " has not returned within {waited} s after the signal")
         }
+        Cause::Overdue => out.write_str(" does not end: a destructor or an exit handler hangs"),
         Cause::Unwound => out.write_str(
             " was left by an exception of C++, by pthread_exit or by the cancellation of its thread, which \
              no function of an FMU may let out",
@@ -180,7 +185,7 @@ pub fn watch(
         return Ok(());
     }
     ADVICE.get_or_init(|| advice);
-    let (ready, started) = std::sync::mpsc::channel();
+    let (ready, started) = channel();
     let report = move || {
         #[cfg(unix)]
         signals::mark_reporter();
@@ -223,6 +228,7 @@ fn cause() -> Cause {
             Cause::GivenUp((waited > 0).then(|| Duration::from_millis(waited)))
         }
         UNWOUND => Cause::Unwound,
+        OVERDUE => Cause::Overdue,
         signal => Cause::Signal(signal),
     }
 }
@@ -302,6 +308,20 @@ pub fn give_up(waited: Option<Duration>) {
         std::thread::sleep(REPORT_LIMIT);
         leave(1);
     }
+}
+
+/// Ends the process as [`give_up`] does unless the returned value is dropped within `time`; `None` where
+/// [`watch`] was not called, or no thread can start.
+pub(crate) fn limit(time: Duration) -> Option<Sender<()>> {
+    REPORTER.get()?;
+    let (in_time, ended) = channel();
+    let wait = move || {
+        if ended.recv_timeout(time) == Err(RecvTimeoutError::Timeout) {
+            start_report(OVERDUE, 0);
+        }
+    };
+    let started = std::thread::Builder::new().name("limit".to_owned()).spawn(wait);
+    started.is_ok().then_some(in_time)
 }
 
 /// Ends the process if a call of the instance that is about to be dropped has not returned: then the stack

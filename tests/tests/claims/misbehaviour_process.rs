@@ -54,6 +54,7 @@ fn what_an_fmu_leaves_for_the_end_of_the_process_loses_nothing_and_is_an_error()
     for (deed, end) in [
         ("leave 7 when unloaded", "exit status 7"),
         ("crash when unloaded", "SIGSEGV"),
+        ("hang when unloaded", "unloading the library does not end"),
         ("abort at exit", "signal 6 (SIGABRT)"),
         ("hang at exit", "kept the process from ending"),
     ] {

@@ -5,11 +5,12 @@ use std::ffi::OsStr;
 use std::mem::ManuallyDrop;
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use libloading::Library;
 
 use super::python;
-use crate::crash::{LOADING, Place, UNLOADING};
+use crate::crash::{self, LOADING, Place, UNLOADING};
 use crate::error::LoadError;
 
 /// What happens to a library with functions that no library defines.
@@ -117,6 +118,9 @@ fn undefined(message: &str) -> Option<&str> {
     symbol.split([' ', ',']).next()
 }
 
+/// How long the destructors and exit handlers of a library may take.
+const UNLOAD_LIMIT: Duration = Duration::from_secs(1);
+
 /// A loaded library, unloaded on drop.
 pub(super) struct Handle {
     library: ManuallyDrop<Library>,
@@ -135,10 +139,13 @@ impl Deref for Handle {
 impl Drop for Handle {
     fn drop(&mut self) {
         let place = Place::new(&self.fmu);
+        // No thread can start while the library is unloaded.
+        let limit = crash::limit(UNLOAD_LIMIT);
         place.enter(&UNLOADING);
         // SAFETY: the library is not used again.
         unsafe { ManuallyDrop::drop(&mut self.library) };
         place.leave();
+        drop(limit);
     }
 }
 
