@@ -154,7 +154,7 @@ struct SystemOptions {
     /// Its symbols are visible to the FMUs. May be repeated.
     #[arg(long, value_name = "LIBRARY")]
     preload: Vec<String>,
-    /// Build the libraries of FMUs that have source code only
+    /// Build FMUs that have source code only
     ///
     /// A C compiler builds what has no library for this platform; the result is kept in the cache folder.
     #[arg(long)]

@@ -6,6 +6,7 @@
 //! thread of the FMU waits. That function can log, write pending results and remove files. The process
 //! then ends with the exit status that the function returns.
 
+mod limit;
 mod place;
 #[cfg(unix)]
 mod signals;
@@ -13,13 +14,13 @@ mod signals;
 use std::fmt::{self, Write as _};
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, AtomicUsize, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::thread::Thread;
 use std::time::Duration;
 
 use fmu_description::number::seconds;
 
+pub(crate) use limit::Limit;
 pub use place::Name;
 pub(crate) use place::{Place, RECORD, Slot, last_of_this_thread};
 #[cfg(target_os = "linux")]
@@ -185,7 +186,7 @@ pub fn watch(
         return Ok(());
     }
     ADVICE.get_or_init(|| advice);
-    let (ready, started) = channel();
+    let (ready, started) = std::sync::mpsc::channel();
     let report = move || {
         #[cfg(unix)]
         signals::mark_reporter();
@@ -308,20 +309,6 @@ pub fn give_up(waited: Option<Duration>) {
         std::thread::sleep(REPORT_LIMIT);
         leave(1);
     }
-}
-
-/// Ends the process as [`give_up`] does unless the returned value is dropped within `time`; `None` where
-/// [`watch`] was not called, or no thread can start.
-pub(crate) fn limit(time: Duration) -> Option<Sender<()>> {
-    REPORTER.get()?;
-    let (in_time, ended) = channel();
-    let wait = move || {
-        if ended.recv_timeout(time) == Err(RecvTimeoutError::Timeout) {
-            start_report(OVERDUE, 0);
-        }
-    };
-    let started = std::thread::Builder::new().name("limit".to_owned()).spawn(wait);
-    started.is_ok().then_some(in_time)
 }
 
 /// Ends the process if a call of the instance that is about to be dropped has not returned: then the stack

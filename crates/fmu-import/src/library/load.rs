@@ -10,7 +10,7 @@ use std::time::Duration;
 use libloading::Library;
 
 use super::python;
-use crate::crash::{self, LOADING, Place, UNLOADING};
+use crate::crash::{LOADING, Limit, Place, UNLOADING};
 use crate::error::LoadError;
 
 /// What happens to a library with functions that no library defines.
@@ -139,8 +139,7 @@ impl Deref for Handle {
 impl Drop for Handle {
     fn drop(&mut self) {
         let place = Place::new(&self.fmu);
-        // No thread can start while the library is unloaded.
-        let limit = crash::limit(UNLOAD_LIMIT);
+        let limit = Limit::new(UNLOAD_LIMIT);
         place.enter(&UNLOADING);
         // SAFETY: the library is not used again.
         unsafe { ManuallyDrop::drop(&mut self.library) };
