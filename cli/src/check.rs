@@ -55,7 +55,7 @@ pub(crate) struct Options {
     /// Its symbols are visible to the FMU. May be repeated.
     #[arg(long, value_name = "LIBRARY")]
     preload: Vec<OsString>,
-    /// Build the library of an FMU that has source code only
+    /// Build the FMU if it has source code only
     #[arg(long, conflicts_with = "no_run")]
     compile: bool,
 }

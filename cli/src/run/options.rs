@@ -188,7 +188,7 @@ pub(super) struct ResultsOptions {
     /// Folder for all files [default: results/run]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// File of the results, .csv or .parquet; - is CSV on stdout
+    /// Results, .csv or .parquet; -: CSV on stdout
     ///
     /// [default: results.csv in the folder of --out]
     #[arg(long, value_name = "FILE")]
