@@ -32,7 +32,11 @@ impl Tail {
         let start = MAGIC.len() as u64;
         file.append(MAGIC)?;
         let mut tail = Self { file, start, footer_start: start, footer: Vec::new() };
-        tail.replace(start, &[], footer)?;
+        if let Err(error) = tail.replace(start, &[], footer) {
+            // Without a footer it is no Parquet file; the caller reports the error of the write.
+            let _ = tail.file.set_length(0);
+            return Err(error);
+        }
         Ok(tail)
     }
 
