@@ -227,6 +227,14 @@ impl OutputFile {
         Ok(())
     }
 
+    /// Leaves nothing of a file whose start cannot be written: empties it, or removes it if that fails, too. The
+    /// caller reports the error of the write.
+    pub(super) fn abandon(mut self) {
+        if self.set_length(0).is_err() && self.regular {
+            let _ = fs::remove_file(&self.absolute);
+        }
+    }
+
     /// Checks that the path still leads to the file.
     pub(super) fn verify_path(&self) -> Result<(), ResultsError> {
         let leads = || {

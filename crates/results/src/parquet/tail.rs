@@ -33,8 +33,8 @@ impl Tail {
         file.append(MAGIC)?;
         let mut tail = Self { file, start, footer_start: start, footer: Vec::new() };
         if let Err(error) = tail.replace(start, &[], footer) {
-            // Without a footer it is no Parquet file; the caller reports the error of the write.
-            let _ = tail.file.set_length(0);
+            // Without a footer it is no Parquet file.
+            tail.file.abandon();
             return Err(error);
         }
         Ok(tail)
