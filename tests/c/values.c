@@ -258,6 +258,9 @@ EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, cha
         return refuse(c, "there is no room for the state");
     }
     memcpy(bytes, state, sizeof(Values));
+    if (is(c, "write past the state")) {
+        bytes[size] = 1;
+    }
     return misbehave(c, "fmi2SerializeFMUstate");
 }
 
@@ -268,5 +271,8 @@ EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const char bytes[], s
     }
     *state = malloc(sizeof(Values));
     memcpy(*state, bytes, sizeof(Values));
+    if (is(c, "change the constant state")) {
+        ((char *)bytes)[0] ^= 1;
+    }
     return misbehave(c, "fmi2DeSerializeFMUstate");
 }

@@ -141,6 +141,16 @@ fn a_write_beside_an_array_or_into_a_constant_one_is_an_error() {
             "fmi2SetReal",
             "changed its constant array of value references",
         ),
+        (
+            "write past the state",
+            "fmi2SerializeFMUstate",
+            "wrote past the end of its array of bytes",
+        ),
+        (
+            "change the constant state",
+            "fmi2DeSerializeFMUstate",
+            "changed its constant array of bytes",
+        ),
     ] {
         let (status, found) = new(behaviour, &[]);
         assert_eq!(status, Some(1), "{found:#?}");

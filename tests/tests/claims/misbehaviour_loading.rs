@@ -84,11 +84,12 @@ fn an_impossible_size_of_a_state_is_an_error_of_the_function() {
 }
 
 /// Behaviours that write where an FMU must not, with function and sentence.
-const WRITES: [(&str, &str, &str); 4] = [
+const WRITES: [(&str, &str, &str); 5] = [
     ("write past the array", "fmi2GetReal", "wrote past the end of its array of values"),
     ("write before the array", "fmi2GetReal", "wrote before the start of its array of values"),
     ("change constant values", "fmi2SetReal", "changed its constant array of values"),
     ("change constant references", "fmi2SetReal", "changed its constant array of value references"),
+    ("write past the state", "fmi2SerializeFMUstate", "wrote past the end of its array of bytes"),
 ];
 
 #[test]
@@ -97,7 +98,9 @@ fn with_a_log_of_calls_a_write_beside_an_array_ends_the_run() {
     let log = folder.path().join("calls.txt").display().to_string();
     for (behaviour, function, sentence) in WRITES {
         for way in WAYS {
-            let more = [way, &["--log-calls", &log, "--set", "a.u=1"]].concat();
+            let checkpoint = folder.path().join("checkpoint").display().to_string();
+            let more = [way, &["--log-calls", &log, "--set", "a.u=1", "--checkpoint", &checkpoint]]
+                .concat();
             let run = Run::pair(&CFmu::that(behaviour), &more);
             assert!(matches!(run.status, Some(1 | 2)), "{behaviour}: {}", run.message);
             run.says(&["a", function, sentence]);

@@ -1,7 +1,7 @@
 //! The calls of an instance: one method for each function of the standard.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
-use std::ffi::CStr;
+use std::ffi::{CStr, CString};
 
 use fmu_description::abi::{fmi2Boolean, fmi2EventInfo};
 
@@ -23,9 +23,9 @@ macro_rules! function {
 }
 pub(super) use function;
 
-/// Defines a method for each function: its arguments, and the C arguments built from them.
-macro_rules! calls {
-    ($($method:ident($($argument:ident: $type:ty),*) = $name:literal($($c:expr),*);)*) => {
+/// Defines a method for each function that changes the mode only.
+macro_rules! modes {
+    ($($method:ident = $name:literal;)*) => {
         impl Component {
             $(#[doc = concat!("Calls `", $name, "`.")]
             ///
@@ -34,28 +34,22 @@ macro_rules! calls {
             /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK`
             /// nor `fmi2Warning`.
             #[inline]
-            pub fn $method(&mut self, $($argument: $type),*) -> Result<(), CallError> {
+            pub fn $method(&mut self) -> Result<(), CallError> {
                 let function = function!(self.$method, $name);
-                // SAFETY: the instance is alive; slices that belong together have the same length.
-                let status = unsafe { function(self.pointer, $($c),*) };
+                // SAFETY: the instance is alive.
+                let status = unsafe { function(self.pointer) };
                 self.check($name, status)
             })*
         }
     };
 }
 
-calls! {
-    enter_initialization_mode() = "fmi2EnterInitializationMode"();
-    exit_initialization_mode() = "fmi2ExitInitializationMode"();
-    terminate() = "fmi2Terminate"();
-    set_real_input_derivatives(references: &[u32], orders: &[i32], values: &[f64]) =
-        "fmi2SetRealInputDerivatives"(references.as_ptr(), same_length(references, values),
-            orders[..references.len()].as_ptr(), values.as_ptr());
-    get_real_output_derivatives(references: &[u32], orders: &[i32], values: &mut [f64]) =
-        "fmi2GetRealOutputDerivatives"(references.as_ptr(), same_length(references, values),
-            orders[..references.len()].as_ptr(), values.as_mut_ptr());
-    enter_event_mode() = "fmi2EnterEventMode"();
-    enter_continuous_time_mode() = "fmi2EnterContinuousTimeMode"();
+modes! {
+    enter_initialization_mode = "fmi2EnterInitializationMode";
+    exit_initialization_mode = "fmi2ExitInitializationMode";
+    terminate = "fmi2Terminate";
+    enter_event_mode = "fmi2EnterEventMode";
+    enter_continuous_time_mode = "fmi2EnterContinuousTimeMode";
 }
 
 /// Defines the methods of the types whose values are copied.
@@ -198,10 +192,15 @@ impl Component {
         let function = function!(self.set_string, NAME);
         let count = same_length(references, values);
         let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
-        let pointers: Vec<_> = values.iter().map(|value| value.as_ptr()).collect();
-        // SAFETY: the instance is alive; as many references as terminated strings.
-        let call = |list, array| unsafe { function(self.pointer, list, count, array) };
-        self.check_guarded(NAME, canary::write(self.guards, references, &pointers, call))
+        let texts: Vec<_> = values.iter().map(CString::as_bytes_with_nul).collect();
+        let (pointer, guards) = (self.pointer, self.guards);
+        let done = canary::constants(guards, canary::STRING, &texts, |array| {
+            canary::constant(guards, canary::REFERENCES, references, |list| {
+                // SAFETY: the instance is alive; as many references as terminated strings.
+                (unsafe { function(pointer, list, count, array.cast()) }, None)
+            })
+        });
+        self.check_guarded(NAME, done)
     }
 
     /// Calls `fmi2GetString` and copies the strings.
@@ -233,6 +232,54 @@ impl Component {
         }
         self.place.leave();
         Ok(())
+    }
+
+    /// Calls `fmi2SetRealInputDerivatives`.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
+    #[inline]
+    pub fn set_real_input_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmi2SetRealInputDerivatives";
+        let function = function!(self.set_real_input_derivatives, NAME);
+        let (count, guards) = (same_length(references, values), self.guards);
+        let done = canary::constant(guards, canary::ORDERS, &orders[..count], |orders| {
+            // SAFETY: the instance is alive; as many references as orders and values.
+            let call = |list, array| unsafe { function(self.pointer, list, count, orders, array) };
+            canary::write(guards, references, values, call)
+        });
+        self.check_guarded(NAME, done)
+    }
+
+    /// Calls `fmi2GetRealOutputDerivatives`.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
+    #[inline]
+    pub fn get_real_output_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &mut [f64],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmi2GetRealOutputDerivatives";
+        let function = function!(self.get_real_output_derivatives, NAME);
+        let (count, guards) = (same_length(references, values), self.guards);
+        let done = canary::constant(guards, canary::ORDERS, &orders[..count], |orders| {
+            // SAFETY: the instance is alive; as many references as orders and values.
+            let call = |list, array| unsafe { function(self.pointer, list, count, orders, array) };
+            canary::read(guards, references, values, call)
+        });
+        self.check_guarded(NAME, done)
     }
 
     /// Calls `fmi2NewDiscreteStates`.
@@ -308,18 +355,16 @@ impl Component {
         const NAME: &str = "fmi2GetDirectionalDerivative";
         let function = function!(self.get_directional_derivative, NAME);
         let (unknown, known) = (same_length(unknowns, changes), same_length(knowns, seed));
-        // SAFETY: the instance is alive; arrays that belong together have the same length.
-        let status = unsafe {
-            function(
-                self.pointer,
-                unknowns.as_ptr(),
-                unknown,
-                knowns.as_ptr(),
-                known,
-                seed.as_ptr(),
-                changes.as_mut_ptr(),
-            )
-        };
-        self.check(NAME, status)
+        let (pointer, guards) = (self.pointer, self.guards);
+        let done = canary::constant(guards, canary::REFERENCES, knowns, |columns| {
+            canary::constant(guards, canary::SEED, seed, |seed| {
+                // SAFETY: the instance is alive; arrays that belong together have the same length.
+                let call = |rows, changes| unsafe {
+                    function(pointer, rows, unknown, columns, known, seed, changes)
+                };
+                canary::read(guards, unknowns, changes, call)
+            })
+        });
+        self.check_guarded(NAME, done)
     }
 }

@@ -17,7 +17,13 @@ const MOST_BYTES: usize = 1 << 30;
 /// Largest number of states or event indicators, as a protection against wrong numbers.
 const MOST_NUMBERS: usize = 1 << 20;
 
-const REFERENCES: &str = "value references";
+/// What arrays are called in a message.
+pub(super) const REFERENCES: &str = "value references";
+pub(super) const ORDERS: &str = "orders";
+pub(super) const SEED: &str = "seed values";
+pub(super) const STRING: &str = "characters of a string";
+pub(super) const BYTES: &str = "bytes";
+pub(super) const SIZES: &str = "sizes";
 const VALUES: &str = "values";
 
 /// A type whose values may have any bits.
@@ -86,6 +92,57 @@ fn bytes<T: Plain>(values: &[T]) -> &[u8] {
     unsafe { std::slice::from_raw_parts(values.as_ptr().cast(), size_of_val(values)) }
 }
 
+/// Makes a call with one more array, which it fills.
+#[inline]
+pub(super) fn filled<T: Plain>(
+    guards: bool,
+    what: &'static str,
+    values: &mut [T],
+    call: impl FnOnce(*mut T) -> Guarded,
+) -> Guarded {
+    if !guards {
+        return call(values.as_mut_ptr());
+    }
+    let mut array = Fence::new(values, what);
+    let (status, violation) = call(array.start());
+    values.copy_from_slice(array.values());
+    (status, violation.or_else(|| array.escaped()))
+}
+
+/// Makes a call with one more array, which is constant.
+#[inline]
+pub(super) fn constant<T: Plain>(
+    guards: bool,
+    what: &'static str,
+    values: &[T],
+    call: impl FnOnce(*const T) -> Guarded,
+) -> Guarded {
+    if !guards {
+        return call(values.as_ptr());
+    }
+    let mut array = Fence::new(values, what);
+    let (status, violation) = call(array.start());
+    (status, violation.or_else(|| array.changed(values)))
+}
+
+/// Makes a call with a constant array of pointers to constant bytes.
+pub(super) fn constants(
+    guards: bool,
+    what: &'static str,
+    values: &[&[u8]],
+    call: impl FnOnce(*const *const u8) -> Guarded,
+) -> Guarded {
+    if !guards {
+        let pointers: Vec<_> = values.iter().map(|bytes| bytes.as_ptr()).collect();
+        return call(pointers.as_ptr());
+    }
+    let mut copies: Vec<_> = values.iter().map(|bytes| Fence::new(bytes, what)).collect();
+    let pointers: Vec<_> = copies.iter_mut().map(|copy| copy.start().cast_const()).collect();
+    let (status, violation) = constant(guards, "pointers", &pointers, call);
+    let changed = || copies.iter().zip(values).find_map(|(copy, bytes)| copy.changed(bytes));
+    (status, violation.or_else(changed))
+}
+
 /// Makes a call that reads variables.
 #[inline]
 pub(super) fn read<T: Plain>(
@@ -94,13 +151,7 @@ pub(super) fn read<T: Plain>(
     values: &mut [T],
     call: impl FnOnce(*const u32, *mut T) -> c_int,
 ) -> Guarded {
-    if !guards {
-        return (call(references.as_ptr(), values.as_mut_ptr()), None);
-    }
-    let (mut list, mut array) = (Fence::new(references, REFERENCES), Fence::new(values, VALUES));
-    let status = call(list.start(), array.start());
-    values.copy_from_slice(array.values());
-    (status, list.changed(references).or_else(|| array.escaped()))
+    constant(guards, REFERENCES, references, |list| fill(guards, values, |array| call(list, array)))
 }
 
 /// Makes a call that sets variables.
@@ -111,12 +162,7 @@ pub(super) fn write<T: Plain>(
     values: &[T],
     call: impl FnOnce(*const u32, *const T) -> c_int,
 ) -> Guarded {
-    if !guards {
-        return (call(references.as_ptr(), values.as_ptr()), None);
-    }
-    let (mut list, mut array) = (Fence::new(references, REFERENCES), Fence::new(values, VALUES));
-    let status = call(list.start(), array.start());
-    (status, list.changed(references).or_else(|| array.changed(values)))
+    constant(guards, REFERENCES, references, |list| send(guards, values, |array| call(list, array)))
 }
 
 /// Makes a call that fills an array.
@@ -126,7 +172,7 @@ pub(super) fn fill<T: Plain>(
     values: &mut [T],
     call: impl FnOnce(*mut T) -> c_int,
 ) -> Guarded {
-    read(guards, &[], values, |_, values| call(values))
+    filled(guards, VALUES, values, |array| (call(array), None))
 }
 
 /// Makes a call with a constant array.
@@ -136,7 +182,7 @@ pub(super) fn send<T: Plain>(
     values: &[T],
     call: impl FnOnce(*const T) -> c_int,
 ) -> Guarded {
-    write(guards, &[], values, |_, values| call(values))
+    constant(guards, VALUES, values, |array| (call(array), None))
 }
 
 /// Returns `size` zero bytes for a state of the size that the FMU states.
@@ -217,6 +263,32 @@ mod tests {
         let references = "changed its constant array of value references";
         assert_eq!(found(Some(0), None, true), references);
         assert_eq!(found(Some(1), None, false), references);
+    }
+
+    #[test]
+    fn each_of_several_arrays_has_its_name() {
+        let found = |orders_at: Option<isize>, text_at: Option<isize>| {
+            let done = constant(true, ORDERS, &[1_i32, 2], |orders| {
+                constants(true, STRING, &[b"one\0", b"three\0"], |texts| {
+                    // SAFETY: within the margins.
+                    unsafe {
+                        orders_at.inspect(|at| orders.cast_mut().offset(*at).write(9));
+                        text_at
+                            .inspect(|at| texts.add(1).read().cast_mut().offset(*at).write(b'x'));
+                    }
+                    (0, None)
+                })
+            });
+            done.1.unwrap_or_default()
+        };
+        assert_eq!(found(None, None), "");
+        assert_eq!(found(Some(1), None), "changed its constant array of orders");
+        assert_eq!(found(Some(2), None), "wrote past the end of its array of orders");
+        assert_eq!(found(None, Some(0)), "changed its constant array of characters of a string");
+        assert_eq!(
+            found(None, Some(6)),
+            "wrote past the end of its array of characters of a string"
+        );
     }
 
     #[test]

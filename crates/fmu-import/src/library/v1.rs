@@ -8,7 +8,7 @@ mod functions;
 mod step;
 
 use std::cell::Cell;
-use std::ffi::{CStr, c_char, c_int};
+use std::ffi::{CStr, CString, c_char, c_int};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -274,12 +274,13 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmiSetRealInputDerivatives";
         let function = function!(self.set_input_derivatives, NAME);
-        let (count, orders) = (same_length(references, values), &orders[..references.len()]);
-        // SAFETY: the instance is alive; as many references as orders and values.
-        let status = unsafe {
-            function(self.pointer, references.as_ptr(), count, orders.as_ptr(), values.as_ptr())
-        };
-        self.check(NAME, status)
+        let (count, guards) = (same_length(references, values), self.guards);
+        let done = canary::constant(guards, canary::ORDERS, &orders[..count], |orders| {
+            // SAFETY: the instance is alive; as many references as orders and values.
+            let call = |list, array| unsafe { function(self.pointer, list, count, orders, array) };
+            canary::write(guards, references, values, call)
+        });
+        self.check_guarded(NAME, done)
     }
 
     /// Calls `fmiGetRealOutputDerivatives`.
@@ -291,12 +292,13 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmiGetRealOutputDerivatives";
         let function = function!(self.get_output_derivatives, NAME);
-        let (count, orders) = (same_length(references, values), &orders[..references.len()]);
-        // SAFETY: the instance is alive; as many references as orders and values.
-        let status = unsafe {
-            function(self.pointer, references.as_ptr(), count, orders.as_ptr(), values.as_mut_ptr())
-        };
-        self.check(NAME, status)
+        let (count, guards) = (same_length(references, values), self.guards);
+        let done = canary::constant(guards, canary::ORDERS, &orders[..count], |orders| {
+            // SAFETY: the instance is alive; as many references as orders and values.
+            let call = |list, array| unsafe { function(self.pointer, list, count, orders, array) };
+            canary::read(guards, references, values, call)
+        });
+        self.check_guarded(NAME, done)
     }
 
     /// Calls `fmiSetString`.
@@ -309,11 +311,15 @@ impl Component {
         let function = function!(self.set_string, NAME);
         let count = same_length(references, values);
         let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
-        let pointers: Vec<_> = values.iter().map(|value| value.as_ptr()).collect();
-        // SAFETY: the instance is alive; as many references as terminated strings.
-        let status =
-            unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_ptr()) };
-        self.check(NAME, status)
+        let texts: Vec<_> = values.iter().map(CString::as_bytes_with_nul).collect();
+        let (pointer, guards) = (self.pointer, self.guards);
+        let done = canary::constants(guards, canary::STRING, &texts, |array| {
+            canary::constant(guards, canary::REFERENCES, references, |list| {
+                // SAFETY: the instance is alive; as many references as terminated strings.
+                (unsafe { function(pointer, list, count, array.cast()) }, None)
+            })
+        });
+        self.check_guarded(NAME, done)
     }
 
     /// Calls `fmiGetString` and copies the strings.
@@ -327,9 +333,8 @@ impl Component {
         let count = same_length(references, values);
         let mut pointers = vec![std::ptr::null(); count];
         // SAFETY: the instance is alive; as many references as pointers to write.
-        let status =
-            unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_mut_ptr()) };
-        self.check(NAME, status)?;
+        let call = |list, array| unsafe { function(self.pointer, list, count, array) };
+        self.check_guarded(NAME, canary::read(self.guards, references, &mut pointers, call))?;
         self.place.enter(&NAME);
         for (value, pointer) in values.iter_mut().zip(pointers) {
             value.clear();

@@ -2,6 +2,7 @@
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use super::super::calls::function;
+use super::super::canary;
 use super::Component;
 use super::functions;
 use slave::{CallError, CompletedStep, EventInfo, absent};
@@ -14,9 +15,10 @@ macro_rules! vectors {
             #[inline]
             pub(crate) fn $method(&mut self, values: &mut [f64]) -> Result<(), CallError> {
                 let function = function!(self.$method, $name);
+                let count = values.len();
                 // SAFETY: the instance is alive; a place for each value.
-                let status = unsafe { function(self.pointer, values.as_mut_ptr(), values.len()) };
-                self.check($name, status)
+                let call = |array| unsafe { function(self.pointer, array, count) };
+                self.check_guarded($name, canary::fill(self.guards, values, call))
             })*
         }
     };
@@ -84,8 +86,8 @@ impl Component {
         const NAME: &str = "fmiSetContinuousStates";
         let function = function!(self.set_continuous_states, NAME);
         // SAFETY: the instance is alive; `states.len()` values.
-        let status = unsafe { function(self.pointer, states.as_ptr(), states.len()) };
-        self.check(NAME, status)
+        let call = |array| unsafe { function(self.pointer, array, states.len()) };
+        self.check_guarded(NAME, canary::send(self.guards, states, call))
     }
 
     /// Calls `fmiCompletedIntegratorStep`.

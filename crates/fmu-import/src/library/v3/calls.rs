@@ -5,8 +5,8 @@ use std::ffi::c_int;
 
 use fmu_description::Experiment;
 
-use super::super::c_string;
 use super::super::calls::{function, same_length};
+use super::super::{c_string, canary};
 use super::Component;
 use slave::{CallError, absent};
 
@@ -84,9 +84,9 @@ impl Component {
         self.log_call(NAME, || format!("{references:?}"));
         let count = same_length(references, values);
         // SAFETY: the instance is alive; as many references as values.
-        let status =
-            unsafe { function(self.pointer, references.as_ptr(), count, values.as_mut_ptr()) };
-        self.check_results(NAME, status, || format!(" {values:?}"))
+        let call = |list, array| unsafe { function(self.pointer, list, count, array) };
+        let done = canary::read(self.guards, references, values, call);
+        self.check_guarded(NAME, done, || format!(" {values:?}"))
     }
 
     /// Calls `fmi3SetClock` to activate clocks.
@@ -96,10 +96,8 @@ impl Component {
         self.log_call(NAME, || format!("{references:?}, active"));
         let values = vec![1_u8; references.len()];
         // SAFETY: the instance is alive; as many references as values.
-        let status = unsafe {
-            function(self.pointer, references.as_ptr(), references.len(), values.as_ptr())
-        };
-        self.check(NAME, status)
+        let call = |list, array| unsafe { function(self.pointer, list, values.len(), array) };
+        self.check_guarded(NAME, canary::write(self.guards, references, &values, call), String::new)
     }
 
     /// Calls `fmi3ActivateModelPartition` at `time` in s.
@@ -155,21 +153,21 @@ impl Component {
         const NAME: &str = "fmi3GetDirectionalDerivative";
         let function = function!(self.get_directional_derivative, NAME);
         self.log_call(NAME, || format!("{unknowns:?}, {knowns:?}, {seed:?}"));
-        // SAFETY: the instance is alive; each pointer comes with its number of values.
-        let status = unsafe {
-            function(
-                self.pointer,
-                unknowns.as_ptr(),
-                unknowns.len(),
-                knowns.as_ptr(),
-                knowns.len(),
-                seed.as_ptr(),
-                seed.len(),
-                changes.as_mut_ptr(),
-                changes.len(),
-            )
-        };
-        self.check_results(NAME, status, || format!(" {changes:?}"))
+        let (pointer, guards) = (self.pointer, self.guards);
+        let (rows, columns) = (unknowns.len(), knowns.len());
+        let (seeds, results) = (seed.len(), changes.len());
+        let done = canary::constant(guards, canary::REFERENCES, knowns, |knowns| {
+            canary::constant(guards, canary::SEED, seed, |seed| {
+                // SAFETY: the instance is alive; each pointer comes with its number of values.
+                let call = |unknowns, changes| unsafe {
+                    function(
+                        pointer, unknowns, rows, knowns, columns, seed, seeds, changes, results,
+                    )
+                };
+                canary::read(guards, unknowns, changes, call)
+            })
+        });
+        self.check_guarded(NAME, done, || format!(" {changes:?}"))
     }
 
     /// Calls `fmi3GetOutputDerivatives`. `values` has as many values as the elements of the outputs
@@ -184,17 +182,13 @@ impl Component {
         let function = function!(self.get_output_derivatives, NAME);
         self.log_call(NAME, || format!("{references:?}, orders {orders:?}"));
         let count = same_length(references, orders);
-        // SAFETY: the instance is alive; as many references as orders, and `values.len()` values.
-        let status = unsafe {
-            function(
-                self.pointer,
-                references.as_ptr(),
-                count,
-                orders.as_ptr(),
-                values.as_mut_ptr(),
-                values.len(),
-            )
-        };
-        self.check_results(NAME, status, || format!(" {values:?}"))
+        let (pointer, guards, length) = (self.pointer, self.guards, values.len());
+        let done = canary::constant(guards, canary::ORDERS, orders, |orders| {
+            // SAFETY: the instance is alive; as many references as orders, and `length` values.
+            let call =
+                |list, array| unsafe { function(pointer, list, count, orders, array, length) };
+            canary::read(guards, references, values, call)
+        });
+        self.check_guarded(NAME, done, || format!(" {values:?}"))
     }
 }

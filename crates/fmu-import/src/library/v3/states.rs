@@ -79,9 +79,11 @@ impl Component {
             canary::bytes_of_state(size).map_err(|failure| self.failed(SIZE, failure))?;
         let function = function!(self.serialize_state, NAME);
         self.log_call(NAME, String::new);
-        // SAFETY: the instance is alive, the state is its own; `size` bytes to write to.
-        let status = unsafe { function(self.pointer, state, bytes.as_mut_ptr(), bytes.len()) };
-        self.check(NAME, status)?;
+        let done = canary::filled(self.guards, canary::BYTES, &mut bytes, |array| {
+            // SAFETY: the instance is alive, the state is its own; `size` bytes to write to.
+            (unsafe { function(self.pointer, state, array, size) }, None)
+        });
+        self.check_guarded(NAME, done, String::new)?;
         Ok(bytes)
     }
 
@@ -91,9 +93,11 @@ impl Component {
         let mut state = null_mut();
         let function = function!(self.deserialize_state, NAME);
         self.log_call(NAME, String::new);
-        // SAFETY: the instance is alive; `bytes.len()` bytes to read, one state to write to.
-        let status = unsafe { function(self.pointer, bytes.as_ptr(), bytes.len(), &raw mut state) };
-        let done = self.check(NAME, status).and_then(|()| self.set_state(state));
+        let done = canary::constant(self.guards, canary::BYTES, bytes, |array| {
+            // SAFETY: the instance is alive; `bytes.len()` bytes to read, one state to write to.
+            (unsafe { function(self.pointer, array, bytes.len(), &raw mut state) }, None)
+        });
+        let done = self.check_guarded(NAME, done, String::new).and_then(|()| self.set_state(state));
         self.free_state(&mut state);
         done
     }

@@ -1,7 +1,7 @@
 //! Get and set: one method for each type. As many values as the elements of all variables together.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
-use std::ffi::CStr;
+use std::ffi::{CStr, CString};
 
 use super::super::calls::function;
 use super::super::{c_string, canary};
@@ -72,11 +72,15 @@ impl Component {
         let function = function!(self.set_string, NAME);
         self.log_call(NAME, || format!("{references:?}, {values:?}"));
         let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
-        let pointers: Vec<_> = values.iter().map(|text| text.as_ptr()).collect();
-        let (count, length) = (references.len(), pointers.len());
-        // SAFETY: the instance is alive; both pointers come with their number of values.
-        let call = |list, array| unsafe { function(self.pointer, list, count, array, length) };
-        let done = canary::write(self.guards, references, &pointers, call);
+        let texts: Vec<_> = values.iter().map(CString::as_bytes_with_nul).collect();
+        let (pointer, guards) = (self.pointer, self.guards);
+        let (count, length) = (references.len(), texts.len());
+        let done = canary::constants(guards, canary::STRING, &texts, |array| {
+            canary::constant(guards, canary::REFERENCES, references, |list| {
+                // SAFETY: the instance is alive; both pointers come with their number of values.
+                (unsafe { function(pointer, list, count, array.cast(), length) }, None)
+            })
+        });
         self.check_guarded(NAME, done, String::new)
     }
 
@@ -118,20 +122,16 @@ impl Component {
         let function = function!(self.set_binary, NAME);
         self.log_call(NAME, || format!("{references:?}, {values:?}"));
         let sizes: Vec<_> = values.iter().map(Vec::len).collect();
-        let pointers: Vec<_> = values.iter().map(Vec::as_ptr).collect();
-        let (count, length) = (references.len(), pointers.len());
-        // SAFETY: the instance is alive; as many sizes as pointers, each to as many bytes.
-        let status = unsafe {
-            function(
-                self.pointer,
-                references.as_ptr(),
-                count,
-                sizes.as_ptr(),
-                pointers.as_ptr(),
-                length,
-            )
-        };
-        self.check(NAME, status)
+        let contents: Vec<_> = values.iter().map(Vec::as_slice).collect();
+        let (pointer, guards) = (self.pointer, self.guards);
+        let (count, length) = (references.len(), contents.len());
+        let done = canary::constants(guards, canary::BYTES, &contents, |array| {
+            // SAFETY: the instance is alive; as many sizes as pointers, each to as many bytes.
+            let call =
+                |list, sizes| unsafe { function(pointer, list, count, sizes, array, length) };
+            canary::write(guards, references, &sizes, call)
+        });
+        self.check_guarded(NAME, done, String::new)
     }
 
     /// Calls `fmi3GetBinary` and copies the bytes.
@@ -146,18 +146,14 @@ impl Component {
         let mut sizes = vec![0_usize; values.len()];
         let mut pointers = vec![std::ptr::null::<u8>(); values.len()];
         let (count, length) = (references.len(), pointers.len());
-        // SAFETY: the instance is alive; as many places for sizes as for pointers.
-        let status = unsafe {
-            function(
-                self.pointer,
-                references.as_ptr(),
-                count,
-                sizes.as_mut_ptr(),
-                pointers.as_mut_ptr(),
-                length,
-            )
-        };
-        self.check(NAME, status)?;
+        let (pointer, guards) = (self.pointer, self.guards);
+        let done = canary::filled(guards, canary::SIZES, &mut sizes, |sizes| {
+            // SAFETY: the instance is alive; as many places for sizes as for pointers.
+            let call =
+                |list, array| unsafe { function(pointer, list, count, sizes, array, length) };
+            canary::read(guards, references, &mut pointers, call)
+        });
+        self.check_guarded(NAME, done, String::new)?;
         self.place.enter(&NAME);
         for (value, (pointer, size)) in values.iter_mut().zip(pointers.into_iter().zip(sizes)) {
             value.clear();
