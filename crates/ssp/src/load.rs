@@ -324,6 +324,10 @@ pub(super) fn check_runnable(fmu: &Unpacked) -> Result<(), String> {
                 .to_owned(),
         );
     };
+    // A library may be built from source code when the FMU is opened.
+    if fmu.has_sources() {
+        return Ok(());
+    }
     fmu.library(identifier).map(|_| ()).map_err(|error| error.to_string())
 }
 

@@ -50,6 +50,27 @@ fn a_built_fmu_gives_the_results_of_its_library_and_is_built_once() {
 }
 
 #[test]
+fn an_fmu_of_a_system_structure_is_built_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let _ = CFmu::well_behaved().in_source().write(folder.path(), "slave");
+    let structure = r#"<?xml version="1.0" encoding="UTF-8"?>
+<ssd:SystemStructureDescription xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription" version="1.0" name="s">
+  <ssd:System name="s">
+    <ssd:Elements>
+      <ssd:Component name="a" type="application/x-fmu-sharedlibrary" source="slave.fmu"/>
+    </ssd:Elements>
+  </ssd:System>
+</ssd:SystemStructureDescription>"#;
+    std::fs::write(folder.path().join("SystemStructure.ssd"), structure).unwrap();
+    let words = ["run", "SystemStructure.ssd", "--stop-time", "1", "--step", "0.0625"];
+    let refused = run(folder.path(), "cc", &words);
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert!(said(&refused).contains("--compile"), "{}", said(&refused));
+    let done = run(folder.path(), "cc", &[&words[..], &["--compile"]].concat());
+    assert!(done.status.success(), "{}", said(&done));
+}
+
+#[test]
 fn check_tries_a_built_fmu() {
     let folder = tempfile::tempdir().unwrap();
     let _ = CFmu::well_behaved().in_source().write(folder.path(), "slave");
