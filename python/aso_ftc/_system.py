@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
 from ._description import Variable
+from ._errors import Error
 from ._results import Results
 
 if TYPE_CHECKING:
@@ -285,7 +286,7 @@ class System:
 
         A folder has the hash of the names and hashes of its files.
         """
-        return {path: _hash(path) for path in sorted(set(self._named_files()))}
+        return {path: hash_of_file(path) for path in sorted(set(self._named_files()))}
 
     def with_files(self, paths: Mapping[str, PathLike]) -> System:
         """Return a copy that reads other files: absolute path to new path, as for :meth:`files`."""
@@ -622,7 +623,7 @@ def _changes(
     return changes
 
 
-def _hash(path: str) -> str:
+def hash_of_file(path: str) -> str:
     """Return the SHA-256 of a file, or of a folder."""
     digest = hashlib.sha256()
     if os.path.isdir(path):
@@ -630,9 +631,12 @@ def _hash(path: str) -> str:
             folders.sort()
             for name in sorted(names):
                 inner = os.path.join(folder, name)
-                digest.update(os.path.relpath(inner, path).encode() + b"\0" + _hash(inner).encode())
+                digest.update(os.path.relpath(inner, path).encode() + b"\0" + hash_of_file(inner).encode())
         return digest.hexdigest()
-    with open(path, "rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
+    try:
+        with open(path, "rb") as file:
+            while block := file.read(1 << 20):
+                digest.update(block)
+    except OSError as error:
+        raise Error(f"cannot read {path}: {error.strerror}") from error
     return digest.hexdigest()

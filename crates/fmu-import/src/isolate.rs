@@ -142,8 +142,9 @@ pub enum IsolateError {
     },
     /// The program started but did not become a worker.
     #[error(
-        "{}, started for {instance} as `{WORKER}`, did not become a worker: it {failure}; its `main` \
-         must first call `fmu_import::isolate::worker()` if its first argument is {WORKER}",
+        "{}, started for {instance} as `{WORKER}`, did not become a worker: it {failure}; either it \
+         said why, or its `main` does not first call `fmu_import::isolate::worker()` if its first argument \
+         is {WORKER}",
         executable.display()
     )]
     NoWorker {

@@ -16,7 +16,7 @@ import numpy as np
 from .. import _core
 from .._errors import ConfigurationError, Error
 from .._paper import paper
-from .._system import System, fault
+from .._system import System, fault, hash_of_file
 from ._changes import arguments, changes
 from ._entries import TABLES, fail, finite, only, positive, table
 from ._faults import NO_FAULT, FaultCase, cases, disturbances
@@ -312,7 +312,7 @@ class Campaign:
         """Return everything that the results depend on, for the manifest of the folder."""
         return {
             "system": self.system.to_dict(),
-            "files": {**self.system.files(), **{path: _digest(path) for path, _ in self.functions.values()}},
+            "files": {**self.system.files(), **{path: hash_of_file(path) for path, _ in self.functions.values()}},
             "seed": self.seed,
             "design": self.plan.design,
             "runs": len(self.plan),
@@ -441,10 +441,6 @@ def _function(place: str, text: Any, folder: Path) -> tuple[str, str]:
     if not file.is_file():
         raise fail(place, f"there is no file {file}")
     return str(file), name
-
-
-def _digest(path: str) -> str:
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def _digest_of_plan(plan: Plan) -> str:
