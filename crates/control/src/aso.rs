@@ -30,13 +30,11 @@
 //! In sampled time the same equations hold with x[k+1], f[k+1] for x', f'; constant faults have
 //! `A_f` = I.
 
-mod gains;
-mod plant;
-
-pub use gains::{Estimator, Gains};
-pub use plant::FaultyPlant;
+pub use crate::faulty_plant::FaultyPlant;
+pub use crate::gains::{Estimator, Gains};
 
 use crate::controller::controller;
+use crate::faults::ExtendedPlant;
 use crate::placement::{Alternatives, Placement, Quality, alternatives, alternatives_balanced};
 use crate::robustness::{Loop, least_sensitive};
 use crate::{Domain, Error, StateSpace, check};
@@ -169,7 +167,7 @@ pub fn design(
 
 /// [`design`] with feedback of the first `states` states only; the other states are a measurement
 /// filter.
-pub(crate) fn design_feedback(
+fn design_feedback(
     plant: &FaultyPlant,
     states: usize,
     controller_poles: &[Complex<f64>],
@@ -190,6 +188,29 @@ pub(crate) fn design_feedback(
     let (pairs, given) = ((&feedbacks, &observers), (Estimator::Prediction, &k_f));
     let (gains, [controller, observer]) = best_pair(plant, pairs, given, Domain::Continuous)?;
     Ok(AsoDesign { gains, cancellation_residual: residual, controller, observer })
+}
+
+impl ExtendedPlant {
+    /// Designs the controller as [`design`] does.
+    ///
+    /// A measurement filter belongs to the plant of the loop whose peaks of S are compared.
+    ///
+    /// `controller_poles`: one per state of the plant itself, the filter's states are not fed back;
+    /// `observer_poles`: one per state of the extended plant and per entry of `f_hat`; `k_f`: m x
+    /// q, or None for [`FaultyPlant::compensation_gain`], whose columns for sensor faults and for
+    /// rates are zero and which is -1 for an effectiveness that is lost.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`design`].
+    pub fn design(
+        &self,
+        controller_poles: &[Complex<f64>],
+        observer_poles: &[Complex<f64>],
+        k_f: Option<&DMatrix<f64>>,
+    ) -> Result<AsoDesign, Error> {
+        design_feedback(&self.plant, self.states, controller_poles, observer_poles, k_f)
+    }
 }
 
 /// Norm of B `K_f` + `F_a` relative to the norm of `F_a`, in the rows of the plant; zero if no

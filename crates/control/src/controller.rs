@@ -1,7 +1,8 @@
 //! The controller of [`crate::aso`] as one linear system, and the loop that it closes.
 
-use crate::aso::{Estimator, FaultyPlant, Gains};
 use crate::blocks::{block_2x2, stacked};
+use crate::faulty_plant::FaultyPlant;
+use crate::gains::{Estimator, Gains};
 use crate::tracking::integration;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;

@@ -4,12 +4,12 @@ mod hidden;
 mod visibility;
 
 pub use hidden::HiddenFault;
-pub(crate) use hidden::hidden_faults;
+use hidden::hidden_faults;
 pub use visibility::Visibility;
 
-use crate::aso::FaultyPlant;
 use crate::distance::{Distance, from_unobservable};
-use crate::rank::{Mode, Rank, observability, unobservable_modes};
+use crate::faulty_plant::FaultyPlant;
+use crate::rank::{Mode, Rank, observability, require_observable, unobservable_modes};
 use crate::stability::is_clearly_stable;
 use crate::zeros::{Zeros, zeros};
 use crate::{Domain, Error};
@@ -109,4 +109,70 @@ pub fn detectability(plant: &FaultyPlant, domain: Domain) -> Result<Detectabilit
         zeros: zeros(&plant.a, &plant.f_a, &plant.c)?,
         visibility: visibility::table(plant, domain)?,
     })
+}
+
+impl FaultyPlant {
+    /// Checks that an augmented observer with arbitrary eigenvalues exists: (`A_0`, `C_0`) is
+    /// observable.
+    ///
+    /// Equivalent conditions: (A, C) is observable, and at every eigenvalue s of `A_f`, with
+    /// eigenvectors in the columns of N, the matrix [A - s I, `F_a` N; C, 0] has full column rank.
+    /// The measurements then distinguish a fault that develops as e^(s t) from every motion of the
+    /// states. For constant and ramp faults s = 0, or 1 in sampled time. There must be at least as
+    /// many measurements as N has columns. Singular values below 1e-12 of the largest count as
+    /// zero, rows and columns of the matrix scaled to length one. [`detectability`] returns the
+    /// hidden faults.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotObservable`], [`Error::TooManyFaults`], [`Error::HiddenFault`] with the
+    /// condition that fails; same as [`FaultyPlant::check`] otherwise.
+    pub fn check_observer_exists(&self) -> Result<(), Error> {
+        self.check()?;
+        require_observable(&self.a, &self.c)?;
+        let hidden = hidden_faults(self)?;
+        if let Some(first) = hidden.first() {
+            return Err(refusal(first, self.c.nrows()));
+        }
+        require_observable(&self.augmented_dynamics(), &self.augmented_output())?;
+        Ok(())
+    }
+
+    /// Checks that an augmented observer exists whose error decays: (`A_0`, `C_0`) is detectable.
+    /// Its fixed eigenvalues are those of the unobservable modes of (A, C), which are returned.
+    ///
+    /// The conditions of [`FaultyPlant::check_observer_exists`] with (A, C) detectable in place of
+    /// observable.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotDetectable`], [`Error::TooManyFaults`], [`Error::HiddenFault`] with the condition
+    /// that fails; same as [`FaultyPlant::check`] otherwise.
+    pub fn check_detectable(&self, domain: Domain) -> Result<Vec<Mode>, Error> {
+        self.check()?;
+        let hidden = hidden_faults(self)?;
+        if let Some(first) = hidden.first() {
+            return Err(refusal(first, self.c.nrows()));
+        }
+        let (a_0, c_0) = (self.augmented_dynamics(), self.augmented_output());
+        let modes = unobservable_modes(&a_0, &c_0)?;
+        for Mode { eigenvalue, .. } in &modes {
+            if !is_clearly_stable(*eigenvalue, &a_0, domain)? {
+                return Err(Error::NotDetectable { eigenvalue: *eigenvalue });
+            }
+        }
+        Ok(modes)
+    }
+}
+
+fn refusal(hidden: &HiddenFault, measurements: usize) -> Error {
+    if hidden.channels > measurements {
+        return Error::TooManyFaults { faults: hidden.channels, measurements };
+    }
+    Error::HiddenFault {
+        at: hidden.at,
+        rank: hidden.rank,
+        expected: hidden.expected,
+        faults: hidden.faults().iter().map(|fault| fault + 1).collect(),
+    }
 }

@@ -26,8 +26,9 @@ pub use learning::{Learning, learning};
 pub use proportional_integral::proportional_integral;
 pub use sliding_mode::{SlidingMode, sliding_mode};
 
-use crate::aso::{Estimator, FaultyPlant, Gains};
 use crate::eigen::eigenvalues;
+use crate::faulty_plant::FaultyPlant;
+use crate::gains::{Estimator, Gains};
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 

@@ -19,18 +19,10 @@
 //! A plant with y = C x + D u is one without D for a controller that filters y - D u, which it knows:
 //! [`crate::controller::with_feedthrough`]. A fault f of its input i enters both: columns i of B and D.
 
-mod loss;
-mod lossy_loop;
-
-pub use loss::{LossTolerance, estimated_loss, loss_tolerance};
-#[cfg(feature = "lmi")]
-pub use lossy_loop::CertifiedLoss;
-pub use lossy_loop::{ConstantLimit, LossyLoop};
-
-use crate::aso::{AsoDesign, FaultyPlant, design_feedback};
 use crate::blocks::{block_2x2, stacked};
+use crate::faulty_plant::FaultyPlant;
 use crate::{Error, check};
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 /// The model by which a fault develops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -172,27 +164,6 @@ impl ExtendedPlant {
             a_f,
         };
         Ok(Self { plant, filter: Some(filter.to_vec()), states: n, channels })
-    }
-
-    /// Designs the controller as [`crate::aso::design`] does.
-    ///
-    /// A measurement filter belongs to the plant of the loop whose peaks of S are compared.
-    ///
-    /// `controller_poles`: one per state of the plant itself, the filter's states are not fed back;
-    /// `observer_poles`: one per state of the extended plant and per entry of `f_hat`; `k_f`: m x
-    /// q, or None for [`FaultyPlant::compensation_gain`], whose columns for sensor faults and for
-    /// rates are zero and which is -1 for an effectiveness that is lost.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`crate::aso::design`].
-    pub fn design(
-        &self,
-        controller_poles: &[Complex<f64>],
-        observer_poles: &[Complex<f64>],
-        k_f: Option<&DMatrix<f64>>,
-    ) -> Result<AsoDesign, Error> {
-        design_feedback(&self.plant, self.states, controller_poles, observer_poles, k_f)
     }
 }
 

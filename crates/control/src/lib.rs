@@ -19,6 +19,7 @@
 //! | references: feedforward, integral action, anti-windup | [`tracking`] |
 //! | bound of the estimation error with a proof | [`theorem1`] |
 //! | weights over frequency | [`weight`] |
+//! | loss of effectiveness: its estimate, which losses the loop bears | [`losses`] |
 //! | linear matrix inequalities (feature `lmi`) | `lmi` |
 //! | the controller as one system, the closed loop, its stability | [`controller`], [`stability`] |
 //! | discretisation, matrix exponential | [`hold`], [`exponential`] |
@@ -62,11 +63,17 @@ pub mod estimation;
 pub mod exponential;
 #[cfg(feature = "design")]
 pub mod faults;
+#[cfg(feature = "design")]
+mod faulty_plant;
+#[cfg(feature = "design")]
+mod gains;
 pub mod hold;
 #[cfg(feature = "design")]
 pub mod isolation;
 #[cfg(feature = "lmi")]
 pub mod lmi;
+#[cfg(feature = "design")]
+pub mod losses;
 #[cfg(feature = "design")]
 pub mod lyapunov;
 #[cfg(feature = "design")]

@@ -14,6 +14,7 @@ mod existence;
 mod kalman;
 mod norm_filter;
 mod problem;
+mod semidefinite;
 
 pub use kalman::{KalmanFilter, kalman};
 pub use norm_filter::{NormFilter, NormFilterProblem};

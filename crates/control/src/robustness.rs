@@ -26,6 +26,7 @@ mod crossing;
 mod delay;
 mod disk;
 mod entries;
+mod family;
 mod held;
 mod hold_time;
 mod noise;
@@ -41,14 +42,15 @@ pub use choice::least_sensitive;
 pub use delay::{delay_margin, sampled_delay_margin};
 pub use disk::{DiskMargin, disk_margin, scaled_peak};
 pub use entries::{PeakDerivatives, peak_derivatives};
+pub use family::PlantFamily;
 pub use hold_time::{longest_hold, longest_period};
 pub use noise::noise_gains;
 pub use opened::OpenedLoop;
 pub use scaling::ScaledPeak;
 pub use speed::regulator_of_same_speed;
 pub use tolerance::{
-    Deviated, EntryFamily, PlantFamily, ToleranceSearch, ToleranceTest, Tolerances,
-    random_deviations, tolerance_test,
+    Deviated, EntryFamily, ToleranceSearch, ToleranceTest, Tolerances, random_deviations,
+    tolerance_test,
 };
 
 use crate::blocks::{block_2x2, stacked};

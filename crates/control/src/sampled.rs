@@ -4,11 +4,13 @@
 //! model. All gains are designed for the sampled plant, so that the loop is stable at every sample
 //! time at which the sampled plant is controllable and observable.
 
-use crate::aso::{Estimator, FaultyPlant, Gains, best_pair, place_controller};
+use crate::aso::{best_pair, place_controller};
 use crate::balance::power_of_two;
 use crate::blocks::{block_2x2, stacked};
 use crate::controller::{closed_loop, controller};
 use crate::faults::ExtendedPlant;
+use crate::faulty_plant::FaultyPlant;
+use crate::gains::{Estimator, Gains};
 use crate::hold::FirstOrderHold;
 use crate::placement::{
     Alternatives, Coordinates, DISCRETE, Quality, Wanted, alternatives_discrete, alternatives_in,

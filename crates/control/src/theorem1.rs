@@ -14,7 +14,8 @@ pub use radius::{RadiusCertificate, smallest_radius};
 #[cfg(feature = "lmi")]
 pub use ultimate_bound::{UltimateBound, ultimate_bound};
 
-use crate::aso::{FaultyPlant, Gains};
+use crate::faulty_plant::FaultyPlant;
+use crate::gains::Gains;
 use crate::lyapunov::{definite_range, lyapunov};
 use crate::rank::{Rank, observability, require_controllable};
 use crate::stability::instability;

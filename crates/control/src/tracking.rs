@@ -32,7 +32,6 @@ pub use integral_feedforward::{IntegralFeedforward, integral_feedforward};
 pub use interpolated_windup::{InterpolatedWindup, interpolated_windup};
 pub use windup::windup_gain;
 
-use crate::aso::Gains;
 use crate::blocks::{block_2x2, stacked};
 use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace, check};
@@ -283,12 +282,4 @@ pub enum Action<'a> {
     },
     /// By the feedforward `N_r`, m x t.
     Feedforward(&'a DMatrix<f64>),
-}
-
-impl Gains {
-    /// The number of integrals.
-    #[must_use]
-    pub fn integrals(&self) -> usize {
-        self.integral.as_ref().map_or(0, |integral| integral.gain.ncols())
-    }
 }

@@ -5,8 +5,8 @@ pub mod report;
 
 use control::aso::{FaultyPlant, Gains};
 use control::controller::controller;
-use control::faults::LossyLoop;
 use control::lmi::{Outcome, Region, common_reachable_set};
+use control::losses::LossyLoop;
 use control::{Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 

@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use control::aso::Estimator;
 use control::eigen::eigenvalues;
-use control::faults::{FaultEntry, loss_tolerance};
+use control::faults::FaultEntry;
+use control::losses::loss_tolerance;
 use control::placement::Quality;
 use control::{Domain, Error};
 use fmu_description::documentation::texts;

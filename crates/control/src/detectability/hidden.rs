@@ -21,9 +21,9 @@
 //! systems, Indagationes Mathematicae 72 (1969).
 
 use crate::Error;
-use crate::aso::FaultyPlant;
 use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;
+use crate::faulty_plant::FaultyPlant;
 use crate::svd::ComplexSvd;
 use nalgebra::{Complex, DMatrix, DVector};
 

@@ -1,6 +1,6 @@
 //! Tests which measurement shows which fault.
 
-use crate::aso::FaultyPlant;
+use crate::faulty_plant::FaultyPlant;
 use crate::rank::Staircase;
 use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace};

@@ -1,8 +1,8 @@
 //! The coordinates in which each fault acts on one output only.
 
 use super::{constant, eigenvalue};
-use crate::aso::FaultyPlant;
 use crate::eigen::eigenvalues;
+use crate::faulty_plant::FaultyPlant;
 use crate::placement::place_balanced;
 use crate::rank::controllable_part;
 use crate::sampled::place_estimator;

@@ -1,7 +1,8 @@
 //! Fast adaptive fault estimation.
 
 use super::{DirectForm, before_correction, eigenvalue, require_constant_faults};
-use crate::aso::{Estimator, FaultyPlant, Gains};
+use crate::faulty_plant::FaultyPlant;
+use crate::gains::{Estimator, Gains};
 use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};
 

@@ -1,7 +1,8 @@
 //! The learning observer of a sampled controller.
 
 use super::{DirectForm, OwnModel, eigenvalue, require_constant_faults, require_current};
-use crate::aso::{FaultyPlant, Gains};
+use crate::faulty_plant::FaultyPlant;
+use crate::gains::Gains;
 use crate::{Error, check};
 use nalgebra::DMatrix;
 

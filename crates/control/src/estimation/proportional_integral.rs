@@ -1,7 +1,8 @@
 //! The proportional-integral observer.
 
 use super::{before_correction, constant};
-use crate::aso::{FaultyPlant, Gains};
+use crate::faulty_plant::FaultyPlant;
+use crate::gains::Gains;
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 

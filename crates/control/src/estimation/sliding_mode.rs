@@ -1,7 +1,8 @@
 //! The sliding-mode observer of a sampled controller.
 
 use super::{DirectForm, OwnModel, constant, eigenvalue, require_constant_faults, require_current};
-use crate::aso::{FaultyPlant, Gains};
+use crate::faulty_plant::FaultyPlant;
+use crate::gains::Gains;
 use crate::{Error, check};
 use nalgebra::{DMatrix, DVector};
 

@@ -15,7 +15,7 @@ use super::affine::Affine;
 use super::coordinates::{Coordinates, mean_eigenvalue};
 use super::gain::{GainInequality, GainScaling, Norm};
 use super::region::{Disc, MARGIN, Region};
-use super::synthesis::{Performance, Synthesis};
+use super::requirement::{Performance, Synthesis};
 use super::{Outcome, Problem, Solution};
 use crate::balance::{divide_columns, divide_rows, power_of_two};
 use crate::eigen::eigenvalues;

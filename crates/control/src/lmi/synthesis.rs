@@ -2,41 +2,14 @@
 
 use super::gain::{GainBound, Norm, certify_gain};
 use super::observer::{Candidate, ObserverRequirements};
-use super::region::{Region, RegionCertificate, certify_region};
+use super::region::{Region, certify_region};
+use super::requirement::{Performance, Synthesis};
 use super::{Outcome, gain, region};
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 use std::slice::from_ref;
 
 const NOT_PROVEN: &str = "a gain was found, but the requirements could not be proven for it";
-
-/// A requirement on the gain from a disturbance w to an output z.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Performance {
-    /// n x k: how w acts on the states.
-    pub disturbance: DMatrix<f64>,
-    /// r x n: the part of z that depends on the states.
-    pub output: DMatrix<f64>,
-    /// How w acts on the measurement (p x k, for an observer), or the command on z (r x m, for a
-    /// state feedback).
-    pub feedthrough: DMatrix<f64>,
-    /// The norm.
-    pub norm: Norm,
-    /// The bound to keep; None for nearly the smallest one possible.
-    pub gamma: Option<f64>,
-}
-
-/// A gain and the certificates of its closed loop.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct Synthesis {
-    /// The gain.
-    pub gain: DMatrix<f64>,
-    /// The proof that the eigenvalues are in the region.
-    pub region: RegionCertificate,
-    /// The bound of the norm, if a performance was required; not above the given bound.
-    pub bound: Option<GainBound>,
-}
 
 /// An observer gain L: the eigenvalues of A - L C in a region, the gain from w to z bounded.
 ///
@@ -183,37 +156,6 @@ pub fn state_feedback(
         let coordinates = candidate.coordinates.transposed();
         prove(Candidate { gain, coordinates }, &dynamics, region, bound, domain)
     })
-}
-
-impl Performance {
-    /// Checks the matrices against the given shapes, and the bound.
-    pub(super) fn check(
-        &self,
-        disturbance: (usize, usize),
-        output: (usize, usize),
-        feedthrough: (usize, usize),
-    ) -> Result<(), Error> {
-        check::shape("disturbance", &self.disturbance, disturbance)?;
-        check::shape("output", &self.output, output)?;
-        check::shape("feedthrough", &self.feedthrough, feedthrough)?;
-        check::positive("gamma", self.gamma.unwrap_or(1.0))
-    }
-
-    /// The same requirement for the transposed system.
-    #[must_use]
-    pub fn transposed(&self) -> Self {
-        Self {
-            disturbance: self.output.transpose(),
-            output: self.disturbance.transpose(),
-            feedthrough: self.feedthrough.transpose(),
-            norm: match self.norm {
-                Norm::HInfinity => Norm::HInfinity,
-                Norm::EnergyToPeak => Norm::ImpulseToEnergy,
-                Norm::ImpulseToEnergy => Norm::EnergyToPeak,
-            },
-            gamma: self.gamma,
-        }
-    }
 }
 
 /// A bound to prove: that the norm of `system` is at most `gamma`, or any value if None.

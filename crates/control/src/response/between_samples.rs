@@ -2,8 +2,9 @@
 
 use super::fault_loop::{error_part, loop_dynamics, outputs, require_rows};
 use super::peak_gain;
-use crate::aso::{Estimator, FaultyPlant, Gains};
 use crate::faults::ExtendedPlant;
+use crate::faulty_plant::FaultyPlant;
+use crate::gains::{Estimator, Gains};
 use crate::hold::zero_order_hold;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;

@@ -1,7 +1,8 @@
 //! The effect of bounded faults and of reversals of friction on the closed loop.
 
 use super::{TimeResponse, Transient, fault_gains, fault_system, ramp_response, step_response};
-use crate::aso::{FaultyPlant, Gains};
+use crate::faulty_plant::FaultyPlant;
+use crate::gains::Gains;
 use crate::{Domain, Error, check};
 
 /// Relative width of the brackets of the peak gains; [`FaultBounds`] uses their upper ends.

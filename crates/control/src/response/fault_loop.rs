@@ -1,7 +1,8 @@
 //! Plant and controller of [`crate::aso`] as one system with the fault as its input.
 
 use super::peak_gain;
-use crate::aso::{Estimator, FaultyPlant, Gains};
+use crate::faulty_plant::FaultyPlant;
+use crate::gains::{Estimator, Gains};
 use crate::tracking::{IntegralAction, integration};
 use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;

@@ -1,6 +1,6 @@
 //! Peak gains of a sampled system by adding every sample of its impulse responses.
 
-use super::peak_gain::Bracket;
+use super::bracket::Bracket;
 use crate::balance::{Balance, divide_rows, multiply_columns};
 use crate::svd::norm_2;
 use crate::{Error, StateSpace};

@@ -1,25 +1,16 @@
 //! The peak-to-peak gain.
 
+use super::bracket::Bracket;
 use super::impulse_sum::impulse_sums;
 use super::interval::{Intervals, Length};
 use crate::{Domain, Error, StateSpace, check};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// Largest number of rounds; each round halves the intervals with the widest bounds.
 const ROUNDS: usize = 200;
 /// Intervals wait until no other one has bounds this many times as wide.
 const WIDEST: f64 = 32.0;
 const MOST_INTERVALS: usize = 1 << 18;
-
-/// Lower and upper bounds of a matrix, entry by entry.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct Bracket {
-    /// p x m.
-    pub lower: DMatrix<f64>,
-    /// p x m.
-    pub upper: DMatrix<f64>,
-}
 
 /// Computes the peak-to-peak gain from each input to each output.
 ///

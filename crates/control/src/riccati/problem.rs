@@ -1,8 +1,9 @@
 //! A Riccati equation in balanced coordinates, with R = I.
 
+use super::Weights;
 use super::doubling;
 use super::equation::RiccatiEquation;
-use super::{Weights, existence};
+use super::semidefinite::require_semidefinite;
 use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
 };
@@ -49,7 +50,7 @@ impl ScaledProblem {
         let free = check::in_range("A - B R^-1 N'", a - &b * n.transpose())?;
         let free_q =
             check::in_range("Q - N R^-1 N'", &weights.q - symmetric_part(&(&n * n.transpose())))?;
-        existence::require_semidefinite(&free_q, &weights.q)?;
+        require_semidefinite(&free_q, &weights.q)?;
         let scale = balancing(&free, &check::in_range("B R^-1 B'", &b * b.transpose())?, &free_q);
         let both = |m: &DMatrix<f64>| multiply_rows(&multiply_columns(m, &scale), &scale);
         let similar = |m: &DMatrix<f64>| divide_rows(&multiply_columns(m, &scale), &scale);

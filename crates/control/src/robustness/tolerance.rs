@@ -1,20 +1,12 @@
 //! Errors of the plant's parameters: random cases and a search for the worst one.
 
-use super::crossing::narrowed;
+use super::family::{Loops, PlantFamily};
 use super::worst_case::climb;
-use super::{Loop, held_plant};
-use crate::stability::instability;
-use crate::{Domain, Error, StateSpace, check};
+use crate::{Error, StateSpace, check};
 use nalgebra::DMatrix;
 
 /// Entries this near to 0 (relative to the largest of the matrix) or to +-1 are structural.
 const STRUCTURAL: f64 = 1e-9;
-/// The worst direction is followed up to this multiple of the tolerances.
-const REACH: f64 = 16.0;
-const FACTOR: f64 = 1.1;
-const FIRST: f64 = 1e-6;
-/// Below this multiple the tests are a factor of two apart.
-const SMALL: f64 = 0.05;
 
 /// The relative tolerances of the entries of A, B, C and D of a plant.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +47,7 @@ pub struct ToleranceTest {
     pub cases: u32,
     /// How many of them are stable.
     pub stable: u32,
-    /// [`instability`] of the worst plant.
+    /// [`crate::stability::instability`] of the worst plant.
     pub worst_instability: f64,
     /// The worst plant that was found.
     pub worst: StateSpace,
@@ -64,34 +56,6 @@ pub struct ToleranceTest {
     /// The multiple of the tolerances, in the direction of the worst plant, below which the loop is
     /// stable; None if it is stable at all [`PlantFamily::multiples`].
     pub first_unstable: Option<f64>,
-}
-
-/// The plants that a controller may meet: each parameter deviates by -1 to 1 of its tolerance.
-pub trait PlantFamily {
-    /// Why a plant cannot be had.
-    type Error: From<Error>;
-
-    /// The number of parameters.
-    fn count(&self) -> usize;
-
-    /// The plant, in continuous time, whose parameters deviate by these parts of their tolerances.
-    ///
-    /// # Errors
-    ///
-    /// The plant cannot be had.
-    fn plant(&self, deviations: &[f64]) -> Result<StateSpace, Self::Error>;
-
-    /// How a quantity changes with each deviation, from its derivatives with respect to the entries
-    /// of A, B, C and D. It guides the search only.
-    fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64>;
-
-    /// The rising multiples of the tolerances at which the worst direction is tested.
-    fn multiples(&self) -> Vec<f64> {
-        let factor = |multiple: f64| if multiple < SMALL { 2.0 } else { FACTOR };
-        let next =
-            |multiple: &f64| Some(multiple * factor(*multiple)).filter(|next| *next <= REACH);
-        std::iter::successors(Some(FIRST), next).collect()
-    }
 }
 
 /// Tests the stability of the loop of a family's plant and `controller` while the parameters of the
@@ -106,7 +70,7 @@ pub trait PlantFamily {
 ///
 /// # Errors
 ///
-/// Those of the family; same as [`Loop::new`], [`crate::hold::zero_order_hold`] and [`instability`].
+/// Those of the family; same as [`super::Loop::new`], [`crate::hold::zero_order_hold`] and [`crate::stability::instability`].
 pub fn tolerance_test<F: PlantFamily>(
     family: &F,
     controller: &StateSpace,
@@ -121,7 +85,7 @@ pub fn tolerance_test<F: PlantFamily>(
     search.result(&cases, climbed)
 }
 
-/// A plant of a family: its [`instability`] with the controller, and its deviations.
+/// A plant of a family: its [`crate::stability::instability`] with the controller, and its deviations.
 pub type Deviated = (f64, Vec<f64>);
 
 /// The parts of [`tolerance_test`], for a caller that runs cases and climbs at the same time.
@@ -139,7 +103,7 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
         random_deviations(self.family.count(), cases, seed)
     }
 
-    /// The [`instability`] of the loop with a plant of the family.
+    /// The [`crate::stability::instability`] of the loop with a plant of the family.
     ///
     /// # Errors
     ///
@@ -290,44 +254,5 @@ impl PlantFamily for EntryFamily<'_> {
     fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64> {
         let of = |entry: &Entry| entries[entry.matrix][(entry.row, entry.column)] * entry.size;
         self.entries.iter().map(of).collect()
-    }
-}
-
-/// The loops of a controller and all plants of a family.
-pub(super) struct Loops<'a, F> {
-    pub(super) family: &'a F,
-    pub(super) controller: &'a StateSpace,
-}
-
-impl<F: PlantFamily> Loops<'_, F> {
-    /// The dynamics of the loop with a plant, which is discretised for a sampled controller.
-    pub(super) fn dynamics(&self, mut plant: StateSpace) -> Result<DMatrix<f64>, Error> {
-        if let Domain::Sampled { period } = self.controller.domain {
-            plant = held_plant(&plant, period)?;
-        }
-        Ok(Loop::new(plant, self.controller.clone())?.dynamics())
-    }
-
-    pub(super) fn instability(&self, deviations: &[f64]) -> Result<f64, F::Error> {
-        let plant = self.family.plant(deviations)?;
-        Ok(instability(&self.dynamics(plant)?, self.controller.domain)?)
-    }
-
-    fn first_unstable(&self, deviations: &[f64]) -> Result<Option<f64>, F::Error> {
-        let value = |multiple: f64| {
-            let scaled: Vec<f64> = deviations.iter().map(|part| multiple * part).collect();
-            self.instability(&scaled)
-        };
-        let mut good = (0.0, f64::NAN);
-        for multiple in self.family.multiples() {
-            let found = value(multiple)?;
-            if found < 0.0 {
-                good = (multiple, found);
-                continue;
-            }
-            let bad = (multiple, found.max(f64::MIN_POSITIVE));
-            return Ok(Some(narrowed(good, bad, value)?.0));
-        }
-        Ok(None)
     }
 }

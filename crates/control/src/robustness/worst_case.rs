@@ -1,6 +1,6 @@
 //! The search for the worst plant within tolerances.
 
-use super::tolerance::{Loops, PlantFamily};
+use super::family::{Loops, PlantFamily};
 use crate::Domain;
 use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;

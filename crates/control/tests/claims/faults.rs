@@ -7,10 +7,9 @@ use crate::paper::{CONTROLLER_POLES, plant};
 use control::StateSpace;
 use control::aso::{AsoDesign, Estimator, FaultyPlant, Gains};
 use control::controller::controller;
-use control::faults::{
-    ExtendedPlant, Fault, FaultEntry, FaultKind, estimated_loss, loss_tolerance,
-};
+use control::faults::{ExtendedPlant, Fault, FaultEntry, FaultKind};
 use control::hold::FirstOrderHold;
+use control::losses::{estimated_loss, loss_tolerance};
 use control::placement::real_poles;
 use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};

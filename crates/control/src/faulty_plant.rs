@@ -1,10 +1,7 @@
 //! The plant with faults.
 
-use crate::detectability::{HiddenFault, hidden_faults};
-use crate::rank::{Mode, require_observable, unobservable_modes};
-use crate::stability::is_clearly_stable;
 use crate::svd::Svd;
-use crate::{Domain, Error, check};
+use crate::{Error, check};
 use nalgebra::DMatrix;
 
 /// Singular values of B below this part of the largest count as zero.
@@ -80,63 +77,11 @@ impl FaultyPlant {
         (-&self.f_a).resize_vertically(n + q, 0.0)
     }
 
-    /// Checks that an augmented observer with arbitrary eigenvalues exists: (`A_0`, `C_0`) is
-    /// observable.
-    ///
-    /// Equivalent conditions: (A, C) is observable, and at every eigenvalue s of `A_f`, with
-    /// eigenvectors in the columns of N, the matrix [A - s I, `F_a` N; C, 0] has full column rank.
-    /// The measurements then distinguish a fault that develops as e^(s t) from every motion of the
-    /// states. For constant and ramp faults s = 0, or 1 in sampled time. There must be at least as
-    /// many measurements as N has columns. Singular values below 1e-12 of the largest count as
-    /// zero, rows and columns of the matrix scaled to length one. [`crate::detectability`] returns
-    /// the hidden faults.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::NotObservable`], [`Error::TooManyFaults`], [`Error::HiddenFault`] with the
-    /// condition that fails; same as [`FaultyPlant::check`] otherwise.
-    pub fn check_observer_exists(&self) -> Result<(), Error> {
-        self.check()?;
-        require_observable(&self.a, &self.c)?;
-        let hidden = hidden_faults(self)?;
-        if let Some(first) = hidden.first() {
-            return Err(refusal(first, self.c.nrows()));
-        }
-        require_observable(&self.augmented_dynamics(), &self.augmented_output())?;
-        Ok(())
-    }
-
-    /// Checks that an augmented observer exists whose error decays: (`A_0`, `C_0`) is detectable.
-    /// Its fixed eigenvalues are those of the unobservable modes of (A, C), which are returned.
-    ///
-    /// The conditions of [`FaultyPlant::check_observer_exists`] with (A, C) detectable in place of
-    /// observable.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::NotDetectable`], [`Error::TooManyFaults`], [`Error::HiddenFault`] with the condition
-    /// that fails; same as [`FaultyPlant::check`] otherwise.
-    pub fn check_detectable(&self, domain: Domain) -> Result<Vec<Mode>, Error> {
-        self.check()?;
-        let hidden = hidden_faults(self)?;
-        if let Some(first) = hidden.first() {
-            return Err(refusal(first, self.c.nrows()));
-        }
-        let (a_0, c_0) = (self.augmented_dynamics(), self.augmented_output());
-        let modes = unobservable_modes(&a_0, &c_0)?;
-        for Mode { eigenvalue, .. } in &modes {
-            if !is_clearly_stable(*eigenvalue, &a_0, domain)? {
-                return Err(Error::NotDetectable { eigenvalue: *eigenvalue });
-            }
-        }
-        Ok(modes)
-    }
-
     /// The `K_f`, m x q, that minimises the norm of B `K_f` + `F_a`; if there are several, the one
     /// of least norm.
     ///
     /// It always exists. The compensation is complete if the columns of `F_a` are in the range of
-    /// B; [`super::AsoDesign::cancellation_residual`] measures the part that is not cancelled.
+    /// B; [`crate::aso::AsoDesign::cancellation_residual`] measures the part that is not cancelled.
     /// Singular values of B below 1e-12 of the largest count as zero.
     ///
     /// # Errors
@@ -149,17 +94,5 @@ impl FaultyPlant {
         let gain = b.least_squares(&-&self.f_a, rank);
         let correction = b.least_squares(&(&self.b * &gain + &self.f_a), rank);
         Ok(gain - correction)
-    }
-}
-
-fn refusal(hidden: &HiddenFault, measurements: usize) -> Error {
-    if hidden.channels > measurements {
-        return Error::TooManyFaults { faults: hidden.channels, measurements };
-    }
-    Error::HiddenFault {
-        at: hidden.at,
-        rank: hidden.rank,
-        expected: hidden.expected,
-        faults: hidden.faults().iter().map(|fault| fault + 1).collect(),
     }
 }

@@ -1,6 +1,6 @@
 //! The gains of the controller.
 
-use super::FaultyPlant;
+use crate::faulty_plant::FaultyPlant;
 use crate::tracking::IntegralAction;
 use crate::{Error, check};
 use nalgebra::DMatrix;
@@ -58,6 +58,12 @@ impl Estimator {
 }
 
 impl Gains {
+    /// The number of integrals.
+    #[must_use]
+    pub fn integrals(&self) -> usize {
+        self.integral.as_ref().map_or(0, |integral| integral.gain.ncols())
+    }
+
     /// L = [`L_x`; -`L_f`], (n + q) x p, as in (10).
     #[must_use]
     pub fn observer_gain(&self) -> DMatrix<f64> {

@@ -1,8 +1,8 @@
 //! Loss of effectiveness: its estimate, and the loss up to which the loop is stable.
 
 use super::lossy_loop::{LossyLoop, grid};
-use crate::aso::FaultyPlant;
 use crate::check::as_number;
+use crate::faulty_plant::FaultyPlant;
 use crate::{Error, StateSpace};
 
 /// Largest number of points of the grid over several inputs.

@@ -7,9 +7,9 @@ mod certified;
 #[cfg(feature = "lmi")]
 pub use certified::CertifiedLoss;
 
-use crate::aso::FaultyPlant;
 use crate::check::as_number;
 use crate::controller::closed_loop;
+use crate::faulty_plant::FaultyPlant;
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;

@@ -1,0 +1,65 @@
+//! A requirement on a gain, and a gain that is proven to meet it.
+
+use super::gain::{GainBound, Norm};
+use super::region::RegionCertificate;
+use crate::{Error, check};
+use nalgebra::DMatrix;
+
+/// A requirement on the gain from a disturbance w to an output z.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Performance {
+    /// n x k: how w acts on the states.
+    pub disturbance: DMatrix<f64>,
+    /// r x n: the part of z that depends on the states.
+    pub output: DMatrix<f64>,
+    /// How w acts on the measurement (p x k, for an observer), or the command on z (r x m, for a
+    /// state feedback).
+    pub feedthrough: DMatrix<f64>,
+    /// The norm.
+    pub norm: Norm,
+    /// The bound to keep; None for nearly the smallest one possible.
+    pub gamma: Option<f64>,
+}
+
+/// A gain and the certificates of its closed loop.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Synthesis {
+    /// The gain.
+    pub gain: DMatrix<f64>,
+    /// The proof that the eigenvalues are in the region.
+    pub region: RegionCertificate,
+    /// The bound of the norm, if a performance was required; not above the given bound.
+    pub bound: Option<GainBound>,
+}
+
+impl Performance {
+    /// Checks the matrices against the given shapes, and the bound.
+    pub(super) fn check(
+        &self,
+        disturbance: (usize, usize),
+        output: (usize, usize),
+        feedthrough: (usize, usize),
+    ) -> Result<(), Error> {
+        check::shape("disturbance", &self.disturbance, disturbance)?;
+        check::shape("output", &self.output, output)?;
+        check::shape("feedthrough", &self.feedthrough, feedthrough)?;
+        check::positive("gamma", self.gamma.unwrap_or(1.0))
+    }
+
+    /// The same requirement for the transposed system.
+    #[must_use]
+    pub fn transposed(&self) -> Self {
+        Self {
+            disturbance: self.output.transpose(),
+            output: self.disturbance.transpose(),
+            feedthrough: self.feedthrough.transpose(),
+            norm: match self.norm {
+                Norm::HInfinity => Norm::HInfinity,
+                Norm::EnergyToPeak => Norm::ImpulseToEnergy,
+                Norm::ImpulseToEnergy => Norm::EnergyToPeak,
+            },
+            gamma: self.gamma,
+        }
+    }
+}

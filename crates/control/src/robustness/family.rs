@@ -1,0 +1,83 @@
+//! The plants that a controller may meet, and their loops.
+
+use super::crossing::narrowed;
+use super::{Loop, held_plant};
+use crate::stability::instability;
+use crate::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
+
+/// The worst direction is followed up to this multiple of the tolerances.
+const REACH: f64 = 16.0;
+const FACTOR: f64 = 1.1;
+const FIRST: f64 = 1e-6;
+/// Below this multiple the tests are a factor of two apart.
+const SMALL: f64 = 0.05;
+
+/// The plants that a controller may meet: each parameter deviates by -1 to 1 of its tolerance.
+pub trait PlantFamily {
+    /// Why a plant cannot be had.
+    type Error: From<Error>;
+
+    /// The number of parameters.
+    fn count(&self) -> usize;
+
+    /// The plant, in continuous time, whose parameters deviate by these parts of their tolerances.
+    ///
+    /// # Errors
+    ///
+    /// The plant cannot be had.
+    fn plant(&self, deviations: &[f64]) -> Result<StateSpace, Self::Error>;
+
+    /// How a quantity changes with each deviation, from its derivatives with respect to the entries
+    /// of A, B, C and D. It guides the search only.
+    fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64>;
+
+    /// The rising multiples of the tolerances at which the worst direction is tested.
+    fn multiples(&self) -> Vec<f64> {
+        let factor = |multiple: f64| if multiple < SMALL { 2.0 } else { FACTOR };
+        let next =
+            |multiple: &f64| Some(multiple * factor(*multiple)).filter(|next| *next <= REACH);
+        std::iter::successors(Some(FIRST), next).collect()
+    }
+}
+
+/// The loops of a controller and all plants of a family.
+pub(super) struct Loops<'a, F> {
+    pub(super) family: &'a F,
+    pub(super) controller: &'a StateSpace,
+}
+
+impl<F: PlantFamily> Loops<'_, F> {
+    /// The dynamics of the loop with a plant, which is discretised for a sampled controller.
+    pub(super) fn dynamics(&self, mut plant: StateSpace) -> Result<DMatrix<f64>, Error> {
+        if let Domain::Sampled { period } = self.controller.domain {
+            plant = held_plant(&plant, period)?;
+        }
+        Ok(Loop::new(plant, self.controller.clone())?.dynamics())
+    }
+
+    pub(super) fn instability(&self, deviations: &[f64]) -> Result<f64, F::Error> {
+        let plant = self.family.plant(deviations)?;
+        Ok(instability(&self.dynamics(plant)?, self.controller.domain)?)
+    }
+
+    /// The multiple of the deviations below which the loop is stable, if it is unstable at one of
+    /// [`PlantFamily::multiples`].
+    pub(super) fn first_unstable(&self, deviations: &[f64]) -> Result<Option<f64>, F::Error> {
+        let value = |multiple: f64| {
+            let scaled: Vec<f64> = deviations.iter().map(|part| multiple * part).collect();
+            self.instability(&scaled)
+        };
+        let mut good = (0.0, f64::NAN);
+        for multiple in self.family.multiples() {
+            let found = value(multiple)?;
+            if found < 0.0 {
+                good = (multiple, found);
+                continue;
+            }
+            let bad = (multiple, found.max(f64::MIN_POSITIVE));
+            return Ok(Some(narrowed(good, bad, value)?.0));
+        }
+        Ok(None)
+    }
+}
