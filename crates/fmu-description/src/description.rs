@@ -3,7 +3,6 @@
 //! (section 2.4).
 
 mod guid;
-pub(crate) mod hash_form;
 mod interface;
 mod kind;
 mod model_structure;
@@ -16,14 +15,13 @@ mod variable;
 mod version;
 mod words;
 
+pub use crate::defect::{ParseError, Position, Warning};
 pub use guid::Guid;
 pub use interface::{CoSimulation, ModelExchange, ScheduledExecution};
 pub use kind::{
     BinaryType, ClockType, IntegerType, IntervalVariability, Kind, RealType, SimpleType,
 };
 pub use model_structure::{ModelStructure, Unknown};
-pub(crate) use parse::read_xml;
-pub use parse::{ParseError, Position, Warning};
 pub use rules::{Problem, array_element, is_structured_name, misplaced_elements};
 pub use variable::{Dimension, Elements, ScalarVariable};
 pub use version::Version;
@@ -31,8 +29,9 @@ pub use words::{Causality, DependencyKind, Initial, Variability};
 
 use serde::Serialize;
 
+use crate::hash_form::{is_default, numbered};
+use crate::terminal::Terminal;
 use crate::unit::Unit;
-use hash_form::{is_default, numbered};
 
 /// `fmiModelDescription`, the root element.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -85,7 +84,7 @@ pub struct ModelDescription {
     pub scheduled_execution: Option<ScheduledExecution>,
     /// The terminals of FMI 3.0, which a file of their own describes.
     #[serde(skip)]
-    pub terminals: Vec<crate::terminals::Terminal>,
+    pub terminals: Vec<Terminal>,
     /// `isBusSimulationFMU` in the manifest of FMI-LS-BUS 1.0: whether the FMU is a bus to which others are connected.
     #[serde(skip)]
     pub is_bus_simulation: bool,

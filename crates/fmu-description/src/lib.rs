@@ -22,15 +22,18 @@ pub mod abi3;
 pub mod call_order;
 pub mod call_order3;
 pub mod can;
+mod defect;
 mod description;
 pub mod documentation;
 mod experiment;
+mod hash_form;
 pub mod limits;
 pub mod location;
 pub mod number;
 #[cfg(feature = "package")]
 pub mod package;
 pub mod similar;
+mod terminal;
 pub mod terminals;
 pub mod unit;
 pub mod xml;

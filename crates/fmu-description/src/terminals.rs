@@ -6,34 +6,11 @@ use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 
 use crate::description::{Causality, Kind, ModelDescription};
+pub use crate::terminal::{Terminal, TerminalMember};
 pub use read::read;
 
 /// The path in the archive.
 pub const PATH: &str = "terminalsAndIcons/terminalsAndIcons.xml";
-
-/// A terminal: variables that are connected together (FMI 3.0.2, section 2.4.9.2).
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Terminal {
-    /// `name`; that of a nested terminal follows after a dot: `outer.inner`.
-    pub name: String,
-    /// `matchingRule`: `plug`, `bus`, `sequence`, `none`, or one that a layered standard defines.
-    pub matching_rule: String,
-    /// `terminalKind`.
-    pub kind: Option<String>,
-    /// The members, in order; those of nested terminals are not among them.
-    pub members: Vec<TerminalMember>,
-}
-
-/// A variable of a terminal.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TerminalMember {
-    /// `memberName`; without it, that of the variable.
-    pub name: String,
-    /// `variableName`.
-    pub variable: String,
-    /// `variableKind`: `signal`, `inflow` or `outflow`.
-    pub kind: String,
-}
 
 /// Renders the terminals of a model: one bus, `signals`, with its inputs and outputs as members. A member
 /// has the name of its variable, so that tools connect the inputs and outputs with equal names of two FMUs

@@ -5,7 +5,7 @@ mod names;
 
 use serde::Serialize;
 
-use crate::description::hash_form::{is_default, numbered};
+use crate::hash_form::{is_default, numbered};
 
 use expression::Cursor;
 

@@ -1,8 +1,15 @@
 //! Reads XML files of FMI and SSP to trees of elements, with limits on size and depth.
 
+pub(crate) mod encoding;
+pub(crate) mod tree;
+
 use std::borrow::Cow;
 
-use crate::description::{ParseError, Position, read_xml};
+use crate::defect::{ParseError, Position};
+use crate::limits::exceeds;
+
+/// Maximum size in bytes of a file.
+pub(crate) const MOST_BYTES: usize = 512 << 20;
 
 /// An element: its attributes, child elements and text, which FMI 2.0 and SSP do not use.
 #[derive(Debug)]
@@ -27,7 +34,11 @@ pub struct Element {
 /// [`ParseError`] with line and column if the file is not well-formed, has a document type declaration
 /// (which could define entities), elements nested too deeply, or too many attributes.
 pub fn read(bytes: &[u8]) -> Result<Element, ParseError> {
-    read_xml(bytes)
+    if exceeds(bytes.len(), MOST_BYTES) {
+        return Err(ParseError::Length { limit: MOST_BYTES });
+    }
+    let (text, _) = encoding::decode(bytes)?;
+    Ok(tree::read_but(&text, |_| false)?.into_owned())
 }
 
 /// Returns whether XML 1.0 allows `character` (production 2).

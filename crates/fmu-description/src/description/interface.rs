@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::hash_form::{is_default, numbered};
+use crate::hash_form::{is_default, numbered};
 
 /// `ModelExchange`: identifier and capability flags (FMI 2.0.5, section 3.3.1;
 /// FMI 3.0.2, section 3.4).

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::DependencyKind;
-use super::hash_form::{is_default, numbered};
+use crate::hash_form::{is_default, numbered};
 
 /// `ModelStructure`: indices are 1-based positions in `ModelDescription::variables`. The value
 /// references of FMI 3.0 are converted when a file is read or written.

@@ -2,7 +2,6 @@
 
 mod attributes;
 mod definitions;
-mod encoding;
 mod fmi1;
 mod fmi2;
 mod fmi3;
@@ -10,127 +9,18 @@ mod schema;
 mod structure;
 mod variables;
 mod warning;
-mod xml;
-
-use std::fmt;
 
 use super::{ModelDescription, Version};
-use crate::limits::{HELP, exceeds};
+use crate::defect::{ParseError, Warning};
+use crate::limits::exceeds;
+use crate::xml::tree::{self, Element};
+use crate::xml::{MOST_BYTES, encoding};
 use attributes::{Node, WHITE_SPACE};
-pub use warning::Warning;
 use warning::Warnings;
-use xml::Element;
-
-/// The root element of an XML file, read with the limits for a model description.
-pub(crate) fn read_xml(bytes: &[u8]) -> Result<crate::xml::Element, ParseError> {
-    if exceeds(bytes.len(), ModelDescription::MOST_BYTES) {
-        return Err(ParseError::Length { limit: ModelDescription::MOST_BYTES });
-    }
-    let (text, _) = encoding::decode(bytes)?;
-    Ok(xml::read_but(&text, |_| false)?.into_owned())
-}
-
-/// A position in an XML file; both numbers count from 1, columns in characters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Position {
-    /// The line.
-    pub line: u32,
-    /// The column.
-    pub column: u32,
-}
-
-impl Position {
-    const START: Position = Position { line: 1, column: 1 };
-}
-
-impl fmt::Display for Position {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "line {}, column {}", self.line, self.column)
-    }
-}
-
-/// The error of parsing a text that is not the model description of an FMU.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ParseError {
-    /// The file is not text that the reader can decode.
-    #[error("expected XML in UTF-8, or in the encoding that it declares, found {found}")]
-    Encoding {
-        /// The encoding, or the position of the first invalid byte.
-        found: String,
-    },
-    /// The file is too long.
-    #[error("expected at most {limit} bytes, found more{HELP}")]
-    Length {
-        /// The limit in bytes.
-        limit: usize,
-    },
-    /// The file is not well-formed XML.
-    #[error("{at}: expected well-formed XML, found: {found}")]
-    Xml {
-        /// The position.
-        at: Position,
-        /// The reason.
-        found: String,
-    },
-    /// The file has a document type declaration, which FMI does not use and which could define
-    /// entities.
-    #[error("{at}: expected no document type declaration, found <!DOCTYPE")]
-    Doctype {
-        /// The position.
-        at: Position,
-    },
-    /// The file has more nesting or more attributes than the limit.
-    #[error("{at}: expected at most {limit} {what}, found more{help}")]
-    Limit {
-        /// The position.
-        at: Position,
-        /// The limited quantity.
-        what: &'static str,
-        /// The limit.
-        limit: usize,
-        /// [`HELP`] if the limit can be lifted, otherwise empty.
-        help: &'static str,
-    },
-    /// The file is of an unknown version of the standard.
-    #[error("{at}: expected fmiVersion 1.0, 2.0 or 3.0, found {found:?}")]
-    Version {
-        /// The position.
-        at: Position,
-        /// The version in the file.
-        found: String,
-    },
-    /// An element is missing, or there is one too many.
-    #[error("{at}: in <{element}>: expected {expected}, found {found}")]
-    Element {
-        /// The position of the parent element.
-        at: Position,
-        /// The parent element.
-        element: String,
-        /// The expected content.
-        expected: String,
-        /// The actual content.
-        found: String,
-    },
-    /// An attribute is missing or has an invalid value.
-    #[error("{at}: <{element}>, attribute {attribute}: expected {expected}, found {found}")]
-    Attribute {
-        /// The position of the element.
-        at: Position,
-        /// The element.
-        element: String,
-        /// The attribute.
-        attribute: &'static str,
-        /// The expected value.
-        expected: String,
-        /// The actual value.
-        found: String,
-    },
-}
 
 impl ModelDescription {
     /// Maximum size in bytes of a file that is read, unless [`crate::limits`] are lifted.
-    pub const MOST_BYTES: usize = 512 << 20;
+    pub const MOST_BYTES: usize = MOST_BYTES;
 
     /// Reads `modelDescription.xml` as [`ModelDescription::read`] does, without warnings.
     ///
@@ -182,7 +72,7 @@ impl ModelDescription {
             return Err(ParseError::Length { limit: Self::MOST_BYTES });
         }
         let (text, not_utf8) = encoding::decode(bytes)?;
-        let element = xml::read(&text)?;
+        let element = tree::read(&text)?;
         let version = version(&element)?;
         let warnings = Warnings::new(version);
         let root = Node { element: &element, warnings: &warnings };

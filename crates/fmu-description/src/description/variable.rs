@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::hash_form::{is_default, numbered};
 use super::{Causality, Initial, Kind, ModelDescription, RealType, Variability, Version};
+use crate::hash_form::{is_default, numbered};
 
 /// `ScalarVariable`, in FMI 3.0 an element named by the type: a scalar or an array.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

@@ -3,9 +3,10 @@
 use std::borrow::Cow;
 use std::str::FromStr;
 
-use super::ParseError;
-use super::warning::{Warning, Warnings, section};
-use super::xml::Element;
+use super::warning::{Warnings, section};
+use crate::defect::ParseError;
+use crate::defect::Warning;
+use crate::xml::tree::Element;
 
 /// The white space of XML.
 pub(super) const WHITE_SPACE: [char; 4] = [' ', '\t', '\r', '\n'];

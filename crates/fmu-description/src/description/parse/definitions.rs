@@ -1,7 +1,7 @@
 //! Reads what FMI 2.0 and 3.0 write in the same way: units, log categories, the default experiment.
 
-use super::ParseError;
 use super::attributes::Node;
+use crate::defect::ParseError;
 use crate::description::{DefaultExperiment, LogCategory, Version};
 use crate::unit::{BaseUnit, DisplayUnit, Unit};
 

@@ -2,11 +2,11 @@
 
 mod variables;
 
-use super::ParseError;
 use super::attributes::Node;
 use super::definitions::{experiment, structured_names};
 use super::schema;
 use super::variables::{integer_limits, real_limits};
+use crate::defect::ParseError;
 use crate::description::{
     CoSimulation, IntegerType, Kind, ModelDescription, ModelExchange, RealType, SimpleType, Version,
 };

@@ -2,7 +2,8 @@
 
 use super::attributes::Node;
 use super::definitions::{category, experiment, structured_names, unit};
-use super::{ParseError, schema, structure, variables};
+use super::{schema, structure, variables};
+use crate::defect::ParseError;
 use crate::description::{CoSimulation, ModelDescription, ModelExchange, Version};
 
 pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {

@@ -5,10 +5,10 @@ mod start;
 mod structure;
 mod variables;
 
-use super::ParseError;
 use super::attributes::Node;
 use super::definitions::{category, experiment, structured_names, unit};
 use super::schema;
+use crate::defect::ParseError;
 use crate::description::{
     CoSimulation, ModelDescription, ModelExchange, ScheduledExecution, Version,
 };

@@ -2,8 +2,8 @@
 
 use std::collections::HashSet;
 
-use super::ParseError;
 use super::attributes::{Node, WHITE_SPACE};
+use crate::defect::ParseError;
 use crate::description::{Causality, DependencyKind, ModelStructure, ScalarVariable, Unknown};
 
 pub(super) const ANYTHING: &str = "read as depending on anything";

@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
-use super::ParseError;
 use super::attributes::Node;
 use super::structure::{index, indices};
+use crate::defect::ParseError;
 use crate::description::{
     Causality, IntegerType, Kind, RealType, ScalarVariable, SimpleType, Variability,
 };
@@ -179,7 +179,7 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
 
 /// Returns the single child that gives the type of a variable or a type definition.
 pub(super) fn typed(element: Node<'_>) -> Result<Node<'_>, ParseError> {
-    let is_kind = |child: &&super::xml::Element<'_>| KINDS.contains(&child.name);
+    let is_kind = |child: &&crate::xml::tree::Element<'_>| KINDS.contains(&child.name);
     let mut found = element.element.children.iter().filter(is_kind);
     match (found.next(), found.next()) {
         (Some(only), None) => Ok(Node { element: only, ..element }),

@@ -1,43 +1,13 @@
-//! Warnings about content that breaks the standard and can still be read.
+//! Collects warnings about content that breaks the standard and can still be read.
 
 use std::cell::RefCell;
-use std::fmt;
 
-use super::Position;
-use super::xml::Element;
+use crate::defect::Warning;
 use crate::description::Version;
+use crate::xml::tree::Element;
 
 /// Maximum number of warnings that are kept; one more says that there were others.
 const KEPT: usize = 1000;
-
-/// A violation of the standard that is harmless, or has a clear meaning, in a simulation.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Warning {
-    /// The position of the element.
-    pub at: Position,
-    /// The subject: an element, or one of its attributes.
-    pub place: String,
-    /// The content that the standard requires.
-    pub expected: String,
-    /// The content of the file.
-    pub found: String,
-    /// The assumption that the reader made.
-    pub assumed: String,
-    /// Section of the standard: FMI 2.0.5 or 3.0.2, for FMI 1.0 the document on co-simulation.
-    pub section: &'static str,
-    /// Whether validation against the schema of the standard reports it too.
-    pub by_schema: bool,
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Warning { at, place, expected, found, assumed, section, .. } = self;
-        write!(
-            formatter,
-            "{at}: {place}: expected {expected}, found {found}; {assumed} (section {section})"
-        )
-    }
-}
 
 /// Collects warnings.
 #[derive(Debug)]

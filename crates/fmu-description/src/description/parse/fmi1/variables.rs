@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::description::parse::ParseError;
+use crate::defect::ParseError;
 use crate::description::parse::attributes::{Node, WHITE_SPACE};
 use crate::description::parse::structure::ANYTHING;
 use crate::description::parse::variables::{

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::description::parse::ParseError;
+use crate::defect::ParseError;
 use crate::description::parse::attributes::Node;
 use crate::description::{
     BinaryType, ClockType, IntegerType, IntervalVariability, Kind, RealType, SimpleType, Version,

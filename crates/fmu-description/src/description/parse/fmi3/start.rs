@@ -1,7 +1,7 @@
 //! Reads the start values of variables and arrays of FMI 3.0.
 
 use super::kinds::Precision;
-use crate::description::parse::ParseError;
+use crate::defect::ParseError;
 use crate::description::parse::attributes::{Node, WHITE_SPACE};
 use crate::description::{Elements, Kind, Version};
 

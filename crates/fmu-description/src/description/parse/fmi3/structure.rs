@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::variables::References;
-use crate::description::parse::ParseError;
+use crate::defect::ParseError;
 use crate::description::parse::attributes::Node;
 use crate::description::parse::structure::{ANYTHING, kinds, missing_outputs, words};
 use crate::description::{ModelStructure, ScalarVariable, Unknown};

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::kinds::{Types, attributes, blank, declared};
 use super::start;
-use crate::description::parse::ParseError;
+use crate::defect::ParseError;
 use crate::description::parse::attributes::{Node, WHITE_SPACE};
 use crate::description::parse::variables::{
     VARIABILITIES, VARIABLES, check_names, check_references,

@@ -1,5 +1,6 @@
 //! Encoding, well-formedness and positions of the file.
 
+use crate::defect::Position;
 use std::fmt::Write as _;
 
 use super::*;

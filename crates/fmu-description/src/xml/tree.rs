@@ -11,7 +11,7 @@ use quick_xml::events::attributes::Attributes;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
 
-use super::{ParseError, Position};
+use crate::defect::{ParseError, Position};
 use crate::limits::{HELP, exceeds};
 
 /// Maximum nesting; a model description needs 5.
@@ -25,21 +25,21 @@ const ALL_ATTRIBUTES: usize = 12_000_000;
 
 /// An element: its attributes, child elements and text, which only FMI 1.0 uses.
 #[derive(Debug)]
-pub(super) struct Element<'a> {
-    pub(super) name: &'a str,
+pub(crate) struct Element<'a> {
+    pub(crate) name: &'a str,
     /// The first text that is more than white space, unchanged.
-    pub(super) text: &'a str,
-    pub(super) attributes: Vec<(&'a str, Cow<'a, str>)>,
-    pub(super) children: Vec<Element<'a>>,
+    pub(crate) text: &'a str,
+    pub(crate) attributes: Vec<(&'a str, Cow<'a, str>)>,
+    pub(crate) children: Vec<Element<'a>>,
     /// The position at which it starts.
-    pub(super) at: Position,
+    pub(crate) at: Position,
 }
 
 impl Element<'_> {
     /// Compares two elements including their texts; the reader limits the depth of the recursion.
-    pub(super) fn into_owned(self) -> crate::xml::Element {
+    pub(super) fn into_owned(self) -> super::Element {
         let attributes = self.attributes.into_iter();
-        crate::xml::Element {
+        super::Element {
             name: self.name.to_owned(),
             text: self.text.to_owned(),
             attributes: attributes
@@ -168,7 +168,7 @@ fn limit(at: Position, what: &'static str, limit: usize) -> ParseError {
 }
 
 /// Reads the root element of `text`. Skips annotations of FMI.
-pub(super) fn read(text: &str) -> Result<Element<'_>, ParseError> {
+pub(crate) fn read(text: &str) -> Result<Element<'_>, ParseError> {
     read_but(text, is_annotation)
 }
 

@@ -6,13 +6,13 @@ use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 use quick_xml::events::Event;
 use quick_xml::reader::Reader;
 
-use super::{ParseError, Position, Warning};
+use crate::defect::{ParseError, Position, Warning};
 
 /// Length of the part that is searched for an XML declaration.
 const DECLARATION: usize = 256;
 
 /// Returns the text of an XML file, and a warning if it is not UTF-8, which FMI requires.
-pub(super) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Warning>), ParseError> {
+pub(crate) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Warning>), ParseError> {
     if let Some((encoding, mark)) = Encoding::for_bom(bytes) {
         let rest = &bytes[mark..];
         if encoding == UTF_8 {
