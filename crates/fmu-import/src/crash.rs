@@ -337,7 +337,28 @@ pub fn done(status: u8) {
     }
     RECORD.done.store(i32::from(status) + 1, Ordering::Release);
     #[cfg(target_os = "linux")]
-    crate::supervise::wake();
+    wake_supervisor();
+}
+
+/// The process that supervises this one; 0 if none does.
+#[cfg(target_os = "linux")]
+static SUPERVISOR: AtomicI32 = AtomicI32::new(0);
+
+/// Lets the process with this number know when the program has finished its work.
+#[cfg(target_os = "linux")]
+pub(crate) fn be_supervised(supervisor: i32) {
+    SUPERVISOR.store(supervisor, Ordering::Relaxed);
+}
+
+/// Sends the supervisor the signal that it waits for, if it is the parent of this process still.
+#[cfg(target_os = "linux")]
+fn wake_supervisor() {
+    use rustix::process::{Signal, getppid, kill_process};
+    let supervisor = SUPERVISOR.load(Ordering::Relaxed);
+    if let Some(parent) = getppid().filter(|parent| parent.as_raw_nonzero().get() == supervisor) {
+        // A parent that has ended needs no signal.
+        let _ = kill_process(parent, Signal::CHILD);
+    }
 }
 
 /// Whether the program has finished its work.

@@ -1,7 +1,5 @@
 //! An opened FMU archive, which creates instances.
 
-mod model_exchange;
-
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,7 +10,6 @@ use fmu_description::package::{PackageError, Unpacked};
 use fmu_description::{Kind, ModelDescription, Version};
 
 use crate::error::LoadError;
-use crate::instance::{Inner, Instance};
 use crate::library::{Binding, Component, Interface, Library, Loading, Names, v1, v3};
 
 /// Why an FMU could not be opened or instantiated.
@@ -83,7 +80,7 @@ impl From<PackageError> for FmuError {
 /// An opened FMU. Its unpacked files are removed when it and all its instances have been dropped.
 #[derive(Clone)]
 pub struct Fmu {
-    content: Arc<Content>,
+    pub(crate) content: Arc<Content>,
 }
 
 /// The library and the unpacked files of an FMU.
@@ -99,10 +96,10 @@ impl Drop for OnlyInstance {
 }
 
 /// Fields are dropped in this order, which unloads the library before its file is removed.
-struct Content {
+pub(crate) struct Content {
     /// The library for co-simulation or scheduled execution; `None` if the FMU offers model exchange only.
-    library: Option<CoSimulation>,
-    unpacked: Unpacked,
+    pub(crate) library: Option<CoSimulation>,
+    pub(crate) unpacked: Unpacked,
     /// The name of its file, for messages about its library.
     name: String,
     binding: Binding,
@@ -114,7 +111,7 @@ struct Content {
 
 /// The library for co-simulation of an FMU, in the version of the FMU.
 #[derive(Clone)]
-enum CoSimulation {
+pub(crate) enum CoSimulation {
     V1(Arc<v1::Library>),
     V2(Arc<Library>),
     V3(Arc<v3::Library>),
@@ -217,23 +214,8 @@ impl Fmu {
         Ok(view.description)
     }
 
-    /// Creates an instance called `name` for co-simulation or, if the FMU does not offer it, for scheduled
-    /// execution.
-    ///
-    /// # Errors
-    ///
-    /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`LoadError::Instantiate`] with the
-    /// FMU's messages if the FMU does not instantiate; [`FmuError::NoInterface`] without co-simulation.
-    pub fn instantiate(&self, name: &str) -> Result<Instance, FmuError> {
-        let flags = self.description().stepped();
-        let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
-        let only = once.then(|| self.occupy(name)).transpose()?;
-        let inner = self.instantiate_version(name)?;
-        Ok(Instance::new(inner, only, self.clone()))
-    }
-
     /// Reserves an FMU that allows one instance only.
-    fn occupy(&self, name: &str) -> Result<OnlyInstance, FmuError> {
+    pub(crate) fn occupy(&self, name: &str) -> Result<OnlyInstance, FmuError> {
         if self.content.instantiated.swap(true, Ordering::Relaxed) {
             let (instance, model) = (name.to_owned(), self.description().model_name.clone());
             return Err(FmuError::OnlyOnce { instance, model });
@@ -241,40 +223,14 @@ impl Fmu {
         Ok(OnlyInstance(self.content.clone()))
     }
 
-    /// Creates an instance with the C interface of the FMU's version.
-    fn instantiate_version(&self, name: &str) -> Result<Inner, FmuError> {
-        let (unpacked, description) = (&self.content.unpacked, self.description());
-        let hint = |error| with_tool_hint(description, error);
-        match &self.content.library {
-            Some(CoSimulation::V1(library)) => {
-                let location = file_uri(unpacked.folder())?;
-                let (guid, names) = (&description.guid, self.names());
-                let component = library.instantiate(name, guid, &location, names).map_err(hint)?;
-                let interface = Interface::CoSimulation;
-                Ok(Inner::V1(Box::new(crate::v1::Instance::new(component, description, interface))))
-            }
-            Some(CoSimulation::V3(library)) => {
-                let resources = resource_path(&unpacked.resources());
-                let (interface, resources) = (stepped(description), resources.as_deref());
-                let created =
-                    crate::v3::Instance::new(library, description, interface, name, resources);
-                Ok(Inner::V3(Box::new(created.map_err(hint)?)))
-            }
-            _ => {
-                let component = self.component(Interface::CoSimulation, name)?;
-                Ok(Inner::V2(crate::v2::Instance::new(component)))
-            }
-        }
-    }
-
     /// The library at `path` as it is to be loaded.
-    fn loading<'a>(&'a self, path: &'a Path) -> Loading<'a> {
+    pub(crate) fn loading<'a>(&'a self, path: &'a Path) -> Loading<'a> {
         Loading { path, fmu: &self.content.name, binding: self.content.binding }
     }
 
     /// Returns the lookup of variable names for messages. Of several aliases it gives the one declared
     /// first.
-    fn names(&self) -> Names {
+    pub(crate) fn names(&self) -> Names {
         let content = self.content.clone();
         Arc::new(move |kind, reference| {
             let variables = &content.unpacked.description.variables;
@@ -354,7 +310,7 @@ fn open_library(
 }
 
 /// Returns the interface of FMI 3.0 by which an FMU makes steps.
-fn stepped(description: &ModelDescription) -> v3::Interface {
+pub(crate) fn stepped(description: &ModelDescription) -> v3::Interface {
     match description.co_simulation {
         Some(_) => v3::Interface::CoSimulation,
         None => v3::Interface::ScheduledExecution,
@@ -363,13 +319,13 @@ fn stepped(description: &ModelDescription) -> v3::Interface {
 
 /// Returns the `resourcePath` of FMI 3.0: absolute, with a trailing separator (section 2.3.1); `None` if
 /// the FMU has no resources.
-fn resource_path(folder: &Path) -> Option<String> {
+pub(crate) fn resource_path(folder: &Path) -> Option<String> {
     let folder = std::path::absolute(folder).ok().filter(|folder| folder.is_dir())?;
     Some(format!("{}{}", folder.display(), std::path::MAIN_SEPARATOR))
 }
 
 /// Adds the tool that the FMU declares to need (`needsExecutionTool`) to `error`.
-fn with_tool_hint(description: &ModelDescription, error: LoadError) -> FmuError {
+pub(crate) fn with_tool_hint(description: &ModelDescription, error: LoadError) -> FmuError {
     let simulation = description.co_simulation.as_ref().map(|flags| flags.needs_execution_tool);
     let exchange = description.model_exchange.as_ref().map(|flags| flags.needs_execution_tool);
     if simulation != Some(true) && exchange != Some(true) {

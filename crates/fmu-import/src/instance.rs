@@ -1,5 +1,8 @@
 //! An instance of an FMU in this process, which implements [`Slave`] for every version of FMI.
 
+mod co_simulation;
+mod model_exchange;
+
 use std::time::Duration;
 
 use fmu_description::{Experiment, ModelDescription};
@@ -25,7 +28,7 @@ pub(crate) enum Inner {
 }
 
 impl Instance {
-    pub(crate) fn new(inner: Inner, only: Option<OnlyInstance>, fmu: Fmu) -> Self {
+    fn new(inner: Inner, only: Option<OnlyInstance>, fmu: Fmu) -> Self {
         Self { inner, _only: only, fmu }
     }
 

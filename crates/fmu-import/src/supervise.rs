@@ -9,7 +9,7 @@ use std::io;
 use std::mem::MaybeUninit;
 use std::ptr::{from_ref, null_mut};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use libc::{c_int, pid_t, siginfo_t, sigset_t};
@@ -28,9 +28,6 @@ const LOOK: Duration = Duration::from_millis(50);
 /// takes memory.
 const WORDS: usize = 1 << 18;
 static MEMORY: OnceLock<&'static [AtomicU64]> = OnceLock::new();
-
-/// The process that supervises this one; 0 if none does.
-static SUPERVISOR: AtomicI32 = AtomicI32::new(0);
 
 /// How the process of the program ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,7 +86,7 @@ pub fn split() -> io::Result<Option<Ended>> {
         }
         0 => {
             signals.restore();
-            SUPERVISOR.store(supervisor, Ordering::Relaxed);
+            crash::be_supervised(supervisor);
             end_with(supervisor);
             Ok(None)
         }
@@ -142,16 +139,6 @@ fn end_with(supervisor: pid_t) {
     // SAFETY: no conditions.
     if unsafe { libc::getppid() } != supervisor {
         crash::leave(1);
-    }
-}
-
-/// Tells the supervisor that the program has finished its work.
-pub(crate) fn wake() {
-    let supervisor = SUPERVISOR.load(Ordering::Relaxed);
-    // SAFETY: the parent of this process, if it is the supervisor still.
-    if supervisor != 0 && unsafe { libc::getppid() } == supervisor {
-        // SAFETY: a signal that the supervisor waits for.
-        unsafe { libc::kill(supervisor, libc::SIGCHLD) };
     }
 }
 

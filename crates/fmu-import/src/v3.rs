@@ -12,8 +12,10 @@ mod clocks;
 mod derivatives;
 mod elements;
 mod equations;
+mod mode;
 mod modes;
 mod plan;
+mod refusal;
 mod scheduled;
 mod states;
 
@@ -24,13 +26,14 @@ use fmu_description::{CoSimulation, Experiment, ModelDescription};
 
 use crate::error::LoadError;
 use crate::library::v3::{Component, Instantiation, Interface, Library};
-use access::refused;
 use buffer::Buffer;
 use clocked::ClockedRuns;
 use clocks::Clocks;
 pub(crate) use elements::ElementView;
-use modes::{Mode, State};
+use mode::Mode;
+use modes::State;
 use plan::Plans;
+use refusal::refused;
 use slave::{CallError, CallSink, StepResult};
 
 /// The categories of messages that explain a status (FMI 3.0.2, section 2.4.5). They are switched on:

@@ -3,6 +3,7 @@
 
 use std::sync::atomic::Ordering;
 
+use fmu_description::Version;
 use serde::Serialize;
 
 use super::Integrator;
@@ -11,7 +12,7 @@ use super::layout::Shared;
 use super::message::{RemoteError, Request, encode};
 use super::words::{Reader, Word, Writer};
 use crate::{Fmu, FmuError};
-use slave::{CallError, Events, Slave, StepResult, absent};
+use slave::{CallError, Events, Failure, Slave, StepResult, absent};
 
 /// First word of an answer that consists of words.
 pub(super) const VALUES: u64 = 0;
@@ -208,7 +209,7 @@ impl Executor {
             Request::EnterEventMode => events(instance.as_mut()).and_then(Events::enter_event_mode),
             Request::LeaveEventMode => events(instance.as_mut()).and_then(Events::leave_event_mode),
             Request::Open(_) | Request::Renew { .. } | Request::ProcessChanges | Request::Free => {
-                Err(super::worker::invalid_command(request.function()))
+                Err(invalid_command(request.function()))
             }
         };
         reply(done, answer);
@@ -317,4 +318,15 @@ fn set<T: Word>(
     reader.take_counted(references.len(), values)?;
     writer.put(VALUES);
     Some(call(references, values))
+}
+
+/// Returns the error of a command whose arguments are invalid or that comes out of order.
+#[cold]
+pub(super) fn invalid_command(function: Function) -> CallError {
+    invalid(function, "received an invalid command: the shared memory is corrupted")
+}
+
+pub(super) fn invalid(function: Function, what: &str) -> CallError {
+    let failure = Failure::InvalidAnswer(what.to_owned());
+    CallError { function: function.name(Version::V2), failure, messages: Vec::new() }
 }

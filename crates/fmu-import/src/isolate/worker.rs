@@ -12,7 +12,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use fmu_description::Version;
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::process::{Pid, Signal, getppid, kill_current_process_group};
 use rustix::stdio::{dup2_stdin, dup2_stdout};
@@ -22,12 +21,14 @@ use super::function::Function;
 use super::layout::Shared;
 use super::log::Forward;
 use super::message::{Open, Opening, Request, decode};
-use super::perform::{CommandResult, Executor, MESSAGE, Maker, VALUES, reply};
+use super::perform::{
+    CommandResult, Executor, MESSAGE, Maker, VALUES, invalid, invalid_command, reply,
+};
 use super::words::{Reader, Writer};
 use super::{Integrator, IsolateError, STARTED_BY, WorkerError, memory};
 use crate::Fmu;
 use crate::library::Surroundings;
-use slave::{CallError, Failure};
+use slave::CallError;
 
 /// Whether this process has become a worker.
 static IS_WORKER: AtomicBool = AtomicBool::new(false);
@@ -286,17 +287,6 @@ fn download(answer: &[u8], reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> 
     writer.put(VALUES);
     writer.put_part(rest);
     Some(Ok(()))
-}
-
-/// Returns the error of a command whose arguments are invalid or that comes out of order.
-#[cold]
-pub(super) fn invalid_command(function: Function) -> CallError {
-    invalid(function, "received an invalid command: the shared memory is corrupted")
-}
-
-fn invalid(function: Function, what: &str) -> CallError {
-    let failure = Failure::InvalidAnswer(what.to_owned());
-    CallError { function: function.name(Version::V2), failure, messages: Vec::new() }
 }
 
 /// Checks that the results fitted into the shared memory.

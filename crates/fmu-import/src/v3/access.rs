@@ -6,15 +6,10 @@ use super::Instance;
 use super::buffer::Buffer;
 use super::clocked::Listed;
 use super::elements::NativeType;
-use super::modes::Mode;
+use super::mode::Mode;
 use super::plan::Run;
-use slave::{CallError, Failure};
-
-/// Returns the error of an access that the FMU cannot be asked for.
-#[cold]
-pub(super) fn refused(function: &'static str, what: String) -> CallError {
-    CallError { function, failure: Failure::InvalidAnswer(what), messages: Vec::new() }
-}
+use super::refusal::refused;
+use slave::CallError;
 
 /// A function that reads the values of whole variables.
 type Get<T> = fn(&mut Instance, &[u32], &mut [T]) -> Result<(), CallError>;

@@ -7,9 +7,9 @@ use fmu_description::{Causality, ClockType, IntervalVariability, Kind, ModelDesc
 use serde::{Deserialize, Serialize};
 
 use super::Instance;
-use super::access::refused;
-use super::modes::Mode;
+use super::mode::Mode;
 use super::plan::Run;
+use super::refusal::refused;
 use crate::library::v3::Component;
 use slave::CallError;
 

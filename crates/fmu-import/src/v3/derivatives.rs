@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::Instance;
-use super::access::refused;
+use super::refusal::refused;
 use slave::CallError;
 
 /// Variables of the FMU, and where the values of a list are among the values of a call.

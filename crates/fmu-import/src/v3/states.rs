@@ -4,10 +4,11 @@ use serde::{Deserialize, Serialize};
 use slave::CallError;
 
 use super::Instance;
-use super::access::refused;
 use super::clocked::Memory;
 use super::clocks::ClocksState;
-use super::modes::{Mode, State};
+use super::mode::Mode;
+use super::modes::State;
+use super::refusal::refused;
 
 /// The first bytes of a serialised state.
 const MAGIC: &[u8; 8] = b"fmi3\0\0\0\x04";

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use fmu_description::Version;
+use fmu_description::location::file_uri;
 use slave::{CallError, CompletedStep, EventInfo, ModelExchange};
 
-use super::{Fmu, FmuError, file_uri, resource_path, with_tool_hint};
-use crate::instance::{Inner, Instance};
+use super::{Inner, Instance};
+use crate::fmu::{Fmu, FmuError, resource_path, with_tool_hint};
 use crate::library::{Interface, check_number, v1, v3};
 
 impl Fmu {

@@ -1,0 +1,50 @@
+//! Instances for co-simulation and scheduled execution.
+
+use fmu_description::location::file_uri;
+
+use super::{Inner, Instance};
+use crate::fmu::{CoSimulation, Fmu, FmuError, resource_path, stepped, with_tool_hint};
+use crate::library::Interface;
+
+impl Fmu {
+    /// Creates an instance called `name` for co-simulation or, if the FMU does not offer it, for scheduled
+    /// execution.
+    ///
+    /// # Errors
+    ///
+    /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`LoadError::Instantiate`] with the
+    /// FMU's messages if the FMU does not instantiate; [`FmuError::NoInterface`] without co-simulation.
+    pub fn instantiate(&self, name: &str) -> Result<Instance, FmuError> {
+        let flags = self.description().stepped();
+        let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
+        let only = once.then(|| self.occupy(name)).transpose()?;
+        let inner = self.instantiate_version(name)?;
+        Ok(Instance::new(inner, only, self.clone()))
+    }
+
+    /// Creates an instance with the C interface of the FMU's version.
+    fn instantiate_version(&self, name: &str) -> Result<Inner, FmuError> {
+        let (unpacked, description) = (&self.content.unpacked, self.description());
+        let hint = |error| with_tool_hint(description, error);
+        match &self.content.library {
+            Some(CoSimulation::V1(library)) => {
+                let location = file_uri(unpacked.folder())?;
+                let (guid, names) = (&description.guid, self.names());
+                let component = library.instantiate(name, guid, &location, names).map_err(hint)?;
+                let interface = Interface::CoSimulation;
+                Ok(Inner::V1(Box::new(crate::v1::Instance::new(component, description, interface))))
+            }
+            Some(CoSimulation::V3(library)) => {
+                let resources = resource_path(&unpacked.resources());
+                let (interface, resources) = (stepped(description), resources.as_deref());
+                let created =
+                    crate::v3::Instance::new(library, description, interface, name, resources);
+                Ok(Inner::V3(Box::new(created.map_err(hint)?)))
+            }
+            _ => {
+                let component = self.component(Interface::CoSimulation, name)?;
+                Ok(Inner::V2(crate::v2::Instance::new(component)))
+            }
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! What an instance refuses by itself.
+
+use slave::{CallError, Failure};
+
+/// Returns the error of an access that the FMU cannot be asked for.
+#[cold]
+pub(super) fn refused(function: &'static str, what: String) -> CallError {
+    CallError { function, failure: Failure::InvalidAnswer(what), messages: Vec::new() }
+}
