@@ -15,8 +15,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::Experiment;
+use crate::callbacks::Callbacks;
 use crate::fence::{HookGuard, guarded};
-use crate::ffi::Callbacks;
 use crate::interface::{Interface, WARNING, new_model};
 use crate::log::{Log, Message};
 use crate::model::{Failure, Model, Step};

@@ -8,9 +8,9 @@ mod sizes;
 mod slot;
 mod states;
 mod structure;
+mod typed;
 
 use crate::model::{Failure, Model};
-use crate::typed::Slots;
 use crate::variable::{Access, Base, Declaration, Enumeration, Fields, Number, Variable};
 use describe::{describe_aliases, describe_variables, keep_derivative};
 use fmu_description::call_order::{InterfaceType, settable};
@@ -20,10 +20,12 @@ use fmu_description::{
     Causality, Guid, Initial, IntegerType, Kind, LogCategory, ModelDescription, Problem, RealType,
     ScalarVariable, Unknown,
 };
+use typed::Slots;
 
 pub(crate) use general::WARNING;
 pub(crate) use slot::Slot;
-pub(crate) use slot::SlotBuilder;
+use slot::SlotBuilder;
+pub(crate) use typed::Native;
 
 /// A continuous state: positions of state and derivative among the Reals, and the nominal value.
 pub(crate) struct ContinuousState {

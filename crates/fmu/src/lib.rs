@@ -98,6 +98,7 @@
 extern crate self as fmu;
 
 mod about;
+mod callbacks;
 mod fence;
 #[doc(hidden)]
 pub mod ffi;
@@ -106,10 +107,10 @@ mod interface;
 mod linked;
 mod log;
 mod model;
+mod room;
 mod simulation;
 pub mod solver;
 mod stepper;
-mod typed;
 mod variable;
 mod variables;
 

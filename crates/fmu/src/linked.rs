@@ -3,9 +3,10 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::Experiment;
-use crate::ffi::{Callbacks, room_of};
+use crate::callbacks::Callbacks;
 use crate::instance::{Instance, Snapshot};
 use crate::model::{Failure, Model};
+use crate::room::room_of;
 use fmu_description::ModelDescription;
 use fmu_description::abi::Status;
 use fmu_description::call_order::Function;

@@ -1,11 +1,12 @@
 //! Declaration of a variable: the source of its description, value reference and field access.
 
 mod declaration;
+mod typed;
 
-use crate::typed::TypedField;
 use fmu_description::{Causality, DependencyKind, Initial, IntervalVariability, Variability};
 
 pub(crate) use declaration::{Base, Declaration};
+pub(crate) use typed::{TypedField, for_types};
 
 /// A function that borrows one field of a model.
 pub(crate) type Field<M, T> = Box<dyn for<'a> Fn(&'a mut M) -> &'a mut T + Send + Sync>;
@@ -260,7 +261,7 @@ impl<M> Variable<M> {
         alias
     }
 
-    pub(crate) fn typed(
+    fn typed(
         name: impl Into<String>,
         description: impl Into<String>,
         variability: Variability,

@@ -5,8 +5,6 @@ mod events;
 mod state;
 mod step;
 
-use std::str::FromStr;
-
 use fmu_description::number::seconds;
 use fmu_description::{CoSimulation, Kind, ModelDescription};
 use serde::{Deserialize, Serialize};
@@ -14,6 +12,7 @@ use slave::{CallError, Failure, ModelExchange, Slave, Status};
 use solve::Scale;
 
 use crate::inputs::Inputs;
+use crate::method::Method;
 use crate::stepper::{Memory, StepError, Stepper};
 use state::Saved;
 
@@ -23,42 +22,6 @@ const TOLERANCE: f64 = 1e-6;
 const ABSOLUTE: f64 = 0.01;
 /// The name of the integration in errors.
 const INTEGRATION: &str = "the integration of the model-exchange FMU";
-
-/// The integration method.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// The explicit method; the stiff one while the steps of the explicit one are limited by its
-    /// stability.
-    #[default]
-    Automatic,
-    /// Dormand and Prince, order 5(4).
-    Explicit,
-    /// RODAS, order 4(3), for stiff equations.
-    Stiff,
-}
-
-impl Method {
-    /// Returns the name in a `system.toml` and on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Method::Automatic => "automatic",
-            Method::Explicit => "explicit",
-            Method::Stiff => "stiff",
-        }
-    }
-}
-
-impl FromStr for Method {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let all = [Method::Automatic, Method::Explicit, Method::Stiff];
-        let found = all.into_iter().find(|method| method.name() == text);
-        found.ok_or_else(|| format!("expected automatic, explicit or stiff, found {text:?}"))
-    }
-}
 
 /// Options of [`Integrated`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -17,10 +17,12 @@
 mod explicit;
 mod inputs;
 mod integrated;
+mod method;
 mod rosenbrock;
 mod stepper;
 
-pub use integrated::{Integrated, Method, Options, description_of};
+pub use integrated::{Integrated, Options, description_of};
+pub use method::Method;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -5,7 +5,7 @@ use slave::{CallError, Failure, Status};
 use solve::Scale;
 
 use crate::explicit::Explicit;
-use crate::integrated::Method;
+use crate::method::Method;
 use crate::rosenbrock::Rosenbrock;
 
 /// Ratio of the chosen step to the largest step that meets the tolerance, and the bounds of the ratio of

@@ -10,6 +10,7 @@
 //! (`server.rs`, `request.rs`, `guard.rs`).
 #![forbid(unsafe_code)]
 
+mod action;
 mod answer;
 mod facts;
 mod guard;
@@ -20,10 +21,11 @@ mod shared;
 mod store;
 mod view;
 
+pub use action::{Action, Request};
 pub use facts::{Facts, Source, Subject, Variable};
 pub use shared::Phase;
 pub use store::Sample;
-pub use view::{Action, Messages, Request, View};
+pub use view::{Messages, View};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -7,12 +7,12 @@ use std::time::Duration;
 
 use serde_json::json;
 
+use crate::action::{Action, Request};
 use crate::answer::Answer;
 use crate::guard::Guard;
 use crate::request::Parsed;
 use crate::shared::{Phase, Shared};
 use crate::store::{Query, SHOWN};
-use crate::view::{Action, Request};
 
 /// Time that an answer of the run may take: a step may be long.
 const PATIENCE: Duration = Duration::from_secs(2);

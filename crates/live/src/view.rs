@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
+use crate::action::Request;
 use crate::facts::Facts;
 use crate::guard::{Guard, Token};
 use crate::routes::Site;
@@ -19,36 +20,6 @@ const EVENTS: usize = 4096;
 const REQUESTS: usize = 32;
 /// Interval between two looks whether the page has seen the end.
 const LOOK: Duration = Duration::from_millis(20);
-
-/// What a page asks of the run.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Action {
-    /// Hold at the next communication point.
-    Pause,
-    /// Go on.
-    Continue,
-    /// Make one communication step and hold again.
-    Step,
-    /// End the run.
-    Stop,
-    /// Add these entries, in TOML, to the scenario.
-    Intervene(String),
-}
-
-/// A request of a page, which waits for its answer.
-pub struct Request {
-    /// What is asked.
-    pub action: Action,
-    pub(crate) answer: SyncSender<Result<String, String>>,
-}
-
-impl Request {
-    /// Answers with a sentence, or with an error.
-    pub fn answer(self, answer: Result<String, String>) {
-        // The page may have given up.
-        let _ = self.answer.try_send(answer);
-    }
-}
 
 /// Passes messages to the page; any thread may use it.
 #[derive(Clone)]

@@ -3,7 +3,7 @@
 use results::{Column, Table};
 
 use crate::Error;
-use crate::plots::Trace;
+use crate::trace::Trace;
 
 /// Number of columns of the second file that are in memory at a time.
 const COLUMNS: usize = 16;

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
-use crate::plots::Trace;
+use crate::trace::Trace;
 use crate::{Error, name};
 
 /// The flag of an error frame.

@@ -11,12 +11,13 @@ mod graph;
 mod page;
 mod plots;
 mod statistics;
+mod trace;
 
 use std::path::Path;
 
 use results::{Column, ColumnKind, ResultsError, Selection, Table};
 
-use plots::Trace;
+use trace::Trace;
 
 pub use difference::Difference;
 pub use statistics::Statistics;

@@ -1,18 +1,18 @@
 //! The curves of the plots, grouped by unit.
 
-use results::{Column, Envelope};
+use results::Column;
 use serde::Serialize;
 
 use crate::difference::Compared;
 use crate::frames::Message;
 use crate::statistics::Statistics;
+use crate::trace::{MOST, Trace};
 
 /// Largest number of curves in a plot: the number of colours.
 const CURVES: usize = 7;
-/// Number of points of all curves together, and the limits for one of them.
+/// Number of points of all curves together, and the least for one of them.
 const POINTS: usize = 160_000;
 const LEAST: usize = 600;
-const MOST: usize = 8_000;
 
 /// Largest ratio of the sizes of two curves in a plot: more, and the smaller one is a line.
 const RATIO: f64 = 30.0;
@@ -97,24 +97,6 @@ pub(crate) fn of_frames(messages: &[Message]) -> Vec<Plot> {
         Plot { unit: unit.to_owned(), curves, size: 0.0 }
     };
     messages.chunks(CURVES).map(plot).collect()
-}
-
-/// A variable over time: all rows of a short run, the envelope of a longer one.
-#[derive(Clone, Default)]
-pub(crate) struct Trace {
-    rows: Vec<(f64, f64)>,
-    count: usize,
-    envelope: Envelope,
-}
-
-impl Trace {
-    pub(crate) fn push(&mut self, time: f64, value: f64) {
-        self.count += 1;
-        if self.count <= MOST {
-            self.rows.push((time, value));
-        }
-        self.envelope.push(time, value);
-    }
 }
 
 /// All rows of a trace, if they are at most `limit`; otherwise the lowest and the highest of each group of

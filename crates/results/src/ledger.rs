@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::output::Identity;
+use super::identity::Identity;
 
 /// Number of words that [`share`] needs at least.
 pub const WORDS: usize = ROWS + (1 << 16);

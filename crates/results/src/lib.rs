@@ -9,6 +9,7 @@
 mod csv;
 mod decimation;
 mod envelope;
+mod identity;
 pub mod ledger;
 mod memory;
 mod output;

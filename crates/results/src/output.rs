@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process;
 
 use super::ResultsError;
+use super::identity::Identity;
 use super::ledger::Ledger;
 
 #[cfg(unix)]
@@ -24,27 +25,6 @@ pub const STANDARD_OUTPUT: &str = "/dev/stdout";
 /// are not theirs begin with the small ones.
 #[cfg(unix)]
 const DESCRIPTOR: i32 = 512;
-
-/// Device and number of a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Identity {
-    pub(super) device: u64,
-    pub(super) inode: u64,
-}
-
-impl Identity {
-    #[cfg(unix)]
-    pub(super) fn new(metadata: &Metadata) -> Self {
-        use std::os::unix::fs::MetadataExt as _;
-        Self { device: metadata.dev(), inode: metadata.ino() }
-    }
-
-    /// The same for all files: while the file is open, nobody can delete or replace it.
-    #[cfg(not(unix))]
-    pub(super) fn new(_: &Metadata) -> Self {
-        Self { device: 0, inode: 0 }
-    }
-}
 
 /// An open file with the length that its writer expects.
 #[derive(Debug)]

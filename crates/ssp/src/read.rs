@@ -54,10 +54,17 @@ pub fn read_ssb(bytes: &[u8]) -> Result<SignalDictionary, SspError> {
 /// The parsed content, and warnings with positions about wrong or unknown content.
 type Read<T> = Result<(T, Vec<String>), SspError>;
 
+/// Reads the tree of a file; returns warnings about broken rules and unknown content, too.
+fn read(bytes: &[u8], space: &str, root: &str) -> Read<Node> {
+    let (node, mut warnings) = xml::read(bytes, space, root)?;
+    schema::check(&node, &mut warnings);
+    Ok((node, warnings))
+}
+
 /// Parses an SSD file; also returns warnings.
 pub(super) fn ssd(bytes: &[u8]) -> Read<SystemStructure> {
     let name = "SystemStructureDescription";
-    let (root, warnings) = xml::read(bytes, name, name)?;
+    let (root, warnings) = read(bytes, name, name)?;
     let system = root.child("System")?;
     let system = system.ok_or_else(|| root.wrong("an element System", "none"))?;
     let structure = SystemStructure {
@@ -72,19 +79,19 @@ pub(super) fn ssd(bytes: &[u8]) -> Read<SystemStructure> {
 
 /// Parses an SSV file; also returns warnings.
 pub(super) fn ssv(bytes: &[u8]) -> Read<ParameterSet> {
-    let (root, warnings) = xml::read(bytes, "SystemStructureParameterValues", "ParameterSet")?;
+    let (root, warnings) = read(bytes, "SystemStructureParameterValues", "ParameterSet")?;
     Ok((parameter_set(&root)?, warnings))
 }
 
 /// Parses an SSM file; also returns warnings.
 pub(super) fn ssm(bytes: &[u8]) -> Read<ParameterMapping> {
-    let (root, warnings) = xml::read(bytes, "SystemStructureParameterMapping", "ParameterMapping")?;
+    let (root, warnings) = read(bytes, "SystemStructureParameterMapping", "ParameterMapping")?;
     Ok((parameter_mapping(&root)?, warnings))
 }
 
 /// Parses an SSB file; also returns warnings.
 pub(super) fn ssb(bytes: &[u8]) -> Read<SignalDictionary> {
-    let (root, warnings) = xml::read(bytes, "SystemStructureSignalDictionary", "SignalDictionary")?;
+    let (root, warnings) = read(bytes, "SystemStructureSignalDictionary", "SignalDictionary")?;
     Ok((signal_dictionary(&root)?, warnings))
 }
 

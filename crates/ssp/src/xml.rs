@@ -12,7 +12,6 @@ use fmu_description::xml::{self, is_character};
 use quick_xml::name::{Namespace, NamespaceResolver, QName, ResolveResult};
 
 use super::error::SspError;
-use super::schema;
 
 /// Common start of all namespaces of SSP 1.0 and 2.0.
 const NAMESPACE: &str = "http://ssp-standard.org/SSP1/";
@@ -39,7 +38,7 @@ pub(super) struct Node {
 }
 
 /// Reads a file whose root element is `root` in the namespace that ends in `space`. Also returns
-/// warnings with positions about broken rules and unknown content.
+/// warnings with positions about prefixes.
 pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<String>), SspError> {
     if exceeds(bytes.len(), CAPACITY) {
         return Err(SspError::Limit { limit: CAPACITY, what: "bytes", help: HELP });
@@ -64,8 +63,7 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<S
     }
     let node = scope.node(element)?;
     node.version()?;
-    let mut warnings: Vec<String> = scope.undeclared.into_iter().map(undeclared).collect();
-    schema::check(&node, &mut warnings);
+    let warnings = scope.undeclared.into_iter().map(undeclared).collect();
     Ok((node, warnings))
 }
 
@@ -280,7 +278,7 @@ impl Node {
     }
 
     /// Reads each child `item` of the child `list` with `read`; empty if there is no such list.
-    /// Several lists of one name are joined; [`schema::check`] warns about them.
+    /// Several lists of one name are joined; [`super::schema::check`] warns about them.
     pub(super) fn list<T>(
         &self,
         list: &str,

@@ -5,7 +5,6 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
-use fmu_import::CallLog;
 use master::Slave;
 use master::System;
 use master::Transformation;
@@ -13,10 +12,10 @@ use ssp::structure::DefaultExperiment;
 use ssp::{self, Opened};
 use ssp::{Element, Link, Terminal};
 
+use crate::assembly_options::AssemblyOptions;
 use crate::config::{ConnectionEntry, LoadedConfig, Solver};
 use crate::instances::instantiate;
 use crate::link::link as link_ports;
-use crate::store::Store;
 
 /// A connected system before initialisation.
 pub struct AssembledSystem {
@@ -32,21 +31,6 @@ pub struct AssembledSystem {
     pub opened: Option<Arc<Opened>>,
     /// FMUs by name that are integrated through their model-exchange interface, with the method.
     pub integrated: Vec<(String, Solver)>,
-}
-
-/// Options of [`assemble`] that are not part of the configuration.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct AssemblyOptions<'a> {
-    /// Whether the FMUs log everything.
-    pub logging: bool,
-    /// Whether free outputs and inputs of equal units are connected.
-    pub by_unit: bool,
-    /// The log of FMI calls, if any.
-    pub log_calls: Option<&'a CallLog>,
-    /// FMUs that are already open, which further runs may use too.
-    pub store: Option<&'a Store>,
-    /// The program that becomes the separate process of an FMU; default: this program.
-    pub worker: Option<&'a Path>,
 }
 
 /// Loads the FMUs of the configuration, connects them and applies the settings.

@@ -11,8 +11,9 @@ use master::{CallError, Failure, Slave, System};
 use ssp::Element;
 use ssp::structure::Implementation;
 
-use crate::assemble::AssemblyOptions;
+use crate::assembly_options::AssemblyOptions;
 use crate::config::{Config, Interface, Solver};
+use crate::content::Content;
 use crate::error::Error;
 use crate::store::Store;
 
@@ -138,34 +139,6 @@ fn choose_interface(
             interface.name()
         ))),
         None => Ok(default),
-    }
-}
-
-/// An opened FMU.
-#[derive(Clone)]
-pub(crate) enum Content {
-    /// Its library is loaded into this process.
-    Loaded(Fmu),
-    /// Its instances run in processes of their own.
-    Isolated(isolate::Package),
-}
-
-impl Content {
-    fn description(&self) -> &ModelDescription {
-        match self {
-            Content::Loaded(fmu) => fmu.description(),
-            Content::Isolated(package) => package.description(),
-        }
-    }
-
-    /// Whether several runs of a process can use it.
-    pub(crate) fn is_reusable(&self) -> bool {
-        let own = self.description();
-        let simulation = own.stepped();
-        let exchange = own.model_exchange.as_ref();
-        let once = simulation.is_some_and(|own| own.can_be_instantiated_only_once_per_process)
-            || exchange.is_some_and(|own| own.can_be_instantiated_only_once_per_process);
-        !once || matches!(self, Content::Isolated(_))
     }
 }
 

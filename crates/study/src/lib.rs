@@ -8,8 +8,12 @@
 
 #[cfg(feature = "load")]
 mod assemble;
+#[cfg(feature = "load")]
+mod assembly_options;
 mod bus_trace;
 pub mod config;
+#[cfg(feature = "load")]
+mod content;
 mod error;
 #[cfg(feature = "load")]
 mod instances;
@@ -32,7 +36,9 @@ mod store;
 pub mod table;
 
 #[cfg(feature = "load")]
-pub use assemble::{AssembledSystem, AssemblyOptions, assemble, assemble_with};
+pub use assemble::{AssembledSystem, assemble, assemble_with};
+#[cfg(feature = "load")]
+pub use assembly_options::AssemblyOptions;
 pub use config::{Config, ConnectionEntry, Every, Interface, LoadedConfig, Memory, Solver};
 pub use error::Error;
 pub use link::link;

@@ -15,7 +15,8 @@ use master::{Port, Scenario, Simulation, Slave, SlowState, System, SystemError};
 use results::{Column, ResultsError, Sink};
 use ssp::Opened;
 
-use crate::assemble::{AssembledSystem, AssemblyOptions, assemble_with};
+use crate::assemble::{AssembledSystem, assemble_with};
+use crate::assembly_options::AssemblyOptions;
 use crate::bus_trace::BusTrace;
 use crate::config::{Config, Every, LoadedConfig};
 use crate::error::Error;

@@ -8,8 +8,8 @@ use std::time::SystemTime;
 
 use ssp::Opened;
 
+use crate::content::Content;
 use crate::error::Error;
-use crate::instances::Content;
 
 /// FMUs and system structures that are unpacked, described and loaded once for several runs.
 ///

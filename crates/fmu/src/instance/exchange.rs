@@ -3,8 +3,8 @@
 use std::mem::MaybeUninit;
 
 use super::{Instance, time_tolerance};
-use crate::ffi::filled;
 use crate::model::{Event, Failure, Model};
+use crate::room::filled;
 use fmu_description::abi::{Status, fmi2EventInfo};
 use fmu_description::call_order::{InterfaceType, State};
 

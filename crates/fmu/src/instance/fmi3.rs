@@ -11,7 +11,7 @@ use crate::interface::new_model;
 use std::path::Path;
 
 use super::{Instance, check_guid};
-use crate::ffi::{Callbacks, IntermediateUpdate};
+use crate::callbacks::{Callbacks, IntermediateUpdate};
 use crate::interface::fmi3::{Dependency, Table, Type};
 use crate::model::{Event, Failure, Model};
 use fmu_description::ModelDescription;

@@ -16,9 +16,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{Instance, Snapshot};
 use crate::Experiment;
-use crate::ffi::{Callbacks, room_of};
+use crate::callbacks::Callbacks;
 use crate::interface::Interface;
 use crate::model::{About, Failure, Model, Step};
+use crate::room::room_of;
 use crate::variable::Variable;
 use fmu_description::Guid;
 use fmu_description::abi::Status;

@@ -1,7 +1,7 @@
 //! The continuous states of a model as vectors.
 
 use super::Interface;
-use crate::typed::Native;
+use super::typed::Native;
 
 impl<M> Interface<M> {
     /// Copies the continuous states of the model to `to`.

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::super::{Callbacks, IntermediateUpdate, into_component, read, text};
+use super::super::{into_component, read, text};
+use crate::callbacks::{Callbacks, IntermediateUpdate};
 use crate::instance::{Instance, Instantiation};
 use crate::model::{Failure, Model};
 use fmu_description::abi::Status;

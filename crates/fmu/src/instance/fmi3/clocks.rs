@@ -3,9 +3,9 @@
 use std::mem::MaybeUninit;
 
 use super::super::Instance;
+use crate::interface::Native;
 use crate::interface::Slot;
 use crate::model::{Failure, Model};
-use crate::typed::Native;
 use fmu_description::abi3::{IntervalQualifier, fmi3Clock};
 use fmu_description::{Causality, IntervalVariability as Variability};
 

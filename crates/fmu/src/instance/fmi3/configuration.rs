@@ -2,10 +2,10 @@
 //! 2.3.6 and 2.3.7).
 
 use super::super::Instance;
+use crate::interface::Native;
 use crate::interface::{Interface, Slot};
 use crate::model::{Failure, Model};
 use crate::stepper::Stepper;
-use crate::typed::Native;
 use fmu_description::call_order::{InterfaceType, State};
 use fmu_description::{Causality, Variability};
 

@@ -4,7 +4,7 @@
 //! model then follows the parabola through start, middle and end, as with the derivatives of FMI 2.0.
 
 use super::super::Instance;
-use crate::ffi::IntermediateUpdate;
+use crate::callbacks::IntermediateUpdate;
 use crate::model::Model;
 use fmu_description::call_order::{InterfaceType, State};
 

@@ -3,10 +3,10 @@
 use std::mem::MaybeUninit;
 
 use super::super::Instance;
+use crate::interface::Native;
 use crate::interface::Slot;
 use crate::interface::fmi3::{INDICATOR, INT64};
 use crate::model::{Failure, Model};
-use crate::typed::Native;
 
 /// Reads the values of located variables.
 fn copy<M, T, V>(

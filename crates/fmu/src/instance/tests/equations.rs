@@ -4,8 +4,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::ffi::{Callbacks, room_of};
+use crate::callbacks::Callbacks;
 use crate::instance::Instance;
+use crate::room::room_of;
 use crate::{Event, Experiment, Failure, Log, Model, Variables};
 use fmu_description::abi::Status;
 use fmu_description::call_order::{Function, InterfaceType};

@@ -5,10 +5,10 @@ use std::path::Path;
 use super::pendulum::{
     ACCELERATION, ANGLE, DAMPING, GAIN, HALF, HEIGHT, Pendulum, SPEED, TORQUE, pendulum,
 };
-use crate::ffi::room_of;
 use crate::instance::Instance;
 use crate::interface::{Interface, problems};
 use crate::model::{Failure, Model};
+use crate::room::room_of;
 use fmu_description::abi::Status;
 use fmu_description::call_order::{Function, InterfaceType, State};
 use fmu_description::{Causality, DependencyKind, Initial, Kind, Variability};

@@ -6,10 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use super::super::{Instantiation, Jacobian, Snapshot};
 use super::pendulum::Pendulum;
-use crate::ffi::{Callbacks, room_of};
+use crate::callbacks::Callbacks;
 use crate::instance::Instance;
 use crate::interface::fmi3::Type;
 use crate::model::{Failure, Model, Step};
+use crate::room::room_of;
 use crate::variable::Variable;
 use crate::{About, Event, ModelExchange, describe, describe_3};
 use fmu_description::abi::Status;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::ffi::Callbacks;
+use crate::callbacks::Callbacks;
 use crate::instance::{Instance, Snapshot};
 use crate::interface::Interface;
 use crate::model::{About, Failure, Model, Step};

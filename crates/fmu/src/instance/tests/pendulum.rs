@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::Experiment;
-use crate::ffi::Callbacks;
+use crate::callbacks::Callbacks;
 use crate::instance::Instance;
 use crate::interface::Interface;
 use crate::model::{About, At, Event, Failure, Model, ModelExchange, Step};

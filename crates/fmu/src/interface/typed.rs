@@ -1,10 +1,10 @@
-//! The types of FMI 3.0 that FMI 2.0 does not have.
+//! Slots of the types of FMI 3.0 that FMI 2.0 does not have.
 
 use std::ops::RangeInclusive;
 
-use crate::interface::Slot;
-use crate::interface::fmi3::Type;
-use crate::variable::{Field, Number, Variable};
+use super::fmi3::Type;
+use super::slot::{Slot, SlotBuilder};
+use crate::variable::{Number, TypedField, for_types};
 use fmu_description::{BinaryType, ClockType, IntegerType, IntervalVariability, Kind, RealType};
 
 /// The Rust type of the field of such a variable.
@@ -28,14 +28,9 @@ pub(crate) trait Native: Clone + Sized + 'static {
     }
 }
 
-/// Defines the lists of fields and slots, one for each type.
-macro_rules! types {
+/// Defines the lists of slots, one for each type.
+macro_rules! slots {
     ($($variant:ident($native:ty) $list:ident;)*) => {
-        /// The field of a variable, by type.
-        pub(crate) enum TypedField<M> {
-            $($variant(Field<M, $native>),)*
-        }
-
         /// The variables of a model, by type.
         pub(crate) struct Slots<M> {
             $($list: Vec<Slot<M, $native>>,)*
@@ -59,7 +54,7 @@ macro_rules! types {
                 model: &mut M,
                 (field, number): (TypedField<M>, Number),
                 start_given: bool,
-                builder: crate::interface::SlotBuilder<M>,
+                builder: SlotBuilder<M>,
             ) -> Result<(Kind, u32), String> {
                 Ok(match field {
                     $(TypedField::$variant(field) => {
@@ -73,18 +68,7 @@ macro_rules! types {
     };
 }
 
-types! {
-    Float32(f32) float32;
-    Int8(i8) int8;
-    UInt8(u8) uint8;
-    Int16(i16) int16;
-    UInt16(u16) uint16;
-    UInt32(u32) uint32;
-    Int64(i64) int64;
-    UInt64(u64) uint64;
-    Binary(Vec<u8>) binary;
-    Clock(bool) clock;
-}
+for_types!(slots);
 
 /// A clock: true where it ticks.
 impl Native for bool {
@@ -127,7 +111,7 @@ impl Native for f32 {
 
     fn kind(start: Option<Self>, number: Number) -> Result<Kind, String> {
         let start = start.map(f64::from);
-        Ok(Kind::Float32(RealType { start, ..crate::interface::real(number) }))
+        Ok(Kind::Float32(RealType { start, ..super::real(number) }))
     }
 
     fn number(&self) -> Option<f64> {
@@ -201,47 +185,4 @@ fn integer(number: Number, within: &RangeInclusive<i128>) -> Result<IntegerType,
     };
     let (min, max) = (bound(number.min)?, bound(number.max)?);
     Ok(IntegerType { quantity: number.quantity, min, max, ..IntegerType::default() })
-}
-
-/// Defines the constructors of the variables.
-macro_rules! constructors {
-    ($($(#[$documentation:meta])* $constructor:ident($variant:ident, $native:ty, $variability:ident);)*) => {
-        /// Variables of the types that FMI 2.0 does not have. A model with one of them leaves as FMI 3.0
-        /// only: `aso-ftc pack --fmi 3`.
-        impl<M> Variable<M> {
-            $($(#[$documentation])*
-            pub fn $constructor<F>(
-                name: impl Into<String>,
-                description: impl Into<String>,
-                field: F,
-            ) -> Self
-            where
-                F: for<'a> Fn(&'a mut M) -> &'a mut $native + Send + Sync + 'static,
-            {
-                let field = TypedField::$variant(Box::new(field));
-                Self::typed(name, description, fmu_description::Variability::$variability, field)
-            })*
-        }
-    };
-}
-
-constructors! {
-    /// Creates a `Float32` variable (FMI 3.0 only).
-    float32(Float32, f32, Continuous);
-    /// Creates an `Int8` variable (FMI 3.0 only).
-    int8(Int8, i8, Discrete);
-    /// Creates a `UInt8` variable (FMI 3.0 only).
-    uint8(UInt8, u8, Discrete);
-    /// Creates an `Int16` variable (FMI 3.0 only).
-    int16(Int16, i16, Discrete);
-    /// Creates a `UInt16` variable (FMI 3.0 only).
-    uint16(UInt16, u16, Discrete);
-    /// Creates a `UInt32` variable (FMI 3.0 only).
-    uint32(UInt32, u32, Discrete);
-    /// Creates an `Int64` variable (FMI 3.0 only).
-    int64(Int64, i64, Discrete);
-    /// Creates a `UInt64` variable (FMI 3.0 only).
-    uint64(UInt64, u64, Discrete);
-    /// Creates a `Binary` variable, which may be empty (FMI 3.0 only).
-    binary(Binary, Vec<u8>, Discrete);
 }

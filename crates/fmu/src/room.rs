@@ -1,0 +1,19 @@
+//! The importer's memory for output values, which it need not have initialised.
+#![expect(unsafe_code, reason = "memory of C")]
+
+use std::mem::MaybeUninit;
+
+/// Fills the memory with `value` and returns it as initialised.
+pub(crate) fn filled<T: Copy>(room: &mut [MaybeUninit<T>], value: T) -> &mut [T] {
+    for place in &mut *room {
+        place.write(value);
+    }
+    // SAFETY: every element was written.
+    unsafe { &mut *(std::ptr::from_mut(room) as *mut [T]) }
+}
+
+/// Converts values to memory for output values, which its user only writes.
+pub(crate) fn room_of<T: Copy>(values: &mut [T]) -> &mut [MaybeUninit<T>] {
+    // SAFETY: the functions of the instance that take this only write values.
+    unsafe { &mut *(std::ptr::from_mut(values) as *mut [MaybeUninit<T>]) }
+}
