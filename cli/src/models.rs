@@ -4,8 +4,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 
-use crate::pack;
-
 /// The FMUs of the paper, by the names that the instances get.
 pub(crate) const FMUS: [(&str, &str); 2] =
     [("plant", "FrictionPendulum.fmu"), ("controller", "AsoController.fmu")];
@@ -19,19 +17,6 @@ const BESIDE: [&str; 3] = ["fmus", "../share/aso-ftc/fmus", "../fmus"];
 
 /// The crates of the FMUs.
 pub(crate) const CRATES: [&str; 2] = ["fmu-plant", "fmu-controller"];
-
-/// Returns the folder with the FMUs: `dist`, into which they are packed if the current folder is in a
-/// clone; the one beside the command; or `dist`, packed from the clone that the command was built in.
-pub(crate) fn folder(dist: &Path) -> anyhow::Result<PathBuf> {
-    if clone_upwards()?.is_none()
-        && let Some(folder) = beside()
-    {
-        println!("FMUs: {}", folder.display());
-        return Ok(folder);
-    }
-    pack::pack_into(&clone()?, dist)?;
-    Ok(dist.to_owned())
-}
 
 /// Returns the path of an FMU that is not stated: the one in `dist`, beside the command, or in `dist` of
 /// the clone that the command was built in.
@@ -70,7 +55,7 @@ fn built_in() -> Option<PathBuf> {
     option_env!("ASO_FTC_CLONE").map(PathBuf::from).filter(|folder| is_clone(folder))
 }
 
-fn clone_upwards() -> anyhow::Result<Option<PathBuf>> {
+pub(crate) fn clone_upwards() -> anyhow::Result<Option<PathBuf>> {
     let here = std::env::current_dir().context("the current folder")?;
     Ok(here.ancestors().find(|folder| is_clone(folder)).map(Path::to_path_buf))
 }
@@ -80,7 +65,7 @@ fn is_clone(folder: &Path) -> bool {
 }
 
 /// Returns the folder with the FMUs beside the command.
-fn beside() -> Option<PathBuf> {
+pub(crate) fn beside() -> Option<PathBuf> {
     let command = std::env::current_exe().ok()?;
     let command = command.canonicalize().ok()?;
     let parent = command.parent()?;

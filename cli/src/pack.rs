@@ -152,6 +152,19 @@ pub(crate) struct PackedFmu {
     description: ModelDescription,
 }
 
+/// Returns the folder with the FMUs: `dist`, into which they are packed if the current folder is in a
+/// clone; the one beside the command; or `dist`, packed from the clone that the command was built in.
+pub(crate) fn folder_of_models(dist: &Path) -> anyhow::Result<PathBuf> {
+    if models::clone_upwards()?.is_none()
+        && let Some(folder) = models::beside()
+    {
+        println!("FMUs: {}", folder.display());
+        return Ok(folder);
+    }
+    pack_into(&models::clone()?, dist)?;
+    Ok(dist.to_owned())
+}
+
 /// Builds all models of the workspace `root` and packs each into the folder `out`.
 pub(crate) fn pack_into(root: &Path, out: &Path) -> anyhow::Result<Vec<PackedFmu>> {
     let versions = Versions::Two;

@@ -15,7 +15,7 @@ use study::{AssemblyOptions, Config, Every, LoadedConfig, PreparedRun, RunEnd};
 use crate::run::{AlgorithmOptions, advance, setting};
 use crate::scenario::Scenario;
 use crate::summary::{ControllerCertificate, Summary};
-use crate::{models, paper_figures, summary};
+use crate::{models, pack, paper_figures, summary};
 
 /// Name of the results file.
 const RESULTS: &str = "results.csv";
@@ -68,7 +68,7 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     if options.record_every == Every::Never {
         bail!("--record-every never leaves nothing to draw, expected seconds or `step`");
     }
-    let fmus = models::folder(&options.dist)?;
+    let fmus = pack::folder_of_models(&options.dist)?;
     let settings = settings(options);
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("cannot make the folder {}", options.out.display()))?;

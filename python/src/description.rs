@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
 use crate::error::{self, Exception};
-use crate::run::guarded;
+use crate::guard::guarded;
 
 /// Most elements of an array whose start values are listed.
 const ELEMENTS: usize = 1_000_000;

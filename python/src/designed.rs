@@ -7,8 +7,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::error;
+use crate::guard::guarded;
 use crate::node::Node;
-use crate::run::guarded;
 
 /// A designed controller.
 #[pyclass(frozen, module = "aso_ftc._core")]

@@ -7,6 +7,7 @@ mod configuration;
 mod description;
 mod designed;
 mod error;
+mod guard;
 mod live;
 mod logging;
 mod node;

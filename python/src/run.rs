@@ -2,9 +2,8 @@
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
-use std::sync::{LazyLock, OnceLock, PoisonError};
+use std::sync::{LazyLock, OnceLock};
 
 use master::{Port, Simulation, Slave};
 use pyo3::exceptions::PyException;
@@ -16,6 +15,7 @@ use study::{AssemblyOptions, Config, LoadedConfig, PreparedRun, Run, RunEnd, Sto
 
 use crate::configuration::{merge, read};
 use crate::error::{self, Exception};
+use crate::guard::{caused, guarded};
 use crate::logging;
 use crate::python_slave::{PythonSlave, Raised};
 use crate::stepper::Stepper;
@@ -179,30 +179,6 @@ impl Study {
         }
         Ok((slaves, raised))
     }
-}
-
-/// Calls `work` without the interpreter. A panic becomes an exception.
-pub(crate) fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    let done = py.detach(|| catch_unwind(AssertUnwindSafe(work)));
-    done.map_err(|panic| {
-        let text = panic.downcast_ref::<String>().map(String::as_str);
-        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("unknown");
-        let sentence = format!("aso_ftc failed by an internal error, please report it: {text}");
-        Exception::new("Error", "Panic", sentence).raise(py)
-    })
-}
-
-/// Raises the exception with that of a Python slave as its cause. What is no `Exception`, such as
-/// `KeyboardInterrupt`, is raised itself.
-pub(crate) fn caused(py: Python<'_>, exception: Exception, raised: &Raised) -> PyErr {
-    let cause = raised.lock().unwrap_or_else(PoisonError::into_inner).take();
-    let Some(cause) = cause else { return exception.raise(py) };
-    if !cause.is_instance_of::<PyException>(py) {
-        return cause;
-    }
-    let error = exception.raise(py);
-    error.set_cause(py, Some(cause));
-    error
 }
 
 fn prepare(

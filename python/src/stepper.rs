@@ -11,9 +11,9 @@ use pyo3::types::{PyBytes, PyList};
 use study::Run;
 
 use crate::error;
+use crate::guard::{caused, guarded};
 use crate::logging;
 use crate::python_slave::Raised;
-use crate::run::{caused, guarded};
 use crate::value;
 use crate::watch::{Progress, Stop, Watch};
 

@@ -3,13 +3,12 @@
 use std::collections::VecDeque;
 
 use controller::AsoController;
-use files::sentence;
 use fmu::description::{Experiment, Kind};
 use master::{AlgorithmRequest, KeptState, Port, Probe, Simulation, System, Value, choose};
 use plant::FrictionPendulum;
 
 use crate::linked::LinkedSlave;
-use crate::settings::Settings;
+use crate::settings::{Settings, told};
 use crate::text;
 
 /// The design that the controller FMU contains.
@@ -169,11 +168,6 @@ fn parsed(system: &System, port: Port, name: &str, text: &str) -> Result<Value, 
         _ => (text.parse().ok().map(Value::Integer), "an integer"),
     };
     value.ok_or_else(|| format!("{name}={text}: expected {expected}"))
-}
-
-/// An error and its causes as a sentence.
-pub(crate) fn told(error: impl std::error::Error) -> String {
-    sentence(&error)
 }
 
 /// A model that needs no resources.

@@ -1,9 +1,9 @@
 //! What the page sets before a run: values of variables, faults.
 
+use files::sentence;
 use master::fault::{Fault, FaultChain, NoiseDistribution, RandomSeries, Window};
 use master::{Scenario, System};
 
-use crate::paper::told;
 use crate::text;
 
 /// The settings of a run.
@@ -102,4 +102,9 @@ impl Settings {
 
 fn number(line: &str, found: &str) -> Result<f64, String> {
     text::number(found).ok_or_else(|| format!("{line}: expected a number, found {found:?}"))
+}
+
+/// An error and its causes as a sentence.
+pub(crate) fn told(error: impl std::error::Error) -> String {
+    sentence(&error)
 }

@@ -4,7 +4,7 @@
 use crate::algorithm::{Algorithm, Coupling};
 use crate::engine::{Engine, SavedState, Swept};
 use crate::error::SystemError;
-use crate::exchange::call;
+use crate::error::call;
 use solve::{Anderson, Newton, Progress, QuasiNewton, Scale, Solver};
 
 use fmu_description::CoSimulation;

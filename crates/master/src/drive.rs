@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::SystemError;
-use crate::exchange::call;
+use crate::error::call;
 use crate::fault::FaultChain;
 use crate::signal::{Cursor, Sample, Signal, earliest, near, reached};
 use crate::system::{Port, System};

@@ -13,14 +13,14 @@ use serde::{Deserialize, Serialize};
 use crate::algorithm::Algorithm;
 use crate::drive::Drives;
 use crate::error::SystemError;
-use crate::exchange::{Exchange, Values, call};
+use crate::error::call;
+use crate::exchange::{Exchange, Values};
 use crate::grid::{Grid, size_between};
 use crate::order::Order;
 use crate::system::{Port, System};
 use groups::Groups;
 pub(crate) use instants::{InstantEnd, Instants, Parts};
 use slave::{CallError, Failure, Slave, StepResult, Value};
-pub(crate) use threads::Task;
 use threads::{Threads, run};
 
 /// Largest number of partial steps in which a slave may complete a step.

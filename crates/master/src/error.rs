@@ -296,3 +296,9 @@ pub enum SystemError {
         rule: String,
     },
 }
+
+/// Wraps the error of an FMI call of `slave` at `time`.
+#[cold]
+pub(crate) fn call(slave: &str, time: f64, source: CallError) -> SystemError {
+    SystemError::Call { slave: slave.to_owned(), time, source }
+}

@@ -23,12 +23,12 @@ use fmu_description::number::seconds;
 use serde::{Deserialize, Serialize};
 
 use crate::algorithm::Algorithm;
-use crate::engine::Task;
-use crate::error::SystemError;
+use crate::error::{SystemError, call};
 use crate::fault::FaultChain;
 use crate::limits::Watch;
 use crate::signal_type::Way;
 use crate::system::{Connection, Port, System};
+use crate::task::Task;
 use channels::{Channels, ChannelsState};
 use instant::Ticks;
 pub(crate) use layout::Refusal;
@@ -376,10 +376,4 @@ impl Exchange {
         self.held.restore(&values.held);
         self.at_events.restore(&values.at_events);
     }
-}
-
-/// Wraps the error of an FMI call of `slave` at `time`.
-#[cold]
-pub(crate) fn call(slave: &str, time: f64, source: CallError) -> SystemError {
-    SystemError::Call { slave: slave.to_owned(), time, source }
 }

@@ -8,7 +8,7 @@ use fmu_description::{DefaultExperiment, Kind, ModelDescription};
 
 use crate::drive::{Drive, Scenario};
 use crate::error::SystemError;
-use crate::exchange::call;
+use crate::error::call;
 use crate::fault::FaultChain;
 use crate::limits::check_start;
 use crate::order::Rows;

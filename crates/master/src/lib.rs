@@ -43,8 +43,10 @@ mod readout;
 pub mod signal;
 mod signal_type;
 mod simulation;
+mod slow_values;
 mod step_control;
 mod system;
+mod task;
 
 pub use algorithm::{Algorithm, Coupling, Extrapolation, Method, StepControl};
 pub use choose::{AlgorithmChoice, AlgorithmRequest, choose};
@@ -54,13 +56,14 @@ pub use error::SystemError;
 pub use grid::EarlyEnd;
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
-pub use readout::{Readout, SlowState, SlowValues};
+pub use readout::Readout;
 pub use signal_type::SignalType;
 pub use simulation::{Checkpoint, KeptState, Simulation};
 pub use slave::{
     Advance, Background, CallError, Failure, Slave, StepResult, Transformation, Value, ValueType,
     to_hex,
 };
+pub use slow_values::{SlowState, SlowValues};
 pub use system::{Connection, EventObserver, Port, System};
 
 #[cfg(doctest)]

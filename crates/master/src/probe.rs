@@ -1,7 +1,7 @@
 //! Reads chosen variables of a system as numbers.
 
 use crate::error::SystemError;
-use crate::exchange::call;
+use crate::error::call;
 use crate::system::{Port, System};
 use slave::ValueType;
 

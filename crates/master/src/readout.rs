@@ -1,22 +1,19 @@
 //! Reads chosen variables of a system in their own types, for results.
 
-mod slow;
-
 use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::drive::{DriveKind, Drives, integer};
 use crate::error::SystemError;
-use crate::exchange::call;
+use crate::error::call;
 use crate::system::{Port, System};
 use slave::{CallError, Slave, Value, ValueType, to_hex};
-pub use slow::{SlowState, SlowValues};
 
 /// Values of chosen variables, in one array for each type. Each array keeps the order of the
 /// variables.
 #[derive(Debug, Default)]
 pub struct Readout {
-    ports: Vec<Port>,
+    pub(crate) ports: Vec<Port>,
     reads: Vec<Read>,
     /// Values of Reals.
     pub reals: Vec<f64>,
@@ -59,7 +56,7 @@ struct ClockRead {
 }
 
 /// Returns the type of the array that holds values of this type: binaries are with the Strings.
-fn array(kind: ValueType) -> ValueType {
+pub(crate) fn array(kind: ValueType) -> ValueType {
     if kind == ValueType::Binary { ValueType::String } else { kind }
 }
 

@@ -98,7 +98,7 @@ impl System {
         let Some(observer) = &mut self.observer else { return Ok(()) };
         let (name, instance) = &mut self.slaves[slave];
         let seen = observer(slave, time, instance.as_mut());
-        seen.map_err(|source| crate::exchange::call(name, time, source))
+        seen.map_err(|source| crate::error::call(name, time, source))
     }
 
     /// Returns the description of the variable at `port`.

@@ -7,21 +7,13 @@ mod pool;
 use std::time::{Duration, Instant};
 
 use crate::error::SystemError;
+use crate::task::Task;
 use pool::Pool;
-use slave::{Advance, CallError, Slave, StepResult};
 
 /// Number of steps measured with and without threads.
 const TRIALS: u32 = 16;
 /// Threads are used if their time is below this fraction of the time without threads.
 const WORTH: f64 = 0.9;
-
-/// The step of one slave.
-pub(crate) struct Task<'a> {
-    pub(crate) slave: usize,
-    pub(crate) instance: &'a mut dyn Slave,
-    pub(crate) step: Advance<'a>,
-    pub(crate) done: Result<StepResult, CallError>,
-}
 
 /// The thread pool, and the measured times of each group of slaves.
 pub(super) struct Threads {

@@ -1,7 +1,6 @@
 //! Connected Reals: values and derivatives of outputs over their last steps, and the resulting
 //! inputs.
 
-use super::call;
 use super::extrapolation::{OutputHistory, Polynomial};
 use super::layout::{Layout, Refusal};
 use super::pass::Pass;
@@ -9,6 +8,7 @@ use super::trace::Span;
 pub(crate) use super::trace::Trace;
 use crate::algorithm::{Algorithm, Coupling, Extrapolation, Method, StepControl};
 use crate::error::SystemError;
+use crate::error::call;
 use crate::fault::FaultChain;
 use crate::system::{Port, System};
 use slave::{Advance, CallError, Slave, StepResult};

@@ -1,7 +1,8 @@
 //! Output derivatives at the start time, before the first step.
 
-use super::{Exchange, call};
+use super::Exchange;
 use crate::error::SystemError;
+use crate::error::call;
 use crate::exchange::Reals;
 use crate::system::System;
 use slave::{CallError, Slave};

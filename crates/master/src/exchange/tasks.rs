@@ -1,8 +1,8 @@
 //! Steps of several slaves at once: in the background, in threads, or one after the other.
 
 use super::reals::Reals;
-use crate::engine::Task;
 use crate::system::System;
+use crate::task::Task;
 use slave::{Advance, CallError, Slave, StepResult, finish};
 
 impl Reals {

@@ -2,7 +2,7 @@
 
 use super::{Port, System};
 use crate::error::SystemError;
-use crate::exchange::call;
+use crate::error::call;
 use fmu_description::Causality;
 use slave::{CallError, Slave, Transformation, Value, ValueType};
 

@@ -8,7 +8,7 @@ use fmu_description::{Causality, Initial, Kind};
 
 use super::{Port, System};
 use crate::error::SystemError;
-use crate::exchange::call;
+use crate::error::call;
 use slave::{CallError, Value};
 
 /// A value for a variable.

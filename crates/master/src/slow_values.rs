@@ -3,8 +3,8 @@
 use fmu_description::{Causality, Variability};
 use serde::{Deserialize, Serialize};
 
-use super::{Readout, array};
 use crate::error::SystemError;
+use crate::readout::{Readout, array};
 use crate::simulation::Simulation;
 use crate::system::{Port, System};
 use slave::ValueType;
