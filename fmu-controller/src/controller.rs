@@ -2,6 +2,7 @@
 
 mod linked;
 mod scheduled;
+mod variables;
 
 use std::path::Path;
 
@@ -16,12 +17,12 @@ use crate::detection::{Detector, Stretch};
 use crate::equations::Equations;
 use crate::loss::Loss;
 use crate::mode::Mode;
+use crate::names;
 use crate::observer::{Conditions, Observer};
 use crate::reconfiguration::Reconfigurator;
 use crate::sampled::Sampler;
 use crate::shared::Shared;
 use crate::signals::{OperatingPoint, Signals, Values};
-use crate::{names, variables};
 
 /// The part of the range of an actuator by which a free command passes a limit before that is an
 /// event: no event indicator is zero after an event, and rounding causes no second event.

@@ -13,6 +13,7 @@
 
 use fmu::description::DependencyKind::{self, Constant, Dependent, Discrete, Fixed};
 
+use crate::channel::channels;
 use crate::design::{Design, Estimator};
 use crate::loss::Loss;
 use crate::matrix::Matrix;
@@ -22,7 +23,7 @@ use crate::names;
 pub(crate) type Group = (DependencyKind, Vec<String>);
 
 fn x_hat(design: &Design) -> Vec<String> {
-    names::channels("x_hat", design.states.len()).collect()
+    channels("x_hat", design.states.len()).collect()
 }
 
 /// The part of z that estimates the faults.
@@ -175,7 +176,7 @@ fn operating_command(design: &Design, j: usize) -> Option<String> {
 /// The dependencies of the initial innovations.
 fn of_innovations(design: &Design) -> Vec<String> {
     let mut names = measurements(design);
-    names.extend(names::channels("x_hat_0", design.states.len()));
+    names.extend(channels("x_hat_0", design.states.len()));
     names.extend(whole("C", &design.c));
     names.extend(operating_states(design));
     names.extend(names::operating(design, "y_op", design.measurements.len()));
@@ -221,7 +222,7 @@ fn of_initial_deviation(design: &Design, j: usize) -> Vec<String> {
 /// The bounds of a sliding-mode law.
 fn sliding_mode(design: &Design) -> impl Iterator<Item = String> {
     let count = design.sliding_mode.as_ref().map_or(0, |own| own.rho.len());
-    names::channels("rho", count).chain(names::channels("delta", count))
+    channels("rho", count).chain(channels("delta", count))
 }
 
 /// The dependencies of the initial deviations of the references from the operating point.
@@ -322,7 +323,7 @@ pub(crate) fn of_initial_slope(design: &Design, i: usize) -> Vec<String> {
     } else if let Some(d) = &design.d {
         let k = i - n - q;
         let mut names: Vec<_> =
-            names::channels("filter", design.measurements.len()).skip(k).take(1).collect();
+            channels("filter", design.measurements.len()).skip(k).take(1).collect();
         names.extend(row("D", d, k));
         names.extend((0..design.actuators.len()).flat_map(|j| of_initial_deviation(design, j)));
         names
@@ -353,7 +354,7 @@ fn of_initial_integral_slope(design: &Design, k: usize) -> Vec<String> {
     names.extend(referred.skip(k).take(1));
     if let Some(f_i) = &design.f_i {
         names.extend(row("F_i", f_i, k));
-        names.extend(names::channels("f_hat_0", design.faults.len()));
+        names.extend(channels("f_hat_0", design.faults.len()));
         if design.p_f.is_some() {
             names.extend((0..design.faults.len()).flat_map(|i| of_initial_fault(design, i)));
         }
@@ -375,7 +376,7 @@ fn of_initial_fault_slope(design: &Design, i: usize) -> Vec<String> {
     names.extend(row("L_f", &design.l_f, i));
     if let Some(a_f) = &design.a_f {
         names.extend(row("A_f", a_f, i));
-        names.extend(names::channels("f_hat_0", design.faults.len()));
+        names.extend(channels("f_hat_0", design.faults.len()));
     }
     names
 }

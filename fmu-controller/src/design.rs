@@ -3,14 +3,15 @@
 
 mod checks;
 pub(crate) mod detection;
+pub(crate) mod schedule;
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use crate::matrix::Matrix;
-use crate::schedule::Schedule;
 use detection::DetectionDesign;
+use schedule::Schedule;
 
 /// The content of a design file. Shapes: n states, m actuators, p measurements, q states of the
 /// fault model, t references.

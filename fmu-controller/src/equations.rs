@@ -344,6 +344,27 @@ impl<'a, D: Number> Equations<'a, D> {
     }
 }
 
+impl Mode {
+    /// The same mode, with the channels at a limit whose free command at `z` and the inputs y and r
+    /// (deviations) is beyond that limit.
+    pub(crate) fn limited(self, design: &Design, z: &[f64], inputs: [&[f64]; 2]) -> Self {
+        let mut mode = self;
+        (mode.lower, mode.upper) = (0, 0);
+        let equations = Equations::<f64>::new(design, mode);
+        for (j, actuator) in design.actuators.iter().enumerate() {
+            if let Some([low, high]) = actuator.range().filter(|_| !self.is_gone(j)) {
+                let mut command = equations.free_command(j, equations.estimate(z), inputs);
+                if self.gone != 0 {
+                    command += self.stuck_part(design, j);
+                }
+                mode.lower |= u64::from(command < low) << j;
+                mode.upper |= u64::from(command > high) << j;
+            }
+        }
+        mode
+    }
+}
+
 /// A row of a matrix that a design may state.
 fn row(matrix: Option<&Matrix>, row: usize) -> &[f64] {
     matrix.map_or(&[], |matrix| matrix.row(row))

@@ -2,6 +2,7 @@
 //! design read from `resources/design.toml`.
 #![forbid(unsafe_code)]
 
+mod channel;
 mod controller;
 mod dependencies;
 mod design;
@@ -18,7 +19,6 @@ mod sampled;
 mod schedule;
 mod shared;
 mod signals;
-mod variables;
 
 pub use controller::AsoController;
 

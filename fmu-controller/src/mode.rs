@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use crate::design::{Design, GainSet};
-use crate::equations::Equations;
 
 /// The switches of the equations: while the mode stays, all equations are linear.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -13,11 +12,11 @@ pub(crate) struct Mode {
     /// f_hat follows the observer.
     pub(crate) estimating: bool,
     /// Bit j: channel j is at its lower limit.
-    lower: u64,
+    pub(crate) lower: u64,
     /// Bit j: channel j is at its upper limit.
-    upper: u64,
+    pub(crate) upper: u64,
     /// Bit j: the actuator of channel j is gone.
-    gone: u64,
+    pub(crate) gone: u64,
     /// Whether the gains are those of the fall-back.
     fallen_back: bool,
 }
@@ -63,24 +62,6 @@ impl Mode {
             let stuck = own.k_s(j).iter().zip(self.gone_channels());
             stuck.map(|(k_s, gone)| k_s * self.held_deviation(design, gone).unwrap_or(0.0)).sum()
         })
-    }
-
-    /// The same mode, with the channels at a limit whose free command at `z` and the inputs y and r
-    /// (deviations) is beyond that limit.
-    pub(crate) fn limited(self, design: &Design, z: &[f64], inputs: [&[f64]; 2]) -> Self {
-        let mut mode = Self { lower: 0, upper: 0, ..self };
-        let equations = Equations::<f64>::new(design, mode);
-        for (j, actuator) in design.actuators.iter().enumerate() {
-            if let Some([low, high]) = actuator.range().filter(|_| !self.is_gone(j)) {
-                let mut command = equations.free_command(j, equations.estimate(z), inputs);
-                if self.gone != 0 {
-                    command += self.stuck_part(design, j);
-                }
-                mode.lower |= u64::from(command < low) << j;
-                mode.upper |= u64::from(command > high) << j;
-            }
-        }
-        mode
     }
 
     /// Whether channel `j` is at its lower (0) or upper (1) limit.

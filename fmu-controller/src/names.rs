@@ -2,18 +2,8 @@
 //!
 //! The functions return iterators of vectors: chains of iterators would be compiled once for each caller.
 
+use crate::channel::{channel, channels};
 use crate::design::Design;
-
-/// `name` for the only channel, `name[k]` for channel k of several; `position` counts from 0.
-pub(crate) fn channel(name: &str, position: usize, count: usize) -> String {
-    if count == 1 { name.to_owned() } else { format!("{name}[{}]", position + 1) }
-}
-
-/// The names of all `count` channels.
-pub(crate) fn channels(name: &str, count: usize) -> std::vec::IntoIter<String> {
-    let names: Vec<_> = (0..count).map(|position| channel(name, position, count)).collect();
-    names.into_iter()
-}
 
 /// `y_f`, the filtered measurements, where the design has a filter.
 pub(crate) fn filtered(design: &Design) -> std::vec::IntoIter<String> {

@@ -1,8 +1,8 @@
 //! The checks of a design file: counts, shapes, ranges, entries that belong together.
 
 use super::{Defaults, Design, DesignError, Estimator, Fault, SlidingMode};
+use crate::channel::channel;
 use crate::matrix::Matrix;
-use crate::names;
 
 /// Range of `least_command`: its square and the inverse of the square are finite.
 const COMMANDS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
@@ -348,7 +348,7 @@ impl Design {
         });
         let (name, k, count, value) =
             all.find(|(.., value)| !(*value > 0.0 && value.is_finite()))?;
-        Some((names::channel(name, k, count), value, "a finite number above 0"))
+        Some((channel(name, k, count), value, "a finite number above 0"))
     }
 
     /// The first element of `filter` that breaks its rule.
@@ -359,7 +359,7 @@ impl Design {
         };
         let filter = self.filter.as_ref()?;
         let k = filter.iter().position(|value| !(*value > 0.0 && *value <= most))?;
-        Some((names::channel("filter", k, filter.len()), filter[k], rule))
+        Some((channel("filter", k, filter.len()), filter[k], rule))
     }
 
     fn refused_signal(&self) -> Option<Refusal> {

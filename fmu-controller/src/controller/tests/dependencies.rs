@@ -1,5 +1,6 @@
 //! The lists of `ModelStructure`, compared with the effects of perturbations.
 
+use crate::channel::{channel, channels};
 use std::collections::{BTreeMap, BTreeSet};
 
 use fmu::description::DependencyKind::{self, Constant, Dependent, Discrete, Fixed};
@@ -92,11 +93,11 @@ fn initial_values_depend_on_what_is_listed_and_on_nothing_else() {
             }
             list(name, dependencies::of_initial_estimate(design, k));
         }
-        for (i, name) in names::channels("f_hat", controller.deviations.f_hat.len()).enumerate() {
+        for (i, name) in channels("f_hat", controller.deviations.f_hat.len()).enumerate() {
             list(name, dependencies::of_initial_fault(design, i));
         }
         for loss in &controller.losses {
-            let name = names::channel("E_hat", loss.fault, q);
+            let name = channel("E_hat", loss.fault, q);
             list(name, dependencies::of_initial_loss(design, loss));
         }
         assert_eq!(found, listed, "{of:?}");
@@ -181,11 +182,11 @@ fn at_a_point_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed
             list(&state, &[(Constant, vec![state.clone()])]);
             list(&format!("der({state})"), &dependencies::of_slope(design, k));
         }
-        for (i, name) in names::channels("f_hat", controller.deviations.f_hat.len()).enumerate() {
+        for (i, name) in channels("f_hat", controller.deviations.f_hat.len()).enumerate() {
             list(&name, &dependencies::of_fault(design, i));
         }
         for loss in &controller.losses {
-            let name = names::channel("E_hat", loss.fault, of.0[3]);
+            let name = channel("E_hat", loss.fault, of.0[3]);
             list(&name, &dependencies::of_loss(design));
         }
         let found: BTreeMap<_, _> = factors(of)

@@ -1,5 +1,6 @@
 //! Designs of any size, and every number of a controller by the name of its variable.
 
+use crate::channel::{channel, channels};
 use crate::controller::AsoController;
 use crate::design::{Actuator, Design};
 use crate::matrix::Matrix;
@@ -196,11 +197,11 @@ pub(super) fn unknowns(controller: &AsoController) -> Vec<Real> {
     };
     let mut all: Vec<_> = design.actuators.iter().enumerate().map(command).collect();
     all.extend(estimates(controller));
-    for (i, name) in names::channels("f_hat", controller.deviations.f_hat.len()).enumerate() {
+    for (i, name) in channels("f_hat", controller.deviations.f_hat.len()).enumerate() {
         all.push(real(name, move |own| &mut own.deviations.f_hat[i]));
     }
     for (position, loss) in controller.losses.iter().enumerate() {
-        let name = names::channel("E_hat", loss.fault, design.faults.len());
+        let name = channel("E_hat", loss.fault, design.faults.len());
         all.push(real(name, move |own| &mut own.losses[position].estimate));
     }
     for (k, state) in states(controller).into_iter().enumerate() {
@@ -215,7 +216,7 @@ pub(super) fn unknowns(controller: &AsoController) -> Vec<Real> {
 fn shared(design: &Design) -> Vec<Real> {
     let mut all = Vec::new();
     let filters = design.filter.as_ref().map_or(0, Vec::len);
-    for (k, name) in names::channels("filter", filters).enumerate() {
+    for (k, name) in channels("filter", filters).enumerate() {
         all.push(real(name, move |own| &mut own.design.filter.as_mut().unwrap()[k]));
     }
     let (n, m, p) = (design.states.len(), design.actuators.len(), design.measurements.len());
@@ -281,7 +282,7 @@ pub(super) fn initial_knowns(controller: &AsoController) -> Vec<Real> {
     }
     for bound in 0..2 * design.sliding_mode.as_ref().map_or(0, |own| own.rho.len()) {
         let (i, count) = (bound / 2, design.faults.len());
-        let name = names::channel(["rho", "delta"][bound % 2], i, count);
+        let name = channel(["rho", "delta"][bound % 2], i, count);
         all.push(real(name, move |own| {
             let own = own.design.sliding_mode.as_mut().unwrap();
             &mut [&mut own.rho, &mut own.delta].into_iter().nth(bound % 2).unwrap()[i]

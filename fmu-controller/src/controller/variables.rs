@@ -6,10 +6,10 @@ mod parameters;
 use fmu::Variable;
 use fmu::description::unit::Unit;
 
+use crate::channel::channel;
 use crate::controller::AsoController;
 use crate::dependencies::Group;
 use crate::design::{Design, Fault, Label, Signal};
-use crate::names::channel;
 use crate::{dependencies, names};
 
 /// All variables of `controller`, in the order of the description.

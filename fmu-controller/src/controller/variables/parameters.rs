@@ -3,11 +3,11 @@
 use fmu::Variable;
 
 use super::{times_second, with_unit};
+use crate::channel::channel;
 use crate::controller::AsoController;
 use crate::design::{Design, Estimator, Fault, Label, Reconfiguration, Signal, SlidingMode};
 use crate::matrix::Matrix;
 use crate::names;
-use crate::names::channel;
 
 /// Returns one matrix of a design.
 type Accessor = fn(&mut Design) -> &mut Matrix;
