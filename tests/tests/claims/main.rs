@@ -18,6 +18,7 @@ mod misbehaviour_loading;
 mod misbehaviour_process;
 mod misbehaviour_run;
 mod model_exchange;
+mod modules;
 mod network;
 mod order;
 mod package;
