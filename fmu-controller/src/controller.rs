@@ -11,8 +11,6 @@ use fmu::{About, At, Event, Experiment, Failure, Log, Model, ModelExchange, Step
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
-use crate::design::Design;
-use crate::design::detection::DetectionDesign;
 use crate::detection::{Detector, Stretch};
 use crate::equations::Equations;
 use crate::loss::Loss;
@@ -23,6 +21,9 @@ use crate::reconfiguration::Reconfigurator;
 use crate::sampled::Sampler;
 use crate::shared::Shared;
 use crate::signals::{OperatingPoint, Signals, Values};
+use aso_controller::Design;
+use aso_controller::design::Refusal;
+use aso_controller::design::detection::DetectionDesign;
 
 /// The part of the range of an actuator by which a free command passes a limit before that is an
 /// event: no event indicator is zero after an event, and rounding causes no second event.
@@ -354,8 +355,12 @@ impl Model for AsoController {
     }
 
     fn new(resources: &Path) -> Result<Self, Failure> {
-        let design = Design::read(resources).map_err(|error| Failure::Error(error.to_string()))?;
-        Ok(Self::with(design))
+        let file = resources.join("design.toml");
+        let path = file.display().to_string();
+        let text = std::fs::read_to_string(&file);
+        let text = text.map_err(|error| Failure::Error(format!("{path}: {error}")))?;
+        let design = Design::parse(&text, path);
+        Ok(Self::with(design.map_err(|error| Failure::Error(error.to_string()))?))
     }
 
     fn variables(&self) -> Vec<Variable<Self>> {
@@ -377,7 +382,7 @@ impl Model for AsoController {
         let refused = detection.and_then(|own| own.refused_number(&self.design));
         let of_laws = self.design.refused_filter().or_else(|| self.design.refused_sliding_mode());
         match of_laws.or(refused) {
-            Some((name, value, rule)) => {
+            Some(Refusal { name, value, rule }) => {
                 Err(Failure::Error(format!("{name} = {value}, expected {rule}")))
             }
             None => Ok(()),

@@ -13,11 +13,11 @@
 
 use fmu::description::DependencyKind::{self, Constant, Dependent, Discrete, Fixed};
 
-use crate::channel::channels;
-use crate::design::{Design, Estimator};
 use crate::loss::Loss;
-use crate::matrix::Matrix;
 use crate::names;
+use aso_controller::Matrix;
+use aso_controller::channels;
+use aso_controller::design::{Design, Estimator};
 
 /// Names of variables that an unknown depends on, with the kind of that dependency.
 pub(crate) type Group = (DependencyKind, Vec<String>);

@@ -21,11 +21,11 @@ use control::Error;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use crate::design::Design;
-use crate::design::detection::DetectionDesign;
-use crate::matrix::Matrix;
+use crate::dense::dense;
 use crate::mode::Mode;
 use crate::observer::{self, Propagators};
+use aso_controller::Design;
+use aso_controller::design::detection::DetectionDesign;
 pub(crate) use decision::Decision;
 use tests_of_residuals::TestState;
 
@@ -241,8 +241,6 @@ fn system((design, own): (&Design, &DetectionDesign), mode: Mode) -> (DMatrix<f6
     let whole = order + k + rows;
     let (mut state, mut input) =
         (DMatrix::zeros(whole, whole), DMatrix::zeros(whole, responses.len() - order));
-    let dense =
-        |matrix: &Matrix| DMatrix::from_row_slice(matrix.rows, matrix.columns, &matrix.values);
     let feedthrough = design.d.as_ref().map(dense);
     let [b_u, b_y, d_u, d_y] = [&own.b_u, &own.b_y, &own.d_u, &own.d_y].map(dense);
     for (at, [slopes, u]) in responses.into_iter().enumerate() {

@@ -45,11 +45,11 @@
 //! their values at unit vectors, the directional derivatives are their values for dual numbers, and
 //! u' is the command at z'.
 
-use crate::design::{Design, SlidingMode};
-use crate::matrix::Matrix;
 use crate::mode::Mode;
 use crate::number::Number;
 use crate::signals::Signals;
+use aso_controller::Matrix;
+use aso_controller::design::{Design, SlidingMode};
 
 /// The equations of one design in one mode, for numbers `D`.
 #[derive(Clone, Copy)]

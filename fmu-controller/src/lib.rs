@@ -2,21 +2,18 @@
 //! design read from `resources/design.toml`.
 #![forbid(unsafe_code)]
 
-mod channel;
 mod controller;
+mod dense;
 mod dependencies;
-mod design;
 mod detection;
 mod equations;
 mod loss;
-mod matrix;
 mod mode;
 mod names;
 mod number;
 mod observer;
 mod reconfiguration;
 mod sampled;
-mod schedule;
 mod shared;
 mod signals;
 

@@ -12,8 +12,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::Design;
 use crate::number::Number;
+use aso_controller::Design;
 
 /// One fault that is a loss of effectiveness.
 #[derive(Clone, Serialize, Deserialize)]

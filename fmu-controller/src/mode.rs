@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::{Design, GainSet};
+use aso_controller::design::{Design, GainSet};
 
 /// The switches of the equations: while the mode stays, all equations are linear.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -2,8 +2,8 @@
 //!
 //! The functions return iterators of vectors: chains of iterators would be compiled once for each caller.
 
-use crate::channel::{channel, channels};
-use crate::design::Design;
+use aso_controller::Design;
+use aso_controller::{channel, channels};
 
 /// `y_f`, the filtered measurements, where the design has a filter.
 pub(crate) fn filtered(design: &Design) -> std::vec::IntoIter<String> {

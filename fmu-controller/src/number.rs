@@ -2,7 +2,7 @@
 
 use num_dual::{Dual64, DualNum};
 
-use crate::matrix::Matrix;
+use aso_controller::Matrix;
 
 /// `f64`, or a dual number `x + x' e` with `e² = 0`, which carries the derivative `x'` in a direction
 /// through the same equations (forward differentiation).

@@ -9,10 +9,10 @@ use std::sync::Arc;
 use control::hold::FirstOrderHold;
 use nalgebra::DMatrix;
 
-use crate::design::Design;
 use crate::equations::Equations;
 use crate::mode::Mode;
 use crate::signals::Signals;
+use aso_controller::Design;
 
 /// The most halvings of a step to locate the instant at which a channel reaches its limit.
 const HALVINGS: u32 = 20;

@@ -30,8 +30,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::Design;
 use crate::loss::Loss;
+use aso_controller::Design;
 
 /// Which actuators are gone.
 #[derive(Clone, Serialize, Deserialize)]

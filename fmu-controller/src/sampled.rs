@@ -26,11 +26,11 @@
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
-use crate::design::{Design, Estimator};
 use crate::equations::Equations;
 use crate::mode::Mode;
 use crate::number::Number;
 use crate::signals::{OperatingPoint, Signals, Values};
+use aso_controller::design::{Design, Estimator};
 
 /// The part of the sample time by which a sample may be early: an importer adds up its steps with
 /// rounding.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::{Design, Signal};
 use crate::mode::Mode;
+use aso_controller::design::{Design, Signal};
 
 /// The signals as the importer sees them.
 #[derive(Clone, Serialize, Deserialize)]

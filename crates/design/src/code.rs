@@ -2,7 +2,7 @@
 //!
 //! The design file, which the controller FMU reads, becomes a [`Controller`]; its [`Recursion`] states
 //! each operation once. Both renderers, the count of operations and the bound of rounding errors follow
-//! from it. An entry of the design file that the recursion does not know is an error.
+//! from it.
 
 mod arithmetic;
 mod c;
@@ -102,7 +102,8 @@ impl Design {
     /// [`Error::Invalid`] for a continuous design; for an entry of the design that has no code; for a
     /// number beyond the range of the precision.
     pub fn code(&self, language: Language, precision: Precision) -> Result<Code, Error> {
-        let controller = Controller::of(&self.file)?;
+        let file = aso_controller::Design::parse(&self.file, "design.toml".to_owned());
+        let controller = Controller::of(file.map_err(|error| Error::Invalid(error.to_string()))?)?;
         controller.check_range(precision)?;
         let recursion = Recursion::of(&controller);
         let bound = match precision {

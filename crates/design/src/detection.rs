@@ -9,6 +9,7 @@ mod problem;
 pub mod report;
 pub(crate) mod request;
 
+use aso_controller::design::detection::DetectionDesign;
 use control::detection::{Cusum, WindowTest};
 use nalgebra::DMatrix;
 
@@ -21,7 +22,6 @@ use crate::detection::report::{
 };
 use crate::detection::request::{DetectionRequest, Method};
 use decoupling::Decoupling;
-pub(crate) use file::Section;
 use model_error::{LargestMean, ModelErrors};
 use prediction::{Prediction, TestKind};
 use problem::Problem;
@@ -39,7 +39,7 @@ const LARGEST_DRIFT: f64 = 2.0;
 
 /// The detection with what the report says about it.
 pub(crate) struct Detection {
-    pub(crate) section: Section,
+    pub(crate) section: DetectionDesign,
     pub(crate) report: Report,
     pub(crate) warnings: Vec<String>,
 }
@@ -86,7 +86,7 @@ pub(crate) fn detection(
     let mut report = report(request, &problem, &parts, &mut warnings).map_err(refuse)?;
     let cases = errors.as_ref().and_then(ModelErrors::random_cases);
     report.parameter_cases = cases.map(|cases| ParameterCases::new(cases, file.robustness.seed));
-    let section = Section::new(&problem, &parts, report.from, designed);
+    let section = file::section(&problem, &parts, report.from, designed);
     Ok(Some(Detection { section, report, warnings }))
 }
 

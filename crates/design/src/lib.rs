@@ -145,7 +145,8 @@ fn design_source(
     let fallback = fallback::fallback(&file, &designed)?;
     let (reconfigurations, without) =
         reconfiguration::reconfigurations(&file, &designed, fallback)?;
-    let text = designed.file(&file, &description, (section, &reconfigurations))?;
+    let controller = designed.file(&file, &description, section, &reconfigurations)?;
+    let text = controller.to_toml().map_err(|error| Error::Invalid(error.to_string()))?;
     let report = reporting::report(
         (&file, family.as_ref()),
         (&designed, without, reconfigurations.fallback.as_ref()),

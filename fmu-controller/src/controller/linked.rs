@@ -4,8 +4,8 @@ use fmu::Failure;
 use nalgebra::DMatrix;
 
 use super::AsoController;
-use crate::design::Design;
-use crate::matrix::Matrix;
+use crate::dense::dense;
+use aso_controller::Design;
 
 impl AsoController {
     /// The bytes of the design in `text`, the content of `design.toml`, for [`AsoController::from_bytes`]: a
@@ -34,6 +34,6 @@ impl AsoController {
 
     /// A, B, C and `F_a` of the design: the plant and the columns by which faults enter it.
     pub fn plant(&self) -> [DMatrix<f64>; 4] {
-        [&self.design.a, &self.design.b, &self.design.c, &self.design.f_a].map(Matrix::dense)
+        [&self.design.a, &self.design.b, &self.design.c, &self.design.f_a].map(dense)
     }
 }

@@ -3,9 +3,10 @@
 use num_dual::Dual64;
 
 use super::AsoController;
-use crate::design::Design;
 use crate::equations::Equations;
-use crate::signals::Signals;
+use crate::signals::{Signals, Values};
+use aso_controller::Design;
+use aso_controller::design::schedule::Schedule;
 
 impl AsoController {
     /// Computes u', and f_hat' with a direct term, of a controller with a schedule: a part of them comes from gains
@@ -43,7 +44,7 @@ impl AsoController {
         let input = self.schedule_input + self.schedule_slope * offset;
         let Self { design, current, values, operating_point, .. } = self;
         let (Some(schedule), Some(current)) = (&design.schedule, current) else { return };
-        let value = schedule.value(design, values, input, offset);
+        let value = scheduling_variable(schedule, design, values, input, offset);
         self.schedule_value = value;
         self.schedule_at = schedule.interpolate(value, current);
         current.take_parameters(design);
@@ -66,7 +67,7 @@ impl AsoController {
         let Self { design, current, values, schedule_input, .. } = direction;
         let (Some(schedule), Some(current)) = (&self.design.schedule, current) else { return };
         let value = self.schedule_value;
-        let slope = schedule.value(&self.design, values, *schedule_input, 0.0);
+        let slope = scheduling_variable(schedule, &self.design, values, *schedule_input, 0.0);
         direction.schedule_at = schedule.differentiate(value, slope, current);
         current.take_parameters(design);
     }
@@ -74,5 +75,19 @@ impl AsoController {
     /// The design of the last sample, or of now.
     pub(super) fn design_in_force(&self) -> &Design {
         self.current.as_deref().unwrap_or(&self.design)
+    }
+}
+
+/// The scheduling variable `offset` s after the measurements were given: one of them, or an input of its own.
+fn scheduling_variable(
+    schedule: &Schedule,
+    design: &Design,
+    values: &Values,
+    input: f64,
+    offset: f64,
+) -> f64 {
+    match schedule.measurement(design) {
+        Some(k) => values.y[k] + values.y_slopes[k] * offset,
+        None => input,
     }
 }

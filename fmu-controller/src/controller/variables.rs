@@ -6,11 +6,11 @@ mod parameters;
 use fmu::Variable;
 use fmu::description::unit::Unit;
 
-use crate::channel::channel;
 use crate::controller::AsoController;
 use crate::dependencies::Group;
-use crate::design::{Design, Fault, Label, Signal};
 use crate::{dependencies, names};
+use aso_controller::channel;
+use aso_controller::design::{Design, Fault, Label, Signal};
 
 /// All variables of `controller`, in the order of the description.
 pub(crate) fn list(controller: &AsoController) -> Vec<Variable<AsoController>> {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::detection::DetectionDesign;
+use aso_controller::design::detection::DetectionDesign;
 
 /// The value of the times before an alarm.
 const NEVER: f64 = -1.0;

@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::detection::TestDesign;
+use aso_controller::design::detection::TestDesign;
 
 /// The state of a test.
 #[derive(Clone, Serialize, Deserialize)]

@@ -45,8 +45,9 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
 }
 
 /// The folders of our libraries, each with the libraries that it may use.
-const ARROWS: [(&str, &[&str]); 19] = [
+const ARROWS: [(&str, &[&str]); 20] = [
     ("lapack", &[]),
+    ("controller", &[]),
     ("control", &["aso-lapack"]),
     ("fmu-description", &[]),
     ("fmu-derive", &[]),
@@ -76,7 +77,18 @@ const ARROWS: [(&str, &[&str]); 19] = [
             "ssp",
         ],
     ),
-    ("design", &["control", "figure", "files", "fmu-description", "fmu-import", "linearise"]),
+    (
+        "design",
+        &[
+            "aso-controller",
+            "control",
+            "figure",
+            "files",
+            "fmu-description",
+            "fmu-import",
+            "linearise",
+        ],
+    ),
 ];
 
 fn manifest(folder: &Path) -> toml::Table {
@@ -100,6 +112,17 @@ fn the_libraries_use_only_those_that_architecture_md_allows() {
         for ours in dependencies.filter(is_ours) {
             assert!(allowed.contains(&ours.as_str()), "crates/{folder} uses {ours}");
         }
+    }
+}
+
+#[test]
+fn the_controller_is_built_once_more_with_the_dependencies_that_it_has() {
+    let dependencies = |folder: &str| -> BTreeSet<String> {
+        let manifest = manifest(&root().join(folder));
+        manifest["dependencies"].as_table().unwrap().keys().cloned().collect()
+    };
+    for folder in ["web/controller", "fuzz/controller"] {
+        assert_eq!(dependencies(folder), dependencies("fmu-controller"), "{folder}");
     }
 }
 

@@ -1,12 +1,13 @@
 //! The sampled controller as its design file states it.
 
+use aso_controller::Design;
+use aso_controller::design::{Actuator, Estimator, Fault, SlidingMode};
 use nalgebra::DMatrix;
-use serde::Deserialize;
 
 use super::Precision;
-use super::detection::{Detection, DetectionFile};
-use super::reconfiguration::{CaseFile, CombinationFile, FallbackFile, Plant, Reconfiguration};
-use super::schedule::{Schedule, ScheduleFile};
+use super::detection::Detection;
+use super::reconfiguration::{Plant, Reconfiguration};
+use super::schedule::Schedule;
 use super::symbols::Matrix;
 use crate::Error;
 
@@ -57,40 +58,14 @@ pub(super) struct Controller {
     pub(super) reconfiguration: Option<Reconfiguration>,
 }
 
-/// The measurements that the command is computed from.
-#[derive(Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Estimator {
-    Current,
-    Prediction,
-}
-
-/// The bounds of a sliding-mode law, f_hat = rho s / (|s| + delta) with s = `L_f` e; a number for each fault.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SlidingMode {
-    pub(super) rho: Vec<f64>,
-    pub(super) delta: Vec<f64>,
-}
-
-/// A state, an actuator, a measurement or a fault.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A state, an actuator, a measurement, a reference or a fault, as the code describes it.
 pub(super) struct Signal {
     pub(super) name: String,
-    #[serde(default)]
     pub(super) unit: Option<String>,
-    #[serde(default)]
     pub(super) description: String,
     /// The value at the operating point.
-    #[serde(default)]
     pub(super) operating: f64,
-    #[serde(default)]
     pub(super) limits: Option<[f64; 2]>,
-    #[serde(default)]
-    loss_of: Option<String>,
-    #[serde(default)]
-    least_command: Option<f64>,
 }
 
 impl Signal {
@@ -100,8 +75,27 @@ impl Signal {
         description: String,
         operating: f64,
     ) -> Self {
-        let (limits, loss_of, least_command) = (None, None, None);
-        Self { name, unit, description, operating, limits, loss_of, least_command }
+        Self { name, unit, description, operating, limits: None }
+    }
+}
+
+impl From<aso_controller::design::Signal> for Signal {
+    fn from(signal: aso_controller::design::Signal) -> Self {
+        let aso_controller::design::Signal { name, unit, description, operating } = signal;
+        Self::new(name, unit, description, operating.unwrap_or_default())
+    }
+}
+
+impl From<Actuator> for Signal {
+    fn from(actuator: Actuator) -> Self {
+        let Actuator { name, unit, description, operating, limits } = actuator;
+        Self { limits, ..Self::new(name, unit, description, operating.unwrap_or_default()) }
+    }
+}
+
+impl From<Fault> for Signal {
+    fn from(fault: Fault) -> Self {
+        Self::new(fault.name, fault.unit, fault.description, 0.0)
     }
 }
 
@@ -113,156 +107,114 @@ pub(super) struct Loss {
     pub(super) least_command: f64,
 }
 
-/// The entries of a design file that this module has code for.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    description: String,
-    t_on: f64,
-    #[serde(default)]
-    monitor: bool,
-    sample_time: Option<f64>,
-    estimator: Option<Estimator>,
-    #[serde(default)]
-    filter: Option<Vec<f64>>,
-    #[serde(rename = "experiment")]
-    _experiment: toml::Value,
-    states: Vec<Signal>,
-    actuators: Vec<Signal>,
-    measurements: Vec<Signal>,
-    faults: Vec<Signal>,
-    #[serde(rename = "A")]
-    a: Rows,
-    #[serde(rename = "B")]
-    b: Rows,
-    #[serde(rename = "C")]
-    c: Rows,
-    #[serde(rename = "D", default)]
-    d: Option<Rows>,
-    #[serde(rename = "F_a")]
-    f_a: Rows,
-    #[serde(rename = "A_f", default)]
-    a_f: Option<Rows>,
-    #[serde(rename = "K_x")]
-    k_x: Rows,
-    #[serde(rename = "K_f")]
-    k_f: Rows,
-    #[serde(rename = "L_x")]
-    l_x: Rows,
-    #[serde(rename = "L_f")]
-    l_f: Rows,
-    #[serde(rename = "P_f", default)]
-    p_f: Option<Rows>,
-    #[serde(default)]
-    sliding_mode: Option<SlidingMode>,
-    #[serde(rename = "H", default)]
-    h: Option<Rows>,
-    #[serde(rename = "K_i", default)]
-    k_i: Option<Rows>,
-    #[serde(rename = "F_i", default)]
-    f_i: Option<Rows>,
-    #[serde(rename = "L_w", default)]
-    l_w: Option<Rows>,
-    #[serde(rename = "N_r", default)]
-    n_r: Option<Rows>,
-    #[serde(default)]
-    references: Vec<Signal>,
-    #[serde(default)]
-    schedule: Option<ScheduleFile>,
-    #[serde(default)]
-    detection: Option<DetectionFile>,
-    #[serde(default)]
-    reconfigurations: Vec<CaseFile>,
-    #[serde(default)]
-    combinations: Vec<CombinationFile>,
-    #[serde(default)]
-    fallback: Option<FallbackFile>,
-}
-
-/// A matrix as the design file has it.
-#[derive(Deserialize)]
-pub(super) struct Rows(Vec<Vec<f64>>);
-
-impl Rows {
-    pub(super) fn dense(self) -> DMatrix<f64> {
-        let columns = self.0.first().map_or(0, Vec::len);
-        DMatrix::from_row_slice(self.0.len(), columns, &self.0.concat())
-    }
+/// A matrix of the design file for linear algebra.
+pub(super) fn dense(matrix: &aso_controller::Matrix) -> DMatrix<f64> {
+    DMatrix::from_row_slice(matrix.rows, matrix.columns, &matrix.values)
 }
 
 impl Controller {
-    /// Reads the design file `text`; the error names what has no code.
-    pub(super) fn of(text: &str) -> Result<Self, Error> {
-        let file: File = toml::from_str(text).map_err(|error| {
-            // `unknown field X, expected one of` all that there are.
-            let reason = error.message().split(", expected").next().unwrap_or_default();
-            let reason = reason.replace("unknown field", "there is no code for its entry");
-            Error::Invalid(format!("only the FMU has this controller: {reason}"))
-        })?;
-        let (Some(sample_time), Some(estimator)) = (file.sample_time, file.estimator) else {
+    /// The controller of a design file; the error names what has no code.
+    pub(super) fn of(file: Design) -> Result<Self, Error> {
+        // Each entry of a design file has code, or the reason why it needs none.
+        let Design {
+            description,
+            t_on,
+            monitor,
+            sample_time,
+            estimator,
+            filter,
+            a,
+            b,
+            c,
+            d,
+            f_a,
+            a_f,
+            p_f,
+            sliding_mode,
+            k_x,
+            k_f,
+            l_x,
+            l_f,
+            h,
+            k_i,
+            f_i,
+            l_w,
+            n_r,
+            states,
+            actuators,
+            measurements,
+            faults,
+            references,
+            reconfigurations,
+            combinations,
+            fallback,
+            // For importers of the FMU.
+            experiment: _,
+            schedule,
+            detection,
+        } = file;
+        let (Some(sample_time), Some(estimator)) = (sample_time, estimator) else {
             return Err(Error::Invalid(
                 "there is code for sampled designs only, and this one is continuous; state \
                  `sample_time` in the plant file"
                     .to_owned(),
             ));
         };
-        let first_compensated = first_at(file.t_on, sample_time).ok_or_else(|| {
-            Error::Invalid(format!(
-                "t_on = {} s is more than 2^32 samples of {sample_time} s after the start; a counter of \
-                 the code has 32 bits",
-                file.t_on
-            ))
-        })?;
-        let faults = file.faults.len();
-        let detection = file.detection.map(|own| Detection::of(own, sample_time)).transpose()?;
-        let schedule =
-            file.schedule.map(|own| Schedule::of(own, &file.measurements)).transpose()?;
-        let (k_x, k_f) = (file.k_x.dense(), file.k_f.dense());
-        let losses = losses(&file.faults, &file.actuators);
+        let first_compensated = first_compensated(t_on, sample_time)?;
+        let detection =
+            detection.map(|detection| Detection::of(detection, sample_time)).transpose()?;
+        let schedule = schedule.map(|schedule| Schedule::of(schedule, &measurements));
+        let (k_x, k_f) = (dense(&k_x), dense(&k_f));
+        let losses = losses(&faults, &actuators);
         let plant = Plant {
             sample_time,
-            actuators: &file.actuators,
-            faults: &file.faults,
+            actuators: &actuators,
+            faults: &faults,
             losses: &losses,
-            gains: [&k_x, &k_f],
+            k_x: &k_x,
+            k_f: &k_f,
         };
         let reconfiguration =
-            Reconfiguration::of(file.reconfigurations, file.combinations, file.fallback, &plant)?;
+            Reconfiguration::of(&reconfigurations, &combinations, fallback.as_ref(), &plant)?;
+        let stated = |matrix: Option<aso_controller::Matrix>| matrix.as_ref().map(dense);
+        let q = faults.len();
+        let signals =
+            |all: Vec<aso_controller::design::Signal>| all.into_iter().map(Signal::from).collect();
         Ok(Self {
             reconfiguration,
             schedule,
             detection,
             losses,
-            description: file.description,
+            description,
             sample_time,
             estimator,
-            t_on: file.t_on,
+            t_on,
             first_compensated,
-            monitor: file.monitor,
-            filter: file.filter,
-            a: file.a.dense(),
-            b: file.b.dense(),
-            c: file.c.dense(),
-            d: file.d.map(Rows::dense),
-            f_a: file.f_a.dense(),
-            constant_faults: file.a_f.is_none(),
-            a_f: file.a_f.map_or_else(|| DMatrix::identity(faults, faults), Rows::dense),
+            monitor,
+            filter,
+            a: dense(&a),
+            b: dense(&b),
+            c: dense(&c),
+            d: stated(d),
+            f_a: dense(&f_a),
+            constant_faults: a_f.is_none(),
+            a_f: stated(a_f).unwrap_or_else(|| DMatrix::identity(q, q)),
             k_x,
             k_f,
-            l_x: file.l_x.dense(),
-            l_f: file.l_f.dense(),
-            p_f: file.p_f.map(Rows::dense),
-            sliding_mode: file.sliding_mode,
-            h: file.h.map(Rows::dense),
-            k_i: file.k_i.map(Rows::dense),
-            f_i: file.f_i.map(Rows::dense),
-            l_w: file.l_w.map(Rows::dense),
-            n_r: file.n_r.map(Rows::dense),
-            references: file.references,
-            states: file.states,
-            actuators: file.actuators,
-            measurements: file.measurements,
-            faults: file.faults,
+            l_x: dense(&l_x),
+            l_f: dense(&l_f),
+            p_f: stated(p_f),
+            sliding_mode,
+            h: stated(h),
+            k_i: stated(k_i),
+            f_i: stated(f_i),
+            l_w: stated(l_w),
+            n_r: stated(n_r),
+            references: signals(references),
+            states: signals(states),
+            actuators: actuators.into_iter().map(Signal::from).collect(),
+            measurements: signals(measurements),
+            faults: faults.into_iter().map(Signal::from).collect(),
         })
     }
 
@@ -372,6 +324,16 @@ fn too_large(name: &str, value: f64) -> Error {
     ))
 }
 
+/// The number of the first sample at which faults are compensated.
+fn first_compensated(t_on: f64, sample_time: f64) -> Result<u32, Error> {
+    first_at(t_on, sample_time).ok_or_else(|| {
+        Error::Invalid(format!(
+            "t_on = {t_on} s is more than 2^32 samples of {sample_time} s after the start; a counter of \
+             the code has 32 bits"
+        ))
+    })
+}
+
 /// The number of the first sample at which the FMU compensates, from a start at time 0; `None` if it
 /// does not fit into 32 bits.
 pub(super) fn first_at(t_on: f64, period: f64) -> Option<u32> {
@@ -387,8 +349,8 @@ pub(super) fn first_at(t_on: f64, period: f64) -> Option<u32> {
     (sample <= f64::from(u32::MAX)).then_some(sample as u32)
 }
 
-fn losses(faults: &[Signal], actuators: &[Signal]) -> Vec<Loss> {
-    let loss = |(fault, own): (usize, &Signal)| {
+fn losses(faults: &[Fault], actuators: &[Actuator]) -> Vec<Loss> {
+    let loss = |(fault, own): (usize, &Fault)| {
         let name = own.loss_of.as_ref()?;
         let actuator = actuators.iter().position(|actuator| actuator.name == *name)?;
         Some(Loss { fault, actuator, least_command: own.least_command? })
@@ -398,13 +360,7 @@ fn losses(faults: &[Signal], actuators: &[Signal]) -> Vec<Loss> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Controller, first_at};
-
-    #[test]
-    fn an_entry_without_code_is_named() {
-        let error = Controller::of("Q_f = [[1.0]]\n").err().unwrap().to_string();
-        assert_eq!(error, "only the FMU has this controller: there is no code for its entry `Q_f`");
-    }
+    use super::first_at;
 
     #[test]
     fn the_first_compensated_sample_is_the_first_one_at_t_on() {

@@ -1,10 +1,10 @@
 //! The detection of a controller: the filter of the residuals is part of the recursion, the tests and the
 //! decision are here as data. `fmu-controller/src/detection.rs` has the equations.
 
+use aso_controller::design::detection::{DetectionDesign, TestDesign};
 use nalgebra::DMatrix;
-use serde::Deserialize;
 
-use super::controller::{Controller, Rows, first_at};
+use super::controller::{Controller, dense, first_at};
 use super::symbols::{Kind, Vector};
 use super::tables::Constants;
 use crate::Error;
@@ -51,44 +51,9 @@ pub(super) struct Test {
     pub(super) reacts: Vec<bool>,
 }
 
-/// The table `[detection]` of a design file.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct DetectionFile {
-    from: f64,
-    #[serde(rename = "A")]
-    a: Rows,
-    #[serde(rename = "B_u")]
-    b_u: Rows,
-    #[serde(rename = "B_y")]
-    b_y: Rows,
-    #[serde(rename = "C")]
-    c: Rows,
-    #[serde(rename = "D_u")]
-    d_u: Rows,
-    #[serde(rename = "D_y")]
-    d_y: Rows,
-    start: Rows,
-    faults: Vec<String>,
-    tests: Vec<TestFile>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TestFile {
-    name: String,
-    residuals: usize,
-    #[serde(default)]
-    drift: Option<f64>,
-    #[serde(default)]
-    window: Option<u32>,
-    threshold: f64,
-    reacts: Vec<bool>,
-}
-
 impl Detection {
     /// The detection of a design file with this sample time in s.
-    pub(super) fn of(file: DetectionFile, sample_time: f64) -> Result<Self, Error> {
+    pub(super) fn of(file: DetectionDesign, sample_time: f64) -> Result<Self, Error> {
         let first_tested = first_at(file.from, sample_time).ok_or_else(|| {
             Error::Invalid(format!(
                 "detection.from = {} s is more than 2^32 samples of {sample_time} s after the start; a \
@@ -105,7 +70,7 @@ impl Detection {
                 return Err(Error::Invalid(text.to_owned()));
             }
         };
-        let test = |own: TestFile| Test {
+        let test = |own: TestDesign| Test {
             name: own.name,
             residuals: own.residuals,
             drift: own.drift.unwrap_or_default(),
@@ -115,13 +80,13 @@ impl Detection {
         };
         Ok(Self {
             first_tested: first_tested.max(1),
-            a: file.a.dense(),
-            b_u: file.b_u.dense(),
-            b_y: file.b_y.dense(),
-            c: file.c.dense(),
-            d_u: file.d_u.dense(),
-            d_y: file.d_y.dense(),
-            start: file.start.dense(),
+            a: dense(&file.a),
+            b_u: dense(&file.b_u),
+            b_y: dense(&file.b_y),
+            c: dense(&file.c),
+            d_u: dense(&file.d_u),
+            d_y: dense(&file.d_y),
+            start: dense(&file.start),
             faults: file.faults,
             method,
             tests: file.tests.into_iter().map(test).collect(),

@@ -1,10 +1,10 @@
 //! The reconfiguration of a controller: gains without actuators that are gone, and the fall-back.
 //! `fmu-controller/src/reconfiguration.rs` has the equations.
 
+use aso_controller::design::{self, Actuator, Fault};
 use nalgebra::DMatrix;
-use serde::Deserialize;
 
-use super::controller::{Controller, Loss, Rows, Signal};
+use super::controller::{Controller, Loss, Signal, dense};
 use super::symbols::{Kind, Matrix};
 use super::tables::Constants;
 use crate::Error;
@@ -41,74 +41,31 @@ pub(super) struct GainSet {
     k_s: DMatrix<f64>,
 }
 
-/// An entry of `reconfigurations` in a design file.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct CaseFile {
-    gone: String,
-    stuck_at: f64,
-    #[serde(rename = "K_x", default)]
-    k_x: Option<Rows>,
-    #[serde(rename = "K_f", default)]
-    k_f: Option<Rows>,
-    #[serde(rename = "K_s", default)]
-    k_s: Option<Vec<f64>>,
-    #[serde(default)]
-    restart: Vec<String>,
-    #[serde(default)]
-    loss: Option<f64>,
-    #[serde(default)]
-    time: Option<f64>,
-}
-
-/// An entry of `combinations`.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct CombinationFile {
-    gone: Vec<String>,
-    #[serde(rename = "K_x")]
-    k_x: Rows,
-    #[serde(rename = "K_f")]
-    k_f: Rows,
-    #[serde(rename = "K_s")]
-    k_s: Rows,
-}
-
-/// The table `fallback`.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct FallbackFile {
-    #[serde(rename = "K_x")]
-    k_x: Rows,
-    #[serde(rename = "K_f", default)]
-    k_f: Option<Rows>,
-}
-
 /// What the positions and shapes follow from.
 pub(super) struct Plant<'a> {
     pub(super) sample_time: f64,
-    pub(super) actuators: &'a [Signal],
-    pub(super) faults: &'a [Signal],
+    pub(super) actuators: &'a [Actuator],
+    pub(super) faults: &'a [Fault],
     pub(super) losses: &'a [Loss],
-    /// `K_x` and `K_f` of the intact plant.
-    pub(super) gains: [&'a DMatrix<f64>; 2],
+    /// Those of the intact plant.
+    pub(super) k_x: &'a DMatrix<f64>,
+    pub(super) k_f: &'a DMatrix<f64>,
 }
 
 impl Reconfiguration {
     /// The reconfiguration of a design file; `None` if it has none.
     pub(super) fn of(
-        cases: Vec<CaseFile>,
-        combinations: Vec<CombinationFile>,
-        fallback: Option<FallbackFile>,
+        cases: &[design::Reconfiguration],
+        combinations: &[design::Combination],
+        fallback: Option<&design::Fallback>,
         plant: &Plant<'_>,
     ) -> Result<Option<Self>, Error> {
         if cases.is_empty() && fallback.is_none() {
             return Ok(None);
         }
         let m = plant.actuators.len();
-        let position = |name: &String| plant.actuators.iter().position(|own| own.name == *name);
         let gone = |names: &[String]| {
-            let own = |actuator: &Signal| names.contains(&actuator.name);
+            let own = |actuator: &Actuator| names.contains(&actuator.name);
             plant.actuators.iter().map(own).collect::<Vec<_>>()
         };
         // The columns of `k_s`, one for each stuck actuator in order, at the places of these actuators.
@@ -120,36 +77,37 @@ impl Reconfiguration {
             }
             all
         };
-        let [k_x, k_f] = plant.gains.map(DMatrix::clone);
+        let (k_x, k_f) = (plant.k_x.clone(), plant.k_f.clone());
         let none = vec![false; m];
         let mut sets = vec![GainSet { gone: none.clone(), k_x, k_f, k_s: DMatrix::zeros(m, m) }];
         let mut kept = Vec::new();
         for own in cases {
             kept.push(Case {
-                actuator: position(&own.gone).unwrap_or_default(),
+                actuator: own.actuator,
                 stuck_at: own.stuck_at,
                 restarts: plant
                     .faults
                     .iter()
                     .map(|fault| own.restart.contains(&fault.name))
                     .collect(),
-                decision: decision(&own, plant)?,
+                decision: decision(own, plant)?,
             });
-            if let (Some(k_x), Some(k_f), Some(k_s)) = (own.k_x, own.k_f, own.k_s) {
-                let gone = gone(&[own.gone]);
-                let k_s = scattered(&DMatrix::from_column_slice(m, 1, &k_s), &gone);
-                sets.push(GainSet { gone, k_x: k_x.dense(), k_f: k_f.dense(), k_s });
+            if let (Some(k_x), Some(k_f), Some(k_s)) = (&own.k_x, &own.k_f, &own.k_s) {
+                let gone = gone(std::slice::from_ref(&own.gone));
+                let k_s = scattered(&DMatrix::from_column_slice(m, 1, k_s), &gone);
+                sets.push(GainSet { gone, k_x: dense(k_x), k_f: dense(k_f), k_s });
             }
         }
         for own in combinations {
             let gone = gone(&own.gone);
-            let k_s = scattered(&own.k_s.dense(), &gone);
-            sets.push(GainSet { gone, k_x: own.k_x.dense(), k_f: own.k_f.dense(), k_s });
+            let k_s = scattered(&dense(&own.k_s), &gone);
+            sets.push(GainSet { gone, k_x: dense(&own.k_x), k_f: dense(&own.k_f), k_s });
         }
-        let compensates = fallback.as_ref().map(|own| own.k_f.is_some());
-        if let Some(FallbackFile { k_x, k_f }) = fallback {
-            let k_f = k_f.map_or_else(|| DMatrix::zeros(m, plant.faults.len()), Rows::dense);
-            sets.push(GainSet { gone: none, k_x: k_x.dense(), k_f, k_s: DMatrix::zeros(m, m) });
+        let compensates = fallback.map(|own| own.k_f.is_some());
+        if let Some(design::Fallback { k_x, k_f }) = fallback {
+            let no_compensation = || DMatrix::zeros(m, plant.faults.len());
+            let k_f = k_f.as_ref().map_or_else(no_compensation, dense);
+            sets.push(GainSet { gone: none, k_x: dense(k_x), k_f, k_s: DMatrix::zeros(m, m) });
         }
         Ok(Some(Self { cases: kept, sets, fallback: compensates }))
     }
@@ -231,7 +189,10 @@ impl Reconfiguration {
 }
 
 /// The loss that decides, its fraction, and the samples that it lasts.
-fn decision(own: &CaseFile, plant: &Plant<'_>) -> Result<Option<(usize, f64, u32)>, Error> {
+fn decision(
+    own: &design::Reconfiguration,
+    plant: &Plant<'_>,
+) -> Result<Option<(usize, f64, u32)>, Error> {
     let (Some(most), Some(time)) = (own.loss, own.time) else { return Ok(None) };
     let of_actuator = |loss: &Loss| plant.actuators[loss.actuator].name == own.gone;
     let Some(loss) = plant.losses.iter().position(of_actuator) else { return Ok(None) };

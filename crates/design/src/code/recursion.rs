@@ -5,8 +5,9 @@
 //! included, so that double precision gives the bits of the FMU. `fmu-controller/src/sampled.rs` has the
 //! equations.
 
-use super::controller::{Controller, Estimator};
+use super::controller::Controller;
 use super::symbols::{Matrix, Vector};
+use aso_controller::design::Estimator;
 
 /// What a statement adds, for element i.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

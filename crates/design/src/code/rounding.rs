@@ -225,7 +225,8 @@ mod tests {
              K_x = [[0.0]]\nK_f = [[-1.0]]\nL_x = [[0.0]]\nL_f = [[1.0]]\n\
              sliding_mode = {{ rho = [1.0], delta = [{delta:?}] }}\nexperiment = {{ stop_time = 1.0 }}\n"
         );
-        let controller = Controller::of(&text).unwrap();
+        let file = aso_controller::Design::parse(&text, "design.toml".to_owned()).unwrap();
+        let controller = Controller::of(file).unwrap();
         let found = RoundingBound::of(&controller, &Recursion::of(&controller));
         found.bound.map(|bound| bound[(1, 1)])
     }

@@ -6,15 +6,13 @@
 //! M(theta) = (1 - t) M_i + t M_{i+1},  t = (theta - theta_i) / (theta_{i+1} - theta_i)
 //! ```
 //!
-//! with theta held within the grid, as `fmu-controller/src/schedule.rs` does.
+//! with theta held within the grid, as `aso_controller::design::schedule::Schedule::interpolate` does.
 
-use std::collections::BTreeMap;
-
+use aso_controller::design::{self, schedule};
 use nalgebra::DMatrix;
-use serde::Deserialize;
 
 use super::Precision;
-use super::controller::{Controller, Rows, Signal};
+use super::controller::{Controller, Signal, dense};
 use super::symbols::{Matrix, Vector};
 use crate::Error;
 
@@ -38,39 +36,15 @@ pub(super) struct Point {
     matrices: Vec<(Matrix, DMatrix<f64>)>,
 }
 
-/// The table `[schedule]` of a design file.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ScheduleFile {
-    variable: String,
-    #[serde(default)]
-    unit: Option<String>,
-    #[serde(default)]
-    description: String,
-    points: Vec<PointFile>,
-}
-
-#[derive(Deserialize)]
-struct PointFile {
-    at: f64,
-    x_op: Vec<f64>,
-    u_op: Vec<f64>,
-    y_op: Vec<f64>,
-    #[serde(default)]
-    r_op: Vec<f64>,
-    #[serde(flatten)]
-    matrices: BTreeMap<String, Rows>,
-}
-
 impl Schedule {
     /// The schedule of a design file with these measurements.
-    pub(super) fn of(file: ScheduleFile, measurements: &[Signal]) -> Result<Self, Error> {
-        let ScheduleFile { variable, unit, description, points } = file;
+    pub(super) fn of(file: schedule::Schedule, measurements: &[design::Signal]) -> Self {
+        let schedule::Schedule { variable, unit, description, points } = file;
         let measurement = measurements.iter().position(|signal| signal.name == variable);
-        let points = points.into_iter().map(Point::of).collect::<Result<Vec<_>, _>>()?;
+        let points: Vec<_> = points.into_iter().map(Point::of).collect();
         let start = points.first().map_or(0.0, |point| point.at);
         let variable = Signal::new(variable, unit, description, start);
-        Ok(Self { variable, measurement, points })
+        Self { variable, measurement, points }
     }
 
     /// The scheduling variable as an input of its own, if it is one.
@@ -129,16 +103,14 @@ impl Schedule {
 }
 
 impl Point {
-    fn of(file: PointFile) -> Result<Self, Error> {
-        let PointFile { at, x_op, u_op, y_op, r_op, matrices } = file;
-        let named = |(name, rows): (String, Rows)| {
-            let matrix = Matrix::ALL.into_iter().find(|own| own.name() == name);
-            let reason = "only the FMU has this controller: there is no code for its entry";
-            let missing = || Error::Invalid(format!("{reason} `schedule.points.{name}`"));
-            Ok((matrix.ok_or_else(missing)?, rows.dense()))
+    fn of(file: schedule::Point) -> Self {
+        let named = |matrix: Matrix| {
+            let (_, values) = file.matrices().find(|(name, _)| *name == matrix.name())?;
+            Some((matrix, dense(values)))
         };
-        let matrices = matrices.into_iter().map(named).collect::<Result<Vec<_>, Error>>()?;
-        Ok(Self { at, x_op, u_op, y_op, r_op, matrices })
+        let matrices = Matrix::ALL.into_iter().filter_map(named).collect();
+        let schedule::Point { at, x_op, u_op, y_op, r_op, .. } = file;
+        Self { at, x_op, u_op, y_op, r_op, matrices }
     }
 }
 

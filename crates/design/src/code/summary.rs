@@ -3,11 +3,12 @@
 mod options;
 
 use super::arithmetic::{Arithmetic, Memory};
-use super::controller::{Controller, Estimator, Loss, Signal, SlidingMode};
+use super::controller::{Controller, Loss, Signal};
 use super::names::fields;
 use super::recursion::Recursion;
 use super::rounding::RoundingBound;
 use super::{Precision, Request};
+use aso_controller::design::{Estimator, SlidingMode};
 
 /// The functions and flags of a language, as its users write them.
 pub(super) struct Vocabulary {

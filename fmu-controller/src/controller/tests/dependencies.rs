@@ -1,6 +1,6 @@
 //! The lists of `ModelStructure`, compared with the effects of perturbations.
 
-use crate::channel::{channel, channels};
+use aso_controller::{channel, channels};
 use std::collections::{BTreeMap, BTreeSet};
 
 use fmu::description::DependencyKind::{self, Constant, Dependent, Discrete, Fixed};

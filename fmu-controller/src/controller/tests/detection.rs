@@ -216,10 +216,10 @@ fn a_window_of_several_residuals_is_tested_at_its_end() {
 
 #[test]
 fn the_fault_is_the_one_to_which_exactly_the_tests_with_an_alarm_react() {
-    let own = crate::design::detection::DetectionDesign {
+    let own = aso_controller::design::detection::DetectionDesign {
         faults: ["a", "b", "c"].map(str::to_owned).to_vec(),
         tests: [[true, false, true], [false, true, true]]
-            .map(|reacts| crate::design::detection::TestDesign {
+            .map(|reacts| aso_controller::design::detection::TestDesign {
                 name: String::new(),
                 residuals: 1,
                 drift: Some(1.0),

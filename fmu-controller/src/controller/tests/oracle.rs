@@ -1,5 +1,6 @@
 //! The equations again, as matrices and vectors: the expected values.
 
+use crate::dense::dense;
 use nalgebra::{DMatrix, DVector};
 
 use super::sized::{Shape, sized};
@@ -16,7 +17,7 @@ pub(super) struct Oracle {
     f_a: DMatrix<f64>,
     a_f: Option<DMatrix<f64>>,
     p_f: Option<DMatrix<f64>>,
-    sliding_mode: Option<crate::design::SlidingMode>,
+    sliding_mode: Option<aso_controller::design::SlidingMode>,
     k_x: DMatrix<f64>,
     k_f: DMatrix<f64>,
     l_x: DMatrix<f64>,
@@ -71,8 +72,8 @@ impl Oracle {
         let all = |values: Vec<f64>| Vector::from_vec(values);
         let (m, p, q) = (design.actuators.len(), design.measurements.len(), design.faults.len());
         let (t, integrals) = (design.references.len(), design.integrals());
-        let stated = |matrix: &Option<crate::matrix::Matrix>, rows: usize, columns: usize| {
-            matrix.as_ref().map_or(DMatrix::zeros(rows, columns), crate::matrix::Matrix::dense)
+        let stated = |matrix: &Option<aso_controller::Matrix>, rows: usize, columns: usize| {
+            matrix.as_ref().map_or(DMatrix::zeros(rows, columns), dense)
         };
         Self {
             tracking: Tracking {
@@ -84,18 +85,18 @@ impl Oracle {
             },
             r_op: all(design.references.iter().map(|own| operating(own.operating)).collect()),
             period: design.sample_time,
-            a: design.a.dense(),
-            b: design.b.dense(),
-            c: design.c.dense(),
+            a: dense(&design.a),
+            b: dense(&design.b),
+            c: dense(&design.c),
             d: stated(&design.d, p, m),
-            f_a: design.f_a.dense(),
-            a_f: design.a_f.as_ref().map(crate::matrix::Matrix::dense),
-            p_f: design.p_f.as_ref().map(crate::matrix::Matrix::dense),
+            f_a: dense(&design.f_a),
+            a_f: design.a_f.as_ref().map(dense),
+            p_f: design.p_f.as_ref().map(dense),
             sliding_mode: design.sliding_mode.clone(),
-            k_x: design.k_x.dense(),
-            k_f: design.k_f.dense(),
-            l_x: design.l_x.dense(),
-            l_f: design.l_f.dense(),
+            k_x: dense(&design.k_x),
+            k_f: dense(&design.k_f),
+            l_x: dense(&design.l_x),
+            l_f: dense(&design.l_f),
             filter: design.filter.clone().map(all),
             x_op: all(design.states.iter().map(|own| operating(own.operating)).collect()),
             u_op: all(design.actuators.iter().map(|own| operating(own.operating)).collect()),

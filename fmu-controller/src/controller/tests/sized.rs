@@ -1,10 +1,10 @@
 //! Designs of any size, and every number of a controller by the name of its variable.
 
-use crate::channel::{channel, channels};
 use crate::controller::AsoController;
-use crate::design::{Actuator, Design};
-use crate::matrix::Matrix;
 use crate::names;
+use aso_controller::Matrix;
+use aso_controller::design::{Actuator, Design};
+use aso_controller::{channel, channels};
 
 /// Numbers of states, actuators, measurements and faults.
 pub(super) type Sizes = [usize; 4];

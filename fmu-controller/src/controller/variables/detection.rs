@@ -2,10 +2,10 @@
 
 use fmu::Variable;
 
-use crate::channel::channel;
 use crate::controller::AsoController;
-use crate::design::Design;
-use crate::design::detection::{DetectionDesign, TestDesign};
+use aso_controller::Design;
+use aso_controller::channel;
+use aso_controller::design::detection::{DetectionDesign, TestDesign};
 
 /// The variables of a design with a detection.
 pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {

@@ -3,11 +3,13 @@
 use fmu::Variable;
 
 use super::{times_second, with_unit};
-use crate::channel::channel;
 use crate::controller::AsoController;
-use crate::design::{Design, Estimator, Fault, Label, Reconfiguration, Signal, SlidingMode};
-use crate::matrix::Matrix;
 use crate::names;
+use aso_controller::Matrix;
+use aso_controller::channel;
+use aso_controller::design::{
+    Design, Estimator, Fault, Label, Reconfiguration, Signal, SlidingMode,
+};
 
 /// Returns one matrix of a design.
 type Accessor = fn(&mut Design) -> &mut Matrix;

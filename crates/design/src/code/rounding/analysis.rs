@@ -6,9 +6,10 @@ use control::{Domain, StateSpace};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::first_signal;
-use crate::code::controller::{Controller, Estimator, SlidingMode};
+use crate::code::controller::Controller;
 use crate::code::recursion::{Operation, Recursion, Statement, Term};
 use crate::code::symbols::{Kind, Matrix, Vector};
+use aso_controller::design::{Estimator, SlidingMode};
 
 /// The relative rounding error of single precision.
 const UNIT: f64 = 5.960_464_477_539_063e-8;

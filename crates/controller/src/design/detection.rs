@@ -17,54 +17,56 @@ use crate::matrix::Matrix;
 /// variance 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct DetectionDesign {
+pub struct DetectionDesign {
     /// The interval in s between two tests of a continuous controller; a sampled one tests in each sample.
     #[serde(default)]
-    pub(crate) sample_time: Option<f64>,
+    pub sample_time: Option<f64>,
     /// Time in s after the start of the run from which the residuals are tested.
-    pub(crate) from: f64,
+    pub from: f64,
     /// A, k x k.
     #[serde(rename = "A")]
-    pub(crate) a: Matrix,
+    pub a: Matrix,
     /// B_u, k x m.
     #[serde(rename = "B_u")]
-    pub(crate) b_u: Matrix,
+    pub b_u: Matrix,
     /// B_y, k x p.
     #[serde(rename = "B_y")]
-    pub(crate) b_y: Matrix,
+    pub b_y: Matrix,
     /// C, rows x k.
     #[serde(rename = "C")]
-    pub(crate) c: Matrix,
+    pub c: Matrix,
     /// D_u, rows x m.
     #[serde(rename = "D_u")]
-    pub(crate) d_u: Matrix,
+    pub d_u: Matrix,
     /// D_y, rows x p.
     #[serde(rename = "D_y")]
-    pub(crate) d_y: Matrix,
+    pub d_y: Matrix,
     /// The initial x_r is this matrix times the initial estimate of the states; k x n.
-    pub(crate) start: Matrix,
+    pub start: Matrix,
     /// The faults that `fault_isolated` counts, from 1.
-    pub(crate) faults: Vec<String>,
+    pub faults: Vec<String>,
     /// The tests, each of some rows of r in turn.
-    pub(crate) tests: Vec<TestDesign>,
+    pub tests: Vec<TestDesign>,
 }
 
 /// A test: of one residual by cumulative sums (`drift`), or of the mean of several over a window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct TestDesign {
-    pub(crate) name: String,
+pub struct TestDesign {
+    /// Its name, that of its output.
+    pub name: String,
     /// How many rows of r it takes.
-    pub(crate) residuals: usize,
+    pub residuals: usize,
     /// kappa of the cumulative sums.
     #[serde(default)]
-    pub(crate) drift: Option<f64>,
+    pub drift: Option<f64>,
     /// The number of samples of a window.
     #[serde(default)]
-    pub(crate) window: Option<u32>,
-    pub(crate) threshold: f64,
+    pub window: Option<u32>,
+    /// The value of the statistic above which there is an alarm.
+    pub threshold: f64,
     /// For each fault whether this test reacts to it.
-    pub(crate) reacts: Vec<bool>,
+    pub reacts: Vec<bool>,
 }
 
 impl DetectionDesign {
@@ -130,17 +132,22 @@ impl DetectionDesign {
     }
 
     /// The first number that is out of its range.
-    pub(crate) fn refused_number(&self, design: &Design) -> Option<Refusal> {
+    #[must_use]
+    pub fn refused_number(&self, design: &Design) -> Option<Refusal> {
         for (name, matrix, _) in self.shapes(design) {
             if let Some(k) = matrix.values.iter().position(|value| !value.is_finite()) {
-                return Some((matrix.element(name, k), matrix.values[k], "a finite number"));
+                return Some(Refusal::new(
+                    matrix.element(name, k),
+                    matrix.values[k],
+                    "a finite number",
+                ));
             }
         }
         let positive = |value: &f64| *value > 0.0 && value.is_finite();
         for test in &self.tests {
             for (what, value) in [("threshold", Some(test.threshold)), ("drift", test.drift)] {
                 if let Some(value) = value.filter(|value| !positive(value)) {
-                    return Some((
+                    return Some(Refusal::new(
                         format!("detection test {}: {what}", test.name),
                         value,
                         "above 0",
@@ -149,9 +156,9 @@ impl DetectionDesign {
             }
         }
         if let Some(value) = self.sample_time.filter(|value| !positive(value)) {
-            return Some(("detection.sample_time".to_owned(), value, "more than 0 s"));
+            return Some(Refusal::new("detection.sample_time".to_owned(), value, "more than 0 s"));
         }
         (!(self.from >= 0.0 && self.from.is_finite()))
-            .then(|| ("detection.from".to_owned(), self.from, "a time in s from 0"))
+            .then(|| Refusal::new("detection.from".to_owned(), self.from, "a time in s from 0"))
     }
 }

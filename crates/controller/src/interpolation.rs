@@ -14,7 +14,6 @@
 
 use crate::design::Design;
 use crate::design::schedule::Schedule;
-use crate::signals::Values;
 
 /// The place of a value in the grid.
 #[derive(Clone, Copy)]
@@ -28,20 +27,14 @@ struct Place {
 
 impl Schedule {
     /// The position of the measurement that schedules.
-    pub(crate) fn measurement(&self, design: &Design) -> Option<usize> {
+    #[must_use]
+    pub fn measurement(&self, design: &Design) -> Option<usize> {
         design.measurements.iter().position(|signal| signal.name == self.variable)
     }
 
-    /// The scheduling variable `offset` s after the measurements were given.
-    pub(crate) fn value(&self, design: &Design, values: &Values, input: f64, offset: f64) -> f64 {
-        match self.measurement(design) {
-            Some(k) => values.y[k] + values.y_slopes[k] * offset,
-            None => input,
-        }
-    }
-
     /// The first and the last value of the grid.
-    pub(crate) fn range(&self) -> [f64; 2] {
+    #[must_use]
+    pub fn range(&self) -> [f64; 2] {
         [self.points[0].at, self.points[self.points.len() - 1].at]
     }
 
@@ -58,7 +51,7 @@ impl Schedule {
 
     /// Writes the interpolated matrices and operating point into `design`; returns the value after it
     /// was held within the grid.
-    pub(crate) fn interpolate(&self, value: f64, design: &mut Design) -> f64 {
+    pub fn interpolate(&self, value: f64, design: &mut Design) -> f64 {
         let Place { interval, part, .. } = self.place(value);
         let mix = |[from, to]: [f64; 2]| from * (1.0 - part) + to * part;
         self.write(interval, mix, design);
@@ -69,7 +62,7 @@ impl Schedule {
     /// the derivative `slope` of the scheduling variable; zero outside of the grid. At a point of the
     /// grid they are those of the interval after it. The matrices that the schedule leaves constant become
     /// zero.
-    pub(crate) fn differentiate(&self, value: f64, slope: f64, direction: &mut Design) -> f64 {
+    pub fn differentiate(&self, value: f64, slope: f64, direction: &mut Design) -> f64 {
         let Place { interval, inside, .. } = self.place(value);
         let [from, to] = [0, 1].map(|end| self.points[interval + end].at);
         let slope = if inside { slope } else { 0.0 };

@@ -7,58 +7,75 @@ use crate::matrix::Matrix;
 /// The table `[schedule]` of a design file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Schedule {
+pub struct Schedule {
     /// The name of a measurement, or of an input of its own.
-    pub(crate) variable: String,
+    pub variable: String,
+    /// The unit of that input.
     #[serde(default)]
-    pub(crate) unit: Option<String>,
+    pub unit: Option<String>,
+    /// What that input is.
     #[serde(default)]
-    pub(crate) description: String,
+    pub description: String,
     /// The grid, in ascending order.
-    pub(crate) points: Vec<Point>,
+    pub points: Vec<Point>,
 }
 
 /// The matrices and the operating point at a value of the scheduling variable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Point {
+pub struct Point {
     /// The value.
-    pub(crate) at: f64,
-    pub(crate) x_op: Vec<f64>,
-    pub(crate) u_op: Vec<f64>,
-    pub(crate) y_op: Vec<f64>,
+    pub at: f64,
+    /// The states at the operating point.
+    pub x_op: Vec<f64>,
+    /// The commands at the operating point.
+    pub u_op: Vec<f64>,
+    /// The measurements at the operating point.
+    pub y_op: Vec<f64>,
     #[serde(rename = "A")]
-    a: Matrix,
+    /// In place of the matrix of this name of the design.
+    pub a: Matrix,
     #[serde(rename = "B")]
-    b: Matrix,
+    /// In place of the matrix of this name of the design.
+    pub b: Matrix,
     #[serde(rename = "C")]
-    c: Matrix,
+    /// In place of the matrix of this name of the design.
+    pub c: Matrix,
     #[serde(rename = "F_a")]
-    f_a: Matrix,
+    /// In place of the matrix of this name of the design.
+    pub f_a: Matrix,
     #[serde(rename = "K_x")]
-    k_x: Matrix,
+    /// In place of the matrix of this name of the design.
+    pub k_x: Matrix,
     #[serde(rename = "K_f")]
-    k_f: Matrix,
+    /// In place of the matrix of this name of the design.
+    pub k_f: Matrix,
     #[serde(rename = "L_x")]
-    l_x: Matrix,
+    /// In place of the matrix of this name of the design.
+    pub l_x: Matrix,
     #[serde(rename = "L_f")]
-    l_f: Matrix,
+    /// In place of the matrix of this name of the design.
+    pub l_f: Matrix,
     #[serde(rename = "P_f", default)]
-    p_f: Option<Matrix>,
+    /// In place of the matrix of this name of the design, if it has one.
+    pub p_f: Option<Matrix>,
     #[serde(rename = "K_i", default)]
-    k_i: Option<Matrix>,
+    /// In place of the matrix of this name of the design, if it has one.
+    pub k_i: Option<Matrix>,
     #[serde(rename = "L_w", default)]
-    l_w: Option<Matrix>,
+    /// In place of the matrix of this name of the design, if it has one.
+    pub l_w: Option<Matrix>,
     #[serde(rename = "N_r", default)]
-    n_r: Option<Matrix>,
+    /// In place of the matrix of this name of the design, if it has one.
+    pub n_r: Option<Matrix>,
     /// The references at the operating point; empty without references.
     #[serde(default)]
-    pub(crate) r_op: Vec<f64>,
+    pub r_op: Vec<f64>,
 }
 
 impl Point {
     /// The matrices, in the order of [`super::Design::scheduled_mut`].
-    pub(crate) fn matrices(&self) -> impl Iterator<Item = (&'static str, &Matrix)> {
+    pub fn matrices(&self) -> impl Iterator<Item = (&'static str, &Matrix)> {
         let always = [
             ("A", &self.a),
             ("B", &self.b),

@@ -9,8 +9,22 @@ const COMMANDS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 /// The most samples in a step of the default experiment.
 const MOST_SAMPLES: f64 = 1e6;
 
-/// Name and value of an entry, and the rule that it breaks.
-pub(crate) type Refusal = (String, f64, &'static str);
+/// A number that is out of its range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// The entry.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// The range.
+    pub rule: &'static str,
+}
+
+impl Refusal {
+    pub(super) fn new(name: String, value: f64, rule: &'static str) -> Self {
+        Self { name, value, rule }
+    }
+}
 
 impl Design {
     /// Checks shapes, names, ranges and combinations of entries.
@@ -22,7 +36,7 @@ impl Design {
         self.check_schedule(path)?;
         let refused = self.refused_number().or_else(|| self.refused_signal());
         match refused.or_else(|| self.refused_time()) {
-            Some((what, value, rule)) => {
+            Some(Refusal { name: what, value, rule }) => {
                 Err(DesignError::Value { path: path.to_owned(), what, value, rule })
             }
             None => Ok(()),
@@ -332,7 +346,11 @@ impl Design {
     fn refused_number(&self) -> Option<Refusal> {
         for (name, matrix) in self.matrices() {
             if let Some(k) = matrix.values.iter().position(|value| !value.is_finite()) {
-                return Some((matrix.element(name, k), matrix.values[k], "a finite number"));
+                return Some(Refusal::new(
+                    matrix.element(name, k),
+                    matrix.values[k],
+                    "a finite number",
+                ));
             }
         }
         let of_laws = self.refused_filter().or_else(|| self.refused_sliding_mode());
@@ -340,7 +358,8 @@ impl Design {
     }
 
     /// The first of rho and delta that is not a number above 0.
-    pub(crate) fn refused_sliding_mode(&self) -> Option<Refusal> {
+    #[must_use]
+    pub fn refused_sliding_mode(&self) -> Option<Refusal> {
         let SlidingMode { rho, delta } = self.sliding_mode.as_ref()?;
         let lists = [("rho", rho), ("delta", delta)].into_iter();
         let mut all = lists.flat_map(|(name, list)| {
@@ -348,18 +367,19 @@ impl Design {
         });
         let (name, k, count, value) =
             all.find(|(.., value)| !(*value > 0.0 && value.is_finite()))?;
-        Some((channel(name, k, count), value, "a finite number above 0"))
+        Some(Refusal::new(channel(name, k, count), value, "a finite number above 0"))
     }
 
     /// The first element of `filter` that breaks its rule.
-    pub(crate) fn refused_filter(&self) -> Option<Refusal> {
+    #[must_use]
+    pub fn refused_filter(&self) -> Option<Refusal> {
         let (most, rule) = match self.sample_time {
             None => (f64::MAX, "more than 0 1/s"),
             Some(_) => (1.0, "more than 0 and at most 1"),
         };
         let filter = self.filter.as_ref()?;
         let k = filter.iter().position(|value| !(*value > 0.0 && *value <= most))?;
-        Some((channel("filter", k, filter.len()), filter[k], rule))
+        Some(Refusal::new(channel("filter", k, filter.len()), filter[k], rule))
     }
 
     fn refused_signal(&self) -> Option<Refusal> {
@@ -368,30 +388,36 @@ impl Design {
         let commands = self.actuators.iter().map(|actuator| (&actuator.name, actuator.operating));
         for (name, value) in values.chain(commands) {
             if let Some(value) = value.filter(|value| !value.is_finite()) {
-                return Some((format!("operating of {name}"), value, "a finite number"));
+                return Some(Refusal::new(
+                    format!("operating of {name}"),
+                    value,
+                    "a finite number",
+                ));
             }
         }
         for actuator in &self.actuators {
             let Some([low, high]) = actuator.limits else { continue };
             if !(low.is_finite() && high.is_finite() && low < high) {
                 let what = format!("limits of {} from {low} to", actuator.name);
-                return Some((what, high, "two finite numbers, the smaller one first"));
+                return Some(Refusal::new(what, high, "two finite numbers, the smaller one first"));
             }
             if let Some(value) = actuator.operating.filter(|value| *value < low || *value > high) {
                 let what = format!("operating of {}", actuator.name);
-                return Some((what, value, "a command within its limits"));
+                return Some(Refusal::new(what, value, "a command within its limits"));
             }
         }
         let least =
             self.faults.iter().filter_map(|fault| Some((&fault.name, fault.least_command?)));
         least
             .filter(|(_, value)| !COMMANDS.contains(value))
-            .map(|(name, value)| (format!("least_command of {name}"), value, "1e-100 to 1e100"))
+            .map(|(name, value)| {
+                Refusal::new(format!("least_command of {name}"), value, "1e-100 to 1e100")
+            })
             .next()
     }
 
     fn refused_time(&self) -> Option<Refusal> {
-        let refuse = |what: &str, value, rule| Some((what.to_owned(), value, rule));
+        let refuse = |what: &str, value, rule| Some(Refusal::new(what.to_owned(), value, rule));
         if !self.t_on.is_finite() {
             return refuse("t_on", self.t_on, "a time in s");
         }
@@ -414,7 +440,8 @@ impl Design {
     }
 
     /// The communication step of the default experiment, in s.
-    pub(crate) fn step_size(&self) -> f64 {
+    #[must_use]
+    pub fn step_size(&self) -> f64 {
         self.experiment.step_size.or(self.sample_time).unwrap_or_default()
     }
 }

@@ -2,14 +2,14 @@
 //! names and units of the signals.
 
 mod checks;
-pub(crate) mod detection;
-pub(crate) mod schedule;
-
-use std::path::Path;
+pub mod detection;
+pub mod schedule;
+mod written;
 
 use serde::{Deserialize, Serialize};
 
 use crate::matrix::Matrix;
+pub use checks::Refusal;
 use detection::DetectionDesign;
 use schedule::Schedule;
 
@@ -17,180 +17,185 @@ use schedule::Schedule;
 /// fault model, t references.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Design {
+pub struct Design {
     /// What the controller is for, in one sentence.
-    pub(crate) description: String,
+    pub description: String,
     /// Start of the compensation in s.
-    pub(crate) t_on: f64,
+    pub t_on: f64,
     /// Whether the fault is estimated while it is not compensated.
     #[serde(default)]
-    pub(crate) monitor: bool,
+    pub monitor: bool,
     /// The sample time of a sampled controller in s; its matrices describe the sampled plant.
     #[serde(default)]
-    pub(crate) sample_time: Option<f64>,
+    pub sample_time: Option<f64>,
     /// The estimator of a sampled controller.
     #[serde(default)]
-    pub(crate) estimator: Option<Estimator>,
+    pub estimator: Option<Estimator>,
     /// The diagonal of W, p numbers, in 1/s; without unit in a sampled controller.
     #[serde(default)]
-    pub(crate) filter: Option<Vec<f64>>,
+    pub filter: Option<Vec<f64>>,
     /// A, n x n.
     #[serde(rename = "A")]
-    pub(crate) a: Matrix,
+    pub a: Matrix,
     /// B, n x m.
     #[serde(rename = "B")]
-    pub(crate) b: Matrix,
+    pub b: Matrix,
     /// C, p x n.
     #[serde(rename = "C")]
-    pub(crate) c: Matrix,
+    pub c: Matrix,
     /// D, p x m, of y = C x + D u, stated together with a filter; without it there is none.
     #[serde(rename = "D", default)]
-    pub(crate) d: Option<Matrix>,
+    pub d: Option<Matrix>,
     /// F_a, n x q.
     #[serde(rename = "F_a")]
-    pub(crate) f_a: Matrix,
+    pub f_a: Matrix,
     /// A_f, q x q; without it the fault is constant.
     #[serde(rename = "A_f", default)]
-    pub(crate) a_f: Option<Matrix>,
+    pub a_f: Option<Matrix>,
     /// P_f, q x p: the direct term of the fault estimate; without it there is none.
     #[serde(rename = "P_f", default)]
-    pub(crate) p_f: Option<Matrix>,
+    pub p_f: Option<Matrix>,
     /// Bounds of the correction of a sliding-mode law.
     #[serde(default)]
-    pub(crate) sliding_mode: Option<SlidingMode>,
+    pub sliding_mode: Option<SlidingMode>,
     /// K_x, m x n.
     #[serde(rename = "K_x")]
-    pub(crate) k_x: Matrix,
+    pub k_x: Matrix,
     /// K_f, m x q.
     #[serde(rename = "K_f")]
-    pub(crate) k_f: Matrix,
+    pub k_f: Matrix,
     /// L_x, n x p.
     #[serde(rename = "L_x")]
-    pub(crate) l_x: Matrix,
+    pub l_x: Matrix,
     /// L_f, q x p.
     #[serde(rename = "L_f")]
-    pub(crate) l_f: Matrix,
+    pub l_f: Matrix,
     /// H, t x p, of the integral action x_i' = r - H y + ...; see `equations.rs`.
     #[serde(rename = "H", default)]
-    pub(crate) h: Option<Matrix>,
+    pub h: Option<Matrix>,
     /// K_i, m x t: the gain of the integral action, stated together with H.
     #[serde(rename = "K_i", default)]
-    pub(crate) k_i: Option<Matrix>,
+    pub k_i: Option<Matrix>,
     /// F_i, t x q: H times the estimated sensor faults.
     #[serde(rename = "F_i", default)]
-    pub(crate) f_i: Option<Matrix>,
+    pub f_i: Option<Matrix>,
     /// L_w, t x m: the back-calculation of commands at a limit.
     #[serde(rename = "L_w", default)]
-    pub(crate) l_w: Option<Matrix>,
+    pub l_w: Option<Matrix>,
     /// N_r, m x t: the feedforward of the references.
     #[serde(rename = "N_r", default)]
-    pub(crate) n_r: Option<Matrix>,
+    pub n_r: Option<Matrix>,
     /// The n states.
-    pub(crate) states: Vec<Signal>,
+    pub states: Vec<Signal>,
     /// The m actuators.
-    pub(crate) actuators: Vec<Actuator>,
+    pub actuators: Vec<Actuator>,
     /// The p measurements; the inputs have the same names.
-    pub(crate) measurements: Vec<Signal>,
+    pub measurements: Vec<Signal>,
     /// The q states of the fault model.
-    pub(crate) faults: Vec<Fault>,
+    pub faults: Vec<Fault>,
     /// The t references; the inputs have the same names.
     #[serde(default)]
-    pub(crate) references: Vec<Signal>,
+    pub references: Vec<Signal>,
     /// What the controller does without an actuator, one entry for each actuator that may be gone.
     #[serde(default)]
-    pub(crate) reconfigurations: Vec<Reconfiguration>,
+    pub reconfigurations: Vec<Reconfiguration>,
     /// What it does without several of them.
     #[serde(default)]
-    pub(crate) combinations: Vec<Combination>,
+    pub combinations: Vec<Combination>,
     /// The feedback that needs not to know which actuator has failed.
     #[serde(default)]
-    pub(crate) fallback: Option<Fallback>,
+    pub fallback: Option<Fallback>,
     /// The experiment that importers run by default.
-    pub(crate) experiment: Defaults,
+    pub experiment: Defaults,
     /// Matrices and operating points by a scheduling variable, in place of those above.
     #[serde(default)]
-    pub(crate) schedule: Option<Schedule>,
+    pub schedule: Option<Schedule>,
     /// The detection of faults, if there is one.
     #[serde(default)]
-    pub(crate) detection: Option<DetectionDesign>,
+    pub detection: Option<DetectionDesign>,
 }
 
 /// What the controller does without an actuator; see `reconfiguration.rs`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Reconfiguration {
+pub struct Reconfiguration {
     /// The actuator that is gone.
-    pub(crate) gone: String,
+    pub gone: String,
     /// Its position; set when the file is read.
     #[serde(default)]
-    pub(crate) actuator: usize,
+    pub actuator: usize,
     /// The command at which it is stuck.
-    pub(crate) stuck_at: f64,
+    pub stuck_at: f64,
     /// K_x, m x n. It is missing, with K_f and K_s, if only the fall-back serves this case.
     #[serde(rename = "K_x", default)]
-    pub(crate) k_x: Option<Matrix>,
+    pub k_x: Option<Matrix>,
     /// K_f, m x q.
     #[serde(rename = "K_f", default)]
-    pub(crate) k_f: Option<Matrix>,
+    pub k_f: Option<Matrix>,
     /// K_s, m numbers.
     #[serde(rename = "K_s", default)]
-    pub(crate) k_s: Option<Vec<f64>>,
+    pub k_s: Option<Vec<f64>>,
     /// The states of the fault model that restart at 0 when the actuator is gone or back.
     #[serde(default)]
-    pub(crate) restart: Vec<String>,
+    pub restart: Vec<String>,
     /// Their positions; set when the file is read.
     #[serde(default)]
-    pub(crate) restarted: Vec<usize>,
+    pub restarted: Vec<usize>,
     /// The actuator counts as gone if its estimated loss of effectiveness is above `loss` for `time` s.
     #[serde(default)]
-    pub(crate) loss: Option<f64>,
+    pub loss: Option<f64>,
+    /// See `loss`; in s.
     #[serde(default)]
-    pub(crate) time: Option<f64>,
+    pub time: Option<f64>,
 }
 
 /// What the controller does without several actuators; each of them has a [`Reconfiguration`], too.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Combination {
+pub struct Combination {
     /// The actuators that are gone, in the order of the actuators.
-    pub(crate) gone: Vec<String>,
+    pub gone: Vec<String>,
     /// Bit j: actuator j is one of them; set when the file is read.
     #[serde(default)]
-    pub(crate) mask: u64,
+    pub mask: u64,
     /// K_x, m x n.
     #[serde(rename = "K_x")]
-    pub(crate) k_x: Matrix,
+    pub k_x: Matrix,
     /// K_f, m x q.
     #[serde(rename = "K_f")]
-    pub(crate) k_f: Matrix,
+    pub k_f: Matrix,
     /// K_s, m numbers for each actuator that is gone.
     #[serde(rename = "K_s")]
-    pub(crate) k_s: Matrix,
+    pub k_s: Matrix,
 }
 
 /// The fall-back; see `reconfiguration.rs`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Fallback {
+pub struct Fallback {
     /// K_x, m x n.
     #[serde(rename = "K_x")]
-    pub(crate) k_x: Matrix,
+    pub k_x: Matrix,
     /// K_f, m x q; without it the estimated faults are not compensated.
     #[serde(rename = "K_f", default)]
-    pub(crate) k_f: Option<Matrix>,
+    pub k_f: Option<Matrix>,
 }
 
 /// The gains in force in place of those of the intact plant.
 #[derive(Clone, Copy)]
-pub(crate) enum GainSet<'a> {
+pub enum GainSet<'a> {
+    /// Those without one actuator.
     Single(&'a Reconfiguration),
+    /// Those without several actuators.
     Several(&'a Combination),
+    /// Those of the fall-back.
     Fallback(&'a Fallback),
 }
 
 impl<'a> GainSet<'a> {
     /// Row `j` of K_x.
-    pub(crate) fn k_x(self, j: usize) -> &'a [f64] {
+    #[must_use]
+    pub fn k_x(self, j: usize) -> &'a [f64] {
         match self {
             Self::Single(own) => own.k_x.as_ref().map_or(&[], |k_x| k_x.row(j)),
             Self::Several(own) => own.k_x.row(j),
@@ -199,7 +204,8 @@ impl<'a> GainSet<'a> {
     }
 
     /// Row `j` of K_f, empty without compensation.
-    pub(crate) fn k_f(self, j: usize) -> &'a [f64] {
+    #[must_use]
+    pub fn k_f(self, j: usize) -> &'a [f64] {
         let k_f = match self {
             Self::Single(own) => own.k_f.as_ref(),
             Self::Several(own) => Some(&own.k_f),
@@ -209,7 +215,8 @@ impl<'a> GainSet<'a> {
     }
 
     /// Row `j` of K_s: a number for each stuck actuator, in their order; empty in the fall-back.
-    pub(crate) fn k_s(self, j: usize) -> &'a [f64] {
+    #[must_use]
+    pub fn k_s(self, j: usize) -> &'a [f64] {
         match self {
             Self::Single(own) => own.k_s.as_ref().map_or(&[], |k_s| &k_s[j..=j]),
             Self::Several(own) => own.k_s.row(j),
@@ -221,7 +228,7 @@ impl<'a> GainSet<'a> {
 /// The measurements that the command of a sampled controller is computed from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Estimator {
+pub enum Estimator {
     /// All measurements, including those of the sample itself.
     Current,
     /// The measurements before the sample.
@@ -231,98 +238,143 @@ pub(crate) enum Estimator {
 /// The nonlinear injection of a sliding-mode law; each has one number for each fault.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct SlidingMode {
+pub struct SlidingMode {
     /// rho: the largest estimate, in the unit of the fault.
-    pub(crate) rho: Vec<f64>,
+    pub rho: Vec<f64>,
     /// delta: the half-width of the boundary layer, in the unit of the fault.
-    pub(crate) delta: Vec<f64>,
+    pub delta: Vec<f64>,
 }
 
 /// A state, a measurement or a reference.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Signal {
-    pub(crate) name: String,
+pub struct Signal {
+    /// Its name, that of its variables.
+    pub name: String,
+    /// Its unit, as FMI writes it.
     #[serde(default)]
-    pub(crate) unit: Option<String>,
+    pub unit: Option<String>,
+    /// What it is, for a reader.
     #[serde(default)]
-    pub(crate) description: String,
+    pub description: String,
     /// Value at the operating point.
     #[serde(default)]
-    pub(crate) operating: Option<f64>,
+    pub operating: Option<f64>,
 }
 
 /// An actuator, with its limits if it has any.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Actuator {
-    pub(crate) name: String,
+pub struct Actuator {
+    /// Its name, that of its variables.
+    pub name: String,
+    /// Its unit, as FMI writes it.
     #[serde(default)]
-    pub(crate) unit: Option<String>,
+    pub unit: Option<String>,
+    /// What it is, for a reader.
     #[serde(default)]
-    pub(crate) description: String,
+    pub description: String,
     /// Command at the operating point.
     #[serde(default)]
-    pub(crate) operating: Option<f64>,
+    pub operating: Option<f64>,
     /// The smallest and the largest command.
     #[serde(default)]
-    pub(crate) limits: Option<[f64; 2]>,
+    pub limits: Option<[f64; 2]>,
 }
 
 /// A state of the fault model: a fault, or the rate of one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Fault {
-    pub(crate) name: String,
+pub struct Fault {
+    /// Its name, that of its variables.
+    pub name: String,
+    /// Its unit, as FMI writes it.
     #[serde(default)]
-    pub(crate) unit: Option<String>,
+    pub unit: Option<String>,
+    /// What it is, for a reader.
     #[serde(default)]
-    pub(crate) description: String,
+    pub description: String,
     /// The actuator whose loss of effectiveness this fault is.
     #[serde(default)]
-    pub(crate) loss_of: Option<String>,
+    pub loss_of: Option<String>,
     /// The smallest command from which the loss can be estimated.
     #[serde(default)]
-    pub(crate) least_command: Option<f64>,
+    pub least_command: Option<f64>,
 }
 
 /// `DefaultExperiment`, times in s.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Defaults {
-    pub(crate) stop_time: f64,
+pub struct Defaults {
+    /// End of the experiment.
+    pub stop_time: f64,
     /// `None` means the sample time of a sampled controller.
     #[serde(default)]
-    pub(crate) step_size: Option<f64>,
+    pub step_size: Option<f64>,
 }
 
-/// Why a design file cannot be used.
+/// Why a design file cannot be used; `path` is that of the file.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum DesignError {
-    #[error("{path}: {source}")]
-    Unreadable { path: String, source: std::io::Error },
+#[non_exhaustive]
+pub enum DesignError {
+    /// It is not TOML, or has an entry that does not exist or lacks one.
     #[error("{path}: {message}")]
-    Malformed { path: String, message: String },
+    Malformed {
+        /// The file.
+        path: String,
+        /// The reason, with the line.
+        message: String,
+    },
+    /// A matrix has a wrong number of rows or columns.
     #[error("{path}: {what} is {found}, expected {expected} ({meaning})")]
-    Shape { path: String, what: &'static str, found: String, expected: String, meaning: String },
+    Shape {
+        /// The file.
+        path: String,
+        /// The matrix.
+        what: &'static str,
+        /// Its shape.
+        found: String,
+        /// The shape that it must have.
+        expected: String,
+        /// What rows and columns stand for.
+        meaning: String,
+    },
+    /// A number is out of its range.
     #[error("{path}: {what} = {value}, expected {rule}")]
-    Value { path: String, what: String, value: f64, rule: &'static str },
+    Value {
+        /// The file.
+        path: String,
+        /// The entry.
+        what: String,
+        /// The number.
+        value: f64,
+        /// The range.
+        rule: &'static str,
+    },
+    /// Entries do not fit together.
     #[error("{path}: {what}")]
-    Entry { path: String, what: String },
+    Entry {
+        /// The file.
+        path: String,
+        /// The contradiction.
+        what: String,
+    },
 }
 
 /// Unit and meaning of a signal.
 #[derive(Clone, Copy)]
-pub(crate) struct Label<'a> {
-    pub(crate) unit: Option<&'a String>,
+pub struct Label<'a> {
+    /// Its unit.
+    pub unit: Option<&'a String>,
     /// Its description, or its name if it has none.
-    pub(crate) meaning: &'a str,
+    pub meaning: &'a str,
 }
 
 macro_rules! labelled {
     ($($signal:ty),*) => {
         $(impl $signal {
-            pub(crate) fn label(&self) -> Label<'_> {
+            /// Unit and meaning.
+            pub fn label(&self) -> Label<'_> {
                 let text = if self.description.is_empty() { &self.name } else { &self.description };
                 Label { unit: self.unit.as_ref(), meaning: text }
             }
@@ -334,7 +386,8 @@ labelled!(Signal, Actuator, Fault);
 
 impl Actuator {
     /// The limits as deviations from the operating point.
-    pub(crate) fn range(&self) -> Option<[f64; 2]> {
+    #[must_use]
+    pub fn range(&self) -> Option<[f64; 2]> {
         let [low, high] = self.limits?;
         let operating = self.operating.unwrap_or(0.0);
         Some([low - operating, high - operating])
@@ -342,18 +395,12 @@ impl Actuator {
 }
 
 impl Design {
-    /// Reads `design.toml` in the folder `resources`.
-    pub(crate) fn read(resources: &Path) -> Result<Self, DesignError> {
-        let file = resources.join("design.toml");
-        let path = file.display().to_string();
-        match std::fs::read_to_string(&file) {
-            Ok(text) => Self::parse(&text, path),
-            Err(source) => Err(DesignError::Unreadable { path, source }),
-        }
-    }
-
     /// Reads a design from `text`; `path` is for messages.
-    pub(crate) fn parse(text: &str, path: String) -> Result<Self, DesignError> {
+    ///
+    /// # Errors
+    ///
+    /// [`DesignError`] for the first entry that is missing, unknown, out of its range, or does not fit the others.
+    pub fn parse(text: &str, path: String) -> Result<Self, DesignError> {
         let mut design: Self = match toml::from_str(text) {
             Ok(design) => design,
             Err(error) => {
@@ -402,7 +449,7 @@ impl Design {
 
     /// The gains without the actuators whose bits are set in `gone`, if the design has gains for
     /// them.
-    pub(crate) fn gains_without(&self, gone: u64) -> Option<GainSet<'_>> {
+    pub fn gains_without(&self, gone: u64) -> Option<GainSet<'_>> {
         if gone.is_power_of_two() {
             let own = self.without(gone.trailing_zeros() as usize)?;
             return own.k_x.as_ref().map(|_| GainSet::Single(own));
@@ -411,13 +458,14 @@ impl Design {
     }
 
     /// The reconfiguration without actuator `j`, if there is one.
-    pub(crate) fn without(&self, j: usize) -> Option<&Reconfiguration> {
+    #[must_use]
+    pub fn without(&self, j: usize) -> Option<&Reconfiguration> {
         self.reconfigurations.iter().find(|own| own.actuator == j)
     }
 
     /// Sets the matrices of reconfigurations and fall-back, which are no variables, to zero: a direction
     /// in the space of the variables.
-    pub(crate) fn clear_reconfigurations(&mut self) {
+    pub fn clear_reconfigurations(&mut self) {
         for own in &mut self.reconfigurations {
             let matrices = own.k_x.iter_mut().chain(&mut own.k_f).flat_map(|own| &mut own.values);
             matrices.chain(own.k_s.iter_mut().flatten()).for_each(|value| *value = 0.0);
@@ -433,18 +481,20 @@ impl Design {
     }
 
     /// Whether other gains than those of the intact plant may be in force.
-    pub(crate) fn is_reconfigurable(&self) -> bool {
+    #[must_use]
+    pub fn is_reconfigurable(&self) -> bool {
         !self.reconfigurations.is_empty() || self.fallback.is_some()
     }
 
     /// The design of one value of the scheduling variable, with the numbers of the plant of the file;
     /// None without a schedule.
-    pub(crate) fn unscheduled(&self) -> Option<Self> {
+    #[must_use]
+    pub fn unscheduled(&self) -> Option<Self> {
         self.schedule.is_some().then(|| Self { schedule: None, ..self.clone() })
     }
 
     /// The matrices that depend on the scheduling variable; the last ones where they are stated.
-    pub(crate) fn scheduled_mut(&mut self) -> impl Iterator<Item = &mut Matrix> {
+    pub fn scheduled_mut(&mut self) -> impl Iterator<Item = &mut Matrix> {
         let Self { a, b, c, f_a, k_x, k_f, l_x, l_f, p_f, k_i, l_w, n_r, .. } = self;
         let stated = [p_f, k_i, l_w, n_r].into_iter().flatten();
         [a, b, c, f_a, k_x, k_f, l_x, l_f].into_iter().chain(stated)
@@ -452,13 +502,13 @@ impl Design {
 
     /// Sets the matrices that do not depend on the scheduling variable to zero: a direction in the space of
     /// this variable.
-    pub(crate) fn clear_constant(&mut self) {
+    pub fn clear_constant(&mut self) {
         let matrices = [&mut self.a_f, &mut self.h, &mut self.f_i].into_iter().flatten();
         matrices.flat_map(|own| &mut own.values).for_each(|value| *value = 0.0);
     }
 
     /// Takes what the importer can change: the limits of the actuators and the filter.
-    pub(crate) fn take_parameters(&mut self, other: &Self) {
+    pub fn take_parameters(&mut self, other: &Self) {
         for (own, other) in self.actuators.iter_mut().zip(&other.actuators) {
             own.limits = other.limits;
         }
@@ -467,33 +517,37 @@ impl Design {
     }
 
     /// Whether the file states an operating point that does not depend on a scheduling variable.
-    pub(crate) fn has_operating_point(&self) -> bool {
+    #[must_use]
+    pub fn has_operating_point(&self) -> bool {
         self.schedule.is_none()
             && self.actuators.iter().any(|actuator| actuator.operating.is_some())
     }
 
     /// The position of the filtered measurement `k` in z.
-    pub(crate) fn filtered_at(&self, k: usize) -> usize {
+    #[must_use]
+    pub fn filtered_at(&self, k: usize) -> usize {
         self.states.len() + self.faults.len() + k
     }
 
     /// The position of the integral `k` in z.
-    pub(crate) fn integral_at(&self, k: usize) -> usize {
+    pub fn integral_at(&self, k: usize) -> usize {
         self.filtered_at(self.filter.as_ref().map_or(0, Vec::len)) + k
     }
 
     /// The number of integrals: one for each reference, or none.
-    pub(crate) fn integrals(&self) -> usize {
+    #[must_use]
+    pub fn integrals(&self) -> usize {
         self.k_i.as_ref().map_or(0, |k_i| k_i.columns)
     }
 
     /// The length of z.
-    pub(crate) fn order(&self) -> usize {
+    #[must_use]
+    pub fn order(&self) -> usize {
         self.integral_at(self.integrals())
     }
 
     /// x_hat, f_hat, y_f and x_i of z.
-    pub(crate) fn parts_mut<'a>(&self, z: &'a mut [f64]) -> [&'a mut [f64]; 4] {
+    pub fn parts_mut<'a>(&self, z: &'a mut [f64]) -> [&'a mut [f64]; 4] {
         let (z, x_i) = z.split_at_mut(self.integral_at(0));
         let (x_hat, rest) = z.split_at_mut(self.states.len());
         let (f_hat, y_f) = rest.split_at_mut(self.faults.len());
@@ -502,7 +556,7 @@ impl Design {
 
     /// The matrices by the name that the file and the variables have; those from A_f on only where they
     /// are stated.
-    pub(crate) fn matrices(&self) -> impl Iterator<Item = (&'static str, &Matrix)> {
+    pub fn matrices(&self) -> impl Iterator<Item = (&'static str, &Matrix)> {
         let always = [
             ("A", &self.a),
             ("B", &self.b),

@@ -1,25 +1,29 @@
 //! A matrix as a list of rows: the form of the design file and of the FMI variables.
 
-use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// Rows times columns numbers, row by row.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<Vec<f64>>", into = "Vec<Vec<f64>>")]
-pub(crate) struct Matrix {
-    pub(crate) rows: usize,
-    pub(crate) columns: usize,
-    pub(crate) values: Vec<f64>,
+pub struct Matrix {
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub columns: usize,
+    /// The elements, row by row.
+    pub values: Vec<f64>,
 }
 
 impl Matrix {
     /// Name of the element at position `k` of `values`, as FMI writes it: `A[1,2]`.
-    pub(crate) fn element(&self, name: &str, k: usize) -> String {
+    #[must_use]
+    pub fn element(&self, name: &str, k: usize) -> String {
         format!("{name}[{},{}]", k / self.columns + 1, k % self.columns + 1)
     }
 
     /// The elements of row `i`, counted from 0.
-    pub(crate) fn row(&self, i: usize) -> &[f64] {
+    #[must_use]
+    pub fn row(&self, i: usize) -> &[f64] {
         &self.values[i * self.columns..][..self.columns]
     }
 
@@ -27,7 +31,7 @@ impl Matrix {
     /// one product after the other.
     ///
     /// For short rows a loop costs more than the products, so it is unrolled for them.
-    pub(crate) fn add_product<const WHOLE: bool>(&self, vector: &[f64], sums: &mut [f64]) {
+    pub fn add_product<const WHOLE: bool>(&self, vector: &[f64], sums: &mut [f64]) {
         match self.columns {
             1 => add_rows::<1, WHOLE>(self.values.as_chunks().0, vector, sums),
             2 => add_rows::<2, WHOLE>(self.values.as_chunks().0, vector, sums),
@@ -39,11 +43,6 @@ impl Matrix {
                 }
             }
         }
-    }
-
-    /// The matrix for linear algebra.
-    pub(crate) fn dense(&self) -> DMatrix<f64> {
-        DMatrix::from_row_slice(self.rows, self.columns, &self.values)
     }
 }
 
