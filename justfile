@@ -21,7 +21,7 @@ bless:
 
 # The benchmarks of the book; they need a machine without other load.
 bench:
-    .venv/bin/python scripts/benchmark-peers
+    .venv/bin/python scripts/bench/benchmark-peers
     cargo bench --package cosim-results --bench results
     cargo bench --package tests
 

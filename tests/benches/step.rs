@@ -4,7 +4,7 @@
 //!
 //! The FMUs are those of `tests/speed`: systems of 2, 20 and 1000 in a ring. For comparison, each
 //! system is also run by a loop that makes the same calls on the same instances and copies the
-//! connected values. `scripts/benchmark-peers` compares with a loop in C. Needs a C compiler.
+//! connected values. `scripts/bench/benchmark-peers` compares with a loop in C. Needs a C compiler.
 #![forbid(unsafe_code)]
 
 use std::path::Path;

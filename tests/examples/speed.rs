@@ -1,4 +1,4 @@
-//! Runs a system as fast as the master can and prints the cost, for `scripts/benchmark-peers`.
+//! Runs a system as fast as the master can and prints the cost, for `scripts/bench/benchmark-peers`.
 //!
 //!     speed pack FOLDER PORTS
 //!     speed run SYSTEM STEP STEPS [RESULTS]

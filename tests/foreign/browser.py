@@ -119,7 +119,7 @@ class Page:
         `rules` are axe's options that choose rules.
         """
         package = find_spec("axe_playwright_python")
-        assert package, "axe-core is missing: pip install --no-deps --requirement scripts/axe-requirements.txt"
+        assert package, "axe-core is missing: pip install --no-deps --requirement scripts/build/axe-requirements.txt"
         if not self.evaluate("'axe' in window"):
             self.evaluate((Path(package.submodule_search_locations[0]) / "axe.min.js").read_text(encoding="utf-8"))
         options = json.dumps({"resultTypes": ["violations"], **rules})

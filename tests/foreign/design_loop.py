@@ -1,4 +1,4 @@
-"""From a plant file to a run in FMPy: `aso-ftc design --fmu`, then scripts/couple_with_fmpy.py."""
+"""From a plant file to a run in FMPy: `aso-ftc design --fmu`, then scripts/reference/couple_with_fmpy.py."""
 
 import json
 import tomllib
@@ -91,7 +91,7 @@ def coupled(python, designed, plant, settings, *arguments):
     out = designed.folder / "results.csv"
     stated = [text for name, value in settings.items() for text in ("--set", f"{name}={value}")]
     done = python(
-        ROOT / "scripts" / "couple_with_fmpy.py",
+        ROOT / "scripts" / "reference" / "couple_with_fmpy.py",
         *("--plant", plant, "--controller", designed.fmu, "--out", out, "--record-every", "1e-9"),
         *(*stated, *arguments),
     )

@@ -5,7 +5,7 @@ import sys
 
 
 def test_the_master_gives_the_outputs_of_a_loop_in_c_on_every_system_of_the_benchmark(root):
-    command = [sys.executable, root / "scripts" / "benchmark-peers", "--alone"]
+    command = [sys.executable, root / "scripts" / "bench" / "benchmark-peers", "--alone"]
     command += ["--repeats", "1", "--seconds", "0.01"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600, cwd=root)
     assert done.returncode == 0, done.stderr

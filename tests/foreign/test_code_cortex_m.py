@@ -82,7 +82,7 @@ def test_no_sample_has_more_operations_than_the_header_states(aso_ftc, packed, t
     """The instructions of the floating-point unit in QEMU. The compiler leaves out products with 1 and the sum of -0 and a number."""
     packed_plant(aso_ftc, "ThreeTank")
     own = Built(aso_ftc, CASES[name].text, tmp_path, "--float")
-    done = subprocess.run([ROOT / "scripts" / "cortex_m_cycles.py", own.folder / "c"], capture_output=True, text=True)
+    done = subprocess.run([ROOT / "scripts" / "bench" / "cortex_m_cycles.py", own.folder / "c"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     most = {kind: int(re.search(rf"(\d+) {kind}", done.stdout).group(1)) for kind in ("multiplications", "additions", "divisions")}
     found = stated(own)

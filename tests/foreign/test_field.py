@@ -1,4 +1,4 @@
-"""`scripts/field` on our own FMUs, and with commands that have one fault each; FMPy is the reference."""
+"""`scripts/reference/field` on our own FMUs, and with commands that have one fault each; FMPy is the reference."""
 
 import json
 import stat
@@ -28,7 +28,7 @@ def field(python, root, packed, tmp_path):
         out = tmp_path / "field.json"
         sink = f"{packed['controller']}:x_p"
         steps = ("--steps", "200", "--sink", sink, "--json", out)
-        done = python(root / "scripts" / "field", folder, *steps, *options, timeout=600)
+        done = python(root / "scripts" / "reference" / "field", folder, *steps, *options, timeout=600)
         verdicts = json.loads(out.read_text())["fmus"] if out.exists() else {}
         return done.returncode, done.stdout + done.stderr, {path.rsplit("/", 1)[-1]: own for path, own in verdicts.items()}
 

@@ -20,7 +20,7 @@ def by_fmpy(scenario, python, root, packed):
     """The summary that the FMPy script prints."""
     settings = [part for setting in scenario["settings"] for part in ("--set", setting)]
     done = python(
-        root / "scripts" / "couple_with_fmpy.py",
+        root / "scripts" / "reference" / "couple_with_fmpy.py",
         "--step",
         scenario["step"],
         "--stop-time",
@@ -66,7 +66,7 @@ def by_rust(scenario, aso_ftc, packed, folder):
 def residual(table, t_on):
     """Half of the peak-to-peak values of position and angle, and the rms of the estimation error.
 
-    Over the second half of the time with compensation, as in scripts/couple_with_fmpy.py.
+    Over the second half of the time with compensation, as in scripts/reference/couple_with_fmpy.py.
     """
     settled = table["time"] > (t_on + table["time"][-1]) / 2
     x_p, theta = table["plant.x_p"][settled], table["plant.theta"][settled]

@@ -67,7 +67,7 @@ def test_fmpy_gives_the_same_residual(tmp_path, python, packed):
     period = 5e-3
     fmu = design(CONSTANT, period, tmp_path)
     done = python(
-        *(ROOT / "scripts" / "couple_with_fmpy.py", "--plant", packed["plant"]),
+        *(ROOT / "scripts" / "reference" / "couple_with_fmpy.py", "--plant", packed["plant"]),
         *("--controller", fmu, "--step", period),
     )
     assert done.returncode == 0, done.stderr

@@ -1,4 +1,4 @@
-"""Measures the time of a step in one master: a child process of scripts/benchmark-peers.
+"""Measures the time of a step in one master: a child process of scripts/bench/benchmark-peers.
 
     python peers.py MASTER SYSTEM STEPS [CSV]
 

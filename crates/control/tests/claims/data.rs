@@ -1,4 +1,4 @@
-//! The matrices of `tests/data/faults.txt`, written by `scripts/reference_faults.py`.
+//! The matrices of `tests/data/faults.txt`, written by `scripts/reference/reference_faults.py`.
 
 use crate::matrix;
 use nalgebra::DMatrix;

@@ -273,7 +273,7 @@ fn the_flight_actuator_case_study_has_the_published_structure_and_errors() {
 }
 
 /// Published: `CS2_1` of Varga 2017, section 8.2. The errors of the nominal gain and of the mean gain are those of
-/// `scripts/reference_isolation.py` (null spaces by scipy, norms by SLICOT).
+/// `scripts/reference/reference_isolation.py` (null spaces by scipy, norms by SLICOT).
 #[cfg(feature = "lmi")]
 #[test]
 fn the_air_data_sensor_case_study_has_the_published_errors() {

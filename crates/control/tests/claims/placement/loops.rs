@@ -1,4 +1,4 @@
-//! Comparison of closed loops with those by scipy's `place_poles`: `scripts/reference_placement.py`.
+//! Comparison of closed loops with those by scipy's `place_poles`: `scripts/reference/reference_placement.py`.
 
 use crate::matrix;
 use control::aso::{Estimator, FaultyPlant, Gains, design};

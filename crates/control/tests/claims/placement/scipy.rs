@@ -1,4 +1,4 @@
-//! Comparison with scipy's `place_poles` on many systems: `scripts/reference_placement.py`.
+//! Comparison with scipy's `place_poles` on many systems: `scripts/reference/reference_placement.py`.
 
 use crate::matrix;
 use control::placement::{
