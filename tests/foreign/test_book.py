@@ -25,7 +25,10 @@ import pytest
 from conftest import ROOT
 
 README = ROOT / "README.md"
-NEIGHBOURS = [ROOT / "CONTRIBUTING.md", ROOT / "python" / "README.md", *sorted(ROOT.glob("crates/*/README.md"))]
+NEIGHBOURS = [
+    *(ROOT / "CONTRIBUTING.md", ROOT / "examples" / "README.md", ROOT / "python" / "README.md"),
+    *sorted(ROOT.glob("crates/*/README.md")),
+]
 PAGES = [README, *NEIGHBOURS, *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"(?:^<!-- ([^\n]*) -->\n)?^```([\w,]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LANGUAGES = {"sh", "text", "toml", "python", "rust", "lua", "xml", "c"}
