@@ -40,7 +40,7 @@ impl Parse for Arguments {
 }
 
 pub(crate) fn expand(arguments: &Arguments, mut block: ItemImpl) -> Result<TokenStream> {
-    let is_model = block.trait_.as_ref().and_then(|(_, path, _)| path.segments.last());
+    let is_model = block.trait_.as_ref().and_then(|(path, _)| path.segments.last());
     if is_model.is_none_or(|segment| segment.ident != "Model") {
         return Err(Error::new_spanned(&block.self_ty, "expected `impl Model for` a struct"));
     }
