@@ -8,10 +8,10 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, RowDVector};
 use rayon::prelude::*;
 
-use super::budget::Budget;
-use super::designed::ControllerDesign;
-use super::report::{Bound, Frequency, Norm};
-use super::signals::Fault;
+use crate::budget::Budget;
+use crate::designed::ControllerDesign;
+use crate::report::{Bound, Frequency, Norm};
+use crate::signals::Fault;
 
 /// Relative width of the brackets of peak gains and norms.
 const WIDTH: f64 = 1e-3;

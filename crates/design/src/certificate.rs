@@ -4,10 +4,11 @@ use control::Domain;
 use control::lmi::Outcome;
 use control::theorem1::{self, certify, largest_decay, smallest_radius, ultimate_bound};
 
-use super::budget::Budget;
-use super::designed::ControllerDesign;
-use super::estimation::Law;
-use super::report::{Certificate, FreeP, Norm, Theorem1, Ultimate, rows};
+use crate::budget::Budget;
+use crate::designed::ControllerDesign;
+use crate::estimation::Law;
+use crate::matrix::rows;
+use crate::report::{Certificate, FreeP, Norm, Theorem1, Ultimate};
 
 /// The design parameter alpha of (12); it cancels in delta.
 const ALPHA: f64 = 1.0;

@@ -5,8 +5,6 @@ use control::lmi::weight_of_table;
 use control::weight::{Weight, bilinear_frequency};
 use files::{Entry, PlaceError, Table};
 
-use super::report::NormWeight;
-
 /// The entries of a plant file that belong to `h_infinity`.
 pub(crate) const CHANNEL: [&str; 2] = ["weights", "noise"];
 
@@ -51,24 +49,8 @@ impl Channel {
         self.all().any(|one| one.weight.as_constant().is_none())
     }
 
-    fn all(&self) -> impl Iterator<Item = &ChannelWeight> {
+    pub(crate) fn all(&self) -> impl Iterator<Item = &ChannelWeight> {
         self.weights.iter().chain(&self.noise)
-    }
-
-    /// The weights over frequency, for the report.
-    pub(crate) fn report(&self, domain: Domain) -> Vec<NormWeight> {
-        let over_frequency = self.all().filter(|one| one.weight.as_constant().is_none());
-        over_frequency
-            .map(|one| {
-                let (numerator, denominator) = one.weight.polynomials(domain);
-                NormWeight {
-                    signal: one.signal.clone(),
-                    numerator,
-                    denominator,
-                    table_deviation: one.deviation,
-                }
-            })
-            .collect()
     }
 
     /// Reads `weights`, a table from names to weights, and `noise`, a weight or one for each measurement.

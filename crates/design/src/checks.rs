@@ -3,13 +3,12 @@
 use control::Domain;
 use control::distance::Distance;
 
-use super::designed::ControllerDesign;
-use super::report::Check;
+use crate::designed::ControllerDesign;
+use crate::linear_plant::AT_REST;
+use crate::report::Check;
 
 /// Relative size of the remaining fault effect below which the compensation counts as complete.
 const CANCELLED: f64 = 1e-9;
-/// Relative distance from an equilibrium below which an operating point counts as an equilibrium.
-pub(crate) const AT_REST: f64 = 1e-6;
 
 /// Returns all conditions, each with its numerical value.
 pub(crate) fn checks(designed: &ControllerDesign) -> Vec<Check> {

@@ -6,17 +6,17 @@ use std::time::Duration;
 use files::{Source, Table};
 use serde::Serialize;
 
-use super::designed::{ControllerDesign, design_by};
-use super::error::Error;
-use super::estimation::Law;
-use super::identity::identity;
-use super::law::LawProblem;
-use super::parameters::ParameterFamily;
-use super::plant_file::PlantFile;
-use super::progress::Steps;
-use super::report::Estimation;
-use super::{page, reporting};
+use crate::designed::{ControllerDesign, design_by};
+use crate::error::Error;
+use crate::estimation::Law;
+use crate::identity::identity;
+use crate::law::LawProblem;
+use crate::parameters::ParameterFamily;
+use crate::plant_file::PlantFile;
+use crate::progress::Steps;
+use crate::report::Estimation;
 use crate::robustness::report::Verdict;
+use crate::{page, reporting};
 
 /// The laws on one plant, all for the same requirement.
 #[derive(Serialize)]

@@ -1,26 +1,27 @@
 //! Writes `design.toml`, the input file of the controller FMU.
 
+use aso_controller::Design;
 use aso_controller::design::detection::DetectionDesign;
 use aso_controller::design::schedule::{Point, Schedule};
 use aso_controller::design::{
     Actuator, Combination, Defaults, Estimator, Fallback, Fault, Reconfiguration, Signal,
     SlidingMode,
 };
-use aso_controller::{Design, Matrix};
 use control::Domain;
 use control::aso::{FaultyPlant, Gains};
 use fmu_description::unit::Unit;
-use nalgebra::DMatrix;
 
-use super::designed::{ControllerDesign, fault_names};
-use super::linear_plant::LinearPlant;
-use super::plant_file::PlantFile;
-use super::reconfiguration::{
+use crate::designed::{ControllerDesign, fault_names};
+use crate::linear_plant::LinearPlant;
+use crate::matrix::matrix;
+use crate::plant_file::PlantFile;
+use crate::reconfiguration::{
     Combination as DesignedCombination, Reconfiguration as DesignedReconfiguration,
     Reconfigurations,
 };
-use super::schedule::Scheduled;
-use super::signals::{EntryPoint, Signal as PlantSignal};
+use crate::report::number::round;
+use crate::schedule::Scheduled;
+use crate::signals::{EntryPoint, Signal as PlantSignal};
 
 impl ControllerDesign {
     /// Returns the design file.
@@ -231,13 +232,6 @@ impl ControllerDesign {
     }
 }
 
-/// The matrix as the file has it: -0.0 is 0.0.
-pub(crate) fn matrix(dense: &DMatrix<f64>) -> Matrix {
-    let values =
-        dense.row_iter().flat_map(|row| row.iter().map(|entry| entry + 0.0).collect::<Vec<_>>());
-    Matrix { rows: dense.nrows(), columns: dense.ncols(), values: values.collect() }
-}
-
 fn estimator(estimator: control::aso::Estimator) -> Estimator {
     match estimator {
         control::aso::Estimator::Current => Estimator::Current,
@@ -249,15 +243,4 @@ fn estimator(estimator: control::aso::Estimator) -> Estimator {
 fn per_second(unit: &str) -> Option<String> {
     let slope = format!("{unit}/s");
     Unit::parse(&slope).is_ok().then_some(slope)
-}
-
-/// Rounds to the nearest 1, 2 or 5 times a power of ten, on the logarithmic scale.
-pub(crate) fn round(x: f64) -> f64 {
-    let exponent = x.log10().floor();
-    let part = x.log10() - exponent;
-    let distance = |factor: &f64| (factor.log10() - part).abs();
-    let factors = [1.0, 2.0, 5.0, 10.0].into_iter();
-    let factor = factors.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(1.0);
-    // A division rounds 0.1, 0.01 and so on to the nearest double; a product does not.
-    if exponent < 0.0 { factor / 10_f64.powf(-exponent) } else { factor * 10_f64.powf(exponent) }
 }

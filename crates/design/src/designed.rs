@@ -1,20 +1,20 @@
 //! Computes the gains for a plant file.
 
-use super::estimation::Law;
-use super::family::{self, Family, common_feedback};
-use super::feedthrough;
-use super::fixed_mode::{described, described_in};
-use super::gains::{FeedbackProblem, GainResult, Refusal, feedback, observer, unique};
-use super::law::{DesignedLaw, LawProblem};
-use super::linear_plant::LinearPlant;
-use super::norm_gains::ObserverProblem;
-use super::pairing::PairProblem;
-use super::plant_file::PlantFile;
-use super::plausibility::{check_faults, check_limits};
-use super::requirements::{Request, Requirement};
-use super::schedule::Scheduled;
-use super::schedule::references::examine;
-use super::tracking::{
+use crate::estimation::Law;
+use crate::family::{self, Family, common_feedback};
+use crate::feedthrough;
+use crate::fixed_mode::{described, described_in};
+use crate::gains::{FeedbackProblem, GainResult, Refusal, feedback, observer, unique};
+use crate::law::{DesignedLaw, LawProblem};
+use crate::linear_plant::LinearPlant;
+use crate::norm_gains::ObserverProblem;
+use crate::pairing::PairProblem;
+use crate::plant_file::{FAULTS, PlantFile};
+use crate::plausibility::{check_faults, check_limits};
+use crate::requirements::{Request, Requirement};
+use crate::schedule::Scheduled;
+use crate::schedule::references::examine;
+use crate::tracking::{
     DesignLoop, Tracking, check_references, decay, feedback_pair, integral_action,
 };
 use control::aso::{Estimator, FaultyPlant, Gains};
@@ -28,9 +28,6 @@ use control::stability::{instability, is_clearly_stable};
 use control::{Domain, Error};
 use files::PlaceError;
 use nalgebra::DMatrix;
-
-/// The entries that errors about faults point at.
-pub(crate) const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
 
 /// A designed controller with the intermediate results.
 pub(crate) struct ControllerDesign {

@@ -13,14 +13,15 @@ use aso_controller::design::detection::DetectionDesign;
 use control::detection::{Cusum, WindowTest};
 use nalgebra::DMatrix;
 
-use super::designed::ControllerDesign;
-use super::parameters::ParameterFamily;
-use super::plant_file::PlantFile;
-use super::report::{Matrix, rows};
+use crate::designed::ControllerDesign;
 use crate::detection::report::{
     DecoupledInput, DetectedFault, Detection as Report, ParameterCases, Test,
 };
 use crate::detection::request::{DetectionRequest, Method};
+use crate::matrix::rows;
+use crate::parameters::ParameterFamily;
+use crate::plant_file::PlantFile;
+use crate::report::Matrix;
 use decoupling::Decoupling;
 use model_error::{LargestMean, ModelErrors};
 use prediction::{Prediction, TestKind};

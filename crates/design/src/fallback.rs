@@ -22,13 +22,13 @@ use control::controller::{closed_loop, controller};
 use control::lmi::{self, CommonFeedback, Outcome, RegionCertificate, Vertex, certify_common};
 use nalgebra::DMatrix;
 
-use super::designed::ControllerDesign;
-use super::page::rounded;
-use super::plant_file::PlantFile;
-use super::requirements::Region;
-use super::rest::unreachable_mode;
-use super::tracking::decay;
+use crate::designed::ControllerDesign;
 use crate::fallback::request::FallbackRequest;
+use crate::plant_file::PlantFile;
+use crate::report::number::rounded;
+use crate::requirements::Region;
+use crate::rest::unreachable_mode;
+use crate::tracking::decay;
 
 /// Largest number of states of plant and controller for which linear matrix inequalities are solved.
 const LARGEST_ORDER: usize = 30;

@@ -7,15 +7,14 @@ use control::lmi::{self, CommonFeedback, Outcome, RegionCertificate, Vertex};
 use control::{Domain, Error};
 use files::PlaceError;
 
-use super::checks::AT_REST;
-use super::gains::{GainResult, Refusal, unique};
-use super::linear_plant::LinearPlant;
-use super::plant_file::PlantFile;
-use super::references::References;
-use super::requirements::Region;
-use super::signals::Signal;
-use super::tracking::{check_member, feedback_pair};
-use super::variants::Variant;
+use crate::gains::{GainResult, Refusal, unique};
+use crate::linear_plant::{AT_REST, LinearPlant};
+use crate::plant_file::PlantFile;
+use crate::references::References;
+use crate::requirements::Region;
+use crate::signals::Signal;
+use crate::tracking::{check_member, feedback_pair};
+use crate::variants::Variant;
 
 /// The name of the plant of the file among the members.
 pub(crate) const NOMINAL: &str = "nominal";
@@ -32,15 +31,6 @@ pub(crate) struct Family {
 pub(crate) struct Member {
     pub(crate) name: String,
     pub(crate) linear: LinearPlant,
-}
-
-/// Checks that the members of a family reach their references.
-pub(crate) fn check_action(file: &PlantFile<'_>) -> Result<(), PlaceError> {
-    let own = file.references.as_ref().filter(|own| !own.integral && !file.family.is_empty());
-    let Some(References { action_places: [place, _], .. }) = own else { return Ok(()) };
-    let message = "without integral action the other members of the family would miss their references, \
-                   because one constant gain N_r fits one plant; expected `integral = true`";
-    Err(file.error_at(place, message))
 }
 
 /// Returns the members that the file states besides its own plant `nominal`; a member that is not at

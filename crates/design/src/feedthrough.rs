@@ -5,27 +5,10 @@
 
 use control::faults::FaultEntry;
 use files::PlaceError;
-use nalgebra::DMatrix;
 
-use super::linear_plant::LinearPlant;
-use super::plant_file::PlantFile;
-use super::requirements::Requirement;
-
-/// Part of the largest entry of a row of C below which an entry of D counts as zero.
-const NOTHING: f64 = 1e-9;
-
-/// D without the entries that are rounding beside the row of `c`.
-pub(crate) fn significant(mut d: DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64> {
-    for (mut row, of_states) in d.row_iter_mut().zip(c.row_iter()) {
-        let negligible = NOTHING * of_states.amax();
-        row.apply(|entry| {
-            if entry.abs() <= negligible {
-                *entry = 0.0;
-            }
-        });
-    }
-    d
-}
+use crate::linear_plant::LinearPlant;
+use crate::plant_file::PlantFile;
+use crate::requirements::Requirement;
 
 /// Refuses a plant with feedthrough and no filter, a filter that nothing needs, and tables that are for plants
 /// without feedthrough.

@@ -11,9 +11,9 @@ use control::sampled::{estimator_alternatives, sampled_poles};
 use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
-use super::norm_gains::{NormRequirement, ObserverProblem};
-use super::report::NormReport;
-use super::requirements::{Region, Requirement};
+use crate::norm_gains::{NormRequirement, ObserverProblem};
+use crate::report::NormReport;
+use crate::requirements::{Region, Requirement};
 
 const IN_REGION: &str = "Eigenvalues in the region by linear matrix inequalities";
 /// Relative distance within which a requested eigenvalue is that of a mode that no gain moves.

@@ -1,6 +1,6 @@
 //! The identity of a design: what a file says about the plant that it was made for.
 
-use super::report::Report;
+use crate::report::Report;
 use crate::robustness::report::{Level, Verdict};
 
 /// Returns `aso-ftc design for NAME (NUMBER)`: the name of the plant file and a number from the

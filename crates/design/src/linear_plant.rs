@@ -6,11 +6,16 @@ use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
 
-use super::feedthrough::significant;
-use super::plant_file::{self, PlantFile};
-use super::signals::{EntryPoint, Fault, FaultDynamics, Signal};
 use crate::detection::request::{Disturbance, DisturbanceEntry};
+use crate::plant_file::{self, PlantFile};
+use crate::signals::{EntryPoint, Fault, FaultDynamics, Signal};
 use files::PlaceError;
+
+/// Relative distance from an equilibrium below which an operating point counts as an equilibrium.
+pub(crate) const AT_REST: f64 = 1e-6;
+
+/// Part of the largest entry of a row of C below which an entry of D counts as zero.
+const NOTHING: f64 = 1e-9;
 
 /// x' = A x + B u + faults, y = C x + D u + faults, about an operating point.
 pub(crate) struct LinearPlant {
@@ -302,4 +307,17 @@ fn entry(
             Err(file.error_at(&fault.place, message).into())
         }
     }
+}
+
+/// D without the entries that are rounding beside the row of `c`.
+pub(crate) fn significant(mut d: DMatrix<f64>, c: &DMatrix<f64>) -> DMatrix<f64> {
+    for (mut row, of_states) in d.row_iter_mut().zip(c.row_iter()) {
+        let negligible = NOTHING * of_states.amax();
+        row.apply(|entry| {
+            if entry.abs() <= negligible {
+                *entry = 0.0;
+            }
+        });
+    }
+    d
 }

@@ -10,21 +10,18 @@ use control::losses::LossyLoop;
 use control::{Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
-use super::budget::Budget;
-use super::designed::ControllerDesign;
-use super::page::rounded;
-use super::report::rows;
-use super::signals::EntryPoint;
-use super::tracking::DesignLoop;
+use crate::budget::Budget;
+use crate::designed::ControllerDesign;
 use crate::losses::report::{
-    CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport,
+    CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport, described,
 };
+use crate::matrix::rows;
 use crate::robustness::report::{Level, Number};
+use crate::signals::EntryPoint;
+use crate::tracking::DesignLoop;
 
 /// Largest number of states of plant and controller for which linear matrix inequalities are solved.
 const LARGEST_ORDER: usize = 30;
-/// Largest number of actuators with a stated loss.
-pub(crate) const MOST_LOSSES: usize = 4;
 /// Rates of the reachable sets, relative to twice the proven decay rate.
 const RATES: [f64; 3] = [0.2, 0.5, 0.8];
 
@@ -40,7 +37,7 @@ struct StatedLoss {
 /// Returns the stated losses.
 fn stated(designed: &ControllerDesign) -> Vec<StatedLoss> {
     let linear = &designed.linear;
-    let one = |fault: &super::signals::Fault| match (&fault.entry_point, fault.up_to) {
+    let one = |fault: &crate::signals::Fault| match (&fault.entry_point, fault.up_to) {
         (EntryPoint::Loss { actuator, .. }, Some(up_to)) => Some(StatedLoss {
             name: linear.actuators[*actuator].name.clone(),
             actuator: *actuator,
@@ -78,12 +75,6 @@ fn numbers(stated: &[StatedLoss], value: impl Fn(&StatedLoss) -> f64) -> Vec<Num
 
 fn number(name: &str, value: f64) -> Number {
     Number { name: name.to_owned(), unit: None, value }
-}
-
-/// Losses in words: `u1 0.4, u2 0.3`.
-pub(crate) fn described(losses: &[Number]) -> String {
-    let one = |loss: &Number| format!("{} {}", loss.name, rounded(loss.value));
-    losses.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 impl LossReport {

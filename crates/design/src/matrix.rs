@@ -1,7 +1,8 @@
-//! Reads matrices of a plant file.
+//! Matrices as lists of rows: read from a plant file, written to the report and the design file.
 
+use aso_controller::Matrix;
 use files::{Entry, PlaceError};
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 
 /// Reads an entry as a matrix.
 pub(crate) trait MatrixEntry {
@@ -45,4 +46,21 @@ impl MatrixEntry for Entry<'_> {
         let found = format!("{}x{}", matrix.nrows(), matrix.ncols());
         Err(self.error(format!("expected {rows}x{columns} ({meaning}), found {found}")))
     }
+}
+
+/// Returns the rows of a matrix; negative zeros become zeros.
+pub(crate) fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    m.row_iter().map(|row| row.iter().map(|entry| entry + 0.0).collect()).collect()
+}
+
+/// Returns real and imaginary parts.
+pub(crate) fn pairs(numbers: &[Complex<f64>]) -> Vec<[f64; 2]> {
+    numbers.iter().map(|number| [number.re, number.im]).collect()
+}
+
+/// The matrix as the design file has it: -0.0 is 0.0.
+pub(crate) fn matrix(dense: &DMatrix<f64>) -> Matrix {
+    let values =
+        dense.row_iter().flat_map(|row| row.iter().map(|entry| entry + 0.0).collect::<Vec<_>>());
+    Matrix { rows: dense.nrows(), columns: dense.ncols(), values: values.collect() }
 }

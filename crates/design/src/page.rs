@@ -26,7 +26,6 @@ mod verdict;
 pub(crate) use comparison::comparison;
 use figure::interactive::{COLOURS, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, UPLOT_STYLE};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-pub(crate) use number::rounded;
 use plots::Plots;
 
 use super::report::Report;

@@ -5,9 +5,9 @@ use control::robustness::{Loop, least_sensitive};
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-use super::gains::GainResult;
-use super::linear_plant::LinearPlant;
-use super::tracking::DesignLoop;
+use crate::gains::GainResult;
+use crate::linear_plant::LinearPlant;
+use crate::tracking::DesignLoop;
 
 /// The plant of a pair of gains.
 pub(crate) struct PairProblem<'a> {

@@ -10,9 +10,9 @@ use fmu_import::Fmu;
 use linearise::{Linearise, linearise};
 use nalgebra::{DMatrix, DVector};
 
-use super::feedthrough::significant;
-use super::linear_plant;
-use super::plant_file::{PlantFile, PlantFmu};
+use crate::linear_plant;
+use crate::linear_plant::significant;
+use crate::plant_file::{PlantFile, PlantFmu};
 use crate::robustness::report::Parameter;
 
 /// Number of equal steps in which the worst direction is followed to the limits.
@@ -83,7 +83,7 @@ impl<'a> ParameterFamily<'a> {
     /// The family that the plant file asks for, if it does.
     pub(crate) fn of(file: &'a PlantFile<'a>) -> Result<Option<Self>, crate::Error> {
         let tolerances = &file.robustness.parameters;
-        let super::plant_file::Model::Fmu(own) = &file.model else {
+        let crate::plant_file::Model::Fmu(own) = &file.model else {
             return Ok(None);
         };
         if tolerances.is_empty() {

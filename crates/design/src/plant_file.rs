@@ -6,21 +6,21 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
 
-use super::channel::ChannelSignals;
-use super::estimation::EstimationRequest;
-use super::family::check_action;
-use super::plausibility::check_names;
-use super::references::References;
-use super::requirements::{Request, request};
-use super::signals::{
+use crate::channel::ChannelSignals;
+use crate::detection::request::{DetectionRequest, Disturbance, disturbances};
+use crate::estimation::EstimationRequest;
+use crate::fallback::request::FallbackRequest;
+use crate::plausibility::check_names;
+use crate::reconfiguration::limits::ReconfigurationRequest;
+use crate::references::References;
+use crate::requirements::{Request, request};
+use crate::robustness::limits::RobustnessLimits;
+use crate::signals::{
     EntryPoint, Fault, Signal, all_actuator_faults, description, faults, signals,
 };
-use super::variants::{self, Schedule, Variant};
-use crate::detection::request::{DetectionRequest, Disturbance, disturbances};
-use crate::fallback::request::FallbackRequest;
-use crate::reconfiguration::limits::ReconfigurationRequest;
-use crate::robustness::limits::RobustnessLimits;
+use crate::variants::{self, Schedule, Variant, check_action};
 use control::Domain;
+use control::aso::Estimator;
 use files::{Entry, Place, PlaceError, Source, Table};
 
 /// A plant file whose entries are valid and consistent.
@@ -161,6 +161,9 @@ const PLACES: [&str; 23] = [
     "reconfiguration",
     "fallback",
 ];
+
+/// The entries that errors about faults point at.
+pub(crate) const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
 
 impl<'a> PlantFile<'a> {
     /// Reads and checks the file.
@@ -450,6 +453,14 @@ fn sampling(file: &Table<'_>) -> Result<Option<Sampling>, PlaceError> {
         },
     };
     Ok(Some(Sampling { period: entry.positive()?, current }))
+}
+
+/// Returns the name of an estimator in the plant file.
+pub(crate) fn estimator(estimator: Estimator) -> &'static str {
+    match estimator {
+        Estimator::Current => "current",
+        Estimator::Prediction => "prediction",
+    }
 }
 
 /// Reads the rates of the measurement filter, which sensor faults require; [`crate::feedthrough`] examines whether

@@ -5,12 +5,11 @@ use files::PlaceError;
 use fmu_description::{array_element, is_structured_name, misplaced_elements};
 use nalgebra::{DMatrix, DVector};
 
-use super::designed::FAULTS;
-use super::estimation::Law;
-use super::linear_plant::LinearPlant;
-use super::plant_file::{Model, PlantFile};
-use super::signals::{EntryPoint, Fault, FaultDynamics, Signal};
-use super::variants::Variable;
+use crate::estimation::Law;
+use crate::linear_plant::LinearPlant;
+use crate::plant_file::{FAULTS, Model, PlantFile};
+use crate::signals::{EntryPoint, Fault, FaultDynamics, Signal};
+use crate::variants::Variable;
 use control::faults::ExtendedPlant;
 
 /// A column counts as a combination of others if they leave less than this of its length; rows and

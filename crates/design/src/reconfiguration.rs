@@ -13,20 +13,20 @@ use control::stability::instability;
 use control::{Error, StateSpace, sampled};
 use nalgebra::{DMatrix, DVector};
 
-use super::designed::ControllerDesign;
-use super::fallback::Fallback;
-use super::fixed_mode::described;
-use super::gains::{FeedbackProblem, GainChoice, Refusal, feedback};
-use super::plant_file::PlantFile;
-use super::report::{pairs, rows};
-use super::requirements::Requirement;
-use super::rest::{Rest, beyond_limits, commands, unreachable_mode};
-use super::signals::{EntryPoint, Signal};
-use super::tracking::decay;
+use crate::designed::ControllerDesign;
+use crate::fallback::Fallback;
+use crate::fixed_mode::described;
+use crate::gains::{FeedbackProblem, GainChoice, Refusal, feedback};
+use crate::matrix::{pairs, rows};
+use crate::plant_file::PlantFile;
 use crate::reconfiguration::limits::ReconfigurationRequest;
 use crate::reconfiguration::report::{
     ReconfigurationReport, Reconfigured, ServedByFallback, WithoutActuator, WithoutSeveral,
 };
+use crate::requirements::Requirement;
+use crate::rest::{Rest, beyond_limits, commands, unreachable_mode};
+use crate::signals::{EntryPoint, Signal};
+use crate::tracking::decay;
 
 /// Relative size of the effect that the other actuators cannot produce below which the allocation counts
 /// as exact.

@@ -5,7 +5,7 @@ pub(crate) mod steps;
 use files::{Entry, Place, PlaceError, Table};
 use nalgebra::DMatrix;
 
-use super::signals::{Signal, description, name, unit};
+use crate::signals::{Signal, description, name, unit};
 
 /// The references of a plant file.
 #[derive(Clone, Debug, PartialEq)]

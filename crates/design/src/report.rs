@@ -1,6 +1,7 @@
 //! The data of a design report: the output of `--json` and the content of the page.
 
-use nalgebra::{Complex, DMatrix};
+pub(crate) mod number;
+
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::{Serialize, Serializer};
@@ -547,16 +548,4 @@ pub(crate) fn or_reason<T: Serialize, S: Serializer>(
         Ok(found) => found.serialize(serializer),
         Err(reason) => serializer.collect_map([("reason", reason)]),
     }
-}
-
-/// Returns the rows of a matrix; negative zeros become zeros.
-#[must_use]
-pub fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
-    m.row_iter().map(|row| row.iter().map(|entry| entry + 0.0).collect()).collect()
-}
-
-/// Returns real and imaginary parts.
-#[must_use]
-pub fn pairs(numbers: &[Complex<f64>]) -> Vec<[f64; 2]> {
-    numbers.iter().map(|number| [number.re, number.im]).collect()
 }

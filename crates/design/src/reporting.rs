@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use control::aso::Estimator;
 use control::eigen::eigenvalues;
 use control::faults::FaultEntry;
 use control::losses::loss_tolerance;
@@ -12,35 +11,34 @@ use fmu_description::documentation::texts;
 use fmu_description::{ModelDescription, ScalarVariable};
 use nalgebra::{Complex, DMatrix};
 
-use super::analysis::Loops;
-use super::budget::Budget;
-use super::certificate::certificate;
-use super::checks::checks;
-use super::designed::{ControllerDesign, fault_names};
-use super::fallback::{self, Fallback};
-use super::fixed_mode::shown;
-use super::gains::GainResult;
-use super::losses::losses;
-use super::page::rounded;
-use super::parameters::ParameterFamily;
-use super::plant_file::PlantFile;
-use super::plausibility::line;
-use super::progress::{Step, Steps};
-use super::report::{
-    Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal, pairs, rows,
-};
-use super::requirements::{self, Requirement};
-use super::responses::responses;
-use super::robustness::{robustness, verdict};
-use super::signals::{self, EntryPoint, Fault, FaultDynamics};
-use super::tracking::{DesignLoop, TrackingAction};
+use crate::analysis::Loops;
+use crate::budget::Budget;
+use crate::certificate::certificate;
+use crate::checks::checks;
+use crate::designed::{ControllerDesign, fault_names};
 use crate::estimation::report as estimation;
+use crate::fallback::{self, Fallback};
 use crate::family::report::{self as family_report, judge};
+use crate::fixed_mode::shown;
+use crate::gains::GainResult;
+use crate::losses::losses;
 use crate::losses::report::LossReport;
+use crate::matrix::{pairs, rows};
+use crate::parameters::ParameterFamily;
+use crate::plant_file::{PlantFile, estimator};
+use crate::plausibility::line;
+use crate::progress::{Step, Steps};
 use crate::reconfiguration::report::ReconfigurationReport;
 use crate::references::steps::{beyond_limits, reached, reference_steps};
+use crate::report::number::rounded;
+use crate::report::{Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal};
+use crate::requirements::{self, Requirement};
+use crate::responses::responses;
 use crate::robustness::report::Level;
+use crate::robustness::{robustness, verdict};
 use crate::schedule::report::{self as schedule_report, judge_schedule};
+use crate::signals::{self, EntryPoint, Fault, FaultDynamics};
+use crate::tracking::{DesignLoop, TrackingAction};
 
 /// Returns the report on `designed`.
 pub(crate) fn report(
@@ -156,14 +154,6 @@ fn unless_numerical<T>(
             Ok(Vec::new())
         }
         found => found,
-    }
-}
-
-/// Returns the name of an estimator in the design file.
-pub(crate) fn estimator(estimator: Estimator) -> &'static str {
-    match estimator {
-        Estimator::Current => "current",
-        Estimator::Prediction => "prediction",
     }
 }
 
@@ -488,11 +478,11 @@ fn tracking_assumption(designed: &ControllerDesign) -> Option<String> {
 }
 
 /// Returns the variables of the controller FMU.
-pub(crate) fn interface(description: &ModelDescription) -> Vec<super::report::Variable> {
+pub(crate) fn interface(description: &ModelDescription) -> Vec<crate::report::Variable> {
     let stated = |text: String| Some(text).filter(|text| !text.is_empty());
     let variable = |variable: &ScalarVariable| {
         let (unit, [start, ..]) = texts(&variable.kind, &description.types);
-        super::report::Variable {
+        crate::report::Variable {
             name: variable.name.clone(),
             causality: variable.causality.as_str().to_owned(),
             variability: variable.variability.as_str().to_owned(),

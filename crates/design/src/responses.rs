@@ -6,11 +6,11 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::analysis::Outputs;
-use super::designed::ControllerDesign;
-use super::report::{Curve, StepResponse};
-use super::signals::Fault;
+use crate::analysis::Outputs;
+use crate::designed::ControllerDesign;
+use crate::report::{Curve, StepResponse};
 use crate::robustness::report::Number;
+use crate::signals::Fault;
 
 /// Relative band of the settling time: a response has settled when it stays within this fraction of
 /// its largest distance.

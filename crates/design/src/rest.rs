@@ -5,10 +5,10 @@ use control::stability::is_clearly_stable;
 use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
-use super::fixed_mode::described;
-use super::linear_plant::LinearPlant;
-use super::signals::Signal;
+use crate::fixed_mode::described;
+use crate::linear_plant::LinearPlant;
 use crate::robustness::report::Number;
+use crate::signals::Signal;
 
 /// The equilibrium without actuators.
 pub(crate) struct Rest {

@@ -22,16 +22,17 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::designed::ControllerDesign;
-use super::linear_plant::LinearPlant;
-use super::parameters::ParameterFamily;
-use super::progress::{Step, Steps};
-use super::report::{Frequency, Matrix, rows};
-use super::signals::Signal;
+use crate::designed::ControllerDesign;
+use crate::linear_plant::LinearPlant;
+use crate::matrix::rows;
+use crate::parameters::ParameterFamily;
+use crate::progress::{Step, Steps};
+use crate::report::{Frequency, Matrix};
 use crate::robustness::limits::RobustnessLimits;
 use crate::robustness::report::{
     Channel, Compared, Disk, LoopPoint, Number, PeakSensitivity, Robustness,
 };
+use crate::signals::Signal;
 
 const WIDTH: f64 = 1e-4;
 const POINTS_PER_DECADE: u32 = 20;

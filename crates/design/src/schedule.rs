@@ -13,13 +13,13 @@ use control::tracking::IntegralAction;
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-use super::designed::{self, ControllerDesign};
-use super::estimation::Law;
-use super::family::check_states;
-use super::linear_plant::LinearPlant;
-use super::plant_file::PlantFile;
-use super::signals::Signal;
-use super::variants::Variable;
+use crate::designed::{self, ControllerDesign};
+use crate::estimation::Law;
+use crate::family::check_states;
+use crate::linear_plant::LinearPlant;
+use crate::plant_file::PlantFile;
+use crate::signals::Signal;
+use crate::variants::Variable;
 
 /// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p` of a
 /// current estimator. The loop of a continuous controller has degree 2, with a direct term 4; its coefficients of

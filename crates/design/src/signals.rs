@@ -3,7 +3,6 @@
 use fmu_description::unit::Unit;
 use fmu_description::xml::is_character;
 
-use super::losses::MOST_LOSSES;
 use files::{Entry, Place, PlaceError, Table};
 
 /// A state, an actuator or a measurement.
@@ -82,6 +81,8 @@ pub(crate) struct Fault {
     pub(crate) place: Place,
 }
 
+/// Largest number of actuators with a stated loss.
+const MOST_LOSSES: usize = 4;
 const SIGNAL: [&str; 4] = ["name", "unit", "description", "operating"];
 const ACTUATOR: [&str; 5] = ["name", "unit", "description", "operating", "limits"];
 const FAULT: [&str; 13] = [

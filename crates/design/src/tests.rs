@@ -5,15 +5,15 @@ use std::time::Duration;
 
 use nalgebra::Complex;
 
-use super::budget::Budget;
-use super::channel::Channel;
-use super::checks::checks;
-use super::designed::design;
-use super::plant_file::{Model, PlantFile};
-use super::requirements::{Region, Requirement};
-use super::robustness::{robustness, verdict};
-use super::signals::{EntryPoint, FaultDynamics};
+use crate::budget::Budget;
+use crate::channel::Channel;
+use crate::checks::checks;
+use crate::designed::design;
+use crate::plant_file::{Model, PlantFile};
+use crate::requirements::{Region, Requirement};
 use crate::robustness::report::Level;
+use crate::robustness::{robustness, verdict};
+use crate::signals::{EntryPoint, FaultDynamics};
 use files::{Source, Table};
 
 const MASS: &str = r#"A = [[0, 1], [0, 0]]
@@ -359,7 +359,7 @@ fn an_observer_that_is_unstable_before_t_on_fails_a_check_unless_it_estimates_fr
 fn designed(text: &str) -> Result<Vec<String>, String> {
     let found = read(text, |file| {
         let first = |error: crate::Error| error.to_string().lines().next().unwrap().to_owned();
-        let line = |warning: &files::PlaceError| super::plausibility::line(file, warning);
+        let line = |warning: &files::PlaceError| crate::plausibility::line(file, warning);
         let found = design(file).map_err(first)?;
         Ok(found.warnings.iter().map(line).collect())
     });
@@ -468,8 +468,8 @@ fn the_worst_plant_is_a_plant_file() {
     let text = format!("{MASS}robustness.tolerance = 0.2\n").replace("[0, 0]]", "[-2.0, -0.5]]");
     let (worst, a) = read(&text, |file| {
         let designed = design(file).unwrap();
-        let time = super::CERTIFICATE_TIME;
-        let report = super::reporting::report(
+        let time = crate::CERTIFICATE_TIME;
+        let report = crate::reporting::report(
             (file, None),
             (&designed, None, None),
             String::new(),
@@ -477,7 +477,7 @@ fn the_worst_plant_is_a_plant_file() {
         )
         .unwrap();
         let a = report.robustness.as_ref().unwrap().tolerance.worst[0].values.clone();
-        (super::worst_case::plant_file(file, &designed, &report).unwrap().unwrap(), a)
+        (crate::worst_case::plant_file(file, &designed, &report).unwrap().unwrap(), a)
     })
     .unwrap();
     assert!((a[1][0].abs() - 2.0).abs() > 0.39 && a[0] == [0.0, 1.0], "{a:?}");
@@ -491,10 +491,10 @@ fn the_worst_plant_is_a_plant_file() {
 #[test]
 fn without_time_for_certificates_the_report_says_what_is_left_out() {
     for text in [MASS.to_owned(), format!("{MASS}sample_time = 0.01\n")] {
-        let [none, all] = [Duration::ZERO, super::CERTIFICATE_TIME].map(|time| {
+        let [none, all] = [Duration::ZERO, crate::CERTIFICATE_TIME].map(|time| {
             let report = |file: &PlantFile<'_>| {
                 let designed = design(file).unwrap();
-                super::reporting::report(
+                crate::reporting::report(
                     (file, None),
                     (&designed, None, None),
                     String::new(),
@@ -520,7 +520,7 @@ fn without_time_for_certificates_the_report_says_what_is_left_out() {
 fn the_schema_in_the_book_is_that_of_the_report() {
     let file =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/design.schema.json");
-    let expected = serde_json::to_string_pretty(&super::report::schema()).unwrap() + "\n";
+    let expected = serde_json::to_string_pretty(&crate::report::schema()).unwrap() + "\n";
     if std::env::var_os("BLESS").is_some() {
         std::fs::write(&file, &expected).unwrap();
     }
@@ -570,7 +570,7 @@ fn fifty_states_get_a_linear_quadratic_design_without_linear_matrix_inequalities
     let text = chain(25);
     let (instability, certificate) = read(&text, |file| {
         let designed = design(file).unwrap();
-        let budget = Budget::start(super::CERTIFICATE_TIME);
+        let budget = Budget::start(crate::CERTIFICATE_TIME);
         (designed.instability, crate::certificate::certificate(&designed, vec![], &budget))
     })
     .unwrap();
@@ -582,8 +582,8 @@ fn fifty_states_get_a_linear_quadratic_design_without_linear_matrix_inequalities
     assert_eq!(refused, expected);
 }
 
-fn unobserved() -> super::progress::Steps<'static> {
-    super::progress::Steps::new(&|_| {})
+fn unobserved() -> crate::progress::Steps<'static> {
+    crate::progress::Steps::new(&|_| {})
 }
 
 #[test]
@@ -592,7 +592,7 @@ fn each_step_of_a_design_is_reported_once_with_the_part_that_is_done() {
     let seen = std::sync::Mutex::new(Vec::new());
     let observe = |step| seen.lock().unwrap().push(step);
     let plant = root.join("fmu-controller/pendulum.toml");
-    super::design_within(&plant, super::CERTIFICATE_TIME, &observe).unwrap();
+    crate::design_within(&plant, crate::CERTIFICATE_TIME, &observe).unwrap();
     let seen = seen.into_inner().unwrap();
     let mut names: Vec<_> = seen.iter().map(|step| step.step).collect();
     assert_eq!((names.len(), names[0]), (7, "gains"), "{names:?}");

@@ -13,12 +13,15 @@ use control::{Domain, Error, StateSpace};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
-use super::linear_plant::LinearPlant;
-use super::plant_file::PlantFile;
-use super::references::References;
-use super::requirements::Requirement;
-use super::signals::Signal;
-use super::variants::Variant;
+use crate::linear_plant::LinearPlant;
+use crate::plant_file::PlantFile;
+use crate::references::References;
+use crate::requirements::Requirement;
+use crate::signals::Signal;
+use crate::variants::Variant;
+
+/// Relative error of a constant reference below which it counts as reached.
+pub(crate) const REACHED: f64 = 1e-9;
 
 /// The references of a design.
 pub(crate) struct Tracking {

@@ -3,9 +3,10 @@
 
 use files::{Entry, Place, PlaceError, Table};
 
-use super::matrix::MatrixEntry as _;
-use super::plant_file::{Model, PlantFile};
-use super::signals::{Signal, description, name, unit};
+use crate::matrix::MatrixEntry as _;
+use crate::plant_file::{Model, PlantFile};
+use crate::references::References;
+use crate::signals::{Signal, description, name, unit};
 
 /// Entries that replace those of the plant of the file.
 const MATRICES: [&str; 4] = ["A", "B", "C", "F_a"];
@@ -251,4 +252,13 @@ fn numbers(table: &Table<'_>, key: &str, count: usize) -> Result<Option<Vec<f64>
         return Ok(Some(found));
     }
     Err(entry.error(format!("expected {count} numbers, found {}", found.len())))
+}
+
+/// Checks that the members of a family reach their references.
+pub(crate) fn check_action(file: &PlantFile<'_>) -> Result<(), PlaceError> {
+    let own = file.references.as_ref().filter(|own| !own.integral && !file.family.is_empty());
+    let Some(References { action_places: [place, _], .. }) = own else { return Ok(()) };
+    let message = "without integral action the other members of the family would miss their references, \
+                   because one constant gain N_r fits one plant; expected `integral = true`";
+    Err(file.error_at(place, message))
 }

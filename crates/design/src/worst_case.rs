@@ -3,10 +3,10 @@
 use control::faults::FaultEntry;
 use toml::{Table, Value};
 
-use super::designed::ControllerDesign;
-use super::identity::identity;
-use super::plant_file::PlantFile;
-use super::report::Report;
+use crate::designed::ControllerDesign;
+use crate::identity::identity;
+use crate::plant_file::PlantFile;
+use crate::report::Report;
 use crate::robustness::report::Parameter;
 
 /// Returns the plant file with the matrices of the worst plant; a plant that is an FMU becomes one

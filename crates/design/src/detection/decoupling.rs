@@ -3,7 +3,7 @@
 use control::detection::{DetectionFilter, detection_filter};
 use control::{Domain, Error};
 
-use super::problem::Problem;
+use crate::detection::problem::Problem;
 
 /// A filter of residuals.
 #[derive(Clone)]

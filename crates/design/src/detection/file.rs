@@ -4,10 +4,10 @@ use aso_controller::design::detection::{DetectionDesign, TestDesign};
 use control::Domain;
 use nalgebra::DMatrix;
 
-use super::problem::Problem;
-use super::{Part, tests};
-use crate::design_file::matrix;
 use crate::designed::ControllerDesign;
+use crate::detection::problem::Problem;
+use crate::detection::{Part, tests};
+use crate::matrix::matrix;
 
 /// The filters of all parts as one filter.
 pub(super) fn section(
@@ -43,7 +43,7 @@ pub(super) fn section(
         }
         state += order;
     }
-    let entry = |(_, test): (_, &super::PlannedTest)| TestDesign {
+    let entry = |(_, test): (_, &crate::detection::PlannedTest)| TestDesign {
         name: test.name.clone(),
         residuals: test.rows.nrows(),
         drift: test.kind.drift(),

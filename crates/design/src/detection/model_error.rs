@@ -11,9 +11,9 @@ use control::robustness::{PlantFamily, Tolerances, random_deviations};
 use control::{Domain, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
-use super::decoupling::Decoupling;
-use super::problem::Problem;
 use crate::designed::ControllerDesign;
+use crate::detection::decoupling::Decoupling;
+use crate::detection::problem::Problem;
 use crate::detection::request::ModelError;
 use crate::linear_plant::LinearPlant;
 use crate::parameters::ParameterFamily;

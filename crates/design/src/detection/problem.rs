@@ -9,13 +9,13 @@ use control::hold::zero_order_hold;
 use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
-use super::decoupling::Decoupling;
-use super::prediction::whole;
-use crate::design_file::round;
 use crate::designed::ControllerDesign;
+use crate::detection::decoupling::Decoupling;
+use crate::detection::prediction::whole;
 use crate::detection::request::DetectionRequest;
 use crate::fixed_mode::shown;
 use crate::plant_file::PlantFile;
+use crate::report::number::round;
 
 /// Time constants of the slowest mode after which a mean has settled.
 const SETTLED: f64 = 15.0;
@@ -262,7 +262,7 @@ impl Problem {
             let at = self.fault_at(fault);
             let steady = self.steady_mean(base, at).map_err(refuse)?.norm();
             let means = self.means(base, at).map_err(refuse)?;
-            if steady <= NO_TRACE * super::largest(&means) || steady <= 0.0 {
+            if steady <= NO_TRACE * crate::detection::largest(&means) || steady <= 0.0 {
                 let name = &self.names[at];
                 let message = format!(
                     "a constant fault `{name}` leaves no trace in the residuals: the measurements cannot \

@@ -8,14 +8,14 @@ use control::robustness::{delay_margin, sampled_delay_margin};
 use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
-use super::{Fallback, Search, remaining};
 use crate::budget::Budget;
 use crate::designed::ControllerDesign;
 use crate::fallback::report::{FallbackCase, FallbackReport};
+use crate::fallback::{Fallback, Search, remaining};
 use crate::family::report::{CommonCertificate, common};
 use crate::linear_plant::LinearPlant;
+use crate::matrix::rows;
 use crate::plant_file::PlantFile;
-use crate::report::rows;
 use crate::rest::{Rest, beyond_limits, commands};
 use crate::robustness::report::{LoopPoint, Number};
 use crate::robustness::{Physical, closed, loop_points};

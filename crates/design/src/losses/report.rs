@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::report::number::rounded;
 use crate::report::{OrReason, or_reason};
 use crate::robustness::report::Number;
 
@@ -81,4 +82,10 @@ pub struct LossPeak {
     pub unit: Option<String>,
     /// The bound of its deviation from the operating point, from rest.
     pub largest: f64,
+}
+
+/// Losses in words: `u1 0.4, u2 0.3`.
+pub(crate) fn described(losses: &[Number]) -> String {
+    let one = |loss: &Number| format!("{} {}", loss.name, rounded(loss.value));
+    losses.iter().map(one).collect::<Vec<_>>().join(", ")
 }

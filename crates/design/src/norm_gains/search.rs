@@ -6,9 +6,10 @@ use control::response::h_infinity;
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
+use crate::channel::Channel;
 use crate::gains::{GainResult, Refusal, synthesised, unique};
 use crate::norm_gains::NormRequirement;
-use crate::report::{LowerBoundFor, NormReport};
+use crate::report::{LowerBoundFor, NormReport, NormWeight};
 use crate::requirements::Region;
 
 /// Relative width of a norm.
@@ -163,7 +164,7 @@ impl Search<'_> {
                 Some(h_infinity(&(self.system)(gain, &self.unweighted), WIDTH)?.upper)
             },
             gain: gain.norm(),
-            weights: self.required.channel.report(self.domain),
+            weights: weights_over_frequency(self.required.channel, self.domain),
         })
     }
 
@@ -186,6 +187,22 @@ impl Search<'_> {
              is {size:.4e}."
         )))
     }
+}
+
+/// Returns the weights over frequency, for the report.
+fn weights_over_frequency(channel: &Channel, domain: Domain) -> Vec<NormWeight> {
+    let over_frequency = channel.all().filter(|one| one.weight.as_constant().is_none());
+    over_frequency
+        .map(|one| {
+            let (numerator, denominator) = one.weight.polynomials(domain);
+            NormWeight {
+                signal: one.signal.clone(),
+                numerator,
+                denominator,
+                table_deviation: one.deviation,
+            }
+        })
+        .collect()
 }
 
 /// Says the norm and its bounds.

@@ -3,9 +3,10 @@
 use maud::{Markup, html};
 
 use super::chart::{legend, line_sample};
-use super::number::{number, rounded};
+use super::number::number;
 use super::plots::{Line, Mark, Plot, Plots, Quantity};
 use super::table::{Cell, table};
+use crate::report::number::rounded;
 use crate::report::{Curve, Frequency, Report, StepResponse};
 
 /// Shows the singular values on logarithmic axes.

@@ -2,10 +2,11 @@
 
 use maud::{Markup, html};
 
-use super::number::{number, rounded};
+use super::number::number;
 use super::plane::{Plane, Pole};
 use super::pole_map::{Group, Map, Sign};
 use super::table::{Cell, table};
+use crate::report::number::rounded;
 use crate::report::{Loop, LowerBoundFor, Region, Report};
 
 /// Returns the required and the actual eigenvalues of a loop, mapped by `place`.

@@ -5,8 +5,7 @@ use maud::{Markup, html};
 use super::number::number;
 use super::plant::effectiveness;
 use super::table::{Cell, table};
-use crate::losses::described;
-use crate::losses::report::{LossLoop, LossReport};
+use crate::losses::report::{LossLoop, LossReport, described};
 use crate::report::Report;
 
 pub(super) fn losses(report: &Report) -> Markup {

@@ -2,9 +2,10 @@
 
 use maud::{Markup, html};
 
-use super::number::{exact, rounded};
+use super::number::exact;
 use super::table::scrolled;
 use crate::report::Matrix;
+use crate::report::number::rounded;
 
 /// Returns the matrices as tables, each followed by its text; identifiers on the page start with
 /// `id`.

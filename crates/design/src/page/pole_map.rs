@@ -116,8 +116,11 @@ impl Map<'_> {
             Plane::Sampled(_) => ("real part of z", "imaginary part of z"),
         };
         let listed = |group: &Group| {
-            let poles: Vec<_> =
-                group.poles.iter().map(|pole| complex(*pole, super::number::rounded)).collect();
+            let poles: Vec<_> = group
+                .poles
+                .iter()
+                .map(|pole| complex(*pole, crate::report::number::rounded))
+                .collect();
             format!("{}: {}", group.name, poles.join(", "))
         };
         let description = self.groups.iter().map(listed).collect::<Vec<_>>().join("; ");

@@ -1,8 +1,9 @@
 //! Tables that can be copied.
 
+use crate::report::number::rounded;
 use maud::{Markup, html};
 
-use super::number::{complex, exact, rounded};
+use super::number::{complex, exact};
 
 /// The content of a cell.
 pub(super) enum Cell {

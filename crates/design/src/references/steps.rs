@@ -10,10 +10,8 @@ use crate::designed::ControllerDesign;
 use crate::report::{Check, CommandPeak, Curve, ReferenceStep};
 use crate::responses::{BETWEEN, SETTLED, add_outputs};
 use crate::robustness::report::Number;
-use crate::tracking::{Tracking, TrackingAction};
+use crate::tracking::{REACHED, Tracking, TrackingAction};
 
-/// Relative error of a constant reference below which it counts as reached.
-pub(crate) const REACHED: f64 = 1e-9;
 /// The parts of a step between which the rise time is measured.
 const RISE: [f64; 2] = [0.1, 0.9];
 

@@ -4,12 +4,13 @@ use control::robustness::{Loop, noise_gains};
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-use super::Physical;
-use super::limits::RobustnessLimits;
-use super::report::Number;
 use crate::analysis::largest_gain;
 use crate::designed::ControllerDesign;
-use crate::report::{Matrix, rows};
+use crate::matrix::rows;
+use crate::report::Matrix;
+use crate::robustness::Physical;
+use crate::robustness::limits::RobustnessLimits;
+use crate::robustness::report::Number;
 
 /// Returns the effect of each measurement noise on commands and estimated faults, and of all
 /// together.

@@ -7,12 +7,13 @@ use control::robustness::{
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::limits::RobustnessLimits;
-use super::report::ToleranceResult;
-use super::{Physical, names};
 use crate::designed::ControllerDesign;
+use crate::matrix::rows;
 use crate::parameters::ParameterFamily;
-use crate::report::{Matrix, rows};
+use crate::report::Matrix;
+use crate::robustness::limits::RobustnessLimits;
+use crate::robustness::report::ToleranceResult;
+use crate::robustness::{Physical, names};
 
 /// Examines the loop for plants whose matrices have other entries, within the tolerances: the part of the
 /// random cases that stays stable, and the worst case found.

@@ -1,9 +1,9 @@
 //! Judges a design by its checks, its margins and its tolerances.
 
-use super::limits::RobustnessLimits;
-use super::report::{Level, Limits, Parameter, Robustness, ToleranceResult, Verdict};
-use crate::page::rounded;
 use crate::report::Check;
+use crate::report::number::rounded;
+use crate::robustness::limits::RobustnessLimits;
+use crate::robustness::report::{Level, Limits, Parameter, Robustness, ToleranceResult, Verdict};
 
 /// Judges a design.
 pub(crate) fn verdict(

@@ -5,11 +5,11 @@ use control::{Domain, Error};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
-use super::{Point, Scheduled};
 use crate::designed::ControllerDesign;
 use crate::plant_file::PlantFile;
 use crate::references::References;
-use crate::references::steps::REACHED;
+use crate::schedule::{Point, Scheduled};
+use crate::tracking::REACHED;
 
 /// Values of the scheduling variable in each interval, besides its ends.
 const CHECKED: u32 = 19;

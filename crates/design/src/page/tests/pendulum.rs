@@ -4,9 +4,10 @@ use control::aso::{Estimator, FaultyPlant, Gains};
 use control::exponential::exponential;
 use nalgebra::{Complex, DMatrix, DVector};
 
+use crate::matrix::{pairs, rows};
 use crate::report::{
     Bound, Certificate, Check, Curve, Estimation, Frequency, Loop, Matrix, Norm, Plant, Report,
-    Signal, StepResponse, pairs, rows,
+    Signal, StepResponse,
 };
 
 use crate::robustness::report::{Level, Limits, Verdict};
