@@ -1,13 +1,13 @@
 //! The summary of a design on the terminal.
 
-use design::detection::report::Detection;
-use design::fallback::report::FallbackReport;
-use design::family::report::MemberReport;
-use design::losses::report::LossLoop;
-use design::reconfiguration::report::ReconfigurationReport;
+use design::report::detection::Detection;
+use design::report::fallback::FallbackReport;
+use design::report::family::MemberReport;
+use design::report::losses::LossLoop;
+use design::report::reconfiguration::ReconfigurationReport;
+use design::report::robustness::Number;
+use design::report::schedule::ScheduleReport;
 use design::report::{CommandPeak, Loop, Matrix, ReferenceStep};
-use design::robustness::report::Number;
-use design::schedule::report::ScheduleReport;
 use design::{Comparison, Report};
 
 /// The most rows or columns of a gain that are printed; the design file has all.

@@ -6,7 +6,6 @@ mod file;
 mod model_error;
 mod prediction;
 mod problem;
-pub mod report;
 pub(crate) mod request;
 
 use aso_controller::design::detection::DetectionDesign;
@@ -14,14 +13,14 @@ use control::detection::{Cusum, WindowTest};
 use nalgebra::DMatrix;
 
 use crate::designed::ControllerDesign;
-use crate::detection::report::{
-    DecoupledInput, DetectedFault, Detection as Report, ParameterCases, Test,
-};
 use crate::detection::request::{DetectionRequest, Method};
 use crate::matrix::rows;
 use crate::parameters::ParameterFamily;
 use crate::plant_file::PlantFile;
 use crate::report::Matrix;
+use crate::report::detection::{
+    DecoupledInput, DetectedFault, Detection as Report, ParameterCases, Test,
+};
 use decoupling::Decoupling;
 use model_error::{LargestMean, ModelErrors};
 use prediction::{Prediction, TestKind};

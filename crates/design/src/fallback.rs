@@ -11,7 +11,6 @@
 //! for the inequalities.
 
 mod examination;
-pub mod report;
 pub(crate) mod request;
 
 pub(crate) use examination::report;

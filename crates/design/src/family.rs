@@ -1,6 +1,6 @@
 //! The members of a family of plants that one controller serves.
 
-pub mod report;
+pub(crate) mod report;
 
 use control::hold::zero_order_hold;
 use control::lmi::{self, CommonFeedback, Outcome, RegionCertificate, Vertex};

@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 use crate::estimation::Law;
 use crate::linear_plant::LinearPlant;
 use crate::report::Check;
-use crate::robustness::report::Number;
+use crate::report::robustness::Number;
 use crate::signals::FaultDynamics;
 
 /// The default of `K_1`.

@@ -1,8 +1,6 @@
 //! Losses of effectiveness up to the fractions that the plant file states: what is proven, and what
 //! constant losses make unstable.
 
-pub mod report;
-
 use control::aso::{FaultyPlant, Gains};
 use control::controller::controller;
 use control::lmi::{Outcome, Region, common_reachable_set};
@@ -12,11 +10,11 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::budget::Budget;
 use crate::designed::ControllerDesign;
-use crate::losses::report::{
+use crate::matrix::rows;
+use crate::report::losses::{
     CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport, described,
 };
-use crate::matrix::rows;
-use crate::robustness::report::{Level, Number};
+use crate::report::robustness::{Level, Number};
 use crate::signals::EntryPoint;
 use crate::tracking::DesignLoop;
 
@@ -77,37 +75,33 @@ fn number(name: &str, value: f64) -> Number {
     Number { name: name.to_owned(), unit: None, value }
 }
 
-impl LossReport {
-    /// What the losses contribute to the verdict.
-    pub(crate) fn reasons(&self) -> Vec<(Level, String)> {
-        self.loops.iter().filter_map(|own| own.reason(&self.stated)).collect()
-    }
+/// What the losses contribute to the verdict.
+pub(crate) fn reasons(report: &LossReport) -> Vec<(Level, String)> {
+    report.loops.iter().filter_map(|own| reason(own, &report.stated)).collect()
 }
 
-impl LossLoop {
-    /// A loop that constant losses within the stated range make unstable is red, a loop without a proof
-    /// amber. With the compensation off, which may never happen, the first is amber, too.
-    fn reason(&self, stated: &[Number]) -> Option<(Level, String)> {
-        let on = self.name == ON;
-        let limit = &self.constant[0];
-        if !limit.stable && limit.factor <= 1.0 {
-            let level = if on { Level::Red } else { Level::Amber };
-            let reason = format!(
-                "constant losses of effectiveness within the stated range make the loop unstable, \
-                 {}: from {} on ({})",
-                self.name,
-                described(&limit.losses),
-                level.word()
-            );
-            return Some((level, reason));
-        }
-        let reason = self.proof.as_ref().err().filter(|_| on)?;
-        let losses = described(stated);
-        Some((
-            Level::Amber,
-            format!("losses of effectiveness up to {losses} are not proven: {reason} (amber)"),
-        ))
+/// A loop that constant losses within the stated range make unstable is red, a loop without a proof
+/// amber. With the compensation off, which may never happen, the first is amber, too.
+fn reason(own: &LossLoop, stated: &[Number]) -> Option<(Level, String)> {
+    let on = own.name == ON;
+    let limit = &own.constant[0];
+    if !limit.stable && limit.factor <= 1.0 {
+        let level = if on { Level::Red } else { Level::Amber };
+        let reason = format!(
+            "constant losses of effectiveness within the stated range make the loop unstable, \
+             {}: from {} on ({})",
+            own.name,
+            described(&limit.losses),
+            level.word()
+        );
+        return Some((level, reason));
     }
+    let reason = own.proof.as_ref().err().filter(|_| on)?;
+    let losses = described(stated);
+    Some((
+        Level::Amber,
+        format!("losses of effectiveness up to {losses} are not proven: {reason} (amber)"),
+    ))
 }
 
 /// The name of the loop with the compensation on.

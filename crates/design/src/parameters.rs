@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::linear_plant;
 use crate::linear_plant::significant;
 use crate::plant_file::{PlantFile, PlantFmu};
-use crate::robustness::report::Parameter;
+use crate::report::robustness::Parameter;
 
 /// Number of equal steps in which the worst direction is followed to the limits.
 const STEPS: u32 = 20;

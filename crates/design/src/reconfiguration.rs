@@ -1,7 +1,6 @@
 //! Designs the controllers without actuators that are gone.
 
 pub(crate) mod limits;
-pub mod report;
 
 use control::allocation::{allocate, equilibrium};
 use control::aso::{FaultyPlant, Gains};
@@ -20,7 +19,7 @@ use crate::gains::{FeedbackProblem, GainChoice, Refusal, feedback};
 use crate::matrix::{pairs, rows};
 use crate::plant_file::PlantFile;
 use crate::reconfiguration::limits::ReconfigurationRequest;
-use crate::reconfiguration::report::{
+use crate::report::reconfiguration::{
     ReconfigurationReport, Reconfigured, ServedByFallback, WithoutActuator, WithoutSeveral,
 };
 use crate::requirements::Requirement;

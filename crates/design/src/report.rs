@@ -1,18 +1,27 @@
 //! The data of a design report: the output of `--json` and the content of the page.
 
+pub mod comparison;
+pub mod detection;
+pub mod fallback;
+pub mod family;
+pub(crate) mod identity;
+pub mod losses;
 pub(crate) mod number;
+pub mod reconfiguration;
+pub mod robustness;
+pub mod schedule;
 
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::{Serialize, Serializer};
 
-use crate::detection::report::Detection;
-use crate::fallback::report::FallbackReport;
-use crate::family::report::FamilyReport;
-use crate::losses::report::LossReport;
-use crate::reconfiguration::report::ReconfigurationReport;
-use crate::robustness::report::{Number, Robustness, Verdict};
-use crate::schedule::report::ScheduleReport;
+use crate::report::detection::Detection;
+use crate::report::fallback::FallbackReport;
+use crate::report::family::FamilyReport;
+use crate::report::losses::LossReport;
+use crate::report::reconfiguration::ReconfigurationReport;
+use crate::report::robustness::{Number, Robustness, Verdict};
+use crate::report::schedule::ScheduleReport;
 
 /// The data of a design report.
 #[derive(Serialize, JsonSchema)]

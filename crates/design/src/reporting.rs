@@ -18,23 +18,22 @@ use crate::checks::checks;
 use crate::designed::{ControllerDesign, fault_names};
 use crate::estimation::report as estimation;
 use crate::fallback::{self, Fallback};
-use crate::family::report::{self as family_report, judge};
+use crate::family::report::{self as family_report, judge, judge_proof};
 use crate::fixed_mode::shown;
 use crate::gains::GainResult;
-use crate::losses::losses;
-use crate::losses::report::LossReport;
+use crate::losses::{self, losses};
 use crate::matrix::{pairs, rows};
 use crate::parameters::ParameterFamily;
 use crate::plant_file::{PlantFile, estimator};
 use crate::plausibility::line;
 use crate::progress::{Step, Steps};
-use crate::reconfiguration::report::ReconfigurationReport;
 use crate::references::steps::{beyond_limits, reached, reference_steps};
 use crate::report::number::rounded;
+use crate::report::reconfiguration::ReconfigurationReport;
+use crate::report::robustness::Level;
 use crate::report::{Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal};
 use crate::requirements::{self, Requirement};
 use crate::responses::responses;
-use crate::robustness::report::Level;
 use crate::robustness::{robustness, verdict};
 use crate::schedule::report::{self as schedule_report, judge_schedule};
 use crate::signals::{self, EntryPoint, Fault, FaultDynamics};
@@ -69,7 +68,7 @@ pub(crate) fn report(
     let certificate = steps.run(Step::Certificates, || certificate(designed, norms, &budget));
     let (bounds, without_bounds) = steps.run(Step::Bounds, || loops.bounds(&budget))?;
     let losses = losses(designed, &budget)?;
-    let of_losses = losses.iter().flat_map(LossReport::reasons);
+    let of_losses = losses.iter().flat_map(losses::reasons);
     let further = of_losses.chain(reconfiguration.iter().flat_map(ReconfigurationReport::reasons));
     let mut further: Vec<_> = further.collect();
     let (responses, frequency) =
@@ -87,7 +86,7 @@ pub(crate) fn report(
     if let Some(found) = &family_report {
         let members: Vec<_> = found.members.iter().skip(1).collect();
         judge(&mut verdict, "member", &members, &file.robustness);
-        found.judge_proof(&mut verdict);
+        judge_proof(&mut verdict, found);
     }
     if let Some(found) = &schedule {
         judge_schedule(&mut verdict, designed, found, &file.robustness);

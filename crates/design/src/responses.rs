@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use crate::analysis::Outputs;
 use crate::designed::ControllerDesign;
+use crate::report::robustness::Number;
 use crate::report::{Curve, StepResponse};
-use crate::robustness::report::Number;
 use crate::signals::Fault;
 
 /// Relative band of the settling time: a response has settled when it stays within this fraction of

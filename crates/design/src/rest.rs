@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::fixed_mode::described;
 use crate::linear_plant::LinearPlant;
-use crate::robustness::report::Number;
+use crate::report::robustness::Number;
 use crate::signals::Signal;
 
 /// The equilibrium without actuators.

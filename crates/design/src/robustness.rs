@@ -2,7 +2,6 @@
 
 pub(crate) mod limits;
 mod noise;
-pub mod report;
 mod tolerances;
 mod verdict;
 
@@ -27,11 +26,11 @@ use crate::linear_plant::LinearPlant;
 use crate::matrix::rows;
 use crate::parameters::ParameterFamily;
 use crate::progress::{Step, Steps};
-use crate::report::{Frequency, Matrix};
-use crate::robustness::limits::RobustnessLimits;
-use crate::robustness::report::{
+use crate::report::robustness::{
     Channel, Compared, Disk, LoopPoint, Number, PeakSensitivity, Robustness,
 };
+use crate::report::{Frequency, Matrix};
+use crate::robustness::limits::RobustnessLimits;
 use crate::signals::Signal;
 
 const WIDTH: f64 = 1e-4;

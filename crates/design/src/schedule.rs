@@ -1,7 +1,7 @@
 //! The designs at the points of a schedule, and the loop between them.
 
 pub(crate) mod references;
-pub mod report;
+pub(crate) mod report;
 
 use control::aso::{Estimator, FaultyPlant, Gains};
 use control::controller::complete_controller;

@@ -4,10 +4,10 @@ use control::faults::FaultEntry;
 use toml::{Table, Value};
 
 use crate::designed::ControllerDesign;
-use crate::identity::identity;
 use crate::plant_file::PlantFile;
 use crate::report::Report;
-use crate::robustness::report::Parameter;
+use crate::report::identity::identity;
+use crate::report::robustness::Parameter;
 
 /// Returns the plant file with the matrices of the worst plant; a plant that is an FMU becomes one
 /// that matrices describe.

@@ -9,10 +9,10 @@ use control::{Domain, Error, StateSpace};
 use rayon::prelude::*;
 
 use crate::designed::ControllerDesign;
+use crate::report::robustness::Robustness;
 use crate::report::{Estimation, EstimationErrors};
 use crate::robustness::limits::RobustnessLimits;
 use crate::robustness::noise_peaks;
-use crate::robustness::report::Robustness;
 
 /// Relative width of the brackets of the peak gains.
 const WIDTH: f64 = 1e-3;

@@ -10,14 +10,14 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::budget::Budget;
 use crate::designed::ControllerDesign;
-use crate::fallback::report::{FallbackCase, FallbackReport};
 use crate::fallback::{Fallback, Search, remaining};
-use crate::family::report::{CommonCertificate, common};
+use crate::family::report::{common, reported};
 use crate::linear_plant::LinearPlant;
 use crate::matrix::rows;
 use crate::plant_file::PlantFile;
+use crate::report::fallback::{FallbackCase, FallbackReport};
+use crate::report::robustness::{LoopPoint, Number};
 use crate::rest::{Rest, beyond_limits, commands};
-use crate::robustness::report::{LoopPoint, Number};
 use crate::robustness::{Physical, closed, loop_points};
 use crate::signals::Signal;
 use crate::tracking::decay;
@@ -56,7 +56,7 @@ pub(crate) fn report(
         gain_norm: fallback.k_x.norm(),
         intact_gain_norm: designed.gains.k_x.norm(),
         intact_decay: decay(&intact, designed.domain)?,
-        feedback: CommonCertificate::of(&fallback.certificate),
+        feedback: reported(&fallback.certificate),
         whole: common(&loops, designed.domain, budget, |at| search.name(at))?,
         whole_left_out,
         cases,

@@ -1,80 +1,20 @@
-//! The part of a design report on the members of a family of plants.
+//! Examines the members of a family of plants with the controller, and judges them.
 
 use control::lmi::{self, Outcome, RegionCertificate, certify_common};
 use control::stability::instability;
 use control::{Domain, Error};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use crate::budget::Budget;
 use crate::designed::ControllerDesign;
 use crate::family::{NOMINAL, name};
 use crate::linear_plant::LinearPlant;
 use crate::matrix::rows;
-use crate::report::{OrReason, or_reason};
+use crate::report::family::{CommonCertificate, FamilyReport, MemberMargins, MemberReport};
+use crate::report::robustness::{Level, Verdict};
 use crate::robustness::limits::RobustnessLimits;
-use crate::robustness::report::{Level, LoopPoint, Number, ToleranceResult, Verdict};
 use crate::robustness::{Margins, Physical, by_entries, margins};
-
-/// A family of plants with one controller.
-#[derive(Serialize, JsonSchema)]
-pub struct FamilyReport {
-    /// The plant of the file, `nominal`, then the others.
-    pub members: Vec<MemberReport>,
-    /// One P for the state feedback loops `A_i + B_i K_x` of all members, with integral action `A_e,i + B_e,i
-    /// [K_x, K_i]` with the integrals; none if the feedback was designed for the nominal plant.
-    pub feedback: Option<CommonCertificate>,
-    /// One P for the loops of all members with the whole controller: the loop is stable while the
-    /// plant moves between the members, in any way and arbitrarily fast; in a sampled design from one
-    /// sample to the next. Or the reason why there is none: then plants between the members, and plants that
-    /// move, are not proven to be stable, and the verdict is not green; each constant member is judged by
-    /// its eigenvalues.
-    #[serde(serialize_with = "or_reason")]
-    #[schemars(with = "OrReason<CommonCertificate>")]
-    pub whole: Result<CommonCertificate, String>,
-}
-
-/// A Lyapunov matrix for several loops.
-#[derive(Serialize, JsonSchema)]
-pub struct CommonCertificate {
-    /// The matrix P, row by row. For the whole loop in the order: states of the plant, filtered
-    /// measurements, estimates of the states, estimates of the faults, integrals of references.
-    pub p: Vec<Vec<f64>>,
-    /// Margin of the inequalities of all members, relative; larger than the rounding errors.
-    pub margin: f64,
-}
-
-/// A plant with the controller.
-#[derive(Serialize, JsonSchema)]
-pub struct MemberReport {
-    /// Its name.
-    pub name: String,
-    /// Largest real part of the eigenvalues of plant and controller together, 1/s, or largest modulus
-    /// less 1; negative if stable.
-    pub instability: f64,
-    /// Margins, noise and tolerances; none if the loop is not stable.
-    pub margins: Option<MemberMargins>,
-}
-
-/// Margins of a plant with the controller.
-#[derive(Serialize, JsonSchema)]
-pub struct MemberMargins {
-    /// The loop opened at the commands and at the measurements.
-    pub points: Vec<LoopPoint>,
-    /// Largest delay, s, common to all commands.
-    #[schemars(with = "Option<f64>")]
-    pub delay_margin: f64,
-    /// The longest time, s, over which the signals may be held, or longest sample time.
-    #[schemars(with = "Option<f64>")]
-    pub longest_hold: f64,
-    /// Root-mean-square values of commands and estimated faults under the noise of all measurements.
-    pub noise_together: Vec<Number>,
-    /// Stability while the entries of this plant vary within the tolerances of the plant file; none
-    /// if parameters of an FMU vary, which is tested for the nominal plant.
-    pub tolerance: Option<ToleranceResult>,
-}
 
 /// Returns the report on the family of `designed`, if it has one.
 pub(crate) fn family(
@@ -99,7 +39,7 @@ pub(crate) fn family(
     let named = |at: usize| name(&own.members, at).to_owned();
     Ok(Some(FamilyReport {
         members,
-        feedback: own.feedback.as_ref().map(CommonCertificate::of),
+        feedback: own.feedback.as_ref().map(reported),
         whole: common(&loops, designed.domain, budget, named)?,
     }))
 }
@@ -141,7 +81,7 @@ pub(crate) fn common(
         return Ok(Err(format!("it was {}", budget.reason())));
     }
     Ok(match certify_common(loops, &lmi::Region::default(), domain)? {
-        Outcome::Optimal(found) => Ok(CommonCertificate::of(&found)),
+        Outcome::Optimal(found) => Ok(reported(&found)),
         Outcome::Infeasible { conflict } => {
             let mut names: Vec<_> = conflict.into_iter().map(name).collect();
             names.dedup();
@@ -151,20 +91,17 @@ pub(crate) fn common(
     })
 }
 
-impl CommonCertificate {
-    pub(crate) fn of(found: &RegionCertificate) -> Self {
-        Self { p: rows(&found.p), margin: found.margin }
-    }
+/// Returns a certificate for the report.
+pub(crate) fn reported(found: &RegionCertificate) -> CommonCertificate {
+    CommonCertificate { p: rows(&found.p), margin: found.margin }
 }
 
-impl FamilyReport {
-    /// Judges what is proven of plants that are no member.
-    pub(crate) fn judge_proof(&self, verdict: &mut Verdict) {
-        if self.whole.is_err() {
-            let text = "stability of plants between the members of the family, and while the plant moves between \
-                        them, is not proven; only the members themselves were checked";
-            verdict.add(Level::Amber, text.to_owned());
-        }
+/// Judges what is proven of plants that are no member.
+pub(crate) fn judge_proof(verdict: &mut Verdict, found: &FamilyReport) {
+    if found.whole.is_err() {
+        let text = "stability of plants between the members of the family, and while the plant moves between \
+                    them, is not proven; only the members themselves were checked";
+        verdict.add(Level::Amber, text.to_owned());
     }
 }
 
@@ -212,15 +149,5 @@ pub(crate) fn judge(
             found.first_unstable
         );
         verdict.add(Level::Red, text);
-    }
-}
-
-impl Verdict {
-    /// Adds a reason; the level is the worse one.
-    pub(crate) fn add(&mut self, level: Level, reason: String) {
-        if self.level != Level::Red && level != Level::Green {
-            self.level = level;
-        }
-        self.reasons.push(reason);
     }
 }

@@ -5,7 +5,7 @@ use maud::{DOCTYPE, Markup, html};
 use super::estimation::{conditions, errors, parameters};
 use super::head;
 use super::table::{Cell, table};
-use crate::compare::{Comparison, LawResult};
+use crate::report::comparison::{Comparison, LawResult};
 
 /// Returns the page of a comparison, a complete HTML document.
 pub(crate) fn comparison(found: &Comparison) -> String {

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::matrix::matrix;
 use super::number::number;
 use super::table::{Cell, table};
-use crate::detection::report::{DecoupledInput, DetectedFault, Detection, Test};
+use crate::report::detection::{DecoupledInput, DetectedFault, Detection, Test};
 
 /// Shows tests, delays and structure.
 pub(super) fn detection(found: &Detection) -> Markup {

@@ -4,8 +4,8 @@ use maud::{Markup, html};
 
 use super::number::number;
 use super::table::{Cell, table};
+use crate::report::robustness::Number;
 use crate::report::{Check, Estimation, EstimationErrors, Report};
-use crate::robustness::report::Number;
 
 pub(super) fn estimation(report: &Report) -> Markup {
     let own = &report.estimation;

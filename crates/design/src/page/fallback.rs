@@ -4,9 +4,9 @@ use maud::{Markup, html};
 
 use super::number::number;
 use super::table::{Cell, table};
-use crate::fallback::report::{FallbackCase, FallbackReport};
 use crate::report::Report;
-use crate::robustness::report::{LoopPoint, Number};
+use crate::report::fallback::{FallbackCase, FallbackReport};
+use crate::report::robustness::{LoopPoint, Number};
 
 pub(super) fn fallback(report: &Report) -> Markup {
     html! { @if let Some(found) = &report.fallback { (section(found)) } }

@@ -5,9 +5,9 @@ use maud::{Markup, html};
 use super::matrix::{matrices, matrix};
 use super::number::number;
 use super::table::{Cell, table};
-use crate::family::report::{CommonCertificate, FamilyReport, MemberReport};
+use crate::report::family::{CommonCertificate, FamilyReport, MemberReport};
+use crate::report::schedule::{RateCertificate, ScheduleReport};
 use crate::report::{Matrix, Report};
-use crate::schedule::report::{RateCertificate, ScheduleReport};
 
 pub(super) fn family(report: &Report) -> Markup {
     html! { @if let Some(found) = &report.family { (members_section(report, found)) } }
@@ -144,7 +144,7 @@ fn noise(members: &[&MemberReport]) -> Markup {
     let stable: Vec<_> =
         members.iter().filter_map(|own| Some((&own.name, own.margins.as_ref()?))).collect();
     let Some((_, first)) = stable.first() else { return html! {} };
-    let row = |(at, number): (usize, &crate::robustness::report::Number)| {
+    let row = |(at, number): (usize, &crate::report::robustness::Number)| {
         let name = match &number.unit {
             Some(unit) => format!("{} ({unit})", number.name),
             None => number.name.clone(),

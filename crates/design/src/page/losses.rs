@@ -5,8 +5,8 @@ use maud::{Markup, html};
 use super::number::number;
 use super::plant::effectiveness;
 use super::table::{Cell, table};
-use crate::losses::report::{LossLoop, LossReport, described};
 use crate::report::Report;
+use crate::report::losses::{LossLoop, LossReport, described};
 
 pub(super) fn losses(report: &Report) -> Markup {
     html! {

@@ -4,9 +4,9 @@ use maud::{Markup, html};
 
 use super::number::number;
 use super::table::{Cell, table};
-use crate::reconfiguration::report::{Reconfigured, ServedByFallback};
 use crate::report::Report;
-use crate::robustness::report::Number;
+use crate::report::reconfiguration::{Reconfigured, ServedByFallback};
+use crate::report::robustness::Number;
 
 pub(super) fn reconfiguration(report: &Report) -> Markup {
     let Some(found) = &report.reconfiguration else {

@@ -7,8 +7,8 @@ use super::matrix::matrices;
 use super::number::number;
 use super::plots::Plots;
 use super::table::{Cell, table};
+use crate::report::robustness::{Disk, Parameter, PeakSensitivity, Robustness, ToleranceResult};
 use crate::report::{Matrix, Report};
-use crate::robustness::report::{Disk, Parameter, PeakSensitivity, Robustness, ToleranceResult};
 
 /// Number of parameters in the table of the sensitivities.
 const SHOWN: usize = 12;
@@ -83,7 +83,7 @@ fn disks(found: &Robustness) -> Markup {
 }
 
 fn peaks(found: &Robustness) -> Markup {
-    let row = |point: &crate::robustness::report::LoopPoint| {
+    let row = |point: &crate::report::robustness::LoopPoint| {
         vec![
             format!("at the {}", point.point).as_str().into(),
             point.s_peak.into(),

@@ -8,7 +8,7 @@ mod plots;
 use resvg::usvg::roxmltree::{Document, Node};
 
 use crate::report::Report;
-use crate::robustness::report::Level;
+use crate::report::robustness::Level;
 use hostile::{bare, hostile};
 use pendulum::pendulum;
 

@@ -4,8 +4,8 @@ use maud::{Markup, html};
 
 use super::number::number;
 use super::plane::Plane;
+use crate::report::robustness::Level;
 use crate::report::{Loop, Report};
-use crate::robustness::report::Level;
 
 pub(super) fn verdict(report: &Report) -> Markup {
     let failures = failures(report);

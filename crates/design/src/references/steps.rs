@@ -7,9 +7,9 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 use crate::designed::ControllerDesign;
+use crate::report::robustness::Number;
 use crate::report::{Check, CommandPeak, Curve, ReferenceStep};
 use crate::responses::{BETWEEN, SETTLED, add_outputs};
-use crate::robustness::report::Number;
 use crate::tracking::{REACHED, Tracking, TrackingAction};
 
 /// The parts of a step between which the rise time is measured.

@@ -8,9 +8,9 @@ use crate::analysis::largest_gain;
 use crate::designed::ControllerDesign;
 use crate::matrix::rows;
 use crate::report::Matrix;
+use crate::report::robustness::Number;
 use crate::robustness::Physical;
 use crate::robustness::limits::RobustnessLimits;
-use crate::robustness::report::Number;
 
 /// Returns the effect of each measurement noise on commands and estimated faults, and of all
 /// together.

@@ -11,8 +11,8 @@ use crate::designed::ControllerDesign;
 use crate::matrix::rows;
 use crate::parameters::ParameterFamily;
 use crate::report::Matrix;
+use crate::report::robustness::ToleranceResult;
 use crate::robustness::limits::RobustnessLimits;
-use crate::robustness::report::ToleranceResult;
 use crate::robustness::{Physical, names};
 
 /// Examines the loop for plants whose matrices have other entries, within the tolerances: the part of the

@@ -2,8 +2,8 @@
 
 use crate::report::Check;
 use crate::report::number::rounded;
+use crate::report::robustness::{Level, Limits, Parameter, Robustness, ToleranceResult, Verdict};
 use crate::robustness::limits::RobustnessLimits;
-use crate::robustness::report::{Level, Limits, Parameter, Robustness, ToleranceResult, Verdict};
 
 /// Judges a design.
 pub(crate) fn verdict(

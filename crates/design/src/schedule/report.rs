@@ -1,20 +1,18 @@
-//! The part of a design report on a scheduled controller.
+//! Examines a scheduled controller at and between the points of its schedule, and judges it.
 
 use control::lmi::{ScheduleCertificate, certify_schedule, largest_change};
 use control::{Domain, Error};
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use crate::budget::Budget;
 use crate::checks::checks;
 use crate::designed::ControllerDesign;
-use crate::family::report::{CommonCertificate, MemberReport, common, judge, member};
+use crate::family::report::{common, judge, member};
 use crate::matrix::rows;
-use crate::report::{Matrix, OrReason, or_reason};
+use crate::report::robustness::{Level, Verdict};
+use crate::report::schedule::{RateCertificate, SchedulePointReport, ScheduleReport};
 use crate::reporting::gains;
 use crate::robustness::limits::RobustnessLimits;
-use crate::robustness::report::{Level, Verdict};
 use crate::schedule::{Scheduled, ScheduledLoop, coupled};
 
 /// Values of the scheduling variable in each interval, its ends included, at which eigenvalues are
@@ -22,65 +20,6 @@ use crate::schedule::{Scheduled, ScheduledLoop, coupled};
 const CHECKED: u32 = 20;
 /// An eigenvalue this near to the stability limit is one on it, with rounding errors.
 const NEUTRAL: f64 = 1e-7;
-
-/// A controller whose gains depend on a scheduling variable.
-#[derive(Serialize, JsonSchema)]
-pub struct ScheduleReport {
-    /// The scheduling variable.
-    pub variable: String,
-    /// Its unit.
-    pub unit: Option<String>,
-    /// Whether it is a measurement; otherwise it is an input of its own.
-    pub measured: bool,
-    /// Its largest rate, per s, as stated in the plant file.
-    pub rate_bound: Option<f64>,
-    /// The points of the grid.
-    pub points: Vec<SchedulePointReport>,
-    /// The proof of stability for one P, or the reason why there is none: plant and controller,
-    /// interpolated linearly, are stable for every value between the first and the last point, while
-    /// it changes in any way and arbitrarily fast.
-    #[serde(serialize_with = "or_reason")]
-    #[schemars(with = "OrReason<CommonCertificate>")]
-    pub any_rate: Result<CommonCertificate, String>,
-    /// The same with P(variable), for a bounded rate; tried only if no common P was found.
-    #[serde(serialize_with = "or_reason")]
-    #[schemars(with = "OrReason<RateCertificate>")]
-    pub bounded_rate: Result<RateCertificate, String>,
-    /// Number of values between the first and the last point at which the eigenvalues of the
-    /// interpolated loop were computed, for constant values of the variable.
-    pub checked: usize,
-    /// The worst of them: largest modulus less 1; of a continuous controller the largest real part, 1/s.
-    pub worst_instability: f64,
-    /// The value of the variable there.
-    pub worst_at: f64,
-}
-
-/// A proof with P(variable) piecewise linear over the grid.
-#[derive(Serialize, JsonSchema)]
-pub struct RateCertificate {
-    /// The largest rate of the variable, per s, that is proven.
-    pub rate: f64,
-    /// P at each point of the grid, row by row.
-    pub p: Vec<Vec<Vec<f64>>>,
-    /// Margin of the inequalities, relative; larger than the rounding errors.
-    pub margin: f64,
-}
-
-/// A point of the grid.
-#[derive(Serialize, JsonSchema)]
-pub struct SchedulePointReport {
-    /// The value of the scheduling variable.
-    pub at: f64,
-    /// Values of states, commands and measurements at its operating point.
-    pub operating: [Vec<f64>; 3],
-    /// The gains.
-    pub gains: Vec<Matrix>,
-    /// The loop of the plant and the controller of this point.
-    pub closed: MemberReport,
-    /// If a measurement schedules: the instability of the loop with the feedback through the
-    /// interpolated operating points, which the design at the point does not know.
-    pub coupled_instability: Option<f64>,
-}
 
 /// Returns the report on the schedule of `designed`, if it has one.
 pub(crate) fn schedule(

@@ -2,13 +2,13 @@
 
 use std::f64::consts::PI;
 
-use crate::detection::report::{DecoupledInput, DetectedFault, Detection, ParameterCases, Test};
-use crate::fallback::report::{FallbackCase, FallbackReport};
-use crate::family::report::CommonCertificate;
-use crate::losses::report::{
+use crate::report::detection::{DecoupledInput, DetectedFault, Detection, ParameterCases, Test};
+use crate::report::fallback::{FallbackCase, FallbackReport};
+use crate::report::family::CommonCertificate;
+use crate::report::losses::{
     CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport,
 };
-use crate::reconfiguration::report::{
+use crate::report::reconfiguration::{
     ReconfigurationReport, Reconfigured, ServedByFallback, WithoutActuator, WithoutSeveral,
 };
 use crate::report::{
@@ -17,7 +17,7 @@ use crate::report::{
     StepResponse, Theorem1, Ultimate, Variable,
 };
 
-use crate::robustness::report::{
+use crate::report::robustness::{
     Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Parameter, PeakSensitivity,
     Robustness, ToleranceResult, Verdict,
 };

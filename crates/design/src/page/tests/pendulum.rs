@@ -10,7 +10,7 @@ use crate::report::{
     Signal, StepResponse,
 };
 
-use crate::robustness::report::{Level, Limits, Verdict};
+use crate::report::robustness::{Level, Limits, Verdict};
 
 const DESIGN: &str = include_str!("../../../../../fmu-controller/resources/design.toml");
 const STATES: [(&str, &str, &str); 4] = [

@@ -41,6 +41,16 @@ pub struct Verdict {
     pub limits: Limits,
 }
 
+impl Verdict {
+    /// Adds a reason; the level is the worse one.
+    pub(crate) fn add(&mut self, level: Level, reason: String) {
+        if self.level != Level::Red && level != Level::Green {
+            self.level = level;
+        }
+        self.reasons.push(reason);
+    }
+}
+
 /// The limits of the verdict, as stated in the plant file or by default.
 #[derive(Serialize, JsonSchema)]
 pub struct Limits {

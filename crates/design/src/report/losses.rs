@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::report::number::rounded;
+use crate::report::robustness::Number;
 use crate::report::{OrReason, or_reason};
-use crate::robustness::report::Number;
 
 /// What is proven about losses of effectiveness up to the fractions that the plant file states.
 #[derive(Serialize, JsonSchema)]

@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::report::robustness::{Level, Number};
 use crate::report::{OrReason, or_reason};
-use crate::robustness::report::{Level, Number};
 
 /// What the controller does without an actuator.
 #[derive(Serialize, JsonSchema)]

@@ -1,7 +1,7 @@
 //! The identity of a design: what a file says about the plant that it was made for.
 
 use crate::report::Report;
-use crate::robustness::report::{Level, Verdict};
+use crate::report::robustness::{Level, Verdict};
 
 /// Returns `aso-ftc design for NAME (NUMBER)`: the name of the plant file and a number from the
 /// names of states, actuators and measurements. Designs of the same plant with other requirements or

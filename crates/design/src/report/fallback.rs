@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::family::report::CommonCertificate;
+use crate::report::family::CommonCertificate;
+use crate::report::robustness::{Level, LoopPoint, Number};
 use crate::report::{OrReason, or_reason};
-use crate::robustness::report::{Level, LoopPoint, Number};
 
 /// One feedback for the intact plant and for each actuator that may fail, without knowing which.
 #[derive(Serialize, JsonSchema)]
