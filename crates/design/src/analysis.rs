@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 use crate::budget::Budget;
 use crate::designed::ControllerDesign;
+use crate::plant_file::signals::Fault;
 use crate::report::{Bound, Frequency, Norm};
-use crate::signals::Fault;
 
 /// Relative width of the brackets of peak gains and norms.
 const WIDTH: f64 = 1e-3;

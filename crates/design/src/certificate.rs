@@ -6,8 +6,8 @@ use control::theorem1::{self, certify, largest_decay, smallest_radius, ultimate_
 
 use crate::budget::Budget;
 use crate::designed::ControllerDesign;
-use crate::estimation::Law;
 use crate::matrix::rows;
+use crate::plant_file::estimation::Law;
 use crate::report::{Certificate, FreeP, Norm, Theorem1, Ultimate};
 
 /// The design parameter alpha of (12); it cancels in delta.

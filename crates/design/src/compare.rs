@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use crate::designed::{ControllerDesign, design_by};
 use crate::error::Error;
-use crate::estimation::Law;
 use crate::law::LawProblem;
 use crate::parameters::ParameterFamily;
 use crate::plant_file::PlantFile;
+use crate::plant_file::estimation::Law;
 use crate::progress::Steps;
 use crate::report::comparison::{Comparison, LawFigures, LawResult};
 use crate::report::identity::identity;

@@ -15,13 +15,13 @@ use crate::designed::{ControllerDesign, fault_names};
 use crate::linear_plant::LinearPlant;
 use crate::matrix::matrix;
 use crate::plant_file::PlantFile;
+use crate::plant_file::signals::{EntryPoint, Signal as PlantSignal};
 use crate::reconfiguration::{
     Combination as DesignedCombination, Reconfiguration as DesignedReconfiguration,
     Reconfigurations,
 };
 use crate::report::number::round;
 use crate::schedule::Scheduled;
-use crate::signals::{EntryPoint, Signal as PlantSignal};
 
 impl ControllerDesign {
     /// Returns the design file.

@@ -1,6 +1,5 @@
 //! Computes the gains for a plant file.
 
-use crate::estimation::Law;
 use crate::family::{self, Family, common_feedback};
 use crate::feedthrough;
 use crate::fixed_mode::{described, described_in};
@@ -9,9 +8,10 @@ use crate::law::{DesignedLaw, LawProblem};
 use crate::linear_plant::LinearPlant;
 use crate::norm_gains::ObserverProblem;
 use crate::pairing::PairProblem;
+use crate::plant_file::estimation::Law;
+use crate::plant_file::requirements::{Request, Requirement};
 use crate::plant_file::{FAULTS, PlantFile};
 use crate::plausibility::{check_faults, check_limits};
-use crate::requirements::{Request, Requirement};
 use crate::schedule::Scheduled;
 use crate::schedule::references::examine;
 use crate::tracking::{

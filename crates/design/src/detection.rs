@@ -6,17 +6,16 @@ mod file;
 mod model_error;
 mod prediction;
 mod problem;
-pub(crate) mod request;
 
 use aso_controller::design::detection::DetectionDesign;
 use control::detection::{Cusum, WindowTest};
 use nalgebra::DMatrix;
 
 use crate::designed::ControllerDesign;
-use crate::detection::request::{DetectionRequest, Method};
 use crate::matrix::rows;
 use crate::parameters::ParameterFamily;
 use crate::plant_file::PlantFile;
+use crate::plant_file::detection::{DetectionRequest, Method};
 use crate::report::Matrix;
 use crate::report::detection::{
     DecoupledInput, DetectedFault, Detection as Report, ParameterCases, Test,

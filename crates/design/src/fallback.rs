@@ -11,7 +11,6 @@
 //! for the inequalities.
 
 mod examination;
-pub(crate) mod request;
 
 pub(crate) use examination::report;
 
@@ -22,10 +21,10 @@ use control::lmi::{self, CommonFeedback, Outcome, RegionCertificate, Vertex, cer
 use nalgebra::DMatrix;
 
 use crate::designed::ControllerDesign;
-use crate::fallback::request::FallbackRequest;
 use crate::plant_file::PlantFile;
+use crate::plant_file::fallback::FallbackRequest;
+use crate::plant_file::requirements::Region;
 use crate::report::number::rounded;
-use crate::requirements::Region;
 use crate::rest::unreachable_mode;
 use crate::tracking::decay;
 

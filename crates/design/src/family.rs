@@ -10,11 +10,11 @@ use files::PlaceError;
 use crate::gains::{GainResult, Refusal, unique};
 use crate::linear_plant::{AT_REST, LinearPlant};
 use crate::plant_file::PlantFile;
-use crate::references::References;
-use crate::requirements::Region;
-use crate::signals::Signal;
+use crate::plant_file::references::References;
+use crate::plant_file::requirements::Region;
+use crate::plant_file::signals::Signal;
+use crate::plant_file::variants::Variant;
 use crate::tracking::{check_member, feedback_pair};
-use crate::variants::Variant;
 
 /// The name of the plant of the file among the members.
 pub(crate) const NOMINAL: &str = "nominal";

@@ -8,7 +8,7 @@ use files::PlaceError;
 
 use crate::linear_plant::LinearPlant;
 use crate::plant_file::PlantFile;
-use crate::requirements::Requirement;
+use crate::plant_file::requirements::Requirement;
 
 /// Refuses a plant with feedthrough and no filter, a filter that nothing needs, and tables that are for plants
 /// without feedthrough.

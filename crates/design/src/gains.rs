@@ -12,8 +12,8 @@ use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
 use crate::norm_gains::{NormRequirement, ObserverProblem};
+use crate::plant_file::requirements::{Region, Requirement};
 use crate::report::NormReport;
-use crate::requirements::{Region, Requirement};
 
 const IN_REGION: &str = "Eigenvalues in the region by linear matrix inequalities";
 /// Relative distance within which a requested eigenvalue is that of a mode that no gain moves.

@@ -9,9 +9,9 @@
 #![forbid(unsafe_code)]
 
 mod analysis;
+mod assess;
 mod budget;
 mod certificate;
-mod channel;
 mod checks;
 mod code;
 mod compare;
@@ -20,7 +20,6 @@ mod design_file;
 mod designed;
 mod detection;
 mod error;
-mod estimation;
 mod fallback;
 mod family;
 mod feedthrough;
@@ -38,20 +37,16 @@ mod plant_file;
 mod plausibility;
 mod progress;
 mod reconfiguration;
-mod references;
 pub mod report;
 mod reporting;
-mod requirements;
 mod responses;
 mod rest;
 mod robustness;
 mod schedule;
-mod signals;
 #[cfg(test)]
 mod tests;
 mod threads;
 mod tracking;
-mod variants;
 mod worst_case;
 
 use std::path::{Path, PathBuf};

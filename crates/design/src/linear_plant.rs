@@ -6,9 +6,9 @@ use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
 
-use crate::detection::request::{Disturbance, DisturbanceEntry};
+use crate::plant_file::detection::{Disturbance, DisturbanceEntry};
+use crate::plant_file::signals::{EntryPoint, Fault, FaultDynamics, Signal};
 use crate::plant_file::{self, PlantFile};
-use crate::signals::{EntryPoint, Fault, FaultDynamics, Signal};
 use files::PlaceError;
 
 /// Relative distance from an equilibrium below which an operating point counts as an equilibrium.

@@ -11,11 +11,11 @@ use nalgebra::{DMatrix, DVector};
 use crate::budget::Budget;
 use crate::designed::ControllerDesign;
 use crate::matrix::rows;
+use crate::plant_file::signals::EntryPoint;
 use crate::report::losses::{
     CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport, described,
 };
 use crate::report::robustness::{Level, Number};
-use crate::signals::EntryPoint;
 use crate::tracking::DesignLoop;
 
 /// Largest number of states of plant and controller for which linear matrix inequalities are solved.
@@ -35,7 +35,7 @@ struct StatedLoss {
 /// Returns the stated losses.
 fn stated(designed: &ControllerDesign) -> Vec<StatedLoss> {
     let linear = &designed.linear;
-    let one = |fault: &crate::signals::Fault| match (&fault.entry_point, fault.up_to) {
+    let one = |fault: &crate::plant_file::signals::Fault| match (&fault.entry_point, fault.up_to) {
         (EntryPoint::Loss { actuator, .. }, Some(up_to)) => Some(StatedLoss {
             name: linear.actuators[*actuator].name.clone(),
             actuator: *actuator,

@@ -1,10 +1,7 @@
 //! The plants of an FMU whose parameters vary within the tolerances that the plant file states.
 
-use std::ops::Range;
-
 use control::robustness::PlantFamily;
 use control::{Domain, StateSpace};
-use files::{Entry, PlaceError};
 use fmu_description::{Causality, Kind};
 use fmu_import::Fmu;
 use linearise::{Linearise, linearise};
@@ -12,54 +9,12 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::linear_plant;
 use crate::linear_plant::significant;
+use crate::plant_file::parameters::{ParameterTolerance, Tolerance};
 use crate::plant_file::{PlantFile, PlantFmu};
 use crate::report::robustness::Parameter;
 
 /// Number of equal steps in which the worst direction is followed to the limits.
 const STEPS: u32 = 20;
-
-/// A parameter of the plant's FMU, and how far it may be from its value.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct ParameterTolerance {
-    pub(crate) name: String,
-    pub(crate) tolerance: Tolerance,
-    /// Where the plant file states it.
-    pub(crate) place: Range<usize>,
-}
-
-/// How far a parameter may be from its value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Tolerance {
-    /// Fraction of the value.
-    Relative(f64),
-    /// Lowest and highest value.
-    Limits([f64; 2]),
-}
-
-/// Reads a table of parameters: `m = 0.1` (relative) or `m = [0.9, 1.1]` (lowest and highest value).
-pub(crate) fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceError> {
-    let one = |(name, entry): (&str, Entry<'_>)| {
-        let tolerance = if entry.is_list() {
-            match entry.list()?.as_slice() {
-                [low, high] => Tolerance::Limits([low.number()?, high.number()?]),
-                other => {
-                    let found = other.len();
-                    let message =
-                        format!("expected the lowest and the highest value, found {found} numbers");
-                    return Err(entry.error(message));
-                }
-            }
-        } else {
-            Tolerance::Relative(crate::robustness::limits::fraction(&entry)?)
-        };
-        Ok(ParameterTolerance { name: name.to_owned(), tolerance, place: entry.place.clone() })
-    };
-    let found: Vec<_> = entry.table()?.entries().map(one).collect::<Result<_, _>>()?;
-    if found.is_empty() {
-        return Err(entry.error("expected parameters of the FMU and their tolerances, found none"));
-    }
-    Ok(found)
-}
 
 /// The linearised FMU as a function of its parameters.
 pub(crate) struct ParameterFamily<'a> {

@@ -1,24 +1,37 @@
 //! Reads a plant file: the plant, its faults and the requirements on the controller.
 
+use crate::plant_file::names::check_names;
+pub(crate) mod channel;
+pub(crate) mod detection;
+pub(crate) mod estimation;
+pub(crate) mod fallback;
+mod names;
+pub(crate) mod parameters;
+pub(crate) mod reconfiguration;
+pub(crate) mod references;
+pub(crate) mod requirements;
+pub(crate) mod robustness;
+pub(crate) mod signals;
+pub(crate) mod variants;
+
 use crate::matrix::MatrixEntry as _;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
 
-use crate::channel::ChannelSignals;
-use crate::detection::request::{DetectionRequest, Disturbance, disturbances};
-use crate::estimation::EstimationRequest;
-use crate::fallback::request::FallbackRequest;
-use crate::plausibility::check_names;
-use crate::reconfiguration::limits::ReconfigurationRequest;
-use crate::references::References;
-use crate::requirements::{Request, request};
-use crate::robustness::limits::RobustnessLimits;
-use crate::signals::{
+use crate::plant_file::channel::ChannelSignals;
+use crate::plant_file::detection::{DetectionRequest, Disturbance, disturbances};
+use crate::plant_file::estimation::EstimationRequest;
+use crate::plant_file::fallback::FallbackRequest;
+use crate::plant_file::reconfiguration::ReconfigurationRequest;
+use crate::plant_file::references::References;
+use crate::plant_file::requirements::{Request, request};
+use crate::plant_file::robustness::RobustnessLimits;
+use crate::plant_file::signals::{
     EntryPoint, Fault, Signal, all_actuator_faults, description, faults, signals,
 };
-use crate::variants::{self, Schedule, Variant, check_action};
+use crate::plant_file::variants::{Schedule, Variant, check_action};
 use control::Domain;
 use control::aso::Estimator;
 use files::{Entry, Place, PlaceError, Source, Table};

@@ -1,7 +1,5 @@
 //! Designs the controllers without actuators that are gone.
 
-pub(crate) mod limits;
-
 use control::allocation::{allocate, equilibrium};
 use control::aso::{FaultyPlant, Gains};
 use control::controller::controller;
@@ -18,13 +16,13 @@ use crate::fixed_mode::described;
 use crate::gains::{FeedbackProblem, GainChoice, Refusal, feedback};
 use crate::matrix::{pairs, rows};
 use crate::plant_file::PlantFile;
-use crate::reconfiguration::limits::ReconfigurationRequest;
+use crate::plant_file::reconfiguration::ReconfigurationRequest;
+use crate::plant_file::requirements::Requirement;
+use crate::plant_file::signals::{EntryPoint, Signal};
 use crate::report::reconfiguration::{
     ReconfigurationReport, Reconfigured, ServedByFallback, WithoutActuator, WithoutSeveral,
 };
-use crate::requirements::Requirement;
 use crate::rest::{Rest, beyond_limits, commands, unreachable_mode};
-use crate::signals::{EntryPoint, Signal};
 use crate::tracking::decay;
 
 /// Relative size of the effect that the other actuators cannot produce below which the allocation counts

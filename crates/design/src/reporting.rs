@@ -12,11 +12,12 @@ use fmu_description::{ModelDescription, ScalarVariable};
 use nalgebra::{Complex, DMatrix};
 
 use crate::analysis::Loops;
+use crate::assess::estimation;
+use crate::assess::references::{beyond_limits, reached, reference_steps};
 use crate::budget::Budget;
 use crate::certificate::certificate;
 use crate::checks::checks;
 use crate::designed::{ControllerDesign, fault_names};
-use crate::estimation::report as estimation;
 use crate::fallback::{self, Fallback};
 use crate::family::report::{self as family_report, judge, judge_proof};
 use crate::fixed_mode::shown;
@@ -24,19 +25,18 @@ use crate::gains::GainResult;
 use crate::losses::{self, losses};
 use crate::matrix::{pairs, rows};
 use crate::parameters::ParameterFamily;
+use crate::plant_file::requirements::{self, Requirement};
+use crate::plant_file::signals::{self, EntryPoint, Fault, FaultDynamics};
 use crate::plant_file::{PlantFile, estimator};
 use crate::plausibility::line;
 use crate::progress::{Step, Steps};
-use crate::references::steps::{beyond_limits, reached, reference_steps};
 use crate::report::number::rounded;
 use crate::report::reconfiguration::ReconfigurationReport;
 use crate::report::robustness::Level;
 use crate::report::{Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal};
-use crate::requirements::{self, Requirement};
 use crate::responses::responses;
 use crate::robustness::{robustness, verdict};
 use crate::schedule::report::{self as schedule_report, judge_schedule};
-use crate::signals::{self, EntryPoint, Fault, FaultDynamics};
 use crate::tracking::{DesignLoop, TrackingAction};
 
 /// Returns the report on `designed`.

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use crate::analysis::Outputs;
 use crate::designed::ControllerDesign;
+use crate::plant_file::signals::Fault;
 use crate::report::robustness::Number;
 use crate::report::{Curve, StepResponse};
-use crate::signals::Fault;
 
 /// Relative band of the settling time: a response has settled when it stays within this fraction of
 /// its largest distance.

@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::fixed_mode::described;
 use crate::linear_plant::LinearPlant;
+use crate::plant_file::signals::Signal;
 use crate::report::robustness::Number;
-use crate::signals::Signal;
 
 /// The equilibrium without actuators.
 pub(crate) struct Rest {

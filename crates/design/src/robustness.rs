@@ -1,6 +1,5 @@
 //! Analyses the robustness of a design and judges it.
 
-pub(crate) mod limits;
 mod noise;
 mod tolerances;
 mod verdict;
@@ -25,13 +24,13 @@ use crate::designed::ControllerDesign;
 use crate::linear_plant::LinearPlant;
 use crate::matrix::rows;
 use crate::parameters::ParameterFamily;
+use crate::plant_file::robustness::RobustnessLimits;
+use crate::plant_file::signals::Signal;
 use crate::progress::{Step, Steps};
 use crate::report::robustness::{
     Channel, Compared, Disk, LoopPoint, Number, PeakSensitivity, Robustness,
 };
 use crate::report::{Frequency, Matrix};
-use crate::robustness::limits::RobustnessLimits;
-use crate::signals::Signal;
 
 const WIDTH: f64 = 1e-4;
 const POINTS_PER_DECADE: u32 = 20;

@@ -14,12 +14,12 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 use crate::designed::{self, ControllerDesign};
-use crate::estimation::Law;
 use crate::family::check_states;
 use crate::linear_plant::LinearPlant;
 use crate::plant_file::PlantFile;
-use crate::signals::Signal;
-use crate::variants::Variable;
+use crate::plant_file::estimation::Law;
+use crate::plant_file::signals::Signal;
+use crate::plant_file::variants::Variable;
 
 /// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p` of a
 /// current estimator. The loop of a continuous controller has degree 2, with a direct term 4; its coefficients of

@@ -6,14 +6,14 @@ use std::time::Duration;
 use nalgebra::Complex;
 
 use crate::budget::Budget;
-use crate::channel::Channel;
 use crate::checks::checks;
 use crate::designed::design;
+use crate::plant_file::channel::Channel;
+use crate::plant_file::requirements::{Region, Requirement};
+use crate::plant_file::signals::{EntryPoint, FaultDynamics};
 use crate::plant_file::{Model, PlantFile};
 use crate::report::robustness::Level;
-use crate::requirements::{Region, Requirement};
 use crate::robustness::{robustness, verdict};
-use crate::signals::{EntryPoint, FaultDynamics};
 use files::{Source, Table};
 
 const MASS: &str = r#"A = [[0, 1], [0, 0]]

@@ -15,10 +15,10 @@ use nalgebra::DMatrix;
 
 use crate::linear_plant::LinearPlant;
 use crate::plant_file::PlantFile;
-use crate::references::References;
-use crate::requirements::Requirement;
-use crate::signals::Signal;
-use crate::variants::Variant;
+use crate::plant_file::references::References;
+use crate::plant_file::requirements::Requirement;
+use crate::plant_file::signals::Signal;
+use crate::plant_file::variants::Variant;
 
 /// Relative error of a constant reference below which it counts as reached.
 pub(crate) const REACHED: f64 = 1e-9;

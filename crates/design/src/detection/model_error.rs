@@ -14,11 +14,11 @@ use nalgebra::{DMatrix, DVector};
 use crate::designed::ControllerDesign;
 use crate::detection::decoupling::Decoupling;
 use crate::detection::problem::Problem;
-use crate::detection::request::ModelError;
 use crate::linear_plant::LinearPlant;
 use crate::parameters::ParameterFamily;
 use crate::plant_file::PlantFile;
-use crate::signals::Signal;
+use crate::plant_file::detection::ModelError;
+use crate::plant_file::signals::Signal;
 
 /// A plant, and the bounds of its inputs.
 type Case = Rc<(UncertainPlant, DVector<f64>)>;

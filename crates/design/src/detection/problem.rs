@@ -12,9 +12,9 @@ use nalgebra::{DMatrix, DVector};
 use crate::designed::ControllerDesign;
 use crate::detection::decoupling::Decoupling;
 use crate::detection::prediction::whole;
-use crate::detection::request::DetectionRequest;
 use crate::fixed_mode::shown;
 use crate::plant_file::PlantFile;
+use crate::plant_file::detection::DetectionRequest;
 use crate::report::number::round;
 
 /// Time constants of the slowest mode after which a mean has settled.

@@ -15,11 +15,11 @@ use crate::family::report::{common, reported};
 use crate::linear_plant::LinearPlant;
 use crate::matrix::rows;
 use crate::plant_file::PlantFile;
+use crate::plant_file::signals::Signal;
 use crate::report::fallback::{FallbackCase, FallbackReport};
 use crate::report::robustness::{LoopPoint, Number};
 use crate::rest::{Rest, beyond_limits, commands};
 use crate::robustness::{Physical, closed, loop_points};
-use crate::signals::Signal;
 use crate::tracking::decay;
 
 /// Returns the report on the fall-back of `designed`.

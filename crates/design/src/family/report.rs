@@ -11,9 +11,9 @@ use crate::designed::ControllerDesign;
 use crate::family::{NOMINAL, name};
 use crate::linear_plant::LinearPlant;
 use crate::matrix::rows;
+use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::family::{CommonCertificate, FamilyReport, MemberMargins, MemberReport};
 use crate::report::robustness::{Level, Verdict};
-use crate::robustness::limits::RobustnessLimits;
 use crate::robustness::{Margins, Physical, by_entries, margins};
 
 /// Returns the report on the family of `designed`, if it has one.

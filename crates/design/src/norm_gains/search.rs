@@ -6,11 +6,11 @@ use control::response::h_infinity;
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-use crate::channel::Channel;
 use crate::gains::{GainResult, Refusal, synthesised, unique};
 use crate::norm_gains::NormRequirement;
+use crate::plant_file::channel::Channel;
+use crate::plant_file::requirements::Region;
 use crate::report::{LowerBoundFor, NormReport, NormWeight};
-use crate::requirements::Region;
 
 /// Relative width of a norm.
 pub(crate) const WIDTH: f64 = 1e-4;

@@ -7,10 +7,10 @@ use nalgebra::DMatrix;
 use crate::analysis::largest_gain;
 use crate::designed::ControllerDesign;
 use crate::matrix::rows;
+use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::Matrix;
 use crate::report::robustness::Number;
 use crate::robustness::Physical;
-use crate::robustness::limits::RobustnessLimits;
 
 /// Returns the effect of each measurement noise on commands and estimated faults, and of all
 /// together.

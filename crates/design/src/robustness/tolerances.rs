@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use crate::designed::ControllerDesign;
 use crate::matrix::rows;
 use crate::parameters::ParameterFamily;
+use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::Matrix;
 use crate::report::robustness::ToleranceResult;
-use crate::robustness::limits::RobustnessLimits;
 use crate::robustness::{Physical, names};
 
 /// Examines the loop for plants whose matrices have other entries, within the tolerances: the part of the

@@ -1,9 +1,9 @@
 //! Judges a design by its checks, its margins and its tolerances.
 
+use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::Check;
 use crate::report::number::rounded;
 use crate::report::robustness::{Level, Limits, Parameter, Robustness, ToleranceResult, Verdict};
-use crate::robustness::limits::RobustnessLimits;
 
 /// Judges a design.
 pub(crate) fn verdict(

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use crate::designed::ControllerDesign;
 use crate::plant_file::PlantFile;
-use crate::references::References;
+use crate::plant_file::references::References;
 use crate::schedule::{Point, Scheduled};
 use crate::tracking::REACHED;
 

@@ -9,10 +9,10 @@ use crate::checks::checks;
 use crate::designed::ControllerDesign;
 use crate::family::report::{common, judge, member};
 use crate::matrix::rows;
+use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::robustness::{Level, Verdict};
 use crate::report::schedule::{RateCertificate, SchedulePointReport, ScheduleReport};
 use crate::reporting::gains;
-use crate::robustness::limits::RobustnessLimits;
 use crate::schedule::{Scheduled, ScheduledLoop, coupled};
 
 /// Values of the scheduling variable in each interval, its ends included, at which eigenvalues are

@@ -3,7 +3,7 @@
 use crate::matrix::MatrixEntry as _;
 use nalgebra::{Complex, DMatrix};
 
-use crate::channel::{CHANNEL, Channel, ChannelSignals};
+use crate::plant_file::channel::{CHANNEL, Channel, ChannelSignals};
 use control::Domain;
 use files::{Entry, Place, PlaceError, Table};
 

@@ -1,6 +1,6 @@
 //! The table `[reconfiguration]` of a plant file: what happens when an actuator is gone.
 
-use crate::signals::{EntryPoint, Fault, Signal};
+use crate::plant_file::signals::{EntryPoint, Fault, Signal};
 use files::{Entry, Place, PlaceError, Table};
 
 /// What the controller must be able to do without an actuator.

@@ -4,9 +4,9 @@
 use files::{Entry, Place, PlaceError, Table};
 
 use crate::matrix::MatrixEntry as _;
+use crate::plant_file::references::References;
+use crate::plant_file::signals::{Signal, description, name, unit};
 use crate::plant_file::{Model, PlantFile};
-use crate::references::References;
-use crate::signals::{Signal, description, name, unit};
 
 /// Entries that replace those of the plant of the file.
 const MATRICES: [&str; 4] = ["A", "B", "C", "F_a"];

@@ -3,7 +3,7 @@
 use files::{Entry, Place, PlaceError, Table};
 use nalgebra::DVector;
 
-use crate::signals::{Fault, Signal, name, position};
+use crate::plant_file::signals::{Fault, Signal, name, position};
 
 /// What the detection of faults shall do.
 #[derive(Clone, Debug)]

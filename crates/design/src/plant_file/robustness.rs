@@ -2,7 +2,7 @@
 
 use files::{Entry, PlaceError, Table};
 
-use crate::parameters::{self, ParameterTolerance};
+use crate::plant_file::parameters::{self, ParameterTolerance, fraction};
 
 /// What the robustness of a design is tested with, and the limits of its verdict.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,13 +101,6 @@ fn tolerances(entry: &Entry<'_>) -> Result<[f64; 4], PlaceError> {
         }
     }
     Ok(found)
-}
-
-pub(crate) fn fraction(entry: &Entry<'_>) -> Result<f64, PlaceError> {
-    match entry.number()? {
-        number if (0.0..1.0).contains(&number) => Ok(number),
-        number => Err(entry.error(format!("expected a number from 0 to below 1, found {number}"))),
-    }
 }
 
 fn at_least_one(entry: &Entry<'_>) -> Result<f64, PlaceError> {

@@ -1,11 +1,9 @@
 //! The table `[reference]` of a plant file: set points of measurements.
 
-pub(crate) mod steps;
-
 use files::{Entry, Place, PlaceError, Table};
 use nalgebra::DMatrix;
 
-use crate::signals::{Signal, description, name, unit};
+use crate::plant_file::signals::{Signal, description, name, unit};
 
 /// The references of a plant file.
 #[derive(Clone, Debug, PartialEq)]

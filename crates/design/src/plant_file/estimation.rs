@@ -1,7 +1,5 @@
 //! The table `[estimation]` of a plant file: the law that estimates the faults.
 
-pub(crate) mod report;
-
 use files::{Entry, Place, PlaceError, Table};
 
 /// A law with the parameters that the file states; the others follow from plant and observer.

@@ -9,9 +9,9 @@ use control::{Domain, Error, StateSpace};
 use rayon::prelude::*;
 
 use crate::designed::ControllerDesign;
+use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::robustness::Robustness;
 use crate::report::{Estimation, EstimationErrors};
-use crate::robustness::limits::RobustnessLimits;
 use crate::robustness::noise_peaks;
 
 /// Relative width of the brackets of the peak gains.

@@ -1,0 +1,56 @@
+//! Reads the tolerances of parameters of the plant's FMU.
+
+use std::ops::Range;
+
+use files::{Entry, PlaceError};
+
+/// A parameter of the plant's FMU, and how far it may be from its value.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ParameterTolerance {
+    pub(crate) name: String,
+    pub(crate) tolerance: Tolerance,
+    /// Where the plant file states it.
+    pub(crate) place: Range<usize>,
+}
+
+/// How far a parameter may be from its value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Tolerance {
+    /// Fraction of the value.
+    Relative(f64),
+    /// Lowest and highest value.
+    Limits([f64; 2]),
+}
+
+/// Reads a table of parameters: `m = 0.1` (relative) or `m = [0.9, 1.1]` (lowest and highest value).
+pub(crate) fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceError> {
+    let one = |(name, entry): (&str, Entry<'_>)| {
+        let tolerance = if entry.is_list() {
+            match entry.list()?.as_slice() {
+                [low, high] => Tolerance::Limits([low.number()?, high.number()?]),
+                other => {
+                    let found = other.len();
+                    let message =
+                        format!("expected the lowest and the highest value, found {found} numbers");
+                    return Err(entry.error(message));
+                }
+            }
+        } else {
+            Tolerance::Relative(fraction(&entry)?)
+        };
+        Ok(ParameterTolerance { name: name.to_owned(), tolerance, place: entry.place.clone() })
+    };
+    let found: Vec<_> = entry.table()?.entries().map(one).collect::<Result<_, _>>()?;
+    if found.is_empty() {
+        return Err(entry.error("expected parameters of the FMU and their tolerances, found none"));
+    }
+    Ok(found)
+}
+
+/// Reads a fraction from 0 to below 1.
+pub(crate) fn fraction(entry: &Entry<'_>) -> Result<f64, PlaceError> {
+    match entry.number()? {
+        number if (0.0..1.0).contains(&number) => Ok(number),
+        number => Err(entry.error(format!("expected a number from 0 to below 1, found {number}"))),
+    }
+}
