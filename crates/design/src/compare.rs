@@ -3,15 +3,15 @@
 use std::path::Path;
 use std::time::Duration;
 
-use crate::designed::{ControllerDesign, design_by};
 use crate::error::Error;
-use crate::law::LawProblem;
-use crate::parameters::ParameterFamily;
+use crate::plant::parameters::ParameterFamily;
 use crate::plant_file::PlantFile;
 use crate::plant_file::estimation::Law;
 use crate::progress::Steps;
 use crate::report::comparison::{Comparison, LawFigures, LawResult};
 use crate::report::identity::identity;
+use crate::solve::law::LawProblem;
+use crate::solve::solution::{ControllerDesign, design_by};
 use crate::{page, reporting};
 use files::{Source, Table};
 

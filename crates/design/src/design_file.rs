@@ -11,17 +11,17 @@ use control::Domain;
 use control::aso::{FaultyPlant, Gains};
 use fmu_description::unit::Unit;
 
-use crate::designed::{ControllerDesign, fault_names};
-use crate::linear_plant::LinearPlant;
 use crate::matrix::matrix;
+use crate::plant::linear::LinearPlant;
 use crate::plant_file::PlantFile;
 use crate::plant_file::signals::{EntryPoint, Signal as PlantSignal};
-use crate::reconfiguration::{
+use crate::report::number::round;
+use crate::solve::reconfiguration::{
     Combination as DesignedCombination, Reconfiguration as DesignedReconfiguration,
     Reconfigurations,
 };
-use crate::report::number::round;
-use crate::schedule::Scheduled;
+use crate::solve::schedule::Scheduled;
+use crate::solve::solution::{ControllerDesign, fault_names};
 
 impl ControllerDesign {
     /// Returns the design file.

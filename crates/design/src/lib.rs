@@ -8,46 +8,23 @@
 //! The crate `control` has the mathematics; use it directly to design without a plant file.
 #![forbid(unsafe_code)]
 
-mod analysis;
 mod assess;
 mod budget;
-mod certificate;
-mod checks;
 mod code;
 mod compare;
 mod controller_fmu;
 mod design_file;
-mod designed;
-mod detection;
 mod error;
-mod fallback;
-mod family;
-mod feedthrough;
-mod fixed_mode;
-mod gains;
-mod law;
-mod linear_plant;
-mod losses;
 mod matrix;
-mod norm_gains;
 mod page;
-mod pairing;
-mod parameters;
+mod plant;
 mod plant_file;
-mod plausibility;
 mod progress;
-mod reconfiguration;
 pub mod report;
-mod reporting;
-mod responses;
-mod rest;
-mod robustness;
-mod schedule;
+mod solve;
 #[cfg(test)]
 mod tests;
 mod threads;
-mod tracking;
-mod worst_case;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -63,12 +40,14 @@ pub use report::Report;
 pub use report::comparison::{Comparison, LawFigures, LawResult};
 pub use report::robustness::Level;
 
+use assess::{detection, reporting, worst_case};
 use controller_fmu::Content;
-use designed::ControllerDesign;
-use parameters::ParameterFamily;
+use plant::parameters::ParameterFamily;
 use plant_file::PlantFile;
 use progress::{Step, Steps};
 use report::identity;
+use solve::solution::ControllerDesign;
+use solve::{fallback, reconfiguration, solution};
 
 /// The time that certificates and bounds may take unless something else is asked for.
 pub const CERTIFICATE_TIME: Duration = Duration::from_secs(30);
@@ -134,7 +113,7 @@ fn design_source(
     let parsed = source.parse()?;
     let file = PlantFile::read(source, &Table::whole(source, &parsed))?;
     let family = ParameterFamily::of(&file)?;
-    let designed = steps.run(Step::Gains, || designed::design(&file))?;
+    let designed = steps.run(Step::Gains, || solution::design(&file))?;
     let description = description(&file, &designed);
     let detection = detection::detection(&file, &designed, family.as_ref())?;
     let section = detection.as_ref().map(|detection| &detection.section);

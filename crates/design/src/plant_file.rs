@@ -476,7 +476,7 @@ pub(crate) fn estimator(estimator: Estimator) -> &'static str {
     }
 }
 
-/// Reads the rates of the measurement filter, which sensor faults require; [`crate::feedthrough`] examines whether
+/// Reads the rates of the measurement filter, which sensor faults require; [`crate::plant::feedthrough`] examines whether
 /// anything else does.
 fn filter(
     file: &Table<'_>,

@@ -5,15 +5,16 @@ use std::time::Duration;
 
 use nalgebra::Complex;
 
+use crate::assess::checks::checks;
+use crate::assess::robustness::robustness;
+use crate::assess::verdict::verdict;
 use crate::budget::Budget;
-use crate::checks::checks;
-use crate::designed::design;
 use crate::plant_file::channel::Channel;
 use crate::plant_file::requirements::{Region, Requirement};
 use crate::plant_file::signals::{EntryPoint, FaultDynamics};
 use crate::plant_file::{Model, PlantFile};
 use crate::report::robustness::Level;
-use crate::robustness::{robustness, verdict};
+use crate::solve::solution::design;
 use files::{Source, Table};
 
 const MASS: &str = r#"A = [[0, 1], [0, 0]]
@@ -359,7 +360,7 @@ fn an_observer_that_is_unstable_before_t_on_fails_a_check_unless_it_estimates_fr
 fn designed(text: &str) -> Result<Vec<String>, String> {
     let found = read(text, |file| {
         let first = |error: crate::Error| error.to_string().lines().next().unwrap().to_owned();
-        let line = |warning: &files::PlaceError| crate::plausibility::line(file, warning);
+        let line = |warning: &files::PlaceError| crate::plant::plausibility::line(file, warning);
         let found = design(file).map_err(first)?;
         Ok(found.warnings.iter().map(line).collect())
     });
@@ -469,7 +470,7 @@ fn the_worst_plant_is_a_plant_file() {
     let (worst, a) = read(&text, |file| {
         let designed = design(file).unwrap();
         let time = crate::CERTIFICATE_TIME;
-        let report = crate::reporting::report(
+        let report = crate::assess::reporting::report(
             (file, None),
             (&designed, None, None),
             String::new(),
@@ -477,7 +478,7 @@ fn the_worst_plant_is_a_plant_file() {
         )
         .unwrap();
         let a = report.robustness.as_ref().unwrap().tolerance.worst[0].values.clone();
-        (crate::worst_case::plant_file(file, &designed, &report).unwrap().unwrap(), a)
+        (crate::assess::worst_case::plant_file(file, &designed, &report).unwrap().unwrap(), a)
     })
     .unwrap();
     assert!((a[1][0].abs() - 2.0).abs() > 0.39 && a[0] == [0.0, 1.0], "{a:?}");
@@ -494,7 +495,7 @@ fn without_time_for_certificates_the_report_says_what_is_left_out() {
         let [none, all] = [Duration::ZERO, crate::CERTIFICATE_TIME].map(|time| {
             let report = |file: &PlantFile<'_>| {
                 let designed = design(file).unwrap();
-                crate::reporting::report(
+                crate::assess::reporting::report(
                     (file, None),
                     (&designed, None, None),
                     String::new(),
@@ -571,7 +572,7 @@ fn fifty_states_get_a_linear_quadratic_design_without_linear_matrix_inequalities
     let (instability, certificate) = read(&text, |file| {
         let designed = design(file).unwrap();
         let budget = Budget::start(crate::CERTIFICATE_TIME);
-        (designed.instability, crate::certificate::certificate(&designed, vec![], &budget))
+        (designed.instability, crate::assess::certificate::certificate(&designed, vec![], &budget))
     })
     .unwrap();
     assert!(instability < 0.0, "{instability}");

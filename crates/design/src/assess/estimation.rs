@@ -8,11 +8,11 @@ use control::response::{
 use control::{Domain, Error, StateSpace};
 use rayon::prelude::*;
 
-use crate::designed::ControllerDesign;
+use crate::assess::robustness::noise_peaks;
 use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::robustness::Robustness;
 use crate::report::{Estimation, EstimationErrors};
-use crate::robustness::noise_peaks;
+use crate::solve::solution::ControllerDesign;
 
 /// Relative width of the brackets of the peak gains.
 const WIDTH: f64 = 1e-3;

@@ -6,11 +6,11 @@ use control::tracking::{Action, reference_system};
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-use crate::designed::ControllerDesign;
+use crate::assess::responses::{BETWEEN, SETTLED, add_outputs};
 use crate::report::robustness::Number;
 use crate::report::{Check, CommandPeak, Curve, ReferenceStep};
-use crate::responses::{BETWEEN, SETTLED, add_outputs};
-use crate::tracking::{REACHED, Tracking, TrackingAction};
+use crate::solve::solution::ControllerDesign;
+use crate::solve::tracking::{REACHED, Tracking, TrackingAction};
 
 /// The parts of a step between which the rise time is measured.
 const RISE: [f64; 2] = [0.1, 0.9];

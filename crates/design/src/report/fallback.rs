@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::report::family::CommonCertificate;
-use crate::report::robustness::{Level, LoopPoint, Number};
+use crate::report::robustness::{LoopPoint, Number};
 use crate::report::{OrReason, or_reason};
 
 /// One feedback for the intact plant and for each actuator that may fail, without knowing which.
@@ -71,37 +71,5 @@ impl FallbackCase {
     #[must_use]
     pub fn worst_price(&self) -> Option<&Number> {
         self.price.iter().max_by(|x, y| x.value.total_cmp(&y.value))
-    }
-}
-
-impl FallbackReport {
-    /// What the fall-back contributes to the verdict; `limit`: the peak of S above which a design is red and
-    /// its fall-back amber.
-    pub(crate) fn reasons(&self, limit: f64) -> Vec<(Level, String)> {
-        let mut found = Vec::new();
-        let mut amber = |text: String| found.push((Level::Amber, text + " (amber)"));
-        if let (Err(reason), false) = (&self.whole, self.whole_left_out) {
-            amber(format!(
-                "the fall-back is not proven for losses that change with time: {reason}; constant losses \
-                 are stable"
-            ));
-        }
-        for own in &self.cases {
-            let name = &own.name;
-            if !own.beyond_limits.is_empty() {
-                let names = own.beyond_limits.join(", ");
-                amber(format!(
-                    "the fall-back needs commands at rest beyond the limits of {names}, {name}"
-                ));
-            }
-            let highest = own.points.iter().max_by(|x, y| x.judged.total_cmp(&y.judged));
-            if let Some(point) = highest.filter(|point| point.judged > limit) {
-                let (peak, place) = (point.judged, &point.point);
-                amber(format!(
-                    "the peak of S of the fall-back at the {place}, {name}, is {peak:.3}, above {limit}"
-                ));
-            }
-        }
-        found
     }
 }

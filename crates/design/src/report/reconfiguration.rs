@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::report::robustness::{Level, Number};
+use crate::report::robustness::Number;
 use crate::report::{OrReason, or_reason};
 
 /// What the controller does without an actuator.
@@ -87,27 +87,4 @@ pub struct Reconfigured {
     pub measurements: Vec<Number>,
     /// Whether the measurements that must be kept are at the operating point.
     pub kept: bool,
-}
-
-impl ReconfigurationReport {
-    /// What actuators that are gone contribute to the verdict.
-    pub(crate) fn reasons(&self) -> Vec<(Level, String)> {
-        let single = self.without.iter().map(|own| (vec![own.actuator.clone()], &own.outcome));
-        let several = self.several.iter().map(|own| (own.actuators.clone(), &own.outcome));
-        let amber = |(actuators, outcome): (Vec<String>, &Result<Reconfigured, String>)| {
-            let name = actuators.join(", ");
-            let mut served = self.by_fallback.iter().filter(|own| own.stable);
-            let text = match outcome {
-                Err(_) if served.any(|own| own.actuators == actuators) => return None,
-                Err(reason) => format!("without {name} there is no controller: {reason} (amber)"),
-                Ok(found) if !found.beyond_limits.is_empty() => format!(
-                    "without {name} the operating point needs commands beyond the limits of {} (amber)",
-                    found.beyond_limits.join(", ")
-                ),
-                Ok(_) => return None,
-            };
-            Some((Level::Amber, text))
-        };
-        single.chain(several).filter_map(amber).collect()
-    }
 }

@@ -1,0 +1,263 @@
+//! Analyses the closed loop of a design: the numbers of the report.
+
+use control::response::{
+    energy, error_part, fault_gains, fault_rate_system, fault_system, frequency_grid,
+    frequency_response, gains_between_samples, h_infinity,
+};
+use control::{Domain, Error, StateSpace};
+use nalgebra::{DMatrix, RowDVector};
+use rayon::prelude::*;
+
+use crate::budget::Budget;
+use crate::plant_file::signals::Fault;
+use crate::report::{Bound, Frequency, Norm};
+use crate::solve::solution::ControllerDesign;
+
+/// Relative width of the brackets of peak gains and norms.
+const WIDTH: f64 = 1e-3;
+/// The parts of a sampling interval in which a fault may change and at which the states are read.
+const PARTS: u32 = 16;
+const POINTS_PER_DECADE: u32 = 20;
+/// Number of outputs for each thread between two looks at the clock, in continuous time.
+const OUTPUTS_AT_ONCE: usize = 16;
+
+/// The outputs of the loop: states, state estimation errors, fault estimation errors.
+pub(crate) struct Outputs {
+    pub(crate) names: Vec<String>,
+    pub(crate) units: Vec<Option<String>>,
+    /// Positions in [x; e; eps] of quantities known to the user, without filter states and rates.
+    pub(crate) positions: Vec<usize>,
+}
+
+impl Outputs {
+    pub(crate) fn of(designed: &ControllerDesign) -> Self {
+        let (all, states) = (designed.plant.a.nrows(), &designed.linear.states);
+        let (mut names, mut units, mut positions) = (Vec::new(), Vec::new(), Vec::new());
+        for (offset, prefix) in [(0, ""), (all, "error of ")] {
+            for (at, state) in states.iter().enumerate() {
+                names.push(format!("{prefix}{}", state.name));
+                units.push(state.unit.clone());
+                positions.push(offset + at);
+            }
+        }
+        for (fault, channel) in designed.linear.faults.iter().zip(&designed.extended.channels) {
+            names.push(format!("error of {}", fault.name));
+            units.push(fault.unit.clone());
+            positions.push(2 * all + channel.estimate);
+        }
+        Self { names, units, positions }
+    }
+}
+
+/// The H-infinity norm, and how it was computed. Where the level sets do not converge, as with a zero of the
+/// whole system at z = 1, it is the largest value on a grid of frequencies.
+pub(crate) fn largest_gain(system: &StateSpace) -> Result<(f64, &'static str), Error> {
+    match h_infinity(system, WIDTH) {
+        Ok(found) => Ok((found.upper, "largest singular value over all frequencies (level sets)")),
+        Err(Error::NotConverged { .. }) => {
+            let grid = frequency_grid(system, POINTS_PER_DECADE)?;
+            let points = frequency_response(system, &grid)?;
+            let largest = points.iter().map(|point| point.singular_values[0]).fold(0.0, f64::max);
+            Ok((largest, "largest singular value on a grid of frequencies"))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// The peak gains of an output from each fault, from the rates, and from what the compensation leaves.
+type PeakGains = [RowDVector<f64>; 3];
+
+/// Why an output has no peak gains.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Missing {
+    /// The time for certificates and bounds was over.
+    Time,
+    /// The computation does not converge.
+    Numerics,
+}
+
+/// The transfer functions from the faults, and from their rates, to [x; e; eps].
+pub(crate) struct Loops<'a> {
+    designed: &'a ControllerDesign,
+    outputs: Outputs,
+    of_faults: StateSpace,
+    of_rates: StateSpace,
+}
+
+impl<'a> Loops<'a> {
+    pub(crate) fn of(designed: &'a ControllerDesign) -> Result<Self, Error> {
+        let ControllerDesign { plant, gains, domain, .. } = designed;
+        let mut of_rates = fault_rate_system(plant, gains, *domain)?;
+        if let Domain::Sampled { period } = domain {
+            // The change of a fault per sample is its rate times the sample time.
+            of_rates.b.columns_mut(0, plant.f_a.ncols()).scale_mut(*period);
+        }
+        let of_faults = fault_system(plant, gains, *domain)?;
+        Ok(Self { designed, outputs: Outputs::of(designed), of_faults, of_rates })
+    }
+
+    fn faults(&self) -> impl Iterator<Item = (usize, &'a Fault)> + use<'a> {
+        let designed = self.designed;
+        let channels = designed.extended.channels.iter().map(|channel| channel.estimate);
+        channels.zip(&designed.linear.faults)
+    }
+
+    /// Returns the peak-to-peak gains of the outputs from faults, from their rates, and from the part of
+    /// them that the compensation leaves. Those of a sampled loop hold between its samples, too. The errors of
+    /// the faults come first, as long as the time of `budget` allows.
+    fn peak_gains(&self, budget: &Budget) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
+        let positions = &self.outputs.positions;
+        let outputs_at_once = match self.designed.domain {
+            Domain::Continuous => OUTPUTS_AT_ONCE,
+            // Each state is read at all parts: about as many rows as the loop has states.
+            Domain::Sampled { .. } => 1 + self.of_faults.a.nrows() / PARTS as usize,
+        };
+        let mut found = vec![Err(Missing::Time); positions.len()];
+        let mut rest = positions.len();
+        while rest > 0 && !budget.is_over() {
+            let first = rest.saturating_sub(outputs_at_once * rayon::current_num_threads());
+            let at_once = found[first..rest].par_chunks_mut(outputs_at_once);
+            let rows = positions[first..rest].par_chunks(outputs_at_once);
+            at_once.zip(rows).try_for_each(|(places, rows)| {
+                places.clone_from_slice(&self.gains_of(rows)?);
+                Ok::<_, Error>(())
+            })?;
+            rest = first;
+        }
+        Ok(found)
+    }
+
+    /// Returns the gains of some outputs. If those of one do not converge, each is computed alone.
+    fn gains_of(&self, rows: &[usize]) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
+        let ControllerDesign { extended, plant, gains, domain, .. } = self.designed;
+        let found = match *domain {
+            Domain::Continuous => fault_gains(plant, gains, *domain, (rows, WIDTH)),
+            Domain::Sampled { period } => {
+                gains_between_samples(extended, plant, gains, (period, PARTS), (rows, WIDTH))
+            }
+        };
+        match found {
+            Ok(all) => {
+                let row = |row| all.each_ref().map(|gains| gains.row(row).into_owned());
+                Ok((0..rows.len()).map(|at| Ok(row(at))).collect())
+            }
+            Err(Error::NotConverged { .. }) if rows.len() == 1 => Ok(vec![Err(Missing::Numerics)]),
+            Err(Error::NotConverged { .. }) => {
+                let alone = rows.iter().map(|row| self.gains_of(&[*row]));
+                Ok(alone.collect::<Result<Vec<_>, _>>()?.concat())
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Returns the peak-to-peak gains from each fault to each output and the resulting bounds, and a warning for
+    /// each reason why some outputs have none.
+    pub(crate) fn bounds(&self, budget: &Budget) -> Result<(Vec<Bound>, Vec<String>), Error> {
+        let gains = self.peak_gains(budget)?;
+        let mut found = Vec::new();
+        for (column, fault) in self.faults() {
+            for (at, gains) in gains.iter().enumerate() {
+                let Ok([jumping, gliding, uncancelled]) = gains else { continue };
+                let of_fault = jumping[column];
+                // A constant fault that leaves a lasting error has no bound by its rate.
+                let leaks = self.designed.law.leaks();
+                let of_rate = if leaks { f64::INFINITY } else { gliding[column] };
+                let left = uncancelled[column];
+                let constant = !leaks && self.designed.extended.plant.a_f.row(column).amax() <= 0.0;
+                let by_rate = match (fault.rate_bound, fault.bound) {
+                    (Some(rate), Some(bound)) if constant => Some(of_rate * rate + left * bound),
+                    _ => None,
+                };
+                let by_size = fault.bound.map(|bound| of_fault * bound);
+                found.push(Bound {
+                    fault: fault.name.clone(),
+                    error: self.outputs.names[at].clone(),
+                    unit: self.outputs.units[at].clone(),
+                    gain_of_fault: of_fault,
+                    gain_of_rate: of_rate,
+                    largest: by_rate.into_iter().chain(by_size).reduce(f64::min),
+                });
+            }
+        }
+        let reasons = [
+            (Missing::Time, format!("were {}", budget.reason())),
+            (
+                Missing::Numerics,
+                "cannot be computed: the loop hardly contracts beside its fastest modes, or rounding \
+                 errors grow in it, as with eigenvectors that are almost parallel"
+                    .to_owned(),
+            ),
+        ];
+        let warning = |(missing, reason): (Missing, String)| {
+            let count = gains.iter().filter(|gains| gains.as_ref().err() == Some(&missing)).count();
+            (count > 0).then(|| format!("the bounds of {count} states and errors {reason}"))
+        };
+        Ok((found, reasons.into_iter().filter_map(warning).collect()))
+    }
+
+    /// Returns the transfer function from the faults, as `system` has them, to their estimation
+    /// errors.
+    fn to_fault_errors(&self, system: &StateSpace) -> StateSpace {
+        let channels = &self.designed.extended.channels;
+        let columns: Vec<_> = channels.iter().map(|channel| channel.estimate).collect();
+        let all = self.designed.plant.a.nrows();
+        let rows: Vec<_> = columns.iter().map(|column| 2 * all + column).collect();
+        StateSpace {
+            a: system.a.clone(),
+            b: system.b.select_columns(&columns),
+            c: system.c.select_rows(&rows),
+            d: system.d.select_rows(&rows).select_columns(&columns),
+            domain: system.domain,
+        }
+    }
+
+    /// Returns the singular values from the faults to their estimates and to the estimation errors.
+    pub(crate) fn frequency(&self) -> Result<Vec<Frequency>, Error> {
+        let errors = self.to_fault_errors(&self.of_faults);
+        let count = errors.d.ncols();
+        let identity = DMatrix::identity(count, count);
+        let estimates = StateSpace { d: &errors.d + identity, ..errors.clone() };
+        let rates = self.to_fault_errors(&self.of_rates);
+        let grid = frequency_grid(&self.of_faults, POINTS_PER_DECADE)?;
+        let curve = |name: &str, system: &StateSpace| {
+            let points = frequency_response(system, &grid)?;
+            let values = |k: usize| points.iter().map(|point| point.singular_values[k]).collect();
+            Ok(Frequency {
+                name: name.to_owned(),
+                frequencies: grid.clone(),
+                singular_values: (0..count).map(values).collect(),
+            })
+        };
+        let mut curves = vec![
+            curve("faults to their estimates", &estimates)?,
+            curve("faults to the errors of their estimates", &errors)?,
+        ];
+        if !self.designed.law.leaks() {
+            curves.push(curve("rates of the faults to the errors of their estimates", &rates)?);
+        }
+        Ok(curves)
+    }
+
+    /// Returns the norms from the rates of the faults to their estimation errors; none if a constant
+    /// fault leaves a lasting error.
+    pub(crate) fn norms(&self) -> Result<Vec<Norm>, Error> {
+        if self.designed.law.leaks() {
+            return Ok(Vec::new());
+        }
+        let rates = error_part(&self.designed.plant, &self.to_fault_errors(&self.of_rates));
+        let norm = |name: &str, value: f64, method: &str| Norm {
+            name: name.to_owned(),
+            from: "rates of the faults".to_owned(),
+            to: "errors of their estimates".to_owned(),
+            value,
+            method: method.to_owned(),
+        };
+        let (largest, method) = largest_gain(&rates)?;
+        let energies = energy(&rates)?;
+        Ok(vec![
+            norm("H-infinity", largest, method),
+            norm("generalised H2", energies.peak, "peak for a rate of unit energy (Lyapunov)"),
+            norm("H2", energies.h2, "covariance under white noise (Lyapunov)"),
+        ])
+    }
+}

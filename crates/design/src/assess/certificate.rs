@@ -1,0 +1,133 @@
+//! Theorem 1 for a design: as printed, and with P from linear matrix inequalities.
+
+use control::Domain;
+use control::lmi::Outcome;
+use control::theorem1::{self, certify, largest_decay, smallest_radius, ultimate_bound};
+
+use crate::budget::Budget;
+use crate::matrix::rows;
+use crate::plant_file::estimation::Law;
+use crate::report::{Certificate, FreeP, Norm, Theorem1, Ultimate};
+use crate::solve::solution::ControllerDesign;
+
+/// The design parameter alpha of (12); it cancels in delta.
+const ALPHA: f64 = 1.0;
+
+/// Largest number of observer states for which linear matrix inequalities are solved: their cost grows
+/// with the sixth power.
+const LARGEST_ORDER: usize = 30;
+
+/// Returns all certificates for `designed`; `norms` were computed before.
+pub(crate) fn certificate(
+    designed: &ControllerDesign,
+    norms: Vec<Norm>,
+    budget: &Budget,
+) -> Certificate {
+    Certificate {
+        printed: printed(designed),
+        free: in_time(budget, || free(designed)),
+        ultimate: in_time(budget, || ultimate(designed)),
+        norms,
+    }
+}
+
+fn in_time<T>(budget: &Budget, solve: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    if budget.is_over() { Err(budget.reason()) } else { solve() }
+}
+
+/// Returns the largest norm of the fault vector, from the bounds of the plant file.
+fn largest(bounds: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+    let squares = bounds.map(|bound| bound.map(|bound| bound * bound));
+    squares.sum::<Option<f64>>().map(f64::sqrt)
+}
+
+fn fault_bound(designed: &ControllerDesign) -> Result<f64, String> {
+    let bounds = designed.linear.faults.iter().map(|fault| fault.bound);
+    largest(bounds).ok_or_else(|| "it needs `bound` for every fault".to_owned())
+}
+
+/// Checks that the theorem applies: a continuous observer of constant faults.
+fn applies(designed: &ControllerDesign) -> Result<(), String> {
+    if designed.law.law != Law::Augmented {
+        return Err("the theorem is about the augmented observer".to_owned());
+    }
+    if designed.domain != Domain::Continuous {
+        return Err("the theorem is about a controller in continuous time".to_owned());
+    }
+    if designed.plant.a_f.amax() > 0.0 {
+        return Err("the theorem is about constant faults".to_owned());
+    }
+    Ok(())
+}
+
+/// Checks that linear matrix inequalities for the estimation error end in a few seconds.
+fn solvable(designed: &ControllerDesign) -> Result<(), String> {
+    applies(designed)?;
+    let order = designed.plant.a.nrows() + designed.plant.f_a.ncols();
+    if order > LARGEST_ORDER {
+        return Err(format!(
+            "linear matrix inequalities are solved for up to {LARGEST_ORDER} states of the observer, \
+             found {order}"
+        ));
+    }
+    Ok(())
+}
+
+fn printed(designed: &ControllerDesign) -> Result<Theorem1, String> {
+    applies(designed)?;
+    let beta = fault_bound(designed)?;
+    let found = certify(&designed.plant, &designed.gains, ALPHA, beta);
+    found.map(|found| (&found).into()).map_err(|error| error.to_string())
+}
+
+impl From<&theorem1::Certificate> for Theorem1 {
+    fn from(found: &theorem1::Certificate) -> Self {
+        Self {
+            alpha: found.alpha,
+            beta: found.beta,
+            p: rows(&found.p),
+            smallest_eigenvalue: found.p_range.0,
+            largest_eigenvalue: found.p_range.1,
+            residual: found.residual,
+            delta: found.delta,
+        }
+    }
+}
+
+fn verified<T>(outcome: Result<Outcome<T>, control::Error>) -> Result<T, String> {
+    match outcome {
+        Ok(Outcome::Optimal(found)) => Ok(found),
+        Ok(Outcome::Infeasible { conflict }) => Err(format!("infeasible: {}", conflict.join("; "))),
+        Ok(Outcome::Inconclusive(reason)) => Err(format!("not proven: {reason}")),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+fn free(designed: &ControllerDesign) -> Result<FreeP, String> {
+    solvable(designed)?;
+    let dynamics = designed.gains.error_dynamics(&designed.plant);
+    let decay = verified(largest_decay(&dynamics))?;
+    let beta = fault_bound(designed)?;
+    let region = verified(smallest_radius(&dynamics, &designed.plant.augmented_fault(), beta))?;
+    Ok(FreeP {
+        decay: decay.alpha,
+        decay_margin: decay.certificate.margin,
+        delta: region.delta,
+        p: rows(&region.p),
+        margin: region.margin,
+    })
+}
+
+/// Returns the ball that the error converges to for bounded rates of the faults.
+fn ultimate(designed: &ControllerDesign) -> Result<Ultimate, String> {
+    solvable(designed)?;
+    let rates = designed.linear.faults.iter().map(|fault| fault.rate_bound);
+    let rate = largest(rates).ok_or_else(|| "it needs `rate_bound` for every fault".to_owned())?;
+    let dynamics = designed.gains.error_dynamics(&designed.plant);
+    let (order, q) = (dynamics.nrows(), designed.plant.f_a.ncols());
+    let mut enters = nalgebra::DMatrix::zeros(order, q);
+    enters.view_mut((order - q, 0), (q, q)).fill_with_identity();
+    let found = verified(ultimate_bound(&dynamics, &enters, rate))?;
+    let peaks = found.peaks.iter().copied().collect();
+    Ok(Ultimate { rate, radius: found.radius, peaks, margin: found.margin })
+}

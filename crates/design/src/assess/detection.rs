@@ -1,0 +1,407 @@
+//! The detection of a design: filters of the residuals, tests, predictions, the section of the design
+//! file.
+
+mod decoupling;
+mod file;
+mod model_error;
+mod prediction;
+mod problem;
+
+use aso_controller::design::detection::DetectionDesign;
+use control::detection::{Cusum, WindowTest};
+use nalgebra::DMatrix;
+
+use crate::matrix::rows;
+use crate::plant::parameters::ParameterFamily;
+use crate::plant_file::PlantFile;
+use crate::plant_file::detection::{DetectionRequest, Method};
+use crate::report::Matrix;
+use crate::report::detection::{
+    DecoupledInput, DetectedFault, Detection as Report, ParameterCases, Test,
+};
+use crate::solve::solution::ControllerDesign;
+use decoupling::Decoupling;
+use model_error::{LargestMean, ModelErrors};
+use prediction::{Prediction, TestKind};
+use problem::Problem;
+
+/// A fault does not act on a residual whose mean it moves by less than this part of that of the fault
+/// that the test is for.
+const INSENSITIVE: f64 = 1e-6;
+/// Time constants of the slowest filter after which its initial error is a thousandth.
+const SETTLING: f64 = 7.0;
+/// An excess of the interior of the limits of parameters above this part is a warning: the brackets of the
+/// means have a relative width of 0.01.
+const NOTICEABLE: f64 = 0.02;
+/// The largest drift: with it a fault of four standard deviations is mostly found in its first sample.
+const LARGEST_DRIFT: f64 = 2.0;
+
+/// The detection with what the report says about it.
+pub(crate) struct Detection {
+    pub(crate) section: DetectionDesign,
+    pub(crate) report: Report,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// A filter with the tests of its residuals.
+struct Part {
+    decoupling: Decoupling,
+    tests: Vec<PlannedTest>,
+}
+
+/// A test of combinations of the residuals of a filter.
+struct PlannedTest {
+    name: String,
+    /// The combinations: rows x residuals of the filter.
+    rows: DMatrix<f64>,
+    kind: TestKind,
+    /// The largest mean of the residuals that errors of the model give them.
+    bias: f64,
+    /// By which part the largest of these means within the limits of parameters exceeds that at the corners.
+    interior_excess: Option<f64>,
+    /// Whether it reacts to each fault.
+    reacts: Vec<bool>,
+}
+
+/// Designs the detection that the plant file asks for, if it does.
+pub(crate) fn detection(
+    file: &PlantFile<'_>,
+    designed: &ControllerDesign,
+    family: Option<&ParameterFamily<'_>>,
+) -> Result<Option<Detection>, crate::Error> {
+    let Some(request) = &file.detection else {
+        return Ok(None);
+    };
+    check_plants(file, request)?;
+    let problem = Problem::new(file, request, designed)?;
+    let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
+    let errors = request
+        .model_error
+        .as_ref()
+        .map(|own| ModelErrors::new(file, own, (&designed.linear, designed), family));
+    let errors = errors.transpose()?;
+    let parts = parts(file, request, &problem, errors.as_ref())?;
+    let mut warnings = Vec::new();
+    let mut report = report(request, &problem, &parts, &mut warnings).map_err(refuse)?;
+    let cases = errors.as_ref().and_then(ModelErrors::random_cases);
+    report.parameter_cases = cases.map(|cases| ParameterCases::new(cases, file.robustness.seed));
+    let section = file::section(&problem, &parts, report.from, designed);
+    Ok(Some(Detection { section, report, warnings }))
+}
+
+/// Refuses several plants that the tests cannot allow for.
+fn check_plants(file: &PlantFile<'_>, request: &DetectionRequest) -> Result<(), crate::Error> {
+    let message = if file.schedule.is_some() {
+        "the thresholds rely on residuals that are white with variance 1, which interpolated filters give at the \
+         points of the schedule only: between them false alarms and delays would not be those stated; \
+         expected no [schedule] with [detection]"
+    } else if file.family.is_empty() || (request.model_error.is_some() && file.fmu().is_none()) {
+        return Ok(());
+    } else if file.fmu().is_some() {
+        "the residuals are those of one operating point: expected no [[family]] of an FMU with [detection]; \
+         tolerances of its `parameters` in [robustness], with `model_error`, allow for other plants"
+    } else {
+        "the other plants of [[family]] would give false alarms: expected `model_error`, so that the tests \
+         allow for them"
+    };
+    Err(file.error_at(&request.place, message).into())
+}
+
+/// Plans the filters and their tests.
+fn parts(
+    file: &PlantFile<'_>,
+    request: &DetectionRequest,
+    problem: &Problem,
+    errors: Option<&ModelErrors<'_>>,
+) -> Result<Vec<Part>, crate::Error> {
+    let q = problem.faults.len();
+    let base = problem.base(file)?;
+    let shifts = problem.shifts(file, &base)?;
+    let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
+    let plan = |decoupling: &Decoupling, faults: &[usize], count: usize| {
+        plan(file, request, (problem, errors), decoupling, (faults, count))
+    };
+    if request.isolation {
+        let part = |fault: usize| {
+            let others: Vec<usize> = (1..q).map(|k| (fault + k) % q).collect();
+            let decoupling = problem.isolating(&base, fault, &others, shifts[fault]);
+            let decoupling = decoupling.map_err(refuse)?;
+            let test = plan(&decoupling, &[fault], q)?;
+            let reacts = reacting(problem, &decoupling, &test, fault).map_err(refuse)?;
+            Ok(Part { decoupling, tests: vec![PlannedTest { reacts, ..test }] })
+        };
+        return (0..q).map(part).collect();
+    }
+    let groups: Vec<Vec<usize>> = match request.method {
+        Method::Cusum => (0..q).map(|fault| vec![fault]).collect(),
+        Method::ChiSquare { .. } => vec![(0..q).collect()],
+    };
+    let count = groups.len();
+    let tests = groups.iter().map(|group| plan(&base, group, count));
+    let tests = tests.collect::<Result<_, crate::Error>>()?;
+    Ok(vec![Part { decoupling: base, tests }])
+}
+
+/// Plans the test for some faults, one of `count` tests.
+fn plan(
+    file: &PlantFile<'_>,
+    request: &DetectionRequest,
+    (problem, errors): (&Problem, Option<&ModelErrors<'_>>),
+    decoupling: &Decoupling,
+    (faults, count): (&[usize], usize),
+) -> Result<PlannedTest, crate::Error> {
+    let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
+    let bias = |rows: &DMatrix<f64>| match errors {
+        Some(errors) => errors.largest_mean(problem, (decoupling, rows)),
+        None => Ok(LargestMean { mean: 0.0, interior_excess: None }),
+    };
+    #[expect(clippy::cast_precision_loss, reason = "a number of faults")]
+    let samples = request.false_alarm_interval * count as f64 / problem.period;
+    let name = match faults {
+        [fault] => problem.names[problem.fault_at(*fault)].clone(),
+        _ => "all".to_owned(),
+    };
+    let reacts = vec![true; problem.faults.len()];
+    let rows = decoupling.filter.generator.c.nrows();
+    match request.method {
+        Method::Cusum => {
+            let mean = problem.steady_mean(decoupling, problem.fault_at(faults[0]));
+            let mean = mean.map_err(refuse)?;
+            let drift = (0.5 * mean.norm()).min(LARGEST_DRIFT);
+            let mut test = Cusum::with_false_alarms(drift, samples).map_err(refuse)?;
+            let direction = mean.normalize().transpose();
+            let rows = DMatrix::from_row_slice(1, direction.len(), direction.as_slice());
+            let LargestMean { mean: bias, interior_excess } = bias(&rows)?;
+            // A mean of up to the bias adds to no sum, so that there are no more false alarms.
+            test.drift += bias;
+            let kind = TestKind::Cusum(test);
+            Ok(PlannedTest { name, rows, kind, bias, interior_excess, reacts })
+        }
+        Method::ChiSquare { window } => {
+            let means = faults
+                .iter()
+                .map(|&fault| problem.means(decoupling, problem.fault_at(fault)))
+                .collect::<Result<Vec<_>, _>>()
+                .map_err(refuse)?;
+            let count = u32::try_from(rows).unwrap_or(u32::MAX);
+            let rows = DMatrix::identity(rows, rows);
+            let LargestMean { mean: bias, interior_excess } = bias(&rows)?;
+            let test = match window {
+                Some(window) => {
+                    let samples_of_window = prediction::whole(window / problem.period).max(1);
+                    WindowTest::with_false_alarms((count, samples_of_window), samples, bias)
+                }
+                None => prediction::best_window(count, (samples, bias), &means),
+            };
+            let kind = TestKind::Window(test.map_err(refuse)?);
+            Ok(PlannedTest { name, rows, kind, bias, interior_excess, reacts })
+        }
+    }
+}
+
+/// Whether the test for `own` reacts to each fault.
+fn reacting(
+    problem: &Problem,
+    decoupling: &Decoupling,
+    test: &PlannedTest,
+    own: usize,
+) -> Result<Vec<bool>, control::Error> {
+    let peak = |fault: usize| {
+        let means = problem.means(decoupling, problem.fault_at(fault))?;
+        Ok(largest(&(&test.rows * means)))
+    };
+    let least = INSENSITIVE * peak(own)?;
+    (0..problem.faults.len())
+        .map(|fault| {
+            Ok(!decoupling.has(problem.fault_at(fault)) && (fault == own || peak(fault)? > least))
+        })
+        .collect()
+}
+
+/// The largest length of a column.
+fn largest(means: &DMatrix<f64>) -> f64 {
+    means.column_iter().map(|column| column.norm()).fold(0.0, f64::max)
+}
+
+/// All tests with the filters that they belong to.
+fn tests(parts: &[Part]) -> impl Iterator<Item = (&Decoupling, &PlannedTest)> {
+    parts.iter().flat_map(|part| part.tests.iter().map(|test| (&part.decoupling, test)))
+}
+
+fn report(
+    request: &DetectionRequest,
+    problem: &Problem,
+    parts: &[Part],
+    warnings: &mut Vec<String>,
+) -> Result<Report, control::Error> {
+    let q = problem.faults.len();
+    let mut structure = DMatrix::zeros(tests(parts).count(), q);
+    for (at, (decoupling, test)) in tests(parts).enumerate() {
+        for fault in 0..q {
+            let means = problem.means(decoupling, problem.fault_at(fault))?;
+            structure[(at, fault)] = largest(&(&test.rows * means));
+        }
+    }
+    let reported = tests(parts).map(|(decoupling, test)| test_report(problem, decoupling, test));
+    let reported = reported.collect::<Result<Vec<_>, _>>()?;
+    let within = request.delay.unwrap_or(10.0 / problem.rate);
+    let faults = (0..q).filter_map(|fault| fault_report(problem, parts, fault, within).transpose());
+    let reacts: Vec<Vec<bool>> = tests(parts).map(|(_, test)| test.reacts.clone()).collect();
+    let confused = if request.isolation { confused(&reacts, problem) } else { Vec::new() };
+    let faults = faults.collect::<Result<Vec<_>, _>>()?;
+    warn(&reported, &confused, warnings);
+    hidden(&reported, &faults, warnings);
+    let rate: f64 = reported.iter().map(|test| 1.0 / test.false_alarm_interval).sum();
+    Ok(Report {
+        method: match request.method {
+            Method::Cusum => "cusum",
+            Method::ChiSquare { .. } => "chi-square",
+        }
+        .to_owned(),
+        sample_time: problem.period,
+        from: match request.from {
+            Some(from) => from,
+            None => SETTLING / problem.slowest_decay(parts.iter().map(|part| &part.decoupling))?,
+        },
+        false_alarm_interval: 1.0 / rate,
+        noise: request.noise.clone(),
+        process_noise: problem.origin_of_process_noise.clone(),
+        structure: Matrix {
+            name: "structure".to_owned(),
+            meaning: "largest mean of the residuals, in standard deviations".to_owned(),
+            rows: reported.iter().map(|test| test.name.clone()).collect(),
+            columns: (0..q).map(|fault| problem.names[problem.fault_at(fault)].clone()).collect(),
+            values: rows(&structure),
+        },
+        tests: reported,
+        faults,
+        reacts,
+        confused,
+        parameter_cases: None,
+    })
+}
+
+fn test_report(
+    problem: &Problem,
+    decoupling: &Decoupling,
+    test: &PlannedTest,
+) -> Result<Test, control::Error> {
+    let decoupled = |&(input, exact): &(usize, bool)| {
+        let means = problem.means(decoupling, input)?;
+        Ok(DecoupledInput {
+            name: problem.names[input].clone(),
+            exact,
+            size: problem.sizes[input],
+            largest_mean: largest(&(&test.rows * means)),
+        })
+    };
+    Ok(Test {
+        name: test.name.clone(),
+        residuals: test.rows.nrows(),
+        drift: test.kind.drift(),
+        window: test.kind.window(),
+        model_error: test.bias,
+        interior_excess: test.interior_excess,
+        threshold: test.kind.threshold(),
+        false_alarm_interval: test.kind.between_false_alarms(test.bias) * problem.period,
+        decoupled: decoupling
+            .inputs()
+            .iter()
+            .map(decoupled)
+            .collect::<Result<_, control::Error>>()?,
+    })
+}
+
+/// Predicts the detection of a fault by the test that is for it.
+fn fault_report(
+    problem: &Problem,
+    parts: &[Part],
+    fault: usize,
+    within: f64,
+) -> Result<Option<DetectedFault>, control::Error> {
+    let (input, period) = (problem.fault_at(fault), problem.period);
+    let name = &problem.names[input];
+    // One test for each fault, or one for all.
+    let own = if tests(parts).count() == 1 { 0 } else { fault };
+    let Some((decoupling, test)) = tests(parts).nth(own) else {
+        return Ok(None);
+    };
+    let means = &test.rows * problem.means(decoupling, input)?;
+    let prediction = Prediction { kind: &test.kind, means: &means, period };
+    let delay = prediction.delay(1.0);
+    let size = problem.sizes[input].unwrap_or(1.0);
+    Ok(Some(DetectedFault {
+        fault: name.clone(),
+        unit: problem.units[fault].clone(),
+        size,
+        test: test.name.clone(),
+        mean: (&test.rows * problem.steady_mean(decoupling, input)?).norm(),
+        // A fault starts between two samples: half a sample before the first one with it, on average.
+        delay: delay.mean().map(|samples| (samples - 0.5) * period),
+        #[expect(clippy::cast_precision_loss, reason = "numbers of samples")]
+        delay_90: delay.quantile(0.9).map(|samples| samples as f64 * period),
+        within,
+        least: prediction.least(within).map(|factor| factor * size),
+    }))
+}
+
+/// Names what the tests cannot do.
+fn warn(tests: &[Test], confused: &[Vec<String>], warnings: &mut Vec<String>) {
+    for group in confused {
+        warnings.push(format!(
+            "the residuals cannot tell the faults {} apart; `fault_isolated` is -1 for them",
+            group.join(", ")
+        ));
+    }
+    for test in tests {
+        if let Some(excess) = test.interior_excess.filter(|excess| *excess > NOTICEABLE) {
+            warnings.push(format!(
+                "parameters within their limits give the test {} means that are up to {:.1} % larger than at the \
+                 corners of the limits; its threshold allows for the largest that was found",
+                test.name,
+                100.0 * excess
+            ));
+        }
+        for input in test.decoupled.iter().filter(|input| !input.exact) {
+            warnings.push(format!(
+                "{} acts on the residual of the test {} while it changes: its step of {} moves the mean by \
+                 up to {:.3} standard deviations; a constant one does not",
+                input.name,
+                test.name,
+                input.size.unwrap_or(1.0),
+                input.largest_mean
+            ));
+        }
+    }
+}
+
+/// Names the faults of their size that errors of the model hide.
+fn hidden(tests: &[Test], faults: &[DetectedFault], warnings: &mut Vec<String>) {
+    for fault in faults.iter().filter(|fault| fault.delay.is_none()) {
+        let own = tests.iter().find(|test| test.name == fault.test && test.model_error > 0.0);
+        if let Some(test) = own {
+            warnings.push(format!(
+                "{} of {} moves the mean of its residuals by {:.3} standard deviations, errors of the model by \
+                 up to {:.3}: it may stay undetected; smaller tolerances in [robustness] or smaller `commands` \
+                 help",
+                fault.fault, fault.size, fault.mean, test.model_error
+            ));
+        }
+    }
+}
+
+/// Groups of faults to which the same tests react.
+fn confused(reacts: &[Vec<bool>], problem: &Problem) -> Vec<Vec<String>> {
+    let signature = |fault: usize| reacts.iter().map(|test| test[fault]).collect::<Vec<_>>();
+    let q = problem.faults.len();
+    let mut groups = Vec::new();
+    for fault in 0..q {
+        let same: Vec<usize> =
+            (0..q).filter(|&other| signature(other) == signature(fault)).collect();
+        if same.len() > 1 && same[0] == fault {
+            let name = |&fault: &usize| problem.names[problem.fault_at(fault)].clone();
+            groups.push(same.iter().map(name).collect());
+        }
+    }
+    groups
+}

@@ -1,0 +1,205 @@
+//! The residuals that errors of the model cause without a fault.
+
+mod parameter_box;
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use control::detection::UncertainPlant;
+use control::robustness::{PlantFamily, Tolerances, random_deviations};
+use control::{Domain, StateSpace};
+use nalgebra::{DMatrix, DVector};
+
+use crate::assess::detection::decoupling::Decoupling;
+use crate::assess::detection::problem::Problem;
+use crate::plant::linear::LinearPlant;
+use crate::plant::parameters::ParameterFamily;
+use crate::plant_file::PlantFile;
+use crate::plant_file::detection::ModelError;
+use crate::plant_file::signals::Signal;
+use crate::solve::solution::ControllerDesign;
+
+/// A plant, and the bounds of its inputs.
+type Case = Rc<(UncertainPlant, DVector<f64>)>;
+
+/// A bound of the means of residuals that errors of the model cause.
+#[derive(Clone, Copy)]
+pub(super) struct LargestMean {
+    /// As a length in standard deviations, times the factor of the plant file.
+    pub(super) mean: f64,
+    /// For parameters of an FMU: by which part the largest mean of the interior exceeds that of the corners.
+    pub(super) interior_excess: Option<f64>,
+}
+
+/// The plants within the tolerances of `[robustness]`, and the bounds of the commands.
+pub(super) struct ModelErrors<'a> {
+    file: &'a PlantFile<'a>,
+    request: &'a ModelError,
+    /// The plant, and the members of its family, whose entries are wrong by their tolerances.
+    plants: Vec<UncertainPlant>,
+    /// The FMU whose parameters are wrong; then the entries are exact.
+    parameters: Option<&'a ParameterFamily<'a>>,
+    /// The random cases of these parameters, as deviations from -1 to 1.
+    random: Vec<Vec<f64>>,
+    /// The plants of parameters that were linearised, by the bits of their deviations: each test has the same
+    /// ones.
+    cases: RefCell<HashMap<Vec<u64>, Case>>,
+    /// The values of the measurements at the operating point.
+    measured: DVector<f64>,
+    domain: Domain,
+    /// The largest deviation of each command from its operating point.
+    bounds: DVector<f64>,
+}
+
+impl<'a> ModelErrors<'a> {
+    pub(super) fn new(
+        file: &'a PlantFile<'a>,
+        request: &'a ModelError,
+        (linear, designed): (&LinearPlant, &ControllerDesign),
+        parameters: Option<&'a ParameterFamily<'a>>,
+    ) -> Result<Self, crate::Error> {
+        let bound = |(at, actuator): (usize, &Signal)| {
+            let operating = actuator.operating.unwrap_or(0.0);
+            let of_limits =
+                actuator.limits.map(|[low, high]| (operating - low).max(high - operating));
+            request.commands.get(at).copied().flatten().or(of_limits).ok_or_else(|| {
+                let message = format!(
+                    "the residuals of a wrong model are bounded only for bounded commands: expected \
+                     `limits` of the actuator `{0}`, or commands.{0}, its largest deviation from the \
+                     operating point",
+                    actuator.name
+                );
+                file.error_at(&request.place, message)
+            })
+        };
+        let bounds = linear.actuators.iter().enumerate().map(bound);
+        let members = designed.family.iter().flat_map(|family| &family.members);
+        let plants = std::iter::once(linear).chain(members.map(|member| &member.linear));
+        Ok(Self {
+            file,
+            request,
+            plants: plants.map(|plant| uncertain(plant, file.robustness.tolerance)).collect(),
+            parameters,
+            random: parameters.map_or_else(Vec::new, |family| {
+                let limits = &file.robustness;
+                random_deviations(family.count(), limits.cases, u64::from(limits.seed))
+            }),
+            cases: RefCell::default(),
+            measured: DVector::from_iterator(
+                linear.measurements.len(),
+                linear.measurements.iter().map(|signal| signal.operating.unwrap_or(0.0)),
+            ),
+            domain: designed.domain,
+            bounds: DVector::from_vec(bounds.collect::<Result<_, _>>()?),
+        })
+    }
+
+    /// The largest mean of combinations of residuals, as a length in standard deviations, times the factor
+    /// of the plant file: a bound for all plants whose entries are within their tolerances; for parameters
+    /// of an FMU the largest bound of the plants that were tried at the corners and within.
+    pub(super) fn largest_mean(
+        &self,
+        problem: &Problem,
+        of: (&Decoupling, &DMatrix<f64>),
+    ) -> Result<LargestMean, crate::Error> {
+        let scale = match self.domain {
+            Domain::Sampled { .. } => 1.0,
+            Domain::Continuous => problem.period.sqrt(),
+        };
+        let scale = scale * self.request.margin;
+        let Some(family) = self.parameters else {
+            let bound = |plant| self.bound_of(plant, &self.bounds, of);
+            let most = |most: f64, plant| Ok::<_, crate::Error>(most.max(bound(plant)?));
+            let mean = scale * self.plants.iter().try_fold(0.0, most)?;
+            return Ok(LargestMean { mean, interior_excess: None });
+        };
+        let found = parameter_box::largest(family.count(), &self.random, |deviations| {
+            let case = self.case(family, deviations)?;
+            self.bound_of(&case.0, &case.1, of)
+        })?;
+        let excess = if found.corners > 0.0 { found.everywhere / found.corners - 1.0 } else { 0.0 };
+        Ok(LargestMean { mean: scale * found.everywhere, interior_excess: Some(excess) })
+    }
+
+    /// The number of random cases of the parameters of an FMU.
+    pub(super) fn random_cases(&self) -> Option<usize> {
+        self.parameters.map(|_| self.random.len())
+    }
+
+    /// [`Self::with_parameters`], computed once for each point.
+    fn case(&self, family: &ParameterFamily<'_>, deviations: &[f64]) -> Result<Case, crate::Error> {
+        let key: Vec<u64> = deviations.iter().map(|deviation| deviation.to_bits()).collect();
+        if let Some(case) = self.cases.borrow().get(&key) {
+            return Ok(Rc::clone(case));
+        }
+        let case = Rc::new(self.with_parameters(family, deviations)?);
+        self.cases.borrow_mut().insert(key, Rc::clone(&case));
+        Ok(case)
+    }
+
+    /// The FMU with other parameters. At the operating point of the plant file it is not at rest: what
+    /// accelerates it there, and what it then measures, is a further input that is always 1.
+    fn with_parameters(
+        &self,
+        family: &ParameterFamily<'_>,
+        deviations: &[f64],
+    ) -> Result<(UncertainPlant, DVector<f64>), crate::Error> {
+        let (mut plant, rates, measured) = family.at_operating_point(deviations)?;
+        let m = plant.b.ncols();
+        plant.b = plant.b.insert_column(m, 0.0);
+        plant.b.set_column(m, &rates);
+        plant.d = plant.d.insert_column(m, 0.0);
+        plant.d.set_column(m, &(measured - &self.measured));
+        let exact = |of: &DMatrix<f64>| DMatrix::zeros(of.nrows(), of.ncols());
+        let sizes = [exact(&plant.a), exact(&plant.b), exact(&plant.c)];
+        Ok((UncertainPlant { nominal: plant, sizes }, self.bounds.clone().push(1.0)))
+    }
+
+    /// The length of the bounds of combinations of residuals for a plant.
+    fn bound_of(
+        &self,
+        plant: &UncertainPlant,
+        bounds: &DVector<f64>,
+        (decoupling, rows): (&Decoupling, &DMatrix<f64>),
+    ) -> Result<f64, crate::Error> {
+        let refuse = |message: String| self.file.error_at(&self.request.place, message);
+        let mut filter = decoupling.filter.generator.clone();
+        let inputs = bounds.len();
+        filter.b_u = filter.b_u.resize_horizontally(inputs, 0.0);
+        filter.d_u = filter.d_u.resize_horizontally(inputs, 0.0);
+        let found = plant.largest_mean(&filter, rows, bounds).map_err(|error| match error {
+            error @ control::Error::NotHurwitz { .. } => refuse(format!(
+                "the residuals of a wrong model are bounded only if the plant is stable without the \
+                 controller: {error}"
+            )),
+            error => refuse(error.to_string()),
+        })?;
+        let bounds = found.ok_or_else(|| {
+            refuse(
+                "the tolerances of [robustness] are too large for a bound of the residuals: expected smaller \
+                 ones, or `parameters` if the plant is an FMU"
+                    .to_owned(),
+            )
+        })?;
+        Ok(bounds.norm())
+    }
+}
+
+/// The linear plant with errors of its entries within the tolerances.
+fn uncertain(linear: &LinearPlant, tolerance: [f64; 4]) -> UncertainPlant {
+    let nominal = StateSpace {
+        a: linear.a.clone(),
+        b: linear.b.clone(),
+        c: linear.c.clone(),
+        d: DMatrix::zeros(linear.c.nrows(), linear.b.ncols()),
+        domain: Domain::Continuous,
+    };
+    let Tolerances { of: [a, b, c, _] } = Tolerances::of_values(&nominal, tolerance);
+    let sizes = [
+        a.component_mul(&nominal.a.abs()),
+        b.component_mul(&nominal.b.abs()),
+        c.component_mul(&nominal.c.abs()),
+    ];
+    UncertainPlant { nominal, sizes }
+}

@@ -1,0 +1,218 @@
+//! The plant with noise and unknown inputs that the residuals are designed for.
+
+use control::detection::{NoisyPlant, UnknownInput, detection_filter};
+use control::eigen::eigenvalues;
+use control::faults::{Fault, FaultEntry};
+use control::hold::zero_order_hold;
+use control::{Domain, Error};
+use nalgebra::{DMatrix, DVector};
+
+use crate::plant_file::PlantFile;
+use crate::plant_file::detection::DetectionRequest;
+use crate::report::number::round;
+use crate::solve::solution::ControllerDesign;
+
+/// The process noise that is chosen makes the filter no faster than this part of what it can.
+const NEARLY: f64 = 0.99;
+
+/// The plant of the residuals, in the time domain of the controller.
+pub(super) struct Problem {
+    pub(super) plant: NoisyPlant,
+    /// The disturbances, then the faults.
+    pub(super) inputs: Vec<UnknownInput>,
+    pub(super) names: Vec<String>,
+    /// The sizes of the inputs; None for a disturbance without a bound.
+    pub(super) sizes: Vec<Option<f64>>,
+    disturbances: usize,
+    /// The faults, as positions from 0.
+    pub(super) faults: std::ops::Range<usize>,
+    pub(super) units: Vec<Option<String>>,
+    /// Time between two tests, s.
+    pub(super) period: f64,
+    /// The decay rate of the slowest eigenvalue under state feedback, 1/s.
+    pub(super) rate: f64,
+    pub(super) origin_of_process_noise: String,
+}
+
+impl Problem {
+    pub(super) fn new(
+        file: &PlantFile<'_>,
+        request: &DetectionRequest,
+        designed: &ControllerDesign,
+    ) -> Result<Self, crate::Error> {
+        let linear = &designed.linear;
+        let refuse = |error: Error| file.error_at(&request.place, error.to_string());
+        let n = linear.a.nrows();
+        let mut inputs = linear.disturbances.clone();
+        let of_faults =
+            linear.models.iter().map(|model| unknown_input(model, &linear.b, &linear.c));
+        inputs.extend(of_faults);
+        let (mut a, mut b) = (linear.a.clone(), linear.b.clone());
+        if let Domain::Sampled { period } = designed.domain {
+            let columns: Vec<DVector<f64>> = b
+                .column_iter()
+                .map(DVector::from)
+                .chain(inputs.iter().map(|input| input.on_states.clone()))
+                .collect();
+            let (phi, gamma) =
+                zero_order_hold(&a, &DMatrix::from_columns(&columns), period).map_err(refuse)?;
+            let m = b.ncols();
+            (a, b) = (phi, gamma.columns(0, m).into_owned());
+            for (input, column) in inputs.iter_mut().zip(gamma.column_iter().skip(m)) {
+                input.on_states = column.into_owned();
+            }
+        }
+        let rate = designed.slowest_rate().map_err(refuse)?;
+        let period = match designed.domain {
+            Domain::Sampled { period } => period,
+            Domain::Continuous => request.sample_time.unwrap_or_else(|| round(0.1 / rate)),
+        };
+        let noise = DVector::from_column_slice(&request.noise);
+        let disturbances = linear.disturbances.len();
+        let bounds = file.disturbances.iter().map(|disturbance| disturbance.bound);
+        let names = file.disturbances.iter().map(|disturbance| disturbance.name.clone());
+        let mut problem = Self {
+            plant: NoisyPlant {
+                a,
+                b,
+                c: linear.c.clone(),
+                w: DMatrix::zeros(n, n),
+                v: DMatrix::from_diagonal(&noise.component_mul(&noise)),
+                domain: designed.domain,
+            },
+            inputs,
+            names: names.chain(linear.faults.iter().map(|fault| fault.name.clone())).collect(),
+            sizes: bounds.chain(request.sizes.iter().copied().map(Some)).collect(),
+            disturbances,
+            faults: 0..linear.faults.len(),
+            units: linear.faults.iter().map(|fault| fault.unit.clone()).collect(),
+            period,
+            rate,
+            origin_of_process_noise: String::new(),
+        };
+        problem.set_process_noise(file, request)?;
+        Ok(problem)
+    }
+
+    /// The position of a fault among the inputs.
+    pub(super) fn fault_at(&self, fault: usize) -> usize {
+        self.disturbances + fault
+    }
+
+    /// Takes the stated process noise, or chooses the least one with which the filter without unknown
+    /// inputs forgets as fast as the loop.
+    fn set_process_noise(
+        &mut self,
+        file: &PlantFile<'_>,
+        request: &DetectionRequest,
+    ) -> Result<(), crate::Error> {
+        let n = self.plant.a.nrows();
+        if let Some(stated) = &request.process_noise {
+            let values = match stated.values.len() {
+                1 => vec![stated.values[0]; n],
+                count if count == n => stated.values.clone(),
+                count => {
+                    let message = format!("expected {n} numbers, one per state, found {count}");
+                    return Err(file.error_at(&stated.place, message).into());
+                }
+            };
+            let noise = DVector::from_vec(values);
+            self.plant.w = DMatrix::from_diagonal(&noise.component_mul(&noise));
+            "The plant file states it.".clone_into(&mut self.origin_of_process_noise);
+            return Ok(());
+        }
+        let found = self.unit_process_noises().into_iter().find_map(|(source, unit)| {
+            let factor = self.least_factor(&unit)?;
+            Some((source, factor, unit * factor))
+        });
+        let Some((source, factor, noise)) = found else {
+            let message = "no process noise was found with which a filter exists: expected `process_noise`, \
+                           one number for each state";
+            return Err(file.error_at(&request.place, message).into());
+        };
+        self.plant.w = noise;
+        self.origin_of_process_noise = if factor > 0.0 {
+            format!(
+                "The plant file states none. {source} that vary as noise, with {factor} times the variance of \
+                 their sizes within one time constant of the loop, make the filter as fast as the loop; \
+                 with less noise in the plant there are fewer false alarms."
+            )
+        } else {
+            "None: the filter is fast enough without.".to_owned()
+        };
+        Ok(())
+    }
+
+    /// The least factor of `unit` with which the filter without unknown inputs forgets as fast as the loop; if
+    /// none does, as fast as with any factor.
+    fn least_factor(&self, unit: &DMatrix<f64>) -> Option<f64> {
+        let decay = |factor: f64| {
+            let plant = NoisyPlant { w: unit * factor, ..self.plant.clone() };
+            let filter = detection_filter(&plant, &[]).ok().flatten()?;
+            self.decay(&filter.generator.a).ok()
+        };
+        let mut slower = Vec::new();
+        for factor in std::iter::once(0.0).chain((-16..=12).map(|power| 4f64.powi(power))) {
+            let Some(own) = decay(factor) else { continue };
+            if own >= NEARLY * self.rate {
+                return Some(factor);
+            }
+            slower.push((factor, own));
+        }
+        // Not always that with the most noise: a sampled filter approaches the zeros of the sampled plant.
+        let fastest = slower.iter().map(|(_, own)| *own).fold(0.0, f64::max);
+        slower.into_iter().find(|(_, own)| *own >= NEARLY * fastest).map(|(factor, _)| factor)
+    }
+
+    /// Process noise by which each fault that acts on the states varies by its size within a time
+    /// constant of the loop; if there is none, or it leaves a mode at rest that does not decay, the commands by
+    /// one too; then all states by the mean of that.
+    fn unit_process_noises(&self) -> [(&'static str, DMatrix<f64>); 3] {
+        let n = self.plant.a.nrows();
+        let mut faults = DMatrix::zeros(n, n);
+        for fault in self.faults.clone() {
+            let at = self.fault_at(fault);
+            let column = &self.inputs[at].on_states * self.sizes[at].unwrap_or(1.0);
+            faults += &column * column.transpose();
+        }
+        let commands = &faults + &self.plant.b * self.plant.b.transpose();
+        #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+        let mean = commands.trace() / n as f64;
+        let states = &commands + DMatrix::from_diagonal_element(n, n, mean);
+        let time = match self.plant.domain {
+            Domain::Continuous => self.rate,
+            Domain::Sampled { period } => self.rate * period,
+        };
+        [
+            ("Faults", faults / time),
+            ("Faults, and commands by one,", commands / time),
+            ("Faults, commands by one, and all states by the mean of both,", states / time),
+        ]
+    }
+
+    /// The decay rate in 1/s of the slowest eigenvalue of a filter.
+    pub(super) fn decay(&self, a: &DMatrix<f64>) -> Result<f64, Error> {
+        let excess = eigenvalues(a)?.into_iter().map(|value| match self.plant.domain {
+            Domain::Continuous => value.re,
+            Domain::Sampled { period } => value.norm().max(f64::MIN_POSITIVE).ln() / period,
+        });
+        Ok(-excess.fold(f64::NEG_INFINITY, f64::max))
+    }
+}
+
+/// How a fault acts on the plant.
+fn unknown_input(model: &Fault, b: &DMatrix<f64>, c: &DMatrix<f64>) -> UnknownInput {
+    let (n, p) = (b.nrows(), c.nrows());
+    let (mut on_states, mut on_measurements) = (DVector::zeros(n), DVector::zeros(p));
+    match &model.entry {
+        FaultEntry::Actuator(column) => on_states.copy_from(column),
+        FaultEntry::Sensor(column) => on_measurements.copy_from(column),
+        FaultEntry::Both { states, measurements } => {
+            on_states.copy_from(states);
+            on_measurements.copy_from(measurements);
+        }
+        FaultEntry::LossOfEffectiveness(at) => on_states.copy_from(&b.column(*at)),
+        _ => {}
+    }
+    UnknownInput { on_states, on_measurements }
+}

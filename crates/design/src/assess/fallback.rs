@@ -1,0 +1,207 @@
+//! The loops of the fall-back, case by case: decay, margins, price, and what is left at rest.
+
+use control::aso::Gains;
+use control::controller::controller;
+use control::lmi::Vertex;
+use control::response::energy;
+use control::robustness::{delay_margin, sampled_delay_margin};
+use control::{Domain, Error, StateSpace};
+use nalgebra::{DMatrix, DVector};
+
+use crate::assess::family::{common, reported};
+use crate::assess::robustness::{Physical, closed, loop_points};
+use crate::budget::Budget;
+use crate::matrix::rows;
+use crate::plant::linear::LinearPlant;
+use crate::plant::rest::{Rest, beyond_limits, commands};
+use crate::plant_file::PlantFile;
+use crate::plant_file::signals::Signal;
+use crate::report::fallback::{FallbackCase, FallbackReport};
+use crate::report::robustness::{Level, LoopPoint, Number};
+use crate::solve::fallback::{Fallback, Search, remaining};
+use crate::solve::solution::ControllerDesign;
+use crate::solve::tracking::decay;
+
+/// Returns the report on the fall-back of `designed`.
+pub(crate) fn report(
+    file: &PlantFile<'_>,
+    designed: &ControllerDesign,
+    fallback: &Fallback,
+    budget: &Budget,
+) -> Result<Option<FallbackReport>, crate::Error> {
+    let Some(request) = &file.fallback else { return Ok(None) };
+    let search = Search { designed, request };
+    let gains = fallback.gains(designed);
+    let intact = search.whole(&designed.gains, None)?;
+    let reference = noise(designed, &intact)?;
+    let stuck_at =
+        |actuator| file.reconfiguration.as_ref().map_or(0.0, |own| own.stuck_at(actuator));
+    let of = Examination { search, gains, reference };
+    let search = &of.search;
+    let cases = search.cases().into_iter().enumerate();
+    let cases = cases.map(|(at, case)| of.case(at, case.map(|own| (own, stuck_at(own)))));
+    let cases = cases.collect::<Result<Vec<_>, _>>()?;
+    let loops = search.cases().into_iter().map(|case| {
+        let lossy = case.map(|actuator| (actuator, request.loss));
+        search.whole(&of.gains, lossy)
+    });
+    let loops = loops.collect::<Result<Vec<_>, Error>>()?;
+    let whole_left_out = budget.is_over();
+    Ok(Some(FallbackReport {
+        loss: request.loss,
+        method: fallback.method.clone(),
+        decay: cases.iter().map(|own| own.decay).fold(f64::INFINITY, f64::min),
+        compensates: fallback.k_f.is_some(),
+        k_x: rows(&fallback.k_x),
+        gain_norm: fallback.k_x.norm(),
+        intact_gain_norm: designed.gains.k_x.norm(),
+        intact_decay: decay(&intact, designed.domain)?,
+        feedback: reported(&fallback.certificate),
+        whole: common(&loops, designed.domain, budget, |at| search.name(at))?,
+        whole_left_out,
+        cases,
+    }))
+}
+
+/// The fall-back, case by case.
+struct Examination<'a> {
+    search: Search<'a>,
+    gains: Gains,
+    /// H2 norms of the intact loop.
+    reference: Vec<f64>,
+}
+
+impl Examination<'_> {
+    /// The case at a position; `failed`: the actuator, and the command at which it is stuck if it is gone.
+    fn case(&self, at: usize, failed: Option<(usize, f64)>) -> Result<FallbackCase, crate::Error> {
+        let Search { designed, request } = self.search;
+        let ControllerDesign { linear, extended, domain, .. } = designed;
+        let actuator = failed.map(|(actuator, _)| actuator);
+        let whole = self.search.whole(&self.gains, actuator.map(|own| (own, request.loss)))?;
+        let Vertex { a, b } = self.search.vertices().swap_remove(at);
+        let fed_back = &a + &b * self.gains.k_x.columns(0, extended.states);
+        let (points, delay_margin) = self.margins(actuator)?;
+        let relative = |(signal, (own, intact)): (&Signal, (&f64, &f64))| {
+            let (name, value) = (signal.name.clone(), own / intact);
+            value.is_finite().then_some(Number { name, unit: None, value })
+        };
+        let noise = self::noise(designed, &whole)?;
+        let price = linear.measurements.iter().zip(noise.iter().zip(&self.reference));
+        let (rest, stuck) = self.rest(&whole, failed)?;
+        let commands = commands(&linear.actuators, &rest.u, &stuck);
+        let gone: Vec<_> = stuck.iter().map(|(actuator, _)| *actuator).collect();
+        Ok(FallbackCase {
+            name: self.search.name(at),
+            decay: decay(&whole, *domain)?,
+            feedback_decay: decay(&fed_back, *domain)?,
+            points,
+            delay_margin,
+            price: price.filter_map(relative).collect(),
+            beyond_limits: beyond_limits(&linear.actuators, &commands, &gone),
+            commands,
+            measurements: rest.measurements,
+        })
+    }
+
+    /// Margins and delay margin in s while an actuator has failed. One that is gone is no input of the loop:
+    /// the plant has no column of it, and the controller no command, although the observer goes on with it.
+    fn margins(&self, failed: Option<usize>) -> Result<(Vec<LoopPoint>, f64), Error> {
+        let Search { designed, request } = self.search;
+        let LinearPlant { actuators, measurements, b, .. } = &designed.linear;
+        let Physical { mut plant, mut controller, .. } =
+            Physical::of_gains(designed, &designed.linear, &self.gains)?;
+        plant.b = remaining(b, failed, request.loss);
+        let mut inputs = actuators.clone();
+        if let Some(gone) = failed.filter(|_| request.loss >= 1.0) {
+            inputs.remove(gone);
+            (plant.b, plant.d) = (plant.b.remove_column(gone), plant.d.remove_column(gone));
+            controller.c = controller.c.remove_row(gone);
+            controller.d = controller.d.remove_row(gone);
+        }
+        let own = closed(&plant, &controller)?;
+        let delay = match designed.domain {
+            Domain::Continuous => delay_margin(&own),
+            Domain::Sampled { .. } => sampled_delay_margin(&plant, &controller),
+        };
+        Ok((loop_points(&own, &inputs, measurements)?, delay?))
+    }
+
+    /// The equilibrium of the loop, and the actuator that is gone with its command.
+    ///
+    /// What acts is the difference between the effect of the operating point's command and that of the
+    /// actuator: its stuck command, or the part that it has lost.
+    fn rest(
+        &self,
+        whole: &DMatrix<f64>,
+        failed: Option<(usize, f64)>,
+    ) -> Result<(Rest, Vec<(usize, f64)>), Error> {
+        let Search { designed, request } = self.search;
+        let ControllerDesign { linear, plant, extended, domain, .. } = designed;
+        let (n, order) = (plant.a.nrows(), whole.nrows());
+        let mut input = DVector::zeros(order);
+        let mut stuck = Vec::new();
+        if let Some((actuator, stuck_at)) = failed {
+            let operating = linear.actuators[actuator].operating.unwrap_or(0.0);
+            let gone = request.loss >= 1.0;
+            let part = if gone { stuck_at - operating } else { -request.loss * operating };
+            input.rows_mut(0, n).copy_from(&(plant.b.column(actuator) * part));
+            stuck.extend(gone.then_some((actuator, stuck_at)));
+        }
+        let kept = match domain {
+            Domain::Continuous => -whole,
+            Domain::Sampled { .. } => DMatrix::identity(order, order) - whole,
+        };
+        let solved = kept.lu().solve(&input);
+        let what = "the equilibrium of the fall-back";
+        let found = solved.ok_or(Error::NotConverged { what, iterations: 1 })?;
+        let StateSpace { c, d, .. } = controller(plant, &self.gains, *domain)?;
+        let x: DVector<f64> = found.rows(0, n).into();
+        let u = c * found.rows(n, order - n) + d * &plant.c * &x;
+        Ok((Rest::of(linear, (&x.rows(0, extended.states).into(), u), true), stuck))
+    }
+}
+
+/// H2 norms from white noise on the commands, before a loss, to the measurements of the loop `whole`.
+fn noise(designed: &ControllerDesign, whole: &DMatrix<f64>) -> Result<Vec<f64>, Error> {
+    let ControllerDesign { linear, plant, domain, .. } = designed;
+    let (p, order) = (linear.c.nrows(), whole.nrows());
+    let b = plant.b.clone().resize_vertically(order, 0.0);
+    let system = StateSpace {
+        a: whole.clone(),
+        d: DMatrix::zeros(p, b.ncols()),
+        b,
+        c: linear.c.clone().resize_horizontally(order, 0.0),
+        domain: *domain,
+    };
+    Ok(energy(&system)?.peaks)
+}
+
+/// What the fall-back contributes to the verdict; `limit`: the peak of S above which a design is red and
+/// its fall-back amber.
+pub(crate) fn reasons(report: &FallbackReport, limit: f64) -> Vec<(Level, String)> {
+    let mut found = Vec::new();
+    let mut amber = |text: String| found.push((Level::Amber, text + " (amber)"));
+    if let (Err(reason), false) = (&report.whole, report.whole_left_out) {
+        amber(format!(
+            "the fall-back is not proven for losses that change with time: {reason}; constant losses \
+             are stable"
+        ));
+    }
+    for own in &report.cases {
+        let name = &own.name;
+        if !own.beyond_limits.is_empty() {
+            let names = own.beyond_limits.join(", ");
+            amber(format!(
+                "the fall-back needs commands at rest beyond the limits of {names}, {name}"
+            ));
+        }
+        let highest = own.points.iter().max_by(|x, y| x.judged.total_cmp(&y.judged));
+        if let Some(point) = highest.filter(|point| point.judged > limit) {
+            let (peak, place) = (point.judged, &point.point);
+            amber(format!(
+                "the peak of S of the fall-back at the {place}, {name}, is {peak:.3}, above {limit}"
+            ));
+        }
+    }
+    found
+}

@@ -1,0 +1,153 @@
+//! Examines the members of a family of plants with the controller, and judges them.
+
+use control::lmi::{self, Outcome, RegionCertificate, certify_common};
+use control::stability::instability;
+use control::{Domain, Error};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::assess::robustness::{Margins, Physical, by_entries, margins};
+use crate::budget::Budget;
+use crate::matrix::rows;
+use crate::plant::linear::LinearPlant;
+use crate::plant_file::robustness::RobustnessLimits;
+use crate::report::family::{CommonCertificate, FamilyReport, MemberMargins, MemberReport};
+use crate::report::robustness::{Level, Verdict};
+use crate::solve::family::{NOMINAL, name};
+use crate::solve::solution::ControllerDesign;
+
+/// Returns the report on the family of `designed`, if it has one.
+pub(crate) fn family(
+    designed: &ControllerDesign,
+    limits: &RobustnessLimits,
+    budget: &Budget,
+) -> Result<Option<FamilyReport>, crate::Error> {
+    let Some(own) = &designed.family else { return Ok(None) };
+    let nominal = (NOMINAL.to_owned(), &designed.linear);
+    let others = own.members.iter().map(|member| (member.name.clone(), &member.linear));
+    let all: Vec<_> = std::iter::once(nominal).chain(others).collect();
+    let one = |(name, linear): &(String, &LinearPlant)| {
+        let found = member(designed, linear, name.clone(), limits);
+        found.map_err(|error| error.within(format!("member `{name}` of the family")))
+    };
+    let members = all.par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
+    let closed = |(_, linear): &(String, &LinearPlant)| {
+        let physical = Physical::with(designed, linear)?;
+        Ok(physical.closed(&physical.controller)?.dynamics())
+    };
+    let loops = all.iter().map(closed).collect::<Result<Vec<_>, Error>>()?;
+    let named = |at: usize| name(&own.members, at).to_owned();
+    Ok(Some(FamilyReport {
+        members,
+        feedback: own.feedback.as_ref().map(reported),
+        whole: common(&loops, designed.domain, budget, named)?,
+    }))
+}
+
+/// Returns margins, noise and tolerances of `linear` with the controller of `designed`.
+pub(crate) fn member(
+    designed: &ControllerDesign,
+    linear: &LinearPlant,
+    name: String,
+    limits: &RobustnessLimits,
+) -> Result<MemberReport, crate::Error> {
+    let physical = Physical::with(designed, linear)?;
+    let own = physical.closed(&physical.controller)?;
+    let instability = instability(&own.dynamics(), designed.domain)?;
+    if instability >= 0.0 {
+        return Ok(MemberReport { name, instability, margins: None });
+    }
+    let Margins { points, delay, hold, noise_together, .. } =
+        margins(designed, &physical, &own, limits)?;
+    let tolerance = limits.parameters.is_empty().then(|| by_entries(designed, &physical, limits));
+    let margins = MemberMargins {
+        points,
+        delay_margin: delay,
+        longest_hold: hold,
+        noise_together,
+        tolerance: tolerance.transpose()?,
+    };
+    Ok(MemberReport { name, instability, margins: Some(margins) })
+}
+
+/// One P for all loops, or the reason why there is none.
+pub(crate) fn common(
+    loops: &[DMatrix<f64>],
+    domain: Domain,
+    budget: &Budget,
+    name: impl Fn(usize) -> String,
+) -> Result<Result<CommonCertificate, String>, Error> {
+    if budget.is_over() {
+        return Ok(Err(format!("it was {}", budget.reason())));
+    }
+    Ok(match certify_common(loops, &lmi::Region::default(), domain)? {
+        Outcome::Optimal(found) => Ok(reported(&found)),
+        Outcome::Infeasible { conflict } => {
+            let mut names: Vec<_> = conflict.into_iter().map(name).collect();
+            names.dedup();
+            Err(format!("no P serves these together: {}", names.join(", ")))
+        }
+        Outcome::Inconclusive(reason) => Err(reason.to_owned()),
+    })
+}
+
+/// Returns a certificate for the report.
+pub(crate) fn reported(found: &RegionCertificate) -> CommonCertificate {
+    CommonCertificate { p: rows(&found.p), margin: found.margin }
+}
+
+/// Judges what is proven of plants that are no member.
+pub(crate) fn judge_proof(verdict: &mut Verdict, found: &FamilyReport) {
+    if found.whole.is_err() {
+        let text = "stability of plants between the members of the family, and while the plant moves between \
+                    them, is not proven; only the members themselves were checked";
+        verdict.add(Level::Amber, text.to_owned());
+    }
+}
+
+/// Judges the worst of several plants with the controller; `kind` names them in the reasons.
+pub(crate) fn judge(
+    verdict: &mut Verdict,
+    kind: &str,
+    members: &[&MemberReport],
+    limits: &RobustnessLimits,
+) {
+    let unstable = members.iter().filter(|member| member.margins.is_none());
+    let unstable: Vec<_> = unstable.map(|member| member.name.as_str()).collect();
+    if !unstable.is_empty() {
+        let names = unstable.join(", ");
+        verdict.add(Level::Red, format!("the loop is not stable with the {kind} {names}"));
+    }
+    let stable = || members.iter().filter_map(|own| Some((&own.name, own.margins.as_ref()?)));
+    let peaks = stable().flat_map(|(name, own)| own.points.iter().map(move |point| (name, point)));
+    if let Some((name, point)) = peaks.max_by(|x, y| x.1.judged.total_cmp(&y.1.judged)) {
+        let peak = point.judged;
+        let reached = match peak {
+            peak if peak > limits.red => Some((limits.red, Level::Red)),
+            peak if peak > limits.amber => Some((limits.amber, Level::Amber)),
+            _ => None,
+        };
+        if let Some((limit, level)) = reached {
+            let text = format!(
+                "the peak of S at the {} with the {kind} {name} is {peak:.3}, above {limit} ({})",
+                point.point,
+                level.word()
+            );
+            verdict.add(level, text);
+        }
+    }
+    let tolerances = stable().filter_map(|(name, own)| Some((name, own.tolerance.as_ref()?)));
+    let worst = tolerances
+        .filter(|(_, found)| found.stable < 1.0 || found.worst_instability >= 0.0)
+        .min_by(|x, y| x.1.first_unstable.total_cmp(&y.1.first_unstable));
+    if let Some((name, found)) = worst {
+        let text = format!(
+            "parameters within their tolerances make the loop with the {kind} {name} unstable: {:.1} % \
+             of {} random cases, the worst case found from {:.3} of the tolerances on",
+            100.0 * (1.0 - found.stable),
+            found.cases,
+            found.first_unstable
+        );
+        verdict.add(Level::Red, text);
+    }
+}

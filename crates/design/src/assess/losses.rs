@@ -1,0 +1,361 @@
+//! Losses of effectiveness up to the fractions that the plant file states: what is proven, and what
+//! constant losses make unstable.
+
+use control::aso::{FaultyPlant, Gains};
+use control::controller::controller;
+use control::lmi::{Outcome, Region, common_reachable_set};
+use control::losses::LossyLoop;
+use control::{Error, StateSpace};
+use nalgebra::{DMatrix, DVector};
+
+use crate::budget::Budget;
+use crate::matrix::rows;
+use crate::plant_file::signals::EntryPoint;
+use crate::report::losses::{
+    CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport, described,
+};
+use crate::report::robustness::{Level, Number};
+use crate::solve::solution::ControllerDesign;
+use crate::solve::tracking::DesignLoop;
+
+/// Largest number of states of plant and controller for which linear matrix inequalities are solved.
+const LARGEST_ORDER: usize = 30;
+/// Rates of the reachable sets, relative to twice the proven decay rate.
+const RATES: [f64; 3] = [0.2, 0.5, 0.8];
+
+/// An actuator that may lose effectiveness up to a stated fraction.
+struct StatedLoss {
+    name: String,
+    actuator: usize,
+    up_to: f64,
+    /// The command at the operating point.
+    operating: f64,
+}
+
+/// Returns the stated losses.
+fn stated(designed: &ControllerDesign) -> Vec<StatedLoss> {
+    let linear = &designed.linear;
+    let one = |fault: &crate::plant_file::signals::Fault| match (&fault.entry_point, fault.up_to) {
+        (EntryPoint::Loss { actuator, .. }, Some(up_to)) => Some(StatedLoss {
+            name: linear.actuators[*actuator].name.clone(),
+            actuator: *actuator,
+            up_to,
+            operating: linear.actuators[*actuator].operating.unwrap_or(0.0),
+        }),
+        _ => None,
+    };
+    linear.faults.iter().filter_map(one).collect()
+}
+
+/// Returns what is proven about the stated losses; None if the plant file states none.
+pub(crate) fn losses(
+    designed: &ControllerDesign,
+    budget: &Budget,
+) -> Result<Option<LossReport>, Error> {
+    let stated = stated(designed);
+    if stated.is_empty() {
+        return Ok(None);
+    }
+    let inputs: Vec<_> = stated.iter().map(|loss| loss.actuator).collect();
+    let loops = controllers(designed)?
+        .into_iter()
+        .map(|own| {
+            let lossy = LossyLoop::new(&own.closed.plant, &own.closed.controller, &inputs)?;
+            Examination { designed, stated: &stated, lossy, budget }.report(&own)
+        })
+        .collect::<Result<_, Error>>()?;
+    Ok(Some(LossReport { stated: numbers(&stated, |loss| loss.up_to), loops }))
+}
+
+fn numbers(stated: &[StatedLoss], value: impl Fn(&StatedLoss) -> f64) -> Vec<Number> {
+    stated.iter().map(|loss| number(&loss.name, value(loss))).collect()
+}
+
+fn number(name: &str, value: f64) -> Number {
+    Number { name: name.to_owned(), unit: None, value }
+}
+
+/// What the losses contribute to the verdict.
+pub(crate) fn reasons(report: &LossReport) -> Vec<(Level, String)> {
+    report.loops.iter().filter_map(|own| reason(own, &report.stated)).collect()
+}
+
+/// A loop that constant losses within the stated range make unstable is red, a loop without a proof
+/// amber. With the compensation off, which may never happen, the first is amber, too.
+fn reason(own: &LossLoop, stated: &[Number]) -> Option<(Level, String)> {
+    let on = own.name == ON;
+    let limit = &own.constant[0];
+    if !limit.stable && limit.factor <= 1.0 {
+        let level = if on { Level::Red } else { Level::Amber };
+        let reason = format!(
+            "constant losses of effectiveness within the stated range make the loop unstable, \
+             {}: from {} on ({})",
+            own.name,
+            described(&limit.losses),
+            level.word()
+        );
+        return Some((level, reason));
+    }
+    let reason = own.proof.as_ref().err().filter(|_| on)?;
+    let losses = described(stated);
+    Some((
+        Level::Amber,
+        format!("losses of effectiveness up to {losses} are not proven: {reason} (amber)"),
+    ))
+}
+
+/// The name of the loop with the compensation on.
+const ON: &str = "compensation on";
+
+/// A controller that the design can become.
+struct Variant {
+    name: &'static str,
+    meaning: &'static str,
+    closed: DesignLoop,
+}
+
+/// Returns the controllers with compensation on and off.
+fn controllers(designed: &ControllerDesign) -> Result<Vec<Variant>, Error> {
+    let ControllerDesign { linear, plant, gains, domain, .. } = designed;
+    let uncompensated = Gains { k_f: &gains.k_f * 0.0, ..gains.clone() };
+    let off = if designed.monitor {
+        Variant {
+            name: "compensation off",
+            meaning: "u = K_x x_hat; the faults are estimated, but not compensated",
+            closed: DesignLoop::of(
+                (linear, plant),
+                &uncompensated,
+                designed.filter.as_deref(),
+                *domain,
+            )?,
+        }
+    } else {
+        Variant {
+            name: "compensation off",
+            meaning: "u = K_x x_hat; the estimates of the faults are held",
+            closed: DesignLoop {
+                plant: plant.clone(),
+                controller: without_estimates(plant, &uncompensated, designed)?,
+            },
+        }
+    };
+    let on = Variant {
+        name: ON,
+        meaning: "u = K_x x_hat + K_f f_hat, with the estimates f_hat that the observer computes",
+        closed: DesignLoop {
+            plant: designed.whole.plant.clone(),
+            controller: designed.whole.controller.clone(),
+        },
+    };
+    // With integral action the estimates are not held while the integrals go on.
+    let held_integrals = gains.integral.is_some() && !designed.monitor;
+    Ok(if held_integrals { vec![on] } else { vec![on, off] })
+}
+
+/// The controller whose estimates of the faults are held: an observer of the states only.
+fn without_estimates(
+    plant: &FaultyPlant,
+    gains: &Gains,
+    designed: &ControllerDesign,
+) -> Result<StateSpace, Error> {
+    let held = Gains { l_f: &gains.l_f * 0.0, ..gains.clone() };
+    let StateSpace { a, b, c, d, domain } = controller(plant, &held, designed.domain)?;
+    let n = plant.a.nrows();
+    Ok(StateSpace {
+        a: a.view((0, 0), (n, n)).into(),
+        b: b.rows(0, n).into(),
+        c: c.columns(0, n).into(),
+        d,
+        domain,
+    })
+}
+
+/// One loop under the stated losses.
+struct Examination<'a> {
+    designed: &'a ControllerDesign,
+    stated: &'a [StatedLoss],
+    lossy: LossyLoop,
+    budget: &'a Budget,
+}
+
+impl Examination<'_> {
+    fn report(&self, own: &Variant) -> Result<LossLoop, Error> {
+        let constant: Vec<_> =
+            self.boxes().iter().map(|own| self.constant(own)).collect::<Result<_, Error>>()?;
+        let proof = match self.obstacle(&constant[0]) {
+            Some(reason) => Err(reason),
+            None => self.proof(own.name == ON)?,
+        };
+        let certified = match &proof {
+            Err(_) if self.is_too_large() => Vec::new(),
+            _ => self.certified(&constant)?,
+        };
+        let (name, meaning) = (own.name.to_owned(), own.meaning.to_owned());
+        Ok(LossLoop { name, meaning, constant, proof, certified })
+    }
+
+    fn largest(&self) -> Vec<f64> {
+        self.stated.iter().map(|loss| loss.up_to).collect()
+    }
+
+    /// The stated losses together; with several, also each one alone.
+    fn boxes(&self) -> Vec<Vec<f64>> {
+        let all = self.largest();
+        let alone = |at: usize| {
+            (0..all.len()).map(|k| if k == at { all[k] } else { 0.0 }).collect::<Vec<_>>()
+        };
+        let single: Vec<_> = (0..all.len()).map(alone).collect();
+        if all.len() == 1 { vec![all] } else { [vec![all], single].concat() }
+    }
+
+    fn is_too_large(&self) -> bool {
+        self.lossy.intact.nrows() > LARGEST_ORDER
+    }
+
+    /// Why no proof is searched.
+    fn obstacle(&self, constant: &ConstantLoss) -> Option<String> {
+        if !constant.stable && constant.factor <= 1.0 {
+            let losses = described(&constant.losses);
+            return Some(format!("the loop is unstable from the constant losses {losses} on"));
+        }
+        self.is_too_large().then(|| {
+            format!(
+                "linear matrix inequalities are solved for up to {LARGEST_ORDER} states of plant and \
+                 controller, found {}",
+                self.lossy.intact.nrows()
+            )
+        })
+    }
+
+    /// The constant losses that make the loop unstable, up to a loss of 1.
+    fn constant(&self, largest: &[f64]) -> Result<ConstantLoss, Error> {
+        let most = 1.0 / largest.iter().copied().fold(0.0, f64::max);
+        let found = self.lossy.constant_limit(largest, most)?;
+        let losses = self.stated.iter().zip(&found.loss);
+        Ok(ConstantLoss {
+            losses: losses
+                .map(|(own, loss)| number(&own.name, *loss))
+                .filter(|loss| loss.value > 0.0)
+                .collect(),
+            stable: found.factor >= most,
+            factor: found.factor,
+        })
+    }
+
+    /// The proof for the stated losses; decay rate and bounds of the states if `bounded`.
+    fn proof(&self, bounded: bool) -> Result<Result<LossProof, String>, Error> {
+        let largest = self.largest();
+        let certificate = match self.lossy.certificate(&largest, &Region::default())? {
+            Outcome::Optimal(certificate) => certificate,
+            Outcome::Infeasible { .. } => {
+                return Ok(Err(
+                    "no common Lyapunov matrix exists for all these losses; losses that vary with \
+                     time may make the loop unstable"
+                        .to_owned(),
+                ));
+            }
+            Outcome::Inconclusive(reason) => return Ok(Err(reason.to_owned())),
+        };
+        let searched = bounded && !self.budget.is_over();
+        let decay = if searched { self.lossy.decay(&largest)? } else { None };
+        Ok(Ok(LossProof {
+            margin: certificate.margin,
+            p: rows(&certificate.p),
+            decay,
+            peaks: decay.map_or(Ok(Vec::new()), |decay| self.peaks(decay))?,
+        }))
+    }
+
+    fn certified(&self, constant: &[ConstantLoss]) -> Result<Vec<CertifiedLoss>, Error> {
+        let mut all = Vec::new();
+        for (largest, limit) in self.boxes().iter().zip(constant) {
+            if self.budget.is_over() {
+                break;
+            }
+            let found = self.lossy.certified(largest, limit.factor)?;
+            let losses = numbers(self.stated, |_| 0.0).into_iter().zip(largest);
+            all.push(CertifiedLoss {
+                losses: losses
+                    .filter(|(_, largest)| **largest > 0.0)
+                    .map(|(own, largest)| Number { value: largest * found.factor, ..own })
+                    .collect(),
+                factor: found.factor,
+            });
+        }
+        Ok(all)
+    }
+
+    /// The bounds of the states under each disturbance of known size.
+    fn peaks(&self, decay: f64) -> Result<Vec<LossPeak>, Error> {
+        let linear = &self.designed.linear;
+        let corners = self.lossy.corners(&self.largest());
+        let (n, order) = (linear.states.len(), self.lossy.intact.nrows());
+        let outputs = DMatrix::identity(n, order);
+        let mut found = Vec::new();
+        for Disturbance { name, size, column } in self.disturbances() {
+            let column = column.resize_vertically(order, 0.0);
+            let mut smallest = vec![f64::INFINITY; n];
+            for rate in RATES {
+                if self.budget.is_over() {
+                    break;
+                }
+                let set = common_reachable_set(
+                    &corners,
+                    (&column, &outputs),
+                    2.0 * decay * rate,
+                    self.lossy.domain,
+                )?;
+                let Outcome::Optimal(set) = set else { continue };
+                for (state, smallest) in smallest.iter_mut().enumerate() {
+                    let peak = set.peak(&outputs.row(state).transpose());
+                    *smallest = smallest.min(peak * size);
+                }
+            }
+            let states = linear.states.iter().zip(smallest);
+            found.extend(states.filter(|(_, largest)| largest.is_finite()).map(
+                |(state, largest)| LossPeak {
+                    disturbance: name.clone(),
+                    size,
+                    state: state.name.clone(),
+                    unit: state.unit.clone(),
+                    largest,
+                },
+            ));
+        }
+        Ok(found)
+    }
+
+    /// What acts on the plant with a known size: the lost part of each command of the operating point,
+    /// and every other fault whose bound is stated.
+    fn disturbances(&self) -> Vec<Disturbance> {
+        let ControllerDesign { linear, extended, whole, .. } = self.designed;
+        let plant = &whole.plant;
+        let lost =
+            self.stated.iter().filter(|loss| loss.operating != 0.0).map(|loss| Disturbance {
+                name: format!("lost part of {} at the operating point", loss.name),
+                size: loss.up_to * loss.operating.abs(),
+                column: plant.b.column(loss.actuator).into_owned(),
+            });
+        let faults = linear.faults.iter().zip(&extended.channels).filter_map(|(fault, channel)| {
+            // A sensor fault acts through the filter, which may be part of the controller.
+            let additive = match fault.entry_point {
+                EntryPoint::Loss { .. } => false,
+                EntryPoint::Sensor(_) => plant.a.nrows() > linear.states.len(),
+                _ => true,
+            };
+            Some(Disturbance {
+                name: fault.name.clone(),
+                size: fault.bound.filter(|_| additive)?,
+                column: plant.f_a.column(channel.estimate).into_owned(),
+            })
+        });
+        lost.chain(faults).collect()
+    }
+}
+
+struct Disturbance {
+    name: String,
+    size: f64,
+    /// How it acts on the states of the plant.
+    column: DVector<f64>,
+}

@@ -1,0 +1,371 @@
+//! Fills the report with the numbers of a design.
+
+use std::time::Duration;
+
+use control::eigen::eigenvalues;
+use control::faults::FaultEntry;
+use control::losses::loss_tolerance;
+use control::placement::Quality;
+use control::{Domain, Error};
+use fmu_description::documentation::texts;
+use fmu_description::{ModelDescription, ScalarVariable};
+use nalgebra::{Complex, DMatrix};
+
+use crate::assess::analysis::Loops;
+use crate::assess::certificate::certificate;
+use crate::assess::checks::checks;
+use crate::assess::estimation;
+use crate::assess::fallback;
+use crate::assess::family::{self as family_report, judge, judge_proof};
+use crate::assess::losses::{self, losses};
+use crate::assess::matrices::Names;
+use crate::assess::reconfiguration::reasons as reconfiguration_reasons;
+use crate::assess::references::{beyond_limits, reached, reference_steps};
+use crate::assess::responses::responses;
+use crate::assess::robustness::robustness;
+use crate::assess::schedule::{self as schedule_report, judge_schedule};
+use crate::assess::verdict::verdict;
+use crate::budget::Budget;
+use crate::matrix::pairs;
+use crate::plant::fixed_mode::shown;
+use crate::plant::parameters::ParameterFamily;
+use crate::plant::plausibility::line;
+use crate::plant_file::requirements::{self, Requirement};
+use crate::plant_file::signals::{self, EntryPoint, Fault, FaultDynamics};
+use crate::plant_file::{PlantFile, estimator};
+use crate::progress::{Step, Steps};
+use crate::report::number::rounded;
+use crate::report::reconfiguration::ReconfigurationReport;
+use crate::report::robustness::Level;
+use crate::report::{Effectiveness, Loop, Plant, Region, Report, Sampled, Signal};
+use crate::solve::fallback::Fallback;
+use crate::solve::gain::GainResult;
+use crate::solve::solution::ControllerDesign;
+use crate::solve::tracking::{DesignLoop, TrackingAction};
+
+/// Returns the report on `designed`.
+pub(crate) fn report(
+    (file, family): (&PlantFile<'_>, Option<&ParameterFamily<'_>>),
+    (designed, reconfiguration, fallback): (
+        &ControllerDesign,
+        Option<ReconfigurationReport>,
+        Option<&Fallback>,
+    ),
+    description: String,
+    (certificate_time, steps): (Duration, &Steps<'_>),
+) -> Result<Report, crate::Error> {
+    let loops = Loops::of(designed)?;
+    let ControllerDesign { plant, gains, linear, .. } = designed;
+    let names = Names::of(designed);
+    let references = reference_steps(designed)?;
+    let mut checks = checks(designed);
+    checks.extend(reached(&references));
+    let robustness = robustness(designed, &file.robustness, family, steps)?;
+    let (errors, norms) = rayon::join(
+        || estimation::errors(designed, robustness.as_ref(), &file.robustness),
+        || loops.norms(),
+    );
+    let mut missing = Vec::new();
+    let errors = unless_numerical("the errors of the estimates", errors, &mut missing)?;
+    let norms = unless_numerical("the norms of the estimation errors", norms, &mut missing)?;
+    let budget = Budget::start(certificate_time);
+    let certificate = steps.run(Step::Certificates, || certificate(designed, norms, &budget));
+    let (bounds, without_bounds) = steps.run(Step::Bounds, || loops.bounds(&budget))?;
+    let losses = losses(designed, &budget)?;
+    let of_losses = losses.iter().flat_map(losses::reasons);
+    let further = of_losses.chain(reconfiguration.iter().flat_map(reconfiguration_reasons));
+    let mut further: Vec<_> = further.collect();
+    let (responses, frequency) =
+        rayon::join(|| steps.run(Step::Responses, || responses(designed)), || loops.frequency());
+    let responses = unless_numerical("the responses to faults", responses, &mut missing)?;
+    let frequency =
+        unless_numerical("the gains from faults over frequency", frequency, &mut missing)?;
+    further.extend(missing.into_iter().map(|reason| (Level::Amber, reason)));
+    let fallback = fallback.map(|own| fallback::report(file, designed, own, &budget));
+    let fallback = fallback.transpose()?.flatten();
+    further.extend(fallback.iter().flat_map(|own| fallback::reasons(own, file.robustness.red)));
+    let family_report = family_report::family(designed, &file.robustness, &budget)?;
+    let schedule = schedule_report::schedule(designed, &file.robustness, &budget)?;
+    let mut verdict = verdict(&checks, robustness.as_ref(), &file.robustness, further);
+    if let Some(found) = &family_report {
+        let members: Vec<_> = found.members.iter().skip(1).collect();
+        judge(&mut verdict, "member", &members, &file.robustness);
+        judge_proof(&mut verdict, found);
+    }
+    if let Some(found) = &schedule {
+        judge_schedule(&mut verdict, designed, found, &file.robustness);
+    }
+    let mut warnings: Vec<_> =
+        designed.warnings.iter().map(|warning| line(file, warning)).collect();
+    warnings.extend(references.iter().filter_map(beyond_limits));
+    warnings.extend(without_bounds);
+    Ok(Report {
+        description,
+        plant_file: file.name(),
+        plant: self::plant(designed, &names)?,
+        verdict,
+        warnings,
+        checks,
+        robustness,
+        gains: names.gains(designed),
+        feedback: closed(
+            if gains.integral.is_some() { "A_e + B_e [K_x, K_i]" } else { "A + B K_x" },
+            &designed.feedback_dynamics(),
+            &designed.feedback,
+            Some(&file.feedback.requirement),
+        )?,
+        observer: closed(
+            "A_0 - L C_0",
+            &gains.error_dynamics(plant),
+            &designed.observer,
+            Some(&file.observer.requirement).filter(|_| designed.law.keeps_error_dynamics()),
+        )?,
+        estimation: estimation::estimation(designed, errors),
+        sampling: match designed.domain {
+            Domain::Continuous => None,
+            Domain::Sampled { period } => Some(Sampled {
+                sample_time: period,
+                estimator: estimator(designed.gains.estimator).to_owned(),
+            }),
+        },
+        family: family_report,
+        schedule,
+        detection: None,
+        certificate,
+        bounds,
+        steps: responses,
+        references,
+        frequency,
+        effectiveness: effectiveness(designed)?,
+        losses,
+        reconfiguration,
+        fallback,
+        assumptions: assumptions(designed, &linear.faults),
+        interface: Vec::new(),
+    })
+}
+
+/// Returns a part of the report; an empty one, with a reason in `missing`, if rounding errors prevent it.
+fn unless_numerical<T>(
+    part: &str,
+    found: Result<Vec<T>, Error>,
+    missing: &mut Vec<String>,
+) -> Result<Vec<T>, Error> {
+    match found {
+        Err(error) if error.is_numerical() => {
+            missing.push(format!("{part} cannot be computed: {error}"));
+            Ok(Vec::new())
+        }
+        found => found,
+    }
+}
+
+fn plant(designed: &ControllerDesign, names: &Names) -> Result<Plant, Error> {
+    let linear = &designed.linear;
+    let signal = |signal: &signals::Signal| Signal {
+        name: signal.name.clone(),
+        unit: signal.unit.clone(),
+        description: signal.description.clone(),
+        operating: signal.operating.unwrap_or(0.0),
+        notes: signal.limits.map_or(String::new(), |[low, high]| format!("from {low} to {high}")),
+    };
+    let fault = |fault: &Fault| Signal {
+        name: fault.name.clone(),
+        unit: fault.unit.clone(),
+        description: fault.description.clone(),
+        operating: 0.0,
+        notes: notes(fault, designed),
+    };
+    Ok(Plant {
+        origin: linear.origin.clone(),
+        states: linear.states.iter().map(signal).collect(),
+        actuators: linear.actuators.iter().map(signal).collect(),
+        measurements: linear.measurements.iter().map(signal).collect(),
+        faults: linear.faults.iter().map(fault).collect(),
+        matrices: names.plant_matrices(designed),
+        eigenvalues: pairs(&eigenvalues(&linear.a)?),
+    })
+}
+
+/// Describes how a fault enters and what is known about it.
+fn notes(fault: &Fault, designed: &ControllerDesign) -> String {
+    let linear = &designed.linear;
+    let mut parts = vec![match &fault.entry_point {
+        EntryPoint::Column(at) => format!("column {} of F_a", at + 1),
+        EntryPoint::Actuator(at) => format!("adds to {}", linear.actuators[*at].name),
+        EntryPoint::Sensor(at) => {
+            format!("adds to the measurement {}", linear.measurements[*at].name)
+        }
+        EntryPoint::Loss { actuator, .. } => {
+            format!("{} loses a part of its effect", linear.actuators[*actuator].name)
+        }
+        EntryPoint::Input(name) => format!("input {name} of the FMU"),
+    }];
+    parts.push(match fault.dynamics {
+        FaultDynamics::Constant => "modelled as constant".to_owned(),
+        FaultDynamics::Ramp => "modelled as a ramp".to_owned(),
+    });
+    let numbers = [("at most", fault.bound), ("rate at most", fault.rate_bound)];
+    for (text, value) in numbers.into_iter().chain([("jumps by", fault.step)]) {
+        parts.extend(value.map(|value| format!("{text} {value}")));
+    }
+    parts.join(", ")
+}
+
+fn closed(
+    name: &str,
+    dynamics: &DMatrix<f64>,
+    found: &GainResult,
+    requirement: Option<&Requirement>,
+) -> Result<Loop, Error> {
+    let quality = found.quality;
+    let region = match requirement {
+        Some(Requirement::Region(region) | Requirement::HInfinity { region, .. }) => Some(*region),
+        _ => None,
+    };
+    let number = |number: fn(&Quality) -> f64| quality.as_ref().map(number);
+    Ok(Loop {
+        matrix: name.to_owned(),
+        method: found.method.clone(),
+        wanted: pairs(&sorted(&found.required)),
+        eigenvalues: pairs(&eigenvalues(dynamics)?),
+        condition: number(|quality| quality.condition),
+        balanced_condition: number(|quality| quality.balanced_condition),
+        pole_error: number(|quality| quality.pole_error),
+        region: region.filter(|region| *region != requirements::Region::default()).map(|region| {
+            Region {
+                decay: region.decay,
+                disc_center: region.disc.map(|disc| disc.0),
+                disc_radius: region.disc.map(|disc| disc.1),
+                sector: region.sector,
+            }
+        }),
+        norm: found.norm.clone(),
+    })
+}
+
+fn sorted(eigenvalues: &[Complex<f64>]) -> Vec<Complex<f64>> {
+    let mut all = eigenvalues.to_vec();
+    all.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
+    all
+}
+
+/// Returns the largest stable loss of effectiveness of each actuator.
+fn effectiveness(designed: &ControllerDesign) -> Result<Vec<Effectiveness>, Error> {
+    let lossy = |model: &control::faults::Fault| match model.entry {
+        FaultEntry::LossOfEffectiveness(input) => Some(input),
+        _ => None,
+    };
+    let inputs: Vec<_> = designed.linear.models.iter().filter_map(lossy).collect();
+    if inputs.is_empty() {
+        return Ok(Vec::new());
+    }
+    let DesignLoop { plant, controller } = &designed.whole;
+    let found = loss_tolerance(plant, controller, &inputs, 1.0)?;
+    let one = |(input, loss): (&usize, &f64)| Effectiveness {
+        actuator: designed.linear.actuators[*input].name.clone(),
+        largest_stable_loss: *loss,
+    };
+    Ok(inputs.iter().zip(&found.single).map(one).collect())
+}
+
+fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
+    let mut all = vec![
+        "The plant is linear, as stated under Plant; the neglected nonlinear terms act as a fault."
+            .to_owned(),
+        "Commands are within the limits of the actuators; the observer receives the applied \
+         command."
+            .to_owned(),
+        "Bounds and responses start from rest, with the compensation on.".to_owned(),
+    ];
+    all.extend(tracking_assumption(designed));
+    if faults.iter().any(|fault| fault.dynamics == FaultDynamics::Constant) {
+        all.push(
+            "The estimate of a fault modelled as constant lags behind it; the rate of the fault \
+             causes the errors."
+                .to_owned(),
+        );
+    }
+    if designed.law.injection.is_some() {
+        all.push(
+            "The sliding-mode law is nonlinear: eigenvalues, margins, noise, bounds and responses are \
+             those of its linearisation within the boundary layer, for faults and noise small against \
+             rho; larger faults leave rho / (rho - |f|) times the lasting error."
+                .to_owned(),
+        );
+    }
+    if let Domain::Sampled { period } = designed.domain {
+        all.push(format!(
+            "Commands are constant over a sample time of {period} s; in the responses a \
+             fault changes at samples; states and commands are shown between them, too."
+        ));
+    }
+    if designed.family.is_some() {
+        all.push(
+            "Responses, bounds and certificates of the estimation errors are those of the nominal \
+             plant; the estimation error of another member also depends on its states."
+                .to_owned(),
+        );
+    }
+    if designed.schedule.is_some() {
+        all.push(
+            "Gains, responses and bounds are those of the plant of the file; between the points of the \
+             schedule, plant and controller are interpolated linearly. A change of the operating point \
+             acts like a disturbance."
+                .to_owned(),
+        );
+    }
+    if designed.linear.models.iter().any(|m| matches!(m.entry, FaultEntry::LossOfEffectiveness(_)))
+    {
+        all.push(
+            "The loss of effectiveness is constant; it is estimated only while the command is well \
+             above its threshold."
+                .to_owned(),
+        );
+    }
+    all
+}
+
+/// Says what the set points rely on.
+fn tracking_assumption(designed: &ControllerDesign) -> Option<String> {
+    Some(match &designed.tracking.as_ref()?.action {
+        TrackingAction::Feedforward(_) => {
+            "The references are reached without error only if A, B and C are those of the plant: there is \
+             no integral action."
+                .to_owned()
+        }
+        TrackingAction::Integral { windup_time, feedforward, .. } => format!(
+            "A constant reference is reached without error for every plant for which the loop is stable. \
+             While a command is at a limit, the integrals follow it with a time constant of {} s; the \
+             responses are those within the limits.{}",
+            rounded(*windup_time),
+            feedforward.as_ref().map_or(String::new(), |own| format!(
+                " In the plant of the model, references do not excite the slowest eigenvalues of the \
+                 feedback ({}): these answer disturbances and errors of the model.",
+                own.silent
+                    .iter()
+                    .filter(|value| value.im >= 0.0)
+                    .map(|value| shown(*value))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            ))
+        ),
+    })
+}
+
+/// Returns the variables of the controller FMU.
+pub(crate) fn interface(description: &ModelDescription) -> Vec<crate::report::Variable> {
+    let stated = |text: String| Some(text).filter(|text| !text.is_empty());
+    let variable = |variable: &ScalarVariable| {
+        let (unit, [start, ..]) = texts(&variable.kind, &description.types);
+        crate::report::Variable {
+            name: variable.name.clone(),
+            causality: variable.causality.as_str().to_owned(),
+            variability: variable.variability.as_str().to_owned(),
+            unit: stated(unit),
+            start: stated(start),
+            description: variable.description.clone().unwrap_or_default(),
+        }
+    };
+    description.variables.iter().map(variable).collect()
+}

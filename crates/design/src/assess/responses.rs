@@ -1,0 +1,301 @@
+//! The responses of the compensated loop to changes of the faults.
+
+use control::hold::zero_order_hold;
+use control::response::{TimeResponse, fault_system, ramp_response, step_response};
+use control::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::assess::analysis::Outputs;
+use crate::plant_file::signals::Fault;
+use crate::report::robustness::Number;
+use crate::report::{Curve, StepResponse};
+use crate::solve::solution::ControllerDesign;
+
+/// Relative band of the settling time: a response has settled when it stays within this fraction of
+/// its largest distance.
+pub(crate) const SETTLED: f64 = 0.02;
+/// Points shown within a sample time, besides the samples.
+pub(crate) const BETWEEN: u32 = 4;
+/// A curve has at most four points for each of so many parts of the logarithmic time axis; the second
+/// number for loops from `LARGE` states on.
+const PARTS: [usize; 2] = [1000, 250];
+const LARGE: usize = 48;
+
+/// Returns the responses to a change of each fault, as a step and as a ramp at the bound of its rate,
+/// and to steps of all faults together.
+pub(crate) fn responses(designed: &ControllerDesign) -> Result<Vec<StepResponse>, Error> {
+    let own = ShownLoop::of(designed)?;
+    let faults = &designed.linear.faults;
+    let changes = faults.iter().zip(&designed.extended.channels).flat_map(|(fault, channel)| {
+        let rates = std::iter::once(None).chain(fault.rate_bound.map(Some));
+        rates.map(move |rate| (fault, channel.estimate, rate))
+    });
+    let changes: Vec<_> = changes.collect();
+    let one = |&(fault, input, rate): &(&Fault, usize, Option<f64>)| {
+        let size = size(fault);
+        let trace = match rate {
+            None => step_response(&own.system, input)?,
+            Some(rate) => ramp_response(&own.system, input, size / rate)?,
+        };
+        Ok(StepResponse {
+            fault: fault.name.clone(),
+            unit: fault.unit.clone(),
+            size,
+            rate,
+            parts: vec![part(fault)],
+            curves: own.curves(&trace, size),
+        })
+    };
+    let together = || {
+        let names: Vec<_> = faults.iter().map(|fault| fault.name.as_str()).collect();
+        Ok::<_, Error>(StepResponse {
+            fault: names.join(" and "),
+            unit: None,
+            size: 1.0,
+            rate: None,
+            parts: faults.iter().map(part).collect(),
+            curves: own.curves(&step_response(&own.together(), 0)?, 1.0),
+        })
+    };
+    let (all, last) = rayon::join(
+        || changes.par_iter().map(one).collect::<Result<Vec<_>, Error>>(),
+        || (faults.len() > 1).then(together).transpose(),
+    );
+    let mut all = all?;
+    all.extend(last?);
+    Ok(all)
+}
+
+/// The size of the change of a fault.
+fn size(fault: &Fault) -> f64 {
+    fault.step.or(fault.bound).unwrap_or(1.0)
+}
+
+fn part(fault: &Fault) -> Number {
+    Number { name: fault.name.clone(), unit: fault.unit.clone(), value: size(fault) }
+}
+
+/// The loop from the faults to all that the responses show.
+struct ShownLoop<'a> {
+    designed: &'a ControllerDesign,
+    outputs: Outputs,
+    /// Outputs: [x; e; eps], the commands, and for a sampled loop the states at each time between
+    /// samples.
+    system: StateSpace,
+}
+
+impl<'a> ShownLoop<'a> {
+    fn of(designed: &'a ControllerDesign) -> Result<Self, Error> {
+        let ControllerDesign { plant, gains, domain, .. } = designed;
+        let mut system = fault_system(plant, gains, *domain)?;
+        let (m, order) = (plant.b.ncols(), system.a.nrows());
+        let (all, q) = plant.f_a.shape();
+        // u = K_x (x - e) + K_f f_hat + K_i x_i, with a direct term f_hat = f_hat_i + P_f C e.
+        let mut commands = DMatrix::zeros(m, order);
+        commands.columns_mut(0, all).copy_from(&gains.k_x);
+        commands.columns_mut(all, all).copy_from(&-&gains.k_x);
+        commands.columns_mut(2 * all, q).copy_from(&gains.k_f);
+        if let Some(p_f) = &gains.p_f {
+            let mut of_error = commands.columns_mut(all, all);
+            of_error += &gains.k_f * p_f * &plant.c;
+        }
+        if let Some(integral) = &gains.integral {
+            commands.columns_mut(2 * all + q, gains.integrals()).copy_from(&integral.gain);
+        }
+        add_outputs(&mut system, &commands, &DMatrix::zeros(m, q));
+        if let Domain::Sampled { period } = *domain {
+            let n = designed.extended.states;
+            let own = &designed.extended.plant;
+            let a = own.a.view((0, 0), (n, n)).into_owned();
+            let mut b = DMatrix::zeros(n, m + q);
+            b.columns_mut(0, m).copy_from(&own.b.rows(0, n));
+            b.columns_mut(m, q).copy_from(&own.f_a.rows(0, n));
+            for part in 1..=BETWEEN {
+                let time = period * f64::from(part) / f64::from(BETWEEN + 1);
+                // x(t_k + time) from x(t_k), with command and fault constant since t_k.
+                let (phi, gamma) = zero_order_hold(&a, &b, time)?;
+                let mut states = gamma.columns(0, m) * &commands;
+                let mut own_states = states.columns_mut(0, n);
+                own_states += phi;
+                add_outputs(&mut system, &states, &gamma.columns(m, q).into_owned());
+            }
+        }
+        Ok(Self { designed, outputs: Outputs::of(designed), system })
+    }
+
+    /// The loop with one input that changes all faults by their sizes.
+    fn together(&self) -> StateSpace {
+        let mut sizes = DMatrix::zeros(self.system.b.ncols(), 1);
+        let designed = self.designed;
+        for (fault, channel) in designed.linear.faults.iter().zip(&designed.extended.channels) {
+            sizes[channel.estimate] = size(fault);
+        }
+        let StateSpace { b, d, .. } = &self.system;
+        StateSpace { b: b * &sizes, d: d * &sizes, ..self.system.clone() }
+    }
+
+    /// Returns the curves of a response that is `factor` times as large.
+    fn curves(&self, trace: &TimeResponse, factor: f64) -> Vec<Curve> {
+        let ControllerDesign { plant, linear, extended, .. } = self.designed;
+        let first_command = 2 * plant.a.nrows() + plant.f_a.ncols();
+        let first_between = first_command + plant.b.ncols();
+        let signals = self.outputs.names.iter().zip(&self.outputs.units);
+        let signals = signals.zip(&self.outputs.positions);
+        let mut found = Vec::new();
+        for (at, ((name, unit), &row)) in signals.enumerate() {
+            let between = |part: usize| first_between + part * extended.states + at;
+            let is_state = at < linear.states.len();
+            let times = self.times(trace, |k, part| match part {
+                None => Some(trace.output[(row, k)]),
+                Some(part) if is_state => Some(trace.output[(between(part), k)]),
+                Some(_) => None,
+            });
+            found.push(self.curve(name.clone(), unit.clone(), (trace, row), factor, &times));
+        }
+        for (at, actuator) in linear.actuators.iter().enumerate() {
+            let row = first_command + at;
+            let times = self.times(trace, |k, _| Some(trace.output[(row, k)]));
+            let name = format!("command {}", actuator.name);
+            found.push(self.curve(name, actuator.unit.clone(), (trace, row), factor, &times));
+        }
+        found
+    }
+
+    /// Returns the points of a curve, each a time and a value.
+    ///
+    /// `value(k, None)` is the value at point k of the trace, `value(k, Some(i))` the one at the i-th time
+    /// after it. Times between samples are added where the trace has neighbouring samples.
+    fn times(
+        &self,
+        trace: &TimeResponse,
+        value: impl Fn(usize, Option<usize>) -> Option<f64>,
+    ) -> Vec<(f64, f64)> {
+        let mut points = Vec::with_capacity(trace.time.len());
+        let period = match self.designed.domain {
+            Domain::Continuous => 0.0,
+            Domain::Sampled { period } => period,
+        };
+        for (k, &time) in trace.time.iter().enumerate() {
+            points.extend(value(k, None).map(|value| (time, value)));
+            let next = trace.time.get(k + 1).filter(|next| **next - time < 1.5 * period);
+            if next.is_none() {
+                continue;
+            }
+            for part in 0..BETWEEN {
+                let later = time + period * f64::from(part + 1) / f64::from(BETWEEN + 1);
+                points.extend(value(k, Some(part as usize)).map(|value| (later, value)));
+            }
+        }
+        points
+    }
+
+    fn curve(
+        &self,
+        name: String,
+        unit: Option<String>,
+        (trace, row): (&TimeResponse, usize),
+        factor: f64,
+        points: &[(f64, f64)],
+    ) -> Curve {
+        let at_points = trace.transient(row, SETTLED);
+        let (peak, peak_time, settling_time) = match self.designed.domain {
+            Domain::Continuous => (at_points.peak, at_points.peak_time, at_points.settling_time),
+            Domain::Sampled { .. } => transient(points, trace.final_value[row]),
+        };
+        let shown = thinned(points, PARTS[usize::from(self.system.a.nrows() >= LARGE)]);
+        Curve {
+            name,
+            unit,
+            peak: factor * peak,
+            peak_time,
+            settling_time,
+            times: shown.iter().map(|point| point.0).collect(),
+            values: shown.iter().map(|point| factor * point.1).collect(),
+        }
+    }
+}
+
+/// Returns the first, the lowest, the highest and the last point of each of `parts` parts of the logarithmic
+/// time axis, and the points before it; all points if there are no more than that.
+fn thinned(points: &[(f64, f64)], parts: usize) -> Vec<(f64, f64)> {
+    if points.len() <= 4 * parts {
+        return points.to_vec();
+    }
+    let begin = points.partition_point(|point| point.0 <= 0.0);
+    let (before, rest) = points.split_at(begin);
+    #[expect(clippy::cast_precision_loss, reason = "at most 1000")]
+    let width = (rest[rest.len() - 1].0 / rest[0].0).ln() / parts as f64;
+    let part = |point: &(f64, f64)| ((point.0 / rest[0].0).ln() / width).floor();
+    let shown = |part: &[(f64, f64)]| {
+        let by_height = |i: &usize, j: &usize| part[*i].1.total_cmp(&part[*j].1);
+        let (lowest, highest) =
+            ((0..part.len()).min_by(by_height), (0..part.len()).max_by(by_height));
+        let mut kept: Vec<usize> = lowest.into_iter().chain(highest).collect();
+        kept.extend([0, part.len() - 1]);
+        kept.sort_unstable();
+        kept.dedup();
+        kept.into_iter().map(|at| part[at]).collect::<Vec<_>>()
+    };
+    let parts = rest.chunk_by(|one, next| part(one).total_cmp(&part(next)).is_eq());
+    before.iter().copied().chain(parts.flat_map(shown)).collect()
+}
+
+/// Appends outputs to a system.
+pub(crate) fn add_outputs(system: &mut StateSpace, c: &DMatrix<f64>, d: &DMatrix<f64>) {
+    let rows = system.c.nrows();
+    for (matrix, below) in [(&mut system.c, c), (&mut system.d, d)] {
+        let mut all = matrix.clone().resize_vertically(rows + below.nrows(), 0.0);
+        all.rows_mut(rows, below.nrows()).copy_from(below);
+        *matrix = all;
+    }
+}
+
+/// Returns the value with the largest modulus, its time, and the time from which the points stay
+/// within the band around the final value.
+fn transient(points: &[(f64, f64)], final_value: f64) -> (f64, f64, f64) {
+    let largest = |best: (f64, f64), point: &(f64, f64)| {
+        if point.1.abs() > best.1.abs() { *point } else { best }
+    };
+    let (peak_time, peak) = points.iter().fold((0.0, 0.0), largest);
+    let distance = |point: &(f64, f64)| (point.1 - final_value).abs();
+    let band = SETTLED * points.iter().map(distance).fold(0.0, f64::max);
+    let outside = points.iter().rposition(|point| distance(point) > band);
+    let settled = outside.map_or(0.0, |at| points[(at + 1).min(points.len() - 1)].0);
+    (peak, peak_time, settled)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thinned_curve_keeps_ends_peaks_and_order() {
+        let point =
+            |k: u32| (f64::from(k), if k == 12_345 { 9.0 } else { (0.1 * f64::from(k)).sin() });
+        let all: Vec<_> = (0..50_000).map(point).collect();
+        let kept = thinned(&all, 250);
+        assert!(kept.len() <= 1005 && kept.is_sorted_by(|x, y| x.0 < y.0), "{}", kept.len());
+        assert_eq!((kept[0], kept[kept.len() - 1]), (all[0], all[49_999]));
+        assert!(kept.contains(&(12_345.0, 9.0)));
+        assert_eq!(thinned(&all[..1000], 250), all[..1000]);
+        // By index the decade to 10^4 would have a fifth of what is kept.
+        let shown = kept.iter().filter(|point| (1e3..1e4).contains(&point.0)).count();
+        assert!((150..=220).contains(&shown), "{shown}");
+    }
+
+    #[test]
+    fn a_thinned_curve_drawn_over_the_logarithm_of_time_is_the_curve_in_every_decade() {
+        // Two modes, 1e-2 s and 10 s.
+        let value = |time: f64| 2.0 - (-100.0 * time).exp() - (-0.1 * time).exp();
+        let all: Vec<_> = (0..50_000).map(|k| 1e-3 * f64::from(k)).map(|t| (t, value(t))).collect();
+        let kept = thinned(&all, 250);
+        for (time, exact) in &all[1..] {
+            let next = kept.partition_point(|point| point.0 < *time);
+            let ((from, low), (to, high)) = (kept[next.max(2) - 1], kept[next.max(2)]);
+            let share = (time / from).ln() / (to / from).ln();
+            let drawn = low + share * (high - low);
+            assert!((drawn - exact).abs() < 2e-3, "{time}: {drawn}, expected {exact}");
+        }
+    }
+}

@@ -1,0 +1,402 @@
+//! Analyses the robustness of a design and judges it.
+
+mod noise;
+mod tolerances;
+
+pub(crate) use noise::noise_peaks;
+pub(crate) use tolerances::by_entries;
+
+use control::aso::Gains;
+use control::controller::{CompleteController, complete_controller, with_feedthrough};
+use control::response::{frequency_grid, frequency_response, h_infinity};
+use control::robustness::{
+    DiskMargin, Loop, OpenedLoop, Point, Tolerances, held_plant, longest_hold, longest_period,
+    peak_derivatives, regulator_of_same_speed,
+};
+use control::tracking::IntegralAction;
+use control::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::matrix::rows;
+use crate::plant::linear::LinearPlant;
+use crate::plant::parameters::ParameterFamily;
+use crate::plant_file::robustness::RobustnessLimits;
+use crate::plant_file::signals::Signal;
+use crate::progress::{Step, Steps};
+use crate::report::robustness::{
+    Channel, Compared, Disk, LoopPoint, Number, PeakSensitivity, Robustness,
+};
+use crate::report::{Frequency, Matrix};
+use crate::solve::solution::ControllerDesign;
+
+const WIDTH: f64 = 1e-4;
+const POINTS_PER_DECADE: u32 = 20;
+const POINTS: [(Point, &str); 2] = [(Point::Input, "input"), (Point::Output, "output")];
+
+/// Returns the robustness of a design; None if the loop is not stable. `family`: the plants whose
+/// parameters vary; without it the entries of the matrices vary.
+pub(crate) fn robustness(
+    designed: &ControllerDesign,
+    limits: &RobustnessLimits,
+    family: Option<&ParameterFamily<'_>>,
+    steps: &Steps<'_>,
+) -> Result<Option<Robustness>, crate::Error> {
+    if designed.instability >= 0.0 {
+        return Ok(None);
+    }
+    let physical = Physical::of(designed)?;
+    let own = physical.closed(&physical.controller)?;
+    let Margins { points, delay, hold, noise, noise_together } =
+        steps.run(Step::Margins, || margins(designed, &physical, &own, limits))?;
+    let slopes = slopes(&designed.linear, &physical, &points)?;
+    let ((comparison, curves), tolerance) = rayon::join(
+        || {
+            let comparison = || comparison(designed, &physical, &points);
+            rayon::join(|| steps.run(Step::Comparison, comparison), || curves(&own))
+        },
+        || {
+            steps.run(Step::Tolerances, || match family {
+                None => by_entries(designed, &physical, limits),
+                Some(family) => {
+                    tolerances::by_parameters(designed, &physical, (limits, family), &slopes)
+                }
+            })
+        },
+    );
+    Ok(Some(Robustness {
+        comparison: comparison?,
+        tolerance: tolerance?,
+        curves: curves?,
+        sensitivity: sensitivity(designed, &physical.plant, &slopes),
+        points,
+        delay_margin: delay,
+        longest_hold: hold,
+        noise_of_measurements: limits.noise.clone(),
+        noise,
+        noise_together,
+    }))
+}
+
+/// The margins of a loop, and what the noise of the measurements does in it.
+pub(crate) struct Margins {
+    pub(crate) points: Vec<LoopPoint>,
+    /// Delay margin and longest hold, s.
+    pub(crate) delay: f64,
+    pub(crate) hold: f64,
+    pub(crate) noise: Matrix,
+    pub(crate) noise_together: Vec<Number>,
+}
+
+/// Returns the margins of `own`, the loop of the controller and `physical`, which is stable.
+pub(crate) fn margins(
+    designed: &ControllerDesign,
+    physical: &Physical,
+    own: &Loop,
+    limits: &RobustnessLimits,
+) -> Result<Margins, crate::Error> {
+    let opened = POINTS.into_par_iter().map(|(at, _)| OpenedLoop::new(own, at));
+    let opened = opened.collect::<Result<Vec<_>, Error>>()?;
+    let point = |(opened, (point, name)): (&OpenedLoop, (Point, &str))| {
+        let signals = match point {
+            Point::Input => &designed.linear.actuators,
+            Point::Output => &designed.linear.measurements,
+        };
+        self::point(opened, name, signals)
+    };
+    let Physical { plant, controller, .. } = physical;
+    let at_input = &opened[0];
+    let (points, (delay, hold)) = rayon::join(
+        || opened.par_iter().zip(POINTS).map(point).collect::<Result<Vec<_>, Error>>(),
+        || match designed.domain {
+            Domain::Continuous => rayon::join(|| at_input.delay_margin(), || longest_hold(own)),
+            Domain::Sampled { .. } => rayon::join(
+                || at_input.sampled_delay_margin(plant, controller),
+                || longest_period(plant, controller),
+            ),
+        },
+    );
+    let (points, delay, hold) = (points?, delay?, hold?);
+    let (noise, noise_together) = noise::noise(designed, own, &physical.estimates, limits)?;
+    Ok(Margins { points, delay, hold, noise, noise_together })
+}
+
+/// Returns the margins of a loop opened at its `inputs` and at its `outputs`.
+pub(crate) fn loop_points(
+    own: &Loop,
+    inputs: &[Signal],
+    outputs: &[Signal],
+) -> Result<Vec<LoopPoint>, Error> {
+    let point = |(at, name): (Point, &str)| {
+        let signals = match at {
+            Point::Input => inputs,
+            Point::Output => outputs,
+        };
+        self::point(&OpenedLoop::new(own, at)?, name, signals)
+    };
+    POINTS.into_par_iter().map(point).collect()
+}
+
+/// The plant without filters, and the controller with its filters and integrals.
+pub(crate) struct Physical {
+    pub(crate) plant: StateSpace,
+    pub(crate) controller: StateSpace,
+    /// The controller with the estimated faults as its output.
+    estimates: StateSpace,
+}
+
+impl Physical {
+    fn of(designed: &ControllerDesign) -> Result<Self, Error> {
+        Self::with(designed, &designed.linear)
+    }
+
+    /// Another plant with the same controller.
+    pub(crate) fn with(designed: &ControllerDesign, linear: &LinearPlant) -> Result<Self, Error> {
+        Self::of_gains(designed, linear, &designed.gains)
+    }
+
+    /// Another plant and other gains in the same controller.
+    pub(crate) fn of_gains(
+        designed: &ControllerDesign,
+        linear: &LinearPlant,
+        gains: &Gains,
+    ) -> Result<Self, Error> {
+        let plant = StateSpace {
+            a: linear.a.clone(),
+            b: linear.b.clone(),
+            c: linear.c.clone(),
+            d: linear.d.clone(),
+            domain: Domain::Continuous,
+        };
+        let CompleteController { commands, estimates } = complete(designed, gains)?;
+        let channels: Vec<_> =
+            designed.extended.channels.iter().map(|channel| channel.estimate).collect();
+        let estimates = StateSpace {
+            c: estimates.c.select_rows(&channels),
+            d: estimates.d.select_rows(&channels),
+            ..estimates
+        };
+        Ok(Self { plant, controller: commands, estimates })
+    }
+
+    pub(crate) fn closed(&self, controller: &StateSpace) -> Result<Loop, Error> {
+        closed(&self.plant, controller)
+    }
+}
+
+/// The loop of a continuous plant and a controller, in the time domain of the controller.
+pub(crate) fn closed(plant: &StateSpace, controller: &StateSpace) -> Result<Loop, Error> {
+    let plant = match controller.domain {
+        Domain::Continuous => plant.clone(),
+        Domain::Sampled { period } => held_plant(plant, period)?,
+    };
+    Loop::new(plant, controller.clone())
+}
+
+/// The controller with `gains`, its filter and its integrals, from the measurements as the plant of the design
+/// gives them.
+fn complete(designed: &ControllerDesign, gains: &Gains) -> Result<CompleteController, Error> {
+    let filter = designed.filter.as_deref();
+    let found = complete_controller(&designed.plant, gains, filter, designed.domain)?;
+    if !designed.linear.has_feedthrough() {
+        return Ok(found);
+    }
+    let own = |system| with_feedthrough(system, &found.commands.c, &designed.linear.d);
+    Ok(CompleteController { commands: own(&found.commands)?, estimates: own(&found.estimates)? })
+}
+
+fn point(opened: &OpenedLoop, name: &str, signals: &[Signal]) -> Result<LoopPoint, Error> {
+    let channel = |(index, signal): (usize, &Signal)| {
+        let margins = || opened.channel_margins(index);
+        let (found, disk) = rayon::join(margins, || opened.disk_margin(Some(index)));
+        let found = found?;
+        Ok(Channel {
+            name: signal.name.clone(),
+            gain: found.gain,
+            phase: found.phase.to_degrees(),
+            delay: found.delay,
+            disk: self::disk(&disk?),
+        })
+    };
+    let s = opened.sensitivity_peak();
+    let ((t, scaled), (together, channels)) = rayon::join(
+        || rayon::join(|| opened.complementary_peak(), || opened.scaled_peak()),
+        || {
+            let channels = || signals.par_iter().enumerate().map(channel).collect();
+            rayon::join(|| opened.disk_margin(None), channels)
+        },
+    );
+    let (t, scaled) = (t?, scaled?);
+    let channels: Result<Vec<_>, Error> = channels;
+    let same_unit = same_unit(signals);
+    Ok(LoopPoint {
+        point: name.to_owned(),
+        s_peak: s.lower,
+        s_frequency: s.frequency,
+        t_peak: t.lower,
+        t_frequency: t.frequency,
+        s_peak_scaled: scaled.value,
+        judged: if same_unit { s.lower } else { scaled.value },
+        judged_frequency: if same_unit { s.frequency } else { scaled.frequency },
+        together: disk(&together?),
+        channels: channels?,
+    })
+}
+
+fn same_unit(signals: &[Signal]) -> bool {
+    signals.iter().all(|signal| signal.unit == signals[0].unit)
+}
+
+/// Returns the derivatives of the judged peaks with respect to the entries of A, B, C and D.
+fn slopes(
+    linear: &LinearPlant,
+    physical: &Physical,
+    points: &[LoopPoint],
+) -> Result<Vec<[DMatrix<f64>; 4]>, Error> {
+    let one = |((point, _), found): ((Point, &str), &LoopPoint)| {
+        let signals = match point {
+            Point::Input => &linear.actuators,
+            Point::Output => &linear.measurements,
+        };
+        let at = (point, found.judged_frequency, !same_unit(signals));
+        let slopes = peak_derivatives(&physical.plant, &physical.controller, at)?;
+        Ok([slopes.a, slopes.b, slopes.c, slopes.d])
+    };
+    POINTS.into_iter().zip(points).map(one).collect()
+}
+
+/// Returns how the judged peaks depend on the entries of the plant.
+fn sensitivity(
+    designed: &ControllerDesign,
+    plant: &StateSpace,
+    slopes: &[[DMatrix<f64>; 4]],
+) -> Vec<PeakSensitivity> {
+    let linear = &designed.linear;
+    let one = |((_, name), [to_a, to_b, to_c, to_d]): ((Point, &str), &[DMatrix<f64>; 4])| {
+        // One for the entries that tolerances vary, zero for structural ones.
+        let [in_a, in_b, in_c, in_d] = Tolerances::of_values(plant, [1.0; 4]).of;
+        let matrix = |name: &str, of: (&[Signal], &[Signal]), effects: &DMatrix<f64>| Matrix {
+            name: name.to_owned(),
+            meaning: "entry times derivative of the peak of S".to_owned(),
+            rows: names(of.0),
+            columns: names(of.1),
+            values: rows(effects),
+        };
+        let times = |varied: DMatrix<f64>, values: &DMatrix<f64>, slopes: &DMatrix<f64>| {
+            varied.component_mul(values).component_mul(slopes)
+        };
+        let LinearPlant { states, actuators, measurements, .. } = linear;
+        let mut matrices = vec![
+            matrix("A", (states, states), &times(in_a, &plant.a, to_a)),
+            matrix("B", (states, actuators), &times(in_b, &plant.b, to_b)),
+            matrix("C", (measurements, states), &times(in_c, &plant.c, to_c)),
+        ];
+        if linear.has_feedthrough() {
+            matrices.push(matrix("D", (measurements, actuators), &times(in_d, &plant.d, to_d)));
+        }
+        PeakSensitivity { point: name.to_owned(), matrices }
+    };
+    POINTS.into_iter().zip(slopes).map(one).collect()
+}
+
+fn names(signals: &[Signal]) -> Vec<String> {
+    signals.iter().map(|signal| signal.name.clone()).collect()
+}
+
+fn disk(found: &DiskMargin) -> Disk {
+    Disk {
+        alpha: found.alpha,
+        certified: found.certified,
+        frequency: found.frequency,
+        gain: found.gains(),
+        phase: found.phase().to_degrees(),
+    }
+}
+
+/// Returns the gains, and the peaks of S, beside those of the linear-quadratic design.
+fn comparison(
+    designed: &ControllerDesign,
+    physical: &Physical,
+    points: &[LoopPoint],
+) -> Result<Vec<Compared>, Error> {
+    let ControllerDesign { plant, gains, domain, extended, .. } = designed;
+    let n = extended.states;
+    let ((a, b), k) = (&designed.feedback_pair, &designed.feedback.gain);
+    let a_0 = plant.augmented_dynamics();
+    let seen = gains.estimator.output_matrix(&a_0, &plant.augmented_output());
+    let l = gains.observer_gain();
+    let dual = (-&l).transpose();
+    // A law with its own model of the fault has no Kalman filter of the same kind.
+    let observer = || match designed.law.a_f {
+        None => regulator_of_same_speed(&a_0.transpose(), &seen.transpose(), &dual, *domain),
+        Some(_) => Ok(None),
+    };
+    let (feedback, observer) = rayon::join(|| regulator_of_same_speed(a, b, k, *domain), observer);
+    let (feedback, observer) = (feedback?, observer?.map(|gain| -gain.transpose()));
+    let mut found = vec![
+        Compared {
+            name: match gains.integral {
+                None => "norm of K_x".to_owned(),
+                Some(_) => "norm of [K_x, K_i]".to_owned(),
+            },
+            design: norm(k),
+            linear_quadratic: feedback.as_ref().map(norm),
+        },
+        Compared {
+            name: "norm of L".to_owned(),
+            design: norm(&l),
+            linear_quadratic: observer.as_ref().map(norm),
+        },
+    ];
+    let other = match (feedback, observer) {
+        (Some(feedback), Some(observer)) => {
+            let all = plant.a.nrows();
+            let other = Gains {
+                k_x: feedback.columns(0, n).into_owned().resize_horizontally(all, 0.0),
+                integral: gains.integral.clone().map(|own| IntegralAction {
+                    gain: feedback.columns(n, own.gain.ncols()).into(),
+                    ..own
+                }),
+                l_x: observer.rows(0, all).into(),
+                l_f: -observer.rows(all, plant.f_a.ncols()),
+                p_f: None,
+                ..gains.clone()
+            };
+            Some(physical.closed(&complete(designed, &other)?.commands)?)
+        }
+        _ => None,
+    };
+    let peaks = points.par_iter().zip(POINTS).map(|(point, (at, name))| {
+        let peak = |other: &Loop| h_infinity(&other.sensitivity(at), WIDTH).ok();
+        Compared {
+            name: format!("peak of S at the {name}"),
+            design: point.s_peak,
+            linear_quadratic: other.as_ref().and_then(peak).map(|found| found.lower),
+        }
+    });
+    found.par_extend(peaks);
+    Ok(found)
+}
+
+/// Returns the 2-norm.
+fn norm(m: &DMatrix<f64>) -> f64 {
+    (m * m.transpose()).symmetric_eigenvalues().max().max(0.0).sqrt()
+}
+
+/// Returns the singular values of S and T at both points.
+fn curves(own: &Loop) -> Result<Vec<Frequency>, Error> {
+    let systems = POINTS.into_iter().flat_map(|(at, name)| {
+        [("S", own.sensitivity(at), name), ("T", own.complementary(at), name)]
+    });
+    let one = |(symbol, system, name): &(&str, StateSpace, &str)| {
+        let grid = frequency_grid(system, POINTS_PER_DECADE)?;
+        let points = frequency_response(system, &grid)?;
+        let values = |k: usize| points.iter().map(|point| point.singular_values[k]).collect();
+        Ok(Frequency {
+            name: format!("{symbol} at the {name}"),
+            singular_values: (0..system.d.nrows()).map(values).collect(),
+            frequencies: grid,
+        })
+    };
+    systems.collect::<Vec<_>>().par_iter().map(one).collect()
+}

@@ -1,0 +1,86 @@
+//! What the noise of the measurements does in a loop.
+
+use control::robustness::{Loop, noise_gains};
+use control::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
+
+use crate::assess::analysis::largest_gain;
+use crate::assess::robustness::Physical;
+use crate::matrix::rows;
+use crate::plant_file::robustness::RobustnessLimits;
+use crate::report::Matrix;
+use crate::report::robustness::Number;
+use crate::solve::solution::ControllerDesign;
+
+/// Returns the effect of each measurement noise on commands and estimated faults, and of all
+/// together.
+pub(super) fn noise(
+    designed: &ControllerDesign,
+    own: &Loop,
+    estimates: &StateSpace,
+    limits: &RobustnessLimits,
+) -> Result<(Matrix, Vec<Number>), Error> {
+    let of = |output: &StateSpace| {
+        let mut gains = noise_or_infinite(own.from_noise(output)?)?;
+        for (mut column, noise) in gains.column_iter_mut().zip(&limits.noise) {
+            column *= *noise;
+        }
+        Ok::<_, Error>(gains)
+    };
+    let (commands, faults) = (of(own.controller())?, of(estimates)?);
+    let linear = &designed.linear;
+    let named = linear.actuators.iter().map(|signal| (signal.name.clone(), signal.unit.clone()));
+    let estimated = linear.faults.iter();
+    let estimated =
+        estimated.map(|fault| (format!("estimate of {}", fault.name), fault.unit.clone()));
+    let names: Vec<_> = named.chain(estimated).collect();
+    let all = commands.row_iter().chain(faults.row_iter());
+    let together = names.iter().zip(all).map(|((name, unit), row)| Number {
+        name: name.clone(),
+        unit: unit.clone(),
+        value: row.norm(),
+    });
+    let together: Vec<_> = together.collect();
+    let mut values = rows(&commands);
+    values.extend(rows(&faults));
+    let matrix = Matrix {
+        name: "noise".to_owned(),
+        meaning: "root-mean-square values under the noise of each measurement".to_owned(),
+        rows: names.into_iter().map(|(name, _)| name).collect(),
+        columns: linear.measurements.iter().map(|signal| signal.name.clone()).collect(),
+        values,
+    };
+    Ok((matrix, together))
+}
+
+/// [`noise_gains`], infinite where a direct term passes white noise of continuous time.
+fn noise_or_infinite(mut system: StateSpace) -> Result<DMatrix<f64>, Error> {
+    let direct = system.d.clone();
+    if system.domain != Domain::Continuous {
+        return noise_gains(&system);
+    }
+    system.d.fill(0.0);
+    let passed = |gain: f64, direct: f64| if direct == 0.0 { gain } else { f64::INFINITY };
+    Ok(noise_gains(&system)?.zip_map(&direct, passed))
+}
+
+/// Returns for each fault the largest amplification of a sinusoidal error of the measurements to its
+/// estimate, all measurements together, in the units of `noise`.
+pub(crate) fn noise_peaks(designed: &ControllerDesign, noise: &[f64]) -> Result<Vec<f64>, Error> {
+    let physical = Physical::of(designed)?;
+    let own = physical.closed(&physical.controller)?;
+    let mut system = own.from_noise(&physical.estimates)?;
+    for (k, noise) in noise.iter().enumerate() {
+        system.b.column_mut(k).scale_mut(*noise);
+        system.d.column_mut(k).scale_mut(*noise);
+    }
+    let peak = |row: usize| {
+        let one = StateSpace {
+            c: system.c.rows(row, 1).into(),
+            d: system.d.rows(row, 1).into(),
+            ..system.clone()
+        };
+        Ok(largest_gain(&one)?.0)
+    };
+    (0..system.c.nrows()).map(peak).collect()
+}

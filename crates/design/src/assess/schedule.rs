@@ -1,0 +1,162 @@
+//! Examines a scheduled controller at and between the points of its schedule, and judges it.
+
+use control::lmi::{ScheduleCertificate, certify_schedule, largest_change};
+use control::{Domain, Error};
+use rayon::prelude::*;
+
+use crate::assess::checks::checks;
+use crate::assess::family::{common, judge, member};
+use crate::assess::matrices::gains;
+use crate::budget::Budget;
+use crate::matrix::rows;
+use crate::plant_file::robustness::RobustnessLimits;
+use crate::report::robustness::{Level, Verdict};
+use crate::report::schedule::{RateCertificate, SchedulePointReport, ScheduleReport};
+use crate::solve::schedule::{Scheduled, ScheduledLoop, coupled};
+use crate::solve::solution::ControllerDesign;
+
+/// Values of the scheduling variable in each interval, its ends included, at which eigenvalues are
+/// computed, less 1.
+const CHECKED: u32 = 20;
+/// An eigenvalue this near to the stability limit is one on it, with rounding errors.
+const NEUTRAL: f64 = 1e-7;
+
+/// Returns the report on the schedule of `designed`, if it has one.
+pub(crate) fn schedule(
+    designed: &ControllerDesign,
+    limits: &RobustnessLimits,
+    budget: &Budget,
+) -> Result<Option<ScheduleReport>, crate::Error> {
+    let Some(own) = &designed.schedule else { return Ok(None) };
+    let coupled = coupled(own, designed)?;
+    let all: Vec<_> = own.points(designed).collect();
+    let variable = &own.variable;
+    let one = |(k, (at, point)): (usize, &(f64, &ControllerDesign))| {
+        let name = format!("{} = {at}", variable.name);
+        let linear = &point.linear;
+        let found = member(point, linear, name.clone(), limits);
+        let operating = [&linear.states, &linear.actuators, &linear.measurements];
+        Ok::<_, crate::Error>(SchedulePointReport {
+            at: *at,
+            operating: operating
+                .map(|all| all.iter().map(|signal| signal.operating.unwrap_or(0.0)).collect()),
+            gains: gains(point),
+            closed: found.map_err(|error| error.within(format!("schedule with {name}")))?,
+            coupled_instability: coupled.as_ref().map(|all| all[k]),
+        })
+    };
+    let points = all.par_iter().enumerate().map(one).collect::<Result<Vec<_>, _>>()?;
+    let whole = ScheduledLoop::of(own, designed)?;
+    let intervals = whole.intervals()?;
+    let (worst_instability, worst_at) = whole.worst(CHECKED, designed.domain)?;
+    let vertices: Vec<_> = intervals.iter().flat_map(|own| own.coefficients.clone()).collect();
+    let degree = intervals[0].coefficients.len() - 1;
+    let named = |vertex: usize| {
+        let (k, j) = (vertex / (degree + 1), vertex % (degree + 1));
+        match j {
+            0 => all[k].0.to_string(),
+            j if j == degree => all[k + 1].0.to_string(),
+            _ => format!("{} to {}", all[k].0, all[k + 1].0),
+        }
+    };
+    let any_rate = common(&vertices, designed.domain, budget, named)?;
+    let bounded_rate = match &any_rate {
+        Ok(_) => Err("one P serves any rate".to_owned()),
+        Err(_) => bounded(own, &intervals, designed.domain, budget)?,
+    };
+    Ok(Some(ScheduleReport {
+        variable: variable.name.clone(),
+        unit: variable.unit.clone(),
+        measured: own.measurement.is_some(),
+        rate_bound: own.rate_bound,
+        checked: intervals.len() * usize::try_from(CHECKED).unwrap_or(usize::MAX) + 1,
+        points,
+        any_rate,
+        bounded_rate,
+        worst_instability,
+        worst_at,
+    }))
+}
+
+/// P(variable) for the stated rate, or for the largest one that is found.
+fn bounded(
+    own: &Scheduled,
+    intervals: &[control::lmi::Interval],
+    domain: Domain,
+    budget: &Budget,
+) -> Result<Result<RateCertificate, String>, Error> {
+    if budget.is_over() {
+        return Ok(Err(format!("it was {}", budget.reason())));
+    }
+    let shortest = intervals.iter().map(|own| own.length).fold(f64::INFINITY, f64::min);
+    // The time in which the variable changes once: a sample, or a second.
+    let (time, is_sampled) = match domain {
+        Domain::Continuous => (1.0, false),
+        Domain::Sampled { period } => (period, true),
+    };
+    let found = match own.rate_bound {
+        Some(rate) if is_sampled && rate * time > shortest => {
+            return Ok(Err(format!(
+                "at the stated rate the variable passes the shortest interval, {shortest}, in less \
+                 than a sample"
+            )));
+        }
+        Some(rate) => certify_schedule(intervals, rate * time, domain)?,
+        None => largest_change(intervals, domain)?,
+    };
+    Ok(match found {
+        Some(ScheduleCertificate { change, p, margin, .. }) => {
+            let p = p.iter().map(rows).collect();
+            Ok(RateCertificate { rate: own.rate_bound.unwrap_or(change / time), p, margin })
+        }
+        None => Err(match own.rate_bound {
+            Some(rate) => format!("no P was found for the stated rate {rate} per s"),
+            None => "no P was found, even for slow changes".to_owned(),
+        }),
+    })
+}
+
+/// Judges a scheduled controller.
+pub(crate) fn judge_schedule(
+    verdict: &mut Verdict,
+    designed: &ControllerDesign,
+    found: &ScheduleReport,
+    limits: &RobustnessLimits,
+) {
+    let members: Vec<_> = found.points.iter().map(|point| &point.closed).collect();
+    judge(verdict, "schedule at", &members, limits);
+    let others = designed.schedule.iter().flat_map(Scheduled::others);
+    for (at, point) in others {
+        for check in checks(point).iter().filter(|check| !check.holds) {
+            let text = format!("with {} = {at} does not hold: {}", found.variable, check.condition);
+            verdict.add(Level::Red, text);
+        }
+    }
+    if found.worst_instability >= 0.0 {
+        verdict.add(
+            Level::Red,
+            format!(
+                "the interpolated loop is not stable with {} = {}",
+                found.variable, found.worst_at
+            ),
+        );
+    }
+    for point in &found.points {
+        if point.coupled_instability.is_some_and(|value| value >= -NEUTRAL) {
+            let text = format!(
+                "the loop at {} = {} is not stable, because the measurement moves the operating point; \
+                 schedule by an input, such as its set point",
+                found.variable, point.at
+            );
+            verdict.add(Level::Red, text);
+        }
+    }
+    if found.any_rate.is_err() && found.bounded_rate.is_err() {
+        let text = format!(
+            "stability while {} changes is not proven, neither for any rate nor for a bounded one; only \
+             constant values were checked",
+            found.variable
+        );
+        verdict.add(Level::Amber, text);
+    }
+}

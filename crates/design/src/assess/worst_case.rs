@@ -1,0 +1,78 @@
+//! A plant file with the worst plant within the tolerances.
+
+use control::faults::FaultEntry;
+use toml::{Table, Value};
+
+use crate::plant_file::PlantFile;
+use crate::report::Report;
+use crate::report::identity::identity;
+use crate::report::robustness::Parameter;
+use crate::solve::solution::ControllerDesign;
+
+/// Returns the plant file with the matrices of the worst plant; a plant that is an FMU becomes one
+/// that matrices describe.
+pub(crate) fn plant_file(
+    file: &PlantFile<'_>,
+    designed: &ControllerDesign,
+    report: &Report,
+) -> Result<Option<String>, crate::Error> {
+    let Some(robustness) = &report.robustness else {
+        return Ok(None);
+    };
+    let unwritable = |error: &dyn std::fmt::Display| crate::Error::Invalid(error.to_string());
+    let mut table: Table = file.text().parse().map_err(|error| unwritable(&error))?;
+    for matrix in &robustness.tolerance.worst {
+        let row = |row: &Vec<f64>| Value::Array(row.iter().map(|x| Value::Float(*x)).collect());
+        let rows = matrix.values.iter().map(row).collect();
+        table.insert(matrix.name.clone(), Value::Array(rows));
+    }
+    if file.fmu().is_some() && !without_fmu(&mut table, designed) {
+        return Ok(None);
+    }
+    let text = toml::to_string(&table).map_err(|error| unwritable(&error))?;
+    let parameters = &robustness.tolerance.parameters;
+    let within = if parameters.is_empty() {
+        format!("within {}", report.verdict.limits.stated_tolerances(&robustness.tolerance.worst))
+    } else {
+        let worst = |own: &Parameter| format!("{} = {}", own.name, own.worst);
+        format!("with {}", parameters.iter().map(worst).collect::<Vec<_>>().join(", "))
+    };
+    Ok(Some(format!(
+        "# Written by {}: the worst plant found {within}.\n\n{text}",
+        identity(report)
+    )))
+}
+
+/// Replaces what refers to the plant's FMU; false if a fault cannot be stated without it.
+fn without_fmu(table: &mut Table, designed: &ControllerDesign) -> bool {
+    // Members and points of a schedule are linearised from the FMU.
+    for key in ["plant", "operating_point", "preload", "linearisation_step", "family", "schedule"] {
+        table.remove(key);
+    }
+    let linear = &designed.linear;
+    let names = linear.states.iter().map(|signal| Value::String(signal.name.clone()));
+    table.insert("states".to_owned(), Value::Array(names.collect()));
+    if let Some(Value::Table(robustness)) = table.get_mut("robustness") {
+        robustness.remove("parameters");
+    }
+    let mut columns = Vec::new();
+    if let Some(Value::Array(faults)) = table.get_mut("faults") {
+        let own = linear.models.len() - faults.len();
+        for (fault, model) in faults.iter_mut().zip(&linear.models[own..]) {
+            let input = fault.as_table_mut().and_then(|fault| fault.remove("input"));
+            match (input, &model.entry) {
+                (None, _) => {}
+                (Some(_), FaultEntry::Actuator(column)) => columns.push(column.clone()),
+                (Some(_), _) => return false,
+            }
+        }
+    }
+    if !columns.is_empty() {
+        let row = |at: usize| {
+            Value::Array(columns.iter().map(|column| Value::Float(column[at])).collect())
+        };
+        let rows = (0..linear.a.nrows()).map(row).collect();
+        table.insert("F_a".to_owned(), Value::Array(rows));
+    }
+    true
+}

@@ -1,0 +1,8 @@
+//! The plant: linear, at the operating point, with its faults; and the plants of varied parameters.
+
+pub(crate) mod feedthrough;
+pub(crate) mod fixed_mode;
+pub(crate) mod linear;
+pub(crate) mod parameters;
+pub(crate) mod plausibility;
+pub(crate) mod rest;

@@ -1,0 +1,149 @@
+//! Direct feedthrough, y = C x + D u: what it needs, and what is not possible with it.
+//!
+//! The controller knows its commands and takes D u off the measurements. What else enters the measurements with
+//! the commands, a fault of an actuator, must pass the measurement filter, which is why there must be one.
+
+use control::faults::FaultEntry;
+use files::PlaceError;
+
+use crate::plant::linear::LinearPlant;
+use crate::plant_file::PlantFile;
+use crate::plant_file::requirements::Requirement;
+
+/// Refuses a plant with feedthrough and no filter, a filter that nothing needs, and tables that are for plants
+/// without feedthrough.
+pub(crate) fn check(file: &PlantFile<'_>, linear: &LinearPlant) -> Result<(), PlaceError> {
+    let LinearPlant { d, models, measurements, actuators, .. } = linear;
+    let entries = || (0..d.nrows()).flat_map(|row| (0..d.ncols()).map(move |column| (row, column)));
+    let Some((row, column)) = entries().find(|at| d[*at] != 0.0) else {
+        let measured = models.iter().any(|model| model.entry.is_measured());
+        return match &file.filter {
+            Some(_) if !measured => {
+                let message = "no fault enters a measurement, and D is 0, so none is needed";
+                Err(file.error(&["filter"], message))
+            }
+            _ => Ok(()),
+        };
+    };
+    let fed = format!(
+        "the measurement {} depends on {} directly (D is {})",
+        measurements[row].name,
+        actuators[column].name,
+        d[(row, column)]
+    );
+    if file.filter.is_none() {
+        let message = format!(
+            "{fed}, which needs `filter`: the rates, in 1/s, of the filter that the measurements pass"
+        );
+        return Err(file.error(&["D", "measurements"], message));
+    }
+    for (fault, model) in file.faults.iter().zip(models) {
+        if let FaultEntry::LossOfEffectiveness(input) = model.entry
+            && d.column(input).amax() > 0.0
+        {
+            let message = format!(
+                "fault `{}`: the measurements contain the command of this actuator directly (D), and its \
+                 loss would be seen in them; expected `actuator`, an additive fault",
+                fault.name
+            );
+            return Err(file.error_at(&fault.place, message));
+        }
+    }
+    let referred = file.references.as_ref().map(|references| &references.h * d);
+    let refused = [
+        ("family", !file.family.is_empty()),
+        ("schedule", file.is_scheduled()),
+        ("reconfiguration", file.reconfiguration.is_some()),
+        ("fallback", file.fallback.is_some()),
+        ("reference", referred.is_some_and(|h_d| h_d.amax() > 0.0)),
+    ];
+    if let Some((key, _)) = refused.into_iter().find(|(_, stated)| *stated) {
+        let advice = match key {
+            "reference" => "expected references of measurements without it",
+            _ => "expected a plant without it, for example measurements that are filtered before",
+        };
+        return Err(file.error(&[key], format!("{fed}; `{key}` is not possible then: {advice}")));
+    }
+    if let Requirement::HInfinity { .. } = file.feedback.requirement {
+        let message = format!(
+            "{fed}; the norm of the feedback is not possible then: expected `eigenvalues`, `region` or `Q` \
+             and `R`"
+        );
+        return Err(file.error_at(&file.feedback.place, message));
+    }
+    match &file.detection {
+        Some(own) if own.model_error.is_some() => {
+            let message = format!("{fed}; `model_error` is not possible then");
+            Err(file.error_at(&own.place, message))
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use files::{Source, Table};
+
+    use super::*;
+    use crate::solve::solution::design;
+
+    const MASS: &str = "A = [[0, 1], [-20, -1]]\nB = [[0], [2]]\nC = [[1, 0], [-20, -1]]\nD = [[0], [2]]\n\
+        measurements = [\"q\", \"acceleration\"]\nactuator_faults = \"all\"\nfilter = 60\n\
+        feedback.eigenvalues = [-5, -6]\nobserver.eigenvalues = [-20, -25, -30, -35, -40]\n";
+
+    /// The error for `MASS` with `from` replaced by `to`.
+    fn refused(from: &str, to: &str) -> String {
+        assert!(MASS.contains(from), "{from}");
+        let source = Source::new(Path::new("plant.toml"), MASS.replacen(from, to, 1));
+        let parsed = source.parse().expect("a table");
+        let file = PlantFile::read(&source, &Table::whole(&source, &parsed)).expect("a plant file");
+        design(&file).err().map_or_else(|| "none".to_owned(), |error| error.to_string())
+    }
+
+    #[test]
+    fn what_is_not_possible_with_feedthrough_is_refused_at_its_line() {
+        assert_eq!(refused("filter = 60", "filter = 61"), "none");
+        let losses = "faults = [{ name = \"f\", loss_of = \"u1\", least_command = 1 }]";
+        let detected = "[detection]\nmethod = \"cusum\"\nfalse_alarm_interval = 1e4\nmodel_error = 1.2\n\
+                        noise = 0.01\nsizes = { f_u1 = 1 }\ncommands = { u1 = 1 }";
+        let observer = "observer.eigenvalues = [-20, -25, -30, -35, -40]";
+        for (from, to, expected) in [
+            (
+                "filter = 60",
+                "",
+                "plant.toml:4:5: the measurement acceleration depends on u1 directly (D is 2), which needs `filter`",
+            ),
+            (
+                "D = [[0], [2]]",
+                "",
+                "7:10: no fault enters a measurement, and D is 0, so none is needed",
+            ),
+            (
+                "actuator_faults = \"all\"",
+                losses,
+                "6:11: fault `f`: the measurements contain the command of this actuator",
+            ),
+            (
+                "filter = 60",
+                "filter = 60\nreference.track = [\"acceleration\"]",
+                "`reference` is not possible then: expected references of",
+            ),
+            (
+                "feedback.eigenvalues = [-5, -6]",
+                "feedback.h_infinity = 3",
+                "the norm of the feedback is not possible then",
+            ),
+            (
+                observer,
+                &format!("{observer}\n[fallback]\nactuators = \"all\"\nloss = 0.5\n"),
+                "`fallback` is not possible then",
+            ),
+            (observer, &format!("{observer}\n{detected}"), "`model_error` is not possible then"),
+        ] {
+            let found = refused(from, to);
+            assert!(found.contains(expected), "{from} -> {to}: {found}");
+        }
+    }
+}

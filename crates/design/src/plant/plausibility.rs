@@ -1,0 +1,178 @@
+//! Mistakes in a plant file that no numerical method would name: limits that exclude the operating point,
+//! faults that no measurement can tell apart.
+
+use files::PlaceError;
+use nalgebra::{DMatrix, DVector};
+
+use crate::plant::linear::LinearPlant;
+use crate::plant_file::{FAULTS, PlantFile};
+use control::faults::ExtendedPlant;
+
+/// A column counts as a combination of others if they leave less than this of its length; rows and
+/// columns have length one.
+const DEPENDENT: f64 = 1e-10;
+/// Coefficients of a combination below this, relative to the largest, count as zero.
+const NEGLIGIBLE: f64 = 1e-6;
+/// Checks that the limits of each actuator contain its operating point; returns the warnings.
+pub(crate) fn check_limits(
+    file: &PlantFile<'_>,
+    linear: &LinearPlant,
+) -> Result<Vec<PlaceError>, PlaceError> {
+    let mut warnings = Vec::new();
+    for actuator in &linear.actuators {
+        let (Some([low, high]), [_, Some(place)]) = (actuator.limits, &actuator.places) else {
+            continue;
+        };
+        let value = actuator.operating.unwrap_or(0.0);
+        let unit = actuator.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+        let about =
+            format!("the operating point of the actuator `{}`, {value}{unit}", actuator.name);
+        if value < low || value > high {
+            let message = format!(
+                "{about}, is outside of its limits {low} and {high}; expected limits around it, or \
+                 another `operating` or `operating_point`"
+            );
+            return Err(file.error_at(place, message));
+        }
+        if value <= low || value >= high {
+            let message = format!(
+                "{about}, is at a limit, so that the controller acts in one direction only"
+            );
+            warnings.push(file.error_at(place, message));
+        }
+    }
+    Ok(warnings)
+}
+
+/// Checks that each fault acts on the plant in a direction of its own and that there are as many
+/// independent measurements as faults.
+///
+/// Both follow from the condition for an observer, rank [A - s I, F; C, 0] = n + q at s = 0, which
+/// needs rank F = q and rank C >= q.
+pub(crate) fn check_faults(
+    file: &PlantFile<'_>,
+    linear: &LinearPlant,
+    extended: &ExtendedPlant,
+) -> Result<(), PlaceError> {
+    let estimates: Vec<_> = extended.channels.iter().map(|channel| channel.estimate).collect();
+    let effects = extended.plant.f_a.select_columns(&estimates);
+    let faults = &linear.faults;
+    if let Some(Dependence { column, of }) = dependences(&effects).into_iter().next() {
+        let name = &faults[column].name;
+        let others: Vec<_> = of.iter().map(|&at| format!("`{}`", faults[at].name)).collect();
+        let message = match others.as_slice() {
+            [] => format!("fault `{name}` has no effect on the plant: its column of F_a is zero"),
+            [other] => format!(
+                "the faults {other} and `{name}` act on the plant in the same direction (their \
+                 columns of F_a are parallel), so that no measurement tells one from the other; \
+                 expected one fault in place of both"
+            ),
+            others => format!(
+                "fault `{name}` acts on the plant as a combination of {} does (their columns of F_a \
+                 are linearly dependent), so that no measurement tells them apart; expected fewer \
+                 faults",
+                others.join(", ")
+            ),
+        };
+        return Err(file.error_at(&faults[column].place, message));
+    }
+    let dependent = match &extended.filter {
+        // The filter makes the measurements independent.
+        Some(_) => Vec::new(),
+        None => dependences(&linear.c.transpose()),
+    };
+    let independent = linear.measurements.len() - dependent.len();
+    if faults.len() <= independent {
+        return Ok(());
+    }
+    let names =
+        |all: Vec<&String>| all.iter().map(|name| name.as_str()).collect::<Vec<_>>().join(", ");
+    let kind = if dependent.is_empty() { "" } else { "independent " };
+    let message = format!(
+        "{} faults ({}) cannot be estimated from {independent} {kind}measurement{} ({}): expected at \
+         least as many independent measurements as faults",
+        faults.len(),
+        names(faults.iter().map(|fault| &fault.name).collect()),
+        if independent == 1 { "" } else { "s" },
+        names(linear.measurements.iter().map(|signal| &signal.name).collect()),
+    );
+    let place = faults.get(independent).map(|fault| &fault.place);
+    Err(place.map_or_else(|| file.error(&FAULTS, &message), |at| file.error_at(at, &message)))
+}
+
+/// A column that is a combination of earlier ones.
+#[derive(Debug, PartialEq)]
+struct Dependence {
+    column: usize,
+    /// The earlier columns with a coefficient that is not negligible; none for a zero column.
+    of: Vec<usize>,
+}
+
+/// Returns all columns of M that are combinations of earlier ones.
+///
+/// Method: rows, then columns are scaled to length one; Gram-Schmidt, each column twice.
+fn dependences(m: &DMatrix<f64>) -> Vec<Dependence> {
+    let unit = |length: f64| if length > 0.0 { length } else { 1.0 };
+    let mut scaled = m.clone();
+    scaled.row_iter_mut().for_each(|mut row| row /= unit(row.amax()));
+    scaled.column_iter_mut().for_each(|mut column| column /= unit(column.norm()));
+    let (mut found, mut kept) = (Vec::new(), Vec::new());
+    // Columns of the orthonormal basis, and of R with M = Q R.
+    let (mut basis, mut r) = (Vec::<DVector<f64>>::new(), Vec::<DVector<f64>>::new());
+    for column in 0..m.ncols() {
+        let mut rest: DVector<f64> = scaled.column(column).into();
+        let mut parts = DVector::zeros(basis.len() + 1);
+        for _ in 0..2 {
+            for (at, direction) in basis.iter().enumerate() {
+                let part = direction.dot(&rest);
+                parts[at] += part;
+                rest.axpy(-part, direction, 1.0);
+            }
+        }
+        let length = rest.norm();
+        if length > DEPENDENT {
+            let last = basis.len();
+            parts[last] = length;
+            basis.push(rest / length);
+            r.push(parts);
+            kept.push(column);
+            continue;
+        }
+        let order = basis.len();
+        let upper = DMatrix::from_fn(order, order, |i, j| if i <= j { r[j][i] } else { 0.0 });
+        let parts = parts.rows(0, order).into_owned();
+        let coefficients = upper.solve_upper_triangular(&parts).unwrap_or(parts);
+        let least = NEGLIGIBLE * coefficients.amax();
+        let taking_part = (0..order).filter(|&at| coefficients[at].abs() > least);
+        found.push(Dependence { column, of: taking_part.map(|at| kept[at]).collect() });
+    }
+    found
+}
+
+/// Returns `plant.toml:3:5: message` for a warning.
+pub(crate) fn line(file: &PlantFile<'_>, warning: &PlaceError) -> String {
+    format!("{}:{}:{}: {}", file.name(), warning.line(), warning.column(), warning.message())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn columns(rows: usize, values: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_row_slice(rows, values.len() / rows, values)
+    }
+
+    #[test]
+    fn a_dependent_column_is_returned_with_the_columns_that_it_depends_on() {
+        let none: [Dependence; 0] = [];
+        assert_eq!(dependences(&columns(2, &[1.0, 0.0, 1e-12, 1.0])), none);
+        // The units of the rows do not matter.
+        assert_eq!(dependences(&columns(2, &[1e9, 2e9, 1e-9, -2e-9])), none);
+        let parallel = columns(3, &[0.0, 0.0, 3.0, -9.0, 0.1, -0.3]);
+        assert_eq!(dependences(&parallel), [Dependence { column: 1, of: vec![0] }]);
+        let sum = columns(3, &[1.0, 0.0, 0.5, 2.0, 0.0, 1.0, 0.5, -3.0, 1.0, 1.0, 0.0, -1.0]);
+        assert_eq!(dependences(&sum), [Dependence { column: 3, of: vec![0, 1] }]);
+        let zero = columns(2, &[0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(dependences(&zero), [Dependence { column: 0, of: Vec::new() }]);
+    }
+}

@@ -1,0 +1,83 @@
+//! The equilibrium of a loop in which actuators are gone.
+
+use control::rank::uncontrollable_modes;
+use control::stability::is_clearly_stable;
+use control::{Domain, Error};
+use nalgebra::{DMatrix, DVector};
+
+use crate::plant::fixed_mode::described;
+use crate::plant::linear::LinearPlant;
+use crate::plant_file::signals::Signal;
+use crate::report::robustness::Number;
+
+/// The equilibrium without actuators.
+pub(crate) struct Rest {
+    /// Deviations of the commands from the operating point.
+    pub(crate) u: DVector<f64>,
+    /// Deviations of the measurements from the operating point.
+    pub(crate) measurements: Vec<Number>,
+    /// Whether the measurements that must be kept are at the operating point.
+    pub(crate) kept: bool,
+}
+
+impl Rest {
+    /// The equilibrium at deviations x and u from the operating point.
+    pub(crate) fn of(
+        linear: &LinearPlant,
+        (x, u): (&DVector<f64>, DVector<f64>),
+        kept: bool,
+    ) -> Self {
+        let measured = &linear.c * x;
+        let measurements = linear.measurements.iter().zip(measured.iter());
+        Self {
+            u,
+            measurements: measurements.map(|(own, value)| number(own, *value)).collect(),
+            kept,
+        }
+    }
+}
+
+fn number(signal: &Signal, value: f64) -> Number {
+    Number { name: signal.name.clone(), unit: signal.unit.clone(), value }
+}
+
+/// Returns the commands at rest: the operating point plus `deviations`; those of actuators that are gone
+/// are where they are stuck.
+pub(crate) fn commands(
+    actuators: &[Signal],
+    deviations: &DVector<f64>,
+    stuck: &[(usize, f64)],
+) -> Vec<Number> {
+    let one = |(at, (own, deviation)): (usize, (&Signal, &f64))| {
+        let stuck = stuck.iter().find(|(gone, _)| *gone == at);
+        let free = own.operating.unwrap_or(0.0) + deviation;
+        number(own, stuck.map_or(free, |(_, command)| *command))
+    };
+    actuators.iter().zip(deviations.iter()).enumerate().map(one).collect()
+}
+
+/// Returns the actuators that are not `gone` and whose command at rest is beyond their limits.
+pub(crate) fn beyond_limits(
+    actuators: &[Signal],
+    commands: &[Number],
+    gone: &[usize],
+) -> Vec<String> {
+    let beyond = |(at, (own, command)): (usize, (&Signal, &Number))| {
+        let [low, high] = own.limits.filter(|_| !gone.contains(&at))?;
+        (command.value < low || command.value > high).then(|| own.name.clone())
+    };
+    actuators.iter().zip(commands).enumerate().filter_map(beyond).collect()
+}
+
+/// Describes a mode of the plant that is not stable and that the columns of `b` do not reach.
+pub(crate) fn unreachable_mode(
+    linear: &LinearPlant,
+    b: &DMatrix<f64>,
+) -> Result<Option<String>, Error> {
+    for mode in uncontrollable_modes(&linear.a, b)? {
+        if !is_clearly_stable(mode.eigenvalue, &linear.a, Domain::Continuous)? {
+            return Ok(Some(described(&mode, |at| linear.states[at].name.clone())));
+        }
+    }
+    Ok(None)
+}

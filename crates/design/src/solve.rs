@@ -1,0 +1,13 @@
+//! Solves for the controller: the gains of one plant, of a family, of a schedule, and without actuators.
+
+pub(crate) mod fallback;
+pub(crate) mod family;
+pub(crate) mod gain;
+pub(crate) mod gains;
+pub(crate) mod law;
+pub(crate) mod norm_gains;
+pub(crate) mod pairing;
+pub(crate) mod reconfiguration;
+pub(crate) mod schedule;
+pub(crate) mod solution;
+pub(crate) mod tracking;

@@ -1,0 +1,150 @@
+//! A gain with the method that found it, and why there is none.
+
+use control::lmi::{self, Outcome, Synthesis};
+use control::placement::Quality;
+use control::rank::Mode;
+use control::{Domain, Error};
+use nalgebra::{Complex, DMatrix};
+
+use crate::plant_file::requirements::Region;
+use crate::report::NormReport;
+
+/// A gain and the method that found it.
+#[derive(Clone)]
+pub(crate) struct GainResult {
+    pub(crate) gain: DMatrix<f64>,
+    /// The method, in a sentence.
+    pub(crate) method: String,
+    /// The required eigenvalues, if any, in the plane of the domain.
+    pub(crate) required: Vec<Complex<f64>>,
+    /// The quality of an eigenvalue assignment.
+    pub(crate) quality: Option<Quality>,
+    /// The H-infinity norm, of a design by it.
+    pub(crate) norm: Option<NormReport>,
+    /// Other results of an eigenvalue assignment.
+    pub(crate) choice: Option<Box<GainChoice>>,
+}
+
+/// The results of an eigenvalue assignment among which the loop decides.
+#[derive(Clone)]
+pub(crate) struct GainChoice {
+    /// See [`control::placement::Alternatives::candidates`].
+    pub(crate) candidates: [Vec<GainResult>; 2],
+    /// The gains of the standard methods, see [`control::placement::Alternatives::standard`].
+    pub(crate) standard: [Option<DMatrix<f64>>; 2],
+}
+
+/// Why no gain was found.
+pub(crate) enum Refusal {
+    /// A numerical method failed or rejected its data.
+    Control(Error),
+    /// The requirements contradict each other, or no result could be verified.
+    Conflict(String),
+    /// The requirement excludes the eigenvalue of a mode that no gain moves.
+    Fixed(Mode),
+}
+
+impl From<Error> for Refusal {
+    fn from(error: Error) -> Self {
+        Self::Control(error)
+    }
+}
+
+/// The system for the state feedback, and its faults.
+pub(crate) struct FeedbackProblem<'a> {
+    pub(crate) a: &'a DMatrix<f64>,
+    pub(crate) b: &'a DMatrix<f64>,
+    pub(crate) c: &'a DMatrix<f64>,
+    pub(crate) f_a: &'a DMatrix<f64>,
+}
+
+/// The gain of a method without a choice, without required eigenvalues.
+pub(crate) fn unique(gain: DMatrix<f64>, method: String) -> GainResult {
+    GainResult { gain, method, required: Vec::new(), quality: None, norm: None, choice: None }
+}
+
+pub(crate) fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<GainResult, Refusal> {
+    match found {
+        Outcome::Optimal(found) => {
+            let bound = found.bound.as_ref();
+            let bound = bound.map_or(String::new(), |bound| {
+                format!("; bound {:.4e}, verified with margin {:.1e}", bound.gamma, bound.margin)
+            });
+            let margin = found.region.margin;
+            let method = format!("{method}; region verified with margin {margin:.1e}{bound}.");
+            Ok(unique(found.gain, method))
+        }
+        Outcome::Infeasible { conflict } => Err(Refusal::Conflict(contradiction(&conflict))),
+        Outcome::Inconclusive(reason) => Err(Refusal::Conflict(format!(
+            "no answer could be verified: {reason}; other requirements, or units nearer to the size of \
+             the signals may help"
+        ))),
+    }
+}
+
+/// Names the conflicting requirements as in the plant file.
+fn contradiction(conflict: &[&str]) -> String {
+    let name = |requirement: &&str| match *requirement {
+        "gain" => "h_infinity".to_owned(),
+        other => other.to_owned(),
+    };
+    match conflict {
+        [one] => format!("this cannot be met, even without the other requirements: {}", name(one)),
+        several => {
+            let names: Vec<_> = several.iter().map(name).collect();
+            format!("these requirements contradict each other: {}", names.join(", "))
+        }
+    }
+}
+
+impl GainChoice {
+    pub(crate) fn candidates(&self) -> [Vec<&GainResult>; 2] {
+        self.candidates.each_ref().map(|own| own.iter().collect())
+    }
+}
+
+impl GainResult {
+    /// The result with another gain.
+    pub(crate) fn mapped(self, map: impl Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
+        Self { gain: map(&self.gain), ..self }
+    }
+
+    /// The results among which the loop decides; without others the result alone.
+    pub(crate) fn into_choice(mut self) -> GainChoice {
+        if let Some(choice) = self.choice.take() {
+            return *choice;
+        }
+        let standard = [Some(self.gain.clone()), Some(self.gain.clone())];
+        GainChoice { candidates: [vec![self], vec![]], standard }
+    }
+}
+
+impl Region {
+    /// Checks that the eigenvalues of modes that no gain moves are in the region.
+    pub(crate) fn require(self, fixed: &[Mode], domain: Domain) -> Result<(), Refusal> {
+        match fixed.iter().find(|mode| !self.contains(mode.eigenvalue, domain)) {
+            Some(mode) => Err(Refusal::Fixed(mode.clone())),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether an eigenvalue of the loop is in the region; for a sampled loop one in the z-plane.
+    pub(crate) fn contains(self, value: Complex<f64>, domain: Domain) -> bool {
+        let decay = self.decay.unwrap_or(0.0);
+        if let Domain::Sampled { period } = domain {
+            return value.norm() < (-decay * period).exp();
+        }
+        value.re < -decay
+            && self.disc.is_none_or(|(center, radius)| (value - center).norm() < radius)
+            && self.sector.is_none_or(|angle| value.im.atan2(-value.re).abs() < angle.to_radians())
+    }
+
+    /// Converts the region for the linear matrix inequalities; angles in rad.
+    pub(crate) fn stated(self) -> lmi::Region {
+        lmi::Region {
+            decay: self.decay,
+            disc: self.disc.map(|(center, radius)| lmi::Disc { center, radius }),
+            sector: self.sector.map(f64::to_radians),
+        }
+    }
+}

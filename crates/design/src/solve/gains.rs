@@ -1,0 +1,203 @@
+//! Computes the gains that satisfy the requirements of the plant file.
+
+use control::Domain;
+use control::aso::Estimator;
+use control::lmi;
+use control::placement::{
+    Alternatives, Placement, alternatives, alternatives_balanced, alternatives_discrete,
+};
+use control::rank::{ControllablePart, Mode, controllable_part, uncontrollable_modes};
+use control::riccati::{Weights, kalman, lqr};
+use control::sampled::{estimator_alternatives, sampled_poles};
+use nalgebra::{Complex, DMatrix};
+
+use crate::plant_file::requirements::Requirement;
+use crate::solve::gain::{FeedbackProblem, GainChoice, GainResult, Refusal, synthesised, unique};
+use crate::solve::norm_gains::{NormRequirement, ObserverProblem};
+
+const IN_REGION: &str = "Eigenvalues in the region by linear matrix inequalities";
+/// Relative distance within which a requested eigenvalue is that of a mode that no gain moves.
+const SAME: f64 = 1e-4;
+
+/// Computes K of u = K x.
+///
+/// Modes that the commands do not reach keep their eigenvalues, which the requirement must allow.
+pub(crate) fn feedback(
+    required: &Requirement,
+    problem: &FeedbackProblem<'_>,
+    domain: Domain,
+) -> Result<GainResult, Refusal> {
+    let FeedbackProblem { a, b, .. } = problem;
+    match required {
+        Requirement::Eigenvalues(_) | Requirement::SampledEigenvalues(_) => {
+            let part = controllable_part(a, b)?;
+            let Assignment { required, movable } = movable(required, &part.fixed, domain)?;
+            let sampled = domain != Domain::Continuous;
+            let assign = if sampled { alternatives_discrete } else { alternatives };
+            if part.fixed.is_empty() {
+                return Ok(assigned(&assign(a, b, &movable)?, &required));
+            }
+            let found = assign(&part.a, &part.b, &movable)?.map(|gain| part.gain(gain));
+            Ok(partly_assigned(&found, &required, &part))
+        }
+        Requirement::Weights { states, channels } => {
+            let weights = Weights { q: states.clone(), r: channels.clone(), n: None };
+            let found = lqr(a, b, &weights, domain)?;
+            Ok(weighted(found.gain, "Linear-quadratic regulator", found.residual))
+        }
+        Requirement::Region(region) => {
+            let part = controllable_part(a, b)?;
+            region.require(&part.fixed, domain)?;
+            let found = if part.fixed.is_empty() {
+                lmi::state_feedback(a, b, &region.stated(), None, domain)?
+            } else {
+                lmi::state_feedback(&part.a, &part.b, &region.stated(), None, domain)?
+            };
+            let found = synthesised(found, IN_REGION)?;
+            Ok(if part.fixed.is_empty() { found } else { found.mapped(|gain| part.gain(gain)) })
+        }
+        Requirement::HInfinity { bound, region, channel } => {
+            region.require(&uncontrollable_modes(a, b)?, domain)?;
+            let required = NormRequirement { bound: *bound, region: *region, channel };
+            problem.by_norm(required, domain)
+        }
+    }
+}
+
+/// Computes L of the observer. For a current estimator it is the gain of the correction.
+///
+/// Modes that the measurements do not show keep their eigenvalues, which the requirement must allow.
+pub(crate) fn observer(
+    required: &Requirement,
+    problem: &ObserverProblem<'_>,
+    domain: Domain,
+) -> Result<GainResult, Refusal> {
+    let ObserverProblem { a_0, c_0, estimator, .. } = *problem;
+    let seen = estimator.output_matrix(a_0, c_0);
+    let (a_dual, b_dual) = (a_0.transpose(), seen.transpose());
+    match required {
+        Requirement::Eigenvalues(_) | Requirement::SampledEigenvalues(_) => {
+            let part = controllable_part(&a_dual, &b_dual)?;
+            let Assignment { required, movable } = movable(required, &part.fixed, domain)?;
+            let (a_1, b_1) = match part.fixed.as_slice() {
+                [] => (&a_dual, &b_dual),
+                _ => (&part.a, &part.b),
+            };
+            let found = match domain {
+                Domain::Continuous => {
+                    alternatives_balanced(a_1, b_1, &movable)?.map(|gain| -gain.transpose())
+                }
+                Domain::Sampled { .. } => {
+                    estimator_alternatives(&a_1.transpose(), &b_1.transpose(), &movable)?
+                }
+            };
+            if part.fixed.is_empty() {
+                return Ok(assigned(&found, &required));
+            }
+            let found = found.map(|gain| part.gain(&gain.transpose()).transpose());
+            Ok(partly_assigned(&found, &required, &part))
+        }
+        Requirement::Weights { states, channels } => {
+            let found = kalman(a_0, c_0, states, channels, domain)?;
+            let gain = found
+                .current_gain
+                .filter(|_| estimator == Estimator::Current)
+                .unwrap_or(found.gain);
+            Ok(weighted(gain, "Kalman filter", found.residual))
+        }
+        Requirement::Region(region) => {
+            let part = controllable_part(&a_dual, &b_dual)?;
+            region.require(&part.fixed, domain)?;
+            if part.fixed.is_empty() {
+                let found = lmi::observer_gain(a_0, &seen, &region.stated(), None, domain)?;
+                return synthesised(found, IN_REGION);
+            }
+            let (a_1, c_1) = (part.a.transpose(), part.b.transpose());
+            let found = lmi::observer_gain(&a_1, &c_1, &region.stated(), None, domain)?;
+            let found = synthesised(found, IN_REGION)?;
+            Ok(found.mapped(|gain| part.gain(&gain.transpose()).transpose()))
+        }
+        Requirement::HInfinity { bound, region, channel } => {
+            region.require(&uncontrollable_modes(&a_dual, &b_dual)?, domain)?;
+            let required = NormRequirement { bound: *bound, region: *region, channel };
+            problem.by_norm(required, domain)
+        }
+    }
+}
+
+/// Required eigenvalues in the plane of the domain.
+struct Assignment {
+    /// All, those of fixed modes included.
+    required: Vec<Complex<f64>>,
+    /// Those of the movable part.
+    movable: Vec<Complex<f64>>,
+}
+
+/// Divides the required eigenvalues: each fixed mode takes the nearest one, the others are assigned to
+/// the movable part.
+fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Assignment, Refusal> {
+    let sampling = match (required, domain) {
+        (Requirement::Eigenvalues(_), Domain::Sampled { period }) => Some(period),
+        _ => None,
+    };
+    let mut rest = required.eigenvalues().to_vec();
+    let mut taken = Vec::new();
+    for mode in fixed {
+        let stated = sampling.map_or(mode.eigenvalue, |period| mode.eigenvalue.ln() / period);
+        let near = |one: &Complex<f64>| (one - stated).norm();
+        let nearest = (0..rest.len()).min_by(|&i, &j| near(&rest[i]).total_cmp(&near(&rest[j])));
+        match nearest.filter(|&at| near(&rest[at]) <= SAME * stated.norm()) {
+            Some(at) => drop(rest.swap_remove(at)),
+            None => return Err(Refusal::Fixed(mode.clone())),
+        }
+        taken.push(mode.eigenvalue);
+    }
+    let movable = match sampling {
+        Some(period) => sampled_poles(&rest, period)?,
+        None => rest,
+    };
+    Ok(Assignment { required: movable.iter().copied().chain(taken).collect(), movable })
+}
+
+fn assigned(found: &Alternatives, required: &[Complex<f64>]) -> GainResult {
+    let method = "Eigenvalues assigned, with eigenvectors as well-conditioned as was found.";
+    let result = |placement: &Placement| GainResult {
+        gain: placement.gain.clone(),
+        method: method.to_owned(),
+        required: required.to_vec(),
+        quality: Some(placement.quality),
+        norm: None,
+        choice: None,
+    };
+    let candidates = found.candidates().map(|own| own.into_iter().map(result).collect());
+    let standard = found.standard.each_ref().map(|own| own.as_ref().map(|own| own.gain.clone()));
+    GainResult {
+        choice: Some(Box::new(GainChoice { candidates, standard })),
+        ..result(&found.chosen)
+    }
+}
+
+/// The quality is that of the movable part, so that it is not stated.
+fn partly_assigned(
+    found: &Alternatives,
+    required: &[Complex<f64>],
+    part: &ControllablePart,
+) -> GainResult {
+    let (movable, all) = (part.a.nrows(), part.coordinates.ncols());
+    let method = format!(
+        "{movable} of {all} eigenvalues assigned, with eigenvectors as well-conditioned as was found; no gain moves \
+         the others."
+    );
+    let named = |own: GainResult| GainResult { method: method.clone(), quality: None, ..own };
+    let mut result = named(assigned(found, required));
+    if let Some(choice) = &mut result.choice {
+        let candidates = std::mem::take(&mut choice.candidates);
+        choice.candidates = candidates.map(|own| own.into_iter().map(named).collect());
+    }
+    result
+}
+
+fn weighted(gain: DMatrix<f64>, method: &str, residual: f64) -> GainResult {
+    let method = format!("{method}; relative residual of the Riccati equation {residual:.1e}.");
+    unique(gain, method)
+}

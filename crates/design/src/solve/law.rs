@@ -1,0 +1,284 @@
+//! Designs the law that estimates the faults, from the augmented observer of the requirement.
+
+use control::aso::{Estimator, FaultyPlant, Gains};
+use control::estimation::{
+    DirectForm, FastAdaptive, Learning, OwnModel, SlidingMode, fast_adaptive, learning, mean_rate,
+    proportional_integral, sliding_mode,
+};
+use control::faults::ExtendedPlant;
+use control::stability::instability;
+use control::{Domain, Error};
+use nalgebra::DMatrix;
+
+use crate::plant::linear::LinearPlant;
+use crate::plant_file::estimation::Law;
+use crate::plant_file::signals::FaultDynamics;
+use crate::report::Check;
+use crate::report::robustness::Number;
+
+/// The default of `K_1`.
+const KEPT: f64 = 0.99;
+/// The default of rho, relative to the bound of the fault.
+const REACH: f64 = 2.0;
+
+/// gamma relative to the mean rate, and the mean rate relative to sigma, by default.
+const APART: f64 = 1.25;
+
+/// What a law is designed from.
+pub(crate) struct LawProblem<'a> {
+    pub(crate) linear: &'a LinearPlant,
+    /// In continuous time.
+    pub(crate) extended: &'a ExtendedPlant,
+    /// In `domain`.
+    pub(crate) plant: &'a FaultyPlant,
+    /// Those of the augmented observer.
+    pub(crate) gains: &'a Gains,
+    pub(crate) domain: Domain,
+}
+
+/// A designed law.
+pub(crate) struct DesignedLaw {
+    pub(crate) law: Law,
+    /// The gains; of a sliding-mode law those of its linearisation.
+    pub(crate) gains: Gains,
+    /// `A_f` of the observer, if it is not that of the fault model.
+    pub(crate) a_f: Option<DMatrix<f64>>,
+    pub(crate) injection: Option<Injection>,
+    /// The parameters with their values.
+    pub(crate) parameters: Vec<Number>,
+    /// The conditions for the existence of the law, all of which hold.
+    pub(crate) conditions: Vec<Check>,
+}
+
+/// The nonlinear function of a sliding-mode law.
+pub(crate) struct Injection {
+    /// F, q x p, which takes the place of `L_f` in the design file.
+    pub(crate) f: DMatrix<f64>,
+    pub(crate) rho: Vec<f64>,
+    pub(crate) delta: Vec<f64>,
+}
+
+impl DesignedLaw {
+    /// Whether the error dynamics are those of the requirement.
+    pub(crate) fn keeps_error_dynamics(&self) -> bool {
+        matches!(self.law, Law::Augmented | Law::ProportionalIntegral { .. })
+    }
+
+    /// Whether a constant fault leaves a lasting error: the observer's own model of the fault decays.
+    pub(crate) fn leaks(&self) -> bool {
+        let identity = |a_f: &DMatrix<f64>| DMatrix::identity(a_f.nrows(), a_f.ncols());
+        self.a_f.as_ref().is_some_and(|a_f| *a_f != identity(a_f))
+    }
+}
+
+impl LawProblem<'_> {
+    /// Designs `law`; the error says in a sentence why it does not exist.
+    pub(crate) fn design(&self, law: &Law) -> Result<DesignedLaw, String> {
+        let mut found = DesignedLaw {
+            law: law.clone(),
+            gains: self.gains.clone(),
+            a_f: None,
+            injection: None,
+            parameters: Vec::new(),
+            conditions: Vec::new(),
+        };
+        match law {
+            Law::Augmented => return Ok(found),
+            Law::ProportionalIntegral { proportional } => {
+                self.require_current()?;
+                let part = proportional.unwrap_or(1.0);
+                found.gains = proportional_integral(self.plant, self.gains, self.domain, part)
+                    .map_err(text)?;
+                found.parameters.push(number("proportional", None, part));
+                return Ok(found);
+            }
+            Law::FastAdaptive { .. } | Law::SlidingMode { .. } | Law::Learning { .. } => {}
+        }
+        let form = self.direct_form(&mut found.conditions)?;
+        if matches!(law, Law::SlidingMode { .. } | Law::Learning { .. })
+            && self.domain == Domain::Continuous
+        {
+            return Err(
+                "it is a law of sampled controllers only: expected `sample_time`".to_owned()
+            );
+        }
+        self.require_current()?;
+        let dynamics = self.gains.error_dynamics(self.plant);
+        let rate = mean_rate(&dynamics, self.domain).map_err(text)?;
+        let own = (self.plant, &form);
+        match law {
+            Law::FastAdaptive { sigma, gamma } => {
+                // Different rates: equal ones would be a multiple eigenvalue.
+                let count = self.linear.faults.len();
+                let gamma = gamma.clone().unwrap_or_else(|| vec![rate * APART; count]);
+                let law = FastAdaptive { sigma: sigma.unwrap_or(rate / APART), gamma };
+                found.gains = fast_adaptive(own, self.gains, &law, rate).map_err(text)?;
+                found.parameters.push(number("sigma", Some("1/s"), law.sigma));
+                found.parameters.extend(self.each("gamma", Some("1/s"), &law.gamma));
+            }
+            Law::SlidingMode { rho, delta } => {
+                let rho = self.reach(rho.as_ref(), &mut found.conditions)?;
+                let law = SlidingMode { rho, delta: delta.clone() };
+                let (OwnModel { gains, a_f, .. }, delta) = sliding_mode(
+                    own, self.gains, &law, rate,
+                )
+                .map_err(|error| match error {
+                    Error::NotSchur { .. } => format!(
+                        "delta is too small for the sample time, the estimate would oscillate from \
+                             sample to sample: {error}"
+                    ),
+                    other => text(other),
+                })?;
+                (found.gains, found.a_f) = (gains, Some(a_f));
+                found.parameters.extend(self.each("rho", None, &law.rho));
+                found.parameters.extend(self.each("delta", None, &delta));
+                found.injection = Some(Injection { f: form.m_1, rho: law.rho, delta });
+            }
+            Law::Learning { kept } => {
+                let law = Learning { kept: kept.unwrap_or(KEPT) };
+                let OwnModel { gains, a_f, .. } =
+                    learning(own, self.gains, &law, rate).map_err(text)?;
+                (found.gains, found.a_f) = (gains, Some(a_f));
+                found.parameters.push(number("K_1", None, law.kept));
+            }
+            Law::Augmented | Law::ProportionalIntegral { .. } => {}
+        }
+        self.require_stable(&mut found)?;
+        Ok(found)
+    }
+
+    /// The names of the laws that exist with default parameters.
+    pub(crate) fn existing(&self) -> Vec<&'static str> {
+        let exists = |law: &Law| self.design(law).is_ok();
+        Law::ALL.iter().filter(|law| exists(law)).map(Law::name).collect()
+    }
+
+    fn require_current(&self) -> Result<(), String> {
+        if self.domain != Domain::Continuous && self.gains.estimator == Estimator::Prediction {
+            return Err(
+                "its estimate uses the newest measurement: expected estimator = \"current\""
+                    .to_owned(),
+            );
+        }
+        Ok(())
+    }
+
+    /// The coordinates that three of the laws need; adds their conditions.
+    fn direct_form(&self, conditions: &mut Vec<Check>) -> Result<DirectForm, String> {
+        let ramp =
+            |fault: &&crate::plant_file::signals::Fault| fault.dynamics == FaultDynamics::Ramp;
+        if let Some(fault) = self.linear.faults.iter().find(ramp) {
+            return Err(format!(
+                "it has its own model of a fault: expected kind = \"constant\" for fault `{}`",
+                fault.name
+            ));
+        }
+        let form = DirectForm::new(&self.extended.plant, Domain::Continuous).map_err(text)?;
+        let q = self.linear.faults.len();
+        #[expect(clippy::cast_precision_loss, reason = "a number of faults is far below 2^52")]
+        let rank = q as f64;
+        conditions.push(check(
+            "rank C F_a is the number of faults",
+            Some(rank),
+            format!(
+                "rank {q} of {q}; the faults act on the derivatives of the measurements directly"
+            ),
+        ));
+        conditions
+            .push(zeros(&form, "the invariant zeros of (A, F_a, C) are in the left half plane"));
+        if self.domain == Domain::Continuous {
+            return Ok(form);
+        }
+        let sampled = DirectForm::new(self.plant, self.domain)
+            .map_err(|error| format!("of the sampled plant: {error}"))?;
+        conditions.push(zeros(&sampled, "those of the sampled plant are in the unit circle"));
+        Ok(sampled)
+    }
+
+    /// rho, checked against the bounds of the faults.
+    fn reach(
+        &self,
+        stated: Option<&Vec<f64>>,
+        conditions: &mut Vec<Check>,
+    ) -> Result<Vec<f64>, String> {
+        let mut all = Vec::new();
+        for (at, fault) in self.linear.faults.iter().enumerate() {
+            let reach = match (stated.map(|list| list[at]), fault.bound) {
+                (Some(rho), _) => rho,
+                (None, Some(bound)) => REACH * bound,
+                (None, None) => {
+                    return Err(format!("it needs `rho`, or `bound` of fault `{}`", fault.name));
+                }
+            };
+            if let Some(bound) = fault.bound {
+                if reach <= bound {
+                    let name = &fault.name;
+                    return Err(format!(
+                        "rho = {reach} of fault `{name}` is not above its bound {bound}: expected more"
+                    ));
+                }
+                conditions.push(check(
+                    "rho is above the bound of the fault",
+                    Some(reach / bound),
+                    format!("{reach} above {bound}: fault {}", fault.name),
+                ));
+            }
+            all.push(reach);
+        }
+        Ok(all)
+    }
+
+    /// Checks the error dynamics as they will run.
+    fn require_stable(&self, found: &mut DesignedLaw) -> Result<(), String> {
+        let mut plant = self.plant.clone();
+        if let Some(a_f) = &found.a_f {
+            plant.a_f.copy_from(a_f);
+        }
+        let excess = instability(&found.gains.error_dynamics(&plant), self.domain).map_err(text)?;
+        if excess >= 0.0 {
+            return Err(format!("its error dynamics would not be stable, by {excess:.3e}"));
+        }
+        let linear = if found.injection.is_some() { " within the boundary layer" } else { "" };
+        let margin = match self.domain {
+            Domain::Continuous => "largest real part of the eigenvalues, 1/s",
+            Domain::Sampled { .. } => "largest modulus of the eigenvalues, less 1",
+        };
+        found.conditions.push(check(
+            "the estimation errors decay",
+            Some(excess),
+            format!("{margin}{linear}"),
+        ));
+        Ok(())
+    }
+
+    /// A parameter with one number for each fault.
+    fn each(&self, name: &str, unit: Option<&str>, values: &[f64]) -> Vec<Number> {
+        let faults = self.linear.faults.iter().zip(values);
+        let one = |(fault, value): (&crate::plant_file::signals::Fault, &f64)| Number {
+            name: format!("{name} of {}", fault.name),
+            unit: unit.map(str::to_owned).or_else(|| fault.unit.clone()),
+            value: *value,
+        };
+        faults.map(one).collect()
+    }
+}
+
+fn number(name: &str, unit: Option<&str>, value: f64) -> Number {
+    Number { name: name.to_owned(), unit: unit.map(str::to_owned), value }
+}
+
+fn zeros(form: &DirectForm, condition: &str) -> Check {
+    let all: Vec<_> =
+        form.zeros.iter().map(|zero| format!("{:.4}{:+.4}i", zero.re, zero.im)).collect();
+    let list = if all.is_empty() { "there are none".to_owned() } else { all.join(", ") };
+    check(condition, None, list)
+}
+
+fn check(condition: &str, value: Option<f64>, explanation: String) -> Check {
+    Check { condition: condition.to_owned(), holds: true, value, explanation }
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "the form that map_err needs")]
+fn text(error: Error) -> String {
+    error.to_string()
+}

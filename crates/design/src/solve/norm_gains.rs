@@ -1,0 +1,371 @@
+//! Gains by the H-infinity norm: the channels of observer and feedback that the plant file weights.
+
+pub(crate) mod search;
+
+use control::aso::Estimator;
+use control::faults::FaultChannel;
+use control::lmi::{
+    self, ChannelWeights, Norm, Performance, disc_norm_lower_bound, feedback_norm_lower_bound,
+    noiseless_norm_lower_bound, observer_norm_lower_bound, weighted_observer_gain,
+    weighted_state_feedback,
+};
+use control::response::h_infinity;
+use control::riccati::{NormFilter, NormFilterProblem};
+use control::weight::{Weight, diagonal};
+use control::{Domain, Error, StateSpace};
+use nalgebra::{DMatrix, DVector};
+
+use crate::plant_file::channel::{Channel, ChannelWeight};
+use crate::plant_file::requirements::Region;
+use crate::report::LowerBoundFor;
+use crate::solve::gain::{FeedbackProblem, GainResult, Refusal};
+use crate::solve::norm_gains::search::{LARGEST_ORDER, LowerBound, Search, WIDTH};
+
+/// Ratio of the bounds between which the least norm of any filter is searched, and at which the search
+/// ends.
+const RANGE: f64 = 1e6;
+const NARROW: f64 = 1.02;
+/// The bound for which a filter is designed, relative to the least one: the gain grows without limit
+/// towards that.
+const RELAXED: f64 = 1.1;
+/// The norm of such a filter, relative to its bound, above which it is not used.
+const ROUNDED: f64 = 1.05;
+
+/// The pair of the augmented observer and what its channel needs.
+pub(crate) struct ObserverProblem<'a> {
+    /// `A_0`.
+    pub(crate) a_0: &'a DMatrix<f64>,
+    /// `C_0`.
+    pub(crate) c_0: &'a DMatrix<f64>,
+    /// The estimates of each fault among the last states.
+    pub(crate) channels: &'a [FaultChannel],
+    /// Number of states of the fault models, the last states.
+    pub(crate) faults: usize,
+    /// Coefficients of the measurement filter, whose states come before those of the faults.
+    pub(crate) filter: Option<&'a [f64]>,
+    pub(crate) estimator: Estimator,
+}
+
+/// The requirement `h_infinity`.
+#[derive(Clone, Copy)]
+pub(crate) struct NormRequirement<'a> {
+    /// The bound to keep; None for the least norm.
+    pub(crate) bound: Option<f64>,
+    pub(crate) region: Region,
+    pub(crate) channel: &'a Channel,
+}
+
+impl ObserverProblem<'_> {
+    /// The channel from [rates of the faults; noise] to the weighted errors of the estimates, for the
+    /// error dynamics A - L C with C = `C_0`, or `C_0` `A_0` for a current estimator:
+    ///
+    /// ```text
+    /// x' = (A - L C) x + (B - L D_y) [rates; noise],  z = W E x
+    /// ```
+    ///
+    /// Without a measurement filter the noise enters through `D_y`, with one through the filter's
+    /// states. A current estimator corrects with the newest measurement: `D_y` then has `C_0` B, too.
+    /// In sampled time a rate acts for one period.
+    fn performance(&self, required: NormRequirement<'_>, domain: Domain) -> Performance {
+        let (order, p, q) = (self.a_0.nrows(), self.c_0.nrows(), self.faults);
+        let noises = required.channel.noise.len();
+        let mut disturbance = DMatrix::zeros(order, q + noises);
+        let period = if let Domain::Sampled { period } = domain { period } else { 1.0 };
+        disturbance.view_mut((order - q, 0), (q, q)).fill_diagonal(period);
+        let mut feedthrough = DMatrix::zeros(p, q + noises);
+        for (at, noise) in required.channel.noise.iter().enumerate() {
+            match self.filter {
+                Some(filter) => {
+                    disturbance[(order - q - p + at, q + at)] = filter[at] * noise.factor();
+                }
+                None => feedthrough[(at, q + at)] = noise.factor(),
+            }
+        }
+        if self.estimator == Estimator::Current {
+            feedthrough += self.c_0 * &disturbance;
+        }
+        let mut output = DMatrix::zeros(q, order);
+        output.columns_mut(order - q, q).fill_with_identity();
+        for (channel, weight) in self.channels.iter().zip(&required.channel.weights) {
+            for row in [Some(channel.estimate), channel.rate].into_iter().flatten() {
+                output.row_mut(row).scale_mut(weight.factor());
+            }
+        }
+        let gamma = required.bound;
+        Performance { disturbance, output, feedthrough, norm: Norm::HInfinity, gamma }
+    }
+
+    /// The weights over frequency of the channel of `performance`, if there are any.
+    fn weights(&self, channel: &Channel, domain: Domain) -> Result<Option<ChannelWeights>, Error> {
+        if !channel.has_states() {
+            return Ok(None);
+        }
+        let one = || Weight::constant(1.0);
+        let mut inputs = vec![one(); self.faults];
+        inputs.extend(channel.noise.iter().map(over_frequency));
+        let mut outputs = vec![one(); self.faults];
+        for (fault, weight) in self.channels.iter().zip(&channel.weights) {
+            for row in [Some(fault.estimate), fault.rate].into_iter().flatten() {
+                outputs[row] = over_frequency(weight);
+            }
+        }
+        let (input, output) = (diagonal(&inputs, domain)?, diagonal(&outputs, domain)?);
+        Ok(Some(ChannelWeights { input, output }))
+    }
+
+    /// Computes the gain of the filter for the bound, or near the least bound that any filter reaches; regions do
+    /// not matter. Only with noise on each measurement: behind a measurement filter there is none in the equation of
+    /// continuous time.
+    fn riccati(
+        &self,
+        required: NormRequirement<'_>,
+        domain: Domain,
+    ) -> Result<Option<DMatrix<f64>>, Error> {
+        let channel = required.channel;
+        let unsuitable = channel.has_states() || channel.noise.is_empty();
+        if unsuitable || self.a_0.nrows() > LARGEST_ORDER {
+            return Ok(None);
+        }
+        let given = self.performance(required, domain);
+        let seen = self.estimator.output_matrix(self.a_0, self.c_0);
+        let problem = NormFilterProblem {
+            a: self.a_0,
+            c: &seen,
+            disturbance: &given.disturbance,
+            feedthrough: &given.feedthrough,
+            output: &given.output,
+        };
+        // A plant with a mode at rest that no fault excites has no such filter.
+        let Ok(filter) = NormFilter::new(&problem, domain) else { return Ok(None) };
+        if let Some(bound) = required.bound {
+            return filter.gain(bound);
+        }
+        let norm = |gain: &DMatrix<f64>| -> Result<f64, Error> {
+            let system = StateSpace {
+                a: self.a_0 - gain * &seen,
+                b: &given.disturbance - gain * &given.feedthrough,
+                c: given.output.clone(),
+                d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
+                domain,
+            };
+            Ok(h_infinity(&system, WIDTH)?.upper)
+        };
+        let mut high = norm(&filter.kalman_gain())? * RELAXED;
+        let mut low = high / RANGE;
+        while high > NARROW * low {
+            let middle = (low * high).sqrt();
+            match filter.gain(middle)? {
+                Some(_) => high = middle,
+                None => low = middle,
+            }
+        }
+        let Some(gain) = filter.gain(RELAXED * high)? else { return Ok(None) };
+        // Rounding errors of the equation are errors of the norm: then inequalities are the better way.
+        Ok((norm(&gain)? <= ROUNDED * RELAXED * high).then_some(gain))
+    }
+
+    /// Computes a norm below which no gain is, and without a noise channel, if it is larger, one for the disc of
+    /// the region.
+    fn lower_bound(
+        &self,
+        required: NormRequirement<'_>,
+        domain: Domain,
+    ) -> Result<Option<LowerBound>, Error> {
+        if !required.channel.noise.is_empty() {
+            return Ok(self.noisy_lower_bound(required, domain)?.map(LowerBound::for_filters));
+        }
+        let seen = self.estimator.output_matrix(self.a_0, self.c_0);
+        let performance = self.performance(required, domain);
+        let of_filters = match self.weights(required.channel, domain)? {
+            None => noiseless_norm_lower_bound(self.a_0, &seen, &performance, domain),
+            Some(weights) => {
+                let (a, c, performance) = weights.extend(self.a_0, &seen, &performance);
+                noiseless_norm_lower_bound(&a, &c, &performance, domain)
+            }
+        };
+        // A bound whose computation fails is not known; the gain does not depend on it.
+        let of_filters = of_filters.unwrap_or(None);
+        let Region { decay, disc, .. } = required.region;
+        let of_disc = match disc.filter(|_| !required.channel.has_states()) {
+            Some((center, radius)) => {
+                let region = (center, radius, decay.unwrap_or(0.0));
+                disc_norm_lower_bound(self.a_0, &seen, &performance, region).unwrap_or(None)
+            }
+            None => None,
+        };
+        Ok(match (of_filters, of_disc) {
+            (found, Some(norm)) if found.is_none_or(|found| found < norm) => {
+                Some(LowerBound { norm, holds_for: LowerBoundFor::Disc })
+            }
+            (found, _) => found.map(LowerBound::for_filters),
+        })
+    }
+
+    /// Computes a norm below which no filter is, of any order, from the unfiltered measurements with noise.
+    ///
+    /// The states of a measurement filter contain the measurements before the present sample.
+    fn noisy_lower_bound(
+        &self,
+        required: NormRequirement<'_>,
+        domain: Domain,
+    ) -> Result<Option<f64>, Error> {
+        let order = self.a_0.nrows();
+        if order > LARGEST_ORDER {
+            return Ok(None);
+        }
+        let Some(filter) = self.filter else {
+            let seen = self.estimator.output_matrix(self.a_0, self.c_0);
+            let performance = self.performance(required, domain);
+            return match self.weights(required.channel, domain)? {
+                None => observer_norm_lower_bound(self.a_0, &seen, &performance, domain),
+                Some(weights) => {
+                    let (a, c, performance) = weights.extend(self.a_0, &seen, &performance);
+                    observer_norm_lower_bound(&a, &c, &performance, domain)
+                }
+            };
+        };
+        let first = order - self.faults - filter.len();
+        let kept: Vec<_> =
+            (0..order).filter(|at| !(first..first + filter.len()).contains(at)).collect();
+        let kept_columns = self.a_0.select_columns(&kept);
+        let rates = DVector::from_column_slice(filter).map(|rate| 1.0 / rate);
+        let unfiltered = ObserverProblem {
+            a_0: &kept_columns.select_rows(&kept),
+            c_0: &(DMatrix::from_diagonal(&rates) * kept_columns.rows(first, filter.len())),
+            channels: self.channels,
+            faults: self.faults,
+            filter: None,
+            estimator: Estimator::Prediction,
+        };
+        unfiltered.noisy_lower_bound(required, domain)
+    }
+
+    /// Computes L; for a current estimator the gain of the correction.
+    pub(crate) fn by_norm(
+        &self,
+        required: NormRequirement<'_>,
+        domain: Domain,
+    ) -> Result<GainResult, Refusal> {
+        let seen = self.estimator.output_matrix(self.a_0, self.c_0);
+        let plain = NormRequirement { channel: &Channel::default(), ..required };
+        let unweighted = self.performance(plain, domain);
+        let weights = self.weights(required.channel, domain)?;
+        let search = Search {
+            synthesise: &|region, performance| match performance.zip(weights.as_ref()) {
+                None => lmi::observer_gain(self.a_0, &seen, region, performance, domain),
+                Some((performance, weights)) => {
+                    let pair = (self.a_0, &seen);
+                    weighted_observer_gain(pair, region, performance, weights, domain)
+                }
+            },
+            weights: weights.as_ref(),
+            system: &|gain, given| StateSpace {
+                a: self.a_0 - gain * &seen,
+                b: &given.disturbance - gain * &given.feedthrough,
+                c: given.output.clone(),
+                d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
+                domain,
+            },
+            performance: self.performance(required, domain),
+            unweighted,
+            required,
+            domain,
+            filter: self.riccati(required, domain)?,
+            lower_bound: self.lower_bound(required, domain)?,
+        };
+        let noise = if required.channel.noise.is_empty() { "" } else { " and measurement noise" };
+        search.result(&format!(
+            "H-infinity norm from the faults' rates{noise} to the errors of their estimates"
+        ))
+    }
+}
+
+impl FeedbackProblem<'_> {
+    /// The channel from the faults to the weighted measurements and commands.
+    fn performance(&self, required: NormRequirement<'_>) -> Performance {
+        let (m, p) = (self.b.ncols(), self.c.nrows());
+        let mut feedthrough = DMatrix::zeros(p + m, m);
+        feedthrough.view_mut((p, 0), (m, m)).fill_with_identity();
+        let mut output = self.c.clone().resize_vertically(p + m, 0.0);
+        for (row, weight) in required.channel.weights.iter().enumerate() {
+            output.row_mut(row).scale_mut(weight.factor());
+            feedthrough.row_mut(row).scale_mut(weight.factor());
+        }
+        let (disturbance, gamma) = (self.f_a.clone(), required.bound);
+        Performance { disturbance, output, feedthrough, norm: Norm::HInfinity, gamma }
+    }
+
+    /// The weights over frequency of measurements and commands, if there are any.
+    fn weights(&self, channel: &Channel, domain: Domain) -> Result<Option<ChannelWeights>, Error> {
+        if !channel.has_states() {
+            return Ok(None);
+        }
+        let inputs = vec![Weight::constant(1.0); self.f_a.ncols()];
+        let outputs: Vec<_> = channel.weights.iter().map(over_frequency).collect();
+        let (input, output) = (diagonal(&inputs, domain)?, diagonal(&outputs, domain)?);
+        Ok(Some(ChannelWeights { input, output }))
+    }
+
+    /// Computes a norm below which no state feedback is, even if it knows the states of the weights.
+    fn lower_bound(
+        &self,
+        performance: &Performance,
+        weights: Option<&ChannelWeights>,
+        domain: Domain,
+    ) -> Result<Option<f64>, Error> {
+        if self.a.nrows() > LARGEST_ORDER {
+            return Ok(None);
+        }
+        let Some(weights) = weights else {
+            return feedback_norm_lower_bound(self.a, self.b, performance, domain);
+        };
+        let dual = performance.transposed();
+        let pair = (self.a.transpose(), self.b.transpose());
+        let (a, c, performance) = weights.transposed().extend(&pair.0, &pair.1, &dual);
+        observer_norm_lower_bound(&a, &c, &performance, domain)
+    }
+
+    /// Computes K of u = K x.
+    pub(crate) fn by_norm(
+        &self,
+        required: NormRequirement<'_>,
+        domain: Domain,
+    ) -> Result<GainResult, Refusal> {
+        let plain = NormRequirement { channel: &Channel::default(), ..required };
+        let performance = self.performance(required);
+        let weights = self.weights(required.channel, domain)?;
+        let lower_bound = self.lower_bound(&performance, weights.as_ref(), domain)?;
+        let search = Search {
+            synthesise: &|region, performance| match performance.zip(weights.as_ref()) {
+                None => lmi::state_feedback(self.a, self.b, region, performance, domain),
+                Some((performance, weights)) => {
+                    let pair = (self.a, self.b);
+                    weighted_state_feedback(pair, region, performance, weights, domain)
+                }
+            },
+            weights: weights.as_ref(),
+            system: &|gain, given| StateSpace {
+                a: self.a + self.b * gain,
+                b: given.disturbance.clone(),
+                c: &given.output + &given.feedthrough * gain,
+                d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
+                domain,
+            },
+            performance,
+            unweighted: self.performance(plain),
+            required,
+            domain,
+            filter: None,
+            lower_bound: lower_bound.map(LowerBound::for_filters),
+        };
+        search.result("H-infinity norm from the faults to measurements and commands")
+    }
+}
+
+/// The weight if it depends on the frequency, else 1: constant weights are factors of the performance.
+fn over_frequency(one: &ChannelWeight) -> Weight {
+    match one.weight.as_constant() {
+        None => one.weight.clone(),
+        Some(_) => Weight::constant(1.0),
+    }
+}

@@ -1,0 +1,254 @@
+//! The search for a gain by its H-infinity norm, and the judgement of the result.
+
+use control::eigen::eigenvalues;
+use control::lmi::{self, ChannelWeights, Norm, Outcome, Performance, Synthesis, certify_gain};
+use control::response::h_infinity;
+use control::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
+
+use crate::plant_file::channel::Channel;
+use crate::plant_file::requirements::Region;
+use crate::report::{LowerBoundFor, NormReport, NormWeight};
+use crate::solve::gain::{GainResult, Refusal, synthesised, unique};
+use crate::solve::norm_gains::NormRequirement;
+
+/// Relative width of a norm.
+pub(crate) const WIDTH: f64 = 1e-4;
+/// Largest order for which bounds are proven and the norm without the region is computed.
+pub(crate) const LARGEST_ORDER: usize = 30;
+/// A bound that is larger than the norm by more than this factor is not stated.
+const LOOSE: f64 = 1.01;
+
+/// Computes a gain for a region and, if given, a performance.
+pub(crate) type Synthesise<'a> =
+    dyn Fn(&lmi::Region, Option<&Performance>) -> Result<Outcome<Synthesis>, Error> + 'a;
+
+/// The search for a gain by its norm, the same for observer and feedback.
+pub(crate) struct Search<'a> {
+    pub(crate) synthesise: &'a Synthesise<'a>,
+    /// The closed loop of a gain, from w to z of a performance.
+    pub(crate) system: &'a dyn Fn(&DMatrix<f64>, &Performance) -> StateSpace,
+    pub(crate) performance: Performance,
+    /// The weights over frequency.
+    pub(crate) weights: Option<&'a ChannelWeights>,
+    /// The performance without weights and noise.
+    pub(crate) unweighted: Performance,
+    pub(crate) required: NormRequirement<'a>,
+    pub(crate) domain: Domain,
+    /// The gain of a filter by a Riccati equation.
+    pub(crate) filter: Option<DMatrix<f64>>,
+    /// A norm below which no gain is.
+    pub(crate) lower_bound: Option<LowerBound>,
+}
+
+/// A proven lower bound of the norm.
+#[derive(Clone, Copy)]
+pub(crate) struct LowerBound {
+    pub(crate) norm: f64,
+    pub(crate) holds_for: LowerBoundFor,
+}
+
+impl LowerBound {
+    pub(crate) fn for_filters(norm: f64) -> Self {
+        Self { norm, holds_for: LowerBoundFor::Filters }
+    }
+}
+
+impl Search<'_> {
+    /// The closed loop of a gain with weights.
+    fn weighted(&self, gain: &DMatrix<f64>) -> StateSpace {
+        let system = (self.system)(gain, &self.performance);
+        self.weights.map_or_else(|| system.clone(), |weights| weights.around(&system))
+    }
+
+    fn weighted_norm(&self, gain: &DMatrix<f64>) -> Result<f64, Error> {
+        Ok(h_infinity(&self.weighted(gain), WIDTH)?.upper)
+    }
+    /// Returns the gain with its norm and bounds of it.
+    ///
+    /// For the least norm the gain for the region alone is computed, too, and the better one is
+    /// chosen: one Lyapunov matrix for norm and region is sufficient, not necessary. A filter by the
+    /// Riccati equation is used if its eigenvalues are in the region and its norm keeps the bound.
+    pub(crate) fn result(&self, channel: &str) -> Result<GainResult, Refusal> {
+        if let (Some(bound), Some(least)) = (self.required.bound, self.lower_bound)
+            && least.norm > bound
+        {
+            let which = match least.holds_for {
+                LowerBoundFor::Filters => {
+                    "no gain keeps this bound, nor does a filter of any order"
+                }
+                LowerBoundFor::Disc => "no gain with all eigenvalues in the disc keeps this bound",
+            };
+            return Err(Refusal::Conflict(format!(
+                "{which}: expected a bound above {:.4e}, which is a proven lower bound of the {channel}",
+                least.norm
+            )));
+        }
+        let mut chosen = match &self.filter {
+            Some(gain) if self.usable(gain)? => {
+                let method = format!("{channel}, by the Riccati equation of the filter.");
+                unique(gain.clone(), method)
+            }
+            _ => self.by_inequalities(channel)?,
+        };
+        let report = self.report(&chosen.gain, channel)?;
+        chosen.method = format!("{} {}", chosen.method, sentence(&report));
+        chosen.norm = Some(report);
+        Ok(chosen)
+    }
+
+    /// Computes the gain by linear matrix inequalities.
+    fn by_inequalities(&self, channel: &str) -> Result<GainResult, Refusal> {
+        let region = self.required.region.stated();
+        let found = (self.synthesise)(&region, Some(&self.performance))?;
+        let mut chosen = synthesised(found, channel)?;
+        if self.required.bound.is_some() {
+            return Ok(chosen);
+        }
+        if self.weights.is_some() {
+            chosen.method = format!("{} {LOCAL}", chosen.method);
+            return Ok(chosen);
+        }
+        let mut remarks = Vec::new();
+        if let Outcome::Optimal(plain) = (self.synthesise)(&region, None)? {
+            let norm = self.weighted_norm(&chosen.gain)?;
+            let other = self.weighted_norm(&plain.gain)?;
+            remarks.push(format!(
+                "The inequalities for norm and region gave a norm of {norm:.4e}, those for the region \
+                 alone {other:.4e}; the smaller one is used."
+            ));
+            if other < norm {
+                let margin = plain.region.margin;
+                chosen.gain = plain.gain;
+                chosen.method = format!("{channel}; region verified with margin {margin:.1e}.");
+            }
+        }
+        remarks.extend(self.without_region()?);
+        chosen.method = format!("{} {LEAST} {}", chosen.method, remarks.join(" "));
+        chosen.method.truncate(chosen.method.trim_end().len());
+        Ok(chosen)
+    }
+
+    /// Whether the eigenvalues with a gain are in the region and its norm keeps the bound.
+    fn usable(&self, gain: &DMatrix<f64>) -> Result<bool, Error> {
+        let all = eigenvalues(&(self.system)(gain, &self.performance).a)?;
+        let inside = |value| self.required.region.contains(value, self.domain);
+        let bound = self.required.bound.unwrap_or(f64::INFINITY);
+        Ok(all.into_iter().all(inside) && self.weighted_norm(gain)? <= bound)
+    }
+
+    /// Computes the norm of the loop with a gain, and bounds of it.
+    fn report(&self, gain: &DMatrix<f64>, channel: &str) -> Result<NormReport, Error> {
+        let system = self.weighted(gain);
+        let norm = h_infinity(&system, WIDTH)?.upper;
+        let certified = if system.a.nrows() > LARGEST_ORDER {
+            None
+        } else {
+            let bound = certify_gain(&system, Norm::HInfinity)?.optimal();
+            bound.map(|bound| bound.gamma).filter(|gamma| *gamma <= LOOSE * norm)
+        };
+        let plain = self.weights.is_none() && self.performance == self.unweighted;
+        Ok(NormReport {
+            channel: channel.to_owned(),
+            norm,
+            certified,
+            lower_bound: self.lower_bound.map(|least| least.norm),
+            lower_bound_for: self.lower_bound.map(|least| least.holds_for),
+            gap: self
+                .lower_bound
+                .filter(|least| least.norm > 0.0)
+                .map(|least| norm / least.norm - 1.0),
+            unweighted: if plain {
+                None
+            } else {
+                Some(h_infinity(&(self.system)(gain, &self.unweighted), WIDTH)?.upper)
+            },
+            gain: gain.norm(),
+            weights: weights_over_frequency(self.required.channel, self.domain),
+        })
+    }
+
+    /// Says what norm a gain reaches that need not keep the region.
+    fn without_region(&self) -> Result<Option<String>, Error> {
+        let order = self.performance.output.ncols();
+        if self.required.region == Region::default() || order > LARGEST_ORDER {
+            return Ok(None);
+        }
+        let gain = if let Some(filter) = &self.filter {
+            filter.clone()
+        } else {
+            let found = (self.synthesise)(&lmi::Region::default(), Some(&self.performance))?;
+            let Outcome::Optimal(found) = found else { return Ok(None) };
+            found.gain
+        };
+        let (norm, size) = (self.weighted_norm(&gain)?, gain.norm());
+        Ok(Some(format!(
+            "Without the region, a gain with the norm {norm:.4e} exists; the Frobenius norm of that gain \
+             is {size:.4e}."
+        )))
+    }
+}
+
+/// Returns the weights over frequency, for the report.
+fn weights_over_frequency(channel: &Channel, domain: Domain) -> Vec<NormWeight> {
+    let over_frequency = channel.all().filter(|one| one.weight.as_constant().is_none());
+    over_frequency
+        .map(|one| {
+            let (numerator, denominator) = one.weight.polynomials(domain);
+            NormWeight {
+                signal: one.signal.clone(),
+                numerator,
+                denominator,
+                table_deviation: one.deviation,
+            }
+        })
+        .collect()
+}
+
+/// Says the norm and its bounds.
+fn sentence(report: &NormReport) -> String {
+    let NormReport { norm, unweighted, gain, lower_bound, lower_bound_for, gap, .. } = report;
+    let plain = unweighted
+        .map_or(String::new(), |plain| format!(" with weights and noise, {plain:.4e} without"));
+    let which = match lower_bound_for {
+        Some(LowerBoundFor::Disc) => "No gain with all eigenvalues in the disc",
+        _ => "No gain and no filter of any order",
+    };
+    let bound = match (lower_bound, gap) {
+        (Some(least), Some(gap)) => {
+            let percent = 100.0 * gap;
+            format!("{which} has a norm below {least:.4e}: the gap is {percent:.2} %.")
+        }
+        (Some(_), None) => {
+            "The measurements have no noise, and there is no lower bound above 0: ever \
+                            larger gains lower the norm without end."
+                .to_owned()
+        }
+        (None, _) => "A lower bound is not known.".to_owned(),
+    };
+    let fits: Vec<_> = report
+        .weights
+        .iter()
+        .filter_map(|weight| {
+            let decibels = 20.0 * weight.table_deviation?.log10();
+            Some(format!(
+                " The weight of {} is within {decibels:.2} dB of its table.",
+                weight.signal
+            ))
+        })
+        .collect();
+    format!(
+        "Norm {norm:.4e}{plain}; Frobenius norm of the gain {gain:.4e}. {bound}{}",
+        fits.concat()
+    )
+}
+
+/// What "least" means: with a region the inequalities are sufficient, not necessary.
+const LEAST: &str = "Least certified: the inequalities are solved 5 % above the least bound that one \
+                     Lyapunov matrix proves for norm and region together; a gain with a smaller norm in \
+                     this region may exist.";
+
+/// What "least" means for weights over frequency.
+const LOCAL: &str = "Least found: from gains by linear matrix inequalities and by the Kalman filter on, the \
+                     norm was lowered over the entries of the gain to a local minimum; a gain with a \
+                     smaller norm in this region may exist.";

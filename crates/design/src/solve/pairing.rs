@@ -1,0 +1,58 @@
+//! The choice of feedback and observer together, among the placements that were found for each.
+
+use control::aso::{FaultyPlant, Gains, pairs};
+use control::robustness::{Loop, least_sensitive};
+use control::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
+
+use crate::plant::linear::LinearPlant;
+use crate::solve::gain::GainResult;
+use crate::solve::tracking::DesignLoop;
+
+/// The plant of a pair of gains.
+pub(crate) struct PairProblem<'a> {
+    pub(crate) linear: &'a LinearPlant,
+    /// The model in the observer.
+    pub(crate) plant: &'a FaultyPlant,
+    pub(crate) filter: Option<&'a [f64]>,
+    pub(crate) domain: Domain,
+}
+
+impl PairProblem<'_> {
+    /// Returns feedback and observer whose loop has the lowest peaks of S, see [`least_sensitive`].
+    ///
+    /// `gains`: those of the controller, from the gains of feedback and observer. A measurement filter
+    /// belongs to the plant, except with integral action.
+    pub(crate) fn chosen(
+        &self,
+        (feedback, observer): (GainResult, GainResult),
+        gains: impl Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains,
+    ) -> Result<(GainResult, GainResult), Error> {
+        let (feedback, observer) = (feedback.into_choice(), observer.into_choice());
+        let [first, second] = pairs(&feedback.candidates(), &observer.candidates());
+        let chosen =
+            |(feedback, observer): (&GainResult, &GainResult)| (feedback.clone(), observer.clone());
+        if let ([only], []) = (first.as_slice(), second.as_slice()) {
+            return Ok(chosen(*only));
+        }
+        let own = |(feedback, observer): &(&GainResult, &GainResult)| {
+            self.closed(&gains(&feedback.gain, &observer.gain))
+        };
+        let loops = |pairs: &[_]| pairs.iter().map(own).collect::<Result<Vec<_>, Error>>();
+        let standard = feedback.standard.iter().zip(&observer.standard);
+        let standard = standard.filter_map(|(own, other)| own.as_ref().zip(other.as_ref()));
+        let references = standard.map(|(own, other)| self.closed(&gains(own, other)));
+        let references = references.collect::<Result<Vec<_>, Error>>()?;
+        let best = least_sensitive([&loops(&first)?, &loops(&second)?], &references);
+        Ok(chosen(*first.iter().chain(&second).nth(best).unwrap_or(&first[0])))
+    }
+
+    fn closed(&self, gains: &Gains) -> Result<Loop, Error> {
+        let Self { linear, plant, filter, domain } = *self;
+        let DesignLoop { plant, controller } =
+            DesignLoop::of((linear, plant), gains, filter, domain)?;
+        let FaultyPlant { a, b, c, .. } = plant;
+        let d = DMatrix::zeros(c.nrows(), b.ncols());
+        Loop::new(StateSpace { a, b, c, d, domain }, controller)
+    }
+}

@@ -1,0 +1,326 @@
+//! The designs at the points of a schedule, and the loop between them.
+
+pub(crate) mod references;
+
+use control::aso::{Estimator, FaultyPlant, Gains};
+use control::controller::complete_controller;
+use control::hold::zero_order_hold;
+use control::lmi::{Interval, bernstein};
+use control::robustness::Loop;
+use control::stability::instability;
+use control::tracking::IntegralAction;
+use control::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
+
+use crate::plant::linear::LinearPlant;
+use crate::plant_file::PlantFile;
+use crate::plant_file::estimation::Law;
+use crate::plant_file::signals::Signal;
+use crate::plant_file::variants::Variable;
+use crate::solve::family::check_states;
+use crate::solve::solution::{ControllerDesign, design_by};
+
+/// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p` of a
+/// current estimator. The loop of a continuous controller has degree 2, with a direct term 4; its coefficients of
+/// degree 4 are nearer to it.
+const DEGREE: u32 = 4;
+/// The same for a current estimator with a direct term: B `K_f` `P_f` C L C.
+const DEGREE_OF_DIRECT_TERM: u32 = 6;
+
+/// The designs of a scheduled controller.
+pub(crate) struct Scheduled {
+    /// The scheduling variable.
+    pub(crate) variable: Signal,
+    /// The position of the measurement that it is.
+    pub(crate) measurement: Option<usize>,
+    /// Largest rate of the variable, per s.
+    pub(crate) rate_bound: Option<f64>,
+    /// Values of the variable, ascending, each with its design: None for the plant of the file.
+    points: Vec<(f64, Option<ControllerDesign>)>,
+}
+
+/// The matrices at a value of the scheduling variable.
+struct Point {
+    /// The plant without filters, sampled if the controller is.
+    physical: StateSpace,
+    /// The model in the observer, and the gains.
+    model: FaultyPlant,
+    gains: Gains,
+}
+
+impl Scheduled {
+    /// Designs the controller with `law` at each point of the schedule of `file`.
+    pub(crate) fn of(
+        file: &PlantFile<'_>,
+        law: &Law,
+        nominal: &LinearPlant,
+    ) -> Result<Option<Self>, crate::Error> {
+        let Some(schedule) = &file.schedule else { return Ok(None) };
+        let variable = schedule.variable(&file.measurements).clone();
+        let mut points = Vec::with_capacity(schedule.points.len());
+        for (at, point) in schedule.points.iter().enumerate() {
+            if at == schedule.nominal {
+                points.push((point.at, None));
+                continue;
+            }
+            let own = design_by(&file.with(&point.plant), law).map_err(|error| {
+                error.within(format!("schedule with {} = {}", variable.name, point.at))
+            })?;
+            check_states(file, &point.plant, (nominal, &own.linear))?;
+            points.push((point.at, Some(own)));
+        }
+        Ok(Some(Self {
+            measurement: match schedule.variable {
+                Variable::Measurement(at) => Some(at),
+                Variable::Input(_) => None,
+            },
+            rate_bound: schedule.rate_bound,
+            variable,
+            points,
+        }))
+    }
+
+    /// The values of the scheduling variable with their designs; `nominal` is the design of the file.
+    pub(crate) fn points<'a>(
+        &'a self,
+        nominal: &'a ControllerDesign,
+    ) -> impl Iterator<Item = (f64, &'a ControllerDesign)> {
+        self.points.iter().map(move |(at, own)| (*at, own.as_ref().unwrap_or(nominal)))
+    }
+
+    /// The points besides that of the plant of the file.
+    pub(crate) fn others(&self) -> impl Iterator<Item = (f64, &ControllerDesign)> {
+        self.points.iter().filter_map(|(at, own)| Some((*at, own.as_ref()?)))
+    }
+}
+
+impl Point {
+    fn of(own: &ControllerDesign) -> Result<Self, Error> {
+        let linear = &own.linear;
+        let (mut a, mut b) = (linear.a.clone(), linear.b.clone());
+        if let Domain::Sampled { period } = own.domain {
+            (a, b) = zero_order_hold(&a, &b, period)?;
+        }
+        let d = DMatrix::zeros(linear.c.nrows(), b.ncols());
+        let physical = StateSpace { a, b, c: linear.c.clone(), d, domain: own.domain };
+        Ok(Self { physical, model: own.plant.clone(), gains: own.gains.clone() })
+    }
+
+    /// The matrices at the part `t` of the way to `other`, as the controller FMU interpolates them.
+    fn between(&self, other: &Self, t: f64) -> Self {
+        let mix = |from: &DMatrix<f64>, to: &DMatrix<f64>| from * (1.0 - t) + to * t;
+        let (plant, next) = (&self.physical, &other.physical);
+        let (model, gains) = (&self.model, &self.gains);
+        Self {
+            physical: StateSpace {
+                a: mix(&plant.a, &next.a),
+                b: mix(&plant.b, &next.b),
+                c: mix(&plant.c, &next.c),
+                ..plant.clone()
+            },
+            model: FaultyPlant {
+                a: mix(&model.a, &other.model.a),
+                b: mix(&model.b, &other.model.b),
+                c: mix(&model.c, &other.model.c),
+                f_a: mix(&model.f_a, &other.model.f_a),
+                a_f: model.a_f.clone(),
+            },
+            gains: Gains {
+                k_x: mix(&gains.k_x, &other.gains.k_x),
+                k_f: mix(&gains.k_f, &other.gains.k_f),
+                l_x: mix(&gains.l_x, &other.gains.l_x),
+                l_f: mix(&gains.l_f, &other.gains.l_f),
+                p_f: gains
+                    .p_f
+                    .as_ref()
+                    .zip(other.gains.p_f.as_ref())
+                    .map(|(own, next)| mix(own, next)),
+                integral: gains.integral.as_ref().zip(other.gains.integral.as_ref()).map(
+                    |(own, next)| IntegralAction {
+                        output: mix(&own.output, &next.output),
+                        gain: mix(&own.gain, &next.gain),
+                        ..own.clone()
+                    },
+                ),
+                ..gains.clone()
+            },
+        }
+    }
+
+    /// The dynamics of plant and controller together.
+    fn closed(self, filter: Option<&[f64]>) -> Result<DMatrix<f64>, Error> {
+        let domain = self.physical.domain;
+        let own = complete_controller(&self.model, &self.gains, filter, domain)?;
+        Ok(Loop::new(self.physical, own.commands)?.dynamics())
+    }
+}
+
+/// The loop at and between the points of a schedule.
+pub(crate) struct ScheduledLoop {
+    at: Vec<f64>,
+    points: Vec<Point>,
+    filter: Option<Vec<f64>>,
+}
+
+impl ScheduledLoop {
+    pub(crate) fn of(own: &Scheduled, nominal: &ControllerDesign) -> Result<Self, Error> {
+        let all: Vec<_> = own.points(nominal).collect();
+        Ok(Self {
+            at: all.iter().map(|(at, _)| *at).collect(),
+            points: all.iter().map(|(_, own)| Point::of(own)).collect::<Result<_, _>>()?,
+            filter: nominal.filter.clone(),
+        })
+    }
+
+    /// The intervals between the points. All plants and gains on them are interpolated linearly, so
+    /// that the loop is a polynomial, of degree 4 or 6.
+    pub(crate) fn intervals(&self) -> Result<Vec<Interval>, Error> {
+        let Gains { p_f, estimator, .. } = &self.points[0].gains;
+        let degree = match (p_f, estimator) {
+            (Some(_), Estimator::Current) => DEGREE_OF_DIRECT_TERM,
+            _ => DEGREE,
+        };
+        let interval = |k: usize| {
+            let at = |j: u32| self.dynamics(k, f64::from(j) / f64::from(degree));
+            let values = (0..=degree).map(at).collect::<Result<Vec<_>, _>>()?;
+            let length = self.at[k + 1] - self.at[k];
+            Ok(Interval { length, coefficients: bernstein(&values)? })
+        };
+        (0..self.points.len() - 1).map(interval).collect()
+    }
+
+    /// The instability of the loop at `count` values in each interval, its ends included: the worst,
+    /// with the value of the variable.
+    pub(crate) fn worst(&self, count: u32, domain: Domain) -> Result<(f64, f64), Error> {
+        let mut worst = (f64::NEG_INFINITY, self.at[0]);
+        for k in 0..self.points.len() - 1 {
+            for j in 0..=count {
+                let t = f64::from(j) / f64::from(count);
+                let found = instability(&self.dynamics(k, t)?, domain)?;
+                if found > worst.0 {
+                    worst = (found, self.at[k] * (1.0 - t) + self.at[k + 1] * t);
+                }
+            }
+        }
+        Ok(worst)
+    }
+
+    fn dynamics(&self, k: usize, t: f64) -> Result<DMatrix<f64>, Error> {
+        self.points[k].between(&self.points[k + 1], t).closed(self.filter.as_deref())
+    }
+}
+
+/// The instability of the loop at each point when a measurement schedules, whose own feedback through
+/// the interpolated operating points ("hidden coupling") the designs at the points do not have.
+///
+/// With slopes ' of the operating points in the variable theta = `y_j`, A to D the controller with its states z,
+///
+/// ```text
+/// z[k+1] = A z + B y + ((I - A) z_op' - B y_op') theta
+/// u      = C z + D y + (u_op' - C z_op' - D y_op') theta
+/// z'     = A z + B y - (A z_op' + B y_op') theta              the first line in continuous time
+/// ```
+///
+/// Between two intervals the slopes jump; the worse side counts. Source: W. J. Rugh and J. S. Shamma,
+/// Research on gain scheduling, Automatica 36 (2000), section 3.
+pub(crate) fn coupled(
+    own: &Scheduled,
+    nominal: &ControllerDesign,
+) -> Result<Option<Vec<f64>>, Error> {
+    let Some(j) = own.measurement else { return Ok(None) };
+    let all: Vec<_> = own.points(nominal).collect();
+    let slopes: Vec<_> = all.windows(2).map(|pair| Slopes::between(pair[0], pair[1])).collect();
+    let one = |k: usize| {
+        let sides = [k.checked_sub(1), (k + 1 < all.len()).then_some(k)].into_iter().flatten();
+        let mut worst = f64::NEG_INFINITY;
+        for side in sides {
+            let design = all[k].1;
+            let point = Point::of(design)?;
+            let filter = design.filter.as_deref();
+            let own = complete_controller(&point.model, &point.gains, filter, design.domain)?;
+            let mut changed = slopes[side].act_on(&own.commands, filter.is_some(), j);
+            slopes[side].move_references((design, &mut changed), j);
+            let whole = Loop::new(point.physical, changed)?;
+            worst = worst.max(instability(&whole.dynamics(), design.domain)?);
+        }
+        Ok(worst)
+    };
+    (0..all.len()).map(one).collect::<Result<_, _>>().map(Some)
+}
+
+/// Slopes of the operating points in the scheduling variable.
+struct Slopes {
+    x: Vec<f64>,
+    u: Vec<f64>,
+    y: Vec<f64>,
+}
+
+impl Slopes {
+    fn between(from: (f64, &ControllerDesign), to: (f64, &ControllerDesign)) -> Self {
+        let length = to.0 - from.0;
+        let slope = |of: fn(&LinearPlant) -> &[Signal]| {
+            let values = of(&from.1.linear).iter().zip(of(&to.1.linear));
+            let value = |signal: &Signal| signal.operating.unwrap_or(0.0);
+            values.map(|(from, to)| (value(to) - value(from)) / length).collect()
+        };
+        Self {
+            x: slope(|linear| &linear.states),
+            u: slope(|linear| &linear.actuators),
+            y: slope(|linear| &linear.measurements),
+        }
+    }
+
+    /// Adds the part of references that rest: r - r_op moves against their operating point r_op = H y_op.
+    ///
+    /// ```text
+    /// x_i[k+1] = ... - T H y_op' theta,   u = ... - N_r H y_op' theta,   x_hat[k+1] = ... - B N_r H y_op' theta
+    /// ```
+    ///
+    /// In continuous time these are x_i' without T, and x_hat'. The observer receives u, and so its next state has the same part of it.
+    fn move_references(&self, (design, own): (&ControllerDesign, &mut StateSpace), j: usize) {
+        let Some(tracking) = &design.tracking else { return };
+        let period = match design.domain {
+            Domain::Continuous => 1.0,
+            Domain::Sampled { period } => period,
+        };
+        let moved = &tracking.h * DMatrix::from_column_slice(self.y.len(), 1, &self.y);
+        let t = design.gains.integrals();
+        let first = own.b.nrows() - t;
+        for k in 0..t {
+            own.b[(first + k, j)] -= period * moved[k];
+        }
+        if let Some(n_r) = tracking.feedforward() {
+            let command = n_r * moved;
+            let states = &design.plant.b * &command;
+            let before = design.filter.as_ref().map_or(0, Vec::len);
+            for i in 0..states.nrows() {
+                own.b[(before + i, j)] -= states[i];
+            }
+            for i in 0..command.nrows() {
+                own.d[(i, j)] -= command[i];
+            }
+        }
+    }
+
+    /// `own`, the controller with its filter, scheduled by its measurement `j`. Its states are the
+    /// filtered measurements, if there are any, x_hat, the filtered measurements of the model, f_hat,
+    /// and the integrals, which have no operating point.
+    fn act_on(&self, own: &StateSpace, is_filtered: bool, j: usize) -> StateSpace {
+        let filtered = if is_filtered { &self.y[..] } else { &[] };
+        let slopes = [filtered, &self.x, filtered].concat();
+        let z = DMatrix::from_column_slice(slopes.len(), 1, &slopes);
+        let z = z.resize_vertically(own.a.nrows(), 0.0);
+        let y = DMatrix::from_column_slice(self.y.len(), 1, &self.y);
+        let u = DMatrix::from_column_slice(self.u.len(), 1, &self.u);
+        let mut found = own.clone();
+        let kept = match own.domain {
+            Domain::Continuous => z.scale(0.0),
+            Domain::Sampled { .. } => z.clone(),
+        };
+        let to_z = kept - &own.a * &z - &own.b * &y;
+        let to_u = u - &own.c * &z - &own.d * &y;
+        found.b.set_column(j, &(own.b.column(j) + to_z.column(0)));
+        found.d.set_column(j, &(own.d.column(j) + to_u.column(0)));
+        found
+    }
+}

@@ -1,0 +1,508 @@
+//! Computes the gains for a plant file.
+
+use crate::plant::feedthrough;
+use crate::plant::fixed_mode::{described, described_in};
+use crate::plant::linear::LinearPlant;
+use crate::plant::plausibility::{check_faults, check_limits};
+use crate::plant_file::estimation::Law;
+use crate::plant_file::requirements::{Request, Requirement};
+use crate::plant_file::{FAULTS, PlantFile};
+use crate::solve::family::{self, Family, common_feedback};
+use crate::solve::gain::{FeedbackProblem, GainResult, Refusal, unique};
+use crate::solve::gains::{feedback, observer};
+use crate::solve::law::{DesignedLaw, LawProblem};
+use crate::solve::norm_gains::ObserverProblem;
+use crate::solve::pairing::PairProblem;
+use crate::solve::schedule::Scheduled;
+use crate::solve::schedule::references::examine;
+use crate::solve::tracking::{
+    DesignLoop, Tracking, check_references, decay, feedback_pair, integral_action,
+};
+use control::aso::{Estimator, FaultyPlant, Gains};
+use control::controller::closed_loop;
+use control::detectability::{Detectability, detectability};
+use control::distance::{Distance, from_uncontrollable};
+use control::faults::ExtendedPlant;
+use control::rank::{Mode, Rank, controllability, uncontrollable_modes};
+use control::sampled;
+use control::stability::{instability, is_clearly_stable};
+use control::{Domain, Error};
+use files::PlaceError;
+use nalgebra::DMatrix;
+
+/// A designed controller with the intermediate results.
+pub(crate) struct ControllerDesign {
+    pub(crate) linear: LinearPlant,
+    /// What is unusual in the plant file, with its place.
+    pub(crate) warnings: Vec<PlaceError>,
+    /// The plant with fault models and measurement filter, in continuous time.
+    pub(crate) extended: ExtendedPlant,
+    pub(crate) domain: Domain,
+    /// The model in the observer: the extended plant, sampled for a sampled design.
+    pub(crate) plant: FaultyPlant,
+    /// The measurement filter in the controller.
+    pub(crate) filter: Option<Vec<f64>>,
+    pub(crate) gains: Gains,
+    /// The law that estimates the faults.
+    pub(crate) law: DesignedLaw,
+    /// The error dynamics of the augmented observer that meets the requirement.
+    pub(crate) required_error_dynamics: DMatrix<f64>,
+    pub(crate) feedback: GainResult,
+    pub(crate) observer: GainResult,
+    pub(crate) controllability: Rank,
+    pub(crate) distance: Distance,
+    pub(crate) detectability: Detectability,
+    /// The part of the faults' effect on the states that the compensation cannot cancel, relative.
+    pub(crate) cancellation_residual: f64,
+    /// The set points of measurements, if there are any.
+    pub(crate) tracking: Option<Tracking>,
+    /// A and B of the feedback: those of the plant, with integral action followed by the integrals.
+    pub(crate) feedback_pair: (DMatrix<f64>, DMatrix<f64>),
+    /// The plant and the linear controller from its measurements to its commands.
+    pub(crate) whole: DesignLoop,
+    /// Largest real part of the closed-loop eigenvalues, or largest modulus minus one; negative if
+    /// stable.
+    pub(crate) instability: f64,
+    /// Whether the faults are estimated while they are not compensated.
+    pub(crate) monitor: bool,
+    /// The same for the observer error before `t_on`, if the faults are not estimated then.
+    pub(crate) instability_before: Option<f64>,
+    pub(crate) family: Option<Family>,
+    pub(crate) schedule: Option<Scheduled>,
+}
+
+/// Designs the controller for `file`.
+pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Error> {
+    design_by(file, &file.estimation.law)
+}
+
+/// Designs the controller for `file` with another law for the estimates of the faults.
+pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDesign, crate::Error> {
+    crate::threads::start()?;
+    let linear = LinearPlant::of(file)?;
+    feedthrough::check(file, &linear)?;
+    let mut warnings = check_limits(file, &linear)?;
+    let filter = file.filter.as_deref().unwrap_or_default();
+    let LinearPlant { a, b, c, models, .. } = &linear;
+    let extended = ExtendedPlant::new(a, b, c, models, filter)
+        .map_err(|error| file.error(&["A"], error.to_string()))?;
+    let (controllable, detectability) = rayon::join(
+        || check_controllable(file, &linear, &mut warnings),
+        || detectability(&extended.plant, Domain::Continuous),
+    );
+    let (controllability, distance) = controllable?;
+    check_faults(file, &linear, &extended)?;
+    check_references(file, &linear)?;
+    let detectability = detectability.map_err(|error| file.error(&FAULTS, error.to_string()))?;
+    check_detectable(file, (&linear, &extended), &detectability, &mut warnings)?;
+    let (domain, mut plant) = in_domain(file, &extended)?;
+    let references = file.references.as_ref();
+    let states = extended.states;
+    let own = (plant.a.view((0, 0), (states, states)).into_owned(), plant.b.rows(0, states).into());
+    let pair = feedback_pair(references, [&own.0, &own.1, c], domain)?;
+    let members = family::members(file, &linear, &mut warnings)?;
+    let common = match &file.feedback.requirement {
+        Requirement::Region(region) if !members.is_empty() => {
+            let found = common_feedback((&linear, &members), references, *region, domain);
+            Some(found.map_err(|refusal| feedback_refused((file, &linear), domain, refusal))?)
+        }
+        _ => None,
+    };
+    let (common, certificate) = common.unzip();
+    let problem = (&plant, &pair, common);
+    let found = compute_gains((file, &linear), &extended, problem, domain)?;
+    let n = plant.a.nrows();
+    let k_f = sampled::compensation_gain(&extended, domain)?;
+    let with = |feedback: &DMatrix<f64>, observer: &DMatrix<f64>| Gains {
+        estimator: estimator(file),
+        k_x: feedback.columns(0, states).into_owned().resize_horizontally(n, 0.0),
+        k_f: k_f.clone(),
+        l_x: observer.rows(0, n).into(),
+        l_f: -observer.rows(n, plant.f_a.ncols()),
+        p_f: None,
+        integral: integral_action(references, (&linear, &extended), feedback),
+    };
+    let filter = sampled::filter(&extended, domain);
+    // The gains of a schedule are interpolated, so that each point takes the first of its pairs.
+    let (feedback, observer) = if file.is_scheduled() {
+        found
+    } else {
+        let filter = filter.as_deref();
+        PairProblem { linear: &linear, plant: &plant, filter, domain }.chosen(found, with)?
+    };
+    let gains = with(&feedback.gain, &observer.gain);
+    let problem =
+        LawProblem { linear: &linear, extended: &extended, plant: &plant, gains: &gains, domain };
+    let designed_law =
+        problem.design(law).map_err(|reason| not_existing(file, law, &reason, &problem))?;
+    let observer =
+        if designed_law.keeps_error_dynamics() { observer } else { by_law(&designed_law) };
+    let required_error_dynamics = gains.error_dynamics(&plant);
+    let (gains, own_model) = (designed_law.gains.clone(), designed_law.a_f.clone());
+    plant.a_f = own_model.unwrap_or(plant.a_f);
+    let whole = DesignLoop::of((&linear, &plant), &gains, filter.as_deref(), domain)?;
+    let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
+    let controlled = &pair.0 + &pair.1 * &feedback.gain;
+    let tracking = Tracking::of(file, (&linear, (&own.0, &own.1)), (&gains, &controlled), domain)?;
+    let schedule = Scheduled::of(file, law, &linear)?;
+    let mut found = ControllerDesign {
+        family: (!members.is_empty()).then_some(Family { members, feedback: certificate }),
+        schedule,
+        cancellation_residual: cancellation_residual(&extended)?,
+        instability_before: if file.t_on > 0.0 && !file.monitor {
+            Some(instability(&gains.state_error_dynamics(&plant), domain)?)
+        } else {
+            None
+        },
+        instability: instability(&dynamics, domain)?,
+        monitor: file.monitor,
+        filter,
+        linear,
+        warnings,
+        extended,
+        domain,
+        plant,
+        gains,
+        law: designed_law,
+        required_error_dynamics,
+        feedback,
+        observer,
+        controllability,
+        distance,
+        detectability,
+        tracking,
+        feedback_pair: pair,
+        whole,
+    };
+    let further = examine(file, &found)?;
+    found.warnings.extend(further);
+    Ok(found)
+}
+
+/// An error at the law of the file, with the laws that exist.
+fn not_existing(
+    file: &PlantFile<'_>,
+    law: &Law,
+    reason: &str,
+    problem: &LawProblem<'_>,
+) -> PlaceError {
+    let message = format!(
+        "the law {} does not exist for this plant: {reason}; possible are {}",
+        law.name(),
+        problem.existing().join(", ")
+    );
+    file.error_at(&file.estimation.place, message)
+}
+
+/// The observer of a law with error dynamics of its own.
+fn by_law(law: &DesignedLaw) -> GainResult {
+    let method = format!("By the law {}, as fast as the requirement on average.", law.law.name());
+    unique(law.gains.observer_gain(), method)
+}
+
+fn estimator(file: &PlantFile<'_>) -> Estimator {
+    match file.sampling {
+        Some(sampling) if sampling.current => Estimator::Current,
+        _ => Estimator::Prediction,
+    }
+}
+
+/// Returns the model in the observer: sampled for a sampled design.
+fn in_domain(
+    file: &PlantFile<'_>,
+    extended: &ExtendedPlant,
+) -> Result<(Domain, FaultyPlant), PlaceError> {
+    let Some(sampling) = file.sampling else {
+        return Ok((Domain::Continuous, extended.plant.clone()));
+    };
+    let period = sampling.period;
+    let refuse =
+        |error: Error| file.error(&["sample_time"], format!("sampled every {period} s: {error}"));
+    let plant = sampled::sample(extended, period).map_err(refuse)?;
+    let domain = Domain::Sampled { period };
+    plant.check_detectable(domain).map_err(refuse)?;
+    Ok((domain, plant))
+}
+
+/// Computes the gains of feedback and observer; `a` and `b` are the pair of the feedback.
+fn compute_gains(
+    (file, linear): (&PlantFile<'_>, &LinearPlant),
+    extended: &ExtendedPlant,
+    (plant, (a, b), common): (&FaultyPlant, &(DMatrix<f64>, DMatrix<f64>), Option<GainResult>),
+    domain: Domain,
+) -> Result<(GainResult, GainResult), PlaceError> {
+    let n = extended.states;
+    let order = a.nrows();
+    let problem = FeedbackProblem {
+        a,
+        b,
+        c: &linear.c.clone().resize_horizontally(order, 0.0),
+        f_a: &plant.f_a.rows(0, n).into_owned().resize_vertically(order, 0.0),
+    };
+    let feedback = || match common {
+        Some(common) => Ok(common),
+        None => feedback(&file.feedback.requirement, &problem, domain),
+    };
+    let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
+    let filter = sampled::filter(extended, domain);
+    let observer_problem = ObserverProblem {
+        a_0: &a_0,
+        c_0: &c_0,
+        channels: &extended.channels,
+        faults: plant.f_a.ncols(),
+        filter: filter.as_deref(),
+        estimator: estimator(file),
+    };
+    let (feedback, observer) =
+        rayon::join(feedback, || observer(&file.observer.requirement, &observer_problem, domain));
+    let feedback = feedback.map_err(|refusal| feedback_refused((file, linear), domain, refusal))?;
+    let observer = observer.map_err(|refusal| {
+        let order = (a_0.nrows(), "states, filters, faults and rates of ramps");
+        let names = observer_states(linear, extended);
+        refused((file, domain), &file.observer, refusal, order, |at| names[at].clone())
+    })?;
+    Ok((feedback, observer))
+}
+
+fn feedback_refused(
+    (file, linear): (&PlantFile<'_>, &LinearPlant),
+    domain: Domain,
+    refusal: Refusal,
+) -> PlaceError {
+    let names = feedback_states(file, linear);
+    let more = names.len() > linear.states.len();
+    let meaning = if more { "states and integrals of references" } else { "states" };
+    refused((file, domain), &file.feedback, refusal, (names.len(), meaning), |at| names[at].clone())
+}
+
+/// Returns the part of the faults' effect on the plant's states that the compensation leaves,
+/// relative.
+fn cancellation_residual(extended: &ExtendedPlant) -> Result<f64, Error> {
+    let ExtendedPlant { plant, states, .. } = extended;
+    let left = &plant.b * plant.compensation_gain()? + &plant.f_a;
+    let whole = plant.f_a.rows(0, *states).norm();
+    Ok(if whole > 0.0 { left.rows(0, *states).norm() / whole } else { 0.0 })
+}
+
+/// Checks that the commands reach every mode that is not stable; the error names the mode.
+fn check_controllable(
+    file: &PlantFile<'_>,
+    linear: &LinearPlant,
+    warnings: &mut Vec<PlaceError>,
+) -> Result<(Rank, Distance), crate::Error> {
+    let refuse = |error: Error| file.error(&["B", "actuators"], error.to_string());
+    let rank = controllability(&linear.a, &linear.b).map_err(refuse)?;
+    let state = |at: usize| linear.states[at].name.clone();
+    let modes = uncontrollable_modes(&linear.a, &linear.b).map_err(refuse)?;
+    for mode in modes.into_iter().filter(above_or_on_the_real_axis) {
+        let stable = is_clearly_stable(mode.eigenvalue, &linear.a, Domain::Continuous);
+        let stable = stable.map_err(refuse)? && rank.rank > 0;
+        let message = format!(
+            "the commands {} reach {} of {} states only: no feedback moves {}{}",
+            names(linear.actuators.iter().map(|signal| signal.name.as_str())),
+            rank.rank,
+            rank.n,
+            described(&mode, state),
+            consequence(stable, &mode),
+        );
+        let error = file.error(&["B", "actuators"], message);
+        if !stable {
+            return Err(error.into());
+        }
+        warnings.push(error);
+    }
+    Ok((rank, from_uncontrollable(&linear.a, &linear.b).map_err(refuse)?))
+}
+
+/// Selects one mode of each complex pair.
+fn above_or_on_the_real_axis(mode: &Mode) -> bool {
+    mode.eigenvalue.im >= 0.0
+}
+
+/// What follows from a mode that no gain moves.
+fn consequence(stable: bool, mode: &Mode) -> &'static str {
+    match stable {
+        true => "; it is stable and keeps its eigenvalue",
+        false if mode.eigenvalue.re < 0.0 => "",
+        false => "; expected that only stable modes are out of reach",
+    }
+}
+
+/// Checks that the augmented observer exists; the error names the faults and the measurements.
+fn check_detectable(
+    file: &PlantFile<'_>,
+    (linear, extended): (&LinearPlant, &ExtendedPlant),
+    found: &Detectability,
+    warnings: &mut Vec<PlaceError>,
+) -> Result<(), crate::Error> {
+    let measurements = names(linear.measurements.iter().map(|signal| signal.name.as_str()));
+    let modes = found.unobservable.iter();
+    for (mode, stable) in modes.filter(|(mode, _)| above_or_on_the_real_axis(mode)) {
+        let message = format!(
+            "the measurements {measurements} show {} of {} states only: no observer moves {}{}",
+            found.observability.rank,
+            found.observability.n,
+            described(mode, |at| state_name(linear, at).to_owned()),
+            consequence(*stable, mode),
+        );
+        let error = file.error(&["C", "measurements"], message);
+        if !stable {
+            return Err(error.into());
+        }
+        warnings.push(error);
+    }
+    let fault_names = fault_names(linear, extended);
+    if let Some(&unseen) = found.invisible_faults().first() {
+        let message = format!(
+            "fault `{}` cannot be seen from the measurements {measurements}",
+            fault_names[unseen]
+        );
+        return Err(at_fault(file, linear, unseen, message).into());
+    }
+    if let Some(hidden) = found.hidden.first() {
+        let faults = hidden.faults();
+        let states: Vec<_> = hidden.states().iter().map(|&at| state_name(linear, at)).collect();
+        let mut hiding = faults.iter().map(|&fault| fault_names[fault].as_str());
+        // If no state is involved, the fault is hidden by the other faults.
+        let (distinguished, from): (Vec<_>, String) = match states.as_slice() {
+            [] => (hiding.by_ref().take(1).collect(), hiding.collect::<Vec<_>>().join(", ")),
+            states => (hiding.collect(), format!("a movement of {}", states.join(", "))),
+        };
+        let message = format!(
+            "{} of {} independent courses of faults and states are seen: the measurements \
+             {measurements} cannot tell a {} of {} from {}",
+            hidden.rank,
+            hidden.expected,
+            if hidden.at.norm() > 0.0 { "change" } else { "constant value" },
+            distinguished.join(", "),
+            from,
+        );
+        return Err(at_fault(file, linear, faults[0], message).into());
+    }
+    extended
+        .plant
+        .check_detectable(Domain::Continuous)
+        .map_err(|error| file.error(&FAULTS, error.to_string()))?;
+    Ok(())
+}
+
+/// Returns an error at the entry of the fault in column `column` of F_a.
+fn at_fault(
+    file: &PlantFile<'_>,
+    linear: &LinearPlant,
+    column: usize,
+    message: String,
+) -> PlaceError {
+    match linear.faults.get(column) {
+        Some(fault) => file.error_at(&fault.place, message),
+        None => file.error(&FAULTS, message),
+    }
+}
+
+/// Returns the names of the faults, then of the rates of ramps.
+pub(crate) fn fault_names(linear: &LinearPlant, extended: &ExtendedPlant) -> Vec<String> {
+    let mut all: Vec<_> = linear.faults.iter().map(|fault| fault.name.clone()).collect();
+    all.resize(extended.plant.f_a.ncols(), String::new());
+    for (fault, channel) in linear.faults.iter().zip(&extended.channels) {
+        if let Some(rate) = channel.rate {
+            all[rate] = format!("{}_rate", fault.name);
+        }
+    }
+    all
+}
+
+/// Returns the name of a state, or of the measurement that a filter state belongs to.
+fn state_name(linear: &LinearPlant, state: usize) -> &str {
+    let n = linear.states.len();
+    let signal = linear.states.get(state).or_else(|| linear.measurements.get(state - n));
+    signal.map_or("", |signal| signal.name.as_str())
+}
+
+fn names<'a>(list: impl Iterator<Item = &'a str>) -> String {
+    list.collect::<Vec<_>>().join(", ")
+}
+
+/// Returns the names of the states of the feedback: states, with integral action the integrals.
+pub(crate) fn feedback_states(file: &PlantFile<'_>, linear: &LinearPlant) -> Vec<String> {
+    let integrals = file.references.iter().filter(|references| references.integral);
+    let integrals = integrals.flat_map(|references| &references.signals);
+    let integrals = integrals.map(|signal| format!("integral of {}", signal.name));
+    linear.states.iter().map(|signal| signal.name.clone()).chain(integrals).collect()
+}
+
+/// Returns the names of the states of the observer: states, filters, faults.
+fn observer_states(linear: &LinearPlant, extended: &ExtendedPlant) -> Vec<String> {
+    let plain = (0..extended.plant.a.nrows()).map(|at| state_name(linear, at).to_owned());
+    plain.chain(fault_names(linear, extended)).collect()
+}
+
+/// Converts the failure of a gain to an error at the requirement in the file; `name` returns the
+/// name of a state.
+fn refused(
+    (file, domain): (&PlantFile<'_>, Domain),
+    request: &Request,
+    refusal: Refusal,
+    (order, meaning): (usize, &str),
+    name: impl Fn(usize) -> String,
+) -> PlaceError {
+    let message = match refusal {
+        Refusal::Conflict(message) => message,
+        Refusal::Fixed(mode) => fixed(&request.requirement, &mode, domain, &name),
+        Refusal::Control(Error::PoleCount { .. }) => {
+            let found = request.requirement.eigenvalues().len();
+            format!("expected {order} eigenvalues, one for each of the {meaning}, found {found}")
+        }
+        Refusal::Control(ref error @ Error::Unweighted { weight: "W", .. }) => {
+            match request.requirement.without_noise() {
+                Some(at) => format!(
+                    "W states no noise for `{}` (its row {} is zero), so that the observer would not \
+                     correct it; expected a number above 0 there",
+                    name(at),
+                    at + 1
+                ),
+                None => error.to_string(),
+            }
+        }
+        Refusal::Control(error @ Error::Shape { matrix: "Q", .. }) => {
+            format!("{error}, one row for each of the {meaning}")
+        }
+        Refusal::Control(error) => error.to_string(),
+    };
+    match &request.other {
+        Some((name, place)) if message.starts_with(&format!("{name} ")) => {
+            file.error_at(place, message)
+        }
+        _ => file.error_at(&request.place, message),
+    }
+}
+
+/// Says that a requirement excludes the eigenvalue of a mode that no gain moves.
+fn fixed(
+    requirement: &Requirement,
+    mode: &Mode,
+    domain: Domain,
+    name: impl Fn(usize) -> String,
+) -> String {
+    let sampled = matches!(requirement, Requirement::SampledEigenvalues(_));
+    let described = described_in(mode, (domain, sampled), name);
+    match requirement {
+        Requirement::Eigenvalues(_) | Requirement::SampledEigenvalues(_) => format!(
+            "no gain moves {described}; expected it among the requested eigenvalues, or `region` or \
+             weights in place of eigenvalues"
+        ),
+        _ => format!("no gain moves {described}, into the region; expected a region around it"),
+    }
+}
+
+impl ControllerDesign {
+    /// Returns A + B K_x, n x n, the dynamics under exact state feedback; with integral action the same of
+    /// the plant extended by the integrals, with [K_x, K_i].
+    pub(crate) fn feedback_dynamics(&self) -> DMatrix<f64> {
+        &self.feedback_pair.0 + &self.feedback_pair.1 * &self.feedback.gain
+    }
+
+    /// Returns the decay rate of the slowest eigenvalue under exact state feedback, 1/s.
+    pub(crate) fn slowest_rate(&self) -> Result<f64, Error> {
+        decay(&self.feedback_dynamics(), self.domain)
+    }
+}

@@ -1,0 +1,283 @@
+//! Computes how the references act: the plant of the feedback, integral action or feedforward, the
+//! conditions for both.
+
+use control::aso::{FaultyPlant, Gains};
+use control::controller::complete_controller;
+use control::faults::{ExtendedPlant, FaultEntry};
+use control::stability::instability;
+use control::tracking::{
+    IntegralAction, IntegralFeedforward, TrackingRank, extended_pair, feedforward,
+    integral_feedforward, tracking_rank, windup_gain,
+};
+use control::{Domain, Error, StateSpace};
+use files::PlaceError;
+use nalgebra::DMatrix;
+
+use crate::plant::linear::LinearPlant;
+use crate::plant_file::PlantFile;
+use crate::plant_file::references::References;
+use crate::plant_file::requirements::Requirement;
+use crate::plant_file::signals::Signal;
+use crate::plant_file::variants::Variant;
+
+/// Relative error of a constant reference below which it counts as reached.
+pub(crate) const REACHED: f64 = 1e-9;
+
+/// The references of a design.
+pub(crate) struct Tracking {
+    /// With operating points and units.
+    pub(crate) signals: Vec<Signal>,
+    /// The size of the step of each that the report shows, if stated.
+    pub(crate) steps: Vec<Option<f64>>,
+    /// H, t x p.
+    pub(crate) h: DMatrix<f64>,
+    /// H C, t x n, of the plant without filter.
+    pub(crate) output: DMatrix<f64>,
+    pub(crate) action: TrackingAction,
+}
+
+/// How the references act.
+pub(crate) enum TrackingAction {
+    /// Integral action, whose gain is in the design's gains.
+    Integral {
+        /// L_w, t x m, where commands have limits.
+        windup: Option<DMatrix<f64>>,
+        /// Time constant of the back-calculation, s.
+        windup_time: f64,
+        /// N_r, m x t, beside the integrals.
+        feedforward: Option<IntegralFeedforward>,
+    },
+    /// N_r, m x t.
+    Feedforward(DMatrix<f64>),
+}
+
+/// Checks that the plant can hold each reference at every constant value.
+pub(crate) fn check_references(
+    file: &PlantFile<'_>,
+    linear: &LinearPlant,
+) -> Result<(), PlaceError> {
+    let Some(References { signals, h, places, integral, .. }) = &file.references else {
+        return Ok(());
+    };
+    let count = signals.len();
+    let names = signals.iter().map(|signal| signal.name.as_str()).collect::<Vec<_>>().join(", ");
+    let commands = linear.actuators.len();
+    if count > commands {
+        let message = format!(
+            "{count} references ({names}) need at least {count} commands, found {commands}; expected \
+             fewer references"
+        );
+        return Err(file.error_at(&places[commands], message));
+    }
+    let TrackingRank { rank, expected, outputs, .. } =
+        tracking_rank(&linear.a, &linear.b, &(h * &linear.c))
+            .map_err(|error| file.error(&["reference"], error.to_string()))?;
+    if outputs < count {
+        let message = format!(
+            "the references {names} are set points of {outputs} independent combination{} of the \
+             states only, so that one of them follows from the others; expected fewer references",
+            if outputs == 1 { "" } else { "s" }
+        );
+        return Err(file.error_at(&places[count - 1], message));
+    }
+    if rank < expected {
+        let action = if *integral { "integral action" } else { "feedforward" };
+        let message = format!(
+            "no {action} exists for {names}: the commands cannot hold every constant value of what is to \
+             follow (rank [A, B; H C, 0] is {rank}, expected {expected}: the plant has a zero at s = \
+             0, or its commands act on these outputs in one direction); expected other measurements, a \
+             position in place of its speed for example"
+        );
+        return Err(file.error(&["reference"], message));
+    }
+    let norm = matches!(&file.feedback.requirement,
+        Requirement::HInfinity { region, .. } if region.decay.is_none());
+    if *integral && norm {
+        let message = "with integral action, `h_infinity` also needs `region` with `decay`: the norm from \
+                       faults to measurements and commands alone leaves the integrals arbitrarily slow";
+        return Err(file.error_at(&file.feedback.place, message));
+    }
+    Ok(())
+}
+
+/// Checks the same for a member of a family.
+pub(crate) fn check_member(
+    file: &PlantFile<'_>,
+    variant: &Variant,
+    linear: &LinearPlant,
+) -> Result<(), PlaceError> {
+    let Some(References { h, .. }) = &file.references else {
+        return Ok(());
+    };
+    let found = tracking_rank(&linear.a, &linear.b, &(h * &linear.c))
+        .map_err(|error| file.error_at(&variant.place, error.to_string()))?;
+    if found.is_full() {
+        return Ok(());
+    }
+    let message = format!(
+        "no integral action exists for the member `{}`: its commands cannot hold every constant value of \
+         what is to follow (rank [A, B; H C, 0] is {}, expected {}); expected a member without a \
+         zero at s = 0",
+        variant.name, found.rank, found.expected
+    );
+    Err(file.error_at(&variant.place, message))
+}
+
+/// The pair, A and B, of the feedback: the plant, with integral action followed by its integrals.
+pub(crate) fn feedback_pair(
+    references: Option<&References>,
+    plant: [&DMatrix<f64>; 3],
+    domain: Domain,
+) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
+    let [a, b, c] = plant;
+    match references.filter(|references| references.integral) {
+        Some(References { h, .. }) => extended_pair(a, b, &(h * c), domain),
+        None => Ok((a.clone(), b.clone())),
+    }
+}
+
+/// The integral action with the gain K = [K_x, K_i] of the feedback; None without.
+pub(crate) fn integral_action(
+    references: Option<&References>,
+    (linear, extended): (&LinearPlant, &ExtendedPlant),
+    k: &DMatrix<f64>,
+) -> Option<IntegralAction> {
+    let References { h, .. } = references.filter(|references| references.integral)?;
+    let (all, q) = extended.plant.f_a.shape();
+    let mut faults = DMatrix::zeros(h.nrows(), q);
+    for (model, channel) in linear.models.iter().zip(&extended.channels) {
+        if let FaultEntry::Sensor(column) = &model.entry {
+            faults.set_column(channel.estimate, &(h * column));
+        }
+    }
+    Some(IntegralAction {
+        h: h.clone(),
+        output: (h * &linear.c).resize_horizontally(all, 0.0),
+        faults,
+        gain: k.columns(extended.states, h.nrows()).into(),
+    })
+}
+
+impl Tracking {
+    /// Returns the references of `file` and how they act; `feedback`: A + B K of [`feedback_pair`].
+    pub(crate) fn of(
+        file: &PlantFile<'_>,
+        (linear, pair): (&LinearPlant, (&DMatrix<f64>, &DMatrix<f64>)),
+        (gains, feedback): (&Gains, &DMatrix<f64>),
+        domain: Domain,
+    ) -> Result<Option<Self>, PlaceError> {
+        let Some(references) = &file.references else {
+            return Ok(None);
+        };
+        let refuse = |error: Error| file.error(&["reference"], error.to_string());
+        let output = &references.h * &linear.c;
+        let action = if let Some(integral) = &gains.integral {
+            let rate = references.windup_time.map(f64::recip);
+            let rate = rate.map_or_else(|| decay(feedback, domain), Ok).map_err(refuse)?;
+            let range = |signal: &Signal| signal.limits.map(|[low, high]| high - low);
+            let ranges: Vec<_> = linear.actuators.iter().map(range).collect();
+            let windup = windup_gain(&integral.gain, &ranges, rate, domain).map_err(refuse)?;
+            let k_x = gains.k_x.columns(0, linear.a.nrows()).into_owned();
+            let k = beside(&k_x, &integral.gain);
+            let own = references.feedforward.then(|| {
+                let found = integral_feedforward(pair, &output, &k, domain).map_err(refuse)?;
+                found.map_err(|reason| references.without_feedforward(file, reason))
+            });
+            TrackingAction::Integral {
+                windup: ranges.iter().any(Option::is_some).then_some(windup),
+                windup_time: rate.recip(),
+                feedforward: own.transpose()?,
+            }
+        } else {
+            let k_x = gains.k_x.columns(0, linear.a.nrows()).into_owned();
+            let n_r = feedforward(pair, &output, &k_x, domain).map_err(refuse)?;
+            TrackingAction::Feedforward(n_r)
+        };
+        Ok(Some(Self {
+            signals: references.completed(&linear.measurements),
+            steps: references.steps.clone(),
+            h: references.h.clone(),
+            output,
+            action,
+        }))
+    }
+}
+
+/// The columns of `left`, then those of `right`.
+fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+    let (n, t) = (left.ncols(), right.ncols());
+    let mut all = left.clone().resize_horizontally(n + t, 0.0);
+    all.columns_mut(n, t).copy_from(right);
+    all
+}
+
+impl References {
+    /// The refusal of a feedforward beside integrals.
+    fn without_feedforward(&self, file: &PlantFile<'_>, reason: &str) -> PlaceError {
+        let message = format!(
+            "no feedforward beside the integrals leaves the slowest modes of the feedback at rest: \
+             {reason}; or `feedforward = false`"
+        );
+        file.error_at(&self.action_places[1], message)
+    }
+}
+
+impl Tracking {
+    /// N_r, m x t, if the references act by a feedforward.
+    pub(crate) fn feedforward(&self) -> Option<&DMatrix<f64>> {
+        match &self.action {
+            TrackingAction::Feedforward(n_r) => Some(n_r),
+            TrackingAction::Integral { feedforward, .. } => Some(&feedforward.as_ref()?.gain),
+        }
+    }
+
+    /// L_w, t x m, if there is a back-calculation.
+    pub(crate) fn windup(&self) -> Option<&DMatrix<f64>> {
+        match &self.action {
+            TrackingAction::Feedforward(_) => None,
+            TrackingAction::Integral { windup, .. } => windup.as_ref(),
+        }
+    }
+}
+
+/// The decay rate of the slowest eigenvalue, 1/s.
+pub(crate) fn decay(dynamics: &DMatrix<f64>, domain: Domain) -> Result<f64, Error> {
+    let rate = -instability(dynamics, domain)?;
+    Ok(match domain {
+        Domain::Continuous => rate,
+        Domain::Sampled { period } => -(-rate).ln_1p() / period,
+    })
+}
+
+/// The loop of the design: a plant, and the controller from its measurements to its commands.
+pub(crate) struct DesignLoop {
+    /// The model in the observer; with integral action, which receives the measurements before their
+    /// filter, the plant without filter.
+    pub(crate) plant: FaultyPlant,
+    /// The controller, with integral action together with the filter.
+    pub(crate) controller: StateSpace,
+}
+
+impl DesignLoop {
+    pub(crate) fn of(
+        (linear, plant): (&LinearPlant, &FaultyPlant),
+        gains: &Gains,
+        filter: Option<&[f64]>,
+        domain: Domain,
+    ) -> Result<Self, Error> {
+        if gains.integral.is_none() {
+            let controller = control::controller::controller(plant, gains, domain)?;
+            return Ok(Self { plant: plant.clone(), controller });
+        }
+        let n = linear.a.nrows();
+        let own = FaultyPlant {
+            a: plant.a.view((0, 0), (n, n)).into(),
+            b: plant.b.rows(0, n).into(),
+            c: linear.c.clone(),
+            f_a: plant.f_a.rows(0, n).into(),
+            a_f: plant.a_f.clone(),
+        };
+        let whole = complete_controller(plant, gains, filter, domain)?;
+        Ok(Self { plant: own, controller: whole.commands })
+    }
+}
