@@ -10,8 +10,9 @@ use crate::plant_file::estimation::Law;
 use crate::progress::Steps;
 use crate::report::comparison::{Comparison, LawFigures, LawResult};
 use crate::report::identity::identity;
+use crate::solve::designed::design_by;
 use crate::solve::law::LawProblem;
-use crate::solve::solution::{ControllerDesign, design_by};
+use crate::solve::solution::Solution;
 use crate::{page, reporting};
 use files::{Source, Table};
 
@@ -29,7 +30,7 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
     let file = PlantFile::read(&source, &Table::whole(&source, &parsed))?;
     let family = ParameterFamily::of(&file)?;
     let base = design_by(&file, &Law::Augmented)?;
-    let ControllerDesign { linear, extended, plant, gains, domain, .. } = &base;
+    let Solution { linear, extended, plant, gains, domain, .. } = &base.nominal;
     let problem = LawProblem { linear, extended, plant, gains, domain: *domain };
     let (mut laws, mut own_identity) = (Vec::new(), String::new());
     for law in Law::ALL {

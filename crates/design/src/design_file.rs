@@ -16,14 +16,15 @@ use crate::plant::linear::LinearPlant;
 use crate::plant_file::PlantFile;
 use crate::plant_file::signals::{EntryPoint, Signal as PlantSignal};
 use crate::report::number::round;
+use crate::solve::designed::Designed;
 use crate::solve::reconfiguration::{
     Combination as DesignedCombination, Reconfiguration as DesignedReconfiguration,
     Reconfigurations,
 };
 use crate::solve::schedule::Scheduled;
-use crate::solve::solution::{ControllerDesign, fault_names};
+use crate::solve::solution::{Solution, fault_names};
 
-impl ControllerDesign {
+impl Designed {
     /// Returns the design file.
     pub(crate) fn file(
         &self,
@@ -32,8 +33,9 @@ impl ControllerDesign {
         detection: Option<&DetectionDesign>,
         reconfigurations: &Reconfigurations,
     ) -> Result<Design, crate::Error> {
-        let linear = &self.linear;
-        let at_origin = self.signals().all(|signal| signal.operating.unwrap_or(0.0) == 0.0);
+        let Self { nominal, schedule, .. } = self;
+        let linear = &nominal.linear;
+        let at_origin = nominal.signals().all(|signal| signal.operating.unwrap_or(0.0) == 0.0);
         let operating = |signal: &PlantSignal| signal.operating.filter(|_| !at_origin);
         let signal = |signal: &PlantSignal| Signal {
             name: signal.name.clone(),
@@ -49,29 +51,29 @@ impl ControllerDesign {
             limits: signal.limits,
         };
         let signals = |all: &[PlantSignal]| all.iter().map(signal).collect::<Vec<_>>();
-        let sampled = match self.domain {
+        let sampled = match nominal.domain {
             Domain::Continuous => None,
             Domain::Sampled { period } => Some(period),
         };
         let mut states = signals(&linear.states);
-        if self.filter.is_some() {
+        if nominal.filter.is_some() {
             states.extend(linear.measurements.iter().map(|measurement| Signal {
                 name: format!("filtered {}", measurement.name),
                 ..signal(measurement)
             }));
         }
-        let FaultyPlant { a, b, c, f_a, a_f } = &self.plant;
-        let has_fault_model = self.law.a_f.is_some() || self.extended.plant.a_f.amax() > 0.0;
-        let Gains { k_x, k_f, l_x, l_f, p_f, integral, .. } = &self.gains;
-        let injection = self.law.injection.as_ref();
-        let tracking = self.tracking.as_ref();
+        let FaultyPlant { a, b, c, f_a, a_f } = &nominal.plant;
+        let has_fault_model = nominal.law.a_f.is_some() || nominal.extended.plant.a_f.amax() > 0.0;
+        let Gains { k_x, k_f, l_x, l_f, p_f, integral, .. } = &nominal.gains;
+        let injection = nominal.law.injection.as_ref();
+        let tracking = nominal.tracking.as_ref();
         Ok(Design {
             description: description.to_owned(),
             t_on: file.t_on,
             monitor: file.monitor,
             sample_time: sampled,
-            estimator: sampled.map(|_| estimator(self.gains.estimator)),
-            filter: self.filter.clone(),
+            estimator: sampled.map(|_| estimator(nominal.gains.estimator)),
+            filter: nominal.filter.clone(),
             a: matrix(a),
             b: matrix(b),
             c: matrix(c),
@@ -96,28 +98,30 @@ impl ControllerDesign {
             states,
             actuators: linear.actuators.iter().map(actuator).collect(),
             measurements: signals(&linear.measurements),
-            faults: self.fault_entries(),
+            faults: nominal.fault_entries(),
             references: tracking.map_or(Vec::new(), |tracking| signals(&tracking.signals)),
             reconfigurations: reconfigurations
                 .single
                 .iter()
-                .map(|single| self.reconfigured(single))
+                .map(|single| nominal.reconfigured(single))
                 .collect(),
             combinations: reconfigurations
                 .combinations
                 .iter()
-                .map(|combination| self.combined(combination))
+                .map(|combination| nominal.combined(combination))
                 .collect(),
             fallback: reconfigurations.fallback.as_ref().map(|fallback| Fallback {
                 k_x: matrix(&fallback.k_x),
                 k_f: fallback.k_f.as_ref().map(matrix),
             }),
-            experiment: self.experiment(file)?,
-            schedule: self.schedule.as_ref().map(|schedule| self.scheduled(schedule)),
+            experiment: nominal.experiment(file)?,
+            schedule: schedule.as_ref().map(|schedule| nominal.scheduled(schedule)),
             detection: detection.cloned(),
         })
     }
+}
 
+impl Solution {
     /// Returns the table `[schedule]`: the variable, and matrices and operating point at each of its
     /// values.
     fn scheduled(&self, schedule: &Scheduled) -> Schedule {

@@ -46,8 +46,8 @@ use plant::parameters::ParameterFamily;
 use plant_file::PlantFile;
 use progress::{Step, Steps};
 use report::identity;
-use solve::solution::ControllerDesign;
-use solve::{fallback, reconfiguration, solution};
+use solve::solution::Solution;
+use solve::{designed, fallback, reconfiguration};
 
 /// The time that certificates and bounds may take unless something else is asked for.
 pub const CERTIFICATE_TIME: Duration = Duration::from_secs(30);
@@ -113,13 +113,13 @@ fn design_source(
     let parsed = source.parse()?;
     let file = PlantFile::read(source, &Table::whole(source, &parsed))?;
     let family = ParameterFamily::of(&file)?;
-    let designed = steps.run(Step::Gains, || solution::design(&file))?;
-    let description = description(&file, &designed);
+    let designed = steps.run(Step::Gains, || designed::design(&file))?;
+    let description = description(&file, &designed.nominal);
     let detection = detection::detection(&file, &designed, family.as_ref())?;
     let section = detection.as_ref().map(|detection| &detection.section);
-    let fallback = fallback::fallback(&file, &designed)?;
+    let fallback = fallback::fallback(&file, &designed.nominal)?;
     let (reconfigurations, without) =
-        reconfiguration::reconfigurations(&file, &designed, fallback)?;
+        reconfiguration::reconfigurations(&file, &designed.nominal, fallback)?;
     let controller = designed.file(&file, &description, section, &reconfigurations)?;
     let text = controller.to_toml().map_err(|error| Error::Invalid(error.to_string()))?;
     let report = reporting::report(
@@ -136,7 +136,7 @@ fn design_source(
         report.detection = Some(detection.report);
     }
     let identity = identity::identity(&report);
-    let worst_case = worst_case::plant_file(&file, &designed, &report)?;
+    let worst_case = worst_case::plant_file(&file, &designed.nominal, &report)?;
     let text = format!("{}\n{text}", identity::heading(&identity, &report.verdict));
     Ok(Design {
         file: text,
@@ -175,8 +175,8 @@ impl Design {
 }
 
 /// The user's sentence, or one that names the faults.
-fn description(file: &PlantFile<'_>, designed: &ControllerDesign) -> String {
-    let faults: Vec<_> = designed.linear.faults.iter().map(|fault| fault.name.as_str()).collect();
+fn description(file: &PlantFile<'_>, solution: &Solution) -> String {
+    let faults: Vec<_> = solution.linear.faults.iter().map(|fault| fault.name.as_str()).collect();
     file.description.clone().unwrap_or_else(|| {
         format!("Fault-tolerant controller that estimates and compensates {}", faults.join(", "))
     })

@@ -14,7 +14,7 @@ use crate::plant_file::requirements::{Region, Requirement};
 use crate::plant_file::signals::{EntryPoint, FaultDynamics};
 use crate::plant_file::{Model, PlantFile};
 use crate::report::robustness::Level;
-use crate::solve::solution::design;
+use crate::solve::designed::design;
 use files::{Source, Table};
 
 const MASS: &str = r#"A = [[0, 1], [0, 0]]
@@ -344,7 +344,7 @@ fn an_observer_that_is_unstable_before_t_on_fails_a_check_unless_it_estimates_fr
         .replace("t_on = 40.0", "t_on = 40.0\nsample_time = 0.005\nestimator = \"prediction\"");
     let failed = |text: &str| {
         read(text, |file| {
-            let checks = checks(&design(file).unwrap());
+            let checks = checks(&design(file).unwrap().nominal);
             let failed = checks.into_iter().filter(|check| !check.holds);
             failed.map(|check| (check.condition, check.value.unwrap())).collect::<Vec<_>>()
         })
@@ -429,8 +429,9 @@ fn a_fault_of_a_mode_that_no_measurement_shows_is_refused() {
 fn judged(text: &str) -> (Level, String) {
     read(text, |file| {
         let designed = design(file).unwrap();
-        let found = robustness(&designed, &file.robustness, None, &unobserved()).unwrap();
-        let verdict = verdict(&checks(&designed), found.as_ref(), &file.robustness, Vec::new());
+        let found = robustness(&designed.nominal, &file.robustness, None, &unobserved()).unwrap();
+        let verdict =
+            verdict(&checks(&designed.nominal), found.as_ref(), &file.robustness, Vec::new());
         (verdict.level, verdict.reasons.join("; "))
     })
     .unwrap()
@@ -478,7 +479,12 @@ fn the_worst_plant_is_a_plant_file() {
         )
         .unwrap();
         let a = report.robustness.as_ref().unwrap().tolerance.worst[0].values.clone();
-        (crate::assess::worst_case::plant_file(file, &designed, &report).unwrap().unwrap(), a)
+        (
+            crate::assess::worst_case::plant_file(file, &designed.nominal, &report)
+                .unwrap()
+                .unwrap(),
+            a,
+        )
     })
     .unwrap();
     assert!((a[1][0].abs() - 2.0).abs() > 0.39 && a[0] == [0.0, 1.0], "{a:?}");
@@ -572,7 +578,10 @@ fn fifty_states_get_a_linear_quadratic_design_without_linear_matrix_inequalities
     let (instability, certificate) = read(&text, |file| {
         let designed = design(file).unwrap();
         let budget = Budget::start(crate::CERTIFICATE_TIME);
-        (designed.instability, crate::assess::certificate::certificate(&designed, vec![], &budget))
+        (
+            designed.nominal.instability,
+            crate::assess::certificate::certificate(&designed.nominal, vec![], &budget),
+        )
     })
     .unwrap();
     assert!(instability < 0.0, "{instability}");

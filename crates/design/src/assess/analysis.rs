@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::budget::Budget;
 use crate::plant_file::signals::Fault;
 use crate::report::{Bound, Frequency, Norm};
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 /// Relative width of the brackets of peak gains and norms.
 const WIDTH: f64 = 1e-3;
@@ -30,7 +30,7 @@ pub(crate) struct Outputs {
 }
 
 impl Outputs {
-    pub(crate) fn of(designed: &ControllerDesign) -> Self {
+    pub(crate) fn of(designed: &Solution) -> Self {
         let (all, states) = (designed.plant.a.nrows(), &designed.linear.states);
         let (mut names, mut units, mut positions) = (Vec::new(), Vec::new(), Vec::new());
         for (offset, prefix) in [(0, ""), (all, "error of ")] {
@@ -78,15 +78,15 @@ enum Missing {
 
 /// The transfer functions from the faults, and from their rates, to [x; e; eps].
 pub(crate) struct Loops<'a> {
-    designed: &'a ControllerDesign,
+    designed: &'a Solution,
     outputs: Outputs,
     of_faults: StateSpace,
     of_rates: StateSpace,
 }
 
 impl<'a> Loops<'a> {
-    pub(crate) fn of(designed: &'a ControllerDesign) -> Result<Self, Error> {
-        let ControllerDesign { plant, gains, domain, .. } = designed;
+    pub(crate) fn of(designed: &'a Solution) -> Result<Self, Error> {
+        let Solution { plant, gains, domain, .. } = designed;
         let mut of_rates = fault_rate_system(plant, gains, *domain)?;
         if let Domain::Sampled { period } = domain {
             // The change of a fault per sample is its rate times the sample time.
@@ -129,7 +129,7 @@ impl<'a> Loops<'a> {
 
     /// Returns the gains of some outputs. If those of one do not converge, each is computed alone.
     fn gains_of(&self, rows: &[usize]) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
-        let ControllerDesign { extended, plant, gains, domain, .. } = self.designed;
+        let Solution { extended, plant, gains, domain, .. } = self.designed;
         let found = match *domain {
             Domain::Continuous => fault_gains(plant, gains, *domain, (rows, WIDTH)),
             Domain::Sampled { period } => {

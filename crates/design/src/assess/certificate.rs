@@ -8,7 +8,7 @@ use crate::budget::Budget;
 use crate::matrix::rows;
 use crate::plant_file::estimation::Law;
 use crate::report::{Certificate, FreeP, Norm, Theorem1, Ultimate};
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 /// The design parameter alpha of (12); it cancels in delta.
 const ALPHA: f64 = 1.0;
@@ -18,11 +18,7 @@ const ALPHA: f64 = 1.0;
 const LARGEST_ORDER: usize = 30;
 
 /// Returns all certificates for `designed`; `norms` were computed before.
-pub(crate) fn certificate(
-    designed: &ControllerDesign,
-    norms: Vec<Norm>,
-    budget: &Budget,
-) -> Certificate {
+pub(crate) fn certificate(designed: &Solution, norms: Vec<Norm>, budget: &Budget) -> Certificate {
     Certificate {
         printed: printed(designed),
         free: in_time(budget, || free(designed)),
@@ -41,13 +37,13 @@ fn largest(bounds: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     squares.sum::<Option<f64>>().map(f64::sqrt)
 }
 
-fn fault_bound(designed: &ControllerDesign) -> Result<f64, String> {
+fn fault_bound(designed: &Solution) -> Result<f64, String> {
     let bounds = designed.linear.faults.iter().map(|fault| fault.bound);
     largest(bounds).ok_or_else(|| "it needs `bound` for every fault".to_owned())
 }
 
 /// Checks that the theorem applies: a continuous observer of constant faults.
-fn applies(designed: &ControllerDesign) -> Result<(), String> {
+fn applies(designed: &Solution) -> Result<(), String> {
     if designed.law.law != Law::Augmented {
         return Err("the theorem is about the augmented observer".to_owned());
     }
@@ -61,7 +57,7 @@ fn applies(designed: &ControllerDesign) -> Result<(), String> {
 }
 
 /// Checks that linear matrix inequalities for the estimation error end in a few seconds.
-fn solvable(designed: &ControllerDesign) -> Result<(), String> {
+fn solvable(designed: &Solution) -> Result<(), String> {
     applies(designed)?;
     let order = designed.plant.a.nrows() + designed.plant.f_a.ncols();
     if order > LARGEST_ORDER {
@@ -73,7 +69,7 @@ fn solvable(designed: &ControllerDesign) -> Result<(), String> {
     Ok(())
 }
 
-fn printed(designed: &ControllerDesign) -> Result<Theorem1, String> {
+fn printed(designed: &Solution) -> Result<Theorem1, String> {
     applies(designed)?;
     let beta = fault_bound(designed)?;
     let found = certify(&designed.plant, &designed.gains, ALPHA, beta);
@@ -103,7 +99,7 @@ fn verified<T>(outcome: Result<Outcome<T>, control::Error>) -> Result<T, String>
     }
 }
 
-fn free(designed: &ControllerDesign) -> Result<FreeP, String> {
+fn free(designed: &Solution) -> Result<FreeP, String> {
     solvable(designed)?;
     let dynamics = designed.gains.error_dynamics(&designed.plant);
     let decay = verified(largest_decay(&dynamics))?;
@@ -119,7 +115,7 @@ fn free(designed: &ControllerDesign) -> Result<FreeP, String> {
 }
 
 /// Returns the ball that the error converges to for bounded rates of the faults.
-fn ultimate(designed: &ControllerDesign) -> Result<Ultimate, String> {
+fn ultimate(designed: &Solution) -> Result<Ultimate, String> {
     solvable(designed)?;
     let rates = designed.linear.faults.iter().map(|fault| fault.rate_bound);
     let rate = largest(rates).ok_or_else(|| "it needs `rate_bound` for every fault".to_owned())?;

@@ -5,13 +5,13 @@ use control::distance::Distance;
 
 use crate::plant::linear::AT_REST;
 use crate::report::Check;
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 /// Relative size of the remaining fault effect below which the compensation counts as complete.
 const CANCELLED: f64 = 1e-9;
 
 /// Returns all conditions, each with its numerical value.
-pub(crate) fn checks(designed: &ControllerDesign) -> Vec<Check> {
+pub(crate) fn checks(designed: &Solution) -> Vec<Check> {
     let mut all = Vec::from(existence(designed));
     all.push(check(
         "the compensation cancels the faults of the actuators",
@@ -50,8 +50,8 @@ pub(crate) fn checks(designed: &ControllerDesign) -> Vec<Check> {
 
 /// Returns the conditions for the existence of feedback and observer, without which no design is
 /// returned.
-fn existence(designed: &ControllerDesign) -> [Check; 3] {
-    let ControllerDesign { controllability, distance, detectability, .. } = designed;
+fn existence(designed: &Solution) -> [Check; 3] {
+    let Solution { controllability, distance, detectability, .. } = designed;
     // For a large system no lower bound is searched.
     let proven = |distance: &Distance| Some(distance.lower).filter(|lower| *lower > 0.0);
     let away = |what: &str, distance: &Distance| match proven(distance) {

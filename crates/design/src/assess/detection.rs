@@ -19,7 +19,7 @@ use crate::report::Matrix;
 use crate::report::detection::{
     DecoupledInput, DetectedFault, Detection as Report, ParameterCases, Test,
 };
-use crate::solve::solution::ControllerDesign;
+use crate::solve::designed::Designed;
 use decoupling::Decoupling;
 use model_error::{LargestMean, ModelErrors};
 use prediction::{Prediction, TestKind};
@@ -66,26 +66,24 @@ struct PlannedTest {
 /// Designs the detection that the plant file asks for, if it does.
 pub(crate) fn detection(
     file: &PlantFile<'_>,
-    designed: &ControllerDesign,
+    designed: &Designed,
     family: Option<&ParameterFamily<'_>>,
 ) -> Result<Option<Detection>, crate::Error> {
     let Some(request) = &file.detection else {
         return Ok(None);
     };
     check_plants(file, request)?;
-    let problem = Problem::new(file, request, designed)?;
+    let problem = Problem::new(file, request, &designed.nominal)?;
     let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
-    let errors = request
-        .model_error
-        .as_ref()
-        .map(|own| ModelErrors::new(file, own, (&designed.linear, designed), family));
+    let errors =
+        request.model_error.as_ref().map(|own| ModelErrors::new(file, own, designed, family));
     let errors = errors.transpose()?;
     let parts = parts(file, request, &problem, errors.as_ref())?;
     let mut warnings = Vec::new();
     let mut report = report(request, &problem, &parts, &mut warnings).map_err(refuse)?;
     let cases = errors.as_ref().and_then(ModelErrors::random_cases);
     report.parameter_cases = cases.map(|cases| ParameterCases::new(cases, file.robustness.seed));
-    let section = file::section(&problem, &parts, report.from, designed);
+    let section = file::section(&problem, &parts, report.from, &designed.nominal);
     Ok(Some(Detection { section, report, warnings }))
 }
 

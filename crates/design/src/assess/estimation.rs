@@ -12,7 +12,7 @@ use crate::assess::robustness::noise_peaks;
 use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::robustness::Robustness;
 use crate::report::{Estimation, EstimationErrors};
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 /// Relative width of the brackets of the peak gains.
 const WIDTH: f64 = 1e-3;
@@ -22,7 +22,7 @@ const SETTLED: f64 = 0.02;
 const SLOW: f64 = 0.1;
 
 /// Returns law and conditions of the estimates, with their errors.
-pub(crate) fn estimation(designed: &ControllerDesign, errors: Vec<EstimationErrors>) -> Estimation {
+pub(crate) fn estimation(designed: &Solution, errors: Vec<EstimationErrors>) -> Estimation {
     let law = &designed.law;
     let sampled = designed.domain != Domain::Continuous;
     Estimation {
@@ -37,7 +37,7 @@ pub(crate) fn estimation(designed: &ControllerDesign, errors: Vec<EstimationErro
 
 /// Returns the errors of the estimate of each fault. What noise does to it is known for a stable loop only.
 pub(crate) fn errors(
-    designed: &ControllerDesign,
+    designed: &Solution,
     robustness: Option<&Robustness>,
     limits: &RobustnessLimits,
 ) -> Result<Vec<EstimationErrors>, Error> {
@@ -61,7 +61,7 @@ pub(crate) fn errors(
 
 /// The error dynamics, from the faults to the errors of their estimates.
 struct Errors<'a> {
-    designed: &'a ControllerDesign,
+    designed: &'a Solution,
     of_faults: StateSpace,
     /// From f', per second.
     of_rates: StateSpace,
@@ -69,8 +69,8 @@ struct Errors<'a> {
 }
 
 impl<'a> Errors<'a> {
-    fn of(designed: &'a ControllerDesign) -> Result<Self, Error> {
-        let ControllerDesign { plant, gains, domain, .. } = designed;
+    fn of(designed: &'a Solution) -> Result<Self, Error> {
+        let Solution { plant, gains, domain, .. } = designed;
         let mut of_rates = fault_rate_system(plant, gains, *domain)?;
         if let Domain::Sampled { period } = domain {
             of_rates.b.scale_mut(*period);
@@ -84,7 +84,7 @@ impl<'a> Errors<'a> {
     }
 
     fn of_fault(&self, at: usize) -> Result<EstimationErrors, Error> {
-        let ControllerDesign { plant, extended, law, .. } = self.designed;
+        let Solution { plant, extended, law, .. } = self.designed;
         let channel = extended.channels[at];
         let row = 2 * plant.a.nrows() + channel.estimate;
         let to_error = |system: &StateSpace| StateSpace {

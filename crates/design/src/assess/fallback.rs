@@ -19,13 +19,13 @@ use crate::plant_file::signals::Signal;
 use crate::report::fallback::{FallbackCase, FallbackReport};
 use crate::report::robustness::{Level, LoopPoint, Number};
 use crate::solve::fallback::{Fallback, Search, remaining};
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 use crate::solve::tracking::decay;
 
 /// Returns the report on the fall-back of `designed`.
 pub(crate) fn report(
     file: &PlantFile<'_>,
-    designed: &ControllerDesign,
+    designed: &Solution,
     fallback: &Fallback,
     budget: &Budget,
 ) -> Result<Option<FallbackReport>, crate::Error> {
@@ -75,7 +75,7 @@ impl Examination<'_> {
     /// The case at a position; `failed`: the actuator, and the command at which it is stuck if it is gone.
     fn case(&self, at: usize, failed: Option<(usize, f64)>) -> Result<FallbackCase, crate::Error> {
         let Search { designed, request } = self.search;
-        let ControllerDesign { linear, extended, domain, .. } = designed;
+        let Solution { linear, extended, domain, .. } = designed;
         let actuator = failed.map(|(actuator, _)| actuator);
         let whole = self.search.whole(&self.gains, actuator.map(|own| (own, request.loss)))?;
         let Vertex { a, b } = self.search.vertices().swap_remove(at);
@@ -136,7 +136,7 @@ impl Examination<'_> {
         failed: Option<(usize, f64)>,
     ) -> Result<(Rest, Vec<(usize, f64)>), Error> {
         let Search { designed, request } = self.search;
-        let ControllerDesign { linear, plant, extended, domain, .. } = designed;
+        let Solution { linear, plant, extended, domain, .. } = designed;
         let (n, order) = (plant.a.nrows(), whole.nrows());
         let mut input = DVector::zeros(order);
         let mut stuck = Vec::new();
@@ -162,8 +162,8 @@ impl Examination<'_> {
 }
 
 /// H2 norms from white noise on the commands, before a loss, to the measurements of the loop `whole`.
-fn noise(designed: &ControllerDesign, whole: &DMatrix<f64>) -> Result<Vec<f64>, Error> {
-    let ControllerDesign { linear, plant, domain, .. } = designed;
+fn noise(designed: &Solution, whole: &DMatrix<f64>) -> Result<Vec<f64>, Error> {
+    let Solution { linear, plant, domain, .. } = designed;
     let (p, order) = (linear.c.nrows(), whole.nrows());
     let b = plant.b.clone().resize_vertically(order, 0.0);
     let system = StateSpace {

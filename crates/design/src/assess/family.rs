@@ -13,26 +13,27 @@ use crate::plant::linear::LinearPlant;
 use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::family::{CommonCertificate, FamilyReport, MemberMargins, MemberReport};
 use crate::report::robustness::{Level, Verdict};
+use crate::solve::designed::Designed;
 use crate::solve::family::{NOMINAL, name};
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 /// Returns the report on the family of `designed`, if it has one.
 pub(crate) fn family(
-    designed: &ControllerDesign,
+    designed: &Designed,
     limits: &RobustnessLimits,
     budget: &Budget,
 ) -> Result<Option<FamilyReport>, crate::Error> {
-    let Some(own) = &designed.family else { return Ok(None) };
-    let nominal = (NOMINAL.to_owned(), &designed.linear);
+    let Designed { nominal: solution, family: Some(own), .. } = designed else { return Ok(None) };
+    let nominal = (NOMINAL.to_owned(), &solution.linear);
     let others = own.members.iter().map(|member| (member.name.clone(), &member.linear));
     let all: Vec<_> = std::iter::once(nominal).chain(others).collect();
     let one = |(name, linear): &(String, &LinearPlant)| {
-        let found = member(designed, linear, name.clone(), limits);
+        let found = member(solution, linear, name.clone(), limits);
         found.map_err(|error| error.within(format!("member `{name}` of the family")))
     };
     let members = all.par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
     let closed = |(_, linear): &(String, &LinearPlant)| {
-        let physical = Physical::with(designed, linear)?;
+        let physical = Physical::with(solution, linear)?;
         Ok(physical.closed(&physical.controller)?.dynamics())
     };
     let loops = all.iter().map(closed).collect::<Result<Vec<_>, Error>>()?;
@@ -40,13 +41,13 @@ pub(crate) fn family(
     Ok(Some(FamilyReport {
         members,
         feedback: own.feedback.as_ref().map(reported),
-        whole: common(&loops, designed.domain, budget, named)?,
+        whole: common(&loops, solution.domain, budget, named)?,
     }))
 }
 
 /// Returns margins, noise and tolerances of `linear` with the controller of `designed`.
 pub(crate) fn member(
-    designed: &ControllerDesign,
+    designed: &Solution,
     linear: &LinearPlant,
     name: String,
     limits: &RobustnessLimits,

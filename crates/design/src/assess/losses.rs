@@ -15,7 +15,7 @@ use crate::report::losses::{
     CertifiedLoss, ConstantLoss, LossLoop, LossPeak, LossProof, LossReport, described,
 };
 use crate::report::robustness::{Level, Number};
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 use crate::solve::tracking::DesignLoop;
 
 /// Largest number of states of plant and controller for which linear matrix inequalities are solved.
@@ -33,7 +33,7 @@ struct StatedLoss {
 }
 
 /// Returns the stated losses.
-fn stated(designed: &ControllerDesign) -> Vec<StatedLoss> {
+fn stated(designed: &Solution) -> Vec<StatedLoss> {
     let linear = &designed.linear;
     let one = |fault: &crate::plant_file::signals::Fault| match (&fault.entry_point, fault.up_to) {
         (EntryPoint::Loss { actuator, .. }, Some(up_to)) => Some(StatedLoss {
@@ -48,10 +48,7 @@ fn stated(designed: &ControllerDesign) -> Vec<StatedLoss> {
 }
 
 /// Returns what is proven about the stated losses; None if the plant file states none.
-pub(crate) fn losses(
-    designed: &ControllerDesign,
-    budget: &Budget,
-) -> Result<Option<LossReport>, Error> {
+pub(crate) fn losses(designed: &Solution, budget: &Budget) -> Result<Option<LossReport>, Error> {
     let stated = stated(designed);
     if stated.is_empty() {
         return Ok(None);
@@ -115,8 +112,8 @@ struct Variant {
 }
 
 /// Returns the controllers with compensation on and off.
-fn controllers(designed: &ControllerDesign) -> Result<Vec<Variant>, Error> {
-    let ControllerDesign { linear, plant, gains, domain, .. } = designed;
+fn controllers(designed: &Solution) -> Result<Vec<Variant>, Error> {
+    let Solution { linear, plant, gains, domain, .. } = designed;
     let uncompensated = Gains { k_f: &gains.k_f * 0.0, ..gains.clone() };
     let off = if designed.monitor {
         Variant {
@@ -156,7 +153,7 @@ fn controllers(designed: &ControllerDesign) -> Result<Vec<Variant>, Error> {
 fn without_estimates(
     plant: &FaultyPlant,
     gains: &Gains,
-    designed: &ControllerDesign,
+    designed: &Solution,
 ) -> Result<StateSpace, Error> {
     let held = Gains { l_f: &gains.l_f * 0.0, ..gains.clone() };
     let StateSpace { a, b, c, d, domain } = controller(plant, &held, designed.domain)?;
@@ -172,7 +169,7 @@ fn without_estimates(
 
 /// One loop under the stated losses.
 struct Examination<'a> {
-    designed: &'a ControllerDesign,
+    designed: &'a Solution,
     stated: &'a [StatedLoss],
     lossy: LossyLoop,
     budget: &'a Budget,
@@ -328,7 +325,7 @@ impl Examination<'_> {
     /// What acts on the plant with a known size: the lost part of each command of the operating point,
     /// and every other fault whose bound is stated.
     fn disturbances(&self) -> Vec<Disturbance> {
-        let ControllerDesign { linear, extended, whole, .. } = self.designed;
+        let Solution { linear, extended, whole, .. } = self.designed;
         let plant = &whole.plant;
         let lost =
             self.stated.iter().filter(|loss| loss.operating != 0.0).map(|loss| Disturbance {

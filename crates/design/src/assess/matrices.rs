@@ -5,10 +5,10 @@ use nalgebra::DMatrix;
 
 use crate::plant_file::signals::Signal;
 use crate::report::Matrix;
-use crate::solve::solution::{ControllerDesign, fault_names};
+use crate::solve::solution::{Solution, fault_names};
 
 /// Returns the gains of a design.
-pub(crate) fn gains(designed: &ControllerDesign) -> Vec<Matrix> {
+pub(crate) fn gains(designed: &Solution) -> Vec<Matrix> {
     Names::of(designed).gains(designed)
 }
 
@@ -23,7 +23,7 @@ pub(crate) struct Names {
 }
 
 impl Names {
-    pub(crate) fn of(designed: &ControllerDesign) -> Self {
+    pub(crate) fn of(designed: &Solution) -> Self {
         let linear = &designed.linear;
         let names = |signals: &[Signal]| {
             signals.iter().map(|signal| signal.name.clone()).collect::<Vec<_>>()
@@ -44,7 +44,7 @@ impl Names {
     }
 
     /// Returns A, B, C, F_a of the plant, and the model in the observer if it differs.
-    pub(crate) fn plant_matrices(&self, designed: &ControllerDesign) -> Vec<Matrix> {
+    pub(crate) fn plant_matrices(&self, designed: &Solution) -> Vec<Matrix> {
         let Self { states, extended, actuators, measurements, faults, .. } = self;
         let linear = &designed.linear;
         let f_a = designed.extended.plant.f_a.rows(0, states.len()).into_owned();
@@ -79,7 +79,7 @@ impl Names {
         matrices
     }
 
-    pub(crate) fn gains(&self, designed: &ControllerDesign) -> Vec<Matrix> {
+    pub(crate) fn gains(&self, designed: &Solution) -> Vec<Matrix> {
         let gains = &designed.gains;
         let Self { extended, actuators, measurements, faults, references, .. } = self;
         let mut all = vec![

@@ -9,14 +9,14 @@ use nalgebra::DMatrix;
 use crate::assess::responses::{BETWEEN, SETTLED, add_outputs};
 use crate::report::robustness::Number;
 use crate::report::{Check, CommandPeak, Curve, ReferenceStep};
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 use crate::solve::tracking::{REACHED, Tracking, TrackingAction};
 
 /// The parts of a step between which the rise time is measured.
 const RISE: [f64; 2] = [0.1, 0.9];
 
 /// Returns the responses to a step of each reference.
-pub(crate) fn reference_steps(designed: &ControllerDesign) -> Result<Vec<ReferenceStep>, Error> {
+pub(crate) fn reference_steps(designed: &Solution) -> Result<Vec<ReferenceStep>, Error> {
     let Some(tracking) = &designed.tracking else {
         return Ok(Vec::new());
     };
@@ -63,7 +63,7 @@ struct Output {
 
 /// The loop from the references to what the responses show.
 struct ReferenceLoop<'a> {
-    designed: &'a ControllerDesign,
+    designed: &'a Solution,
     tracking: &'a Tracking,
     /// The measurements, then what references for combinations of them set.
     outputs: Vec<Output>,
@@ -74,7 +74,7 @@ struct ReferenceLoop<'a> {
 }
 
 impl<'a> ReferenceLoop<'a> {
-    fn of(designed: &'a ControllerDesign, tracking: &'a Tracking) -> Result<Self, Error> {
+    fn of(designed: &'a Solution, tracking: &'a Tracking) -> Result<Self, Error> {
         let linear = &designed.linear;
         let signal = |name: String, unit: &Option<String>| Output { name, unit: unit.clone() };
         let mut outputs: Vec<_> =
@@ -211,7 +211,7 @@ fn time_between(period: f64, part: usize) -> f64 {
 
 /// The loop from the references to `rows` times the states and the commands, and the same between samples.
 fn system(
-    designed: &ControllerDesign,
+    designed: &Solution,
     tracking: &Tracking,
     rows: &DMatrix<f64>,
 ) -> Result<StateSpace, Error> {

@@ -38,50 +38,52 @@ use crate::report::number::rounded;
 use crate::report::reconfiguration::ReconfigurationReport;
 use crate::report::robustness::Level;
 use crate::report::{Effectiveness, Loop, Plant, Region, Report, Sampled, Signal};
+use crate::solve::designed::Designed;
 use crate::solve::fallback::Fallback;
 use crate::solve::gain::GainResult;
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 use crate::solve::tracking::{DesignLoop, TrackingAction};
 
 /// Returns the report on `designed`.
 pub(crate) fn report(
     (file, family): (&PlantFile<'_>, Option<&ParameterFamily<'_>>),
     (designed, reconfiguration, fallback): (
-        &ControllerDesign,
+        &Designed,
         Option<ReconfigurationReport>,
         Option<&Fallback>,
     ),
     description: String,
     (certificate_time, steps): (Duration, &Steps<'_>),
 ) -> Result<Report, crate::Error> {
-    let loops = Loops::of(designed)?;
-    let ControllerDesign { plant, gains, linear, .. } = designed;
-    let names = Names::of(designed);
-    let references = reference_steps(designed)?;
-    let mut checks = checks(designed);
+    let nominal = &designed.nominal;
+    let loops = Loops::of(nominal)?;
+    let Solution { plant, gains, .. } = nominal;
+    let names = Names::of(nominal);
+    let references = reference_steps(nominal)?;
+    let mut checks = checks(nominal);
     checks.extend(reached(&references));
-    let robustness = robustness(designed, &file.robustness, family, steps)?;
+    let robustness = robustness(nominal, &file.robustness, family, steps)?;
     let (errors, norms) = rayon::join(
-        || estimation::errors(designed, robustness.as_ref(), &file.robustness),
+        || estimation::errors(nominal, robustness.as_ref(), &file.robustness),
         || loops.norms(),
     );
     let mut missing = Vec::new();
     let errors = unless_numerical("the errors of the estimates", errors, &mut missing)?;
     let norms = unless_numerical("the norms of the estimation errors", norms, &mut missing)?;
     let budget = Budget::start(certificate_time);
-    let certificate = steps.run(Step::Certificates, || certificate(designed, norms, &budget));
+    let certificate = steps.run(Step::Certificates, || certificate(nominal, norms, &budget));
     let (bounds, without_bounds) = steps.run(Step::Bounds, || loops.bounds(&budget))?;
-    let losses = losses(designed, &budget)?;
+    let losses = losses(nominal, &budget)?;
     let of_losses = losses.iter().flat_map(losses::reasons);
     let further = of_losses.chain(reconfiguration.iter().flat_map(reconfiguration_reasons));
     let mut further: Vec<_> = further.collect();
     let (responses, frequency) =
-        rayon::join(|| steps.run(Step::Responses, || responses(designed)), || loops.frequency());
+        rayon::join(|| steps.run(Step::Responses, || responses(nominal)), || loops.frequency());
     let responses = unless_numerical("the responses to faults", responses, &mut missing)?;
     let frequency =
         unless_numerical("the gains from faults over frequency", frequency, &mut missing)?;
     further.extend(missing.into_iter().map(|reason| (Level::Amber, reason)));
-    let fallback = fallback.map(|own| fallback::report(file, designed, own, &budget));
+    let fallback = fallback.map(|own| fallback::report(file, nominal, own, &budget));
     let fallback = fallback.transpose()?.flatten();
     further.extend(fallback.iter().flat_map(|own| fallback::reasons(own, file.robustness.red)));
     let family_report = family_report::family(designed, &file.robustness, &budget)?;
@@ -102,30 +104,30 @@ pub(crate) fn report(
     Ok(Report {
         description,
         plant_file: file.name(),
-        plant: self::plant(designed, &names)?,
+        plant: self::plant(nominal, &names)?,
         verdict,
         warnings,
         checks,
         robustness,
-        gains: names.gains(designed),
+        gains: names.gains(nominal),
         feedback: closed(
             if gains.integral.is_some() { "A_e + B_e [K_x, K_i]" } else { "A + B K_x" },
-            &designed.feedback_dynamics(),
-            &designed.feedback,
+            &nominal.feedback_dynamics(),
+            &nominal.feedback,
             Some(&file.feedback.requirement),
         )?,
         observer: closed(
             "A_0 - L C_0",
             &gains.error_dynamics(plant),
-            &designed.observer,
-            Some(&file.observer.requirement).filter(|_| designed.law.keeps_error_dynamics()),
+            &nominal.observer,
+            Some(&file.observer.requirement).filter(|_| nominal.law.keeps_error_dynamics()),
         )?,
-        estimation: estimation::estimation(designed, errors),
-        sampling: match designed.domain {
+        estimation: estimation::estimation(nominal, errors),
+        sampling: match nominal.domain {
             Domain::Continuous => None,
             Domain::Sampled { period } => Some(Sampled {
                 sample_time: period,
-                estimator: estimator(designed.gains.estimator).to_owned(),
+                estimator: estimator(nominal.gains.estimator).to_owned(),
             }),
         },
         family: family_report,
@@ -136,11 +138,11 @@ pub(crate) fn report(
         steps: responses,
         references,
         frequency,
-        effectiveness: effectiveness(designed)?,
+        effectiveness: effectiveness(nominal)?,
         losses,
         reconfiguration,
         fallback,
-        assumptions: assumptions(designed, &linear.faults),
+        assumptions: assumptions(designed),
         interface: Vec::new(),
     })
 }
@@ -160,7 +162,7 @@ fn unless_numerical<T>(
     }
 }
 
-fn plant(designed: &ControllerDesign, names: &Names) -> Result<Plant, Error> {
+fn plant(designed: &Solution, names: &Names) -> Result<Plant, Error> {
     let linear = &designed.linear;
     let signal = |signal: &signals::Signal| Signal {
         name: signal.name.clone(),
@@ -188,7 +190,7 @@ fn plant(designed: &ControllerDesign, names: &Names) -> Result<Plant, Error> {
 }
 
 /// Describes how a fault enters and what is known about it.
-fn notes(fault: &Fault, designed: &ControllerDesign) -> String {
+fn notes(fault: &Fault, designed: &Solution) -> String {
     let linear = &designed.linear;
     let mut parts = vec![match &fault.entry_point {
         EntryPoint::Column(at) => format!("column {} of F_a", at + 1),
@@ -251,7 +253,7 @@ fn sorted(eigenvalues: &[Complex<f64>]) -> Vec<Complex<f64>> {
 }
 
 /// Returns the largest stable loss of effectiveness of each actuator.
-fn effectiveness(designed: &ControllerDesign) -> Result<Vec<Effectiveness>, Error> {
+fn effectiveness(designed: &Solution) -> Result<Vec<Effectiveness>, Error> {
     let lossy = |model: &control::faults::Fault| match model.entry {
         FaultEntry::LossOfEffectiveness(input) => Some(input),
         _ => None,
@@ -269,7 +271,8 @@ fn effectiveness(designed: &ControllerDesign) -> Result<Vec<Effectiveness>, Erro
     Ok(inputs.iter().zip(&found.single).map(one).collect())
 }
 
-fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
+fn assumptions(designed: &Designed) -> Vec<String> {
+    let Designed { nominal, family, schedule, .. } = designed;
     let mut all = vec![
         "The plant is linear, as stated under Plant; the neglected nonlinear terms act as a fault."
             .to_owned(),
@@ -278,15 +281,15 @@ fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
             .to_owned(),
         "Bounds and responses start from rest, with the compensation on.".to_owned(),
     ];
-    all.extend(tracking_assumption(designed));
-    if faults.iter().any(|fault| fault.dynamics == FaultDynamics::Constant) {
+    all.extend(tracking_assumption(nominal));
+    if nominal.linear.faults.iter().any(|fault| fault.dynamics == FaultDynamics::Constant) {
         all.push(
             "The estimate of a fault modelled as constant lags behind it; the rate of the fault \
              causes the errors."
                 .to_owned(),
         );
     }
-    if designed.law.injection.is_some() {
+    if nominal.law.injection.is_some() {
         all.push(
             "The sliding-mode law is nonlinear: eigenvalues, margins, noise, bounds and responses are \
              those of its linearisation within the boundary layer, for faults and noise small against \
@@ -294,20 +297,20 @@ fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
                 .to_owned(),
         );
     }
-    if let Domain::Sampled { period } = designed.domain {
+    if let Domain::Sampled { period } = nominal.domain {
         all.push(format!(
             "Commands are constant over a sample time of {period} s; in the responses a \
              fault changes at samples; states and commands are shown between them, too."
         ));
     }
-    if designed.family.is_some() {
+    if family.is_some() {
         all.push(
             "Responses, bounds and certificates of the estimation errors are those of the nominal \
              plant; the estimation error of another member also depends on its states."
                 .to_owned(),
         );
     }
-    if designed.schedule.is_some() {
+    if schedule.is_some() {
         all.push(
             "Gains, responses and bounds are those of the plant of the file; between the points of the \
              schedule, plant and controller are interpolated linearly. A change of the operating point \
@@ -315,8 +318,7 @@ fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
                 .to_owned(),
         );
     }
-    if designed.linear.models.iter().any(|m| matches!(m.entry, FaultEntry::LossOfEffectiveness(_)))
-    {
+    if nominal.linear.models.iter().any(|m| matches!(m.entry, FaultEntry::LossOfEffectiveness(_))) {
         all.push(
             "The loss of effectiveness is constant; it is estimated only while the command is well \
              above its threshold."
@@ -327,7 +329,7 @@ fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
 }
 
 /// Says what the set points rely on.
-fn tracking_assumption(designed: &ControllerDesign) -> Option<String> {
+fn tracking_assumption(designed: &Solution) -> Option<String> {
     Some(match &designed.tracking.as_ref()?.action {
         TrackingAction::Feedforward(_) => {
             "The references are reached without error only if A, B and C are those of the plant: there is \

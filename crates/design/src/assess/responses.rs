@@ -10,7 +10,7 @@ use crate::assess::analysis::Outputs;
 use crate::plant_file::signals::Fault;
 use crate::report::robustness::Number;
 use crate::report::{Curve, StepResponse};
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 /// Relative band of the settling time: a response has settled when it stays within this fraction of
 /// its largest distance.
@@ -24,7 +24,7 @@ const LARGE: usize = 48;
 
 /// Returns the responses to a change of each fault, as a step and as a ramp at the bound of its rate,
 /// and to steps of all faults together.
-pub(crate) fn responses(designed: &ControllerDesign) -> Result<Vec<StepResponse>, Error> {
+pub(crate) fn responses(designed: &Solution) -> Result<Vec<StepResponse>, Error> {
     let own = ShownLoop::of(designed)?;
     let faults = &designed.linear.faults;
     let changes = faults.iter().zip(&designed.extended.channels).flat_map(|(fault, channel)| {
@@ -78,7 +78,7 @@ fn part(fault: &Fault) -> Number {
 
 /// The loop from the faults to all that the responses show.
 struct ShownLoop<'a> {
-    designed: &'a ControllerDesign,
+    designed: &'a Solution,
     outputs: Outputs,
     /// Outputs: [x; e; eps], the commands, and for a sampled loop the states at each time between
     /// samples.
@@ -86,8 +86,8 @@ struct ShownLoop<'a> {
 }
 
 impl<'a> ShownLoop<'a> {
-    fn of(designed: &'a ControllerDesign) -> Result<Self, Error> {
-        let ControllerDesign { plant, gains, domain, .. } = designed;
+    fn of(designed: &'a Solution) -> Result<Self, Error> {
+        let Solution { plant, gains, domain, .. } = designed;
         let mut system = fault_system(plant, gains, *domain)?;
         let (m, order) = (plant.b.ncols(), system.a.nrows());
         let (all, q) = plant.f_a.shape();
@@ -137,7 +137,7 @@ impl<'a> ShownLoop<'a> {
 
     /// Returns the curves of a response that is `factor` times as large.
     fn curves(&self, trace: &TimeResponse, factor: f64) -> Vec<Curve> {
-        let ControllerDesign { plant, linear, extended, .. } = self.designed;
+        let Solution { plant, linear, extended, .. } = self.designed;
         let first_command = 2 * plant.a.nrows() + plant.f_a.ncols();
         let first_between = first_command + plant.b.ncols();
         let signals = self.outputs.names.iter().zip(&self.outputs.units);

@@ -28,7 +28,7 @@ use crate::report::robustness::{
     Channel, Compared, Disk, LoopPoint, Number, PeakSensitivity, Robustness,
 };
 use crate::report::{Frequency, Matrix};
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 const WIDTH: f64 = 1e-4;
 const POINTS_PER_DECADE: u32 = 20;
@@ -37,7 +37,7 @@ const POINTS: [(Point, &str); 2] = [(Point::Input, "input"), (Point::Output, "ou
 /// Returns the robustness of a design; None if the loop is not stable. `family`: the plants whose
 /// parameters vary; without it the entries of the matrices vary.
 pub(crate) fn robustness(
-    designed: &ControllerDesign,
+    designed: &Solution,
     limits: &RobustnessLimits,
     family: Option<&ParameterFamily<'_>>,
     steps: &Steps<'_>,
@@ -90,7 +90,7 @@ pub(crate) struct Margins {
 
 /// Returns the margins of `own`, the loop of the controller and `physical`, which is stable.
 pub(crate) fn margins(
-    designed: &ControllerDesign,
+    designed: &Solution,
     physical: &Physical,
     own: &Loop,
     limits: &RobustnessLimits,
@@ -146,18 +146,18 @@ pub(crate) struct Physical {
 }
 
 impl Physical {
-    fn of(designed: &ControllerDesign) -> Result<Self, Error> {
+    fn of(designed: &Solution) -> Result<Self, Error> {
         Self::with(designed, &designed.linear)
     }
 
     /// Another plant with the same controller.
-    pub(crate) fn with(designed: &ControllerDesign, linear: &LinearPlant) -> Result<Self, Error> {
+    pub(crate) fn with(designed: &Solution, linear: &LinearPlant) -> Result<Self, Error> {
         Self::of_gains(designed, linear, &designed.gains)
     }
 
     /// Another plant and other gains in the same controller.
     pub(crate) fn of_gains(
-        designed: &ControllerDesign,
+        designed: &Solution,
         linear: &LinearPlant,
         gains: &Gains,
     ) -> Result<Self, Error> {
@@ -195,7 +195,7 @@ pub(crate) fn closed(plant: &StateSpace, controller: &StateSpace) -> Result<Loop
 
 /// The controller with `gains`, its filter and its integrals, from the measurements as the plant of the design
 /// gives them.
-fn complete(designed: &ControllerDesign, gains: &Gains) -> Result<CompleteController, Error> {
+fn complete(designed: &Solution, gains: &Gains) -> Result<CompleteController, Error> {
     let filter = designed.filter.as_deref();
     let found = complete_controller(&designed.plant, gains, filter, designed.domain)?;
     if !designed.linear.has_feedthrough() {
@@ -267,7 +267,7 @@ fn slopes(
 
 /// Returns how the judged peaks depend on the entries of the plant.
 fn sensitivity(
-    designed: &ControllerDesign,
+    designed: &Solution,
     plant: &StateSpace,
     slopes: &[[DMatrix<f64>; 4]],
 ) -> Vec<PeakSensitivity> {
@@ -315,11 +315,11 @@ fn disk(found: &DiskMargin) -> Disk {
 
 /// Returns the gains, and the peaks of S, beside those of the linear-quadratic design.
 fn comparison(
-    designed: &ControllerDesign,
+    designed: &Solution,
     physical: &Physical,
     points: &[LoopPoint],
 ) -> Result<Vec<Compared>, Error> {
-    let ControllerDesign { plant, gains, domain, extended, .. } = designed;
+    let Solution { plant, gains, domain, extended, .. } = designed;
     let n = extended.states;
     let ((a, b), k) = (&designed.feedback_pair, &designed.feedback.gain);
     let a_0 = plant.augmented_dynamics();

@@ -12,8 +12,9 @@ use crate::matrix::rows;
 use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::robustness::{Level, Verdict};
 use crate::report::schedule::{RateCertificate, SchedulePointReport, ScheduleReport};
+use crate::solve::designed::Designed;
 use crate::solve::schedule::{Scheduled, ScheduledLoop, coupled};
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 /// Values of the scheduling variable in each interval, its ends included, at which eigenvalues are
 /// computed, less 1.
@@ -23,15 +24,15 @@ const NEUTRAL: f64 = 1e-7;
 
 /// Returns the report on the schedule of `designed`, if it has one.
 pub(crate) fn schedule(
-    designed: &ControllerDesign,
+    designed: &Designed,
     limits: &RobustnessLimits,
     budget: &Budget,
 ) -> Result<Option<ScheduleReport>, crate::Error> {
-    let Some(own) = &designed.schedule else { return Ok(None) };
-    let coupled = coupled(own, designed)?;
-    let all: Vec<_> = own.points(designed).collect();
+    let Designed { nominal, schedule: Some(own), .. } = designed else { return Ok(None) };
+    let coupled = coupled(own, nominal)?;
+    let all: Vec<_> = own.points(nominal).collect();
     let variable = &own.variable;
-    let one = |(k, (at, point)): (usize, &(f64, &ControllerDesign))| {
+    let one = |(k, (at, point)): (usize, &(f64, &Solution))| {
         let name = format!("{} = {at}", variable.name);
         let linear = &point.linear;
         let found = member(point, linear, name.clone(), limits);
@@ -46,9 +47,9 @@ pub(crate) fn schedule(
         })
     };
     let points = all.par_iter().enumerate().map(one).collect::<Result<Vec<_>, _>>()?;
-    let whole = ScheduledLoop::of(own, designed)?;
+    let whole = ScheduledLoop::of(own, nominal)?;
     let intervals = whole.intervals()?;
-    let (worst_instability, worst_at) = whole.worst(CHECKED, designed.domain)?;
+    let (worst_instability, worst_at) = whole.worst(CHECKED, nominal.domain)?;
     let vertices: Vec<_> = intervals.iter().flat_map(|own| own.coefficients.clone()).collect();
     let degree = intervals[0].coefficients.len() - 1;
     let named = |vertex: usize| {
@@ -59,10 +60,10 @@ pub(crate) fn schedule(
             _ => format!("{} to {}", all[k].0, all[k + 1].0),
         }
     };
-    let any_rate = common(&vertices, designed.domain, budget, named)?;
+    let any_rate = common(&vertices, nominal.domain, budget, named)?;
     let bounded_rate = match &any_rate {
         Ok(_) => Err("one P serves any rate".to_owned()),
-        Err(_) => bounded(own, &intervals, designed.domain, budget)?,
+        Err(_) => bounded(own, &intervals, nominal.domain, budget)?,
     };
     Ok(Some(ScheduleReport {
         variable: variable.name.clone(),
@@ -119,7 +120,7 @@ fn bounded(
 /// Judges a scheduled controller.
 pub(crate) fn judge_schedule(
     verdict: &mut Verdict,
-    designed: &ControllerDesign,
+    designed: &Designed,
     found: &ScheduleReport,
     limits: &RobustnessLimits,
 ) {

@@ -7,13 +7,13 @@ use crate::plant_file::PlantFile;
 use crate::report::Report;
 use crate::report::identity::identity;
 use crate::report::robustness::Parameter;
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 /// Returns the plant file with the matrices of the worst plant; a plant that is an FMU becomes one
 /// that matrices describe.
 pub(crate) fn plant_file(
     file: &PlantFile<'_>,
-    designed: &ControllerDesign,
+    designed: &Solution,
     report: &Report,
 ) -> Result<Option<String>, crate::Error> {
     let Some(robustness) = &report.robustness else {
@@ -44,7 +44,7 @@ pub(crate) fn plant_file(
 }
 
 /// Replaces what refers to the plant's FMU; false if a fault cannot be stated without it.
-fn without_fmu(table: &mut Table, designed: &ControllerDesign) -> bool {
+fn without_fmu(table: &mut Table, designed: &Solution) -> bool {
     // Members and points of a schedule are linearised from the FMU.
     for key in ["plant", "operating_point", "preload", "linearisation_step", "family", "schedule"] {
         table.remove(key);

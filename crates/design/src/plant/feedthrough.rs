@@ -87,7 +87,7 @@ mod tests {
     use files::{Source, Table};
 
     use super::*;
-    use crate::solve::solution::design;
+    use crate::solve::designed::design;
 
     const MASS: &str = "A = [[0, 1], [-20, -1]]\nB = [[0], [2]]\nC = [[1, 0], [-20, -1]]\nD = [[0], [2]]\n\
         measurements = [\"q\", \"acceleration\"]\nactuator_faults = \"all\"\nfilter = 60\n\

@@ -21,7 +21,7 @@ use crate::plant_file::PlantFile;
 use crate::plant_file::fallback::FallbackRequest;
 use crate::plant_file::requirements::Region;
 use crate::report::number::rounded;
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 use crate::solve::tracking::decay;
 
 /// Largest number of states of plant and controller for which linear matrix inequalities are solved.
@@ -57,7 +57,7 @@ pub(crate) struct Fallback {
 /// [`crate::Error`] at the entry of the plant file if there is none, with the actuators that are in conflict.
 pub(crate) fn fallback(
     file: &PlantFile<'_>,
-    designed: &ControllerDesign,
+    designed: &Solution,
 ) -> Result<Option<Fallback>, crate::Error> {
     let Some(request) = &file.fallback else { return Ok(None) };
     let search = Search { designed, request };
@@ -72,7 +72,7 @@ pub(crate) fn fallback(
 
 /// The search for the gains.
 pub(crate) struct Search<'a> {
-    pub(crate) designed: &'a ControllerDesign,
+    pub(crate) designed: &'a Solution,
     pub(crate) request: &'a FallbackRequest,
 }
 
@@ -127,7 +127,7 @@ impl Search<'_> {
     /// The gains with which all cases meet `region`, with the compensation of the estimated faults if that is
     /// possible, or the reason why none were found.
     fn within(&self, region: Region) -> Result<Result<Fallback, String>, Error> {
-        let ControllerDesign { extended, gains, domain, .. } = self.designed;
+        let Solution { extended, gains, domain, .. } = self.designed;
         let n = extended.states;
         let vertices = self.vertices();
         let closed = |gain: &DMatrix<f64>| -> Vec<_> {
@@ -254,7 +254,7 @@ impl Search<'_> {
 
     /// A and B of the states in each case, in the time domain of the design.
     pub(crate) fn vertices(&self) -> Vec<Vertex> {
-        let ControllerDesign { plant, extended, .. } = self.designed;
+        let Solution { plant, extended, .. } = self.designed;
         let n = extended.states;
         let (a, b) = (plant.a.view((0, 0), (n, n)), plant.b.rows(0, n).into_owned());
         let vertex = |case: Option<usize>| Vertex {
@@ -270,7 +270,7 @@ impl Search<'_> {
         gains: &Gains,
         case: Option<(usize, f64)>,
     ) -> Result<DMatrix<f64>, Error> {
-        let ControllerDesign { plant, domain, .. } = self.designed;
+        let Solution { plant, domain, .. } = self.designed;
         let mut effectiveness = vec![1.0; plant.b.ncols()];
         if let Some((actuator, loss)) = case {
             effectiveness[actuator] = 1.0 - loss;
@@ -313,7 +313,7 @@ fn described(region: Region) -> String {
 
 impl Fallback {
     /// The gains of the controller in the fall-back.
-    pub(crate) fn gains(&self, designed: &ControllerDesign) -> Gains {
+    pub(crate) fn gains(&self, designed: &Solution) -> Gains {
         let intact = &designed.gains;
         let k_f = self.k_f.clone().unwrap_or_else(|| &intact.k_f * 0.0);
         Gains { k_x: self.k_x.clone(), k_f, ..intact.clone() }

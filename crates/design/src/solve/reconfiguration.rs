@@ -23,7 +23,7 @@ use crate::report::reconfiguration::{
 use crate::solve::fallback::Fallback;
 use crate::solve::gain::{FeedbackProblem, GainChoice, Refusal};
 use crate::solve::gains::feedback;
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 use crate::solve::tracking::decay;
 
 /// Relative size of the effect that the other actuators cannot produce below which the allocation counts
@@ -74,7 +74,7 @@ pub(crate) struct ReconfiguredGains {
 /// The controllers without each of the requested actuators, and without several of them, with the report.
 pub(crate) fn reconfigurations(
     file: &PlantFile<'_>,
-    designed: &ControllerDesign,
+    designed: &Solution,
     fallback: Option<Fallback>,
 ) -> Result<(Reconfigurations, Option<ReconfigurationReport>), Error> {
     let Some(request) = &file.reconfiguration else {
@@ -124,7 +124,7 @@ pub(crate) fn reconfigurations(
 
 /// Actuators that are gone.
 struct Without<'a> {
-    designed: &'a ControllerDesign,
+    designed: &'a Solution,
     request: &'a ReconfigurationRequest,
     /// In ascending order.
     gone: Vec<usize>,
@@ -144,7 +144,7 @@ impl Without<'_> {
         &self,
         requirement: &Requirement,
     ) -> Result<Result<(ReconfiguredGains, Reconfigured), String>, Error> {
-        let ControllerDesign { linear, plant, extended, gains, domain, .. } = self.designed;
+        let Solution { linear, plant, extended, gains, domain, .. } = self.designed;
         let n = extended.states;
         if let Some(mode) = unreachable_mode(linear, &self.without_columns(&linear.b))? {
             let reason =
@@ -222,7 +222,7 @@ impl Without<'_> {
 
     /// The loop in which the observer knows that the actuators are gone.
     fn known_loop(&self, k_x: &DMatrix<f64>, k_f: &DMatrix<f64>) -> Result<Loop, Error> {
-        let ControllerDesign { plant, gains, domain, .. } = self.designed;
+        let Solution { plant, gains, domain, .. } = self.designed;
         let mut reduced = plant.clone();
         reduced.b = self.without_columns(&plant.b);
         let own = Gains { k_x: k_x.clone(), k_f: k_f.clone(), ..gains.clone() };
@@ -277,7 +277,7 @@ impl Without<'_> {
 
     /// Feedbacks of the other actuators that meet the requirement of the plant file, and the method.
     fn redesigned(&self, requirement: &Requirement) -> Result<(Feedbacks, String), String> {
-        let ControllerDesign { linear, plant, extended, domain, .. } = self.designed;
+        let Solution { linear, plant, extended, domain, .. } = self.designed;
         let n = extended.states;
         let gone = &self.gone;
         let requirement = match requirement {
@@ -331,7 +331,7 @@ impl Without<'_> {
         k_x: &DMatrix<f64>,
         authority: &[f64],
     ) -> Result<(DMatrix<f64>, DMatrix<f64>, Rest), Error> {
-        let ControllerDesign { linear, extended, domain, .. } = self.designed;
+        let Solution { linear, extended, domain, .. } = self.designed;
         let kept = linear.c.select_rows(&self.request.keep);
         let mut reduced = extended.clone();
         reduced.plant.b = self.without_columns(&extended.plant.b);
@@ -365,7 +365,7 @@ impl Without<'_> {
 
     /// The faults of an actuator: their first column, and their channels.
     fn faults_of(&self, gone: usize) -> impl Iterator<Item = (usize, FaultChannel)> + '_ {
-        let ControllerDesign { linear, extended, .. } = self.designed;
+        let Solution { linear, extended, .. } = self.designed;
         let own = move |point: &EntryPoint| match point {
             EntryPoint::Actuator(actuator) | EntryPoint::Loss { actuator, .. } => *actuator == gone,
             _ => false,

@@ -18,7 +18,7 @@ use crate::plant_file::estimation::Law;
 use crate::plant_file::signals::Signal;
 use crate::plant_file::variants::Variable;
 use crate::solve::family::check_states;
-use crate::solve::solution::{ControllerDesign, design_by};
+use crate::solve::solution::{Solution, solve};
 
 /// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p` of a
 /// current estimator. The loop of a continuous controller has degree 2, with a direct term 4; its coefficients of
@@ -36,7 +36,7 @@ pub(crate) struct Scheduled {
     /// Largest rate of the variable, per s.
     pub(crate) rate_bound: Option<f64>,
     /// Values of the variable, ascending, each with its design: None for the plant of the file.
-    points: Vec<(f64, Option<ControllerDesign>)>,
+    points: Vec<(f64, Option<Solution>)>,
 }
 
 /// The matrices at a value of the scheduling variable.
@@ -63,9 +63,11 @@ impl Scheduled {
                 points.push((point.at, None));
                 continue;
             }
-            let own = design_by(&file.with(&point.plant), law).map_err(|error| {
-                error.within(format!("schedule with {} = {}", variable.name, point.at))
-            })?;
+            let own = solve(&file.with(&point.plant), law)
+                .map_err(|error| {
+                    error.within(format!("schedule with {} = {}", variable.name, point.at))
+                })?
+                .solution;
             check_states(file, &point.plant, (nominal, &own.linear))?;
             points.push((point.at, Some(own)));
         }
@@ -83,19 +85,19 @@ impl Scheduled {
     /// The values of the scheduling variable with their designs; `nominal` is the design of the file.
     pub(crate) fn points<'a>(
         &'a self,
-        nominal: &'a ControllerDesign,
-    ) -> impl Iterator<Item = (f64, &'a ControllerDesign)> {
+        nominal: &'a Solution,
+    ) -> impl Iterator<Item = (f64, &'a Solution)> {
         self.points.iter().map(move |(at, own)| (*at, own.as_ref().unwrap_or(nominal)))
     }
 
     /// The points besides that of the plant of the file.
-    pub(crate) fn others(&self) -> impl Iterator<Item = (f64, &ControllerDesign)> {
+    pub(crate) fn others(&self) -> impl Iterator<Item = (f64, &Solution)> {
         self.points.iter().filter_map(|(at, own)| Some((*at, own.as_ref()?)))
     }
 }
 
 impl Point {
-    fn of(own: &ControllerDesign) -> Result<Self, Error> {
+    fn of(own: &Solution) -> Result<Self, Error> {
         let linear = &own.linear;
         let (mut a, mut b) = (linear.a.clone(), linear.b.clone());
         if let Domain::Sampled { period } = own.domain {
@@ -163,7 +165,7 @@ pub(crate) struct ScheduledLoop {
 }
 
 impl ScheduledLoop {
-    pub(crate) fn of(own: &Scheduled, nominal: &ControllerDesign) -> Result<Self, Error> {
+    pub(crate) fn of(own: &Scheduled, nominal: &Solution) -> Result<Self, Error> {
         let all: Vec<_> = own.points(nominal).collect();
         Ok(Self {
             at: all.iter().map(|(at, _)| *at).collect(),
@@ -223,10 +225,7 @@ impl ScheduledLoop {
 ///
 /// Between two intervals the slopes jump; the worse side counts. Source: W. J. Rugh and J. S. Shamma,
 /// Research on gain scheduling, Automatica 36 (2000), section 3.
-pub(crate) fn coupled(
-    own: &Scheduled,
-    nominal: &ControllerDesign,
-) -> Result<Option<Vec<f64>>, Error> {
+pub(crate) fn coupled(own: &Scheduled, nominal: &Solution) -> Result<Option<Vec<f64>>, Error> {
     let Some(j) = own.measurement else { return Ok(None) };
     let all: Vec<_> = own.points(nominal).collect();
     let slopes: Vec<_> = all.windows(2).map(|pair| Slopes::between(pair[0], pair[1])).collect();
@@ -256,7 +255,7 @@ struct Slopes {
 }
 
 impl Slopes {
-    fn between(from: (f64, &ControllerDesign), to: (f64, &ControllerDesign)) -> Self {
+    fn between(from: (f64, &Solution), to: (f64, &Solution)) -> Self {
         let length = to.0 - from.0;
         let slope = |of: fn(&LinearPlant) -> &[Signal]| {
             let values = of(&from.1.linear).iter().zip(of(&to.1.linear));
@@ -277,7 +276,7 @@ impl Slopes {
     /// ```
     ///
     /// In continuous time these are x_i' without T, and x_hat'. The observer receives u, and so its next state has the same part of it.
-    fn move_references(&self, (design, own): (&ControllerDesign, &mut StateSpace), j: usize) {
+    fn move_references(&self, (design, own): (&Solution, &mut StateSpace), j: usize) {
         let Some(tracking) = &design.tracking else { return };
         let period = match design.domain {
             Domain::Continuous => 1.0,

@@ -1,4 +1,4 @@
-//! Computes the gains for a plant file.
+//! Computes the gains for the plant of a plant file.
 
 use crate::plant::feedthrough;
 use crate::plant::fixed_mode::{described, described_in};
@@ -13,8 +13,6 @@ use crate::solve::gains::{feedback, observer};
 use crate::solve::law::{DesignedLaw, LawProblem};
 use crate::solve::norm_gains::ObserverProblem;
 use crate::solve::pairing::PairProblem;
-use crate::solve::schedule::Scheduled;
-use crate::solve::schedule::references::examine;
 use crate::solve::tracking::{
     DesignLoop, Tracking, check_references, decay, feedback_pair, integral_action,
 };
@@ -30,11 +28,9 @@ use control::{Domain, Error};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
-/// A designed controller with the intermediate results.
-pub(crate) struct ControllerDesign {
+/// The controller of one plant, with the intermediate results.
+pub(crate) struct Solution {
     pub(crate) linear: LinearPlant,
-    /// What is unusual in the plant file, with its place.
-    pub(crate) warnings: Vec<PlaceError>,
     /// The plant with fault models and measurement filter, in continuous time.
     pub(crate) extended: ExtendedPlant,
     pub(crate) domain: Domain,
@@ -67,17 +63,19 @@ pub(crate) struct ControllerDesign {
     pub(crate) monitor: bool,
     /// The same for the observer error before `t_on`, if the faults are not estimated then.
     pub(crate) instability_before: Option<f64>,
+}
+
+/// The controller of the plant of a file, and what it was solved with.
+pub(crate) struct Solved {
+    pub(crate) solution: Solution,
+    /// The plants that the controller serves besides the one of the file.
     pub(crate) family: Option<Family>,
-    pub(crate) schedule: Option<Scheduled>,
+    /// What is unusual in the plant file, with its place.
+    pub(crate) warnings: Vec<PlaceError>,
 }
 
-/// Designs the controller for `file`.
-pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Error> {
-    design_by(file, &file.estimation.law)
-}
-
-/// Designs the controller for `file` with another law for the estimates of the faults.
-pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDesign, crate::Error> {
+/// Solves for the controller of the plant of `file` with `law` for the estimates of the faults.
+pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Error> {
     crate::threads::start()?;
     let linear = LinearPlant::of(file)?;
     feedthrough::check(file, &linear)?;
@@ -144,10 +142,7 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
     let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
     let controlled = &pair.0 + &pair.1 * &feedback.gain;
     let tracking = Tracking::of(file, (&linear, (&own.0, &own.1)), (&gains, &controlled), domain)?;
-    let schedule = Scheduled::of(file, law, &linear)?;
-    let mut found = ControllerDesign {
-        family: (!members.is_empty()).then_some(Family { members, feedback: certificate }),
-        schedule,
+    let solution = Solution {
         cancellation_residual: cancellation_residual(&extended)?,
         instability_before: if file.t_on > 0.0 && !file.monitor {
             Some(instability(&gains.state_error_dynamics(&plant), domain)?)
@@ -158,7 +153,6 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
         monitor: file.monitor,
         filter,
         linear,
-        warnings,
         extended,
         domain,
         plant,
@@ -174,9 +168,8 @@ pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<ControllerDes
         feedback_pair: pair,
         whole,
     };
-    let further = examine(file, &found)?;
-    found.warnings.extend(further);
-    Ok(found)
+    let family = (!members.is_empty()).then_some(Family { members, feedback: certificate });
+    Ok(Solved { solution, family, warnings })
 }
 
 /// An error at the law of the file, with the laws that exist.
@@ -494,7 +487,7 @@ fn fixed(
     }
 }
 
-impl ControllerDesign {
+impl Solution {
     /// Returns A + B K_x, n x n, the dynamics under exact state feedback; with integral action the same of
     /// the plant extended by the integrals, with [K_x, K_i].
     pub(crate) fn feedback_dynamics(&self) -> DMatrix<f64> {

@@ -7,14 +7,14 @@ use nalgebra::DMatrix;
 use crate::assess::detection::problem::Problem;
 use crate::assess::detection::{Part, tests};
 use crate::matrix::matrix;
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 /// The filters of all parts as one filter.
 pub(super) fn section(
     problem: &Problem,
     parts: &[Part],
     from: f64,
-    designed: &ControllerDesign,
+    designed: &Solution,
 ) -> DetectionDesign {
     let orders = parts.iter().map(|part| part.decoupling.filter.generator.a.nrows());
     let k: usize = orders.sum();

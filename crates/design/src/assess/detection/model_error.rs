@@ -18,7 +18,7 @@ use crate::plant::parameters::ParameterFamily;
 use crate::plant_file::PlantFile;
 use crate::plant_file::detection::ModelError;
 use crate::plant_file::signals::Signal;
-use crate::solve::solution::ControllerDesign;
+use crate::solve::designed::Designed;
 
 /// A plant, and the bounds of its inputs.
 type Case = Rc<(UncertainPlant, DVector<f64>)>;
@@ -56,9 +56,10 @@ impl<'a> ModelErrors<'a> {
     pub(super) fn new(
         file: &'a PlantFile<'a>,
         request: &'a ModelError,
-        (linear, designed): (&LinearPlant, &ControllerDesign),
+        designed: &Designed,
         parameters: Option<&'a ParameterFamily<'a>>,
     ) -> Result<Self, crate::Error> {
+        let linear = &designed.nominal.linear;
         let bound = |(at, actuator): (usize, &Signal)| {
             let operating = actuator.operating.unwrap_or(0.0);
             let of_limits =
@@ -90,7 +91,7 @@ impl<'a> ModelErrors<'a> {
                 linear.measurements.len(),
                 linear.measurements.iter().map(|signal| signal.operating.unwrap_or(0.0)),
             ),
-            domain: designed.domain,
+            domain: designed.nominal.domain,
             bounds: DVector::from_vec(bounds.collect::<Result<_, _>>()?),
         })
     }

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::plant_file::PlantFile;
 use crate::plant_file::detection::DetectionRequest;
 use crate::report::number::round;
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 /// The process noise that is chosen makes the filter no faster than this part of what it can.
 const NEARLY: f64 = 0.99;
@@ -38,7 +38,7 @@ impl Problem {
     pub(super) fn new(
         file: &PlantFile<'_>,
         request: &DetectionRequest,
-        designed: &ControllerDesign,
+        designed: &Solution,
     ) -> Result<Self, crate::Error> {
         let linear = &designed.linear;
         let refuse = |error: Error| file.error_at(&request.place, error.to_string());

@@ -10,12 +10,12 @@ use crate::matrix::rows;
 use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::Matrix;
 use crate::report::robustness::Number;
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 /// Returns the effect of each measurement noise on commands and estimated faults, and of all
 /// together.
 pub(super) fn noise(
-    designed: &ControllerDesign,
+    designed: &Solution,
     own: &Loop,
     estimates: &StateSpace,
     limits: &RobustnessLimits,
@@ -66,7 +66,7 @@ fn noise_or_infinite(mut system: StateSpace) -> Result<DMatrix<f64>, Error> {
 
 /// Returns for each fault the largest amplification of a sinusoidal error of the measurements to its
 /// estimate, all measurements together, in the units of `noise`.
-pub(crate) fn noise_peaks(designed: &ControllerDesign, noise: &[f64]) -> Result<Vec<f64>, Error> {
+pub(crate) fn noise_peaks(designed: &Solution, noise: &[f64]) -> Result<Vec<f64>, Error> {
     let physical = Physical::of(designed)?;
     let own = physical.closed(&physical.controller)?;
     let mut system = own.from_noise(&physical.estimates)?;

@@ -13,12 +13,12 @@ use crate::plant::parameters::ParameterFamily;
 use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::Matrix;
 use crate::report::robustness::ToleranceResult;
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 
 /// Examines the loop for plants whose matrices have other entries, within the tolerances: the part of the
 /// random cases that stays stable, and the worst case found.
 pub(crate) fn by_entries(
-    designed: &ControllerDesign,
+    designed: &Solution,
     physical: &Physical,
     limits: &RobustnessLimits,
 ) -> Result<ToleranceResult, crate::Error> {
@@ -36,7 +36,7 @@ pub(crate) fn by_entries(
 
 /// Examines the loop for other parameters of the plant's FMU, as [`by_entries`] does for entries.
 pub(super) fn by_parameters(
-    designed: &ControllerDesign,
+    designed: &Solution,
     physical: &Physical,
     (limits, family): (&RobustnessLimits, &ParameterFamily<'_>),
     slopes: &[[DMatrix<f64>; 4]],
@@ -48,7 +48,7 @@ pub(super) fn by_parameters(
 }
 
 fn tested(
-    designed: &ControllerDesign,
+    designed: &Solution,
     limits: &RobustnessLimits,
     found: &ToleranceTest,
 ) -> ToleranceResult {

@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use crate::plant_file::PlantFile;
 use crate::plant_file::references::References;
 use crate::solve::schedule::{Point, Scheduled};
-use crate::solve::solution::ControllerDesign;
+use crate::solve::solution::Solution;
 use crate::solve::tracking::REACHED;
 
 /// Values of the scheduling variable in each interval, besides its ends.
@@ -20,12 +20,11 @@ const CHECKED: u32 = 19;
 /// that this could not be decided, and that references without integral action are exact at the points only.
 pub(crate) fn examine(
     file: &PlantFile<'_>,
-    designed: &ControllerDesign,
+    own: &Scheduled,
+    nominal: &Solution,
 ) -> Result<Vec<PlaceError>, crate::Error> {
-    let (Some(own), Some(references)) = (&designed.schedule, &file.references) else {
-        return Ok(Vec::new());
-    };
-    let all: Vec<_> = own.points(designed).collect();
+    let Some(references) = &file.references else { return Ok(Vec::new()) };
+    let all: Vec<_> = own.points(nominal).collect();
     let mut warnings = Vec::new();
     if references.integral {
         for pair in all.windows(2) {
@@ -37,7 +36,7 @@ pub(crate) fn examine(
     Ok(warnings)
 }
 
-type DesignAt<'a> = (f64, &'a ControllerDesign);
+type DesignAt<'a> = (f64, &'a Solution);
 
 /// Examines the back-calculation between two points.
 fn windup(
@@ -45,7 +44,7 @@ fn windup(
     own: &Scheduled,
     [(from, first), (to, second)]: [DesignAt<'_>; 2],
 ) -> Result<Option<PlaceError>, crate::Error> {
-    let gains = |design: &ControllerDesign| {
+    let gains = |design: &Solution| {
         let l_w = design.tracking.as_ref()?.windup()?.clone();
         Some((design.gains.integral.as_ref()?.gain.clone(), l_w))
     };

@@ -1,0 +1,37 @@
+//! Designs the controller that a plant file asks for: for its plant, its family, and along its schedule.
+
+use files::PlaceError;
+
+use crate::plant_file::PlantFile;
+use crate::plant_file::estimation::Law;
+use crate::solve::family::Family;
+use crate::solve::schedule::Scheduled;
+use crate::solve::schedule::references::examine;
+use crate::solve::solution::{Solution, Solved, solve};
+
+/// A designed controller.
+pub(crate) struct Designed {
+    /// The controller of the plant of the file.
+    pub(crate) nominal: Solution,
+    /// The plants that the same controller serves.
+    pub(crate) family: Option<Family>,
+    /// The controllers at the other points of the schedule.
+    pub(crate) schedule: Option<Scheduled>,
+    /// What is unusual in the plant file, with its place.
+    pub(crate) warnings: Vec<PlaceError>,
+}
+
+/// Designs the controller for `file`.
+pub(crate) fn design(file: &PlantFile<'_>) -> Result<Designed, crate::Error> {
+    design_by(file, &file.estimation.law)
+}
+
+/// Designs the controller for `file` with another law for the estimates of the faults.
+pub(crate) fn design_by(file: &PlantFile<'_>, law: &Law) -> Result<Designed, crate::Error> {
+    let Solved { solution: nominal, family, mut warnings } = solve(file, law)?;
+    let schedule = Scheduled::of(file, law, &nominal.linear)?;
+    if let Some(schedule) = &schedule {
+        warnings.extend(examine(file, schedule, &nominal)?);
+    }
+    Ok(Designed { nominal, family, schedule, warnings })
+}
