@@ -1,8 +1,8 @@
 //! Compares the laws that estimate faults on one plant file.
 
 use std::path::Path;
-use std::time::Duration;
 
+use crate::assess::reporting::Assessment;
 use crate::error::Error;
 use crate::plant::parameters::ParameterFamily;
 use crate::plant_file::PlantFile;
@@ -55,10 +55,9 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
                 }
                 designed => designed?,
             };
-            let whole = (&file, family.as_ref());
-            let designed = (&designed, None, None);
-            let quietly = (Duration::ZERO, &Steps::new(&|_| {}));
-            let report = reporting::report(whole, designed, String::new(), quietly)?;
+            let steps = Steps::new(&|_| {});
+            let assessment = Assessment::new(&file, family.as_ref(), &designed, &steps);
+            let report = reporting::report(assessment)?;
             own_identity = identity(&report);
             found.result = Some(LawFigures {
                 disk_margin: report.robustness.as_ref().and_then(|found| {

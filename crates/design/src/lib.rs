@@ -40,6 +40,7 @@ pub use report::Report;
 pub use report::comparison::{Comparison, LawFigures, LawResult};
 pub use report::robustness::Level;
 
+use assess::reporting::Assessment;
 use assess::{detection, reporting, worst_case};
 use controller_fmu::Content;
 use plant::parameters::ParameterFamily;
@@ -122,19 +123,17 @@ fn design_source(
         reconfiguration::reconfigurations(&file, &designed.nominal, fallback)?;
     let controller = designed.file(&file, &description, section, &reconfigurations)?;
     let text = controller.to_toml().map_err(|error| Error::Invalid(error.to_string()))?;
-    let report = reporting::report(
-        (&file, family.as_ref()),
-        (&designed, without, reconfigurations.fallback.as_ref()),
+    let assessment = Assessment {
         description,
-        (certificate_time, steps),
-    );
-    let mut report = report.map_err(|error| {
+        detection,
+        reconfiguration: without,
+        fallback: reconfigurations.fallback.as_ref(),
+        certificate_time,
+        ..Assessment::new(&file, family.as_ref(), &designed, steps)
+    };
+    let report = reporting::report(assessment).map_err(|error| {
         error.within(format!("the design for {} cannot be examined", file.name()))
     })?;
-    if let Some(detection) = detection {
-        report.warnings.extend(detection.warnings);
-        report.detection = Some(detection.report);
-    }
     let identity = identity::identity(&report);
     let worst_case = worst_case::plant_file(&file, &designed.nominal, &report)?;
     let text = format!("{}\n{text}", identity::heading(&identity, &report.verdict));

@@ -6,6 +6,7 @@ use std::time::Duration;
 use nalgebra::Complex;
 
 use crate::assess::checks::checks;
+use crate::assess::reporting::{Assessment, report};
 use crate::assess::robustness::robustness;
 use crate::assess::verdict::verdict;
 use crate::budget::Budget;
@@ -13,8 +14,9 @@ use crate::plant_file::channel::Channel;
 use crate::plant_file::requirements::{Region, Requirement};
 use crate::plant_file::signals::{EntryPoint, FaultDynamics};
 use crate::plant_file::{Model, PlantFile};
+use crate::report::Report;
 use crate::report::robustness::Level;
-use crate::solve::designed::design;
+use crate::solve::designed::{Designed, design};
 use files::{Source, Table};
 
 const MASS: &str = r#"A = [[0, 1], [0, 0]]
@@ -471,13 +473,7 @@ fn the_worst_plant_is_a_plant_file() {
     let (worst, a) = read(&text, |file| {
         let designed = design(file).unwrap();
         let time = crate::CERTIFICATE_TIME;
-        let report = crate::assess::reporting::report(
-            (file, None),
-            (&designed, None, None),
-            String::new(),
-            (time, &unobserved()),
-        )
-        .unwrap();
+        let report = report_within(file, &designed, time).unwrap();
         let a = report.robustness.as_ref().unwrap().tolerance.worst[0].values.clone();
         (
             crate::assess::worst_case::plant_file(file, &designed.nominal, &report)
@@ -495,19 +491,23 @@ fn the_worst_plant_is_a_plant_file() {
     assert_eq!(stated.unwrap().map(f64::to_bits), [a[1][0], a[1][1]].map(f64::to_bits));
 }
 
+fn report_within(
+    file: &PlantFile<'_>,
+    designed: &Designed,
+    time: Duration,
+) -> Result<Report, crate::Error> {
+    let steps = unobserved();
+    let assessment = Assessment::new(file, None, designed, &steps);
+    report(Assessment { certificate_time: time, ..assessment })
+}
+
 #[test]
 fn without_time_for_certificates_the_report_says_what_is_left_out() {
     for text in [MASS.to_owned(), format!("{MASS}sample_time = 0.01\n")] {
         let [none, all] = [Duration::ZERO, crate::CERTIFICATE_TIME].map(|time| {
             let report = |file: &PlantFile<'_>| {
                 let designed = design(file).unwrap();
-                crate::assess::reporting::report(
-                    (file, None),
-                    (&designed, None, None),
-                    String::new(),
-                    (time, &unobserved()),
-                )
-                .unwrap()
+                report_within(file, &designed, time).unwrap()
             };
             read(&text, report).unwrap()
         });

@@ -14,6 +14,7 @@ use nalgebra::{Complex, DMatrix};
 use crate::assess::analysis::Loops;
 use crate::assess::certificate::certificate;
 use crate::assess::checks::checks;
+use crate::assess::detection::Detection;
 use crate::assess::estimation;
 use crate::assess::fallback;
 use crate::assess::family::{self as family_report, judge, judge_proof};
@@ -44,17 +45,57 @@ use crate::solve::gain::GainResult;
 use crate::solve::solution::Solution;
 use crate::solve::tracking::{DesignLoop, TrackingAction};
 
-/// Returns the report on `designed`.
-pub(crate) fn report(
-    (file, family): (&PlantFile<'_>, Option<&ParameterFamily<'_>>),
-    (designed, reconfiguration, fallback): (
-        &Designed,
-        Option<ReconfigurationReport>,
-        Option<&Fallback>,
-    ),
-    description: String,
-    (certificate_time, steps): (Duration, &Steps<'_>),
-) -> Result<Report, crate::Error> {
+/// A design with all that its report is about.
+pub(crate) struct Assessment<'a> {
+    pub(crate) file: &'a PlantFile<'a>,
+    /// The plants whose parameters vary; without them the entries of the matrices vary.
+    pub(crate) parameters: Option<&'a ParameterFamily<'a>>,
+    pub(crate) designed: &'a Designed,
+    /// What the controller is, in a sentence.
+    pub(crate) description: String,
+    pub(crate) detection: Option<Detection>,
+    pub(crate) reconfiguration: Option<ReconfigurationReport>,
+    pub(crate) fallback: Option<&'a Fallback>,
+    /// The time that certificates and bounds may take.
+    pub(crate) certificate_time: Duration,
+    pub(crate) steps: &'a Steps<'a>,
+}
+
+impl<'a> Assessment<'a> {
+    /// A design with the plants whose parameters vary; without certificates and bounds.
+    pub(crate) fn new(
+        file: &'a PlantFile<'a>,
+        parameters: Option<&'a ParameterFamily<'a>>,
+        designed: &'a Designed,
+        steps: &'a Steps<'a>,
+    ) -> Self {
+        Self {
+            file,
+            parameters,
+            designed,
+            description: String::new(),
+            detection: None,
+            reconfiguration: None,
+            fallback: None,
+            certificate_time: Duration::ZERO,
+            steps,
+        }
+    }
+}
+
+/// Returns the report on a design.
+pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error> {
+    let Assessment {
+        file,
+        parameters,
+        designed,
+        description,
+        detection,
+        reconfiguration,
+        fallback,
+        certificate_time,
+        steps,
+    } = assessment;
     let nominal = &designed.nominal;
     let loops = Loops::of(nominal)?;
     let Solution { plant, gains, .. } = nominal;
@@ -62,7 +103,7 @@ pub(crate) fn report(
     let references = reference_steps(nominal)?;
     let mut checks = checks(nominal);
     checks.extend(reached(&references));
-    let robustness = robustness(nominal, &file.robustness, family, steps)?;
+    let robustness = robustness(nominal, &file.robustness, parameters, steps)?;
     let (errors, norms) = rayon::join(
         || estimation::errors(nominal, robustness.as_ref(), &file.robustness),
         || loops.norms(),
@@ -101,6 +142,8 @@ pub(crate) fn report(
         designed.warnings.iter().map(|warning| line(file, warning)).collect();
     warnings.extend(references.iter().filter_map(beyond_limits));
     warnings.extend(without_bounds);
+    let (detection, of_detection) = detection.map(|own| (own.report, own.warnings)).unzip();
+    warnings.extend(of_detection.into_iter().flatten());
     Ok(Report {
         description,
         plant_file: file.name(),
@@ -123,16 +166,10 @@ pub(crate) fn report(
             Some(&file.observer.requirement).filter(|_| nominal.law.keeps_error_dynamics()),
         )?,
         estimation: estimation::estimation(nominal, errors),
-        sampling: match nominal.domain {
-            Domain::Continuous => None,
-            Domain::Sampled { period } => Some(Sampled {
-                sample_time: period,
-                estimator: estimator(nominal.gains.estimator).to_owned(),
-            }),
-        },
+        sampling: sampling(nominal),
         family: family_report,
         schedule,
-        detection: None,
+        detection,
         certificate,
         bounds,
         steps: responses,
@@ -145,6 +182,17 @@ pub(crate) fn report(
         assumptions: assumptions(designed),
         interface: Vec::new(),
     })
+}
+
+/// Returns the sampling of the controller; none in continuous time.
+fn sampling(solution: &Solution) -> Option<Sampled> {
+    match solution.domain {
+        Domain::Continuous => None,
+        Domain::Sampled { period } => Some(Sampled {
+            sample_time: period,
+            estimator: estimator(solution.gains.estimator).to_owned(),
+        }),
+    }
 }
 
 /// Returns a part of the report; an empty one, with a reason in `missing`, if rounding errors prevent it.
