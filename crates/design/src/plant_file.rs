@@ -228,7 +228,7 @@ impl<'a> PlantFile<'a> {
             schedule: variants::schedule(file, &model, &measurements)?,
             is_point: false,
             disturbances: disturbances(file, &actuators, &measurements)?,
-            detection: DetectionRequest::read(file, (&actuators, measurements.len()), &faults)?,
+            detection: DetectionRequest::read(file, &actuators, measurements.len(), &faults)?,
             reconfiguration: ReconfigurationRequest::read(
                 file,
                 &actuators,
@@ -390,10 +390,10 @@ fn stated(file: &Table<'_>) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
         let columns = entry.matrix()?.ncols();
         entry.shaped((n, columns), "states x faults")
     });
-    let states = counted(file, "states", "x", (n, "states, the rows of A"))?;
-    let actuators = counted(file, "actuators", "u", (b.ncols(), "actuators, the columns of B"))?;
+    let states = counted(file, "states", "x", n, "states, the rows of A")?;
+    let actuators = counted(file, "actuators", "u", b.ncols(), "actuators, the columns of B")?;
     let measurements =
-        counted(file, "measurements", "y", (c.nrows(), "measurements, the rows of C"))?;
+        counted(file, "measurements", "y", c.nrows(), "measurements, the rows of C")?;
     let model = Model::Matrices { a, b, c, d, f_a: f_a.transpose()?, states };
     Ok((model, [actuators, measurements]))
 }
@@ -403,7 +403,8 @@ fn counted(
     file: &Table<'_>,
     key: &str,
     letter: &str,
-    (count, meaning): (usize, &str),
+    count: usize,
+    meaning: &str,
 ) -> Result<Vec<Signal>, PlaceError> {
     let Some(entry) = file.get(key) else {
         return Ok((1..=count).map(|k| Signal::named(format!("{letter}{k}"))).collect());

@@ -150,7 +150,7 @@ fn plan(
 ) -> Result<PlannedTest, crate::Error> {
     let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
     let bias = |rows: &DMatrix<f64>| match errors {
-        Some(errors) => errors.largest_mean(problem, (decoupling, rows)),
+        Some(errors) => errors.largest_mean(problem, decoupling, rows),
         None => Ok(LargestMean { mean: 0.0, interior_excess: None }),
     };
     #[expect(clippy::cast_precision_loss, reason = "a number of faults")]
@@ -189,7 +189,7 @@ fn plan(
                     let samples_of_window = prediction::whole(window / problem.period).max(1);
                     WindowTest::with_false_alarms((count, samples_of_window), samples, bias)
                 }
-                None => prediction::best_window(count, (samples, bias), &means),
+                None => prediction::best_window(count, samples, bias, &means),
             };
             let kind = TestKind::Window(test.map_err(refuse)?);
             Ok(PlannedTest { name, rows, kind, bias, interior_excess, reacts })

@@ -157,7 +157,7 @@ impl Examination<'_> {
         let StateSpace { c, d, .. } = controller(plant, &self.gains, *domain)?;
         let x: DVector<f64> = found.rows(0, n).into();
         let u = c * found.rows(n, order - n) + d * &plant.c * &x;
-        Ok((Rest::of(linear, (&x.rows(0, extended.states).into(), u), true), stuck))
+        Ok((Rest::of(linear, &x.rows(0, extended.states).into(), u, true), stuck))
     }
 }
 

@@ -120,7 +120,8 @@ fn controllers(designed: &Solution) -> Result<Vec<Variant>, Error> {
             name: "compensation off",
             meaning: "u = K_x x_hat; the faults are estimated, but not compensated",
             closed: DesignLoop::of(
-                (linear, plant),
+                linear,
+                plant,
                 &uncompensated,
                 designed.filter.as_deref(),
                 *domain,

@@ -59,7 +59,7 @@ pub(crate) fn robustness(
             steps.run(Step::Tolerances, || match family {
                 None => by_entries(designed, &physical, limits),
                 Some(family) => {
-                    tolerances::by_parameters(designed, &physical, (limits, family), &slopes)
+                    tolerances::by_parameters(designed, &physical, limits, family, &slopes)
                 }
             })
         },

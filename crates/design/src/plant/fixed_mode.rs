@@ -13,7 +13,8 @@ pub(crate) fn described(mode: &Mode, name: impl Fn(usize) -> String) -> String {
 /// if `sampled`, otherwise in 1/s.
 pub(crate) fn described_in(
     mode: &Mode,
-    (domain, sampled): (Domain, bool),
+    domain: Domain,
+    sampled: bool,
     name: impl Fn(usize) -> String,
 ) -> String {
     match domain {

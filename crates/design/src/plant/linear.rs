@@ -65,7 +65,7 @@ impl LinearPlant {
                     measurements: file.measurements.clone(),
                     faults: file.faults.clone(),
                     models: file.faults.iter().map(model).collect(),
-                    disturbances: disturbances(file, (b, d), None)?,
+                    disturbances: disturbances(file, b, d, None)?,
                     origin: "The plant file states the matrices.".to_owned(),
                     residual: None,
                 })
@@ -123,7 +123,7 @@ fn linearised(
     let d = significant(found.matrices.d.clone(), &found.matrices.c);
     let (faults, models) = faults(file, &found, &d)?;
     Ok(LinearPlant {
-        disturbances: disturbances(file, (&found.matrices.b, &d), Some(&found.matrices))?,
+        disturbances: disturbances(file, &found.matrices.b, &d, Some(&found.matrices))?,
         states: found.states.iter().map(known).collect(),
         actuators: merged(&file.actuators, &found.inputs),
         measurements: merged(&file.measurements, &found.outputs),
@@ -179,7 +179,8 @@ fn disturbance_inputs<'a>(file: &'a PlantFile<'_>) -> impl Iterator<Item = Strin
 /// FMU are the last columns of `found`.
 fn disturbances(
     file: &PlantFile<'_>,
-    (b, d): (&DMatrix<f64>, &DMatrix<f64>),
+    b: &DMatrix<f64>,
+    d: &DMatrix<f64>,
     found: Option<&linearise::Matrices>,
 ) -> Result<Vec<UnknownInput>, PlaceError> {
     let columns = found.map_or(0, |found| found.f.ncols());

@@ -22,11 +22,7 @@ pub(crate) struct Rest {
 
 impl Rest {
     /// The equilibrium at deviations x and u from the operating point.
-    pub(crate) fn of(
-        linear: &LinearPlant,
-        (x, u): (&DVector<f64>, DVector<f64>),
-        kept: bool,
-    ) -> Self {
+    pub(crate) fn of(linear: &LinearPlant, x: &DVector<f64>, u: DVector<f64>, kept: bool) -> Self {
         let measured = &linear.c * x;
         let measurements = linear.measurements.iter().zip(measured.iter());
         Self {

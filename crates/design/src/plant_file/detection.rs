@@ -103,7 +103,8 @@ impl DetectionRequest {
     /// Reads the table, if the file has one.
     pub(crate) fn read(
         file: &Table<'_>,
-        (actuators, measurements): (&[Signal], usize),
+        actuators: &[Signal],
+        measurements: usize,
         faults: &[Fault],
     ) -> Result<Option<Self>, PlaceError> {
         let Some(entry) = file.get("detection") else {

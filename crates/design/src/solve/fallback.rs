@@ -139,7 +139,7 @@ impl Search<'_> {
             certify_common(&closed(&intact), &region.stated(), *domain)?
         {
             let method = "The feedback of the intact controller meets the region in all cases.";
-            best = Some(self.verified(&intact, (region, certificate), method.to_owned())?);
+            best = Some(self.verified(&intact, region, certificate, method.to_owned())?);
         }
         for factor in FASTER {
             let faster = Region { decay: region.decay.map(|decay| decay * factor), ..region };
@@ -154,7 +154,7 @@ impl Search<'_> {
                         "One gain for the {} cases by linear matrix inequalities, with one P.",
                         vertices.len()
                     );
-                    let found = self.verified(&gain, (region, certificate), method)?;
+                    let found = self.verified(&gain, region, certificate, method)?;
                     best =
                         Some(best.map_or_else(|| found.clone(), |own| better(own, found.clone())));
                 }
@@ -184,7 +184,8 @@ impl Search<'_> {
     fn verified(
         &self,
         gain: &DMatrix<f64>,
-        (region, certificate): (Region, RegionCertificate),
+        region: Region,
+        certificate: RegionCertificate,
         method: String,
     ) -> Result<Result<Fallback, String>, Error> {
         let gains = &self.designed.gains;

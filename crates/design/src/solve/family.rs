@@ -41,7 +41,7 @@ pub(crate) fn members(
     let mut member = |variant: &Variant| {
         let linear = LinearPlant::of(&file.with(variant))
             .map_err(|error| error.within(format!("member `{}` of the family", variant.name)))?;
-        check_states(file, variant, (nominal, &linear))?;
+        check_states(file, variant, nominal, &linear)?;
         if linear.has_feedthrough() {
             let message = "a measurement depends on a command directly (D is not 0); expected members \
                            without direct feedthrough";
@@ -65,13 +65,14 @@ pub(crate) fn members(
 pub(crate) fn check_states(
     file: &PlantFile<'_>,
     variant: &Variant,
-    (nominal, own): (&LinearPlant, &LinearPlant),
+    nominal: &LinearPlant,
+    linear: &LinearPlant,
 ) -> Result<(), PlaceError> {
     let names = |signals: &[Signal]| {
         let names: Vec<_> = signals.iter().map(|signal| signal.name.as_str()).collect();
         names.join(", ")
     };
-    let (expected, found) = (names(&nominal.states), names(&own.states));
+    let (expected, found) = (names(&nominal.states), names(&linear.states));
     if expected == found {
         return Ok(());
     }
@@ -83,7 +84,8 @@ pub(crate) fn check_states(
 /// Computes one K_x for the nominal plant and all members, with its certificate; with integral action one
 /// K = [K_x, K_i] for all of them with their integrals.
 pub(crate) fn common_feedback(
-    (nominal, members): (&LinearPlant, &[Member]),
+    nominal: &LinearPlant,
+    members: &[Member],
     references: Option<&References>,
     region: Region,
     domain: Domain,

@@ -25,7 +25,8 @@ impl PairProblem<'_> {
     /// belongs to the plant, except with integral action.
     pub(crate) fn chosen(
         &self,
-        (feedback, observer): (GainResult, GainResult),
+        feedback: GainResult,
+        observer: GainResult,
         gains: impl Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains,
     ) -> Result<(GainResult, GainResult), Error> {
         let (feedback, observer) = (feedback.into_choice(), observer.into_choice());
@@ -50,7 +51,7 @@ impl PairProblem<'_> {
     fn closed(&self, gains: &Gains) -> Result<Loop, Error> {
         let Self { linear, plant, filter, domain } = *self;
         let DesignLoop { plant, controller } =
-            DesignLoop::of((linear, plant), gains, filter, domain)?;
+            DesignLoop::of(linear, plant, gains, filter, domain)?;
         let FaultyPlant { a, b, c, .. } = plant;
         let d = DMatrix::zeros(c.nrows(), b.ncols());
         Loop::new(StateSpace { a, b, c, d, domain }, controller)

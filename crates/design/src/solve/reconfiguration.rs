@@ -360,7 +360,7 @@ impl Without<'_> {
             u += &unit.u * deviation;
             is_kept &= unit.left <= KEPT * linear.c.norm() * unit.x.norm();
         }
-        Ok((k_f, k_s, Rest::of(linear, (&x, u), is_kept)))
+        Ok((k_f, k_s, Rest::of(linear, &x, u, is_kept)))
     }
 
     /// The faults of an actuator: their first column, and their channels.

@@ -68,7 +68,7 @@ impl Scheduled {
                     error.within(format!("schedule with {} = {}", variable.name, point.at))
                 })?
                 .solution;
-            check_states(file, &point.plant, (nominal, &own.linear))?;
+            check_states(file, &point.plant, nominal, &own.linear)?;
             points.push((point.at, Some(own)));
         }
         Ok(Some(Self {
@@ -238,7 +238,7 @@ pub(crate) fn coupled(own: &Scheduled, nominal: &Solution) -> Result<Option<Vec<
             let filter = design.filter.as_deref();
             let own = complete_controller(&point.model, &point.gains, filter, design.domain)?;
             let mut changed = slopes[side].act_on(&own.commands, filter.is_some(), j);
-            slopes[side].move_references((design, &mut changed), j);
+            slopes[side].move_references(design, &mut changed, j);
             let whole = Loop::new(point.physical, changed)?;
             worst = worst.max(instability(&whole.dynamics(), design.domain)?);
         }
@@ -276,7 +276,7 @@ impl Slopes {
     /// ```
     ///
     /// In continuous time these are x_i' without T, and x_hat'. The observer receives u, and so its next state has the same part of it.
-    fn move_references(&self, (design, own): (&Solution, &mut StateSpace), j: usize) {
+    fn move_references(&self, design: &Solution, controller: &mut StateSpace, j: usize) {
         let Some(tracking) = &design.tracking else { return };
         let period = match design.domain {
             Domain::Continuous => 1.0,
@@ -284,19 +284,19 @@ impl Slopes {
         };
         let moved = &tracking.h * DMatrix::from_column_slice(self.y.len(), 1, &self.y);
         let t = design.gains.integrals();
-        let first = own.b.nrows() - t;
+        let first = controller.b.nrows() - t;
         for k in 0..t {
-            own.b[(first + k, j)] -= period * moved[k];
+            controller.b[(first + k, j)] -= period * moved[k];
         }
         if let Some(n_r) = tracking.feedforward() {
             let command = n_r * moved;
             let states = &design.plant.b * &command;
             let before = design.filter.as_ref().map_or(0, Vec::len);
             for i in 0..states.nrows() {
-                own.b[(before + i, j)] -= states[i];
+                controller.b[(before + i, j)] -= states[i];
             }
             for i in 0..command.nrows() {
-                own.d[(i, j)] -= command[i];
+                controller.d[(i, j)] -= command[i];
             }
         }
     }

@@ -92,7 +92,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     check_faults(file, &linear, &extended)?;
     check_references(file, &linear)?;
     let detectability = detectability.map_err(|error| file.error(&FAULTS, error.to_string()))?;
-    check_detectable(file, (&linear, &extended), &detectability, &mut warnings)?;
+    check_detectable(file, &linear, &extended, &detectability, &mut warnings)?;
     let (domain, mut plant) = in_domain(file, &extended)?;
     let references = file.references.as_ref();
     let states = extended.states;
@@ -101,14 +101,14 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let members = family::members(file, &linear, &mut warnings)?;
     let common = match &file.feedback.requirement {
         Requirement::Region(region) if !members.is_empty() => {
-            let found = common_feedback((&linear, &members), references, *region, domain);
-            Some(found.map_err(|refusal| feedback_refused((file, &linear), domain, refusal))?)
+            let found = common_feedback(&linear, &members, references, *region, domain);
+            Some(found.map_err(|refusal| feedback_refused(file, &linear, domain, refusal))?)
         }
         _ => None,
     };
     let (common, certificate) = common.unzip();
     let problem = (&plant, &pair, common);
-    let found = compute_gains((file, &linear), &extended, problem, domain)?;
+    let (feedback, observer) = compute_gains((file, &linear), &extended, problem, domain)?;
     let n = plant.a.nrows();
     let k_f = sampled::compensation_gain(&extended, domain)?;
     let with = |feedback: &DMatrix<f64>, observer: &DMatrix<f64>| Gains {
@@ -118,15 +118,16 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
         l_x: observer.rows(0, n).into(),
         l_f: -observer.rows(n, plant.f_a.ncols()),
         p_f: None,
-        integral: integral_action(references, (&linear, &extended), feedback),
+        integral: integral_action(references, &linear, &extended, feedback),
     };
     let filter = sampled::filter(&extended, domain);
     // The gains of a schedule are interpolated, so that each point takes the first of its pairs.
     let (feedback, observer) = if file.is_scheduled() {
-        found
+        (feedback, observer)
     } else {
         let filter = filter.as_deref();
-        PairProblem { linear: &linear, plant: &plant, filter, domain }.chosen(found, with)?
+        PairProblem { linear: &linear, plant: &plant, filter, domain }
+            .chosen(feedback, observer, with)?
     };
     let gains = with(&feedback.gain, &observer.gain);
     let problem =
@@ -138,7 +139,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let required_error_dynamics = gains.error_dynamics(&plant);
     let (gains, own_model) = (designed_law.gains.clone(), designed_law.a_f.clone());
     plant.a_f = own_model.unwrap_or(plant.a_f);
-    let whole = DesignLoop::of((&linear, &plant), &gains, filter.as_deref(), domain)?;
+    let whole = DesignLoop::of(&linear, &plant, &gains, filter.as_deref(), domain)?;
     let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
     let controlled = &pair.0 + &pair.1 * &feedback.gain;
     let tracking = Tracking::of(file, (&linear, (&own.0, &own.1)), (&gains, &controlled), domain)?;
@@ -248,7 +249,7 @@ fn compute_gains(
     };
     let (feedback, observer) =
         rayon::join(feedback, || observer(&file.observer.requirement, &observer_problem, domain));
-    let feedback = feedback.map_err(|refusal| feedback_refused((file, linear), domain, refusal))?;
+    let feedback = feedback.map_err(|refusal| feedback_refused(file, linear, domain, refusal))?;
     let observer = observer.map_err(|refusal| {
         let order = (a_0.nrows(), "states, filters, faults and rates of ramps");
         let names = observer_states(linear, extended);
@@ -258,7 +259,8 @@ fn compute_gains(
 }
 
 fn feedback_refused(
-    (file, linear): (&PlantFile<'_>, &LinearPlant),
+    file: &PlantFile<'_>,
+    linear: &LinearPlant,
     domain: Domain,
     refusal: Refusal,
 ) -> PlaceError {
@@ -324,7 +326,8 @@ fn consequence(stable: bool, mode: &Mode) -> &'static str {
 /// Checks that the augmented observer exists; the error names the faults and the measurements.
 fn check_detectable(
     file: &PlantFile<'_>,
-    (linear, extended): (&LinearPlant, &ExtendedPlant),
+    linear: &LinearPlant,
+    extended: &ExtendedPlant,
     found: &Detectability,
     warnings: &mut Vec<PlaceError>,
 ) -> Result<(), crate::Error> {
@@ -477,7 +480,7 @@ fn fixed(
     name: impl Fn(usize) -> String,
 ) -> String {
     let sampled = matches!(requirement, Requirement::SampledEigenvalues(_));
-    let described = described_in(mode, (domain, sampled), name);
+    let described = described_in(mode, domain, sampled, name);
     match requirement {
         Requirement::Eigenvalues(_) | Requirement::SampledEigenvalues(_) => format!(
             "no gain moves {described}; expected it among the requested eigenvalues, or `region` or \

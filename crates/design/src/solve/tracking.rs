@@ -139,7 +139,8 @@ pub(crate) fn feedback_pair(
 /// The integral action with the gain K = [K_x, K_i] of the feedback; None without.
 pub(crate) fn integral_action(
     references: Option<&References>,
-    (linear, extended): (&LinearPlant, &ExtendedPlant),
+    linear: &LinearPlant,
+    extended: &ExtendedPlant,
     k: &DMatrix<f64>,
 ) -> Option<IntegralAction> {
     let References { h, .. } = references.filter(|references| references.integral)?;
@@ -260,7 +261,8 @@ pub(crate) struct DesignLoop {
 
 impl DesignLoop {
     pub(crate) fn of(
-        (linear, plant): (&LinearPlant, &FaultyPlant),
+        linear: &LinearPlant,
+        plant: &FaultyPlant,
         gains: &Gains,
         filter: Option<&[f64]>,
         domain: Domain,

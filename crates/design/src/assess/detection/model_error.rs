@@ -102,7 +102,8 @@ impl<'a> ModelErrors<'a> {
     pub(super) fn largest_mean(
         &self,
         problem: &Problem,
-        of: (&Decoupling, &DMatrix<f64>),
+        decoupling: &Decoupling,
+        rows: &DMatrix<f64>,
     ) -> Result<LargestMean, crate::Error> {
         let scale = match self.domain {
             Domain::Sampled { .. } => 1.0,
@@ -110,14 +111,14 @@ impl<'a> ModelErrors<'a> {
         };
         let scale = scale * self.request.margin;
         let Some(family) = self.parameters else {
-            let bound = |plant| self.bound_of(plant, &self.bounds, of);
+            let bound = |plant| self.bound_of(plant, &self.bounds, decoupling, rows);
             let most = |most: f64, plant| Ok::<_, crate::Error>(most.max(bound(plant)?));
             let mean = scale * self.plants.iter().try_fold(0.0, most)?;
             return Ok(LargestMean { mean, interior_excess: None });
         };
         let found = parameter_box::largest(family.count(), &self.random, |deviations| {
             let case = self.case(family, deviations)?;
-            self.bound_of(&case.0, &case.1, of)
+            self.bound_of(&case.0, &case.1, decoupling, rows)
         })?;
         let excess = if found.corners > 0.0 { found.everywhere / found.corners - 1.0 } else { 0.0 };
         Ok(LargestMean { mean: scale * found.everywhere, interior_excess: Some(excess) })
@@ -162,7 +163,8 @@ impl<'a> ModelErrors<'a> {
         &self,
         plant: &UncertainPlant,
         bounds: &DVector<f64>,
-        (decoupling, rows): (&Decoupling, &DMatrix<f64>),
+        decoupling: &Decoupling,
+        rows: &DMatrix<f64>,
     ) -> Result<f64, crate::Error> {
         let refuse = |message: String| self.file.error_at(&self.request.place, message);
         let mut filter = decoupling.filter.generator.clone();

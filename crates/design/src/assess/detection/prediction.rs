@@ -102,7 +102,8 @@ impl Prediction<'_> {
 /// The test with the window, a power of two of samples, with the least sum of mean delays of some faults.
 pub(super) fn best_window(
     residuals: u32,
-    (samples, bias): (f64, f64),
+    samples: f64,
+    bias: f64,
     means: &[DMatrix<f64>],
 ) -> Result<WindowTest, Error> {
     let mut best: Option<(f64, WindowTest)> = None;

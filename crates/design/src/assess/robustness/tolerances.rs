@@ -38,7 +38,8 @@ pub(crate) fn by_entries(
 pub(super) fn by_parameters(
     designed: &Solution,
     physical: &Physical,
-    (limits, family): (&RobustnessLimits, &ParameterFamily<'_>),
+    limits: &RobustnessLimits,
+    family: &ParameterFamily<'_>,
     slopes: &[[DMatrix<f64>; 4]],
 ) -> Result<ToleranceResult, crate::Error> {
     let request = (limits.cases, u64::from(limits.seed));

@@ -31,7 +31,7 @@ pub(crate) fn examine(
             warnings.extend(windup(file, own, [pair[0], pair[1]])?);
         }
     } else {
-        warnings.extend(missed(file, (own, references), &all)?);
+        warnings.extend(missed(file, own, references, &all)?);
     }
     Ok(warnings)
 }
@@ -91,7 +91,8 @@ fn windup(
 /// with all matrices interpolated.
 fn missed(
     file: &PlantFile<'_>,
-    (own, references): (&Scheduled, &References),
+    own: &Scheduled,
+    references: &References,
     all: &[DesignAt<'_>],
 ) -> Result<Option<PlaceError>, crate::Error> {
     let mut worst = (0.0, all[0].0);
