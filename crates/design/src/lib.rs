@@ -118,7 +118,7 @@ fn design_source(
     let description = description(&file, &designed.nominal);
     let detection = detection::detection(&file, &designed, family.as_ref())?;
     let section = detection.as_ref().map(|detection| &detection.section);
-    let fallback = fallback::fallback(&file, &designed.nominal)?;
+    let fallback = fallback::fallback(&file, &designed.nominal, &assess::fallback::slowest)?;
     let (reconfigurations, without) =
         reconfiguration::reconfigurations(&file, &designed.nominal, fallback)?;
     let controller = designed.file(&file, &description, section, &reconfigurations)?;

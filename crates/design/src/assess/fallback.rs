@@ -18,9 +18,38 @@ use crate::plant_file::PlantFile;
 use crate::plant_file::signals::Signal;
 use crate::report::fallback::{FallbackCase, FallbackReport};
 use crate::report::robustness::{Level, LoopPoint, Number};
-use crate::solve::fallback::{Fallback, Search, remaining};
+use crate::solve::fallback::{Cases, Fallback, SlowCase, remaining};
 use crate::solve::solution::Solution;
 use crate::solve::tracking::decay;
+
+/// Number of losses between 0 and the largest one at which the decay rate is tested.
+const LOSSES: u32 = 10;
+/// Decay rates below this part of that of the intact loop count as zero.
+const NEGLIGIBLE: f64 = 1e-6;
+
+/// The case with the slowest loop, if its decay rate is below the required one.
+pub(crate) fn slowest(cases: &Cases<'_>, fallback: &Fallback) -> Result<Option<SlowCase>, Error> {
+    let Cases { designed, request } = *cases;
+    let gains = fallback.gains(designed);
+    let intact = decay(&cases.whole(&designed.gains, None)?, designed.domain)?;
+    let required = fallback.region.decay.unwrap_or(0.0).max(NEGLIGIBLE * intact);
+    let mut slowest: Option<SlowCase> = None;
+    let mut test = |name: String, case: Option<(usize, f64)>| -> Result<(), Error> {
+        let rate = decay(&cases.whole(&gains, case)?, designed.domain)?;
+        if slowest.as_ref().is_none_or(|slowest| rate < slowest.rate) {
+            slowest = Some(SlowCase { name, rate });
+        }
+        Ok(())
+    };
+    test(cases.name(0), None)?;
+    for &actuator in &request.actuators {
+        for point in 1..=LOSSES {
+            let loss = request.loss * f64::from(point) / f64::from(LOSSES);
+            test(cases.described(actuator, loss), Some((actuator, loss)))?;
+        }
+    }
+    Ok(slowest.filter(|slowest| slowest.rate < required))
+}
 
 /// Returns the report on the fall-back of `designed`.
 pub(crate) fn report(
@@ -30,20 +59,20 @@ pub(crate) fn report(
     budget: &Budget,
 ) -> Result<Option<FallbackReport>, crate::Error> {
     let Some(request) = &file.fallback else { return Ok(None) };
-    let search = Search { designed, request };
+    let plants = Cases { designed, request };
     let gains = fallback.gains(designed);
-    let intact = search.whole(&designed.gains, None)?;
+    let intact = plants.whole(&designed.gains, None)?;
     let reference = noise(designed, &intact)?;
     let stuck_at =
         |actuator| file.reconfiguration.as_ref().map_or(0.0, |own| own.stuck_at(actuator));
-    let of = Examination { search, gains, reference };
-    let search = &of.search;
-    let cases = search.cases().into_iter().enumerate();
+    let of = Examination { cases: plants, gains, reference };
+    let plants = &of.cases;
+    let cases = plants.all().into_iter().enumerate();
     let cases = cases.map(|(at, case)| of.case(at, case.map(|own| (own, stuck_at(own)))));
     let cases = cases.collect::<Result<Vec<_>, _>>()?;
-    let loops = search.cases().into_iter().map(|case| {
+    let loops = plants.all().into_iter().map(|case| {
         let lossy = case.map(|actuator| (actuator, request.loss));
-        search.whole(&of.gains, lossy)
+        plants.whole(&of.gains, lossy)
     });
     let loops = loops.collect::<Result<Vec<_>, Error>>()?;
     let whole_left_out = budget.is_over();
@@ -57,7 +86,7 @@ pub(crate) fn report(
         intact_gain_norm: designed.gains.k_x.norm(),
         intact_decay: decay(&intact, designed.domain)?,
         feedback: reported(&fallback.certificate),
-        whole: common(&loops, designed.domain, budget, |at| search.name(at))?,
+        whole: common(&loops, designed.domain, budget, |at| plants.name(at))?,
         whole_left_out,
         cases,
     }))
@@ -65,7 +94,7 @@ pub(crate) fn report(
 
 /// The fall-back, case by case.
 struct Examination<'a> {
-    search: Search<'a>,
+    cases: Cases<'a>,
     gains: Gains,
     /// H2 norms of the intact loop.
     reference: Vec<f64>,
@@ -74,11 +103,11 @@ struct Examination<'a> {
 impl Examination<'_> {
     /// The case at a position; `failed`: the actuator, and the command at which it is stuck if it is gone.
     fn case(&self, at: usize, failed: Option<(usize, f64)>) -> Result<FallbackCase, crate::Error> {
-        let Search { designed, request } = self.search;
+        let Cases { designed, request } = self.cases;
         let Solution { linear, extended, domain, .. } = designed;
         let actuator = failed.map(|(actuator, _)| actuator);
-        let whole = self.search.whole(&self.gains, actuator.map(|own| (own, request.loss)))?;
-        let Vertex { a, b } = self.search.vertices().swap_remove(at);
+        let whole = self.cases.whole(&self.gains, actuator.map(|own| (own, request.loss)))?;
+        let Vertex { a, b } = self.cases.vertices().swap_remove(at);
         let fed_back = &a + &b * self.gains.k_x.columns(0, extended.states);
         let (points, delay_margin) = self.margins(actuator)?;
         let relative = |(signal, (own, intact)): (&Signal, (&f64, &f64))| {
@@ -91,7 +120,7 @@ impl Examination<'_> {
         let commands = commands(&linear.actuators, &rest.u, &stuck);
         let gone: Vec<_> = stuck.iter().map(|(actuator, _)| *actuator).collect();
         Ok(FallbackCase {
-            name: self.search.name(at),
+            name: self.cases.name(at),
             decay: decay(&whole, *domain)?,
             feedback_decay: decay(&fed_back, *domain)?,
             points,
@@ -106,7 +135,7 @@ impl Examination<'_> {
     /// Margins and delay margin in s while an actuator has failed. One that is gone is no input of the loop:
     /// the plant has no column of it, and the controller no command, although the observer goes on with it.
     fn margins(&self, failed: Option<usize>) -> Result<(Vec<LoopPoint>, f64), Error> {
-        let Search { designed, request } = self.search;
+        let Cases { designed, request } = self.cases;
         let LinearPlant { actuators, measurements, b, .. } = &designed.linear;
         let Physical { mut plant, mut controller, .. } =
             Physical::of_gains(designed, &designed.linear, &self.gains)?;
@@ -135,7 +164,7 @@ impl Examination<'_> {
         whole: &DMatrix<f64>,
         failed: Option<(usize, f64)>,
     ) -> Result<(Rest, Vec<(usize, f64)>), Error> {
-        let Search { designed, request } = self.search;
+        let Cases { designed, request } = self.cases;
         let Solution { linear, plant, extended, domain, .. } = designed;
         let (n, order) = (plant.a.nrows(), whole.nrows());
         let mut input = DVector::zeros(order);

@@ -31,11 +31,6 @@ const RATES: [f64; 3] = [0.5, 0.125, 0.03125];
 /// Decay rates of the state feedback, relative to the required one, that are tried in turn: the observer
 /// slows the loop.
 const FASTER: [f64; 3] = [1.0, 1.5, 2.25];
-/// Number of losses between 0 and the largest one at which the decay rate is tested.
-const LOSSES: u32 = 10;
-
-/// Decay rates below this part of that of the intact loop count as zero.
-const NEGLIGIBLE: f64 = 1e-6;
 
 /// The gains of the fall-back.
 #[derive(Clone)]
@@ -45,12 +40,13 @@ pub(crate) struct Fallback {
     /// The compensation, if the loop with it meets the requirement in all cases.
     pub(crate) k_f: Option<DMatrix<f64>>,
     /// The required region, and the proof for the state feedback.
-    region: Region,
+    pub(crate) region: Region,
     pub(crate) certificate: RegionCertificate,
     pub(crate) method: String,
 }
 
-/// Designs the fall-back that the plant file asks for.
+/// Designs the fall-back that the plant file asks for. `judge` decides which state feedback is accepted, and
+/// whether with the compensation of the estimated faults.
 ///
 /// # Errors
 ///
@@ -58,9 +54,10 @@ pub(crate) struct Fallback {
 pub(crate) fn fallback(
     file: &PlantFile<'_>,
     designed: &Solution,
+    judge: &Judge<'_>,
 ) -> Result<Option<Fallback>, crate::Error> {
     let Some(request) = &file.fallback else { return Ok(None) };
-    let search = Search { designed, request };
+    let search = Search { cases: Cases { designed, request }, judge };
     match search.run()? {
         Ok(found) => Ok(Some(found)),
         Err(reason) => {
@@ -70,10 +67,74 @@ pub(crate) fn fallback(
     }
 }
 
-/// The search for the gains.
-pub(crate) struct Search<'a> {
+/// The plant with all actuators, and with each actuator that may fail.
+pub(crate) struct Cases<'a> {
     pub(crate) designed: &'a Solution,
     pub(crate) request: &'a FallbackRequest,
+}
+
+impl Cases<'_> {
+    /// The cases: the intact plant, then each actuator with the largest loss.
+    pub(crate) fn all(&self) -> Vec<Option<usize>> {
+        std::iter::once(None).chain(self.request.actuators.iter().copied().map(Some)).collect()
+    }
+
+    pub(crate) fn name(&self, case: usize) -> String {
+        match self.all()[case] {
+            None => "all actuators".to_owned(),
+            Some(actuator) => self.described(actuator, self.request.loss),
+        }
+    }
+
+    pub(crate) fn described(&self, actuator: usize, loss: f64) -> String {
+        let name = &self.designed.linear.actuators[actuator].name;
+        if loss < 1.0 {
+            return format!("{name} with a loss of {}", rounded(loss));
+        }
+        format!("without {name}")
+    }
+
+    /// A and B of the states in each case, in the time domain of the design.
+    pub(crate) fn vertices(&self) -> Vec<Vertex> {
+        let Solution { plant, extended, .. } = self.designed;
+        let n = extended.states;
+        let (a, b) = (plant.a.view((0, 0), (n, n)), plant.b.rows(0, n).into_owned());
+        let vertex = |case: Option<usize>| Vertex {
+            a: a.into_owned(),
+            b: remaining(&b, case, self.request.loss),
+        };
+        self.all().into_iter().map(vertex).collect()
+    }
+
+    /// The loop of plant, observer and feedback, in which an actuator has lost a fraction of its effect.
+    pub(crate) fn whole(
+        &self,
+        gains: &Gains,
+        case: Option<(usize, f64)>,
+    ) -> Result<DMatrix<f64>, Error> {
+        let Solution { plant, domain, .. } = self.designed;
+        let mut effectiveness = vec![1.0; plant.b.ncols()];
+        if let Some((actuator, loss)) = case {
+            effectiveness[actuator] = 1.0 - loss;
+        }
+        closed_loop(plant, &controller(plant, gains, *domain)?, &effectiveness)
+    }
+}
+
+/// A case in which a fall-back is not good enough.
+pub(crate) struct SlowCase {
+    pub(crate) name: String,
+    /// Decay rate of the slowest eigenvalue, 1/s; negative if it grows.
+    pub(crate) rate: f64,
+}
+
+/// Judges the loops of plant, observer and fall-back: the slowest case, if it is below the requirement.
+pub(crate) type Judge<'a> = dyn Fn(&Cases<'_>, &Fallback) -> Result<Option<SlowCase>, Error> + 'a;
+
+/// The search for the gains.
+struct Search<'a> {
+    cases: Cases<'a>,
+    judge: &'a Judge<'a>,
 }
 
 impl Search<'_> {
@@ -81,13 +142,16 @@ impl Search<'_> {
         if let Some(reason) = self.obstacle()? {
             return Ok(Err(reason));
         }
-        let intact = decay(&self.whole(&self.designed.gains, None)?, self.designed.domain)?;
+        let intact = decay(
+            &self.cases.whole(&self.cases.designed.gains, None)?,
+            self.cases.designed.domain,
+        )?;
         if intact <= 0.0 {
             return Ok(Err("the loop of the intact plant is not stable".to_owned()));
         }
         let by_default =
             RATES.map(|part| Region { decay: Some(part * intact), ..Region::default() });
-        let regions = self.request.region.map_or(by_default.to_vec(), |region| vec![region]);
+        let regions = self.cases.request.region.map_or(by_default.to_vec(), |region| vec![region]);
         let mut best = Err(String::new());
         for region in regions {
             best = better(best, self.within(region)?);
@@ -100,18 +164,19 @@ impl Search<'_> {
 
     /// Why no gain can exist, or why none is searched.
     fn obstacle(&self) -> Result<Option<String>, Error> {
-        let linear = &self.designed.linear;
-        let order = self.designed.whole.plant.a.nrows() + self.designed.whole.controller.a.nrows();
+        let linear = &self.cases.designed.linear;
+        let order = self.cases.designed.whole.plant.a.nrows()
+            + self.cases.designed.whole.controller.a.nrows();
         if order > LARGEST_ORDER {
             return Ok(Some(format!(
                 "linear matrix inequalities are solved for up to {LARGEST_ORDER} states of plant and \
                  controller, found {order}"
             )));
         }
-        if self.request.loss < 1.0 {
+        if self.cases.request.loss < 1.0 {
             return Ok(None);
         }
-        for &actuator in &self.request.actuators {
+        for &actuator in &self.cases.request.actuators {
             let b = remaining(&linear.b, Some(actuator), 1.0);
             if let Some(mode) = unreachable_mode(linear, &b)? {
                 let name = &linear.actuators[actuator].name;
@@ -127,9 +192,9 @@ impl Search<'_> {
     /// The gains with which all cases meet `region`, with the compensation of the estimated faults if that is
     /// possible, or the reason why none were found.
     fn within(&self, region: Region) -> Result<Result<Fallback, String>, Error> {
-        let Solution { extended, gains, domain, .. } = self.designed;
+        let Solution { extended, gains, domain, .. } = self.cases.designed;
         let n = extended.states;
-        let vertices = self.vertices();
+        let vertices = self.cases.vertices();
         let closed = |gain: &DMatrix<f64>| -> Vec<_> {
             vertices.iter().map(|Vertex { a, b }| a + b * gain).collect()
         };
@@ -160,7 +225,7 @@ impl Search<'_> {
                 }
                 _ if best.is_some() => break,
                 Outcome::Infeasible { conflict } => {
-                    let names: Vec<_> = conflict.iter().map(|at| self.name(*at)).collect();
+                    let names: Vec<_> = conflict.iter().map(|at| self.cases.name(*at)).collect();
                     return Ok(Err(format!(
                         "no gain with one Lyapunov matrix keeps the eigenvalues of these cases in the \
                          region ({}): {}; expected fewer `actuators`, a smaller `loss`, or a larger region",
@@ -188,10 +253,10 @@ impl Search<'_> {
         certificate: RegionCertificate,
         method: String,
     ) -> Result<Result<Fallback, String>, Error> {
-        let gains = &self.designed.gains;
+        let gains = &self.cases.designed.gains;
         let k_x = gain.clone().resize_horizontally(gains.k_x.ncols(), 0.0);
         let mut found = Fallback { k_x, k_f: None, region, certificate, method };
-        if let Some((name, rate)) = self.too_slow(&found)? {
+        if let Some(SlowCase { name, rate }) = (self.judge)(&self.cases, &found)? {
             let slowest = if rate < 0.0 {
                 format!("the loop with {name} is unstable and grows with {} 1/s", rounded(-rate))
             } else {
@@ -204,79 +269,10 @@ impl Search<'_> {
             )));
         }
         found.k_f = Some(gains.k_f.clone());
-        if self.too_slow(&found)?.is_some() {
+        if (self.judge)(&self.cases, &found)?.is_some() {
             found.k_f = None;
         }
         Ok(Ok(found))
-    }
-
-    /// The case with the slowest loop, and its decay rate, if that is below the required one.
-    fn too_slow(&self, fallback: &Fallback) -> Result<Option<(String, f64)>, Error> {
-        let gains = fallback.gains(self.designed);
-        let intact = decay(&self.whole(&self.designed.gains, None)?, self.designed.domain)?;
-        let required = fallback.region.decay.unwrap_or(0.0).max(NEGLIGIBLE * intact);
-        let mut slowest: Option<(String, f64)> = None;
-        let mut test = |name: String, case: Option<(usize, f64)>| -> Result<(), Error> {
-            let rate = decay(&self.whole(&gains, case)?, self.designed.domain)?;
-            if slowest.as_ref().is_none_or(|(_, slowest)| rate < *slowest) {
-                slowest = Some((name, rate));
-            }
-            Ok(())
-        };
-        test(self.name(0), None)?;
-        for &actuator in &self.request.actuators {
-            for point in 1..=LOSSES {
-                let loss = self.request.loss * f64::from(point) / f64::from(LOSSES);
-                test(self.described(actuator, loss), Some((actuator, loss)))?;
-            }
-        }
-        Ok(slowest.filter(|(_, rate)| *rate < required))
-    }
-
-    /// The cases: the intact plant, then each actuator with the largest loss.
-    pub(crate) fn cases(&self) -> Vec<Option<usize>> {
-        std::iter::once(None).chain(self.request.actuators.iter().copied().map(Some)).collect()
-    }
-
-    pub(crate) fn name(&self, case: usize) -> String {
-        match self.cases()[case] {
-            None => "all actuators".to_owned(),
-            Some(actuator) => self.described(actuator, self.request.loss),
-        }
-    }
-
-    fn described(&self, actuator: usize, loss: f64) -> String {
-        let name = &self.designed.linear.actuators[actuator].name;
-        if loss < 1.0 {
-            return format!("{name} with a loss of {}", rounded(loss));
-        }
-        format!("without {name}")
-    }
-
-    /// A and B of the states in each case, in the time domain of the design.
-    pub(crate) fn vertices(&self) -> Vec<Vertex> {
-        let Solution { plant, extended, .. } = self.designed;
-        let n = extended.states;
-        let (a, b) = (plant.a.view((0, 0), (n, n)), plant.b.rows(0, n).into_owned());
-        let vertex = |case: Option<usize>| Vertex {
-            a: a.into_owned(),
-            b: remaining(&b, case, self.request.loss),
-        };
-        self.cases().into_iter().map(vertex).collect()
-    }
-
-    /// The loop of plant, observer and feedback, in which an actuator has lost a fraction of its effect.
-    pub(crate) fn whole(
-        &self,
-        gains: &Gains,
-        case: Option<(usize, f64)>,
-    ) -> Result<DMatrix<f64>, Error> {
-        let Solution { plant, domain, .. } = self.designed;
-        let mut effectiveness = vec![1.0; plant.b.ncols()];
-        if let Some((actuator, loss)) = case {
-            effectiveness[actuator] = 1.0 - loss;
-        }
-        closed_loop(plant, &controller(plant, gains, *domain)?, &effectiveness)
     }
 }
 
