@@ -10,7 +10,12 @@ pub(crate) trait MatrixEntry {
     fn matrix(&self) -> Result<DMatrix<f64>, PlaceError>;
 
     /// Reads a matrix and checks its shape; `meaning` names its rows and columns.
-    fn shaped(&self, shape: (usize, usize), meaning: &str) -> Result<DMatrix<f64>, PlaceError>;
+    fn shaped(
+        &self,
+        rows: usize,
+        columns: usize,
+        meaning: &str,
+    ) -> Result<DMatrix<f64>, PlaceError>;
 }
 
 impl MatrixEntry for Entry<'_> {
@@ -36,7 +41,8 @@ impl MatrixEntry for Entry<'_> {
 
     fn shaped(
         &self,
-        (rows, columns): (usize, usize),
+        rows: usize,
+        columns: usize,
         meaning: &str,
     ) -> Result<DMatrix<f64>, PlaceError> {
         let matrix = self.matrix()?;

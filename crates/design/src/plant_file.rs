@@ -377,18 +377,18 @@ fn stated(file: &Table<'_>) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
     let meaning = "the plant x' = A x + B u + F_a f_a, y = C x + D u; or `plant`, an FMU";
     let entry = file.require("A", meaning)?;
     let n = entry.matrix()?.nrows();
-    let a = entry.shaped((n, n), "states x states")?;
+    let a = entry.shaped(n, n, "states x states")?;
     let b = file.require("B", meaning)?;
-    let b = b.shaped((n, b.matrix()?.ncols()), "states x actuators")?;
+    let b = b.shaped(n, b.matrix()?.ncols(), "states x actuators")?;
     let c = file.require("C", meaning)?;
-    let c = c.shaped((c.matrix()?.nrows(), n), "measurements x states")?;
+    let c = c.shaped(c.matrix()?.nrows(), n, "measurements x states")?;
     let d = match file.get("D") {
-        Some(entry) => entry.shaped((c.nrows(), b.ncols()), "measurements x actuators")?,
+        Some(entry) => entry.shaped(c.nrows(), b.ncols(), "measurements x actuators")?,
         None => DMatrix::zeros(c.nrows(), b.ncols()),
     };
     let f_a = file.get("F_a").map(|entry| {
         let columns = entry.matrix()?.ncols();
-        entry.shaped((n, columns), "states x faults")
+        entry.shaped(n, columns, "states x faults")
     });
     let states = counted(file, "states", "x", n, "states, the rows of A")?;
     let actuators = counted(file, "actuators", "u", b.ncols(), "actuators, the columns of B")?;

@@ -78,11 +78,12 @@ pub(crate) fn detection(
     let errors =
         request.model_error.as_ref().map(|own| ModelErrors::new(file, own, designed, family));
     let errors = errors.transpose()?;
-    let parts = parts(file, request, &problem, errors.as_ref())?;
+    let planner = Planner { file, request, problem: &problem, errors: errors.as_ref() };
+    let parts = planner.parts()?;
     let mut warnings = Vec::new();
-    let mut report = report(request, &problem, &parts, &mut warnings).map_err(refuse)?;
     let cases = errors.as_ref().and_then(ModelErrors::random_cases);
-    report.parameter_cases = cases.map(|cases| ParameterCases::new(cases, file.robustness.seed));
+    let cases = cases.map(|cases| ParameterCases::new(cases, file.robustness.seed));
+    let report = report(request, &problem, &parts, cases, &mut warnings).map_err(refuse)?;
     let section = file::section(&problem, &parts, report.from, &designed.nominal);
     Ok(Some(Detection { section, report, warnings }))
 }
@@ -106,93 +107,96 @@ fn check_plants(file: &PlantFile<'_>, request: &DetectionRequest) -> Result<(), 
 }
 
 /// Plans the filters and their tests.
-fn parts(
-    file: &PlantFile<'_>,
-    request: &DetectionRequest,
-    problem: &Problem,
-    errors: Option<&ModelErrors<'_>>,
-) -> Result<Vec<Part>, crate::Error> {
-    let q = problem.faults.len();
-    let base = problem.base(file)?;
-    let shifts = problem.shifts(file, &base)?;
-    let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
-    let plan = |decoupling: &Decoupling, faults: &[usize], count: usize| {
-        plan(file, request, (problem, errors), decoupling, (faults, count))
-    };
-    if request.isolation {
-        let part = |fault: usize| {
-            let others: Vec<usize> = (1..q).map(|k| (fault + k) % q).collect();
-            let decoupling = problem.isolating(&base, fault, &others, shifts[fault]);
-            let decoupling = decoupling.map_err(refuse)?;
-            let test = plan(&decoupling, &[fault], q)?;
-            let reacts = reacting(problem, &decoupling, &test, fault).map_err(refuse)?;
-            Ok(Part { decoupling, tests: vec![PlannedTest { reacts, ..test }] })
-        };
-        return (0..q).map(part).collect();
-    }
-    let groups: Vec<Vec<usize>> = match request.method {
-        Method::Cusum => (0..q).map(|fault| vec![fault]).collect(),
-        Method::ChiSquare { .. } => vec![(0..q).collect()],
-    };
-    let count = groups.len();
-    let tests = groups.iter().map(|group| plan(&base, group, count));
-    let tests = tests.collect::<Result<_, crate::Error>>()?;
-    Ok(vec![Part { decoupling: base, tests }])
+struct Planner<'a> {
+    file: &'a PlantFile<'a>,
+    request: &'a DetectionRequest,
+    problem: &'a Problem,
+    errors: Option<&'a ModelErrors<'a>>,
 }
 
-/// Plans the test for some faults, one of `count` tests.
-fn plan(
-    file: &PlantFile<'_>,
-    request: &DetectionRequest,
-    (problem, errors): (&Problem, Option<&ModelErrors<'_>>),
-    decoupling: &Decoupling,
-    (faults, count): (&[usize], usize),
-) -> Result<PlannedTest, crate::Error> {
-    let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
-    let bias = |rows: &DMatrix<f64>| match errors {
-        Some(errors) => errors.largest_mean(problem, decoupling, rows),
-        None => Ok(LargestMean { mean: 0.0, interior_excess: None }),
-    };
-    #[expect(clippy::cast_precision_loss, reason = "a number of faults")]
-    let samples = request.false_alarm_interval * count as f64 / problem.period;
-    let name = match faults {
-        [fault] => problem.names[problem.fault_at(*fault)].clone(),
-        _ => "all".to_owned(),
-    };
-    let reacts = vec![true; problem.faults.len()];
-    let rows = decoupling.filter.generator.c.nrows();
-    match request.method {
-        Method::Cusum => {
-            let mean = problem.steady_mean(decoupling, problem.fault_at(faults[0]));
-            let mean = mean.map_err(refuse)?;
-            let drift = (0.5 * mean.norm()).min(LARGEST_DRIFT);
-            let mut test = Cusum::with_false_alarms(drift, samples).map_err(refuse)?;
-            let direction = mean.normalize().transpose();
-            let rows = DMatrix::from_row_slice(1, direction.len(), direction.as_slice());
-            let LargestMean { mean: bias, interior_excess } = bias(&rows)?;
-            // A mean of up to the bias adds to no sum, so that there are no more false alarms.
-            test.drift += bias;
-            let kind = TestKind::Cusum(test);
-            Ok(PlannedTest { name, rows, kind, bias, interior_excess, reacts })
-        }
-        Method::ChiSquare { window } => {
-            let means = faults
-                .iter()
-                .map(|&fault| problem.means(decoupling, problem.fault_at(fault)))
-                .collect::<Result<Vec<_>, _>>()
-                .map_err(refuse)?;
-            let count = u32::try_from(rows).unwrap_or(u32::MAX);
-            let rows = DMatrix::identity(rows, rows);
-            let LargestMean { mean: bias, interior_excess } = bias(&rows)?;
-            let test = match window {
-                Some(window) => {
-                    let samples_of_window = prediction::whole(window / problem.period).max(1);
-                    WindowTest::with_false_alarms((count, samples_of_window), samples, bias)
-                }
-                None => prediction::best_window(count, samples, bias, &means),
+impl Planner<'_> {
+    /// Plans the filters and their tests.
+    fn parts(&self) -> Result<Vec<Part>, crate::Error> {
+        let Self { file, request, problem, .. } = *self;
+        let q = problem.faults.len();
+        let base = problem.base(file)?;
+        let shifts = problem.shifts(file, &base)?;
+        let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
+        if request.isolation {
+            let part = |fault: usize| {
+                let others: Vec<usize> = (1..q).map(|k| (fault + k) % q).collect();
+                let decoupling = problem.isolating(&base, fault, &others, shifts[fault]);
+                let decoupling = decoupling.map_err(refuse)?;
+                let test = self.plan(&decoupling, &[fault], q)?;
+                let reacts = reacting(problem, &decoupling, &test, fault).map_err(refuse)?;
+                Ok(Part { decoupling, tests: vec![PlannedTest { reacts, ..test }] })
             };
-            let kind = TestKind::Window(test.map_err(refuse)?);
-            Ok(PlannedTest { name, rows, kind, bias, interior_excess, reacts })
+            return (0..q).map(part).collect();
+        }
+        let groups: Vec<Vec<usize>> = match request.method {
+            Method::Cusum => (0..q).map(|fault| vec![fault]).collect(),
+            Method::ChiSquare { .. } => vec![(0..q).collect()],
+        };
+        let count = groups.len();
+        let tests = groups.iter().map(|group| self.plan(&base, group, count));
+        let tests = tests.collect::<Result<_, crate::Error>>()?;
+        Ok(vec![Part { decoupling: base, tests }])
+    }
+
+    /// Plans the test for some faults, one of `count` tests.
+    fn plan(
+        &self,
+        decoupling: &Decoupling,
+        faults: &[usize],
+        count: usize,
+    ) -> Result<PlannedTest, crate::Error> {
+        let Self { file, request, problem, errors } = *self;
+        let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
+        let bias = |rows: &DMatrix<f64>| match errors {
+            Some(errors) => errors.largest_mean(problem, decoupling, rows),
+            None => Ok(LargestMean { mean: 0.0, interior_excess: None }),
+        };
+        #[expect(clippy::cast_precision_loss, reason = "a number of faults")]
+        let samples = request.false_alarm_interval * count as f64 / problem.period;
+        let name = match faults {
+            [fault] => problem.names[problem.fault_at(*fault)].clone(),
+            _ => "all".to_owned(),
+        };
+        let reacts = vec![true; problem.faults.len()];
+        let rows = decoupling.filter.generator.c.nrows();
+        match request.method {
+            Method::Cusum => {
+                let mean = problem.steady_mean(decoupling, problem.fault_at(faults[0]));
+                let mean = mean.map_err(refuse)?;
+                let drift = (0.5 * mean.norm()).min(LARGEST_DRIFT);
+                let mut test = Cusum::with_false_alarms(drift, samples).map_err(refuse)?;
+                let direction = mean.normalize().transpose();
+                let rows = DMatrix::from_row_slice(1, direction.len(), direction.as_slice());
+                let LargestMean { mean: bias, interior_excess } = bias(&rows)?;
+                // A mean of up to the bias adds to no sum, so that there are no more false alarms.
+                test.drift += bias;
+                let kind = TestKind::Cusum(test);
+                Ok(PlannedTest { name, rows, kind, bias, interior_excess, reacts })
+            }
+            Method::ChiSquare { window } => {
+                let means = faults
+                    .iter()
+                    .map(|&fault| problem.means(decoupling, problem.fault_at(fault)))
+                    .collect::<Result<Vec<_>, _>>()
+                    .map_err(refuse)?;
+                let count = u32::try_from(rows).unwrap_or(u32::MAX);
+                let rows = DMatrix::identity(rows, rows);
+                let LargestMean { mean: bias, interior_excess } = bias(&rows)?;
+                let test = match window {
+                    Some(window) => {
+                        let samples_of_window = prediction::whole(window / problem.period).max(1);
+                        WindowTest::with_false_alarms((count, samples_of_window), samples, bias)
+                    }
+                    None => prediction::best_window(count, samples, bias, &means),
+                };
+                let kind = TestKind::Window(test.map_err(refuse)?);
+                Ok(PlannedTest { name, rows, kind, bias, interior_excess, reacts })
+            }
         }
     }
 }
@@ -230,6 +234,7 @@ fn report(
     request: &DetectionRequest,
     problem: &Problem,
     parts: &[Part],
+    parameter_cases: Option<ParameterCases>,
     warnings: &mut Vec<String>,
 ) -> Result<Report, control::Error> {
     let q = problem.faults.len();
@@ -275,7 +280,7 @@ fn report(
         faults,
         reacts,
         confused,
-        parameter_cases: None,
+        parameter_cases,
     })
 }
 

@@ -76,6 +76,14 @@ fn part(fault: &Fault) -> Number {
     Number { name: fault.name.clone(), unit: fault.unit.clone(), value: size(fault) }
 }
 
+/// A signal that a response shows.
+struct ShownSignal {
+    name: String,
+    unit: Option<String>,
+    /// Its position among the outputs of the system.
+    row: usize,
+}
+
 /// The loop from the faults to all that the responses show.
 struct ShownLoop<'a> {
     designed: &'a Solution,
@@ -151,13 +159,15 @@ impl<'a> ShownLoop<'a> {
                 Some(part) if is_state => Some(trace.output[(between(part), k)]),
                 Some(_) => None,
             });
-            found.push(self.curve(name.clone(), unit.clone(), (trace, row), factor, &times));
+            let shown = ShownSignal { name: name.clone(), unit: unit.clone(), row };
+            found.push(self.curve(shown, trace, factor, &times));
         }
         for (at, actuator) in linear.actuators.iter().enumerate() {
             let row = first_command + at;
             let times = self.times(trace, |k, _| Some(trace.output[(row, k)]));
             let name = format!("command {}", actuator.name);
-            found.push(self.curve(name, actuator.unit.clone(), (trace, row), factor, &times));
+            let shown = ShownSignal { name, unit: actuator.unit.clone(), row };
+            found.push(self.curve(shown, trace, factor, &times));
         }
         found
     }
@@ -192,12 +202,12 @@ impl<'a> ShownLoop<'a> {
 
     fn curve(
         &self,
-        name: String,
-        unit: Option<String>,
-        (trace, row): (&TimeResponse, usize),
+        shown: ShownSignal,
+        trace: &TimeResponse,
         factor: f64,
         points: &[(f64, f64)],
     ) -> Curve {
+        let ShownSignal { name, unit, row } = shown;
         let at_points = trace.transient(row, SETTLED);
         let (peak, peak_time, settling_time) = match self.designed.domain {
             Domain::Continuous => (at_points.peak, at_points.peak_time, at_points.settling_time),

@@ -229,7 +229,8 @@ fn variant(
             ];
             for (key, matrix) in matrices {
                 if let (Some(entry), Some(matrix)) = (table.get(key), matrix) {
-                    *matrix = entry.shaped(matrix.shape(), "as that of the file")?;
+                    let (rows, columns) = matrix.shape();
+                    *matrix = entry.shaped(rows, columns, "as that of the file")?;
                 }
             }
             let (m, p) = (b.ncols(), c.nrows());

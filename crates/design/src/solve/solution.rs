@@ -7,20 +7,21 @@ use crate::plant::plausibility::{check_faults, check_limits};
 use crate::plant_file::estimation::Law;
 use crate::plant_file::requirements::{Request, Requirement};
 use crate::plant_file::{FAULTS, PlantFile};
-use crate::solve::family::{self, Family, common_feedback};
+use crate::solve::family::{self, Family, Member, common_feedback};
 use crate::solve::gain::{FeedbackProblem, GainResult, Refusal, unique};
 use crate::solve::gains::{feedback, observer};
 use crate::solve::law::{DesignedLaw, LawProblem};
 use crate::solve::norm_gains::ObserverProblem;
 use crate::solve::pairing::PairProblem;
 use crate::solve::tracking::{
-    DesignLoop, Tracking, check_references, decay, feedback_pair, integral_action,
+    DesignLoop, Tracking, TrackingProblem, check_references, decay, feedback_pair, integral_action,
 };
 use control::aso::{Estimator, FaultyPlant, Gains};
 use control::controller::closed_loop;
 use control::detectability::{Detectability, detectability};
 use control::distance::{Distance, from_uncontrollable};
 use control::faults::ExtendedPlant;
+use control::lmi::RegionCertificate;
 use control::rank::{Mode, Rank, controllability, uncontrollable_modes};
 use control::sampled;
 use control::stability::{instability, is_clearly_stable};
@@ -99,16 +100,16 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let own = (plant.a.view((0, 0), (states, states)).into_owned(), plant.b.rows(0, states).into());
     let pair = feedback_pair(references, [&own.0, &own.1, c], domain)?;
     let members = family::members(file, &linear, &mut warnings)?;
-    let common = match &file.feedback.requirement {
-        Requirement::Region(region) if !members.is_empty() => {
-            let found = common_feedback(&linear, &members, references, *region, domain);
-            Some(found.map_err(|refusal| feedback_refused(file, &linear, domain, refusal))?)
-        }
-        _ => None,
+    let (common, certificate) = feedback_of_family(file, &linear, &members, domain)?.unzip();
+    let problem = GainProblem {
+        file,
+        linear: &linear,
+        extended: &extended,
+        plant: &plant,
+        pair: &pair,
+        domain,
     };
-    let (common, certificate) = common.unzip();
-    let problem = (&plant, &pair, common);
-    let (feedback, observer) = compute_gains((file, &linear), &extended, problem, domain)?;
+    let (feedback, observer) = problem.solve(common)?;
     let n = plant.a.nrows();
     let k_f = sampled::compensation_gain(&extended, domain)?;
     let with = |feedback: &DMatrix<f64>, observer: &DMatrix<f64>| Gains {
@@ -142,14 +143,18 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let whole = DesignLoop::of(&linear, &plant, &gains, filter.as_deref(), domain)?;
     let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
     let controlled = &pair.0 + &pair.1 * &feedback.gain;
-    let tracking = Tracking::of(file, (&linear, (&own.0, &own.1)), (&gains, &controlled), domain)?;
+    let problem = TrackingProblem {
+        file,
+        linear: &linear,
+        pair: (&own.0, &own.1),
+        gains: &gains,
+        feedback: &controlled,
+        domain,
+    };
+    let tracking = problem.solve()?;
     let solution = Solution {
         cancellation_residual: cancellation_residual(&extended)?,
-        instability_before: if file.t_on > 0.0 && !file.monitor {
-            Some(instability(&gains.state_error_dynamics(&plant), domain)?)
-        } else {
-            None
-        },
+        instability_before: instability_before(file, &gains, &plant, domain)?,
         instability: instability(&dynamics, domain)?,
         monitor: file.monitor,
         filter,
@@ -171,6 +176,36 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     };
     let family = (!members.is_empty()).then_some(Family { members, feedback: certificate });
     Ok(Solved { solution, family, warnings })
+}
+
+/// Computes one feedback for the plant and the members of its family, if a region is required of them.
+fn feedback_of_family(
+    file: &PlantFile<'_>,
+    linear: &LinearPlant,
+    members: &[Member],
+    domain: Domain,
+) -> Result<Option<(GainResult, RegionCertificate)>, PlaceError> {
+    match &file.feedback.requirement {
+        Requirement::Region(region) if !members.is_empty() => {
+            let references = file.references.as_ref();
+            let found = common_feedback(linear, members, references, *region, domain);
+            found.map(Some).map_err(|refusal| feedback_refused(file, linear, domain, refusal))
+        }
+        _ => Ok(None),
+    }
+}
+
+/// Returns the instability of the observer error before `t_on`, if the faults are not estimated then.
+fn instability_before(
+    file: &PlantFile<'_>,
+    gains: &Gains,
+    plant: &FaultyPlant,
+    domain: Domain,
+) -> Result<Option<f64>, Error> {
+    if file.t_on <= 0.0 || file.monitor {
+        return Ok(None);
+    }
+    instability(&gains.state_error_dynamics(plant), domain).map(Some)
 }
 
 /// An error at the law of the file, with the laws that exist.
@@ -218,44 +253,56 @@ fn in_domain(
     Ok((domain, plant))
 }
 
-/// Computes the gains of feedback and observer; `a` and `b` are the pair of the feedback.
-fn compute_gains(
-    (file, linear): (&PlantFile<'_>, &LinearPlant),
-    extended: &ExtendedPlant,
-    (plant, (a, b), common): (&FaultyPlant, &(DMatrix<f64>, DMatrix<f64>), Option<GainResult>),
+/// What the gains of feedback and observer are computed for.
+struct GainProblem<'a> {
+    file: &'a PlantFile<'a>,
+    linear: &'a LinearPlant,
+    extended: &'a ExtendedPlant,
+    /// The model in the observer.
+    plant: &'a FaultyPlant,
+    /// A and B of the feedback.
+    pair: &'a (DMatrix<f64>, DMatrix<f64>),
     domain: Domain,
-) -> Result<(GainResult, GainResult), PlaceError> {
-    let n = extended.states;
-    let order = a.nrows();
-    let problem = FeedbackProblem {
-        a,
-        b,
-        c: &linear.c.clone().resize_horizontally(order, 0.0),
-        f_a: &plant.f_a.rows(0, n).into_owned().resize_vertically(order, 0.0),
-    };
-    let feedback = || match common {
-        Some(common) => Ok(common),
-        None => feedback(&file.feedback.requirement, &problem, domain),
-    };
-    let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-    let filter = sampled::filter(extended, domain);
-    let observer_problem = ObserverProblem {
-        a_0: &a_0,
-        c_0: &c_0,
-        channels: &extended.channels,
-        faults: plant.f_a.ncols(),
-        filter: filter.as_deref(),
-        estimator: estimator(file),
-    };
-    let (feedback, observer) =
-        rayon::join(feedback, || observer(&file.observer.requirement, &observer_problem, domain));
-    let feedback = feedback.map_err(|refusal| feedback_refused(file, linear, domain, refusal))?;
-    let observer = observer.map_err(|refusal| {
-        let order = (a_0.nrows(), "states, filters, faults and rates of ramps");
-        let names = observer_states(linear, extended);
-        refused((file, domain), &file.observer, refusal, order, |at| names[at].clone())
-    })?;
-    Ok((feedback, observer))
+}
+
+impl GainProblem<'_> {
+    /// Computes the gains of feedback and observer. `common`: the feedback of a family.
+    fn solve(&self, common: Option<GainResult>) -> Result<(GainResult, GainResult), PlaceError> {
+        let Self { file, linear, extended, plant, pair: (a, b), domain } = *self;
+        let n = extended.states;
+        let order = a.nrows();
+        let problem = FeedbackProblem {
+            a,
+            b,
+            c: &linear.c.clone().resize_horizontally(order, 0.0),
+            f_a: &plant.f_a.rows(0, n).into_owned().resize_vertically(order, 0.0),
+        };
+        let feedback = || match common {
+            Some(common) => Ok(common),
+            None => feedback(&file.feedback.requirement, &problem, domain),
+        };
+        let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
+        let filter = sampled::filter(extended, domain);
+        let observer_problem = ObserverProblem {
+            a_0: &a_0,
+            c_0: &c_0,
+            channels: &extended.channels,
+            faults: plant.f_a.ncols(),
+            filter: filter.as_deref(),
+            estimator: estimator(file),
+        };
+        let (feedback, observer) = rayon::join(feedback, || {
+            observer(&file.observer.requirement, &observer_problem, domain)
+        });
+        let feedback =
+            feedback.map_err(|refusal| feedback_refused(file, linear, domain, refusal))?;
+        let observer = observer.map_err(|refusal| {
+            let names = observer_states(linear, extended);
+            let states = States { names, meaning: "states, filters, faults and rates of ramps" };
+            refused(file, domain, &file.observer, refusal, &states)
+        })?;
+        Ok((feedback, observer))
+    }
 }
 
 fn feedback_refused(
@@ -267,7 +314,7 @@ fn feedback_refused(
     let names = feedback_states(file, linear);
     let more = names.len() > linear.states.len();
     let meaning = if more { "states and integrals of references" } else { "states" };
-    refused((file, domain), &file.feedback, refusal, (names.len(), meaning), |at| names[at].clone())
+    refused(file, domain, &file.feedback, refusal, &States { names, meaning })
 }
 
 /// Returns the part of the faults' effect on the plant's states that the compensation leaves,
@@ -432,18 +479,26 @@ fn observer_states(linear: &LinearPlant, extended: &ExtendedPlant) -> Vec<String
     plain.chain(fault_names(linear, extended)).collect()
 }
 
-/// Converts the failure of a gain to an error at the requirement in the file; `name` returns the
-/// name of a state.
+/// The states that a gain is for.
+struct States {
+    names: Vec<String>,
+    /// What they are, in words.
+    meaning: &'static str,
+}
+
+/// Converts the failure of a gain to an error at the requirement in the file.
 fn refused(
-    (file, domain): (&PlantFile<'_>, Domain),
+    file: &PlantFile<'_>,
+    domain: Domain,
     request: &Request,
     refusal: Refusal,
-    (order, meaning): (usize, &str),
-    name: impl Fn(usize) -> String,
+    states: &States,
 ) -> PlaceError {
+    let (order, meaning) = (states.names.len(), states.meaning);
+    let name = |at: usize| states.names[at].clone();
     let message = match refusal {
         Refusal::Conflict(message) => message,
-        Refusal::Fixed(mode) => fixed(&request.requirement, &mode, domain, &name),
+        Refusal::Fixed(mode) => fixed(&request.requirement, &mode, domain, name),
         Refusal::Control(Error::PoleCount { .. }) => {
             let found = request.requirement.eigenvalues().len();
             format!("expected {order} eigenvalues, one for each of the {meaning}, found {found}")

@@ -159,14 +159,22 @@ pub(crate) fn integral_action(
     })
 }
 
-impl Tracking {
-    /// Returns the references of `file` and how they act; `feedback`: A + B K of [`feedback_pair`].
-    pub(crate) fn of(
-        file: &PlantFile<'_>,
-        (linear, pair): (&LinearPlant, (&DMatrix<f64>, &DMatrix<f64>)),
-        (gains, feedback): (&Gains, &DMatrix<f64>),
-        domain: Domain,
-    ) -> Result<Option<Self>, PlaceError> {
+/// What the action of the references is computed for.
+pub(crate) struct TrackingProblem<'a> {
+    pub(crate) file: &'a PlantFile<'a>,
+    pub(crate) linear: &'a LinearPlant,
+    /// A and B of the plant, in the domain of the design.
+    pub(crate) pair: (&'a DMatrix<f64>, &'a DMatrix<f64>),
+    pub(crate) gains: &'a Gains,
+    /// A + B K of [`feedback_pair`].
+    pub(crate) feedback: &'a DMatrix<f64>,
+    pub(crate) domain: Domain,
+}
+
+impl TrackingProblem<'_> {
+    /// Returns the references of the file and how they act; None if it has none.
+    pub(crate) fn solve(&self) -> Result<Option<Tracking>, PlaceError> {
+        let Self { file, linear, pair, gains, feedback, domain } = *self;
         let Some(references) = &file.references else {
             return Ok(None);
         };
@@ -194,7 +202,7 @@ impl Tracking {
             let n_r = feedforward(pair, &output, &k_x, domain).map_err(refuse)?;
             TrackingAction::Feedforward(n_r)
         };
-        Ok(Some(Self {
+        Ok(Some(Tracking {
             signals: references.completed(&linear.measurements),
             steps: references.steps.clone(),
             h: references.h.clone(),
