@@ -223,7 +223,7 @@ mod tests {
              measurements = [{{ name = \"y\" }}]\nfaults = [{{ name = \"f\" }}]\n\
              A = [[0.9]]\nB = [[1.0]]\nC = [[1.0]]\nF_a = [[1.0]]\nA_f = [[0.0]]\n\
              K_x = [[0.0]]\nK_f = [[-1.0]]\nL_x = [[0.0]]\nL_f = [[1.0]]\n\
-             sliding_mode = {{ rho = [1.0], delta = [{delta:?}] }}\nexperiment = {{ stop_time = 1.0 }}\n"
+             sliding_mode = {{ rho = [1.0], delta = [{delta:?}] }}\nexperiment = {{ stop_time = 2.0 }}\n"
         );
         let file = aso_controller::Design::parse(&text, "design.toml".to_owned()).unwrap();
         let controller = Controller::of(file).unwrap();
