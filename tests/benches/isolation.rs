@@ -16,8 +16,8 @@ mod linux {
     use fmu_import::isolate::{self, Isolated, Options};
     use master::Transformation;
     use master::{
-        Advance, Algorithm, Background as _, CallError, Extrapolation, Method, Simulation, Slave,
-        StepResult, System,
+        Algorithm, Background as _, CallError, CommunicationStep, Extrapolation, Method,
+        Simulation, Slave, StepRequest, StepResult, System,
     };
     use ssp::{Link, Terminal};
     use tests::{dist, troubles};
@@ -49,10 +49,11 @@ mod linux {
             Self { inputs, outputs, input, output }
         }
 
-        fn step(&mut self, count: u32) -> Advance<'_> {
-            let inputs = (&self.inputs[..], &self.input[..]);
-            let outputs = (&self.outputs[..], &mut self.output[..]);
-            Advance::held(inputs, (f64::from(count) * SIZE, SIZE), true, outputs)
+        fn step(&mut self, count: u32) -> StepRequest<'_> {
+            let time = f64::from(count) * SIZE;
+            let step = CommunicationStep { time, size: SIZE, never_back: true };
+            let Self { inputs, outputs, input, output } = self;
+            StepRequest::held(inputs, input, step, outputs, output)
         }
     }
 
@@ -123,8 +124,8 @@ mod linux {
         fn do_step(&mut self, time: f64, size: f64, back: bool) -> Result<StepResult, CallError> {
             self.0.do_step(time, size, back)
         }
-        fn advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
-            self.0.advance(step)
+        fn advance(&mut self, request: &mut StepRequest<'_>) -> Result<StepResult, CallError> {
+            self.0.advance(request)
         }
     }
 

@@ -9,7 +9,7 @@ use fmu_description::{Experiment, ModelDescription};
 
 use crate::fmu::{Fmu, OnlyInstance};
 use crate::{v1, v2, v3};
-use slave::{CallError, CallSink, EventInfo, Events, Slave, StepResult, absent};
+use slave::{CallError, CallSink, CommunicationStep, EventInfo, Events, Slave, StepResult, absent};
 
 /// An instance of an FMU in this process, for either interface.
 pub struct Instance {
@@ -275,19 +275,17 @@ impl Slave for Instance {
         &mut self,
         inputs: &[u32],
         values: &[f64],
-        (time, size): (f64, f64),
-        never_back: bool,
+        step: CommunicationStep,
         outputs: &[u32],
         results: &mut [f64],
     ) -> Result<StepResult, CallError> {
         if let Inner::V2(own) = &mut self.inner {
-            let span = (time, size);
-            return own.component.pass(inputs, values, span, never_back, outputs, results);
+            return own.component.pass(inputs, values, step, outputs, results);
         }
         if !inputs.is_empty() {
             self.set_real(inputs, values)?;
         }
-        let done = self.do_step(time, size, never_back)?;
+        let done = self.do_step(step.time, step.size, step.never_back)?;
         if !outputs.is_empty() {
             self.get_real(outputs, results)?;
         }

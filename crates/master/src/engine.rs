@@ -16,11 +16,11 @@ use crate::error::SystemError;
 use crate::error::call;
 use crate::exchange::{Exchange, Values};
 use crate::grid::{Grid, size_between};
-use crate::order::Order;
 use crate::system::{Port, System};
 use groups::Groups;
+pub(crate) use groups::Schedule;
 pub(crate) use instants::{InstantEnd, Instants, Parts};
-use slave::{CallError, Failure, Slave, StepResult, Value};
+use slave::{CallError, CommunicationStep, Failure, Slave, StepResult, Value};
 use threads::{Threads, run};
 
 /// Largest number of partial steps in which a slave may complete a step.
@@ -133,13 +133,13 @@ impl Engine {
         mut system: System,
         exchange: Exchange,
         drives: Drives,
-        grid: Grid,
         instants: Instants,
+        grid: Grid,
+        schedule: Schedule,
         algorithm: &Algorithm,
-        (order, multiples): (&Order, Vec<u32>),
     ) -> Result<Self, SystemError> {
+        let Schedule { groups, multiples } = schedule;
         let rigid = Rigid::of(&system, &multiples);
-        let groups = Groups::new(&system, algorithm.method, order);
         let background = system.slaves.iter_mut().any(|(_, slave)| slave.in_background().is_some());
         let threads = Threads::new(algorithm.jobs, groups.len())?;
         let mut engine = Self {
@@ -299,11 +299,11 @@ impl Engine {
     #[inline]
     fn pass(&mut self, time: f64, size: f64) -> Result<Swept, SystemError> {
         let mut swept = Swept::default();
-        let never_back = !self.repeats;
-        let parts = self.exchange.reals.pass(&mut self.system, (time, size), never_back)?;
+        let step = CommunicationStep { time, size, never_back: !self.repeats };
+        let parts = self.exchange.reals.pass(&mut self.system, step)?;
         if !parts.is_empty() {
             for (slave, done) in std::mem::take(parts) {
-                self.finish_in_parts(slave, (time, size), done, &mut swept)?;
+                self.finish_in_parts(slave, time, size, done, &mut swept)?;
             }
         }
         if !self.exchange.reals.is_finite() {
@@ -351,6 +351,11 @@ impl Engine {
         }
     }
 
+    /// Returns the step of `slave` from `time`; its size is 0 if it makes none.
+    fn step_of(&self, slave: usize, time: f64) -> CommunicationStep {
+        CommunicationStep { time, size: self.sizes[slave], never_back: !self.repeats }
+    }
+
     /// Steps the slaves at `members` of the sequence. Background slaves start before the first
     /// result is waited for; results are evaluated in the order of the slaves. Returns the first
     /// error in this order; does not wait for steps started after it.
@@ -360,21 +365,20 @@ impl Engine {
         time: f64,
         swept: &mut Swept,
     ) -> Result<(), SystemError> {
-        let never_back = !self.repeats;
         let failed = if self.background { self.start_members(members.clone(), time) } else { None };
         for position in members {
             if failed.as_ref().is_some_and(|(failed, _)| *failed == position) {
                 break;
             }
             let slave = self.groups.sequence[position];
-            let span = (time, self.sizes[slave]);
-            if span.1 == 0.0 {
+            let step = self.step_of(slave, time);
+            if step.size == 0.0 {
                 continue;
             }
             let done = if self.background {
-                self.exchange.finish(&mut self.system, slave, span, never_back)?
+                self.exchange.finish(&mut self.system, slave, step)?
             } else {
-                self.exchange.advance(&mut self.system, slave, span, never_back)?
+                self.exchange.advance(&mut self.system, slave, step)?
             };
             self.finish(slave, time, done, swept)?;
         }
@@ -386,9 +390,9 @@ impl Engine {
     fn start_members(&mut self, members: Range<usize>, time: f64) -> Option<(usize, SystemError)> {
         for position in members {
             let slave = self.groups.sequence[position];
-            let span = (time, self.sizes[slave]);
-            if span.1 > 0.0 {
-                let started = self.exchange.start(&mut self.system, slave, span, !self.repeats);
+            let step = self.step_of(slave, time);
+            if step.size > 0.0 {
+                let started = self.exchange.start(&mut self.system, slave, step);
                 if let Err(error) = started {
                     return Some((position, error));
                 }
@@ -426,14 +430,13 @@ impl Engine {
         time: f64,
         swept: &mut Swept,
     ) -> Result<(), SystemError> {
-        let (sizes, threads) = (&self.sizes, &self.threads);
+        let (sizes, threads, never_back) = (&self.sizes, &self.threads, !self.repeats);
         let due = self.groups.sequence[members].iter().copied();
         let due: Vec<usize> = due.filter(|&slave| sizes[slave] > 0.0).collect();
         let done = self.exchange.advance_all(
             &mut self.system,
             &due,
-            &|slave| (time, sizes[slave]),
-            !self.repeats,
+            &|slave| CommunicationStep { time, size: sizes[slave], never_back },
             |tasks| run(threads.as_ref(), tasks),
         )?;
         for (slave, done) in due.into_iter().zip(done) {
@@ -452,7 +455,7 @@ impl Engine {
     ) -> Result<(), SystemError> {
         let size = self.sizes[slave];
         if done != StepResult::Whole {
-            self.finish_in_parts(slave, (time, size), done, swept)?;
+            self.finish_in_parts(slave, time, size, done, swept)?;
         }
         self.exchange.check_finite(&self.system, slave, time + size)
     }
@@ -462,7 +465,8 @@ impl Engine {
     fn finish_in_parts(
         &mut self,
         slave: usize,
-        (time, size): (f64, f64),
+        time: f64,
+        size: f64,
         mut done: StepResult,
         swept: &mut Swept,
     ) -> Result<(), SystemError> {

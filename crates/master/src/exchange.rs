@@ -33,7 +33,7 @@ use channels::{Channels, ChannelsState};
 use instant::Ticks;
 pub(crate) use layout::Refusal;
 pub(crate) use reals::{Reals, Trace};
-use slave::{CallError, Slave, StepResult};
+use slave::{CallError, CommunicationStep, Slave, StepResult};
 
 /// All connections of a system with the current values of their outputs.
 pub(crate) struct Exchange {
@@ -184,15 +184,14 @@ impl Exchange {
         &mut self,
         system: &mut System,
         position: usize,
-        (time, size): (f64, f64),
-        never_back: bool,
+        step: CommunicationStep,
     ) -> Result<StepResult, SystemError> {
         let (name, slave) = &mut system.slaves[position];
         let slave = slave.as_mut();
-        self.set_held(position, slave).map_err(|source| call(name, time, source))?;
-        let done = self.reals.advance(position, slave, (time, size), never_back);
-        let done = done.map_err(|source| call(name, time, source))?;
-        self.read_discrete(position, slave).map_err(|source| call(name, time, source))?;
+        self.set_held(position, slave).map_err(|source| call(name, step.time, source))?;
+        let done = self.reals.advance(position, slave, step);
+        let done = done.map_err(|source| call(name, step.time, source))?;
+        self.read_discrete(position, slave).map_err(|source| call(name, step.time, source))?;
         Ok(done)
     }
 
@@ -201,8 +200,7 @@ impl Exchange {
         &mut self,
         system: &mut System,
         position: usize,
-        (time, size): (f64, f64),
-        never_back: bool,
+        step: CommunicationStep,
     ) -> Result<(), SystemError> {
         let (name, slave) = &mut system.slaves[position];
         if slave.in_background().is_none() {
@@ -210,12 +208,10 @@ impl Exchange {
         }
         let set = self.set_held(position, slave.as_mut());
         set.and_then(|()| match slave.in_background() {
-            Some(slave) => {
-                slave.begin_advance(&self.reals.step(position, (time, size), never_back))
-            }
+            Some(slave) => slave.begin_advance(&self.reals.request(position, step)),
             None => Ok(()),
         })
-        .map_err(|source| call(name, time, source))
+        .map_err(|source| call(name, step.time, source))
     }
 
     /// Waits for the step of a background slave and reads its outputs; steps any other slave with
@@ -224,38 +220,36 @@ impl Exchange {
         &mut self,
         system: &mut System,
         position: usize,
-        (time, size): (f64, f64),
-        never_back: bool,
+        step: CommunicationStep,
     ) -> Result<StepResult, SystemError> {
         let (name, slave) = &mut system.slaves[position];
         if slave.in_background().is_none() {
-            return self.advance(system, position, (time, size), never_back);
+            return self.advance(system, position, step);
         }
-        let done = self.reals.finish(position, slave.as_mut(), (time, size), never_back);
+        let done = self.reals.finish(position, slave.as_mut(), step);
         done.and_then(|done| self.read_discrete(position, slave.as_mut()).map(|()| done))
-            .map_err(|source| call(name, time, source))
+            .map_err(|source| call(name, step.time, source))
     }
 
-    /// Steps several slaves at once. `run` makes the steps that may run in another thread; `span`
-    /// returns time and size of the step of each slave.
+    /// Steps several slaves at once. `run` makes the steps that may run in another thread; `step`
+    /// returns the step of each slave.
     pub(crate) fn advance_all(
         &mut self,
         system: &mut System,
         slaves: &[usize],
-        span: &dyn Fn(usize) -> (f64, f64),
-        never_back: bool,
+        step: &dyn Fn(usize) -> CommunicationStep,
         run: impl FnOnce(&mut [Task<'_>]),
     ) -> Result<Vec<StepResult>, SystemError> {
         for &position in slaves {
             let (name, slave) = &mut system.slaves[position];
             self.set_held(position, slave.as_mut())
-                .map_err(|source| call(name, span(position).0, source))?;
+                .map_err(|source| call(name, step(position).time, source))?;
         }
-        let results = self.reals.advance_all(system, slaves, span, never_back, run);
+        let results = self.reals.advance_all(system, slaves, step, run);
         let mut done = Vec::with_capacity(slaves.len());
         for (&position, result) in slaves.iter().zip(results) {
             let (name, slave) = &mut system.slaves[position];
-            let at = |source| call(name, span(position).0, source);
+            let at = |source| call(name, step(position).time, source);
             done.push(result.map_err(at)?);
             self.read_discrete(position, slave.as_mut()).map_err(at)?;
         }

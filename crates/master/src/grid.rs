@@ -74,7 +74,8 @@ impl Grid {
         system: &System,
         step: f64,
         multiples: &[u32],
-        (start, stop): (f64, Option<f64>),
+        start: f64,
+        stop: Option<f64>,
     ) -> Result<(Self, Option<EarlyEnd>), SystemError> {
         if !(step > 0.0 && step.is_finite()) {
             let (what, rule) = ("the communication step", "more than 0".to_owned());

@@ -84,6 +84,13 @@ fn solve_connections(
     Ok(())
 }
 
+/// A point of the iteration on a loop: the unknowns u and G(u).
+#[derive(Clone, Copy)]
+struct Iterate<'a> {
+    u: &'a [f64],
+    g: &'a [f64],
+}
+
 /// The dependency graph of the connected outputs in initialization mode.
 struct Graph<'a> {
     faults: HashMap<Port, &'a FaultChain>,
@@ -250,7 +257,7 @@ impl<'a> Graph<'a> {
                     continue;
                 }
                 Progress::Matrix => {
-                    self.differentiate(system, nodes, (&u, &g), &mut solver, time)?;
+                    self.differentiate(system, nodes, Iterate { u: &u, g: &g }, &mut solver, time)?;
                     continue;
                 }
                 Progress::NotConverged { iterations, residual } => format!(
@@ -273,20 +280,20 @@ impl<'a> Graph<'a> {
         &self,
         system: &mut System,
         nodes: &[usize],
-        (u, g): (&[f64], &[f64]),
+        point: Iterate<'_>,
         solver: &mut Newton,
         time: f64,
     ) -> Result<(), SystemError> {
         for column in 0..nodes.len() {
-            let change = solver.perturbation(column, u);
-            let mut moved = u.to_vec();
+            let change = solver.perturbation(column, point.u);
+            let mut moved = point.u.to_vec();
             moved[column] += change;
             let there = self.evaluate(system, nodes, &moved, time)?;
             let quotients: Vec<f64> =
-                there.iter().zip(g).map(|(there, here)| (there - here) / change).collect();
+                there.iter().zip(point.g).map(|(there, here)| (there - here) / change).collect();
             solver.set_column(column, &quotients);
         }
-        self.evaluate(system, nodes, u, time).map(|_| ())
+        self.evaluate(system, nodes, point.u, time).map(|_| ())
     }
 
     fn unsolved(&self, system: &System, nodes: &[usize], time: f64, why: String) -> SystemError {

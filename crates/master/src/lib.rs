@@ -60,8 +60,8 @@ pub use readout::Readout;
 pub use signal_type::SignalType;
 pub use simulation::{Checkpoint, KeptState, Simulation};
 pub use slave::{
-    Advance, Background, CallError, Failure, Slave, StepResult, Transformation, Value, ValueType,
-    to_hex,
+    Background, CallError, CommunicationStep, Failure, Slave, StepRequest, StepResult,
+    Transformation, Value, ValueType, to_hex,
 };
 pub use slow_values::{SlowState, SlowValues};
 pub use system::{Connection, EventObserver, Port, System};

@@ -13,7 +13,7 @@ use crate::algorithm::{Algorithm, Extrapolation, StepControl};
 use crate::capabilities;
 use crate::coupling::{Coupler, Fallbacks};
 use crate::drive::Scenario;
-use crate::engine::{Ending, Engine, Instants, Parts};
+use crate::engine::{Ending, Engine, Instants, Parts, Schedule};
 use crate::error::SystemError;
 use crate::error::call;
 use crate::events::Events;
@@ -86,8 +86,8 @@ impl Simulation {
     ) -> Result<Self, SystemError> {
         algorithm.check(&system)?;
         let multiples = grid::multiples(&system, algorithm)?;
-        let span = (experiment.start_time, stop);
-        let (grid, early_end) = Grid::new(&system, algorithm.step, &multiples, span)?;
+        let start = experiment.start_time;
+        let (grid, early_end) = Grid::new(&system, algorithm.step, &multiples, start, stop)?;
         let origin = Origin::new(&system, algorithm, experiment);
         let order = by_direct_dependencies(&system);
         system.discrete = algorithm.discrete.iter().copied().collect();
@@ -103,8 +103,8 @@ impl Simulation {
         read_at_start(&mut system, &mut exchange, algorithm, experiment.start_time)?;
         scenario.drives.commit(experiment.start_time);
         let drives = scenario.drives;
-        let ordering = (&order, multiples);
-        let engine = Engine::new(system, exchange, drives, grid, instants, algorithm, ordering)?;
+        let schedule = Schedule::new(&system, algorithm, &order, multiples);
+        let engine = Engine::new(system, exchange, drives, instants, grid, schedule, algorithm)?;
         let control = SizeControl::new(&engine.system, &engine.exchange.reals, algorithm)?;
         let events = Events::new(&algorithm.events);
         let varies = algorithm.control != StepControl::Fixed || events.is_some();
@@ -313,7 +313,7 @@ fn read_at_start(
         exchange.read(system, slave, start)?;
     }
     if algorithm.extrapolation == Extrapolation::Quadratic {
-        exchange.derive_at_start(system, (start, algorithm.step))?;
+        exchange.derive_at_start(system, start, algorithm.step)?;
     }
     exchange.accept_at_events(system.slaves.len(), start);
     exchange.reals.clear_history();

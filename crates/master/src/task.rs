@@ -1,11 +1,11 @@
 //! What a thread does for one slave.
 
-use slave::{Advance, CallError, Slave, StepResult};
+use slave::{CallError, Slave, StepRequest, StepResult};
 
 /// The step of one slave.
 pub(crate) struct Task<'a> {
     pub(crate) slave: usize,
     pub(crate) instance: &'a mut dyn Slave,
-    pub(crate) step: Advance<'a>,
+    pub(crate) request: StepRequest<'a>,
     pub(crate) done: Result<StepResult, CallError>,
 }

@@ -215,38 +215,43 @@ pub trait Slave: Send {
     ///
     /// One call does all of it, so that a slave in another process receives one request. The outputs
     /// are also read after a partial step.
-    fn advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
-        if !step.inputs.is_empty() {
-            self.set_real(step.inputs, step.input_values)?;
+    fn advance(&mut self, request: &mut StepRequest<'_>) -> Result<StepResult, CallError> {
+        if !request.inputs.is_empty() {
+            self.set_real(request.inputs, request.input_values)?;
         }
-        if !step.derived_inputs.is_empty() {
-            let orders = step.input_orders;
-            self.set_input_derivatives(step.derived_inputs, orders, step.input_derivatives)?;
+        if !request.derived_inputs.is_empty() {
+            self.set_input_derivatives(
+                request.derived_inputs,
+                request.input_orders,
+                request.input_derivatives,
+            )?;
         }
-        let done = self.do_step(step.time, step.size, step.never_back)?;
-        if !step.outputs.is_empty() {
-            self.get_real(step.outputs, step.output_values)?;
+        let CommunicationStep { time, size, never_back } = request.step;
+        let done = self.do_step(time, size, never_back)?;
+        if !request.outputs.is_empty() {
+            self.get_real(request.outputs, request.output_values)?;
         }
-        if !step.derived_outputs.is_empty() {
-            let orders = step.output_orders;
-            self.get_output_derivatives(step.derived_outputs, orders, step.output_derivatives)?;
+        if !request.derived_outputs.is_empty() {
+            self.get_output_derivatives(
+                request.derived_outputs,
+                request.output_orders,
+                request.output_derivatives,
+            )?;
         }
         Ok(done)
     }
 
     /// [`Slave::advance`] without derivatives, the fastest form: sets the inputs (references and
-    /// values), steps from `time` over `size` (in s), reads the outputs (references and values).
+    /// values), makes the step, reads the outputs (references and values).
     fn pass(
         &mut self,
         inputs: &[u32],
         values: &[f64],
-        (time, size): (f64, f64),
-        never_back: bool,
+        step: CommunicationStep,
         outputs: &[u32],
         results: &mut [f64],
     ) -> Result<StepResult, CallError> {
-        let (inputs, outputs) = ((inputs, values), (outputs, results));
-        self.advance(&mut Advance::held(inputs, (time, size), never_back, outputs))
+        self.advance(&mut StepRequest::held(inputs, values, step, outputs, results))
     }
 
     /// Hands the events of this slave over to the master; call it before [`Slave::setup_experiment`]. Returns
@@ -314,14 +319,14 @@ pub trait Background {
     /// # Errors
     ///
     /// [`CallError`] if the step cannot be started. Do not call [`Background::finish_advance`] then.
-    fn begin_advance(&mut self, step: &Advance<'_>) -> Result<(), CallError>;
+    fn begin_advance(&mut self, request: &StepRequest<'_>) -> Result<(), CallError>;
 
     /// The second half of [`Slave::advance`]: waits for the end of the step and reads the outputs.
     ///
     /// # Errors
     ///
     /// [`CallError`] if the step or the reading of the outputs fails, or if no step was started.
-    fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError>;
+    fn finish_advance(&mut self, request: &mut StepRequest<'_>) -> Result<StepResult, CallError>;
 }
 
 /// Finishes a step: calls [`Background::finish_advance`] if the slave steps in the background, otherwise
@@ -330,16 +335,30 @@ pub trait Background {
 /// # Errors
 ///
 /// As [`Slave::advance`].
-pub fn finish(slave: &mut dyn Slave, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
+pub fn finish(
+    slave: &mut dyn Slave,
+    request: &mut StepRequest<'_>,
+) -> Result<StepResult, CallError> {
     match slave.in_background() {
-        Some(slave) => slave.finish_advance(step),
-        None => slave.advance(step),
+        Some(slave) => slave.finish_advance(request),
+        None => slave.advance(request),
     }
+}
+
+/// A communication step: the arguments of `fmi2DoStep`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CommunicationStep {
+    /// Start of the step in s.
+    pub time: f64,
+    /// Size of the step in s.
+    pub size: f64,
+    /// `noSetFMUStatePriorToCurrentPoint`.
+    pub never_back: bool,
 }
 
 /// The arguments of [`Slave::advance`]: inputs, communication step and outputs.
 #[derive(Debug)]
-pub struct Advance<'a> {
+pub struct StepRequest<'a> {
     /// Value references of the inputs to set.
     pub inputs: &'a [u32],
     /// Values of `inputs`.
@@ -350,12 +369,8 @@ pub struct Advance<'a> {
     pub input_orders: &'a [i32],
     /// Values of the derivatives of `derived_inputs`.
     pub input_derivatives: &'a [f64],
-    /// Start of the step in s.
-    pub time: f64,
-    /// Size of the step in s.
-    pub size: f64,
-    /// `noSetFMUStatePriorToCurrentPoint`.
-    pub never_back: bool,
+    /// The communication step.
+    pub step: CommunicationStep,
     /// Value references of the outputs to read.
     pub outputs: &'a [u32],
     /// Receives the values of `outputs`.
@@ -368,15 +383,16 @@ pub struct Advance<'a> {
     pub output_derivatives: &'a mut [f64],
 }
 
-impl<'a> Advance<'a> {
-    /// A step from `time` over `size` (in s) with constant inputs: references and values of the inputs
-    /// and of the outputs, no derivatives.
+impl<'a> StepRequest<'a> {
+    /// A step with constant inputs: references and values of the inputs and of the outputs, no
+    /// derivatives.
     #[must_use]
     pub fn held(
-        (inputs, input_values): (&'a [u32], &'a [f64]),
-        (time, size): (f64, f64),
-        never_back: bool,
-        (outputs, output_values): (&'a [u32], &'a mut [f64]),
+        inputs: &'a [u32],
+        input_values: &'a [f64],
+        step: CommunicationStep,
+        outputs: &'a [u32],
+        output_values: &'a mut [f64],
     ) -> Self {
         Self {
             inputs,
@@ -384,9 +400,7 @@ impl<'a> Advance<'a> {
             derived_inputs: &[],
             input_orders: &[],
             input_derivatives: &[],
-            time,
-            size,
-            never_back,
+            step,
             outputs,
             output_values,
             derived_outputs: &[],

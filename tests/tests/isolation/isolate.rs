@@ -9,7 +9,7 @@ use fmu_description::abi::Status;
 use fmu_description::{Causality, Kind, ModelDescription};
 use fmu_import::Fmu;
 use fmu_import::isolate::{self, IsolateError, Isolated, Options};
-use master::{Advance, CallError, Failure, Slave, StepResult};
+use master::{CallError, CommunicationStep, Failure, Slave, StepRequest, StepResult};
 use tests::isolated::{limited, options, ready};
 use tests::{Trouble, dist, troubles};
 
@@ -27,8 +27,8 @@ fn error_of(trouble: Trouble, options: &Options) -> (Isolated, CallError) {
 fn advance(slave: &mut dyn Slave, input: f64, size: f64) -> Result<(StepResult, f64), CallError> {
     let mut output = [f64::NAN];
     let input = [input];
-    let mut step = Advance::held((&[0], &input), (0.0, size), true, (&[1], &mut output));
-    let done = slave.advance(&mut step)?;
+    let step = CommunicationStep { time: 0.0, size, never_back: true };
+    let done = slave.advance(&mut StepRequest::held(&[0], &input, step, &[1], &mut output))?;
     Ok((done, output[0]))
 }
 
@@ -59,15 +59,13 @@ impl Pendulum<'_> {
     fn step(&mut self, time: f64, force: f64) {
         let (inputs, outputs) = (self.inputs.len(), self.outputs.len());
         let (mut values, mut derivatives) = (vec![0.0; outputs], vec![0.0; outputs]);
-        let mut step = Advance {
+        let mut step = StepRequest {
             inputs: &self.inputs,
             input_values: &vec![force; inputs],
             derived_inputs: &self.inputs,
             input_orders: &vec![1; inputs],
             input_derivatives: &vec![3.0; inputs],
-            time,
-            size: 0.001,
-            never_back: false,
+            step: CommunicationStep { time, size: 0.001, never_back: false },
             outputs: &self.outputs,
             output_values: &mut values,
             derived_outputs: &self.outputs,

@@ -4,7 +4,7 @@
 
 use std::time::{Duration, Instant};
 
-use master::{Advance, Background as _, Failure, Slave as _};
+use master::{Background as _, CommunicationStep, Failure, Slave as _, StepRequest};
 use tests::Trouble;
 use tests::c_fmu::CFmu;
 use tests::coupled::Run;
@@ -76,8 +76,9 @@ fn the_time_limit_of_a_step_counts_from_its_start() {
 }
 
 /// A step of 0.25 s.
-fn step<'a>(input: &'a [f64], output: &'a mut [f64]) -> Advance<'a> {
-    Advance::held((&[0], input), (0.0, 0.25), true, (&[1], output))
+fn step<'a>(input: &'a [f64], output: &'a mut [f64]) -> StepRequest<'a> {
+    let step = CommunicationStep { time: 0.0, size: 0.25, never_back: true };
+    StepRequest::held(&[0], input, step, &[1], output)
 }
 
 const NAMES: [&str; 4] = ["a", "b", "c", "d"];

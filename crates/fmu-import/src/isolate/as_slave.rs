@@ -9,7 +9,9 @@ use super::isolated::{Isolated, description_of_instance};
 use super::message::Request;
 use super::perform::{EVENT, PART, TERMINATED, WHOLE};
 use super::words::{Reader, Word, Writer};
-use slave::{Advance, Background, CallError, EventInfo, Events, Slave, StepResult};
+use slave::{
+    Background, CallError, CommunicationStep, EventInfo, Events, Slave, StepRequest, StepResult,
+};
 
 /// Writes references and one value for each.
 #[inline]
@@ -75,29 +77,30 @@ impl Isolated {
 
 impl Background for Isolated {
     #[inline]
-    fn begin_advance(&mut self, step: &Advance<'_>) -> Result<(), CallError> {
-        self.place.set_time(step.time);
+    fn begin_advance(&mut self, request: &StepRequest<'_>) -> Result<(), CallError> {
+        let CommunicationStep { time, size, never_back } = request.step;
+        self.place.set_time(time);
         self.post(Function::DoStep, |writer| {
-            writer.put(step.time);
-            writer.put(step.size);
-            writer.put(u64::from(step.never_back));
-            write_pairs(writer, step.inputs, step.input_values);
-            write_pairs(writer, step.derived_inputs, step.input_derivatives);
-            writer.put_all(step.input_orders);
-            writer.put_list(step.outputs);
-            writer.put_list(step.derived_outputs);
-            writer.put_all(step.output_orders);
+            writer.put(time);
+            writer.put(size);
+            writer.put(u64::from(never_back));
+            write_pairs(writer, request.inputs, request.input_values);
+            write_pairs(writer, request.derived_inputs, request.input_derivatives);
+            writer.put_all(request.input_orders);
+            writer.put_list(request.outputs);
+            writer.put_list(request.derived_outputs);
+            writer.put_all(request.output_orders);
         })?;
         self.start_timer();
         Ok(())
     }
 
     #[inline]
-    fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
+    fn finish_advance(&mut self, request: &mut StepRequest<'_>) -> Result<StepResult, CallError> {
         self.answer(Function::DoStep, |reader| {
             let done = read_step_result(reader)?;
-            reader.take_all(step.output_values)?;
-            reader.take_all(step.output_derivatives)?;
+            reader.take_all(request.output_values)?;
+            reader.take_all(request.output_derivatives)?;
             Some(done)
         })
     }
@@ -223,7 +226,8 @@ impl Slave for Isolated {
     }
 
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
-        self.advance(&mut Advance::held((&[], &[]), (time, size), never_back, (&[], &mut [])))
+        let step = CommunicationStep { time, size, never_back };
+        self.advance(&mut StepRequest::held(&[], &[], step, &[], &mut []))
     }
 
     fn directional_derivative(
@@ -255,9 +259,9 @@ impl Slave for Isolated {
         self.request(&Request::DeserializeState(bytes))
     }
 
-    fn advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
-        self.begin_advance(step)?;
-        self.finish_advance(step)
+    fn advance(&mut self, request: &mut StepRequest<'_>) -> Result<StepResult, CallError> {
+        self.begin_advance(request)?;
+        self.finish_advance(request)
     }
 
     fn in_background(&mut self) -> Option<&mut dyn Background> {

@@ -73,7 +73,8 @@ impl Maker {
 /// The arguments and results of [`Slave::advance`].
 #[derive(Default)]
 struct Step {
-    span: (f64, f64),
+    time: f64,
+    size: f64,
     never_back: bool,
     inputs: Vec<u32>,
     input_values: Vec<f64>,
@@ -251,7 +252,8 @@ impl Step {
     }
 
     fn read(&mut self, reader: &mut Reader<'_>) -> Option<()> {
-        self.span = (reader.take()?, reader.take()?);
+        self.time = reader.take()?;
+        self.size = reader.take()?;
         self.never_back = reader.take::<u64>()? != 0;
         reader.take_list(&mut self.inputs)?;
         reader.take_counted(self.inputs.len(), &mut self.input_values)?;
@@ -280,7 +282,7 @@ impl Step {
             instance.set_input_derivatives(references, orders, &self.input_derivatives)?;
         }
         at(Function::DoStep);
-        let done = instance.do_step(self.span.0, self.span.1, self.never_back)?;
+        let done = instance.do_step(self.time, self.size, self.never_back)?;
         if !self.outputs.is_empty() {
             at(Function::GetReal);
             instance.get_real(&self.outputs, &mut self.output_values)?;

@@ -7,7 +7,7 @@ use fmu_description::abi::{Status, StatusKind, fmi2Status};
 
 use super::Component;
 use super::calls::{function, same_length};
-use slave::{CallError, Failure, StepResult, absent};
+use slave::{CallError, CommunicationStep, Failure, StepResult, absent};
 
 const NAME: &str = "fmi2DoStep";
 const SET: &str = "fmi2SetReal";
@@ -55,8 +55,7 @@ impl Component {
         &mut self,
         inputs: &[u32],
         values: &[f64],
-        (time, size): (f64, f64),
-        never_back: bool,
+        step: CommunicationStep,
         outputs: &[u32],
         results: &mut [f64],
     ) -> Result<StepResult, CallError> {
@@ -74,12 +73,13 @@ impl Component {
             }
         }
         let Some(function) = hot.do_step else { return Err(absent(NAME)) };
+        let CommunicationStep { time, size, never_back } = step;
         hot.place.set_time(time);
         hot.place.enter(&NAME);
         // SAFETY: the instance is alive.
         let status = unsafe { function(hot.pointer, time, size, never_back.into()) };
         if !usual(status) {
-            return self.finish_pass(status, (time, size), outputs, results);
+            return self.finish_pass(status, step, outputs, results);
         }
         if !outputs.is_empty() {
             let Some(function) = hot.get_real else { return Err(absent(GET)) };
@@ -111,11 +111,11 @@ impl Component {
     fn finish_pass(
         &mut self,
         status: fmi2Status,
-        (time, size): (f64, f64),
+        step: CommunicationStep,
         outputs: &[u32],
         results: &mut [f64],
     ) -> Result<StepResult, CallError> {
-        let done = self.finish_step(status, time, size)?;
+        let done = self.finish_step(status, step.time, step.size)?;
         if !outputs.is_empty() {
             self.get_real(outputs, results)?;
         }

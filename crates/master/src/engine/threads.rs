@@ -71,7 +71,7 @@ impl Threads {
 
 /// Makes all steps in the threads of the pool.
 pub(super) fn run(threads: Option<&Threads>, tasks: &mut [Task<'_>]) {
-    let step = |task: &mut Task<'_>| task.done = task.instance.advance(&mut task.step);
+    let step = |task: &mut Task<'_>| task.done = task.instance.advance(&mut task.request);
     match threads {
         Some(threads) => threads.pool.for_each(tasks, step),
         None => tasks.iter_mut().for_each(step),

@@ -9,8 +9,7 @@ use crate::algorithm::{Algorithm, Extrapolation};
 use crate::order::Rows;
 use crate::signal_type::{SignalType, Way};
 use crate::system::{Port, System};
-use slave::Advance;
-use slave::{Transformation, ValueType};
+use slave::{CommunicationStep, StepRequest, Transformation, ValueType};
 
 /// Derivatives that a slave refuses although its model description promises them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,25 +40,24 @@ pub(super) struct PortMap {
 }
 
 impl PortMap {
-    /// Builds the arguments of a step: values of its inputs and outputs out of `values` of all
-    /// inputs and `outputs`, with their derivatives.
+    /// Builds the request of a step from the `values` of all inputs, and the input derivatives, output
+    /// values and output derivatives of the slave.
     #[inline]
-    pub(super) fn step<'a>(
+    pub(super) fn request<'a>(
         &'a self,
-        (values, input_derivatives): (&'a [f64], &'a [f64]),
-        (time, size): (f64, f64),
-        never_back: bool,
-        (output_values, output_derivatives): (&'a mut [f64], &'a mut [f64]),
-    ) -> Advance<'a> {
-        Advance {
+        values: &'a [f64],
+        input_derivatives: &'a [f64],
+        step: CommunicationStep,
+        output_values: &'a mut [f64],
+        output_derivatives: &'a mut [f64],
+    ) -> StepRequest<'a> {
+        StepRequest {
             inputs: &self.inputs,
             input_values: &values[self.input_range.clone()],
             derived_inputs: &self.derived_inputs,
             input_orders: &self.input_orders,
             input_derivatives,
-            time,
-            size,
-            never_back,
+            step,
             outputs: &self.outputs,
             output_values,
             derived_outputs: &self.derived_outputs,

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use slave::{CallError, Slave, StepResult};
+use slave::{CallError, CommunicationStep, Slave, StepResult};
 
 /// The ranges of one slave in the arrays of all slaves.
 #[derive(Clone, Debug)]
@@ -45,8 +45,8 @@ impl Pass {
         self.parts.reserve(self.places.len());
     }
 
-    /// Sets the inputs of all slaves from `latest`, steps the slaves from `time` over `size` and
-    /// reads their outputs. Replaces `latest` after all slaves have stepped. Returns the slaves
+    /// Sets the inputs of all slaves from `latest`, makes `step` with each slave and reads
+    /// their outputs. Replaces `latest` after all slaves have stepped. Returns the slaves
     /// that completed only a part of the step.
     ///
     /// # Errors
@@ -57,8 +57,7 @@ impl Pass {
         &mut self,
         slaves: &mut [(String, Box<dyn Slave>)],
         latest: &mut Vec<f64>,
-        span: (f64, f64),
-        never_back: bool,
+        step: CommunicationStep,
     ) -> Result<&mut Vec<(usize, StepResult)>, (usize, CallError)> {
         self.parts.clear();
         for (slave, ((_, instance), place)) in slaves.iter_mut().zip(&self.places).enumerate() {
@@ -69,8 +68,7 @@ impl Pass {
             let done = instance.pass(
                 &self.inputs[place.inputs.clone()],
                 values,
-                span,
-                never_back,
+                step,
                 &self.outputs[place.outputs.clone()],
                 &mut self.next[place.outputs.clone()],
             );

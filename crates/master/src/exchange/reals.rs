@@ -11,7 +11,7 @@ use crate::error::SystemError;
 use crate::error::call;
 use crate::fault::FaultChain;
 use crate::system::{Port, System};
-use slave::{Advance, CallError, Slave, StepResult};
+use slave::{CallError, CommunicationStep, Slave, StepRequest, StepResult};
 
 /// Part of a step below which a difference of times is rounding.
 const ROUNDING: f64 = 1e-9;
@@ -177,7 +177,7 @@ impl Reals {
         let extrapolation = if layout.held[k] || ahead {
             Polynomial::held(self.value_at(source, source_time))
         } else {
-            self.polynomial(slave, source, (time, size))
+            self.polynomial(slave, source, time, size)
         };
         let value = match (port_map.input_order, self.extrapolation) {
             (0, Extrapolation::Limited) if known => extrapolation.end(size),
@@ -252,7 +252,7 @@ impl Reals {
     }
 
     /// Returns the polynomial of an output from `time` on.
-    fn polynomial(&self, slave: usize, output: usize, (time, size): (f64, f64)) -> Polynomial {
+    fn polynomial(&self, slave: usize, output: usize, time: f64, size: f64) -> Polynomial {
         let (layout, trace) = (&self.layout, &self.trace);
         let span = &trace.spans[layout.owners[output] as usize];
         let known = self.known(output, span);
@@ -270,26 +270,25 @@ impl Reals {
         &mut self,
         slave: usize,
         instance: &mut dyn Slave,
-        span: (f64, f64),
-        never_back: bool,
+        step: CommunicationStep,
     ) -> Result<StepResult, CallError> {
-        let done = instance.advance(&mut self.step(slave, span, never_back))?;
+        let done = instance.advance(&mut self.request(slave, step))?;
         self.trace.spans[slave].stepped = true;
         Ok(done)
     }
 
-    /// Builds the arguments of the step of `slave` with its gathered inputs.
+    /// Builds the request of the step of `slave` with its gathered inputs.
     #[inline]
-    pub(super) fn step(&mut self, slave: usize, span: (f64, f64), never_back: bool) -> Advance<'_> {
+    pub(super) fn request(&mut self, slave: usize, step: CommunicationStep) -> StepRequest<'_> {
         let port_map = &self.layout.port_maps[slave];
         let trace = &mut self.trace;
-        let inputs =
-            (&self.values[..], &self.input_derivatives[port_map.input_derivative_range.clone()]);
-        let outputs = (
+        port_map.request(
+            &self.values,
+            &self.input_derivatives[port_map.input_derivative_range.clone()],
+            step,
             &mut trace.latest[port_map.output_range.clone()],
             &mut trace.derivatives[port_map.output_derivative_range.clone()],
-        );
-        port_map.step(inputs, span, never_back, outputs)
+        )
     }
 
     /// Whether [`Reals::pass`] can make a complete sweep of Jacobi's method.
@@ -306,12 +305,11 @@ impl Reals {
     pub(crate) fn pass(
         &mut self,
         system: &mut System,
-        (time, size): (f64, f64),
-        never_back: bool,
+        step: CommunicationStep,
     ) -> Result<&mut Vec<(usize, StepResult)>, SystemError> {
         let latest = &mut self.trace.latest;
-        let done = self.pass.run(&mut system.slaves, latest, (time, size), never_back);
-        done.map_err(|(slave, source)| call(&system.slaves[slave].0, time, source))
+        let done = self.pass.run(&mut system.slaves, latest, step);
+        done.map_err(|(slave, source)| call(&system.slaves[slave].0, step.time, source))
     }
 
     /// Whether all outputs are finite numbers.

@@ -18,7 +18,8 @@ impl Exchange {
     pub(crate) fn derive_at_start(
         &mut self,
         system: &mut System,
-        (time, size): (f64, f64),
+        time: f64,
+        size: f64,
     ) -> Result<(), SystemError> {
         for _ in 0..PASSES {
             for slave in 0..system.slaves.len() {

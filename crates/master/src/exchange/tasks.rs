@@ -3,7 +3,7 @@
 use super::reals::Reals;
 use crate::system::System;
 use crate::task::Task;
-use slave::{Advance, CallError, Slave, StepResult, finish};
+use slave::{CallError, CommunicationStep, Slave, StepRequest, StepResult, finish};
 
 impl Reals {
     /// Waits for the step of a background slave and reads its outputs.
@@ -11,10 +11,9 @@ impl Reals {
         &mut self,
         slave: usize,
         instance: &mut dyn Slave,
-        span: (f64, f64),
-        never_back: bool,
+        step: CommunicationStep,
     ) -> Result<StepResult, CallError> {
-        let done = finish(instance, &mut self.step(slave, span, never_back))?;
+        let done = finish(instance, &mut self.request(slave, step))?;
         self.trace.spans[slave].stepped = true;
         Ok(done)
     }
@@ -24,8 +23,7 @@ impl Reals {
         &mut self,
         system: &mut System,
         slaves: &[usize],
-        span: &dyn Fn(usize) -> (f64, f64),
-        never_back: bool,
+        step: &dyn Fn(usize) -> CommunicationStep,
         run: impl FnOnce(&mut [Task<'_>]),
     ) -> Vec<Result<StepResult, CallError>> {
         let mut chosen = vec![false; system.slaves.len()];
@@ -46,13 +44,14 @@ impl Reals {
             if !chosen[slave] {
                 continue;
             }
-            let inputs = (
-                &self.values[..],
+            let request = port_map.request(
+                &self.values,
                 &self.input_derivatives[port_map.input_derivative_range.clone()],
+                step(slave),
+                output_values,
+                output_derivatives,
             );
-            let outputs = (output_values, output_derivatives);
-            let step = port_map.step(inputs, span(slave), never_back, outputs);
-            sorted.add(slave, instance.as_mut(), step);
+            sorted.add(slave, instance.as_mut(), request);
         }
         for (slave, done) in sorted.run(run) {
             self.trace.spans[slave].stepped |= done.is_ok();
@@ -73,15 +72,17 @@ struct StepBatch<'a> {
 }
 
 /// A slave with the arguments of its step.
-type Step<'a> = (usize, &'a mut dyn Slave, Advance<'a>);
+type Step<'a> = (usize, &'a mut dyn Slave, StepRequest<'a>);
 
 impl<'a> StepBatch<'a> {
     /// Adds a step; starts it if the slave works in the background.
-    fn add(&mut self, slave: usize, instance: &'a mut dyn Slave, step: Advance<'a>) {
-        match instance.in_background().map(|instance| instance.begin_advance(&step)) {
-            Some(Ok(())) => self.started.push((slave, instance, step)),
+    fn add(&mut self, slave: usize, instance: &'a mut dyn Slave, request: StepRequest<'a>) {
+        match instance.in_background().map(|instance| instance.begin_advance(&request)) {
+            Some(Ok(())) => self.started.push((slave, instance, request)),
             Some(Err(error)) => self.done.push((slave, Err(error))),
-            None => self.tasks.push(Task { slave, instance, step, done: Ok(StepResult::Whole) }),
+            None => {
+                self.tasks.push(Task { slave, instance, request, done: Ok(StepResult::Whole) });
+            }
         }
     }
 
@@ -94,8 +95,8 @@ impl<'a> StepBatch<'a> {
             run(&mut self.tasks);
         }
         self.done.extend(self.tasks.into_iter().map(|task| (task.slave, task.done)));
-        for (slave, instance, mut step) in self.started {
-            self.done.push((slave, finish(instance, &mut step)));
+        for (slave, instance, mut request) in self.started {
+            self.done.push((slave, finish(instance, &mut request)));
         }
         self.done
     }

@@ -18,7 +18,7 @@ fn magnitude(state: &mut u64, exponent: f64) -> f64 {
 }
 
 fn grid(step: f64, start: f64, stop: f64) -> Grid {
-    Grid::new(&System::default(), step, &[], (start, Some(stop))).unwrap().0
+    Grid::new(&System::default(), step, &[], start, Some(stop)).unwrap().0
 }
 
 #[test]

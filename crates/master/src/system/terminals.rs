@@ -11,13 +11,28 @@ use crate::error::SystemError;
 const TRANSCEIVER: &str = fmu_description::can::MATCHING_RULE;
 const RULES: &str = "plug, bus, sequence or org.fmi-ls-bus.transceiver";
 
+/// A terminal of a slave.
+#[derive(Clone, Copy)]
+struct SlaveTerminal<'a> {
+    slave: usize,
+    terminal: &'a Terminal,
+}
+
+/// A member of a terminal of a slave.
+#[derive(Clone, Copy)]
+struct SlaveMember<'a> {
+    slave: usize,
+    member: &'a TerminalMember,
+}
+
 impl System {
-    /// Returns the slave and the terminal called `slave.terminal`.
-    fn terminal_called(&self, name: &str) -> Option<(usize, &Terminal)> {
+    /// Returns the terminal called `slave.terminal`.
+    fn terminal_called(&self, name: &str) -> Option<SlaveTerminal<'_>> {
         name.match_indices('.').rev().find_map(|(at, _)| {
             let slave = *self.names.get(&name[..at])?;
             let terminals = &self.slaves[slave].1.description().terminals;
-            Some((slave, terminals.iter().find(|own| own.name == name[at + 1..])?))
+            let terminal = terminals.iter().find(|terminal| terminal.name == name[at + 1..])?;
+            Some(SlaveTerminal { slave, terminal })
         })
     }
 
@@ -38,16 +53,19 @@ impl System {
         let mut pairs = Vec::new();
         self.match_members(one, other, &mut pairs).map_err(wrong)?;
         // Nested terminals of equal names.
-        let inner = |(slave, outer): (usize, &Terminal)| {
-            let prefix = format!("{}.", outer.name);
-            let all = self.slaves[slave].1.description().terminals.iter();
-            all.filter_map(move |own| Some((own.name.strip_prefix(&prefix)?.to_owned(), own)))
-                .collect::<Vec<_>>()
+        let inner = |outer: SlaveTerminal<'_>| {
+            let prefix = format!("{}.", outer.terminal.name);
+            let all = self.slaves[outer.slave].1.description().terminals.iter();
+            let nested = all.filter_map(move |terminal| {
+                let name = terminal.name.strip_prefix(&prefix)?.to_owned();
+                Some((name, SlaveTerminal { slave: outer.slave, terminal }))
+            });
+            nested.collect::<Vec<_>>()
         };
         let others = inner(other);
-        for (name, own) in inner(one) {
+        for (name, terminal) in inner(one) {
             if let Some((_, partner)) = others.iter().find(|(other, _)| *other == name) {
-                self.match_members((one.0, own), (other.0, partner), &mut pairs).map_err(wrong)?;
+                self.match_members(terminal, *partner, &mut pairs).map_err(wrong)?;
             }
         }
         if pairs.is_empty() {
@@ -59,10 +77,11 @@ impl System {
     /// Adds the connections between the members of two terminals to `pairs`.
     fn match_members(
         &self,
-        (slave, one): (usize, &Terminal),
-        (partner, other): (usize, &Terminal),
+        from: SlaveTerminal<'_>,
+        to: SlaveTerminal<'_>,
         pairs: &mut Vec<(Port, Port)>,
     ) -> Result<(), String> {
+        let (one, other) = (from.terminal, to.terminal);
         let rule = one.matching_rule.as_str();
         if rule != other.matching_rule {
             let other = &other.matching_rule;
@@ -74,10 +93,12 @@ impl System {
             return Err(format!("their terminalKind differ, {one} and {other}"));
         }
         let partner_of: &dyn Fn(usize, &TerminalMember) -> Option<usize> = match rule {
-            "plug" | "bus" => &|_, own| other.members.iter().position(|it| it.name == own.name),
-            TRANSCEIVER => &|_, own| {
-                let crossed = crossed(&own.name)?;
-                other.members.iter().position(|it| it.name == crossed)
+            "plug" | "bus" => {
+                &|_, member| other.members.iter().position(|partner| partner.name == member.name)
+            }
+            TRANSCEIVER => &|_, member| {
+                let crossed = crossed(&member.name)?;
+                other.members.iter().position(|partner| partner.name == crossed)
             },
             "sequence" => &|position, _| Some(position).filter(|at| *at < other.members.len()),
             "none" if one.members.is_empty() && other.members.is_empty() => &|_, _| None,
@@ -87,16 +108,16 @@ impl System {
         let mut alone = Vec::new();
         for (position, member) in one.members.iter().enumerate() {
             let Some(at) = partner_of(position, member) else {
-                alone.push(format!("{}.{}.{}", self.slaves[slave].0, one.name, member.name));
+                alone.push(format!("{}.{}.{}", self.slaves[from.slave].0, one.name, member.name));
                 continue;
             };
             free[at] = false;
-            self.add_pairs((slave, member), (partner, &other.members[at]), pairs)?;
+            let partner = SlaveMember { slave: to.slave, member: &other.members[at] };
+            self.add_pairs(SlaveMember { slave: from.slave, member }, partner, pairs)?;
         }
         let rest = other.members.iter().zip(free).filter(|(_, free)| *free);
-        alone.extend(
-            rest.map(|(it, _)| format!("{}.{}.{}", self.slaves[partner].0, other.name, it.name)),
-        );
+        let owner = &self.slaves[to.slave].0;
+        alone.extend(rest.map(|(member, _)| format!("{owner}.{}.{}", other.name, member.name)));
         if alone.is_empty() {
             return Ok(());
         }
@@ -111,24 +132,23 @@ impl System {
     /// Adds the connections between two members to `pairs`: output and input.
     fn add_pairs(
         &self,
-        (slave, one): (usize, &TerminalMember),
-        (partner, other): (usize, &TerminalMember),
+        from: SlaveMember<'_>,
+        to: SlaveMember<'_>,
         pairs: &mut Vec<(Port, Port)>,
     ) -> Result<(), String> {
-        for own in [one, other] {
-            if own.kind != "signal" {
-                let (name, kind) = (&own.name, &own.kind);
+        for member in [from.member, to.member] {
+            if member.kind != "signal" {
+                let (name, kind) = (&member.name, &member.kind);
                 return Err(format!(
                     "the member {name} has the variableKind {kind:?}, expected signal: flows need an equation \
                      of balance"
                 ));
             }
         }
-        let name = |slave: usize, own: &TerminalMember| {
-            format!("{}.{}", self.slaves[slave].0, own.variable)
-        };
-        let found = self.pairs(&name(slave, one), &name(partner, other));
-        for (first, second) in found.map_err(|error| error.to_string())? {
+        let name =
+            |end: SlaveMember<'_>| format!("{}.{}", self.slaves[end.slave].0, end.member.variable);
+        let elements = self.pairs(&name(from), &name(to)).map_err(|error| error.to_string())?;
+        for (first, second) in elements {
             if self.is_source(first, second) {
                 pairs.push((first, second));
             } else if self.is_source(second, first) {
@@ -169,7 +189,9 @@ impl System {
         let (source, target) = (self.variable(from), self.variable(to));
         let inputs = source.causality == Causality::Input && target.causality == Causality::Input;
         let triggered = |kind: &Kind| match kind {
-            Kind::Clock(own) => Some(own.interval_variability == IntervalVariability::Triggered),
+            Kind::Clock(clock) => {
+                Some(clock.interval_variability == IntervalVariability::Triggered)
+            }
             _ => None,
         };
         inputs && triggered(&source.kind) == Some(false) && triggered(&target.kind) == Some(true)

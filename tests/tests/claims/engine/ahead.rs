@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use fmu_description::abi::Status;
-use master::{Advance, Background, CallError, Failure, Slave, StepResult, System};
+use master::{Background, CallError, Failure, Slave, StepRequest, StepResult, System};
 
 type Done = Result<(), CallError>;
 
@@ -68,20 +68,20 @@ impl Ahead {
 }
 
 impl Background for Ahead {
-    fn begin_advance(&mut self, step: &Advance<'_>) -> Done {
+    fn begin_advance(&mut self, request: &StepRequest<'_>) -> Done {
         self.note("begin");
-        self.time = step.time;
+        self.time = request.step.time;
         self.fail(Fails::InBegin, "fmi2DoStep")?;
-        self.begun = Some(step.input_values.to_vec());
+        self.begun = Some(request.input_values.to_vec());
         Ok(())
     }
 
-    fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
+    fn finish_advance(&mut self, request: &mut StepRequest<'_>) -> Result<StepResult, CallError> {
         self.note("finish");
-        assert_eq!(self.begun.take().as_deref(), Some(step.input_values), "the step begun");
+        assert_eq!(self.begun.take().as_deref(), Some(request.input_values), "the step begun");
         self.fail(Fails::InFinish, "fmi2DoStep")?;
-        self.time = step.time + step.size;
-        self.inner.advance(step)
+        self.time = request.step.time + request.step.size;
+        self.inner.advance(request)
     }
 }
 
