@@ -140,19 +140,19 @@ pub(crate) fn system(error: &SystemError) -> Exception {
         E::UnknownVariable { name, model, variable, .. } => {
             named("UnknownVariable", name).text("model", model).text("variable", variable)
         }
-        E::Role { name, found, expected } => {
-            named("Role", name).text("found", found).text("expected", expected)
+        E::Role { name, found: actual, expected } => {
+            named("Role", name).text("found", actual).text("expected", expected)
         }
         E::Twice { input, first, second } => {
             named("Twice", input).text("first", first).text("second", second)
         }
         E::Unit { from, from_unit, to, to_unit } => {
-            let own = named("Unit", to).text("unit", to_unit);
-            own.text("source", from).text("source_unit", from_unit)
+            let exception = named("Unit", to).text("unit", to_unit);
+            exception.text("source", from).text("source_unit", from_unit)
         }
         E::Size { from, from_size, to, to_size, element } => {
-            let own = named("Size", to).text("size", to_size).text("element", &**element);
-            own.text("source", from).text("source_size", from_size)
+            let exception = named("Size", to).text("size", to_size).text("element", &**element);
+            exception.text("source", from).text("source_size", from_size)
         }
         E::Resized { name } => named("Resized", name),
         E::Value { name, value, expected } => {
@@ -161,8 +161,8 @@ pub(crate) fn system(error: &SystemError) -> Exception {
         E::Setting { name, value, source } => {
             called(named("Setting", name).text("value", value), source)
         }
-        E::LostSetting { name, value, found } => {
-            named("LostSetting", name).text("value", value).text("found", found)
+        E::LostSetting { name, value, found: actual } => {
+            named("LostSetting", name).text("value", value).text("found", actual)
         }
         E::Capability { slave, lacks, required_by } => {
             Exception::new(CONFIGURATION, "Capability", error.to_string())
@@ -172,11 +172,11 @@ pub(crate) fn system(error: &SystemError) -> Exception {
         }
         E::Algorithm { .. } => Exception::new(CONFIGURATION, "Algorithm", error.to_string()),
         E::Time { what, value, .. } => {
-            let own = Exception::new(CONFIGURATION, "Time", error.to_string());
-            own.text("what", *what).number("value", *value)
+            let exception = Exception::new(CONFIGURATION, "Time", error.to_string());
+            exception.text("what", *what).number("value", *value)
         }
-        E::Resume { name, taken, given } => {
-            named("Resume", name).text("taken", taken).text("given", given)
+        E::Resume { name, saved, requested } => {
+            named("Resume", name).text("taken", saved).text("given", requested)
         }
         E::Call { slave, time, source } => {
             called(failed("Call").text("fmu", slave).number("time", *time), source)

@@ -183,7 +183,8 @@ pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bo
 /// 4 and 5 of section 3.2.3. Inputs may also be set before initialization mode, as importers do.
 #[must_use]
 pub fn settable(
-    (causality, variability): (Causality, Variability),
+    causality: Causality,
+    variability: Variability,
     initial: Option<Initial>,
     is_state: bool,
 ) -> u16 {

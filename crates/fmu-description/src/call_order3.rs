@@ -175,7 +175,8 @@ pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
 /// `is_state`: `Some(reinit)` for a continuous state.
 #[must_use]
 pub fn settable(
-    (causality, variability): (Causality, Variability),
+    causality: Causality,
+    variability: Variability,
     initial: Option<Initial>,
     is_state: Option<bool>,
 ) -> u16 {
@@ -276,7 +277,7 @@ mod tests {
         use Causality::{Input, Local, Output, Parameter, StructuralParameter};
         use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
         let exact = Some(Initial::Exact);
-        for (role, initial, state, expected) in [
+        for ((causality, variability), initial, state, expected) in [
             ((Input, Continuous), None, None, I | M | V | N | C | U),
             ((Input, Discrete), None, None, I | M | V | C),
             ((Parameter, Fixed), exact, None, I | M),
@@ -289,7 +290,8 @@ mod tests {
             ((StructuralParameter, Fixed), exact, None, G),
             ((StructuralParameter, Tunable), exact, None, G | R),
         ] {
-            assert_eq!(settable(role, initial, state), expected, "{role:?}");
+            let states = settable(causality, variability, initial, state);
+            assert_eq!(states, expected, "{causality:?} {variability:?}");
         }
     }
 }

@@ -124,10 +124,10 @@ pub struct Warning {
 
 impl fmt::Display for Warning {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Warning { at, place, expected, found, assumed, section, .. } = self;
+        let Warning { at, place, expected, found: actual, assumed, section, .. } = self;
         write!(
             formatter,
-            "{at}: {place}: expected {expected}, found {found}; {assumed} (section {section})"
+            "{at}: {place}: expected {expected}, found {actual}; {assumed} (section {section})"
         )
     }
 }

@@ -102,16 +102,16 @@ impl ModelDescription {
     #[must_use]
     pub fn stepped(&self) -> Option<CoSimulation> {
         let scheduled = || {
-            let own = self.scheduled_execution.as_ref()?;
+            let flags = self.scheduled_execution.as_ref()?;
             Some(CoSimulation {
-                model_identifier: own.model_identifier.clone(),
-                needs_execution_tool: own.needs_execution_tool,
+                model_identifier: flags.model_identifier.clone(),
+                needs_execution_tool: flags.needs_execution_tool,
                 can_handle_variable_communication_step_size: true,
-                can_be_instantiated_only_once_per_process: own
+                can_be_instantiated_only_once_per_process: flags
                     .can_be_instantiated_only_once_per_process,
-                can_get_and_set_fmu_state: own.can_get_and_set_fmu_state,
-                can_serialize_fmu_state: own.can_serialize_fmu_state,
-                provides_directional_derivative: own.provides_directional_derivative,
+                can_get_and_set_fmu_state: flags.can_get_and_set_fmu_state,
+                can_serialize_fmu_state: flags.can_serialize_fmu_state,
+                provides_directional_derivative: flags.provides_directional_derivative,
                 has_event_mode: true,
                 ..CoSimulation::default()
             })

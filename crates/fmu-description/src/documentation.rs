@@ -35,9 +35,13 @@ pub fn page(description: &ModelDescription, model_html: &str) -> String {
     let third = description.version() == Version::V3;
     let simulation = description.co_simulation.as_ref();
     let simulation =
-        simulation.map(|own| if third { co_simulation_3(own) } else { co_simulation(own) });
-    let exchange = description.model_exchange.as_ref().map(|own| {
-        if third { model_exchange_3(own, description) } else { model_exchange(own, description) }
+        simulation.map(|flags| if third { co_simulation_3(flags) } else { co_simulation(flags) });
+    let exchange = description.model_exchange.as_ref().map(|flags| {
+        if third {
+            model_exchange_3(flags, description)
+        } else {
+            model_exchange(flags, description)
+        }
     });
     let sections = [
         format!("<h1>{title}</h1>\n"),
@@ -141,8 +145,8 @@ fn code(text: &str) -> String {
 /// structural parameters.
 fn type_name(variable: &ScalarVariable, version: Version) -> String {
     let name = match &variable.kind {
-        Kind::Enumeration(own) => {
-            let name = own.declared_type.as_deref().unwrap_or_default();
+        Kind::Enumeration(integer) => {
+            let name = integer.declared_type.as_deref().unwrap_or_default();
             format!("Enumeration {}", escaped(name))
         }
         other => other.element_in(version).to_owned(),
@@ -159,12 +163,16 @@ fn type_name(variable: &ScalarVariable, version: Version) -> String {
 fn list(elements: &Elements) -> String {
     const SHOWN: usize = 20;
     let texts: Vec<String> = match elements {
-        Elements::Real(own) => own.iter().take(SHOWN).map(|own| format!("{own:?}")).collect(),
-        Elements::Integer(own) => own.iter().take(SHOWN).map(ToString::to_string).collect(),
-        Elements::Boolean(own) => own.iter().take(SHOWN).map(ToString::to_string).collect(),
-        Elements::String(own) => own.iter().take(SHOWN).map(|own| format!("{own:?}")).collect(),
-        Elements::Binary(own) => {
-            own.iter().take(SHOWN).map(|own| format!("{} bytes", own.len())).collect()
+        Elements::Real(values) => {
+            values.iter().take(SHOWN).map(|value| format!("{value:?}")).collect()
+        }
+        Elements::Integer(values) => values.iter().take(SHOWN).map(ToString::to_string).collect(),
+        Elements::Boolean(values) => values.iter().take(SHOWN).map(ToString::to_string).collect(),
+        Elements::String(values) => {
+            values.iter().take(SHOWN).map(|value| format!("{value:?}")).collect()
+        }
+        Elements::Binary(values) => {
+            values.iter().take(SHOWN).map(|value| format!("{} bytes", value.len())).collect()
         }
     };
     let more = if elements.len() > SHOWN { ", ..." } else { "" };
@@ -178,21 +186,22 @@ fn list(elements: &Elements) -> String {
 pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
     let none = String::new;
     match kind {
-        Kind::Real(own) | Kind::Float32(own) => {
+        Kind::Real(real) | Kind::Float32(real) => {
             let number = |value: Option<f64>| value.map_or_else(none, |value| format!("{value:?}"));
-            let unit = own.unit.clone().unwrap_or_default();
-            (unit, [number(own.start), number(own.min), number(own.max)])
+            let unit = real.unit.clone().unwrap_or_default();
+            (unit, [number(real.start), number(real.min), number(real.max)])
         }
-        Kind::Enumeration(own) => {
+        Kind::Enumeration(integer) => {
             let declared =
-                types.iter().find(|other| Some(&other.name) == own.declared_type.as_ref());
-            let items = declared.map_or(&[][..], |own| &own.items);
+                types.iter().find(|other| Some(&other.name) == integer.declared_type.as_ref());
+            let items = declared.map_or(&[][..], |declared| &declared.items);
             let item = |value: Option<i128>| {
                 let Some(value) = value else { return none() };
-                let item = items.iter().find(|(_, own)| i128::from(*own) == value);
+                let item =
+                    items.iter().find(|(_, value_of_item)| i128::from(*value_of_item) == value);
                 item.map_or_else(|| value.to_string(), |(name, _)| format!("{value} ({name})"))
             };
-            (none(), [item(own.start), item(own.min), item(own.max)])
+            (none(), [item(integer.start), item(integer.min), item(integer.max)])
         }
         Kind::Boolean(start) => {
             (none(), [start.map_or_else(none, |start| start.to_string()), none(), none()])
@@ -201,22 +210,25 @@ pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
             let text = start.as_ref().map_or_else(none, |start| format!("\"{start}\""));
             (none(), [text, none(), none()])
         }
-        Kind::Binary(own) => {
-            let bytes = own.start.as_ref();
+        Kind::Binary(binary) => {
+            let bytes = binary.start.as_ref();
             let hex = bytes.map_or_else(none, |bytes| {
                 bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
             });
             (none(), [hex, none(), none()])
         }
-        Kind::Clock(own) => {
-            let interval = own.interval_decimal.map_or_else(none, |value| format!("{value:?}"));
+        Kind::Clock(clock) => {
+            let interval = clock.interval_decimal.map_or_else(none, |value| format!("{value:?}"));
             ("s".to_owned(), [interval, none(), none()])
         }
         other => {
             let number = |value: Option<i128>| value.map_or_else(none, |value| value.to_string());
-            let own = other.as_integer();
-            let of = |of: fn(&IntegerType) -> Option<i128>| number(own.and_then(of));
-            (none(), [of(|own| own.start), of(|own| own.min), of(|own| own.max)])
+            let integer = other.as_integer();
+            let of = |of: fn(&IntegerType) -> Option<i128>| number(integer.and_then(of));
+            (
+                none(),
+                [of(|integer| integer.start), of(|integer| integer.min), of(|integer| integer.max)],
+            )
         }
     }
 }
@@ -225,20 +237,20 @@ fn log_categories(description: &ModelDescription) -> String {
     let rows: Vec<Vec<String>> = description
         .log_categories
         .iter()
-        .map(|own| {
-            let text = own.description.as_deref().unwrap_or_default();
-            vec![code(&own.name), escaped(text).into_owned()]
+        .map(|category| {
+            let text = category.description.as_deref().unwrap_or_default();
+            vec![code(&category.name), escaped(text).into_owned()]
         })
         .collect();
     table(&["Category", "Messages"], &rows)
 }
 
-fn experiment(own: &DefaultExperiment) -> String {
+fn experiment(default_experiment: &DefaultExperiment) -> String {
     let rows: Vec<Vec<String>> = [
-        ("Start time in s", own.start_time),
-        ("Stop time in s", own.stop_time),
-        ("Relative tolerance", own.tolerance),
-        ("Step size in s", own.step_size),
+        ("Start time in s", default_experiment.start_time),
+        ("Stop time in s", default_experiment.stop_time),
+        ("Relative tolerance", default_experiment.tolerance),
+        ("Step size in s", default_experiment.step_size),
     ]
     .iter()
     .filter_map(|(name, value)| Some(vec![(*name).to_owned(), code(&format!("{:?}", (*value)?))]))
@@ -255,78 +267,78 @@ fn attributes(rows: &[(&str, &str)]) -> String {
     table(&[], &rows.iter().map(row).collect::<Vec<_>>())
 }
 
-fn co_simulation(own: &CoSimulation) -> String {
-    let order = own.max_output_derivative_order.to_string();
-    let variable_step = flag(own.can_handle_variable_communication_step_size);
-    let only_once = flag(own.can_be_instantiated_only_once_per_process);
-    let own_memory = flag(own.can_not_use_memory_management_functions);
+fn co_simulation(flags: &CoSimulation) -> String {
+    let order = flags.max_output_derivative_order.to_string();
+    let variable_step = flag(flags.can_handle_variable_communication_step_size);
+    let only_once = flag(flags.can_be_instantiated_only_once_per_process);
+    let own_memory = flag(flags.can_not_use_memory_management_functions);
     attributes(&[
-        ("modelIdentifier", own.model_identifier.as_str()),
-        ("needsExecutionTool", flag(own.needs_execution_tool)),
+        ("modelIdentifier", flags.model_identifier.as_str()),
+        ("needsExecutionTool", flag(flags.needs_execution_tool)),
         ("canHandleVariableCommunicationStepSize", variable_step),
-        ("canInterpolateInputs", flag(own.can_interpolate_inputs)),
+        ("canInterpolateInputs", flag(flags.can_interpolate_inputs)),
         ("maxOutputDerivativeOrder", &order),
-        ("canRunAsynchronuously", flag(own.can_run_asynchronuously)),
+        ("canRunAsynchronuously", flag(flags.can_run_asynchronuously)),
         ("canBeInstantiatedOnlyOncePerProcess", only_once),
         ("canNotUseMemoryManagementFunctions", own_memory),
-        ("canGetAndSetFMUstate", flag(own.can_get_and_set_fmu_state)),
-        ("canSerializeFMUstate", flag(own.can_serialize_fmu_state)),
-        ("providesDirectionalDerivative", flag(own.provides_directional_derivative)),
+        ("canGetAndSetFMUstate", flag(flags.can_get_and_set_fmu_state)),
+        ("canSerializeFMUstate", flag(flags.can_serialize_fmu_state)),
+        ("providesDirectionalDerivative", flag(flags.provides_directional_derivative)),
     ])
 }
 
-fn model_exchange(own: &ModelExchange, description: &ModelDescription) -> String {
+fn model_exchange(flags: &ModelExchange, description: &ModelDescription) -> String {
     let states = description.structure.derivatives.len().to_string();
     let indicators = description.number_of_event_indicators.unwrap_or_default().to_string();
-    let only_once = flag(own.can_be_instantiated_only_once_per_process);
-    let own_memory = flag(own.can_not_use_memory_management_functions);
+    let only_once = flag(flags.can_be_instantiated_only_once_per_process);
+    let own_memory = flag(flags.can_not_use_memory_management_functions);
     attributes(&[
-        ("modelIdentifier", own.model_identifier.as_str()),
+        ("modelIdentifier", flags.model_identifier.as_str()),
         ("continuous states", &states),
         ("numberOfEventIndicators", &indicators),
-        ("needsExecutionTool", flag(own.needs_execution_tool)),
-        ("completedIntegratorStepNotNeeded", flag(own.completed_integrator_step_not_needed)),
+        ("needsExecutionTool", flag(flags.needs_execution_tool)),
+        ("completedIntegratorStepNotNeeded", flag(flags.completed_integrator_step_not_needed)),
         ("canBeInstantiatedOnlyOncePerProcess", only_once),
         ("canNotUseMemoryManagementFunctions", own_memory),
-        ("canGetAndSetFMUstate", flag(own.can_get_and_set_fmu_state)),
-        ("canSerializeFMUstate", flag(own.can_serialize_fmu_state)),
-        ("providesDirectionalDerivative", flag(own.provides_directional_derivative)),
+        ("canGetAndSetFMUstate", flag(flags.can_get_and_set_fmu_state)),
+        ("canSerializeFMUstate", flag(flags.can_serialize_fmu_state)),
+        ("providesDirectionalDerivative", flag(flags.provides_directional_derivative)),
     ])
 }
 
-fn co_simulation_3(own: &CoSimulation) -> String {
-    let order = own.max_output_derivative_order.to_string();
-    let step = own.fixed_internal_step_size.map(|step| format!("{step:?} s"));
+fn co_simulation_3(flags: &CoSimulation) -> String {
+    let order = flags.max_output_derivative_order.to_string();
+    let step = flags.fixed_internal_step_size.map(|step| format!("{step:?} s"));
     attributes(&[
-        ("modelIdentifier", own.model_identifier.as_str()),
-        ("needsExecutionTool", flag(own.needs_execution_tool)),
+        ("modelIdentifier", flags.model_identifier.as_str()),
+        ("needsExecutionTool", flag(flags.needs_execution_tool)),
         (
             "canHandleVariableCommunicationStepSize",
-            flag(own.can_handle_variable_communication_step_size),
+            flag(flags.can_handle_variable_communication_step_size),
         ),
         ("fixedInternalStepSize", step.as_deref().unwrap_or("none")),
         ("maxOutputDerivativeOrder", &order),
-        ("hasEventMode", flag(own.has_event_mode)),
-        ("mightReturnEarlyFromDoStep", flag(own.might_return_early_from_do_step)),
+        ("hasEventMode", flag(flags.has_event_mode)),
+        ("mightReturnEarlyFromDoStep", flag(flags.might_return_early_from_do_step)),
         (
             "canReturnEarlyAfterIntermediateUpdate",
-            flag(own.can_return_early_after_intermediate_update),
+            flag(flags.can_return_early_after_intermediate_update),
         ),
-        ("providesIntermediateUpdate", flag(own.provides_intermediate_update)),
+        ("providesIntermediateUpdate", flag(flags.provides_intermediate_update)),
         (
             "canBeInstantiatedOnlyOncePerProcess",
-            flag(own.can_be_instantiated_only_once_per_process),
+            flag(flags.can_be_instantiated_only_once_per_process),
         ),
-        ("canGetAndSetFMUState", flag(own.can_get_and_set_fmu_state)),
-        ("canSerializeFMUState", flag(own.can_serialize_fmu_state)),
-        ("providesDirectionalDerivatives", flag(own.provides_directional_derivative)),
-        ("providesAdjointDerivatives", flag(own.provides_adjoint_derivatives)),
-        ("providesPerElementDependencies", flag(own.provides_per_element_dependencies)),
-        ("providesEvaluateDiscreteStates", flag(own.provides_evaluate_discrete_states)),
+        ("canGetAndSetFMUState", flag(flags.can_get_and_set_fmu_state)),
+        ("canSerializeFMUState", flag(flags.can_serialize_fmu_state)),
+        ("providesDirectionalDerivatives", flag(flags.provides_directional_derivative)),
+        ("providesAdjointDerivatives", flag(flags.provides_adjoint_derivatives)),
+        ("providesPerElementDependencies", flag(flags.provides_per_element_dependencies)),
+        ("providesEvaluateDiscreteStates", flag(flags.provides_evaluate_discrete_states)),
     ])
 }
 
-fn model_exchange_3(own: &ModelExchange, description: &ModelDescription) -> String {
+fn model_exchange_3(flags: &ModelExchange, description: &ModelDescription) -> String {
     let size = |rows: &[Unknown]| {
         let variables = rows.iter().filter_map(|row| description.at(row.index));
         let sizes = variables.map(|variable| variable.size(description));
@@ -335,21 +347,21 @@ fn model_exchange_3(own: &ModelExchange, description: &ModelDescription) -> Stri
     let states = size(&description.structure.derivatives);
     let indicators = size(&description.structure.event_indicators);
     attributes(&[
-        ("modelIdentifier", own.model_identifier.as_str()),
+        ("modelIdentifier", flags.model_identifier.as_str()),
         ("continuous states", &states),
         ("event indicators", &indicators),
-        ("needsExecutionTool", flag(own.needs_execution_tool)),
-        ("needsCompletedIntegratorStep", flag(own.needs_completed_integrator_step)),
+        ("needsExecutionTool", flag(flags.needs_execution_tool)),
+        ("needsCompletedIntegratorStep", flag(flags.needs_completed_integrator_step)),
         (
             "canBeInstantiatedOnlyOncePerProcess",
-            flag(own.can_be_instantiated_only_once_per_process),
+            flag(flags.can_be_instantiated_only_once_per_process),
         ),
-        ("canGetAndSetFMUState", flag(own.can_get_and_set_fmu_state)),
-        ("canSerializeFMUState", flag(own.can_serialize_fmu_state)),
-        ("providesDirectionalDerivatives", flag(own.provides_directional_derivative)),
-        ("providesAdjointDerivatives", flag(own.provides_adjoint_derivatives)),
-        ("providesPerElementDependencies", flag(own.provides_per_element_dependencies)),
-        ("providesEvaluateDiscreteStates", flag(own.provides_evaluate_discrete_states)),
+        ("canGetAndSetFMUState", flag(flags.can_get_and_set_fmu_state)),
+        ("canSerializeFMUState", flag(flags.can_serialize_fmu_state)),
+        ("providesDirectionalDerivatives", flag(flags.provides_directional_derivative)),
+        ("providesAdjointDerivatives", flag(flags.provides_adjoint_derivatives)),
+        ("providesPerElementDependencies", flag(flags.provides_per_element_dependencies)),
+        ("providesEvaluateDiscreteStates", flag(flags.provides_evaluate_discrete_states)),
     ])
 }
 

@@ -19,13 +19,13 @@ pub fn nearest(description: &ModelDescription, name: &str) -> String {
 /// most two, ignoring case.
 #[must_use]
 pub fn among<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str> {
-    let wanted = name.to_ascii_lowercase();
+    let lower = name.to_ascii_lowercase();
     let near = |known: &&str| {
         let known = known.to_ascii_lowercase();
-        known.contains(&wanted) || wanted.contains(&known) || levenshtein(&known, &wanted) <= EDITS
+        known.contains(&lower) || lower.contains(&known) || levenshtein(&known, &lower) <= EDITS
     };
     let mut similar: Vec<_> = names.filter(near).collect();
-    similar.sort_by_key(|known| levenshtein(&known.to_ascii_lowercase(), &wanted));
+    similar.sort_by_key(|known| levenshtein(&known.to_ascii_lowercase(), &lower));
     similar.truncate(5);
     similar
 }
@@ -34,7 +34,7 @@ pub fn among<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a st
 /// one letter.
 #[must_use]
 pub fn slip<'a>(mut names: impl Iterator<Item = &'a str>, name: &str) -> Option<&'a str> {
-    let wanted = name.to_ascii_lowercase();
-    let edits = usize::from(wanted.len() > 3);
-    names.find(|known| levenshtein(&known.to_ascii_lowercase(), &wanted) <= edits)
+    let lower = name.to_ascii_lowercase();
+    let edits = usize::from(lower.len() > 3);
+    names.find(|known| levenshtein(&known.to_ascii_lowercase(), &lower) <= edits)
 }

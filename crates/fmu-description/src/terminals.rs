@@ -68,7 +68,9 @@ impl Output {
         let signals: Vec<_> = description
             .variables
             .iter()
-            .filter(|own| is_signal(own.causality) && !matches!(own.kind, Kind::Clock(_)))
+            .filter(|variable| {
+                is_signal(variable.causality) && !matches!(variable.kind, Kind::Clock(_))
+            })
             .collect();
         if signals.is_empty() {
             return;
@@ -77,12 +79,12 @@ impl Output {
         let terminal = [("name", "signals"), ("matchingRule", "bus"), ("description", text)];
         self.within("Terminals", &[], |output| {
             output.within("Terminal", &terminal, |output| {
-                for own in &signals {
+                for signal in &signals {
                     output.empty(
                         "TerminalMemberVariable",
                         &[
-                            ("variableName", &own.name),
-                            ("memberName", &own.name),
+                            ("variableName", &signal.name),
+                            ("memberName", &signal.name),
                             ("variableKind", "signal"),
                         ],
                     );

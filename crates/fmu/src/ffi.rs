@@ -167,7 +167,7 @@ unsafe fn text(pointer: fmi2String, what: &str) -> Result<String, Failure> {
 
 unsafe fn texts(pointer: *const fmi2String, count: usize) -> Result<Vec<String>, Failure> {
     // SAFETY: the caller gives `count` strings.
-    unsafe { read(pointer, count)?.iter().map(|&each| text(each, "a string")).collect() }
+    unsafe { read(pointer, count)?.iter().map(|&pointer| text(pointer, "a string")).collect() }
 }
 
 unsafe fn write_one<T>(target: *mut T, value: T) -> Result<(), Failure> {
@@ -214,7 +214,7 @@ pub unsafe fn instantiate<M: Model>(
     let functions = *functions;
     let mut callbacks = Callbacks::Version2 { functions, instance_name: CString::default() };
     // SAFETY: strings as the standard demands them.
-    let made = unsafe { text(instance_name, "instanceName") }.and_then(|name| {
+    let instance = unsafe { text(instance_name, "instanceName") }.and_then(|name| {
         if name.is_empty() {
             return Err(Failure::Error("instanceName is empty".to_owned()));
         }
@@ -233,7 +233,7 @@ pub unsafe fn instantiate<M: Model>(
         let (guid, folder) = unsafe { (text(guid, "fmuGUID")?, resources(resource_location)?) };
         Instance::<M>::new(interface_type, &folder, &guid, callbacks.clone())
     });
-    match made {
+    match instance {
         Ok(mut instance) => {
             instance.set_logging_on(logging_on != 0);
             instance.send_messages();
@@ -290,7 +290,8 @@ fn render(description: &ModelDescription) -> Result<String, Failure> {
 /// Passes the model description that `make` makes, or an error message, to `sink`.
 unsafe fn pass_description(
     resources: *const c_char,
-    (context, sink): (*mut c_void, DescribeSink),
+    context: *mut c_void,
+    sink: DescribeSink,
     make: impl FnOnce(&Path) -> Result<ModelDescription, Failure>,
 ) -> fmi2Integer {
     let hook_guard = HookGuard::new();
@@ -316,5 +317,5 @@ pub unsafe fn describe<M: Model>(
     sink: DescribeSink,
 ) -> fmi2Integer {
     // SAFETY: the arguments are passed on unchanged.
-    unsafe { pass_description(resources, (context, sink), crate::interface::describe::<M>) }
+    unsafe { pass_description(resources, context, sink, crate::interface::describe::<M>) }
 }

@@ -160,7 +160,7 @@ impl<M: Model> Instance<M> {
     ) -> Result<Self, Failure> {
         // The guard outlives a panic of the model, during which it could not restore the hook.
         let hook_guard = HookGuard::new();
-        let made = guarded(|| {
+        let build = guarded(|| {
             let mut fresh = make()?;
             let messages = fresh.log().map(Log::take).unwrap_or_default();
             let (mut interface, mut description) = Interface::new(&mut fresh)?;
@@ -183,7 +183,7 @@ impl<M: Model> Instance<M> {
                 hook_guard,
             })
         })?;
-        Ok(made(hook_guard))
+        Ok(build(hook_guard))
     }
 
     /// An instance for co-simulation of `model` in the same program, with its model description of FMI 2.0.
@@ -441,18 +441,18 @@ impl<M: Model> Instance<M> {
 
 /// Checks the GUID or the token that the importer read in the description.
 fn check_guid<M: Model>(
-    own: Guid,
+    guid_of_library: Guid,
     what: &str,
     guid: &str,
     resources: &Path,
 ) -> Result<(), Failure> {
-    let (name, own) = (M::IDENTIFIER, own.to_string());
-    if guid == own {
+    let (name, described) = (M::IDENTIFIER, guid_of_library.to_string());
+    if guid == described {
         return Ok(());
     }
     Err(Failure::Error(format!(
         "the {what} is {guid}, but this library of {name} with the resources in {} describes itself \
-         with {own}",
+         with {described}",
         resources.display()
     )))
 }

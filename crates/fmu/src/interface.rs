@@ -76,7 +76,7 @@ impl<M: Model> Interface<M> {
             strings: Vec::new(),
             typed: Slots::default(),
             states: Vec::new(),
-            event_indicators: model.model_exchange().map(|own| own.event_indicators),
+            event_indicators: model.model_exchange().map(|interface| interface.event_indicators),
             max_output_derivative_order: 0,
             interpolated: Vec::new(),
             log_categories: names(&description.log_categories),
@@ -105,11 +105,11 @@ impl<M: Model> Interface<M> {
         for state in &self.states {
             let slot = &mut self.reals[state.state];
             slot.is_state = true;
-            slot.settable = settable((slot.causality, slot.variability), slot.initial, true);
+            slot.settable = settable(slot.causality, slot.variability, slot.initial, true);
         }
         let real = |row: &Unknown| {
-            let own = &description.variables[row.index as usize - 1];
-            matches!(own.kind, Kind::Real(_)).then(|| own.value_reference as usize - 1)
+            let variable = &description.variables[row.index as usize - 1];
+            matches!(variable.kind, Kind::Real(_)).then(|| variable.value_reference as usize - 1)
         };
         for (position, slot) in self.reals.iter().enumerate() {
             if slot.causality == Causality::Input && !slot.derivatives.is_empty() {
@@ -143,9 +143,9 @@ impl<M: Model> Interface<M> {
             let (kind, value_reference) = self
                 .assign_reference(model, variable, fields)
                 .map_err(|reason| Failure::Error(format!("variable {name}: {reason}")))?;
-            let own = &mut description.variables[position + 1];
-            keep_derivative(&mut own.kind, kind);
-            own.value_reference = value_reference;
+            let variable = &mut description.variables[position + 1];
+            keep_derivative(&mut variable.kind, kind);
+            variable.value_reference = value_reference;
         }
         describe_aliases(aliases, description);
         Ok(())
@@ -193,7 +193,7 @@ impl<M: Model> Interface<M> {
                 let start = start_given.then(|| field(model).clone());
                 (Kind::String(start), builder.build(&mut self.strings, field))
             }
-            Access::Typed(field) => self.typed.add(model, (field, number), start_given, builder)?,
+            Access::Typed(field) => self.typed.add(model, field, number, start_given, builder)?,
             Access::Alias => return Err("it is an alias".to_owned()),
         })
     }
@@ -203,8 +203,8 @@ impl<M: Model> Interface<M> {
 /// the indices of the others must not change.
 fn split<M>(variables: Vec<Variable<M>>) -> (Vec<Declaration>, Vec<Fields<M>>) {
     let (last, first): (Vec<_>, Vec<_>) =
-        variables.into_iter().partition(|own| own.declaration.is_left_out_of_2());
-    first.into_iter().chain(last).map(|own| (own.declaration, own.fields)).unzip()
+        variables.into_iter().partition(|variable| variable.declaration.is_left_out_of_2());
+    first.into_iter().chain(last).map(|variable| (variable.declaration, variable.fields)).unzip()
 }
 
 fn names(categories: &[LogCategory]) -> Vec<String> {
@@ -243,12 +243,12 @@ fn continuous_state(
     derivative: usize,
 ) -> Result<ContinuousState, Failure> {
     let slot = |position: usize| {
-        let own = &description.variables[position + 1];
-        match &own.kind {
-            Kind::Real(real) => Ok((own.value_reference as usize - 1, real.nominal)),
+        let variable = &description.variables[position + 1];
+        match &variable.kind {
+            Kind::Real(real) => Ok((variable.value_reference as usize - 1, real.nominal)),
             _ => Err(Failure::Error(format!(
                 "{} is no Real, but a state or its derivative",
-                own.name
+                variable.name
             ))),
         }
     };
@@ -271,13 +271,13 @@ pub fn describe<M: Model>(resources: &std::path::Path) -> Result<ModelDescriptio
 
 /// Checks that every variable has a type of FMI 2.0.
 fn expressible_in_2(description: &ModelDescription) -> Result<(), Failure> {
-    match description.variables.iter().find(|own| is_of_3(own)) {
+    match description.variables.iter().find(|variable| is_of_3(variable)) {
         None => Ok(()),
-        Some(own) => Err(Failure::Error(format!(
+        Some(variable) => Err(Failure::Error(format!(
             "variable {} is a {}, a type that FMI 2.0 does not have: this model is for FMI 3.0 only \
              (aso-ftc pack --fmi 3)",
-            own.name,
-            own.kind.element()
+            variable.name,
+            variable.kind.element()
         ))),
     }
 }
@@ -315,11 +315,12 @@ impl<M> Interface<M> {
     ///
     /// [`Failure::Error`] for a variable of another type that FMI 2.0 does not have.
     pub(crate) fn restrict(&mut self, description: &mut ModelDescription) -> Result<(), Failure> {
-        let left_out = |own: &ScalarVariable| {
-            own.causality == Causality::StructuralParameter || matches!(own.kind, Kind::Clock(_))
+        let left_out = |variable: &ScalarVariable| {
+            variable.causality == Causality::StructuralParameter
+                || matches!(variable.kind, Kind::Clock(_))
         };
         if description.variables.iter().any(left_out) {
-            description.variables.retain(|own| !left_out(own));
+            description.variables.retain(|variable| !left_out(variable));
             // The variables that are left out are the last ones.
             let count = description.variables.len();
             let structure = &mut description.structure;
@@ -349,10 +350,10 @@ impl<M> Interface<M> {
         let (table, mut converted) = fmi3::describe(description, indicators);
         self.sizes.enter(&mut converted)?;
         self.clocks.enter(&mut converted)?;
-        for own in &mut converted.variables {
-            own.intermediate_update = self.interpolates(&own.name);
+        for variable in &mut converted.variables {
+            variable.intermediate_update = self.interpolates(&variable.name);
         }
-        let intermediate = converted.variables.iter().any(|own| own.intermediate_update);
+        let intermediate = converted.variables.iter().any(|variable| variable.intermediate_update);
         if let Some(co_simulation) = &mut converted.co_simulation {
             co_simulation.provides_intermediate_update = intermediate;
         }
@@ -366,8 +367,8 @@ impl<M> Interface<M> {
         for slot in &mut self.reals {
             let is_state = slot.is_state && interface_type == InterfaceType::ModelExchange;
             let is_state = is_state.then_some(slot.is_reinitialised);
-            let role = (slot.causality, slot.variability);
-            slot.settable = call_order3::settable(role, slot.initial, is_state);
+            slot.settable =
+                call_order3::settable(slot.causality, slot.variability, slot.initial, is_state);
         }
         Ok((table, converted))
     }

@@ -94,7 +94,7 @@ impl Stepper {
         step: &Step,
         tolerance: Option<f64>,
     ) -> Result<(), Failure> {
-        self.with_equations((model, interface), step, tolerance, |stepper, equations| {
+        self.with_equations(model, interface, step, tolerance, |stepper, equations| {
             stepper.follow(equations, step)
         })
     }
@@ -118,7 +118,7 @@ impl Stepper {
         if target <= start {
             return Ok(Stop { time: start, is_event: true });
         }
-        self.with_equations((model, interface), step, tolerance, |stepper, equations| {
+        self.with_equations(model, interface, step, tolerance, |stepper, equations| {
             Ok(match stepper.integrate(equations, start, target)? {
                 Reached::End => {
                     Stop { time: target, is_event: next.is_some_and(|next| next <= end) }
@@ -131,7 +131,8 @@ impl Stepper {
     /// Runs `body` with the equations of the model during a step.
     fn with_equations<M: Model, T>(
         &mut self,
-        (model, interface): (&mut M, &Interface<M>),
+        model: &mut M,
+        interface: &Interface<M>,
         step: &Step,
         tolerance: Option<f64>,
         body: impl FnOnce(&mut Self, &mut Equations<'_, M>) -> Result<T, Failure>,

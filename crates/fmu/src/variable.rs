@@ -311,11 +311,11 @@ impl<M> Variable<M> {
     }
 
     fn any_parameter(mut self, variability: Variability) -> Self {
-        let own = &mut self.declaration;
-        if own.causality != Causality::StructuralParameter {
-            own.causality = Causality::Parameter;
+        let declaration = &mut self.declaration;
+        if declaration.causality != Causality::StructuralParameter {
+            declaration.causality = Causality::Parameter;
         }
-        (own.variability, own.initial) = (variability, Some(Initial::Exact));
+        (declaration.variability, declaration.initial) = (variability, Some(Initial::Exact));
         self
     }
 

@@ -232,8 +232,8 @@ impl Algorithm {
         };
         let crossing = self.events.iter().any(|event| matches!(event, EventSource::Crossing(_)));
         let located = crossing.then(|| "the location of crossings".to_owned());
-        let kept = self.rollback.then(|| "steps with rollback".to_owned());
-        if let Some(required_by) = repeats.or(located).or(kept) {
+        let rollback = self.rollback.then(|| "steps with rollback".to_owned());
+        if let Some(required_by) = repeats.or(located).or(rollback) {
             let lacks = "canGetAndSetFMUstate";
             require(system, lacks, &required_by, |flags| flags.can_get_and_set_fmu_state)?;
         }

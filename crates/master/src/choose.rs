@@ -251,7 +251,10 @@ fn explain_signals(system: &System, discrete: &[Port], reasons: &mut Vec<String>
     let signal_type = |port: Port| {
         if discrete.contains(&port) { SignalType::Discrete } else { system.signal_type(port) }
     };
-    let of_connection = |own: &Connection| match (signal_type(own.from), signal_type(own.to)) {
+    let of_connection = |connection: &Connection| match (
+        signal_type(connection.from),
+        signal_type(connection.to),
+    ) {
         (SignalType::Clocked, _) | (_, SignalType::Clocked) => SignalType::Clocked,
         (SignalType::Discrete, _) | (_, SignalType::Discrete) => SignalType::Discrete,
         _ => SignalType::Continuous,
@@ -273,10 +276,14 @@ fn explain_signals(system: &System, discrete: &[Port], reasons: &mut Vec<String>
         let names = system
             .connections
             .iter()
-            .filter(|own| of_connection(own) == chosen)
-            .filter(|own| (has_events(own.from) && has_events(own.to)) == events);
+            .filter(|connection| of_connection(connection) == chosen)
+            .filter(|connection| {
+                (has_events(connection.from) && has_events(connection.to)) == events
+            });
         let names: Vec<String> = names
-            .map(|own| format!("{} -> {}", system.name(own.from), system.name(own.to)))
+            .map(|connection| {
+                format!("{} -> {}", system.name(connection.from), system.name(connection.to))
+            })
             .collect();
         if !names.is_empty() {
             let names: Vec<&str> = names.iter().map(String::as_str).collect();

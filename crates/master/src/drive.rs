@@ -252,8 +252,9 @@ impl Drives {
         slave: usize,
         time: f64,
     ) -> Result<(), SystemError> {
-        let own = |drive: &&mut Drive| drive.kind == DriveKind::Clock && drive.port.slave == slave;
-        for drive in self.all.iter_mut().filter(own) {
+        let is_own_clock =
+            |drive: &&mut Drive| drive.kind == DriveKind::Clock && drive.port.slave == slave;
+        for drive in self.all.iter_mut().filter(is_own_clock) {
             let Some(sample) = drive.sample(time) else { continue };
             if sample.value != 0.0 && (drive.written.is_none() || drive.breaks_at(time)) {
                 let clock = [drive.reference];
@@ -429,9 +430,9 @@ impl DriveKind {
     /// Reals only.
     #[must_use]
     pub fn of(kind: &fmu_description::Kind, version: Version, derivatives: bool) -> Self {
-        let (least, largest) = kind.integer_range(version).unwrap_or_default();
-        let least = i64::try_from(least).unwrap_or(i64::MIN);
-        let largest = i64::try_from(largest).unwrap_or(i64::MAX);
+        let range = kind.integer_range(version).unwrap_or(0..=0);
+        let least = i64::try_from(*range.start()).unwrap_or(i64::MIN);
+        let largest = i64::try_from(*range.end()).unwrap_or(i64::MAX);
         match ValueType::of(kind) {
             _ if matches!(kind, fmu_description::Kind::Clock(_)) => Self::Clock,
             ValueType::Real => Self::Real { derivatives },

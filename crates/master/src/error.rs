@@ -235,14 +235,14 @@ pub enum SystemError {
         why: String,
     },
     /// A checkpoint cannot be resumed because a setting differs.
-    #[error("the checkpoint was taken with {name} {taken}; {name} {given} is not possible")]
+    #[error("the checkpoint was taken with {name} {saved}; {name} {requested} is not possible")]
     Resume {
         /// Name of the setting.
         name: &'static str,
         /// Its value in the run of the checkpoint.
-        taken: String,
+        saved: String,
         /// Its value now.
-        given: String,
+        requested: String,
     },
     /// The error of the smallest step exceeds the tolerance.
     #[error(

@@ -55,20 +55,20 @@ impl Events {
         let next = self.next_event(engine, time, planned.end)?;
         let limit = next.unwrap_or(planned.end);
         self.read_crossings(engine, time)?;
-        let mut made = control.step(engine, coupler, PlannedStep::between(time, limit))?;
-        if made.ending.is_some() {
-            return Ok(made);
+        let mut step = control.step(engine, coupler, PlannedStep::between(time, limit))?;
+        if step.ending.is_some() {
+            return Ok(step);
         }
-        let crossing = self.locate(engine, coupler, time, made.end)?;
-        let happened = crossing.is_some() || (next.is_some() && made.end >= limit);
+        let crossing = self.locate(engine, coupler, time, step.end)?;
+        let happened = crossing.is_some() || (next.is_some() && step.end >= limit);
         if let Some((end, swept)) = crossing {
-            made = StepMade::new(end, swept);
+            step = StepMade::new(end, swept);
         }
         if happened {
             engine.exchange.reals.clear_history();
             control.clear_history();
         }
-        Ok(made)
+        Ok(step)
     }
 
     /// Returns the time of the first announced event before `end`, or `end` itself if the event
@@ -111,7 +111,7 @@ impl Events {
         time: f64,
         end: f64,
     ) -> Result<Option<(f64, Swept)>, SystemError> {
-        let mut found: Option<(f64, Swept)> = None;
+        let mut crossing: Option<(f64, Swept)> = None;
         let (mut end, width) = (end, WIDTH * (end - time));
         for (&port, &before) in self.crossings.iter().zip(&self.before) {
             let after = engine.read_real(port, end)?;
@@ -128,8 +128,8 @@ impl Events {
                 bracket.tell(asked, value);
             }
             end = bracket.after();
-            found = Some((end, repeat_until(engine, end)?));
+            crossing = Some((end, repeat_until(engine, end)?));
         }
-        Ok(found)
+        Ok(crossing)
     }
 }

@@ -74,7 +74,11 @@ impl Exchange {
         let reals = Reals::new(system, algorithm, refusing);
         let to_reals: Vec<Port> = reals.integer_sources().iter().map(|(port, _)| *port).collect();
         let along = |way| -> Vec<&Connection> {
-            system.connections.iter().filter(|own| Way::of(system, own) == way).collect()
+            system
+                .connections
+                .iter()
+                .filter(|connection| Way::of(system, connection) == way)
+                .collect()
         };
         let held = Channels::new(system, &along(Way::Held), &to_reals);
         let at_events = Channels::new(system, &along(Way::AtEvents), &[]);

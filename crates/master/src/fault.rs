@@ -180,9 +180,9 @@ impl FaultChain {
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     pub fn apply_integer(&self, time: f64, value: i64) -> i64 {
-        let given = slave::to_real(value);
-        let faulty = self.apply(time, given);
-        if faulty.total_cmp(&given).is_eq() {
+        let real = slave::to_real(value);
+        let faulty = self.apply(time, real);
+        if faulty.total_cmp(&real).is_eq() {
             value
         } else if i32::try_from(value).is_ok() {
             (faulty.round() as i32).into()
@@ -233,7 +233,8 @@ impl FaultChain {
     /// false if they are not.
     pub(crate) fn inherit(&mut self, earlier: &Self) -> bool {
         let Some(first) = self.stages.get_mut(..earlier.stages.len()) else { return false };
-        let same = first.iter().zip(&earlier.stages).all(|(own, theirs)| own.is_same_fault(theirs));
+        let same =
+            first.iter().zip(&earlier.stages).all(|(stage, before)| stage.is_same_fault(before));
         if same {
             first.clone_from_slice(&earlier.stages);
         }

@@ -189,11 +189,11 @@ impl<'a> Graph<'a> {
                 self.write(system, node, value, time)?;
             }
             self.solve_reals(system, &reals, time)?;
-            let found = self.read_all(system, &others, time)?;
-            if found == held {
+            let values = self.read_all(system, &others, time)?;
+            if values == held {
                 return Ok(());
             }
-            held = found;
+            held = values;
         }
         let why = format!("its discrete values do not settle within {EVALUATIONS} passes");
         Err(self.unsolved(system, nodes, time, why))

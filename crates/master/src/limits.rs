@@ -29,7 +29,7 @@ struct Limits {
 type Types<'a> = HashMap<&'a str, &'a SimpleType>;
 
 fn types(description: &ModelDescription) -> Types<'_> {
-    description.types.iter().map(|own| (own.name.as_str(), own)).collect()
+    description.types.iter().map(|declared| (declared.name.as_str(), declared)).collect()
 }
 
 impl Limits {
@@ -37,18 +37,18 @@ impl Limits {
     fn of(variable: &ScalarVariable, types: &Types<'_>) -> Option<Self> {
         let declared = variable.kind.declared_type().and_then(|name| types.get(name));
         let (min, max, nominal) = match (variable.kind.as_real(), variable.kind.as_integer()) {
-            (Some(own), _) => {
+            (Some(kind), _) => {
                 let declared = declared.and_then(|declared| declared.kind.as_real());
-                let stated = |of: fn(&RealType) -> Option<f64>| of(own).or_else(|| of(declared?));
-                (stated(|own| own.min), stated(|own| own.max), stated(|own| own.nominal))
+                let stated = |of: fn(&RealType) -> Option<f64>| of(kind).or_else(|| of(declared?));
+                (stated(|kind| kind.min), stated(|kind| kind.max), stated(|kind| kind.nominal))
             }
-            (_, Some(own)) => {
+            (_, Some(kind)) => {
                 let declared = declared.and_then(|declared| declared.kind.as_integer());
                 let stated = |of: fn(&IntegerType) -> Option<i128>| {
                     #[expect(clippy::cast_precision_loss, reason = "rounds to the nearest number")]
-                    of(own).or_else(|| of(declared?)).map(|limit| limit as f64)
+                    of(kind).or_else(|| of(declared?)).map(|limit| limit as f64)
                 };
-                (stated(|own| own.min), stated(|own| own.max), Some(0.0))
+                (stated(|kind| kind.min), stated(|kind| kind.max), Some(0.0))
             }
             _ => return None,
         };
@@ -98,14 +98,14 @@ pub(crate) fn check_start(system: &System) {
     for (slave, (_, instance)) in system.slaves.iter().enumerate() {
         let description = instance.description();
         let types = types(description);
-        for (variable, own) in description.variables.iter().enumerate() {
+        for (variable, declaration) in description.variables.iter().enumerate() {
             let port = Port { slave, variable };
-            if own.alias_of.is_some() || system.source(port).is_some() {
+            if declaration.alias_of.is_some() || system.source(port).is_some() {
                 continue;
             }
-            let Some(limits) = Limits::of(own, &types) else { continue };
+            let Some(limits) = Limits::of(declaration, &types) else { continue };
             let setting = system.setting(port);
-            let value = setting.cloned().or_else(|| Value::start(&own.kind));
+            let value = setting.cloned().or_else(|| Value::start(&declaration.kind));
             let Some(value) = value.as_ref().and_then(number) else { continue };
             if let Some(why) = limits.refuse(value) {
                 let list = if setting.is_some() { &mut set } else { &mut started };
@@ -169,7 +169,8 @@ impl Watch {
     /// Watches the connected inputs of `system` that state limits. `position` is the position of an output among the
     /// connected Reals.
     pub(crate) fn new(system: &System, position: impl Fn(Port) -> Option<usize>) -> Self {
-        let types: Vec<_> = system.slaves.iter().map(|(_, own)| types(own.description())).collect();
+        let types: Vec<_> =
+            system.slaves.iter().map(|(_, instance)| types(instance.description())).collect();
         let watched = system.connections.iter().filter_map(|connection| {
             let (from, to) = (connection.from, connection.to);
             let limits = Limits::of(system.variable(to), &types[to.slave])?;
@@ -194,14 +195,14 @@ impl Watch {
         integer: impl Fn(Port) -> Option<i64>,
     ) {
         let reported = &mut self.reported;
-        self.watched.retain(|own| {
-            let Some(value) = own.value(reals, &integer) else { return true };
-            let Some(why) = own.limits.refuse(value) else { return true };
+        self.watched.retain(|input| {
+            let Some(value) = input.value(reals, &integer) else { return true };
+            let Some(why) = input.limits.refuse(value) else { return true };
             *reported += 1;
             let last = if *reported == NAMED { "; further inputs are not reported" } else { "" };
             tracing::warn!(
                 "{} gets {} at t = {} s by its connection, which is {why}{last}",
-                own.name,
+                input.name,
                 rounded(value, DIGITS),
                 seconds(time)
             );

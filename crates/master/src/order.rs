@@ -32,11 +32,11 @@ pub fn by_direct_dependencies(system: &System) -> Order {
         .filter(|connection| through[connection.to.slave].has(connection.to.variable))
         .map(|connection| (connection.from.slave, connection.to.slave))
         .collect();
-    let found = components(system.slaves.len(), &edges);
-    let loops = (0..found.len()).filter(|&k| found.is_loop(k));
-    let mut looped: Vec<usize> = loops.flat_map(|k| found.nodes(k)).copied().collect();
+    let components = components(system.slaves.len(), &edges);
+    let loops = (0..components.len()).filter(|&k| components.is_loop(k));
+    let mut looped: Vec<usize> = loops.flat_map(|k| components.nodes(k)).copied().collect();
     looped.sort_unstable();
-    Order { sequence: found.sequence().to_vec(), looped }
+    Order { sequence: components.sequence().to_vec(), looped }
 }
 
 /// Whether a connection passes values at ticks of clocks only: within an instant, not by the order of the steps.
@@ -64,7 +64,8 @@ fn passed_through(system: &System) -> Vec<Inputs> {
     let mut through: Vec<Inputs> =
         system.slaves.iter().map(|_| Inputs::These(HashSet::new())).collect();
     let mut rows: Vec<Option<HashMap<u32, &Unknown>>> = vec![None; system.slaves.len()];
-    for connection in system.connections.iter().filter(|own| !is_clocked(system, own)) {
+    for connection in system.connections.iter().filter(|connection| !is_clocked(system, connection))
+    {
         let from = connection.from;
         let description = system.slaves[from.slave].1.description();
         let rows = rows[from.slave].get_or_insert_with(|| by_index(&description.structure.outputs));

@@ -153,8 +153,8 @@ impl Readout {
         let position = self.present.len();
         self.present.push(false);
         let description = system.slaves[port.slave].1.description();
-        let clocks = system.variable(port).clocks.iter().filter_map(|own| description.at(*own));
-        let references: Vec<u32> = clocks.map(|own| own.value_reference).collect();
+        let clocks = system.variable(port).clocks.iter().filter_map(|index| description.at(*index));
+        let references: Vec<u32> = clocks.map(|clock| clock.value_reference).collect();
         match self.clocks.last_mut() {
             Some(last) if last.slave == port.slave && last.references == references => {
                 last.range.end = position + 1;

@@ -226,12 +226,12 @@ impl Simulation {
         let start = engine.grid.time;
         let planned = control.plan(engine);
         self.attempted = self.attempted.max(planned.end);
-        let made = match events {
+        let step = match events {
             None => control.step(engine, coupler, planned)?,
             Some(events) => events.step(engine, coupler, control, planned)?,
         };
-        engine.grid.reach(made.end);
-        if let Some(ending) = made.ending {
+        engine.grid.reach(step.end);
+        if let Some(ending) = step.ending {
             self.end_early(start, ending);
         }
         if self.time() > start && self.ended.is_none() {

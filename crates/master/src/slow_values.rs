@@ -131,7 +131,7 @@ impl SlowValues {
 
 impl SlowSlave {
     fn new(system: &System, ports: &[Port], slave: usize) -> Self {
-        let (mut own, mut places) = (Vec::new(), Vec::new());
+        let (mut ports_of_slave, mut places) = (Vec::new(), Vec::new());
         // Numbers of values of each type so far: start values, and values in a row.
         let mut counts = [[0; 2]; 4];
         for &port in ports {
@@ -145,11 +145,11 @@ impl SlowSlave {
                 let continuous =
                     kind == ValueType::Real && variable.variability == Variability::Continuous;
                 places.push(ValueIndex { kind, start: *starts, row, continuous });
-                own.push(port);
+                ports_of_slave.push(port);
                 *starts += 1;
             }
         }
-        Self { slave, start_values: Readout::new(system, &own), places }
+        Self { slave, start_values: Readout::new(system, &ports_of_slave), places }
     }
 
     /// Writes the values at the fraction `part` of the step to `row`.

@@ -114,7 +114,8 @@ impl SizeControl {
             StepControl::Energy => Controller::Energy(EnergyControl::new(
                 bounds,
                 extrapolation,
-                (relative, absolute),
+                relative,
+                absolute,
                 &powers,
             )),
         };
@@ -320,12 +321,12 @@ impl SizeControl {
             }
             StepControl::Energy => {
                 self.predict(reals, size);
-                let found = reals.outputs();
+                let outputs = reals.outputs();
                 self.states.clear();
                 for &(first, second) in &self.bonds {
                     self.states.push(Bond {
-                        first: (self.predicted[first], found[first]),
-                        second: (self.predicted[second], found[second]),
+                        first: (self.predicted[first], outputs[first]),
+                        second: (self.predicted[second], outputs[second]),
                     });
                 }
                 if let Controller::Energy(control) = &mut self.controller {

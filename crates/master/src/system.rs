@@ -61,7 +61,7 @@ pub struct System {
     observer: Option<EventObserver>,
     /// Values of inputs that were set last by [`System::set_value`], by the variable that holds the value, and
     /// the number of these calls.
-    given: HashMap<Port, Value>,
+    input_values: HashMap<Port, Value>,
     pub(crate) changes: u64,
 }
 
@@ -97,8 +97,8 @@ impl System {
     pub(crate) fn show_event(&mut self, slave: usize, time: f64) -> Result<(), SystemError> {
         let Some(observer) = &mut self.observer else { return Ok(()) };
         let (name, instance) = &mut self.slaves[slave];
-        let seen = observer(slave, time, instance.as_mut());
-        seen.map_err(|source| crate::error::call(name, time, source))
+        let observed = observer(slave, time, instance.as_mut());
+        observed.map_err(|source| crate::error::call(name, time, source))
     }
 
     /// Returns the description of the variable at `port`.

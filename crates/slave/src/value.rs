@@ -56,8 +56,8 @@ impl Value {
 
 /// Reads an integer of a type of FMI 3.0. Integers beyond 63 bits are not supported.
 fn parse_integer(kind: &Kind, text: &str) -> Result<Value, String> {
-    let (least, most) = kind.integer_range(Version::V3).unwrap_or_default();
-    let most = most.min(i64::MAX.into());
+    let range = kind.integer_range(Version::V3).unwrap_or(0..=0);
+    let (least, most) = (*range.start(), (*range.end()).min(i64::MAX.into()));
     let value = text.parse::<i128>().ok().filter(|value| (least..=most).contains(value));
     let value = value.and_then(|value| i64::try_from(value).ok());
     value.map(Value::Integer).ok_or_else(|| {
@@ -149,14 +149,14 @@ impl Value {
     /// Whether `found`, read from an FMU, equals this value; for Reals within a relative difference of
     /// 1e-9.
     #[must_use]
-    pub fn is_near(&self, found: &Self) -> bool {
-        match (self, found) {
-            (Value::Real(value), Value::Real(found)) => {
-                value.total_cmp(found).is_eq()
-                    || (found - value).abs() <= TOLERANCE * value.abs()
-                    || value.is_nan() && found.is_nan()
+    pub fn is_near(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Value::Real(value), Value::Real(other)) => {
+                value.total_cmp(other).is_eq()
+                    || (other - value).abs() <= TOLERANCE * value.abs()
+                    || value.is_nan() && other.is_nan()
             }
-            _ => self == found,
+            _ => self == other,
         }
     }
 }

@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::secants::Secants;
+use super::secants::{Filters, Secants};
 use super::{Convergence, Progress, Scale, Solver};
 
 /// Relative norm, after orthogonalisation, below which a difference is dropped as linearly dependent.
-const FILTER: f64 = 1e-10;
+const FILTERS: Filters = Filters { present: 1e-10, earlier: 1e-10 };
 
 /// Anderson mixing without damping: `u_next = G(u) - dG c`.
 ///
@@ -51,8 +51,8 @@ impl Solver for Anderson {
             return end;
         }
         let residual = &self.convergence.residual;
-        self.secants.learn(&mut self.last, (residual, g), self.convergence.iterations <= 1);
-        self.secants.apply(residual, &self.convergence.weights, (FILTER, FILTER), (g, u_next));
+        self.secants.learn(&mut self.last, residual, g, self.convergence.iterations <= 1);
+        self.secants.apply(residual, &self.convergence.weights, FILTERS, g, u_next);
         Progress::Evaluate
     }
 

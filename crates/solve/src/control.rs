@@ -229,7 +229,8 @@ impl EnergyControl {
     pub fn new(
         bounds: SizeBounds,
         exponent: f64,
-        (relative, absolute): (f64, f64),
+        relative: f64,
+        absolute: f64,
         nominals: &[f64],
     ) -> Self {
         let least = |value: f64| if value > 0.0 { value } else { f64::MIN_POSITIVE };

@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::secants::Secants;
+use super::secants::{Filters, Secants};
 use super::{Convergence, Progress, Scale, Solver};
 
 /// Relative norms, after orthogonalisation, below which differences of this and of earlier solutions are
 /// dropped as linearly dependent.
-const FILTERS: (f64, f64) = (1e-10, 1e-3);
+const FILTERS: Filters = Filters { present: 1e-10, earlier: 1e-3 };
 /// Relaxation factor of the first step of all.
 const RELAXATION: f64 = 0.1;
 /// Largest number of stored differences.
@@ -59,14 +59,14 @@ impl Solver for QuasiNewton {
             return end;
         }
         let residual = &self.convergence.residual;
-        self.secants.learn(&mut self.last, (residual, g), self.convergence.iterations <= 1);
+        self.secants.learn(&mut self.last, residual, g, self.convergence.iterations <= 1);
         if self.secants.is_empty() {
             for ((next, u), residual) in u_next.iter_mut().zip(u).zip(residual) {
                 *next = u + RELAXATION * residual;
             }
             return Progress::Evaluate;
         }
-        self.secants.apply(residual, &self.convergence.weights, FILTERS, (g, u_next));
+        self.secants.apply(residual, &self.convergence.weights, FILTERS, g, u_next);
         Progress::Evaluate
     }
 

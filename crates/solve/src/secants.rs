@@ -28,6 +28,15 @@ pub(super) struct Secants {
     coefficients: Vec<f64>,
 }
 
+/// The ratios of norms below which pairs are dropped as linearly dependent.
+#[derive(Clone, Copy)]
+pub(super) struct Filters {
+    /// For pairs of the present solution.
+    pub(super) present: f64,
+    /// For pairs of earlier solutions.
+    pub(super) earlier: f64,
+}
+
 impl Secants {
     pub(super) fn new(n: usize, capacity: usize) -> Self {
         Self {
@@ -60,61 +69,63 @@ impl Secants {
         }
         let (ages, free) = (&self.ages, &mut self.free);
         self.order.retain(|&slot| {
-            let kept = ages[slot] <= oldest;
-            if !kept {
+            let is_recent = ages[slot] <= oldest;
+            if !is_recent {
                 free.push(slot);
             }
-            kept
+            is_recent
         });
     }
 
-    /// Adds the pair `after - before` and drops the oldest pair if no slot is free.
-    fn push(&mut self, residual: (&[f64], &[f64]), value: (&[f64], &[f64])) {
+    /// Adds the pair of `residual` and `g` minus the evaluation `before` and drops the oldest pair if no
+    /// slot is free.
+    fn push(&mut self, residual: &[f64], g: &[f64], before: &(Vec<f64>, Vec<f64>)) {
         let Some(slot) = self.free.pop().or_else(|| self.order.pop()) else { return };
         let place = slot * self.n..(slot + 1) * self.n;
-        subtract(&mut self.residuals[place.clone()], residual);
-        subtract(&mut self.values[place], value);
+        subtract(&mut self.residuals[place.clone()], residual, &before.0);
+        subtract(&mut self.values[place], g, &before.1);
         self.ages[slot] = 0;
         self.order.insert(0, slot);
     }
 
-    /// Adds the difference between the evaluations `now` and `last` (residual and value), unless `now` is
-    /// the `first`, and copies `now` to `last`.
+    /// Adds the difference between an evaluation, `residual` and `g`, and the `last` one, unless it is the
+    /// `first`, and copies it to `last`.
     pub(super) fn learn(
         &mut self,
         last: &mut (Vec<f64>, Vec<f64>),
-        now: (&[f64], &[f64]),
+        residual: &[f64],
+        g: &[f64],
         first: bool,
     ) {
         if !first {
-            self.push((now.0, &last.0), (now.1, &last.1));
+            self.push(residual, g, last);
         }
-        last.0.copy_from_slice(now.0);
-        last.1.copy_from_slice(now.1);
+        last.0.copy_from_slice(residual);
+        last.1.copy_from_slice(g);
     }
 
     /// Computes `u_next = g - dG c`, where c is the least squares solution of `dR c = residual`.
     ///
-    /// `filters` are the ratios below which pairs of this and of earlier solutions are dropped.
     pub(super) fn apply(
         &mut self,
         residual: &[f64],
         weights: &[f64],
-        filters: (f64, f64),
-        (g, u_next): (&[f64], &mut [f64]),
+        filters: Filters,
+        g: &[f64],
+        u_next: &mut [f64],
     ) {
-        let mut kept = 0;
-        while kept < self.order.len() {
-            let slot = self.order[kept];
-            let filter = if self.ages[slot] == 0 { filters.0 } else { filters.1 };
-            if kept < self.n && self.orthogonalise(slot, kept, weights, filter) {
-                kept += 1;
+        let mut rank = 0;
+        while rank < self.order.len() {
+            let slot = self.order[rank];
+            let filter = if self.ages[slot] == 0 { filters.present } else { filters.earlier };
+            if rank < self.n && self.orthogonalise(slot, rank, weights, filter) {
+                rank += 1;
             } else {
-                self.order.remove(kept);
+                self.order.remove(rank);
                 self.free.push(slot);
             }
         }
-        self.project(kept, residual, weights);
+        self.project(rank, residual, weights);
         u_next.copy_from_slice(g);
         for (&slot, coefficient) in self.order.iter().zip(&self.coefficients) {
             let column = &self.values[slot * self.n..(slot + 1) * self.n];
@@ -124,18 +135,18 @@ impl Secants {
         }
     }
 
-    /// Computes column `kept` of Q and R from `slot`; returns false if its norm falls below the ratio
+    /// Computes column `rank` of Q and R from `slot`; returns false if its norm falls below the ratio
     /// `filter`.
-    fn orthogonalise(&mut self, slot: usize, kept: usize, weights: &[f64], filter: f64) -> bool {
+    fn orthogonalise(&mut self, slot: usize, rank: usize, weights: &[f64], filter: f64) -> bool {
         let n = self.n;
-        let (done, rest) = self.orthonormal.split_at_mut(kept * n);
+        let (done, rest) = self.orthonormal.split_at_mut(rank * n);
         let column = &mut rest[..n];
         let source = &self.residuals[slot * n..(slot + 1) * n];
         for ((entry, value), weight) in column.iter_mut().zip(source).zip(weights) {
             *entry = value / weight;
         }
         let whole = length(column);
-        let triangle = &mut self.triangle[kept * self.capacity..][..=kept];
+        let triangle = &mut self.triangle[rank * self.capacity..][..=rank];
         triangle.fill(0.0);
         for _ in 0..2 {
             for (other, entry) in done.chunks_exact(n).zip(triangle.iter_mut()) {
@@ -153,7 +164,7 @@ impl Secants {
         {
             return false;
         }
-        triangle[kept] = left;
+        triangle[rank] = left;
         for entry in column {
             *entry /= left;
         }
@@ -161,12 +172,12 @@ impl Secants {
     }
 
     /// Computes the coefficients c from `R c = Q' residual`.
-    fn project(&mut self, kept: usize, residual: &[f64], weights: &[f64]) {
+    fn project(&mut self, rank: usize, residual: &[f64], weights: &[f64]) {
         for (column, entry) in self.orthonormal.chunks_exact(self.n).zip(&mut self.coefficients) {
             let products = column.iter().zip(residual).zip(weights);
             *entry = products.map(|((q, r), weight)| q * r / weight).sum();
         }
-        for column in (0..kept).rev() {
+        for column in (0..rank).rev() {
             let entries = &self.triangle[column * self.capacity..][..=column];
             let value = self.coefficients[column] / entries[column];
             self.coefficients[column] = value;
@@ -177,7 +188,7 @@ impl Secants {
     }
 }
 
-fn subtract(target: &mut [f64], (after, before): (&[f64], &[f64])) {
+fn subtract(target: &mut [f64], after: &[f64], before: &[f64]) {
     for ((target, after), before) in target.iter_mut().zip(after).zip(before) {
         *target = after - before;
     }

@@ -69,7 +69,7 @@ fn no_controller_and_no_bracket_allocates() {
     let bounds = SizeBounds { smallest: 1e-6, largest: 1.0 };
     let mut error = ErrorControl::new(bounds, 2.0);
     let mut forward = ForwardControl::new(bounds, 1.0);
-    let mut energy = EnergyControl::new(bounds, 1.0, (1e-3, 1e-6), &[1.0, 1.0]);
+    let mut energy = EnergyControl::new(bounds, 1.0, 1e-3, 1e-6, &[1.0, 1.0]);
     let bonds = [Bond { first: (1.0, 1.1), second: (2.0, 2.2) }; 2];
     let measured = allocation_counter::measure(|| {
         let _ = error.judge(0.1, 3.0);

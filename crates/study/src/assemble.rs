@@ -68,7 +68,9 @@ pub fn assemble_with(
     };
     let opened = config.system.as_deref().map(shared).transpose()?;
     let (mut assembly, experiment, steps, fixed_step) = match opened.as_deref() {
-        Some(own) => (own.assembly.clone(), own.experiment, own.steps.clone(), own.fixed_step),
+        Some(opened) => {
+            (opened.assembly.clone(), opened.experiment, opened.steps.clone(), opened.fixed_step)
+        }
         None => Default::default(),
     };
     for (name, path) in &config.fmus.0 {
@@ -157,8 +159,8 @@ fn connect(
     by_unit: bool,
 ) -> Result<(), Error> {
     let config = &loaded.config;
-    let mut taken = HashSet::new();
-    let mut own = Vec::new();
+    let mut connected = HashSet::new();
+    let mut stated_links = Vec::new();
     for wire in config.connections.iter().flatten() {
         let ConnectionEntry { from, to, factor, offset } = wire.get_ref();
         let pairs = system.pairs(from.get_ref(), to.get_ref()).map_err(|error| {
@@ -174,7 +176,7 @@ fn connect(
         let linear =
             Transformation::Linear { factor: factor.unwrap_or(1.0), offset: offset.unwrap_or(0.0) };
         for (from, to) in pairs {
-            taken.insert(terminal(to));
+            connected.insert(terminal(to));
             let transformation = if stated { linear.clone() } else { Transformation::Identity };
             let link = Link {
                 from: terminal(from),
@@ -182,13 +184,13 @@ fn connect(
                 transformation,
                 units_settled: stated,
             };
-            own.push((wire.span(), link));
+            stated_links.push((wire.span(), link));
         }
     }
-    for link in links.iter().filter(|link| !taken.contains(&link.to)) {
+    for link in links.iter().filter(|link| !connected.contains(&link.to)) {
         link_ports(system, link)?;
     }
-    for (place, link) in &own {
+    for (place, link) in &stated_links {
         link_ports(system, link).map_err(|error| loaded.point(place, error))?;
     }
     let alone = config.connections.is_none() && config.system.is_none();

@@ -116,15 +116,15 @@ impl Writer {
             self.instant = (time, Vec::new());
         }
         for operation in Operation::read(bytes) {
-            let own = (bus, operation);
-            if self.failed.is_some() || self.instant.1.contains(&own) {
+            let frame = (bus, operation);
+            if self.failed.is_some() || self.instant.1.contains(&frame) {
                 continue;
             }
             self.bytes.clear();
-            let composed = self.format.operation(&mut self.bytes, time, bus, &own.1);
+            let composed = self.format.operation(&mut self.bytes, time, bus, &frame.1);
             let written = composed.and_then(|()| self.file.write_all(&self.bytes));
             self.failed = written.err();
-            self.instant.1.push(own);
+            self.instant.1.push(frame);
         }
     }
 }
@@ -153,8 +153,8 @@ fn senders(system: &System) -> Vec<Sender> {
     let mut buses: Vec<usize> = senders.iter().map(|sender| sender.bus).collect();
     buses.sort_unstable();
     buses.dedup();
-    let own = senders.iter().filter(|sender| is_simulation(system, sender.slave));
-    let simulated: Vec<usize> = own.map(|sender| sender.bus).collect();
+    let simulations = senders.iter().filter(|sender| is_simulation(system, sender.slave));
+    let simulated: Vec<usize> = simulations.map(|sender| sender.bus).collect();
     senders
         .retain(|sender| !simulated.contains(&sender.bus) || is_simulation(system, sender.slave));
     for sender in &mut senders {
@@ -174,12 +174,14 @@ fn nodes(system: &System) -> Vec<Node> {
         let description = instance.description();
         for terminal in &description.terminals {
             let variable = |name: &str| {
-                let own = member(terminal, name)?;
-                let element = format!("{own}[1]");
-                description.variable(own).or_else(|| description.variable(&element))
+                let name_of_variable = member(terminal, name)?;
+                let element = format!("{name_of_variable}[1]");
+                description.variable(name_of_variable).or_else(|| description.variable(&element))
             };
             let is_can = |kind: &Kind| match kind {
-                Kind::Binary(own) => own.mime_type.as_ref().is_some_and(|mime| mime.contains(CAN)),
+                Kind::Binary(binary) => {
+                    binary.mime_type.as_ref().is_some_and(|mime| mime.contains(CAN))
+                }
                 _ => false,
             };
             if let (Some(clock), Some(data)) = (variable("Tx_Clock"), variable("Tx_Data"))
@@ -190,7 +192,7 @@ fn nodes(system: &System) -> Vec<Node> {
                 nodes.push(Node {
                     sender: Sender { slave, clock, data: reference, bus: nodes.len() },
                     sends: data.name.clone(),
-                    receives: variable("Rx_Data").map(|own| own.name.clone()),
+                    receives: variable("Rx_Data").map(|variable| variable.name.clone()),
                 });
             }
         }
@@ -222,5 +224,9 @@ fn links(system: &System, nodes: &[Node]) -> Vec<(usize, usize)> {
 
 /// Returns the name of the variable that is the member `name` of a terminal.
 fn member<'a>(terminal: &'a Terminal, name: &str) -> Option<&'a str> {
-    terminal.members.iter().find(|own| own.name == name).map(|own| own.variable.as_str())
+    terminal
+        .members
+        .iter()
+        .find(|member| member.name == name)
+        .map(|member| member.variable.as_str())
 }

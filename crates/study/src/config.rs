@@ -94,7 +94,7 @@ impl LoadedConfig {
     /// Returns an error if the file cannot be read, is larger than 64 MiB or is not a valid
     /// `system.toml`.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let length = std::fs::metadata(path).map_or(0, |found| found.len());
+        let length = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
         if length > in_force(LARGEST_FILE) {
             let sentence = format!("expected at most {LARGEST_FILE} bytes, found {length}{HELP}");
             return Err(Error::Invalid(format!("{}: {sentence}", path.display())));

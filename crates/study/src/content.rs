@@ -22,11 +22,12 @@ impl Content {
 
     /// Whether several runs of a process can use it.
     pub(crate) fn is_reusable(&self) -> bool {
-        let own = self.description();
-        let simulation = own.stepped();
-        let exchange = own.model_exchange.as_ref();
-        let once = simulation.is_some_and(|own| own.can_be_instantiated_only_once_per_process)
-            || exchange.is_some_and(|own| own.can_be_instantiated_only_once_per_process);
+        let description = self.description();
+        let simulation = description.stepped();
+        let exchange = description.model_exchange.as_ref();
+        let once = simulation
+            .is_some_and(|simulation| simulation.can_be_instantiated_only_once_per_process)
+            || exchange.is_some_and(|exchange| exchange.can_be_instantiated_only_once_per_process);
         !once || matches!(self, Content::Isolated(_))
     }
 }

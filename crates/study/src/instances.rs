@@ -73,8 +73,9 @@ pub(crate) fn instantiate(
         system.add(name, slave)?;
     }
     let unused = config.solver.0.iter();
-    let unused =
-        unused.map(|(name, _)| name).find(|name| !integrated.iter().any(|own| own.0 == **name));
+    let unused = unused
+        .map(|(name, _)| name)
+        .find(|name| !integrated.iter().any(|solver| solver.0 == **name));
     if let Some(name) = unused {
         return Err(Error::Invalid(format!(
             "solver.{name}: {name} runs by co-simulation, with a solver of its own; the interface \

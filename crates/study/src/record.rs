@@ -249,8 +249,8 @@ fn readable(system: &mut System, ports: &[Port], time: f64) -> Result<Vec<Port>,
     for (port, error) in &refused {
         tracing::warn!("{}: {error}; it is left out of the results", system.name(*port));
     }
-    let kept = ports.iter().filter(|port| refused.iter().all(|(refused, _)| refused != *port));
-    Ok(kept.copied().collect())
+    let readable = ports.iter().filter(|port| refused.iter().all(|(refused, _)| refused != *port));
+    Ok(readable.copied().collect())
 }
 
 fn lock(recording: &Mutex<Recording>) -> MutexGuard<'_, Recording> {
@@ -280,12 +280,12 @@ fn keep(file: &Mutex<Recording>) -> Option<(PathBuf, Result<(), ResultsError>)> 
         };
         let (path, mut sink) = (recording.path.clone(), recording.sink.take()?);
         // The FMU may have overwritten memory of the sink.
-        let kept = catch_unwind(AssertUnwindSafe(|| sink.flush()));
+        let flushed = catch_unwind(AssertUnwindSafe(|| sink.flush()));
         std::mem::forget(sink);
         let damaged = || io::Error::other("the FMU has overwritten memory of the master");
         let lost = |_| Err(ResultsError::Write { path: path.clone(), source: damaged() });
-        let kept = kept.unwrap_or_else(lost);
-        return Some((path, kept));
+        let outcome = flushed.unwrap_or_else(lost);
+        return Some((path, outcome));
     }
     None
 }

@@ -17,8 +17,8 @@ pub(crate) fn resume(
     let Plan { algorithm, experiment, stop, .. } = plan;
     let resumed = Simulation::resume(system, algorithm, experiment, scenario, checkpoint);
     let simulation = resumed.map_err(|error| match error {
-        SystemError::Resume { name, taken, given } => Error::Invalid(format!(
-            "resume: the checkpoint was taken with {name} {taken}; --{name} {given} is not possible"
+        SystemError::Resume { name, saved, requested } => Error::Invalid(format!(
+            "resume: the checkpoint was taken with {name} {saved}; --{name} {requested} is not possible"
         )),
         other => Error::from(other).within("resume"),
     })?;

@@ -169,7 +169,8 @@ fn scenario(loaded: &LoadedConfig, system: &System, plan: &Plan) -> Result<Scena
     let free: Vec<String> = free.map(|port| system.name(port)).collect();
     for (file, column) in &prepared.unused {
         let file = file.display();
-        let variable = |name: &str| name.split_once('.').map_or("", |(_, own)| own).to_owned();
+        let variable =
+            |name: &str| name.split_once('.').map_or("", |(_, variable)| variable).to_owned();
         let meant = free.iter().find(|name| {
             let names = [name.as_str(), &variable(name)];
             slip(names.into_iter(), column).is_some()
@@ -293,7 +294,7 @@ impl Run {
         mut watch: impl FnMut(&mut Self) -> Result<ControlFlow<()>, Error>,
     ) -> Result<RunEnd, Error> {
         let start = self.simulation.time();
-        let interval = self.checkpoints.as_ref().and_then(|own| own.interval);
+        let interval = self.checkpoints.as_ref().and_then(|checkpoints| checkpoints.interval);
         let mut saved = 0.0;
         let mut save_at = interval.map_or(f64::INFINITY, |interval| start + interval);
         let mut flow = watch(self)?;

@@ -66,8 +66,10 @@ impl Store {
         }
         let content = open()?;
         if content.is_reusable() {
-            let stale = |own: &FmuKey| own.isolated == isolated && own.stamp.path == key.stamp.path;
-            fmus.retain(|own, _| !stale(own));
+            let stale = |stored: &FmuKey| {
+                stored.isolated == isolated && stored.stamp.path == key.stamp.path
+            };
+            fmus.retain(|stored, _| !stale(stored));
             fmus.insert(key, content.clone());
         }
         Ok(content)
@@ -88,7 +90,7 @@ impl Store {
             return Ok(opened.clone());
         }
         let opened = Arc::new(open()?);
-        systems.retain(|own, _| own.path != stamp.path);
+        systems.retain(|stored, _| stored.path != stamp.path);
         systems.insert(stamp, opened.clone());
         Ok(opened)
     }
@@ -119,6 +121,6 @@ impl fmt::Debug for Store {
     }
 }
 
-fn lock<T>(own: &Mutex<T>) -> MutexGuard<'_, T> {
-    own.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

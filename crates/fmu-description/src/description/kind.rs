@@ -1,5 +1,7 @@
 //! The types of variables with the attributes that depend on them.
 
+use std::ops::RangeInclusive;
+
 use serde::Serialize;
 
 use super::Version;
@@ -95,7 +97,7 @@ impl Kind {
     #[must_use]
     pub fn as_real(&self) -> Option<&RealType> {
         match self {
-            Kind::Real(own) | Kind::Float32(own) => Some(own),
+            Kind::Real(real) | Kind::Float32(real) => Some(real),
             _ => None,
         }
     }
@@ -104,55 +106,55 @@ impl Kind {
     #[must_use]
     pub fn as_integer(&self) -> Option<&IntegerType> {
         match self {
-            Kind::Integer(own)
-            | Kind::Enumeration(own)
-            | Kind::Int8(own)
-            | Kind::UInt8(own)
-            | Kind::Int16(own)
-            | Kind::UInt16(own)
-            | Kind::UInt32(own)
-            | Kind::Int64(own)
-            | Kind::UInt64(own) => Some(own),
+            Kind::Integer(integer)
+            | Kind::Enumeration(integer)
+            | Kind::Int8(integer)
+            | Kind::UInt8(integer)
+            | Kind::Int16(integer)
+            | Kind::UInt16(integer)
+            | Kind::UInt32(integer)
+            | Kind::Int64(integer)
+            | Kind::UInt64(integer) => Some(integer),
             _ => None,
         }
     }
 
     pub(super) fn as_real_mut(&mut self) -> Option<&mut RealType> {
         match self {
-            Kind::Real(own) | Kind::Float32(own) => Some(own),
+            Kind::Real(real) | Kind::Float32(real) => Some(real),
             _ => None,
         }
     }
 
     pub(super) fn as_integer_mut(&mut self) -> Option<&mut IntegerType> {
         match self {
-            Kind::Integer(own)
-            | Kind::Enumeration(own)
-            | Kind::Int8(own)
-            | Kind::UInt8(own)
-            | Kind::Int16(own)
-            | Kind::UInt16(own)
-            | Kind::UInt32(own)
-            | Kind::Int64(own)
-            | Kind::UInt64(own) => Some(own),
+            Kind::Integer(integer)
+            | Kind::Enumeration(integer)
+            | Kind::Int8(integer)
+            | Kind::UInt8(integer)
+            | Kind::Int16(integer)
+            | Kind::UInt16(integer)
+            | Kind::UInt32(integer)
+            | Kind::Int64(integer)
+            | Kind::UInt64(integer) => Some(integer),
             _ => None,
         }
     }
 
-    /// Returns the smallest and largest integer of the type in a version of FMI; `None` for types
+    /// Returns the range of the integers of the type in a version of FMI; `None` for types
     /// other than integers and enumerations.
     #[must_use]
-    pub fn integer_range(&self, version: Version) -> Option<(i128, i128)> {
+    pub fn integer_range(&self, version: Version) -> Option<RangeInclusive<i128>> {
         Some(match self {
-            Kind::Enumeration(_) if version == Version::V3 => (i64::MIN.into(), i64::MAX.into()),
-            Kind::Integer(_) | Kind::Enumeration(_) => (i32::MIN.into(), i32::MAX.into()),
-            Kind::Int8(_) => (i8::MIN.into(), i8::MAX.into()),
-            Kind::UInt8(_) => (0, u8::MAX.into()),
-            Kind::Int16(_) => (i16::MIN.into(), i16::MAX.into()),
-            Kind::UInt16(_) => (0, u16::MAX.into()),
-            Kind::UInt32(_) => (0, u32::MAX.into()),
-            Kind::Int64(_) => (i64::MIN.into(), i64::MAX.into()),
-            Kind::UInt64(_) => (0, u64::MAX.into()),
+            Kind::Enumeration(_) if version == Version::V3 => i64::MIN.into()..=i64::MAX.into(),
+            Kind::Integer(_) | Kind::Enumeration(_) => i32::MIN.into()..=i32::MAX.into(),
+            Kind::Int8(_) => i8::MIN.into()..=i8::MAX.into(),
+            Kind::UInt8(_) => 0..=u8::MAX.into(),
+            Kind::Int16(_) => i16::MIN.into()..=i16::MAX.into(),
+            Kind::UInt16(_) => 0..=u16::MAX.into(),
+            Kind::UInt32(_) => 0..=u32::MAX.into(),
+            Kind::Int64(_) => i64::MIN.into()..=i64::MAX.into(),
+            Kind::UInt64(_) => 0..=u64::MAX.into(),
             _ => return None,
         })
     }
@@ -162,13 +164,13 @@ impl Kind {
         match self {
             Kind::Boolean(start) => *start = None,
             Kind::String(start) => *start = None,
-            Kind::Binary(own) => own.start = None,
+            Kind::Binary(binary) => binary.start = None,
             Kind::Clock(_) => {}
             other => {
-                if let Some(own) = other.as_real_mut() {
-                    (own.start, own.reinit) = (None, false);
-                } else if let Some(own) = other.as_integer_mut() {
-                    own.start = None;
+                if let Some(real) = other.as_real_mut() {
+                    (real.start, real.reinit) = (None, false);
+                } else if let Some(integer) = other.as_integer_mut() {
+                    integer.start = None;
                 }
             }
         }
@@ -178,11 +180,11 @@ impl Kind {
     #[must_use]
     pub fn declared_type(&self) -> Option<&str> {
         match self {
-            Kind::Binary(own) => own.declared_type.as_deref(),
-            Kind::Clock(own) => own.declared_type.as_deref(),
+            Kind::Binary(binary) => binary.declared_type.as_deref(),
+            Kind::Clock(clock) => clock.declared_type.as_deref(),
             other => match (other.as_real(), other.as_integer()) {
-                (Some(own), _) => own.declared_type.as_deref(),
-                (_, own) => own?.declared_type.as_deref(),
+                (Some(real), _) => real.declared_type.as_deref(),
+                (_, integer) => integer?.declared_type.as_deref(),
             },
         }
     }
@@ -193,11 +195,11 @@ impl Kind {
         match self {
             Kind::Boolean(start) => start.is_some(),
             Kind::String(start) => start.is_some(),
-            Kind::Binary(own) => own.start.is_some(),
+            Kind::Binary(binary) => binary.start.is_some(),
             Kind::Clock(_) => false,
             other => {
-                other.as_real().is_some_and(|own| own.start.is_some())
-                    || other.as_integer().is_some_and(|own| own.start.is_some())
+                other.as_real().is_some_and(|real| real.start.is_some())
+                    || other.as_integer().is_some_and(|integer| integer.start.is_some())
             }
         }
     }

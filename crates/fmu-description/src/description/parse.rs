@@ -102,7 +102,7 @@ fn version(root: &Element<'_>) -> Result<Version, ParseError> {
         });
     }
     let stated = root.attributes.iter().find(|(name, _)| *name == "fmiVersion");
-    let Some((_, found)) = stated else {
+    let Some((_, text)) = stated else {
         return Err(ParseError::Attribute {
             at: root.at,
             element: root.name.to_owned(),
@@ -111,18 +111,18 @@ fn version(root: &Element<'_>) -> Result<Version, ParseError> {
             found: "no such attribute".to_owned(),
         });
     };
-    let trimmed = found.trim_matches(WHITE_SPACE);
+    let trimmed = text.trim_matches(WHITE_SPACE);
     let is_patch = |rest: &str| {
         let patch = rest.strip_prefix('.').unwrap_or(rest);
-        patch.len() <= 3 && patch.bytes().all(|own| own.is_ascii_digit())
+        patch.len() <= 3 && patch.bytes().all(|digit| digit.is_ascii_digit())
     };
     match trimmed.split_at_checked(2) {
         Some(("1.", "0")) => Ok(Version::V1),
         Some(("2.", _)) if trimmed.strip_prefix("2.0").is_some_and(is_patch) => Ok(Version::V2),
-        Some(("3.", minor)) if minor.starts_with(|own: char| own.is_ascii_digit()) => {
+        Some(("3.", minor)) if minor.starts_with(|character: char| character.is_ascii_digit()) => {
             Ok(Version::V3)
         }
-        _ => Err(ParseError::Version { at: root.at, found: found.clone().into_owned() }),
+        _ => Err(ParseError::Version { at: root.at, found: text.clone().into_owned() }),
     }
 }
 

@@ -72,8 +72,8 @@ impl Output {
     fn list<T>(&mut self, name: &str, items: &[T], item: impl Fn(&mut Self, &T)) {
         if !items.is_empty() {
             self.around(Tag::new(name), |output| {
-                for own in items {
-                    item(output, own);
+                for element in items {
+                    item(output, element);
                 }
             });
         }
@@ -197,19 +197,19 @@ impl Output {
         self.empty(conversion(tag, base.factor, base.offset));
     }
 
-    fn simple_type(&mut self, own: &SimpleType) {
+    fn simple_type(&mut self, declared: &SimpleType) {
         let tag = Tag::new("SimpleType")
-            .with("name", &own.name)
-            .maybe("description", own.description.as_ref());
+            .with("name", &declared.name)
+            .maybe("description", declared.description.as_ref());
         self.around(tag, |output| {
-            let element = Tag::new(own.kind.element());
-            match &own.kind {
+            let element = Tag::new(declared.kind.element());
+            match &declared.kind {
                 Kind::Real(real) => output.empty(real_limits(element, real)),
                 Kind::Integer(integer) => output.empty(integer_limits(element, integer)),
                 Kind::Enumeration(integer) => {
                     let element = element.maybe("quantity", integer.quantity.as_ref());
                     output.around(element, |output| {
-                        for (name, value) in &own.items {
+                        for (name, value) in &declared.items {
                             output.empty(Tag::new("Item").with("name", name).with("value", value));
                         }
                     });

@@ -66,12 +66,12 @@ const SECTIONS_OF_3: Sections = Sections {
 /// Collects problems.
 struct Problems {
     sections: &'static Sections,
-    found: Vec<Problem>,
+    list: Vec<Problem>,
 }
 
 impl Problems {
     fn add(&mut self, section: &'static str, text: String) {
-        self.found.push(Problem { section, text });
+        self.list.push(Problem { section, text });
     }
 
     /// Adds a problem unless the rule `holds`.
@@ -109,9 +109,11 @@ impl Problems {
         what: &str,
         names: impl Iterator<Item = &'a str>,
     ) {
-        let mut seen = HashSet::new();
+        let mut earlier = HashSet::new();
         for name in names {
-            self.demand(seen.insert(name), section, || format!("{what} {name:?} is there twice"));
+            self.demand(earlier.insert(name), section, || {
+                format!("{what} {name:?} is there twice")
+            });
         }
     }
 }
@@ -133,7 +135,7 @@ impl ModelDescription {
             Version::V2 => &SECTIONS_OF_2,
             Version::V3 => &SECTIONS_OF_3,
         };
-        let mut problems = Problems { sections, found: Vec::new() };
+        let mut problems = Problems { sections, list: Vec::new() };
         if self.version() == Version::V3 {
             fmi3::check_identity(self, &mut problems);
         } else {
@@ -142,8 +144,8 @@ impl ModelDescription {
         texts(self, &mut problems);
         let categories = self.log_categories.iter().map(|category| category.name.as_str());
         problems.unique(sections.categories, "log category", categories);
-        if let Some(own) = &self.default_experiment {
-            experiment(own, self.version(), &mut problems);
+        if let Some(default_experiment) = &self.default_experiment {
+            experiment(default_experiment, self.version(), &mut problems);
         }
         definitions::check(self, &mut problems);
         if self.version() == Version::V3 {
@@ -157,7 +159,7 @@ impl ModelDescription {
         } else {
             structure::check(self, &mut problems);
         }
-        problems.found
+        problems.list
     }
 }
 
@@ -172,8 +174,8 @@ fn identity(description: &ModelDescription, problems: &mut Problems) {
     let identifiers = description
         .model_exchange
         .iter()
-        .map(|own| ("3.3.1", &own.model_identifier))
-        .chain(co_simulation.map(|own| ("4.3.1", &own.model_identifier)));
+        .map(|flags| ("3.3.1", &flags.model_identifier))
+        .chain(co_simulation.map(|flags| ("4.3.1", &flags.model_identifier)));
     let mut interfaces = 0;
     for (section, identifier) in identifiers {
         interfaces += 1;
@@ -186,9 +188,10 @@ fn identity(description: &ModelDescription, problems: &mut Problems) {
     });
     let exchange = description.model_exchange.as_ref();
     for (section, serializes, keeps) in [
-        exchange.map(|own| ("3.3.1", own.can_serialize_fmu_state, own.can_get_and_set_fmu_state)),
+        exchange
+            .map(|flags| ("3.3.1", flags.can_serialize_fmu_state, flags.can_get_and_set_fmu_state)),
         co_simulation
-            .map(|own| ("4.3.1", own.can_serialize_fmu_state, own.can_get_and_set_fmu_state)),
+            .map(|flags| ("4.3.1", flags.can_serialize_fmu_state, flags.can_get_and_set_fmu_state)),
     ]
     .into_iter()
     .flatten()
@@ -232,28 +235,31 @@ fn texts(description: &ModelDescription, problems: &mut Problems) {
     }
 }
 
-fn experiment(own: &DefaultExperiment, version: Version, problems: &mut Problems) {
+fn experiment(default_experiment: &DefaultExperiment, version: Version, problems: &mut Problems) {
     let section = problems.sections.experiment;
     for (name, value) in [
-        ("startTime", own.start_time),
-        ("stopTime", own.stop_time),
-        ("tolerance", own.tolerance),
-        ("stepSize", own.step_size),
+        ("startTime", default_experiment.start_time),
+        ("stopTime", default_experiment.stop_time),
+        ("tolerance", default_experiment.tolerance),
+        ("stepSize", default_experiment.step_size),
     ] {
         problems.finite(section, name, value);
     }
-    for (name, value) in [("tolerance", own.tolerance), ("stepSize", own.step_size)] {
+    for (name, value) in
+        [("tolerance", default_experiment.tolerance), ("stepSize", default_experiment.step_size)]
+    {
         if let Some(value) = value {
             problems.demand(value > 0.0, section, || format!("{name} is {value:?}, not positive"));
         }
     }
-    let (Some(start), Some(stop)) = (own.start_time, own.stop_time) else {
+    let (Some(start), Some(stop)) = (default_experiment.start_time, default_experiment.stop_time)
+    else {
         return;
     };
     problems.demand(stop > start, section, || {
         format!("stopTime {stop:?} is not after startTime {start:?}")
     });
-    if let Some(step) = own.step_size.filter(|_| version == Version::V2) {
+    if let Some(step) = default_experiment.step_size.filter(|_| version == Version::V2) {
         problems.demand(step < stop - start, section, || {
             format!("stepSize {step:?} is not shorter than the experiment")
         });
@@ -269,9 +275,9 @@ fn is_c_identifier(text: &str) -> bool {
 fn is_date_and_time(text: &str) -> bool {
     let shape = "0000-00-00T00:00:00Z";
     let fits = text.len() == shape.len()
-        && text.bytes().zip(shape.bytes()).all(|(found, wanted)| match wanted {
-            b'0' => found.is_ascii_digit(),
-            _ => found == wanted,
+        && text.bytes().zip(shape.bytes()).all(|(character, pattern)| match pattern {
+            b'0' => character.is_ascii_digit(),
+            _ => character == pattern,
         });
     let inside = |from: usize, low: u32, high: u32| {
         let number = text.get(from..from + 2).and_then(|digits| digits.parse().ok());

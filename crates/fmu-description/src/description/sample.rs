@@ -8,7 +8,7 @@ use super::{
 use crate::unit::Unit;
 
 pub(crate) fn complete() -> ModelDescription {
-    let text = |own: &str| Some(own.to_owned());
+    let text = |text: &str| Some(text.to_owned());
     ModelDescription {
         fmi_version: "2.0".to_owned(),
         model_name: "Sample.<Model> & \"quotes\"".to_owned(),
@@ -113,16 +113,18 @@ fn types() -> Vec<SimpleType> {
 /// A Real variable with its table entries and start value.
 pub(crate) fn real(
     name: &str,
-    (causality, variability): (Causality, Variability),
+    causality: Causality,
+    variability: Variability,
     start: Option<f64>,
 ) -> ScalarVariable {
     let kind = Kind::Real(RealType { start, ..RealType::default() });
-    other(name, (causality, variability), kind)
+    other(name, causality, variability, kind)
 }
 
 pub(crate) fn other(
     name: &str,
-    (causality, variability): (Causality, Variability),
+    causality: Causality,
+    variability: Variability,
     kind: Kind,
 ) -> ScalarVariable {
     ScalarVariable {
@@ -151,7 +153,7 @@ fn state() -> ScalarVariable {
     ScalarVariable {
         initial: Some(Initial::Exact),
         description: Some("a state".to_owned()),
-        ..other("x", (Causality::Output, Variability::Continuous), kind)
+        ..other("x", Causality::Output, Variability::Continuous, kind)
     }
 }
 
@@ -173,20 +175,20 @@ fn variables() -> Vec<ScalarVariable> {
     let speed = Kind::Real(RealType { derivative: Some(7), ..RealType::default() });
     let label = Kind::String(Some("two\nlines <&> \"'\r\t".to_owned()));
     let mut variables = vec![
-        real("time", (Independent, Continuous), None),
-        real("body.m", (Parameter, Fixed), Some(0.1 + 0.2)),
-        real("body.'F #1'", (Parameter, Tunable), Some(-1e-5)),
-        real("c", (CalculatedParameter, Fixed), None),
-        real("u", (Input, Continuous), Some(5e-324)),
-        other("enable", (Input, Discrete), Kind::Boolean(Some(false))),
+        real("time", Independent, Continuous, None),
+        real("body.m", Parameter, Fixed, Some(0.1 + 0.2)),
+        real("body.'F #1'", Parameter, Tunable, Some(-1e-5)),
+        real("c", CalculatedParameter, Fixed, None),
+        real("u", Input, Continuous, Some(5e-324)),
+        other("enable", Input, Discrete, Kind::Boolean(Some(false))),
         state(),
-        other("der(x)", (Local, Continuous), speed),
-        real("v[1,1]", (Output, Continuous), None),
-        real("v[1,2]", (Output, Discrete), None),
-        other("mode", (Local, Discrete), Kind::Enumeration(mode)),
-        other("count", (Output, Discrete), Kind::Integer(count)),
-        other("label", (Parameter, Fixed), label),
-        real("pi", (Local, Constant), Some(f64::MAX)),
+        other("der(x)", Local, Continuous, speed),
+        real("v[1,1]", Output, Continuous, None),
+        real("v[1,2]", Output, Discrete, None),
+        other("mode", Local, Discrete, Kind::Enumeration(mode)),
+        other("count", Output, Discrete, Kind::Integer(count)),
+        other("label", Parameter, Fixed, label),
+        real("pi", Local, Constant, Some(f64::MAX)),
     ];
     variables[10].initial = Some(Initial::Exact);
     for (reference, variable) in (0..).zip(&mut variables) {

@@ -122,11 +122,11 @@ impl Elements {
     #[must_use]
     pub fn len(&self) -> usize {
         match self {
-            Elements::Real(own) => own.len(),
-            Elements::Integer(own) => own.len(),
-            Elements::Boolean(own) => own.len(),
-            Elements::String(own) => own.len(),
-            Elements::Binary(own) => own.len(),
+            Elements::Real(values) => values.len(),
+            Elements::Integer(values) => values.len(),
+            Elements::Boolean(values) => values.len(),
+            Elements::String(values) => values.len(),
+            Elements::Binary(values) => values.len(),
         }
     }
 
@@ -141,11 +141,11 @@ impl Elements {
         Some(match kind {
             Kind::Boolean(start) => Elements::Boolean(vec![(*start)?; count]),
             Kind::String(start) => Elements::String(vec![start.clone()?; count]),
-            Kind::Binary(own) => Elements::Binary(vec![own.start.clone()?; count]),
+            Kind::Binary(binary) => Elements::Binary(vec![binary.start.clone()?; count]),
             Kind::Clock(_) => return None,
             other => match (other.as_real(), other.as_integer()) {
-                (Some(own), _) => Elements::Real(vec![own.start?; count]),
-                (_, own) => Elements::Integer(vec![own?.start?; count]),
+                (Some(real), _) => Elements::Real(vec![real.start?; count]),
+                (_, integer) => Elements::Integer(vec![integer?.start?; count]),
             },
         })
     }
@@ -189,11 +189,12 @@ impl ScalarVariable {
     pub fn start_values(&self, description: &ModelDescription, most: usize) -> Option<Elements> {
         let third = description.version() == Version::V3;
         if let Some(of) = self.alias_of.as_ref().filter(|_| third && !self.has_start()) {
-            let variable = description.variable(of).filter(|own| own.alias_of.is_none())?;
+            let variable =
+                description.variable(of).filter(|variable| variable.alias_of.is_none())?;
             return variable.start_values(description, most);
         }
         if let Some(elements) = &self.start_elements {
-            return Some(elements.clone()).filter(|own| own.len() <= most);
+            return Some(elements.clone()).filter(|elements| elements.len() <= most);
         }
         let count = self.size(description);
         if count > most {
@@ -217,7 +218,8 @@ impl ModelDescription {
     /// which determines the extent of an array.
     #[must_use]
     pub fn extent(&self, reference: u32) -> Option<u64> {
-        let variable = self.variables.iter().find(|own| own.value_reference == reference)?;
+        let variable =
+            self.variables.iter().find(|variable| variable.value_reference == reference)?;
         u64::try_from(variable.kind.as_integer()?.start?).ok()
     }
 }

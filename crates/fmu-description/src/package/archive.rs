@@ -149,9 +149,9 @@ impl Archive {
     pub(super) fn unpack(
         &mut self,
         folder: &Path,
-        wanted: impl Fn(&str) -> bool,
+        is_needed: impl Fn(&str) -> bool,
     ) -> Result<(), PackageError> {
-        self.unpack_up_to(folder, self.capacity, wanted)
+        self.unpack_up_to(folder, self.capacity, is_needed)
     }
 
     /// The same with a limit of `capacity` bytes.
@@ -159,11 +159,11 @@ impl Archive {
         &mut self,
         folder: &Path,
         capacity: u64,
-        wanted: impl Fn(&str) -> bool,
+        is_needed: impl Fn(&str) -> bool,
     ) -> Result<(), PackageError> {
         use std::fs;
         let mut left = capacity;
-        for (index, name) in self.names.iter().enumerate().filter(|(_, name)| wanted(name)) {
+        for (index, name) in self.names.iter().enumerate().filter(|(_, name)| is_needed(name)) {
             if name.is_empty() {
                 continue;
             }
@@ -200,11 +200,11 @@ impl Archive {
 
 /// Whether two entries have the same name; a folder may occur twice.
 fn has_duplicates(names: &[String]) -> bool {
-    let mut seen = HashSet::new();
+    let mut earlier = HashSet::new();
     names
         .iter()
         .filter(|name| !name.is_empty() && !name.ends_with('/'))
-        .any(|name| !seen.insert(name))
+        .any(|name| !earlier.insert(name))
 }
 
 /// Returns a name that belongs to a file and a folder.

@@ -81,13 +81,13 @@ impl Unpacked {
         Self::unpack(path, |_| true)
     }
 
-    fn unpack(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<Self, PackageError> {
+    fn unpack(path: &Path, is_needed: impl Fn(&str) -> bool) -> Result<Self, PackageError> {
         let mut archive = Archive::open(path)?;
         if !archive.names().iter().any(|name| name == DESCRIPTION) {
             return Err(missing(archive.names()));
         }
         let temporary = folder()?;
-        archive.unpack(temporary.path(), wanted)?;
+        archive.unpack(temporary.path(), is_needed)?;
         let (mut description, warnings) = describe(temporary.path(), path)?;
         let mut archive_warnings = archive.warnings();
         archive_warnings.extend(add_terminals(temporary.path(), &mut description));
@@ -159,17 +159,17 @@ impl Unpacked {
         let mut candidates = platforms.iter().map(|platform| binaries.join(platform).join(&name));
         let library = candidates.find(|path| path.is_file()).or_else(|| self.only_library());
         library.ok_or_else(|| {
-            let wanted: Vec<String> =
+            let expected: Vec<String> =
                 platforms.iter().map(|platform| format!("binaries/{platform}/{name}")).collect();
-            let found = self.libraries();
-            let mut found =
-                if found.is_empty() { "no library".to_owned() } else { found.join(", ") };
+            let libraries = self.libraries();
+            let mut actual =
+                if libraries.is_empty() { "no library".to_owned() } else { libraries.join(", ") };
             if self.has_sources() {
-                found.push_str("; its source code is in sources/, which --compile builds");
+                actual.push_str("; its source code is in sources/, which --compile builds");
             }
             PackageError::Missing {
-                expected: format!("the library {}", wanted.join(" or ")),
-                found,
+                expected: format!("the library {}", expected.join(" or ")),
+                found: actual,
             }
         })
     }
@@ -188,8 +188,9 @@ impl Unpacked {
     /// Adds a warning for each library that is used although its name is not the model identifier.
     fn warn_of_other_names(&mut self) {
         let description = &self.description;
-        let simulation = description.stepped().map(|own| own.model_identifier);
-        let exchange = description.model_exchange.as_ref().map(|own| own.model_identifier.clone());
+        let simulation = description.stepped().map(|flags| flags.model_identifier);
+        let exchange =
+            description.model_exchange.as_ref().map(|flags| flags.model_identifier.clone());
         let mut identifiers: Vec<String> = simulation.into_iter().chain(exchange).collect();
         identifiers.dedup();
         for identifier in identifiers {
@@ -216,7 +217,7 @@ impl Unpacked {
 
     /// The files two levels below `binaries`, in any case of that name; at most 20, sorted.
     fn libraries(&self) -> Vec<String> {
-        let mut found = if self.temporary.is_some() {
+        let mut libraries = if self.temporary.is_some() {
             self.names.clone()
         } else {
             below(self.folder())
@@ -230,14 +231,14 @@ impl Unpacked {
                 })
                 .collect()
         };
-        found.retain(|name| {
+        libraries.retain(|name| {
             let parts: Vec<&str> = name.split('/').collect();
             matches!(parts.as_slice(), [top, _, file]
                 if top.eq_ignore_ascii_case("binaries") && !file.is_empty())
         });
-        found.sort();
-        found.truncate(20);
-        found
+        libraries.sort();
+        libraries.truncate(20);
+        libraries
     }
 }
 
@@ -337,7 +338,7 @@ fn missing(names: &[String]) -> PackageError {
     tops.sort_unstable();
     tops.dedup();
     tops.truncate(10);
-    let found = match near {
+    let actual = match near {
         Some(near) if near.eq_ignore_ascii_case(DESCRIPTION) => {
             format!("{near}, which differs in upper and lower case")
         }
@@ -345,5 +346,8 @@ fn missing(names: &[String]) -> PackageError {
         None if tops.is_empty() => "nothing".to_owned(),
         None => tops.join(", "),
     };
-    PackageError::Missing { expected: format!("{DESCRIPTION} at the root of the FMU"), found }
+    PackageError::Missing {
+        expected: format!("{DESCRIPTION} at the root of the FMU"),
+        found: actual,
+    }
 }

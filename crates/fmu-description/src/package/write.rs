@@ -89,10 +89,10 @@ impl Package {
     /// without a license), is too large, or the file cannot be written.
     pub fn write(&self, target: &Path) -> Result<(), PackageError> {
         if target.extension().is_none_or(|extension| extension != "fmu") {
-            let found = target.display().to_string();
+            let actual = target.display().to_string();
             return Err(PackageError::Missing {
                 expected: "a file name ending in .fmu".into(),
-                found,
+                found: actual,
             });
         }
         self.check(target)?;
@@ -118,27 +118,27 @@ impl Package {
     }
 
     fn check(&self, target: &Path) -> Result<(), PackageError> {
-        let mut seen = HashSet::new();
+        let mut earlier = HashSet::new();
         for (path, _) in &self.entries {
             let entry = path.clone();
             if let Some(expected) = paths::unsuitable(path, self.version) {
                 return Err(PackageError::Entry { entry, expected });
             }
-            if !seen.insert(path.to_ascii_lowercase()) {
+            if !earlier.insert(path.to_ascii_lowercase()) {
                 let expected = "a path that no other entry has, in upper or lower case";
                 return Err(PackageError::Entry { entry, expected });
             }
         }
         let has_folder = |name: &str| self.entries.iter().any(|(path, _)| path.starts_with(name));
-        for (holds, expected, found) in [
+        for (holds, expected, actual) in [
             (has_folder("binaries/") || has_folder("sources/"), "binaries or sources", "neither"),
             (
-                !has_folder("documentation/") || seen.contains("documentation/index.html"),
+                !has_folder("documentation/") || earlier.contains("documentation/index.html"),
                 "documentation/index.html",
                 "documentation without it",
             ),
         ] {
-            demand(holds, expected, found)?;
+            demand(holds, expected, actual)?;
         }
         if self.version == Version::V3 {
             self.check_folders_of_3()?;
@@ -147,8 +147,8 @@ impl Package {
         let sizes = self.entries.iter().map(|(_, content)| bytes(content));
         let total = sizes.fold(bytes(self.description.as_bytes()), u64::saturating_add);
         let count = u64::try_from(self.entries.len()).unwrap_or(u64::MAX);
-        for (found, limit, unit) in [(total, CAPACITY, "bytes"), (count, ENTRIES, "files")] {
-            if found > limit {
+        for (number, limit, unit) in [(total, CAPACITY, "bytes"), (count, ENTRIES, "files")] {
+            if number > limit {
                 return Err(PackageError::Limit { path: target.to_owned(), limit, unit, help: "" });
             }
         }
@@ -192,10 +192,10 @@ impl Package {
     }
 }
 
-fn demand(holds: bool, expected: &str, found: &str) -> Result<(), PackageError> {
+fn demand(holds: bool, expected: &str, actual: &str) -> Result<(), PackageError> {
     if holds {
         return Ok(());
     }
-    let (expected, found) = (expected.to_owned(), found.to_owned());
-    Err(PackageError::Missing { expected, found })
+    let (expected, actual) = (expected.to_owned(), actual.to_owned());
+    Err(PackageError::Missing { expected, found: actual })
 }

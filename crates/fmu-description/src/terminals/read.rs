@@ -35,28 +35,28 @@ fn named<'a>(element: &'a Element, name: &'a str) -> impl Iterator<Item = &'a El
 
 /// Adds the terminals within `element`.
 fn add(element: &Element, prefix: &str, all: &mut Vec<Terminal>) {
-    for own in named(element, "Terminal") {
-        let name = format!("{prefix}{}", text(own, "name").unwrap_or_default());
-        let member = |own: &Element| {
-            let variable = text(own, "variableName")?;
+    for terminal in named(element, "Terminal") {
+        let name = format!("{prefix}{}", text(terminal, "name").unwrap_or_default());
+        let member = |member_element: &Element| {
+            let variable = text(member_element, "variableName")?;
             Some(TerminalMember {
-                name: text(own, "memberName").unwrap_or_else(|| variable.clone()),
+                name: text(member_element, "memberName").unwrap_or_else(|| variable.clone()),
                 variable,
-                kind: text(own, "variableKind").unwrap_or_default(),
+                kind: text(member_element, "variableKind").unwrap_or_default(),
             })
         };
         let within = format!("{name}.");
         all.push(Terminal {
             name,
-            matching_rule: text(own, "matchingRule").unwrap_or_default(),
-            kind: text(own, "terminalKind"),
-            members: named(own, "TerminalMemberVariable").filter_map(member).collect(),
+            matching_rule: text(terminal, "matchingRule").unwrap_or_default(),
+            kind: text(terminal, "terminalKind"),
+            members: named(terminal, "TerminalMemberVariable").filter_map(member).collect(),
         });
-        add(own, &within, all);
+        add(terminal, &within, all);
     }
 }
 
 fn text(element: &Element, name: &str) -> Option<String> {
-    let found = element.attributes.iter().find(|(own, _)| own == name);
-    found.map(|(_, value)| value.clone())
+    let attribute = element.attributes.iter().find(|(known, _)| known == name);
+    attribute.map(|(_, value)| value.clone())
 }

@@ -14,8 +14,8 @@ struct Product {
 
 impl Product {
     fn multiply(&mut self, unit: &Named, exponent: i32) {
-        for (sum, own) in self.exponents.iter_mut().zip(unit.exponents) {
-            *sum += own * exponent;
+        for (sum, exponent_of_unit) in self.exponents.iter_mut().zip(unit.exponents) {
+            *sum += exponent_of_unit * exponent;
         }
         self.ten += unit.ten * exponent;
         if exponent >= 0 {
@@ -78,9 +78,9 @@ impl<'a> Cursor<'a> {
     }
 
     fn accept(&mut self, characters: &[char]) -> bool {
-        let found = self.peek().filter(|character| characters.contains(character));
-        self.at += found.map_or(0, char::len_utf8);
-        found.is_some()
+        let character = self.peek().filter(|character| characters.contains(character));
+        self.at += character.map_or(0, char::len_utf8);
+        character.is_some()
     }
 
     fn skip_blanks(&mut self) -> bool {
@@ -92,9 +92,14 @@ impl<'a> Cursor<'a> {
     }
 
     fn syntax(&self, expected: &'static str) -> UnitError {
-        let found = self.peek().map_or("the end".to_owned(), |character| format!("{character:?}"));
+        let actual = self.peek().map_or("the end".to_owned(), |character| format!("{character:?}"));
         let column = self.column(self.at);
-        UnitError::Syntax { expression: self.expression.to_owned(), column, expected, found }
+        UnitError::Syntax {
+            expression: self.expression.to_owned(),
+            column,
+            expected,
+            found: actual,
+        }
     }
 
     pub(super) fn unit(&mut self) -> Result<BaseUnit, UnitError> {
@@ -109,8 +114,8 @@ impl<'a> Cursor<'a> {
         self.denominators(&mut product)?;
         let factor = product.factor();
         if !(1e-300..=1e300).contains(&factor) {
-            let (expression, found) = (self.expression.to_owned(), format!("{factor:?}"));
-            return Err(UnitError::Magnitude { expression, found });
+            let (expression, actual) = (self.expression.to_owned(), format!("{factor:?}"));
+            return Err(UnitError::Magnitude { expression, found: actual });
         }
         Ok(BaseUnit::from_exponents(product.exponents, factor, 0.0))
     }

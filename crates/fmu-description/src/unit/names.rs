@@ -96,8 +96,8 @@ const PREFIXES: [(&str, i32); 11] = [
 
 /// Finds the unit called `name`. A full match (`min`, `cd`) has priority over prefix and unit.
 pub(super) fn find(name: &str) -> Option<Named> {
-    let own = UNITS.iter().find(|unit| unit.name == name).copied();
-    own.or_else(|| {
+    let named = UNITS.iter().find(|unit| unit.name == name).copied();
+    named.or_else(|| {
         PREFIXES.iter().find_map(|(prefix, ten)| {
             let rest = name.strip_prefix(prefix)?;
             let unit = UNITS.iter().find(|unit| unit.prefixes && unit.name == rest)?;

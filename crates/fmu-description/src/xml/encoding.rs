@@ -49,20 +49,20 @@ fn converted<'a>(
     bytes: &'a [u8],
     encoding: &'static Encoding,
 ) -> Result<(Cow<'a, str>, Option<Warning>), ParseError> {
-    let found = format!("encoding {:?}", encoding.name());
+    let actual = format!("encoding {:?}", encoding.name());
     let text = encoding.decode_without_bom_handling_and_without_replacement(bytes);
     let text = text.ok_or_else(|| ParseError::Encoding {
-        found: format!("{found} with bytes that it does not have"),
+        found: format!("{actual} with bytes that it does not have"),
     })?;
-    Ok((text, Some(other(found))))
+    Ok((text, Some(other(actual))))
 }
 
-fn other(found: String) -> Warning {
+fn other(actual: String) -> Warning {
     Warning {
         at: Position::START,
         place: "the file".to_owned(),
         expected: "UTF-8 without a byte order mark".to_owned(),
-        found,
+        found: actual,
         assumed: "it was read as what it is".to_owned(),
         section: "2.2",
         by_schema: false,
@@ -73,8 +73,8 @@ fn utf8(bytes: &[u8]) -> Result<Cow<'_, str>, ParseError> {
     std::str::from_utf8(bytes).map(Cow::Borrowed).map_err(|error| {
         let at = error.valid_up_to();
         let line = bytes[..at].split(|byte| *byte == b'\n').count();
-        let found = format!("a byte 0x{:02x} that is not UTF-8 in line {line}", bytes[at]);
-        ParseError::Encoding { found }
+        let actual = format!("a byte 0x{:02x} that is not UTF-8 in line {line}", bytes[at]);
+        ParseError::Encoding { found: actual }
     })
 }
 

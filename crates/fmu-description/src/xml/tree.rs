@@ -104,8 +104,8 @@ impl<'a> Tree<'a> {
         } else if self.root.is_none() {
             self.root = Some(element);
         } else {
-            let found = format!("a second root element <{}>", element.name);
-            return Err(ParseError::Xml { at: element.at, found });
+            let actual = format!("a second root element <{}>", element.name);
+            return Err(ParseError::Xml { at: element.at, found: actual });
         }
         Ok(())
     }
@@ -119,8 +119,8 @@ impl<'a> Tree<'a> {
 
     fn finish(self, at: Position) -> Result<Element<'a>, ParseError> {
         if let Some(element) = self.open.last() {
-            let found = format!("the end of the file inside <{}>", element.name);
-            return Err(ParseError::Xml { at: element.at, found });
+            let actual = format!("the end of the file inside <{}>", element.name);
+            return Err(ParseError::Xml { at: element.at, found: actual });
         }
         let none = || ParseError::Xml { at, found: "a file without an element".to_owned() };
         self.root.ok_or_else(none)
@@ -148,7 +148,7 @@ impl<'a> Tree<'a> {
                 return Err(limit(at, "attributes", ATTRIBUTES));
             }
             let wrong =
-                |found: String| ParseError::Xml { at, found: format!("in <{name}>: {found}") };
+                |what: String| ParseError::Xml { at, found: format!("in <{name}>: {what}") };
             let attribute = attribute.map_err(|error| wrong(error.to_string()))?;
             let value = attribute
                 .normalized_value(XmlVersion::Explicit1_0)
@@ -225,8 +225,8 @@ fn skip(reader: &mut Reader<&[u8]>, tree: &Tree<'_>, at: Position) -> Result<(),
             Ok(Event::Empty(_)) => tree.go_down(at, inner)?,
             Ok(Event::End(_)) => inner -= 1,
             Ok(Event::Eof) => {
-                let found = "the end of the file inside an annotation".to_owned();
-                return Err(ParseError::Xml { at, found });
+                let actual = "the end of the file inside an annotation".to_owned();
+                return Err(ParseError::Xml { at, found: actual });
             }
             Ok(_) => {}
         }

@@ -75,7 +75,8 @@ entry_points! {
         known_delta: *const fmi2Real, unknown_delta: *mut fmi2Real
     ), instance => instance.get_directional_derivative(
         read(unknown, n_unknown)?,
-        (read(known, n_known)?, read(known_delta, n_known)?),
+        read(known, n_known)?,
+        read(known_delta, n_known)?,
         borrow_output(unknown_delta, n_unknown)?,
     );
     enter_event_mode = EnterEventMode(), instance => instance.enter_event_mode();

@@ -53,7 +53,7 @@ pub unsafe fn describe<M: Model>(
     sink: DescribeSink,
 ) -> fmi2Integer {
     // SAFETY: the arguments are passed on unchanged.
-    unsafe { pass_description(resources, (context, sink), crate::interface::describe_3::<M>) }
+    unsafe { pass_description(resources, context, sink, crate::interface::describe_3::<M>) }
 }
 
 /// The failure of a function that a model without clocks or with one interface cannot fulfil.

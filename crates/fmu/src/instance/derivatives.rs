@@ -23,11 +23,12 @@ impl<M: Model> Instance<M> {
     pub(crate) fn get_directional_derivative(
         &mut self,
         unknowns: &[u32],
-        (knowns, delta): (&[u32], &[f64]),
+        knowns: &[u32],
+        delta: &[f64],
         to: &mut [MaybeUninit<f64>],
     ) -> Result<(), Failure> {
         let mut places = to.iter_mut();
-        self.directional_derivative(unknowns, (knowns, delta), |value| {
+        self.directional_derivative(unknowns, knowns, delta, |value| {
             if let Some(place) = places.next() {
                 place.write(value);
             }
@@ -47,7 +48,8 @@ impl<M: Model> Instance<M> {
     pub(super) fn directional_derivative(
         &mut self,
         unknowns: &[u32],
-        (knowns, delta): (&[u32], &[f64]),
+        knowns: &[u32],
+        delta: &[f64],
         mut write: impl FnMut(f64),
     ) -> Result<(), Failure> {
         Self::provides_derivatives()?;

@@ -9,11 +9,11 @@ use fmu_description::abi::{Status, fmi2EventInfo};
 use fmu_description::call_order::{InterfaceType, State};
 
 /// Checks that the length of an array is as the model description states.
-fn check_length(what: &str, found: usize, expected: usize) -> Result<(), Failure> {
-    if found == expected {
+fn check_length(what: &str, actual: usize, expected: usize) -> Result<(), Failure> {
+    if actual == expected {
         return Ok(());
     }
-    Err(Failure::Error(format!("expected {expected} {what}, found {found}")))
+    Err(Failure::Error(format!("expected {expected} {what}, found {actual}")))
 }
 
 impl<M: Model> Instance<M> {

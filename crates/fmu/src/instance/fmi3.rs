@@ -56,35 +56,45 @@ pub(crate) struct Instantiation<'a> {
 
 impl<M: Model> Instance<M> {
     /// `fmi3InstantiateModelExchange`, `fmi3InstantiateCoSimulation`.
-    pub(crate) fn new_3(made: &Instantiation<'_>, callbacks: Callbacks) -> Result<Self, Failure> {
+    pub(crate) fn new_3(
+        arguments: &Instantiation<'_>,
+        callbacks: Callbacks,
+    ) -> Result<Self, Failure> {
         let mut instance = Self::build(
-            || new_model::<M>(made.resources),
+            || new_model::<M>(arguments.resources),
             callbacks,
             |interface, description| {
-                let (table, converted) = interface.convert(description, made.interface_type)?;
+                let (table, converted) =
+                    interface.convert(description, arguments.interface_type)?;
                 if !interface.offers_exchange() {
-                    if made.interface_type == InterfaceType::ModelExchange {
+                    if arguments.interface_type == InterfaceType::ModelExchange {
                         return Err(Failure::Error(
                             "this FMU offers co-simulation only".to_owned(),
                         ));
                     }
-                    if made.event_mode_used {
+                    if arguments.event_mode_used {
                         let message =
                             "eventModeUsed is true, but hasEventMode of this FMU is false";
                         return Err(Failure::Error(message.to_owned()));
                     }
                 }
-                check_guid::<M>(interface.guid, "instantiationToken", made.token, made.resources)?;
-                check_required(made.required, &converted)?;
+                check_guid::<M>(
+                    interface.guid,
+                    "instantiationToken",
+                    arguments.token,
+                    arguments.resources,
+                )?;
+                check_required(arguments.required, &converted)?;
                 let indicators = vec![0.0; interface.event_indicators.unwrap_or_default()];
                 let inputs = interface.interpolated.len();
-                let intermediate = made.intermediate.filter(|_| !made.required.is_empty());
+                let intermediate =
+                    arguments.intermediate.filter(|_| !arguments.required.is_empty());
                 let intermediate =
                     intermediate.map(|update| Box::new(Intermediate::new(update, inputs)));
                 Ok(Some(Box::new(Session {
                     table,
-                    event_mode_used: made.event_mode_used,
-                    early_return_allowed: made.early_return_allowed,
+                    event_mode_used: arguments.event_mode_used,
+                    early_return_allowed: arguments.early_return_allowed,
                     intermediate,
                     places: Vec::new(),
                     integers: Vec::new(),
@@ -95,10 +105,10 @@ impl<M: Model> Instance<M> {
             },
         )?;
         instance.debug_logging = true;
-        instance.categories = (!made.logging_on).then(Vec::new);
+        instance.categories = (!arguments.logging_on).then(Vec::new);
         instance.session_mut()?.structural = instance.structural_parameters();
         instance.lay_out = Some(Self::lay_out);
-        Ok(instance.into_type(made.interface_type))
+        Ok(instance.into_type(arguments.interface_type))
     }
 
     /// Returns the part of FMI 3.0.
@@ -112,7 +122,7 @@ impl<M: Model> Instance<M> {
 
     /// Whether this is co-simulation with event mode.
     pub(super) fn uses_event_mode(&self) -> bool {
-        self.session.as_ref().is_some_and(|own| own.event_mode_used)
+        self.session.as_ref().is_some_and(|session| session.event_mode_used)
     }
 
     /// `fmi3SetDebugLogging`: turns categories on or off, all of them if none is given.
@@ -245,7 +255,7 @@ impl<M: Model> Instance<M> {
         read: impl FnOnce(&mut Self, &[u32]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         if self.core.state == State::EventMode && self.interface.clocks.any() && self.ticks() {
-            return self.at_tick(|own| own.located(kind, references, count, read));
+            return self.at_tick(|instance| instance.located(kind, references, count, read));
         }
         self.located(kind, references, count, read)
     }
@@ -261,8 +271,8 @@ impl<M: Model> Instance<M> {
     ) -> Result<(), Failure> {
         let session = self.session_mut()?;
         let mut places = std::mem::take(&mut session.places);
-        let found = session.table.locate(kind, references, count, &mut places);
-        let done = found.and_then(|()| body(self, &places));
+        let located = session.table.locate(kind, references, count, &mut places);
+        let done = located.and_then(|()| body(self, &places));
         self.session_mut()?.places = places;
         done
     }
@@ -272,9 +282,10 @@ impl<M: Model> Instance<M> {
 /// it (section 2.3.1).
 fn check_required(required: &[u32], description: &ModelDescription) -> Result<(), Failure> {
     for &reference in required {
-        let own = description.variables.iter().find(|own| own.value_reference == reference);
-        if own.is_none_or(|own| !own.intermediate_update) {
-            let name = own.map_or("no variable", |own| &own.name);
+        let variable =
+            description.variables.iter().find(|known| known.value_reference == reference);
+        if variable.is_none_or(|variable| !variable.intermediate_update) {
+            let name = variable.map_or("no variable", |variable| &variable.name);
             return Err(Failure::Error(format!(
                 "requiredIntermediateVariables has the value reference {reference} of {name}, expected \
                  variables with intermediateUpdate = true"

@@ -35,19 +35,19 @@ impl<M: Model> Instance<M> {
     /// `fmi2SetFMUstate`.
     pub(crate) fn restore(&mut self, snapshot: &Snapshot<M>) -> Result<(), Failure> {
         if snapshot.guid != self.guid() {
-            let (of, own) = (snapshot.guid, self.guid());
+            let (of, expected) = (snapshot.guid, self.guid());
             return Err(Failure::Error(format!(
-                "the state belongs to the FMU with GUID {of}, this FMU has GUID {own}"
+                "the state belongs to the FMU with GUID {of}, this FMU has GUID {expected}"
             )));
         }
-        let (of, own) = (snapshot.core.interface_type, self.core.interface_type);
-        if of != own {
+        let (of, expected) = (snapshot.core.interface_type, self.core.interface_type);
+        if of != expected {
             return Err(Failure::Error(format!(
-                "the state belongs to an instance for {of:?}, this instance is for {own:?}"
+                "the state belongs to an instance for {of:?}, this instance is for {expected:?}"
             )));
         }
         if snapshot.core.state == State::EventMode
-            && own == InterfaceType::CoSimulation
+            && expected == InterfaceType::CoSimulation
             && !self.uses_event_mode()
         {
             let message = "the state is in event mode, which this instance does not use";
@@ -72,9 +72,9 @@ impl<M: Model> Snapshot<M> {
     /// Writes the state to the first bytes of `room`.
     pub(crate) fn write(&self, room: &mut [MaybeUninit<u8>]) -> Result<(), Failure> {
         let bytes = self.to_bytes()?;
-        let (found, needed) = (room.len(), bytes.len());
-        if found < needed {
-            return Err(Failure::Error(format!("expected {needed} bytes, found {found}")));
+        let (available, needed) = (room.len(), bytes.len());
+        if available < needed {
+            return Err(Failure::Error(format!("expected {needed} bytes, found {available}")));
         }
         for (place, byte) in room.iter_mut().zip(bytes) {
             place.write(byte);

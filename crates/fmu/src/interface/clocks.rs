@@ -9,8 +9,8 @@ pub(crate) struct Clocks(Vec<(String, Vec<String>)>);
 
 impl Clocks {
     pub(super) fn of(variables: &[Declaration]) -> Self {
-        let clocked = variables.iter().filter(|own| !own.clocks.is_empty());
-        Self(clocked.map(|own| (own.name.clone(), own.clocks.clone())).collect())
+        let clocked = variables.iter().filter(|variable| !variable.clocks.is_empty());
+        Self(clocked.map(|variable| (variable.name.clone(), variable.clocks.clone())).collect())
     }
 
     /// Whether a variable is clocked.
@@ -26,17 +26,19 @@ impl Clocks {
     pub(super) fn enter(&self, description: &mut ModelDescription) -> Result<(), Failure> {
         for (name, clocks) in &self.0 {
             let index = |clock: &String| {
-                let is_clock = |(_, own): &(u32, &fmu_description::ScalarVariable)| {
-                    own.name == *clock && matches!(own.kind, Kind::Clock(_))
+                let is_clock = |(_, variable): &(u32, &fmu_description::ScalarVariable)| {
+                    variable.name == *clock && matches!(variable.kind, Kind::Clock(_))
                 };
-                let found = (1..).zip(&description.variables).find(is_clock);
-                found
+                let variable = (1..).zip(&description.variables).find(is_clock);
+                variable
                     .map(|(index, _)| index)
                     .ok_or_else(|| Failure::Error(format!("variable {name}: {clock} is no clock")))
             };
             let clocks = clocks.iter().map(index).collect::<Result<Vec<_>, _>>()?;
-            if let Some(own) = description.variables.iter_mut().find(|own| own.name == *name) {
-                own.clocks = clocks;
+            if let Some(variable) =
+                description.variables.iter_mut().find(|variable| variable.name == *name)
+            {
+                variable.clocks = clocks;
             }
         }
         Ok(())

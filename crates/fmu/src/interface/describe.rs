@@ -110,12 +110,13 @@ fn wide(items: &[(String, i32)]) -> Vec<(String, i64)> {
 /// Gives aliases, by index, the value references and types of their variables, by name.
 pub(super) fn describe_aliases(aliases: Vec<(usize, String)>, description: &mut ModelDescription) {
     for (index, of) in aliases {
-        let target = description.variable(&of).map(|own| (own.kind.clone(), own.value_reference));
+        let target =
+            description.variable(&of).map(|target| (target.kind.clone(), target.value_reference));
         let Some((kind, value_reference)) = target else { continue };
-        let own = &mut description.variables[index];
-        let constant = own.variability == Variability::Constant;
-        keep_derivative(&mut own.kind, if constant { kind } else { without_start(kind) });
-        own.value_reference = value_reference;
+        let alias = &mut description.variables[index];
+        let constant = alias.variability == Variability::Constant;
+        keep_derivative(&mut alias.kind, if constant { kind } else { without_start(kind) });
+        alias.value_reference = value_reference;
     }
 }
 
@@ -129,9 +130,9 @@ pub(super) fn keep_derivative(place: &mut Kind, mut kind: Kind) {
 
 fn without_start(kind: Kind) -> Kind {
     match kind {
-        Kind::Real(own) => Kind::Real(RealType { start: None, reinit: false, ..own }),
-        Kind::Integer(own) => Kind::Integer(IntegerType { start: None, ..own }),
-        Kind::Enumeration(own) => Kind::Enumeration(IntegerType { start: None, ..own }),
+        Kind::Real(real) => Kind::Real(RealType { start: None, reinit: false, ..real }),
+        Kind::Integer(integer) => Kind::Integer(IntegerType { start: None, ..integer }),
+        Kind::Enumeration(integer) => Kind::Enumeration(IntegerType { start: None, ..integer }),
         Kind::Boolean(_) => Kind::Boolean(None),
         Kind::String(_) => Kind::String(None),
         mut other => {

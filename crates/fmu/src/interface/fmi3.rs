@@ -113,7 +113,8 @@ impl Table {
     ///
     /// [`Failure::Error`] with the name of the first such variable.
     pub(crate) fn check_settable(&self, references: &[u32]) -> Result<(), Failure> {
-        let entries = || references.iter().filter_map(|own| self.entries.get(*own as usize));
+        let entries =
+            || references.iter().filter_map(|reference| self.entries.get(*reference as usize));
         match entries().find(|entry| entry.is_calculated) {
             None => Ok(()),
             Some(Entry { name, .. }) => {
@@ -188,12 +189,12 @@ impl Table {
     }
 
     #[cold]
-    fn wrong_count(&self, references: &[u32], expected: usize, found: usize) -> Failure {
+    fn wrong_count(&self, references: &[u32], expected: usize, actual: usize) -> Failure {
         let names = references.iter().filter_map(|&reference| self.entries.get(reference as usize));
         let names: Vec<_> = names.take(5).map(|entry| entry.name.as_str()).collect();
         let more = if references.len() > names.len() { ", ..." } else { "" };
         Failure::Error(format!(
-            "nValues is {found}, expected {expected} for the elements of {}{more}",
+            "nValues is {actual}, expected {expected} for the elements of {}{more}",
             names.join(", ")
         ))
     }
@@ -217,30 +218,31 @@ impl Table {
         initial: bool,
     ) -> Result<Vec<Dependency>, Failure> {
         self.entry(reference, "exported")?;
-        let own = &self.scalars;
-        let later = || own.outputs.iter().chain(&own.derivatives);
+        let scalars = &self.scalars;
+        let later = || scalars.outputs.iter().chain(&scalars.derivatives);
         let rows: Vec<_> =
-            if initial { own.initial_unknowns.iter().collect() } else { later().collect() };
-        let mut found = Vec::new();
-        let mut seen = Vec::new();
+            if initial { scalars.initial_unknowns.iter().collect() } else { later().collect() };
+        let mut dependencies = Vec::new();
+        let mut rows_read = Vec::new();
         for row in rows {
             let (owner, element) = self.elements[row.index as usize - 1];
-            if owner != reference || seen.contains(&row.index) {
+            if owner != reference || rows_read.contains(&row.index) {
                 continue;
             }
-            seen.push(row.index);
+            rows_read.push(row.index);
             let all = &self.knowns[usize::from(!initial)];
             let listed = row.dependencies.as_ref().unwrap_or(all);
             for (position, &known) in listed.iter().enumerate() {
                 let kinds = row.kinds.as_ref();
                 let kind = kinds.and_then(|kinds| kinds.get(position).copied());
-                found.push(self.dependency(element, known, kind));
+                dependencies.push(self.dependency(element, known, kind));
             }
             if !initial && row.dependencies.is_some() && !self.states.contains(&row.index) {
-                found.extend(self.parameters.iter().map(|&k| self.dependency(element, k, None)));
+                dependencies
+                    .extend(self.parameters.iter().map(|&k| self.dependency(element, k, None)));
             }
         }
-        Ok(found)
+        Ok(dependencies)
     }
 
     fn dependency(&self, element: usize, known: u32, kind: Option<DependencyKind>) -> Dependency {

@@ -15,18 +15,18 @@ const CATEGORIES: [(&str, &str); 4] = [
 /// The category of the warnings of a model.
 pub(crate) const WARNING: &str = "logStatusWarning";
 
-/// Log categories of an FMU with the model's `own` ones; with warnings if it `logs`.
-pub(super) fn categories(logs: bool, own: &[(&str, &str)]) -> Vec<LogCategory> {
+/// Log categories of an FMU with the model's `of_model` ones; with warnings if it `logs`.
+pub(super) fn categories(logs: bool, of_model: &[(&str, &str)]) -> Vec<LogCategory> {
     let warning = logs.then_some((WARNING, "Calls that succeeded, with a warning of the model"));
     let category = |(name, description): (&str, &str)| LogCategory {
         name: name.to_owned(),
         description: Some(description.to_owned()),
     };
-    CATEGORIES.into_iter().chain(warning).chain(own.iter().copied()).map(category).collect()
+    CATEGORIES.into_iter().chain(warning).chain(of_model.iter().copied()).map(category).collect()
 }
 
 pub(super) fn general<M: Model>(model: &M) -> ModelDescription {
-    let indicators = model.model_exchange().map(|own| own.event_indicators);
+    let indicators = model.model_exchange().map(|interface| interface.event_indicators);
     description(M::IDENTIFIER, model.about(), indicators, M::PROVIDES_DIRECTIONAL_DERIVATIVE)
 }
 
@@ -47,7 +47,8 @@ fn description(
         license: text(about.license),
         generation_tool: Some(concat!("aso-ftc ", env!("CARGO_PKG_VERSION")).to_owned()),
         structured_names: true,
-        number_of_event_indicators: indicators.map(|own| u32::try_from(own).unwrap_or(u32::MAX)),
+        number_of_event_indicators: indicators
+            .map(|count| u32::try_from(count).unwrap_or(u32::MAX)),
         model_exchange: indicators.map(|_| ModelExchange {
             model_identifier: identifier.to_owned(),
             completed_integrator_step_not_needed: true,

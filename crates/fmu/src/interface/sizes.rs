@@ -15,8 +15,9 @@ pub(super) struct Sizes {
 
 impl Sizes {
     pub(super) fn of(variables: &[Declaration]) -> Self {
-        let sized = variables.iter().filter(|own| !own.sized_by.is_empty());
-        let by_element = sized.map(|own| (own.name.clone(), own.sized_by.clone())).collect();
+        let sized = variables.iter().filter(|variable| !variable.sized_by.is_empty());
+        let by_element =
+            sized.map(|variable| (variable.name.clone(), variable.sized_by.clone())).collect();
         Self { by_element }
     }
 
@@ -56,11 +57,12 @@ impl Sizes {
 }
 
 /// Returns name, value reference and value of a structural parameter.
-fn parameter(own: &ScalarVariable) -> Option<(String, (u32, i128))> {
-    match &own.kind {
-        Kind::UInt64(kind) if own.causality == Causality::StructuralParameter => {
-            Some((own.name.clone(), (own.value_reference, kind.start.unwrap_or_default())))
-        }
+fn parameter(variable: &ScalarVariable) -> Option<(String, (u32, i128))> {
+    match &variable.kind {
+        Kind::UInt64(kind) if variable.causality == Causality::StructuralParameter => Some((
+            variable.name.clone(),
+            (variable.value_reference, kind.start.unwrap_or_default()),
+        )),
         _ => None,
     }
 }
@@ -90,9 +92,9 @@ fn references(
 ) -> Result<Vec<Dimension>, Failure> {
     let wrong = |reason: String| Failure::Error(format!("array {array}: {reason}"));
     if extents.len() != names.len() {
-        let (found, expected) = (extents.len(), names.len());
+        let (actual, expected) = (extents.len(), names.len());
         return Err(wrong(format!(
-            "it has {found} dimensions and {expected} structural parameters"
+            "it has {actual} dimensions and {expected} structural parameters"
         )));
     }
     let reference = |(&extent, name): (&u64, &String)| match parameters.get(name) {

@@ -57,7 +57,7 @@ impl<M> SlotBuilder<M> {
             range: (min.unwrap_or(f64::MIN), max.unwrap_or(f64::MAX)),
             items: variable
                 .enumeration
-                .map(|own| own.items.iter().map(|(_, value)| *value).collect())
+                .map(|enumeration| enumeration.items.iter().map(|(_, value)| *value).collect())
                 .unwrap_or_default(),
             interval: variable.number.interval,
             interval_variability: variable.number.interval_variability,
@@ -68,8 +68,7 @@ impl<M> SlotBuilder<M> {
     /// Same as [`SlotBuilder::build`] for a type that FMI 2.0 does not have: the rules of FMI 3.0 say when
     /// the variable may be set.
     pub(crate) fn build_3<T>(self, slots: &mut Vec<Slot<M, T>>, field: Field<M, T>) -> u32 {
-        let role = (self.causality, self.variability);
-        let settable = call_order3::settable(role, self.initial, None);
+        let settable = call_order3::settable(self.causality, self.variability, self.initial, None);
         let position = self.build(slots, field);
         slots[position as usize].settable = settable;
         position
@@ -87,7 +86,7 @@ impl<M> SlotBuilder<M> {
             is_unknown: false,
             is_initial_unknown: false,
             range: self.range,
-            settable: settable((self.causality, self.variability), self.initial, false),
+            settable: settable(self.causality, self.variability, self.initial, false),
             items: self.items,
             interval: self.interval,
             interval_variability: self.interval_variability,

@@ -80,9 +80,9 @@ impl<M> Interface<M> {
             ];
             let line = [(end - start) / size, 0.0];
             let fields = &self.reals[position].derivatives;
-            let found = if fields.len() == 1 { line } else { parabola };
+            let derivatives = if fields.len() == 1 { line } else { parabola };
             for (order, field) in fields.iter().enumerate() {
-                let value = found.get(order).copied().unwrap_or(0.0);
+                let value = derivatives.get(order).copied().unwrap_or(0.0);
                 *field(model) = value;
                 moves |= value != 0.0;
             }

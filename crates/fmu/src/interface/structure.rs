@@ -11,8 +11,8 @@ pub(super) fn index(position: usize) -> u32 {
 
 /// Returns the position of the variable called `name`, to which `of` refers.
 pub(super) fn find(variables: &[Declaration], of: &str, name: &str) -> Result<usize, Failure> {
-    let found = variables.iter().position(|variable| variable.name == name);
-    found.ok_or_else(|| {
+    let position = variables.iter().position(|variable| variable.name == name);
+    position.ok_or_else(|| {
         Failure::Error(format!("{of} refers to {name}, which is no variable (section 2.2.7)"))
     })
 }
@@ -79,15 +79,15 @@ fn dependency_row(
     own_state: Option<usize>,
 ) -> Result<Unknown, Failure> {
     let variable = &variables[position];
-    let mut found = Vec::with_capacity(variable.direct.len() + 1);
-    found.extend(own_state.map(|state| (index(state), DependencyKind::Constant)));
+    let mut row = Vec::with_capacity(variable.direct.len() + 1);
+    row.extend(own_state.map(|state| (index(state), DependencyKind::Constant)));
     for (name, kind) in &variable.direct {
         let known = if name == "time" { 1 } else { index(find(variables, &variable.name, name)?) };
-        found.push((known, *kind));
+        row.push((known, *kind));
     }
-    found.sort_by_key(|(known, _)| *known);
-    found.dedup_by_key(|(known, _)| *known);
-    let (dependencies, kinds): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+    row.sort_by_key(|(known, _)| *known);
+    row.dedup_by_key(|(known, _)| *known);
+    let (dependencies, kinds): (Vec<_>, Vec<_>) = row.into_iter().unzip();
     let plain = kinds.iter().all(|kind| *kind == DependencyKind::Dependent);
     Ok(Unknown {
         index: index(position),
@@ -102,11 +102,11 @@ fn initial_row(variables: &[Declaration], position: usize) -> Result<Unknown, Fa
     let Some(names) = &variable.initially else {
         return Ok(Unknown { index: index(position), dependencies: None, kinds: None });
     };
-    let mut found = Vec::with_capacity(names.len());
+    let mut row = Vec::with_capacity(names.len());
     for name in names {
-        found.push(if name == "time" { 1 } else { index(find(variables, &variable.name, name)?) });
+        row.push(if name == "time" { 1 } else { index(find(variables, &variable.name, name)?) });
     }
-    found.sort_unstable();
-    found.dedup();
-    Ok(Unknown { index: index(position), dependencies: Some(found), kinds: None })
+    row.sort_unstable();
+    row.dedup();
+    Ok(Unknown { index: index(position), dependencies: Some(row), kinds: None })
 }

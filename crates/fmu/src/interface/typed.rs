@@ -52,7 +52,8 @@ macro_rules! slots {
             pub(crate) fn add(
                 &mut self,
                 model: &mut M,
-                (field, number): (TypedField<M>, Number),
+                field: TypedField<M>,
+                number: Number,
                 start_given: bool,
                 builder: SlotBuilder<M>,
             ) -> Result<(Kind, u32), String> {

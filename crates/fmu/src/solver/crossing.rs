@@ -90,8 +90,8 @@ impl Quartic {
         }
         let (left, right) = self.halves();
         let half = width / 2.0;
-        let found = left.search(from, half, depth - 1);
-        found.or_else(|| right.search(from + half, half, depth - 1))
+        let root = left.search(from, half, depth - 1);
+        root.or_else(|| right.search(from + half, half, depth - 1))
     }
 
     fn halves(&self) -> (Self, Self) {

@@ -149,7 +149,7 @@ impl Instants {
         for position in 0..self.members.len() {
             let slave = self.members[position];
             let jumps =
-                |own: &crate::drive::Drive| own.port().slave == slave && own.breaks_at(time);
+                |drive: &crate::drive::Drive| drive.port().slave == slave && drive.breaks_at(time);
             if !self.in_event[slave] && parts.drives.iter().any(jumps) {
                 self.enter(parts.system, slave, time)?;
             }

@@ -39,19 +39,19 @@ impl ChannelsState {
 
 /// Calls a method of the channels of all types, one after the other, up to the first error.
 macro_rules! all {
-    ($own:ident.$method:ident($($argument:expr),*)?) => {{
-        $own.reals.$method($($argument),*)?;
-        $own.integers.$method($($argument),*)?;
-        $own.booleans.$method($($argument),*)?;
-        $own.strings.$method($($argument),*)?;
-        $own.binaries.$method($($argument),*)
+    ($channels:ident.$method:ident($($argument:expr),*)?) => {{
+        $channels.reals.$method($($argument),*)?;
+        $channels.integers.$method($($argument),*)?;
+        $channels.booleans.$method($($argument),*)?;
+        $channels.strings.$method($($argument),*)?;
+        $channels.binaries.$method($($argument),*)
     }};
-    ($own:ident.$method:ident($($argument:expr),*);) => {
-        $own.reals.$method($($argument),*);
-        $own.integers.$method($($argument),*);
-        $own.booleans.$method($($argument),*);
-        $own.strings.$method($($argument),*);
-        $own.binaries.$method($($argument),*);
+    ($channels:ident.$method:ident($($argument:expr),*);) => {
+        $channels.reals.$method($($argument),*);
+        $channels.integers.$method($($argument),*);
+        $channels.booleans.$method($($argument),*);
+        $channels.strings.$method($($argument),*);
+        $channels.binaries.$method($($argument),*);
     };
 }
 
@@ -59,8 +59,10 @@ impl Channels {
     /// Lays out `connections`, by the types of their inputs. `more` are Integer outputs to read as well.
     pub(super) fn new(system: &System, connections: &[&Connection], more: &[Port]) -> Self {
         let of = |kind: ValueType| -> Vec<&Connection> {
-            let own = |own: &&&Connection| ValueType::of(&system.variable(own.to).kind) == kind;
-            connections.iter().filter(own).copied().collect()
+            let of_kind = |connection: &&&Connection| {
+                ValueType::of(&system.variable(connection.to).kind) == kind
+            };
+            connections.iter().filter(of_kind).copied().collect()
         };
         let reals = Channel::new(system, REALS, &of(ValueType::Real), &[]);
         let integers = Channel::new(system, INTEGERS, &of(ValueType::Integer), more);

@@ -129,18 +129,19 @@ pub(crate) struct ChannelState<T> {
     /// several communication steps.
     start: Vec<T>,
     /// Values of the inputs that were set last.
-    given: Vec<T>,
+    #[serde(rename = "given")]
+    inputs: Vec<T>,
 }
 
 impl<T: Clone> ChannelState<T> {
     pub(crate) fn has_shape_of(&self, other: &Self) -> bool {
-        self.latest.len() == other.latest.len() && self.given.len() == other.given.len()
+        self.latest.len() == other.latest.len() && self.inputs.len() == other.inputs.len()
     }
 
     fn copy(&mut self, other: &Self) {
         self.latest.clone_from(&other.latest);
         self.start.clone_from(&other.start);
-        self.given.clone_from(&other.given);
+        self.inputs.clone_from(&other.inputs);
     }
 }
 
@@ -170,7 +171,7 @@ impl Wiring {
         Self {
             port_maps,
             sources: inputs.iter().map(|connection| indices[&connection.from]).collect(),
-            transformations: inputs.iter().map(|each| each.transformation.clone()).collect(),
+            transformations: inputs.iter().map(|input| input.transformation.clone()).collect(),
             input_ports: inputs.iter().map(|connection| connection.to).collect(),
             faults: vec![None; inputs.len()],
             output_ports: outputs,
@@ -204,16 +205,19 @@ impl<T: Clone + Default> Channel<T> {
         let wiring = Wiring::new(system, connections, more);
         let (outputs, inputs) = (wiring.output_ports.len(), wiring.input_ports.len());
         let defaults = |count: usize| vec![T::default(); count];
-        let (latest, start, given) = (defaults(outputs), defaults(outputs), defaults(inputs));
-        let state = ChannelState { latest, start, given };
+        let state = ChannelState {
+            latest: defaults(outputs),
+            start: defaults(outputs),
+            inputs: defaults(inputs),
+        };
         Self { access, wiring, state, values: defaults(inputs) }
     }
 
     /// Returns the current value of a connected output.
     pub(crate) fn value(&self, port: Port) -> Option<&T> {
         let key = |known: &Port| (known.slave, known.variable);
-        let found = self.wiring.output_ports.binary_search_by_key(&key(&port), key);
-        found.ok().map(|index| &self.state.latest[index])
+        let position = self.wiring.output_ports.binary_search_by_key(&key(&port), key);
+        position.ok().map(|index| &self.state.latest[index])
     }
 
     /// Puts a fault on the connection to an input; returns false if the input has no connection.
@@ -287,13 +291,13 @@ impl<T: Clone + Default> Channel<T> {
     /// Whether a gathered input of `slave` differs from the value that was set last.
     pub(crate) fn has_new(&self, slave: usize) -> bool {
         let range = self.wiring.port_maps[slave].input_range.clone();
-        range.into_iter().any(|k| !(self.access.same)(&self.values[k], &self.state.given[k]))
+        range.into_iter().any(|k| !(self.access.same)(&self.values[k], &self.state.inputs[k]))
     }
 
     /// Adds the connected inputs of `slave` whose gathered value differs from the one that was set last to `ports`.
     pub(crate) fn add_new(&self, slave: usize, ports: &mut Vec<Port>) {
         for k in self.wiring.port_maps[slave].input_range.clone() {
-            if !(self.access.same)(&self.values[k], &self.state.given[k]) {
+            if !(self.access.same)(&self.values[k], &self.state.inputs[k]) {
                 ports.push(self.wiring.input_ports[k]);
             }
         }
@@ -307,13 +311,13 @@ impl<T: Clone + Default> Channel<T> {
         }
         let range = port_map.input_range.clone();
         (self.access.set)(instance, &port_map.inputs, &self.values[range.clone()])?;
-        self.state.given[range.clone()].clone_from_slice(&self.values[range]);
+        self.state.inputs[range.clone()].clone_from_slice(&self.values[range]);
         Ok(())
     }
 
     /// Takes the gathered values of all inputs as set.
     pub(crate) fn accept(&mut self) {
-        self.state.given.clone_from(&self.values);
+        self.state.inputs.clone_from(&self.values);
     }
 
     /// Whether there are no connections.

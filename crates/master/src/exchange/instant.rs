@@ -62,8 +62,8 @@ impl Ticks {
 
     /// Asks which clocks of `slave` tick.
     fn read(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let own = self.sources.iter_mut().filter(|source| source.slave == slave);
-        for TickSource { references, flags, .. } in own {
+        let sources = self.sources.iter_mut().filter(|source| source.slave == slave);
+        for TickSource { references, flags, .. } in sources {
             instance.get_boolean(references, flags)?;
         }
         Ok(())

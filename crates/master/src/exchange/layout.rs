@@ -210,7 +210,8 @@ impl Layout {
         let rows: Vec<_> =
             system.slaves.iter().map(|(_, slave)| Rows::new(slave.description())).collect();
         loop {
-            let fed = system.connections.iter().filter(|own| jumping.contains(&own.from));
+            let fed =
+                system.connections.iter().filter(|connection| jumping.contains(&connection.from));
             let fed: HashSet<Port> = fed.map(|connection| connection.to).collect();
             let follows = |port: &&Port| {
                 let inputs = rows[port.slave].direct_dependencies(port.variable);
@@ -220,11 +221,11 @@ impl Layout {
                 };
                 !jumping.contains(port) && inputs.is_some_and(|all| all.iter().any(is_fed))
             };
-            let found: Vec<Port> = self.output_ports.iter().filter(follows).copied().collect();
-            if found.is_empty() {
+            let reached: Vec<Port> = self.output_ports.iter().filter(follows).copied().collect();
+            if reached.is_empty() {
                 break;
             }
-            jumping.extend(found);
+            jumping.extend(reached);
         }
         let jumps = |port: &Port| jumping.contains(port) && !is_discrete(*port);
         self.jumping = self.output_ports.iter().map(jumps).collect();

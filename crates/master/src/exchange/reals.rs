@@ -186,15 +186,15 @@ impl Reals {
         };
         let factor = layout.factors[k];
         let value = if layout.plain[slave] { value } else { factor * value + layout.offsets[k] };
-        let mut given = Polynomial {
+        let mut input = Polynomial {
             value,
             slope: factor * extrapolation.slope,
             curvature: factor * extrapolation.curvature,
         };
         if let Some(Some(fault)) = self.faults.get(k) {
-            given = if port_map.input_order > 0 {
+            input = if port_map.input_order > 0 {
                 let [value, slope, curvature] =
-                    fault.apply_derivatives(time, [value, given.slope, given.curvature]);
+                    fault.apply_derivatives(time, [value, input.slope, input.curvature]);
                 Polynomial { value, slope, curvature }
             } else {
                 let at_end = known
@@ -205,12 +205,12 @@ impl Reals {
         let (count, first) =
             (port_map.inputs.len(), port_map.input_derivative_range.start + position);
         let order = port_map.input_order;
-        self.values[k] = given.value;
+        self.values[k] = input.value;
         if order > 0 {
-            self.input_derivatives[first] = given.slope;
+            self.input_derivatives[first] = input.slope;
         }
         if order > 1 {
-            self.input_derivatives[first + count] = given.curvature;
+            self.input_derivatives[first + count] = input.curvature;
         }
     }
 
@@ -343,8 +343,8 @@ impl Reals {
             return None;
         }
         let range = self.layout.port_maps[slave].input_range.clone();
-        let found = range.into_iter().find(|&k| !self.values[k].is_finite())?;
-        Some((self.layout.input_ports[found], self.values[found]))
+        let index = range.into_iter().find(|&k| !self.values[k].is_finite())?;
+        Some((self.layout.input_ports[index], self.values[index]))
     }
 
     /// Returns an output of the slave whose value is not finite.

@@ -67,18 +67,20 @@ impl Reals {
                     continue;
                 }
                 let known = port_map.inputs[k - port_map.input_range.start];
-                let mut own = vec![0.0; port_map.outputs.len()];
+                let mut derivatives = vec![0.0; port_map.outputs.len()];
                 system.slaves[slave]
                     .1
                     .directional_derivative(
                         &port_map.outputs,
                         &[known],
                         &[layout.factors[k]],
-                        &mut own,
+                        &mut derivatives,
                     )
                     .map_err(|source| (slave, source))?;
-                for (change, own) in changes[port_map.output_range.clone()].iter_mut().zip(own) {
-                    *change += own;
+                for (change, derivative) in
+                    changes[port_map.output_range.clone()].iter_mut().zip(derivatives)
+                {
+                    *change += derivative;
                 }
             }
         }

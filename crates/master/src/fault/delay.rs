@@ -44,8 +44,8 @@ impl TryFrom<StoredDelayLine> for DelayLine {
     fn try_from(stored: StoredDelayLine) -> Result<Self, String> {
         let mut line = Self::new(stored.seconds, stored.step).map_err(|error| error.to_string())?;
         if stored.points.len() > line.room {
-            let (found, room) = (stored.points.len(), line.room);
-            return Err(format!("a delay has {found} points, expected at most {room}"));
+            let (count, room) = (stored.points.len(), line.room);
+            return Err(format!("a delay has {count} points, expected at most {room}"));
         }
         line.points.extend(stored.points);
         Ok(line)

@@ -13,7 +13,8 @@ pub(super) struct Stage {
     window: Window,
     fault: Fault,
     /// The value at which it sticks, or the last value not lost.
-    kept: Option<f64>,
+    #[serde(rename = "kept")]
+    last: Option<f64>,
     /// The memory of a delay.
     line: Option<DelayLine>,
 }
@@ -24,7 +25,7 @@ impl Stage {
             Fault::Delay { seconds, .. } => Some(DelayLine::new(seconds, step)?),
             _ => None,
         };
-        Ok(Self { window, fault, kept: None, line })
+        Ok(Self { window, fault, last: None, line })
     }
 
     /// Whether both are the same fault in the same window, whatever they remember.
@@ -46,9 +47,9 @@ impl Stage {
                 let since = (time - self.window.from).max(0.0);
                 [value + rate * since, slope + rate, curvature]
             }
-            Fault::Stuck(given) => held(given.or(self.kept).unwrap_or(value)),
+            Fault::Stuck(stated) => held(stated.or(self.last).unwrap_or(value)),
             Fault::Dropout { lost, instead } if self.loses(lost, time) => {
-                held(instead.or(self.kept).unwrap_or(value))
+                held(instead.or(self.last).unwrap_or(value))
             }
             Fault::Dropout { .. } => derivatives,
             Fault::Delay { hold, initial, .. } => self.line.as_ref().map_or(derivatives, |line| {
@@ -75,14 +76,14 @@ impl Stage {
     /// Records the value in front of this fault at a communication point.
     pub(super) fn commit(&mut self, time: f64, value: f64) {
         match &self.fault {
-            Fault::Stuck(None) if self.kept.is_none() && self.window.contains(time) => {
-                self.kept = Some(value);
+            Fault::Stuck(None) if self.last.is_none() && self.window.contains(time) => {
+                self.last = Some(value);
             }
             Fault::Dropout { lost, instead: None }
-                if self.kept.is_none()
+                if self.last.is_none()
                     || !(self.window.contains(time) && self.loses(lost, time)) =>
             {
-                self.kept = Some(value);
+                self.last = Some(value);
             }
             Fault::Delay { .. } => {
                 if let Some(line) = &mut self.line {

@@ -35,15 +35,15 @@ impl Simulation {
     pub fn change_scenario(&mut self, mut scenario: Scenario) -> Result<(), SystemError> {
         let engine = &mut self.engine;
         let earlier = engine.exchange.faults().count();
-        let mut kept = 0;
+        let mut inherited = 0;
         let mut same = scenario.drives.inherit(&engine.drives);
         for (input, chain) in &mut scenario.faults {
             if let Some(earlier) = engine.exchange.fault(*input) {
                 same &= chain.inherit(earlier);
-                kept += 1;
+                inherited += 1;
             }
         }
-        if !same || kept != earlier {
+        if !same || inherited != earlier {
             let what = "the new scenario lacks a driven variable or a fault of the present one, \
                         expected all of them";
             return Err(SystemError::Algorithm { what: what.to_owned() });

@@ -117,13 +117,13 @@ impl Simulation {
     ///
     /// Returns an error if slaves, connections or faults differ from the kept state, or if an FMU refuses
     /// its state.
-    pub fn return_to(&mut self, kept: &KeptState) -> Result<(), SystemError> {
-        self.expect_origin_of(&kept.master)?;
+    pub fn return_to(&mut self, state: &KeptState) -> Result<(), SystemError> {
+        self.expect_origin_of(&state.master)?;
         for (name, slave) in &mut self.engine.system.slaves {
-            let restored = slave.restore_state(FIRST_SLOT + kept.slot);
-            restored.map_err(|source| call(name, kept.master.time, source))?;
+            let restored = slave.restore_state(FIRST_SLOT + state.slot);
+            restored.map_err(|source| call(name, state.master.time, source))?;
         }
-        self.restore_master(&kept.master)
+        self.restore_master(&state.master)
     }
 
     /// A checkpoint whose FMU states are the bytes that `state` returns; it gets the name of each slave, the slave,
@@ -199,8 +199,8 @@ impl Simulation {
     /// Restores everything but the FMU states.
     fn restore_master(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
         self.engine.exchange.restore(&checkpoint.values);
-        for (fault, kept) in self.engine.exchange.faults().zip(&checkpoint.faults) {
-            fault.clone_from(kept);
+        for (fault, saved) in self.engine.exchange.faults().zip(&checkpoint.faults) {
+            fault.clone_from(saved);
         }
         self.engine
             .drives
@@ -221,7 +221,7 @@ impl Simulation {
     }
 
     fn expect_origin_of(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
-        let own = self
+        let present = self
             .engine
             .system
             .slaves
@@ -231,12 +231,12 @@ impl Simulation {
         let list = |names: &mut dyn Iterator<Item = (&str, &str)>| {
             names.map(|(name, guid)| format!("{name} {guid}")).collect::<Vec<_>>().join(", ")
         };
-        if !own.clone().eq(theirs.clone()) {
-            let (mut theirs, mut own) = (theirs, own);
+        if !present.clone().eq(theirs.clone()) {
+            let (mut theirs, mut present) = (theirs, present);
             let what = format!(
                 "the checkpoint is one of other FMUs: expected {}, found {}",
                 list(&mut theirs),
-                list(&mut own)
+                list(&mut present)
             );
             return Err(SystemError::Algorithm { what });
         }

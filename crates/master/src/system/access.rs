@@ -69,7 +69,7 @@ impl System {
         let variable = self.variable(port);
         let (reference, causality) = ([variable.value_reference], variable.causality);
         if causality == Causality::Input {
-            self.given.insert(self.holder(port), value.clone());
+            self.input_values.insert(self.holder(port), value.clone());
             self.changes += 1;
         }
         let slave = &mut self.slaves[port.slave].1;

@@ -55,8 +55,8 @@ impl System {
     /// Returns the elements of the array `variable`, with their indices, in the order of the description.
     fn elements(&self, slave: usize, variable: &str) -> Vec<(String, Port)> {
         let variables = self.slaves[slave].1.description().variables.iter().enumerate();
-        let element = |(position, own): (usize, &fmu_description::ScalarVariable)| {
-            let indices = own.name.strip_prefix(variable).filter(|rest| is_indices(rest))?;
+        let element = |(position, element): (usize, &fmu_description::ScalarVariable)| {
+            let indices = element.name.strip_prefix(variable).filter(|rest| is_indices(rest))?;
             Some((indices.to_owned(), Port { slave, variable: position }))
         };
         variables.filter_map(element).collect()
@@ -87,8 +87,8 @@ impl System {
             }
             (Named::Array(sources), Named::Array(targets)) if sources.len() == targets.len() => {
                 let partner = |indices: &String| {
-                    let found = targets.iter().find(|(other, _)| other == indices);
-                    found.map(|(_, port)| *port)
+                    let target = targets.iter().find(|(other, _)| other == indices);
+                    target.map(|(_, port)| *port)
                 };
                 let pair = |(position, (indices, port)): (usize, &(String, Port))| {
                     // Usually both arrays have their elements in the same order.
@@ -249,10 +249,12 @@ impl System {
             moved(&mut setting.port)?;
         }
         let connections = self.connections.iter().enumerate();
-        self.sources = connections.map(|(position, own)| (self.holder(own.to), position)).collect();
+        self.sources = connections
+            .map(|(position, connection)| (self.holder(connection.to), position))
+            .collect();
         let settings = self.settings.iter().enumerate();
         self.setting_positions =
-            settings.map(|(position, own)| (self.holder(own.port), position)).collect();
+            settings.map(|(position, setting)| (self.holder(setting.port), position)).collect();
         Ok(())
     }
 }

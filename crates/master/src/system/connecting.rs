@@ -64,13 +64,13 @@ impl System {
     }
 
     fn expect_causality(&self, port: Port, expected: Causality) -> Result<(), SystemError> {
-        let found = self.variable(port).causality;
-        if found == expected {
+        let causality = self.variable(port).causality;
+        if causality == expected {
             return Ok(());
         }
         Err(SystemError::Role {
             name: self.name(port),
-            found: format!("a variable of causality {}", found.as_str()),
+            found: format!("a variable of causality {}", causality.as_str()),
             expected: expected.as_str().to_owned(),
         })
     }

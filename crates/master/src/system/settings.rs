@@ -94,7 +94,7 @@ impl System {
                 self.set_value(setting.port, &setting.value)
             } else {
                 match self.get_value(setting.port) {
-                    Ok(found) if exact && found != setting.value => {
+                    Ok(value) if exact && value != setting.value => {
                         self.set_value(setting.port, &setting.value)
                     }
                     read => read.map(|_| ()),
@@ -135,8 +135,8 @@ impl System {
                 continue;
             }
             let name = self.name(setting.port);
-            let found = match self.get_value(setting.port) {
-                Ok(found) => found,
+            let value = match self.get_value(setting.port) {
+                Ok(value) => value,
                 Err(error) => {
                     tracing::warn!(
                         "{name}: cannot be read, so it is not known whether {:?} is kept: {error}",
@@ -146,10 +146,10 @@ impl System {
                     continue;
                 }
             };
-            if setting.value.is_near(&found) {
+            if setting.value.is_near(&value) {
                 continue;
             }
-            let (value, found) = (setting.text, found.to_string());
+            let (value, found) = (setting.text, value.to_string());
             let error = SystemError::LostSetting { name, value, found };
             if causality == Causality::Parameter {
                 return Err(error);
@@ -172,7 +172,11 @@ impl System {
         let set = || self.setting(port);
         let known = free
             .then(|| {
-                self.given.get(&port).or_else(set).cloned().or_else(|| Value::start(&variable.kind))
+                self.input_values
+                    .get(&port)
+                    .or_else(set)
+                    .cloned()
+                    .or_else(|| Value::start(&variable.kind))
             })
             .flatten();
         match known? {

@@ -124,7 +124,7 @@ fn the_residual_of_a_bond_is_the_power_given_less_the_power_got() {
 
 #[test]
 fn energy_control_measures_the_residuals_by_the_largest_power_so_far() {
-    let mut control = EnergyControl::new(BOUNDS, 1.0, (0.01, 0.0), &[1.0, 1.0]);
+    let mut control = EnergyControl::new(BOUNDS, 1.0, 0.01, 0.0, &[1.0, 1.0]);
     let strong = Bond { first: (100.0, 100.0), second: (1.0, 1.0) };
     assert!(control.measure(&[strong, strong]).abs() < 1e-15);
     // Both lose 0.5 W of at most 100 W, the first one at rest: 0.5 / (0.01 * 100) each.
@@ -136,10 +136,10 @@ fn energy_control_measures_the_residuals_by_the_largest_power_so_far() {
 
 #[test]
 fn bonds_at_rest_are_measured_by_the_absolute_tolerance() {
-    let mut control = EnergyControl::new(BOUNDS, 1.0, (0.01, 1e-3), &[4.0]);
+    let mut control = EnergyControl::new(BOUNDS, 1.0, 0.01, 1e-3, &[4.0]);
     let bond = Bond { first: (1.0, 0.0), second: (0.0, 8e-3) };
     assert!((control.measure(&[bond]) - 2.0).abs() < 1e-12);
-    let mut none = EnergyControl::new(BOUNDS, 1.0, (0.01, 0.0), &[1.0]);
+    let mut none = EnergyControl::new(BOUNDS, 1.0, 0.01, 0.0, &[1.0]);
     let rest = Bond { first: (0.0, 0.0), second: (0.0, 0.0) };
     assert!(none.next(1e-3, &[rest]) > 1e-3, "0/0 is no step");
 }

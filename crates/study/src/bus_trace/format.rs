@@ -30,7 +30,7 @@ pub(super) enum Format {
 impl Format {
     /// Returns the format for the extension of a file.
     pub(super) fn of(path: &Path) -> Result<Self, Error> {
-        match path.extension().and_then(|own| own.to_str()) {
+        match path.extension().and_then(|extension| extension.to_str()) {
             Some("log") => Ok(Self::Candump),
             Some("asc") => Ok(Self::Asc),
             Some("pcapng") => Ok(Self::Pcapng),

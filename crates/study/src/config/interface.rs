@@ -30,7 +30,7 @@ impl FromStr for Interface {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let all = [Interface::CoSimulation, Interface::ModelExchange];
-        let found = all.into_iter().find(|interface| interface.name() == text);
-        found.ok_or_else(|| format!("expected co-simulation or model-exchange, found {text:?}"))
+        let named = all.into_iter().find(|interface| interface.name() == text);
+        named.ok_or_else(|| format!("expected co-simulation or model-exchange, found {text:?}"))
     }
 }

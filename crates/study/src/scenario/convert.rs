@@ -36,19 +36,19 @@ impl Conversion {
     ) -> Result<Self, Reason> {
         let Some(stated) = stated else { return Ok(Self::NONE) };
         let name = name.to_owned();
-        let Some(own) = unit_of(variable, description) else {
+        let Some(unit) = unit_of(variable, description) else {
             return Err(Reason::NoUnit { name, stated: stated.to_owned() });
         };
-        if own == stated {
+        if unit == stated {
             return Ok(Self::NONE);
         }
-        let target = base_of(own, description)?;
+        let target = base_of(unit, description)?;
         let source = base_of(stated, description)?;
         match source.conversion(&target) {
             Some((factor, offset)) if factor.is_finite() && factor != 0.0 && offset.is_finite() => {
                 Ok(Self { factor, offset })
             }
-            _ => Err(Reason::Dimension { name, stated: stated.to_owned(), own: own.to_owned() }),
+            _ => Err(Reason::Dimension { name, stated: stated.to_owned(), unit: unit.to_owned() }),
         }
     }
 }

@@ -135,14 +135,14 @@ pub enum Reason {
         stated: String,
     },
     /// The unit has another dimension than the variable.
-    #[error("{name} is in {own:?}, to which {stated:?} cannot be converted")]
+    #[error("{name} is in {unit:?}, to which {stated:?} cannot be converted")]
     Dimension {
         /// The variable.
         name: String,
         /// The unit stated.
         stated: String,
         /// The unit of the variable.
-        own: String,
+        unit: String,
     },
     /// Points do not define a signal.
     #[error(transparent)]
@@ -180,6 +180,6 @@ pub enum Reason {
     },
 }
 
-fn listed(found: &[&str]) -> String {
-    if found.is_empty() { "none".to_owned() } else { found.join(" and ") }
+fn listed(kinds: &[&str]) -> String {
+    if kinds.is_empty() { "none".to_owned() } else { kinds.join(" and ") }
 }

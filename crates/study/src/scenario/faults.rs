@@ -71,8 +71,8 @@ impl<'a> Resolver<'a> {
             None => (None, stated.trim()),
         };
         let target = self.target(input)?;
-        let found = self.names.source(target.port);
-        if found.is_none() && self.driver(target.port).is_none() {
+        let source_port = self.names.source(target.port);
+        if source_port.is_none() && self.driver(target.port).is_none() {
             let found = match target.variable.causality {
                 Causality::Input => "an input without a source",
                 Causality::Output => "an output",
@@ -82,9 +82,9 @@ impl<'a> Resolver<'a> {
         }
         if let Some(source) = source {
             let stated_source = self.names.port(source)?;
-            if found != Some(stated_source) {
+            if source_port != Some(stated_source) {
                 let found =
-                    found.map_or_else(|| "a signal".to_owned(), |port| self.names.name(port));
+                    source_port.map_or_else(|| "a signal".to_owned(), |port| self.names.name(port));
                 let stated = self.names.name(stated_source);
                 return Err(Reason::OtherSource { target: target.name, found, stated });
             }

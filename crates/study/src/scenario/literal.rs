@@ -111,7 +111,7 @@ const EXACT: i128 = 1 << f64::MANTISSA_DIGITS;
 
 /// Returns the smallest and largest integer that a signal can give to a variable of this type.
 fn range(kind: &Kind, description: &ModelDescription) -> Option<(i128, i128)> {
-    let (least, largest) = kind.integer_range(description.version())?;
+    let (least, largest) = kind.integer_range(description.version())?.into_inner();
     Some((least.max(-EXACT), largest.min(EXACT)))
 }
 

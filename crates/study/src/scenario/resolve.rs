@@ -223,23 +223,23 @@ fn with_article(noun: &str) -> String {
 }
 
 /// Checks that a number is finite.
-pub(super) fn finite(what: &'static str, found: f64) -> Result<f64, Reason> {
-    require(what, found, found.is_finite(), "a finite number")
+pub(super) fn finite(what: &'static str, number: f64) -> Result<f64, Reason> {
+    require(what, number, number.is_finite(), "a finite number")
 }
 
 /// Checks that a number is finite and above 0.
-pub(super) fn positive(what: &'static str, found: f64) -> Result<f64, Reason> {
-    require(what, found, found.is_finite() && found > 0.0, "a number above 0")
+pub(super) fn positive(what: &'static str, number: f64) -> Result<f64, Reason> {
+    require(what, number, number.is_finite() && number > 0.0, "a number above 0")
 }
 
-/// Returns `found` if `holds` is true, otherwise an error with the text `expected`.
+/// Returns `number` if `holds` is true, otherwise an error with the text `expected`.
 pub(super) fn require(
     what: &'static str,
-    found: f64,
+    number: f64,
     holds: bool,
     expected: &'static str,
 ) -> Result<f64, Reason> {
-    if holds { Ok(found) } else { Err(Reason::Number { what, found, expected }) }
+    if holds { Ok(number) } else { Err(Reason::Number { what, found: number, expected }) }
 }
 
 /// Returns the only kind of an entry, or an error if there are none or several.
@@ -247,9 +247,9 @@ pub(super) fn only(
     kinds: &[(&'static str, bool)],
     expected: &'static str,
 ) -> Result<&'static str, Reason> {
-    let found: Vec<_> = kinds.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
-    match found[..] {
+    let stated: Vec<_> = kinds.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
+    match stated[..] {
         [one] => Ok(one),
-        _ => Err(Reason::Kinds { found, expected }),
+        _ => Err(Reason::Kinds { found: stated, expected }),
     }
 }

@@ -100,11 +100,11 @@ impl<'a> Resolver<'a> {
 
     fn column(&mut self, csv: &Csv, target: &Target<'_>) -> Result<Signal, Reason> {
         let (path, table) = self.file(csv.file.get_ref())?;
-        let own = &target.variable.name;
+        let variable = &target.variable.name;
         let name = match &csv.column {
             Some(column) => column.get_ref().clone(),
             None if table.column(&target.name).is_some() => target.name.clone(),
-            None => own.clone(),
+            None => variable.clone(),
         };
         if table.column(&name).is_none() {
             return Err(Reason::Column { path, name, known: some(&table.names) });

@@ -1,5 +1,7 @@
 //! Typed access to attributes and children, with errors and warnings that name them.
 
+use std::ops::RangeInclusive;
+
 use std::borrow::Cow;
 use std::str::FromStr;
 
@@ -26,32 +28,43 @@ pub(super) struct Node<'a> {
 
 impl<'a> Node<'a> {
     /// Returns the error for a missing or surplus child.
-    pub(super) fn misses(&self, expected: impl Into<String>, found: String) -> ParseError {
+    pub(super) fn misses(&self, expected: impl Into<String>, actual: String) -> ParseError {
         let (at, element) = (self.element.at, self.element.name.to_owned());
-        ParseError::Element { at, element, expected: expected.into(), found }
+        ParseError::Element { at, element, expected: expected.into(), found: actual }
     }
 
     /// Returns the error for the value `found` of an attribute.
-    pub(super) fn wrong(&self, attribute: &'static str, expected: &str, found: &str) -> ParseError {
-        self.fault(attribute, expected, format!("{found:?}"))
+    pub(super) fn wrong(
+        &self,
+        attribute: &'static str,
+        expected: &str,
+        actual: &str,
+    ) -> ParseError {
+        self.fault(attribute, expected, format!("{actual:?}"))
     }
 
-    fn fault(&self, attribute: &'static str, expected: &str, found: String) -> ParseError {
+    fn fault(&self, attribute: &'static str, expected: &str, actual: String) -> ParseError {
         let (at, element) = (self.element.at, self.element.name.to_owned());
-        ParseError::Attribute { at, element, attribute, expected: expected.to_owned(), found }
+        ParseError::Attribute {
+            at,
+            element,
+            attribute,
+            expected: expected.to_owned(),
+            found: actual,
+        }
     }
 
     /// Warns about the value `found` of an attribute that the schema does not allow.
-    pub(super) fn warn(&self, attribute: &str, expected: &str, found: &str, assumed: &str) {
+    pub(super) fn warn(&self, attribute: &str, expected: &str, actual: &str, assumed: &str) {
         let place = self.place(attribute);
-        self.warn_of(true, place, (expected, format!("{found:?}")), assumed);
+        self.warn_of(true, place, expected, format!("{actual:?}"), assumed);
     }
 
     /// Warns about the value `found` of an attribute that only the text of the standard does not
     /// allow.
-    pub(super) fn warn_text(&self, attribute: &str, expected: &str, found: &str, assumed: &str) {
+    pub(super) fn warn_text(&self, attribute: &str, expected: &str, actual: &str, assumed: &str) {
         let place = self.place(attribute);
-        self.warn_of(false, place, (expected, format!("{found:?}")), assumed);
+        self.warn_of(false, place, expected, format!("{actual:?}"), assumed);
     }
 
     /// The name of an attribute in a warning.
@@ -64,7 +77,8 @@ impl<'a> Node<'a> {
         &self,
         by_schema: bool,
         place: String,
-        (expected, found): (&str, String),
+        expected: &str,
+        actual: String,
         assumed: &str,
     ) {
         self.warnings.add(Warning {
@@ -72,15 +86,15 @@ impl<'a> Node<'a> {
             at: self.element.at,
             place,
             expected: expected.to_owned(),
-            found,
+            found: actual,
             assumed: assumed.to_owned(),
             section: section(self.warnings.version, self.element),
         });
     }
 
     pub(super) fn attribute(&self, name: &str) -> Option<&'a str> {
-        let own = self.element.attributes.iter().find(|(own, _)| *own == name);
-        own.map(|(_, value)| value.as_ref())
+        let attribute = self.element.attributes.iter().find(|(known, _)| *known == name);
+        attribute.map(|(_, value)| value.as_ref())
     }
 
     /// Returns the text in the element, with its entities resolved.
@@ -97,8 +111,9 @@ impl<'a> Node<'a> {
     /// `default`.
     pub(super) fn text_or(&self, name: &str, default: String) -> String {
         self.text(name).unwrap_or_else(|| {
-            let said = ("a value", "no such attribute".to_owned());
-            self.warn_of(true, self.place(name), said, &format!("read as {default:?}"));
+            let actual = "no such attribute".to_owned();
+            let assumed = format!("read as {default:?}");
+            self.warn_of(true, self.place(name), "a value", actual, &assumed);
             default
         })
     }
@@ -131,7 +146,7 @@ impl<'a> Node<'a> {
         if is_not_finite(trimmed) {
             // The schema allows these spellings, the text of FMI does not.
             let by_schema = !["INF", "-INF", "NaN"].contains(&trimmed);
-            self.warn_of(by_schema, self.place(name), (NUMBER, format!("{text:?}")), NOTHING);
+            self.warn_of(by_schema, self.place(name), NUMBER, format!("{text:?}"), NOTHING);
             return Ok(None);
         }
         match trimmed.parse::<f64>() {
@@ -173,11 +188,11 @@ impl<'a> Node<'a> {
     pub(super) fn integer_within(
         &self,
         name: &'static str,
-        (low, high): (i128, i128),
+        range: &RangeInclusive<i128>,
     ) -> Result<Option<i128>, ParseError> {
-        let expected = || format!("an integer from {low} to {high}");
+        let expected = || format!("an integer from {} to {}", range.start(), range.end());
         let Some((text, trimmed)) = self.content(name, "an integer") else { return Ok(None) };
-        let inside = |value: &i128| (low..=high).contains(value);
+        let inside = |value: &i128| range.contains(value);
         if let Some(value) = trimmed.parse().ok().filter(inside) {
             return Ok(Some(value));
         }
@@ -272,8 +287,8 @@ impl<'a> Node<'a> {
         match children.next() {
             None => Ok(first),
             Some(second) => {
-                let found = format!("another at {}", second.element.at);
-                Err(self.misses(format!("one element {name}"), found))
+                let actual = format!("another at {}", second.element.at);
+                Err(self.misses(format!("one element {name}"), actual))
             }
         }
     }

@@ -21,7 +21,7 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
     let (variables, structure) = variables.unwrap_or_default();
     let implementation = root.optional_child("Implementation")?;
     let co_simulation =
-        implementation.map(|own| co_simulation(own, identifier.clone())).transpose()?;
+        implementation.map(|element| co_simulation(element, identifier.clone())).transpose()?;
     let model_exchange = co_simulation.is_none().then(|| ModelExchange {
         model_identifier: identifier.clone(),
         number_of_continuous_states: root
@@ -71,23 +71,27 @@ fn unit(element: Node<'_>) -> Result<Unit, ParseError> {
 }
 
 fn simple_type(element: Node<'_>) -> Result<SimpleType, ParseError> {
-    let mut kinds = element.children().filter(|own| own.element.name.ends_with("Type"));
-    let Some(own) = kinds.next() else {
+    let mut kinds = element.children().filter(|child| child.element.name.ends_with("Type"));
+    let Some(element_of_kind) = kinds.next() else {
         let expected = "RealType, IntegerType, BooleanType, StringType or EnumerationType";
         return Err(element.misses(expected, "none".to_owned()));
     };
     // The items of an enumeration are numbered from 1.
-    let items = (1..).zip(own.children_named("Item"));
+    let items = (1..).zip(element_of_kind.children_named("Item"));
     let items = items.map(|(value, item)| Ok((item.required("name")?.to_owned(), value)));
     Ok(SimpleType {
         name: element.required("name")?.to_owned(),
         description: element.text("description"),
-        kind: match own.element.name {
-            "IntegerType" => Kind::Integer(integer_limits(own, &IntegerType::default())?),
+        kind: match element_of_kind.element.name {
+            "IntegerType" => {
+                Kind::Integer(integer_limits(element_of_kind, &IntegerType::default())?)
+            }
             "BooleanType" => Kind::Boolean(None),
             "StringType" => Kind::String(None),
-            "EnumerationType" => Kind::Enumeration(integer_limits(own, &IntegerType::default())?),
-            _ => Kind::Real(real_limits(own, &RealType::default())?),
+            "EnumerationType" => {
+                Kind::Enumeration(integer_limits(element_of_kind, &IntegerType::default())?)
+            }
+            _ => Kind::Real(real_limits(element_of_kind, &RealType::default())?),
         },
         items: items.collect::<Result<_, ParseError>>()?,
     })
@@ -100,7 +104,7 @@ fn co_simulation(
 ) -> Result<CoSimulation, ParseError> {
     let stand_alone = implementation.optional_child("CoSimulation_StandAlone")?;
     let tool = implementation.optional_child("CoSimulation_Tool")?;
-    let Some(own) = stand_alone.or(tool) else {
+    let Some(interface) = stand_alone.or(tool) else {
         let expected = "CoSimulation_StandAlone or CoSimulation_Tool";
         return Err(implementation.misses(expected, "neither".to_owned()));
     };
@@ -109,10 +113,10 @@ fn co_simulation(
         needs_execution_tool: stand_alone.is_none(),
         ..CoSimulation::default()
     };
-    let Some(capabilities) = own.optional_child("Capabilities")? else {
-        let place = format!("<{}>", own.element.name);
-        let said = ("an element Capabilities", "none".to_owned());
-        own.warn_of(true, place, said, "read without capabilities");
+    let Some(capabilities) = interface.optional_child("Capabilities")? else {
+        let place = format!("<{}>", interface.element.name);
+        let (expected, assumed) = ("an element Capabilities", "read without capabilities");
+        interface.warn_of(true, place, expected, "none".to_owned(), assumed);
         return Ok(flags);
     };
     let flag = |name| capabilities.flag(name);

@@ -14,8 +14,8 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
     let structure = structure::read(root, &variables)?;
     let model_exchange = root.optional_child("ModelExchange")?.map(model_exchange).transpose()?;
     let co_simulation = root.optional_child("CoSimulation")?.map(co_simulation).transpose()?;
-    let identifier = co_simulation.as_ref().map(|own| &own.model_identifier);
-    let identifier = identifier.or(model_exchange.as_ref().map(|own| &own.model_identifier));
+    let identifier = co_simulation.as_ref().map(|flags| &flags.model_identifier);
+    let identifier = identifier.or(model_exchange.as_ref().map(|flags| &flags.model_identifier));
     let model_name = root.text_or("modelName", identifier.cloned().unwrap_or_default());
     Ok(ModelDescription {
         fmi_version: "2.0".to_owned(),
@@ -47,8 +47,8 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
 
 /// Warns of 2.0.1 to 2.0.5, versions of the standard's text, which are read as 2.0.
 fn version(root: Node<'_>) {
-    if let Some(found) = root.attribute("fmiVersion").filter(|found| *found != "2.0") {
-        root.warn("fmiVersion", "2.0 for every 2.0.x", found, "read as 2.0");
+    if let Some(stated) = root.attribute("fmiVersion").filter(|stated| *stated != "2.0") {
+        root.warn("fmiVersion", "2.0 for every 2.0.x", stated, "read as 2.0");
     }
 }
 

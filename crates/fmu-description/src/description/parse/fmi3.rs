@@ -23,9 +23,9 @@ pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
     let co_simulation = optional("CoSimulation")?.map(co_simulation).transpose()?;
     let scheduled = optional("ScheduledExecution")?.map(scheduled_execution).transpose()?;
     let identifiers = [
-        co_simulation.as_ref().map(|own| &own.model_identifier),
-        model_exchange.as_ref().map(|own| &own.model_identifier),
-        scheduled.as_ref().map(|own| &own.model_identifier),
+        co_simulation.as_ref().map(|flags| &flags.model_identifier),
+        model_exchange.as_ref().map(|flags| &flags.model_identifier),
+        scheduled.as_ref().map(|flags| &flags.model_identifier),
     ];
     let identifier = identifiers.into_iter().flatten().next().cloned();
     Ok(ModelDescription {

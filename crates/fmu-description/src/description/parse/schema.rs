@@ -53,16 +53,16 @@ fn check_element(node: Node<'_>, parent: &str, shapes: fn(&str, &str) -> Option<
     let Some(shape) = shapes(parent, element.name) else { return };
     for (name, value) in &element.attributes {
         // FMI defines no namespaces.
-        let own = shape.attributes.contains(name) || shape.shared.contains(name);
-        let known = own || *name == "xmlns" || name.contains(':');
+        let is_listed = shape.attributes.contains(name) || shape.shared.contains(name);
+        let known = is_listed || *name == "xmlns" || name.contains(':');
         if !known {
             node.warn(name, "an attribute of the standard", value, "it was skipped");
         }
     }
     if shape.list && element.children.is_empty() {
         let place = format!("<{}>", element.name);
-        let said = ("an item, or no such list", "none".to_owned());
-        node.warn_of(true, place, said, "read as no list");
+        let expected = "an item, or no such list";
+        node.warn_of(true, place, expected, "none".to_owned(), "read as no list");
     }
     let mut last = 0;
     for child in &element.children {
@@ -70,16 +70,16 @@ fn check_element(node: Node<'_>, parent: &str, shapes: fn(&str, &str) -> Option<
         let position = shape.children.iter().position(|name| *name == child.name);
         let Some(position) = position else {
             let place = format!("<{}> in <{}>", child.name, element.name);
-            let said = ("an element of the standard", "another one".to_owned());
-            inner.warn_of(true, place, said, "it was skipped");
+            let (expected, actual) = ("an element of the standard", "another one".to_owned());
+            inner.warn_of(true, place, expected, actual, "it was skipped");
             continue;
         };
         let position = position.max(shape.unordered);
         if position < last {
             let place = format!("<{}>", child.name);
             let expected = format!("the order {}", shape.children.join(", "));
-            let found = format!("it after {}", shape.children[last]);
-            inner.warn_of(true, place, (&expected, found), "it was read all the same");
+            let actual = format!("it after {}", shape.children[last]);
+            inner.warn_of(true, place, &expected, actual, "it was read all the same");
         }
         last = last.max(position);
         check_element(inner, element.name, shapes);

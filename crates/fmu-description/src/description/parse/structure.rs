@@ -19,7 +19,7 @@ pub(super) fn read(
     let Some(element) = root.optional_child("ModelStructure")? else {
         let place = "<fmiModelDescription>".to_owned();
         let expected = "an element ModelStructure";
-        root.warn_of(true, place, (expected, "none".to_owned()), ANYTHING);
+        root.warn_of(true, place, expected, "none".to_owned(), ANYTHING);
         return Ok(ModelStructure {
             outputs: missing_outputs(&[], variables).map(|(row, _)| row).collect(),
             ..ModelStructure::default()
@@ -30,9 +30,9 @@ pub(super) fn read(
     if !missing.is_empty() {
         let names: Vec<_> = missing.iter().take(5).map(|(_, name)| *name).collect();
         let more = if missing.len() > 5 { ", and others" } else { "" };
-        let found = format!("no row for {}{more}", names.join(", "));
+        let actual = format!("no row for {}{more}", names.join(", "));
         let place = "<ModelStructure>".to_owned();
-        element.warn_of(false, place, ("every output in Outputs", found), ANYTHING);
+        element.warn_of(false, place, "every output in Outputs", actual, ANYTHING);
         outputs.extend(missing.into_iter().map(|(row, _)| row));
     }
     Ok(ModelStructure {
@@ -48,11 +48,11 @@ pub(super) fn missing_outputs<'a>(
     variables: &'a [ScalarVariable],
 ) -> impl Iterator<Item = (Unknown, &'a str)> {
     let listed: HashSet<u32> = rows.iter().map(|row| row.index).collect();
-    (1..).zip(variables).filter_map(move |(index, own)| {
-        let missing = own.causality == Causality::Output
-            && own.alias_of.is_none()
+    (1..).zip(variables).filter_map(move |(index, variable)| {
+        let missing = variable.causality == Causality::Output
+            && variable.alias_of.is_none()
             && !listed.contains(&index);
-        missing.then(|| (Unknown { index, ..Unknown::default() }, own.name.as_str()))
+        missing.then(|| (Unknown { index, ..Unknown::default() }, variable.name.as_str()))
     })
 }
 
@@ -76,8 +76,8 @@ fn list(element: Node<'_>, name: &'static str, count: usize) -> Result<Vec<Unkno
         rows.push(Unknown { index, dependencies, kinds });
     }
     if !trusted {
-        let said = (indices(count), "others".to_owned());
-        list.warn_of(false, format!("<{name}>"), (&said.0, said.1), ANYTHING);
+        let place = format!("<{name}>");
+        list.warn_of(false, place, &indices(count), "others".to_owned(), ANYTHING);
         for row in &mut rows {
             (row.dependencies, row.kinds) = (None, None);
         }
@@ -100,7 +100,7 @@ fn derivatives(element: Node<'_>, count: usize) -> Result<Vec<Unknown>, ParseErr
 /// Reads the 1-based index of one of `count` variables.
 pub(super) fn index(text: &str, count: usize) -> Option<u32> {
     let index = text.trim_matches(WHITE_SPACE).parse::<u32>().ok()?;
-    (index > 0 && usize::try_from(index).is_ok_and(|own| own <= count)).then_some(index)
+    (index > 0 && usize::try_from(index).is_ok_and(|position| position <= count)).then_some(index)
 }
 
 pub(super) fn indices(count: usize) -> String {
@@ -117,15 +117,15 @@ struct Impossible;
 /// Reads the attribute `dependencies`, if there is one.
 fn dependencies(row: Node<'_>, count: usize) -> Result<Option<Vec<u32>>, Impossible> {
     let Some(text) = row.attribute("dependencies") else { return Ok(None) };
-    let mut found = Vec::new();
+    let mut listed = Vec::new();
     for word in words(text) {
         let Some(index) = index(word, count) else {
             row.warn_text("dependencies", &indices(count), word, ANYTHING);
             return Err(Impossible);
         };
-        found.push(index);
+        listed.push(index);
     }
-    Ok(Some(found))
+    Ok(Some(listed))
 }
 
 /// Reads the attribute `dependenciesKind`, if it fits `dependencies`.
@@ -134,13 +134,14 @@ pub(super) fn kinds(row: Node<'_>, dependencies: Option<&[u32]>) -> Option<Vec<D
     let text = row.attribute(NAME)?;
     let expected = match dependencies {
         None => "no such attribute without dependencies".to_owned(),
-        Some(own) => format!(
+        Some(indices) => format!(
             "{} of dependent, constant, fixed, tunable or discrete, as many as dependencies",
-            own.len()
+            indices.len()
         ),
     };
     let kinds: Option<Vec<DependencyKind>> = words(text).map(|word| word.parse().ok()).collect();
-    let kinds = kinds.filter(|kinds| dependencies.is_some_and(|own| own.len() == kinds.len()));
+    let kinds =
+        kinds.filter(|kinds| dependencies.is_some_and(|indices| indices.len() == kinds.len()));
     if kinds.is_none() {
         row.warn_text(NAME, &expected, text, "read as dependent");
     }

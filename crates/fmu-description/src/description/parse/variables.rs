@@ -54,7 +54,8 @@ pub(super) fn variables(
     list: Node<'_>,
     types: &[SimpleType],
 ) -> Result<Vec<ScalarVariable>, ParseError> {
-    let types: Types<'_> = types.iter().map(|own| (own.name.as_str(), own)).collect();
+    let types: Types<'_> =
+        types.iter().map(|declared| (declared.name.as_str(), declared)).collect();
     let elements: Vec<Node<'_>> = list.children_named("ScalarVariable").collect();
     if exceeds(elements.len(), VARIABLES) {
         let at = list.element.at;
@@ -81,7 +82,8 @@ pub(super) fn check_names(
             continue;
         };
         let expected = "a name that is used once";
-        let local = [first, &variable].iter().all(|own| own.causality == Causality::Local);
+        let local =
+            [first, &variable].iter().all(|variable| variable.causality == Causality::Local);
         if !local
             && (base(&first.kind), first.value_reference)
                 != (base(&variable.kind), variable.value_reference)
@@ -109,8 +111,8 @@ pub(super) fn check_references(
         if let Some(first) = settable.insert(key, &variable.name) {
             let expected =
                 format!("one that no other input or parameter of this type has, {first} has it");
-            let found = variable.value_reference.to_string();
-            return Err(element.wrong("valueReference", &expected, &found));
+            let actual = variable.value_reference.to_string();
+            return Err(element.wrong("valueReference", &expected, &actual));
         }
     }
     Ok(())
@@ -172,21 +174,21 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
     let expected = format!("another one than continuous, the default, for {}", kind.element());
     let assumed_as = format!("read as {name}");
     let stated = element.attribute("variability");
-    let found = stated.map_or_else(|| "no such attribute".to_owned(), |text| format!("{text:?}"));
-    element.warn_of(false, element.place("variability"), (&expected, found), &assumed_as);
+    let actual = stated.map_or_else(|| "no such attribute".to_owned(), |text| format!("{text:?}"));
+    element.warn_of(false, element.place("variability"), &expected, actual, &assumed_as);
     assumed
 }
 
 /// Returns the single child that gives the type of a variable or a type definition.
 pub(super) fn typed(element: Node<'_>) -> Result<Node<'_>, ParseError> {
     let is_kind = |child: &&crate::xml::tree::Element<'_>| KINDS.contains(&child.name);
-    let mut found = element.element.children.iter().filter(is_kind);
-    match (found.next(), found.next()) {
+    let mut kinds = element.element.children.iter().filter(is_kind);
+    match (kinds.next(), kinds.next()) {
         (Some(only), None) => Ok(Node { element: only, ..element }),
         (first, _) => {
-            let found = if first.is_some() { "more" } else { "none" };
+            let actual = if first.is_some() { "more" } else { "none" };
             let expected = "one of Real, Integer, Boolean, String and Enumeration";
-            Err(element.misses(expected, found.to_owned()))
+            Err(element.misses(expected, actual.to_owned()))
         }
     }
 }
@@ -211,17 +213,21 @@ pub(super) fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result
         "String" => Kind::String(element.text("start")),
         other => {
             let (name, defaults) = match declared {
-                Some((name, Kind::Integer(own) | Kind::Enumeration(own))) => {
-                    (Some(name), own.clone())
+                Some((name, Kind::Integer(declared_type) | Kind::Enumeration(declared_type))) => {
+                    (Some(name), declared_type.clone())
                 }
                 _ => (None, IntegerType::default()),
             };
-            let own = IntegerType {
+            let integer_type = IntegerType {
                 declared_type: name,
                 start: element.integer("start")?.map(i128::from),
                 ..integer_limits(element, &defaults)?
             };
-            if other == "Integer" { Kind::Integer(own) } else { Kind::Enumeration(own) }
+            if other == "Integer" {
+                Kind::Integer(integer_type)
+            } else {
+                Kind::Enumeration(integer_type)
+            }
         }
     })
 }
@@ -238,13 +244,16 @@ fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kin
     let kind = element.element.name;
     let Some(name) = element.attribute(NAME) else {
         if kind == "Enumeration" {
-            let said = ("the name of an enumeration", "no such attribute".to_owned());
-            element.warn_of(true, element.place(NAME), said, "read without names of its items");
+            let (expected, actual) = ("the name of an enumeration", "no such attribute".to_owned());
+            let assumed = "read without names of its items";
+            element.warn_of(true, element.place(NAME), expected, actual, assumed);
         }
         return None;
     };
     match types.get(name) {
-        Some(own) if own.kind.element() == kind => Some((name.to_owned(), &own.kind)),
+        Some(declared_type) if declared_type.kind.element() == kind => {
+            Some((name.to_owned(), &declared_type.kind))
+        }
         _ => {
             let expected = format!("the name of a SimpleType that is {kind}");
             element.warn_text(NAME, &expected, name, "read without declared type");

@@ -14,32 +14,32 @@ const KEPT: usize = 1000;
 pub(super) struct Warnings {
     /// The version of the file.
     pub(super) version: Version,
-    kept: RefCell<Vec<Warning>>,
+    list: RefCell<Vec<Warning>>,
 }
 
 impl Warnings {
     pub(super) fn new(version: Version) -> Self {
-        Self { version, kept: RefCell::new(Vec::new()) }
+        Self { version, list: RefCell::new(Vec::new()) }
     }
 
     pub(super) fn add(&self, warning: Warning) {
-        let mut kept = self.kept.borrow_mut();
-        if kept.len() < KEPT {
-            kept.push(warning);
-        } else if kept.len() == KEPT {
+        let mut list = self.list.borrow_mut();
+        if list.len() < KEPT {
+            list.push(warning);
+        } else if list.len() == KEPT {
             let place = "after this".to_owned();
-            let found = "more".to_owned();
+            let actual = "more".to_owned();
             let expected = format!("at most {KEPT} warnings");
             let assumed = "the others are not listed".to_owned();
-            kept.push(Warning { place, expected, found, assumed, ..warning });
+            list.push(Warning { place, expected, found: actual, assumed, ..warning });
         }
     }
 
     /// Returns all warnings in the order of the file.
     pub(super) fn finish(self) -> Vec<Warning> {
-        let mut kept = self.kept.into_inner();
-        kept.sort_by_key(|warning| (warning.at.line, warning.at.column));
-        kept
+        let mut list = self.list.into_inner();
+        list.sort_by_key(|warning| (warning.at.line, warning.at.column));
+        list
     }
 }
 

@@ -26,14 +26,14 @@ impl Output {
             .maybe("generationDateAndTime", date)
             .maybe("variableNamingConvention", naming);
         self.around(tag, |output| {
-            if let Some(own) = &description.model_exchange {
-                output.empty(model_exchange(own));
+            if let Some(flags) = &description.model_exchange {
+                output.empty(model_exchange(flags));
             }
-            if let Some(own) = &description.co_simulation {
-                output.empty(co_simulation(own));
+            if let Some(flags) = &description.co_simulation {
+                output.empty(co_simulation(flags));
             }
-            if let Some(own) = &description.scheduled_execution {
-                output.empty(scheduled_execution(own));
+            if let Some(flags) = &description.scheduled_execution {
+                output.empty(scheduled_execution(flags));
             }
             output.list("UnitDefinitions", &description.units, Self::unit);
             output.list("TypeDefinitions", &description.types, Self::type_definition);
@@ -46,30 +46,30 @@ impl Output {
         });
     }
 
-    fn type_definition(&mut self, own: &SimpleType) {
-        let element = format!("{}Type", own.kind.element_in(Version::V3));
+    fn type_definition(&mut self, declared: &SimpleType) {
+        let element = format!("{}Type", declared.kind.element_in(Version::V3));
         let tag = Tag::new(&element)
-            .with("name", &own.name)
-            .maybe("description", own.description.as_ref());
-        let tag = attributes(tag, &own.kind);
-        if own.items.is_empty() {
+            .with("name", &declared.name)
+            .maybe("description", declared.description.as_ref());
+        let tag = attributes(tag, &declared.kind);
+        if declared.items.is_empty() {
             return self.empty(tag);
         }
         self.around(tag, |output| {
-            for (name, value) in &own.items {
+            for (name, value) in &declared.items {
                 output.empty(Tag::new("Item").with("name", name).with("value", value));
             }
         });
     }
 
     fn structure_3(&mut self, description: &ModelDescription) {
-        let own = &description.structure;
+        let structure = &description.structure;
         let rows = [
-            ("Output", &own.outputs),
-            ("ContinuousStateDerivative", &own.derivatives),
-            ("ClockedState", &own.clocked_states),
-            ("InitialUnknown", &own.initial_unknowns),
-            ("EventIndicator", &own.event_indicators),
+            ("Output", &structure.outputs),
+            ("ContinuousStateDerivative", &structure.derivatives),
+            ("ClockedState", &structure.clocked_states),
+            ("InitialUnknown", &structure.initial_unknowns),
+            ("EventIndicator", &structure.event_indicators),
         ];
         if rows.iter().all(|(_, rows)| rows.is_empty()) {
             return self.empty(Tag::new("ModelStructure"));
@@ -86,7 +86,7 @@ impl Output {
 
 /// Returns the value reference of the variable with a 1-based index, 0 if there is none.
 fn reference(description: &ModelDescription, index: u32) -> u32 {
-    description.at(index).map(|own| own.value_reference).unwrap_or_default()
+    description.at(index).map(|variable| variable.value_reference).unwrap_or_default()
 }
 
 fn references(description: &ModelDescription, indices: &[u32]) -> String {
@@ -95,7 +95,7 @@ fn references(description: &ModelDescription, indices: &[u32]) -> String {
 }
 
 fn unknown<'a>(name: &'a str, row: &Unknown, description: &ModelDescription) -> Tag<'a> {
-    let dependencies = row.dependencies.as_ref().map(|own| references(description, own));
+    let dependencies = row.dependencies.as_ref().map(|indices| references(description, indices));
     let kinds = row
         .kinds
         .as_ref()
@@ -109,24 +109,24 @@ fn unknown<'a>(name: &'a str, row: &Unknown, description: &ModelDescription) -> 
 /// Adds the attributes that a type and a variable have in common.
 fn attributes<'a>(tag: Tag<'a>, kind: &Kind) -> Tag<'a> {
     match kind {
-        Kind::Real(own) => real_limits(tag, own, |value| format!("{value:?}")),
-        Kind::Float32(own) => real_limits(tag, own, single),
+        Kind::Real(real) => real_limits(tag, real, |value| format!("{value:?}")),
+        Kind::Float32(real) => real_limits(tag, real, single),
         Kind::Boolean(_) | Kind::String(_) => tag,
-        Kind::Binary(own) => {
-            tag.maybe("mimeType", own.mime_type.as_ref()).maybe("maxSize", own.max_size.as_ref())
-        }
-        Kind::Clock(own) => tag
-            .unless_default("canBeDeactivated", &own.can_be_deactivated)
-            .maybe("priority", own.priority.as_ref())
-            .with("intervalVariability", own.interval_variability.as_str())
-            .maybe("intervalDecimal", own.interval_decimal.as_ref())
-            .maybe("shiftDecimal", own.shift_decimal.as_ref())
-            .unless_default("supportsFraction", &own.supports_fraction)
-            .maybe("resolution", own.resolution.as_ref())
-            .maybe("intervalCounter", own.interval_counter.as_ref())
-            .maybe("shiftCounter", own.shift_counter.as_ref()),
+        Kind::Binary(binary) => tag
+            .maybe("mimeType", binary.mime_type.as_ref())
+            .maybe("maxSize", binary.max_size.as_ref()),
+        Kind::Clock(clock) => tag
+            .unless_default("canBeDeactivated", &clock.can_be_deactivated)
+            .maybe("priority", clock.priority.as_ref())
+            .with("intervalVariability", clock.interval_variability.as_str())
+            .maybe("intervalDecimal", clock.interval_decimal.as_ref())
+            .maybe("shiftDecimal", clock.shift_decimal.as_ref())
+            .unless_default("supportsFraction", &clock.supports_fraction)
+            .maybe("resolution", clock.resolution.as_ref())
+            .maybe("intervalCounter", clock.interval_counter.as_ref())
+            .maybe("shiftCounter", clock.shift_counter.as_ref()),
         other => match other.as_integer() {
-            Some(own) => integer_limits(tag, own),
+            Some(integer) => integer_limits(tag, integer),
             None => tag,
         },
     }
@@ -147,58 +147,58 @@ fn single(value: f64) -> String {
     format!("{:?}", value as f32)
 }
 
-fn model_exchange(own: &ModelExchange) -> Tag<'_> {
-    let only_once = &own.can_be_instantiated_only_once_per_process;
-    let elements = &own.provides_per_element_dependencies;
+fn model_exchange(flags: &ModelExchange) -> Tag<'_> {
+    let only_once = &flags.can_be_instantiated_only_once_per_process;
+    let elements = &flags.provides_per_element_dependencies;
     Tag::new("ModelExchange")
-        .with("modelIdentifier", &own.model_identifier)
-        .unless_default("needsExecutionTool", &own.needs_execution_tool)
+        .with("modelIdentifier", &flags.model_identifier)
+        .unless_default("needsExecutionTool", &flags.needs_execution_tool)
         .unless_default("canBeInstantiatedOnlyOncePerProcess", only_once)
-        .unless_default("canGetAndSetFMUState", &own.can_get_and_set_fmu_state)
-        .unless_default("canSerializeFMUState", &own.can_serialize_fmu_state)
-        .unless_default("providesDirectionalDerivatives", &own.provides_directional_derivative)
-        .unless_default("providesAdjointDerivatives", &own.provides_adjoint_derivatives)
+        .unless_default("canGetAndSetFMUState", &flags.can_get_and_set_fmu_state)
+        .unless_default("canSerializeFMUState", &flags.can_serialize_fmu_state)
+        .unless_default("providesDirectionalDerivatives", &flags.provides_directional_derivative)
+        .unless_default("providesAdjointDerivatives", &flags.provides_adjoint_derivatives)
         .unless_default("providesPerElementDependencies", elements)
-        .unless_default("needsCompletedIntegratorStep", &own.needs_completed_integrator_step)
-        .unless_default("providesEvaluateDiscreteStates", &own.provides_evaluate_discrete_states)
+        .unless_default("needsCompletedIntegratorStep", &flags.needs_completed_integrator_step)
+        .unless_default("providesEvaluateDiscreteStates", &flags.provides_evaluate_discrete_states)
 }
 
-fn co_simulation(own: &CoSimulation) -> Tag<'_> {
-    let only_once = &own.can_be_instantiated_only_once_per_process;
-    let elements = &own.provides_per_element_dependencies;
-    let variable_step = &own.can_handle_variable_communication_step_size;
-    let smoothness = &own.recommended_intermediate_input_smoothness;
-    let after_update = &own.can_return_early_after_intermediate_update;
+fn co_simulation(flags: &CoSimulation) -> Tag<'_> {
+    let only_once = &flags.can_be_instantiated_only_once_per_process;
+    let elements = &flags.provides_per_element_dependencies;
+    let variable_step = &flags.can_handle_variable_communication_step_size;
+    let smoothness = &flags.recommended_intermediate_input_smoothness;
+    let after_update = &flags.can_return_early_after_intermediate_update;
     Tag::new("CoSimulation")
-        .with("modelIdentifier", &own.model_identifier)
-        .unless_default("needsExecutionTool", &own.needs_execution_tool)
+        .with("modelIdentifier", &flags.model_identifier)
+        .unless_default("needsExecutionTool", &flags.needs_execution_tool)
         .unless_default("canBeInstantiatedOnlyOncePerProcess", only_once)
-        .unless_default("canGetAndSetFMUState", &own.can_get_and_set_fmu_state)
-        .unless_default("canSerializeFMUState", &own.can_serialize_fmu_state)
-        .unless_default("providesDirectionalDerivatives", &own.provides_directional_derivative)
-        .unless_default("providesAdjointDerivatives", &own.provides_adjoint_derivatives)
+        .unless_default("canGetAndSetFMUState", &flags.can_get_and_set_fmu_state)
+        .unless_default("canSerializeFMUState", &flags.can_serialize_fmu_state)
+        .unless_default("providesDirectionalDerivatives", &flags.provides_directional_derivative)
+        .unless_default("providesAdjointDerivatives", &flags.provides_adjoint_derivatives)
         .unless_default("providesPerElementDependencies", elements)
         .unless_default("canHandleVariableCommunicationStepSize", variable_step)
-        .maybe("fixedInternalStepSize", own.fixed_internal_step_size.as_ref())
-        .unless_default("maxOutputDerivativeOrder", &own.max_output_derivative_order)
+        .maybe("fixedInternalStepSize", flags.fixed_internal_step_size.as_ref())
+        .unless_default("maxOutputDerivativeOrder", &flags.max_output_derivative_order)
         .unless_default("recommendedIntermediateInputSmoothness", smoothness)
-        .unless_default("providesIntermediateUpdate", &own.provides_intermediate_update)
-        .unless_default("mightReturnEarlyFromDoStep", &own.might_return_early_from_do_step)
+        .unless_default("providesIntermediateUpdate", &flags.provides_intermediate_update)
+        .unless_default("mightReturnEarlyFromDoStep", &flags.might_return_early_from_do_step)
         .unless_default("canReturnEarlyAfterIntermediateUpdate", after_update)
-        .unless_default("hasEventMode", &own.has_event_mode)
-        .unless_default("providesEvaluateDiscreteStates", &own.provides_evaluate_discrete_states)
+        .unless_default("hasEventMode", &flags.has_event_mode)
+        .unless_default("providesEvaluateDiscreteStates", &flags.provides_evaluate_discrete_states)
 }
 
-fn scheduled_execution(own: &ScheduledExecution) -> Tag<'_> {
-    let only_once = &own.can_be_instantiated_only_once_per_process;
-    let elements = &own.provides_per_element_dependencies;
+fn scheduled_execution(flags: &ScheduledExecution) -> Tag<'_> {
+    let only_once = &flags.can_be_instantiated_only_once_per_process;
+    let elements = &flags.provides_per_element_dependencies;
     Tag::new("ScheduledExecution")
-        .with("modelIdentifier", &own.model_identifier)
-        .unless_default("needsExecutionTool", &own.needs_execution_tool)
+        .with("modelIdentifier", &flags.model_identifier)
+        .unless_default("needsExecutionTool", &flags.needs_execution_tool)
         .unless_default("canBeInstantiatedOnlyOncePerProcess", only_once)
-        .unless_default("canGetAndSetFMUState", &own.can_get_and_set_fmu_state)
-        .unless_default("canSerializeFMUState", &own.can_serialize_fmu_state)
-        .unless_default("providesDirectionalDerivatives", &own.provides_directional_derivative)
-        .unless_default("providesAdjointDerivatives", &own.provides_adjoint_derivatives)
+        .unless_default("canGetAndSetFMUState", &flags.can_get_and_set_fmu_state)
+        .unless_default("canSerializeFMUState", &flags.can_serialize_fmu_state)
+        .unless_default("providesDirectionalDerivatives", &flags.provides_directional_derivative)
+        .unless_default("providesAdjointDerivatives", &flags.provides_adjoint_derivatives)
         .unless_default("providesPerElementDependencies", elements)
 }

@@ -19,18 +19,18 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
             check_use(&format!("variable {}", variable.name), real, &units, problems);
         }
     }
-    let names = description.types.iter().map(|own| own.name.as_str());
+    let names = description.types.iter().map(|declared| declared.name.as_str());
     problems.unique(in_types, "type", names);
     let variables: HashSet<_> =
         description.variables.iter().map(|variable| variable.name.as_str()).collect();
-    for own in &description.types {
-        problems.demand(!variables.contains(own.name.as_str()), in_types, || {
-            format!("type {} has the name of a variable", own.name)
+    for declared in &description.types {
+        problems.demand(!variables.contains(declared.name.as_str()), in_types, || {
+            format!("type {} has the name of a variable", declared.name)
         });
-        if let Some(real) = own.kind.as_real() {
-            check_use(&format!("type {}", own.name), real, &units, problems);
+        if let Some(real) = declared.kind.as_real() {
+            check_use(&format!("type {}", declared.name), real, &units, problems);
         }
-        check_type(own, problems);
+        check_type(declared, problems);
     }
 }
 
@@ -70,33 +70,33 @@ fn check_use(who: &str, real: &RealType, units: &HashMap<&str, &Unit>, problems:
         problems.demand(unit.is_some(), in_types, || {
             format!("{who} has display unit {display:?} and no unit")
         });
-        let listed =
-            defined.is_none_or(|unit| unit.display_units.iter().any(|own| own.name == *display));
+        let listed = defined
+            .is_none_or(|unit| unit.display_units.iter().any(|known| known.name == *display));
         problems.demand(listed, in_types, || {
             format!("{who} has display unit {display:?}, which its unit does not list")
         });
     }
 }
 
-fn check_type(own: &SimpleType, problems: &mut Problems) {
+fn check_type(declared: &SimpleType, problems: &mut Problems) {
     let Sections { types: in_types, .. } = problems.sections;
-    let name = &own.name;
+    let name = &declared.name;
     problems.demand(!name.is_empty(), in_types, || "a type has no name".to_owned());
     problems.line(in_types, "type", name);
     problems.text(
         in_types,
         "description of a type",
-        own.description.as_deref().unwrap_or_default(),
+        declared.description.as_deref().unwrap_or_default(),
     );
-    match &own.kind {
+    match &declared.kind {
         Kind::Enumeration(_) => {
-            problems.demand(!own.items.is_empty(), in_types, || {
+            problems.demand(!declared.items.is_empty(), in_types, || {
                 format!("enumeration type {name} has no item")
             });
-            let items = own.items.iter().map(|(item, _)| item.as_str());
+            let items = declared.items.iter().map(|(item, _)| item.as_str());
             problems.unique(in_types, &format!("in type {name}, item"), items);
             let mut values = HashSet::new();
-            for (item, value) in &own.items {
+            for (item, value) in &declared.items {
                 problems.demand(values.insert(value), in_types, || {
                     format!("in type {name}, item {item} has the value {value} of another item")
                 });

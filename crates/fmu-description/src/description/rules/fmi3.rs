@@ -32,8 +32,8 @@ pub(super) fn check_identity(description: &ModelDescription, problems: &mut Prob
             format!("{name}: canSerializeFMUState is true without canGetAndSetFMUState")
         });
     }
-    if let Some(own) = &description.co_simulation {
-        check_co_simulation(own, description, problems);
+    if let Some(flags) = &description.co_simulation {
+        check_co_simulation(flags, description, problems);
     }
 }
 
@@ -46,43 +46,44 @@ struct Interface<'a> {
 }
 
 fn interfaces(description: &ModelDescription) -> Vec<Interface<'_>> {
-    let exchange = description.model_exchange.as_ref().map(|own| Interface {
+    let exchange = description.model_exchange.as_ref().map(|flags| Interface {
         name: "ModelExchange",
-        identifier: &own.model_identifier,
-        keeps: own.can_get_and_set_fmu_state,
-        serializes: own.can_serialize_fmu_state,
+        identifier: &flags.model_identifier,
+        keeps: flags.can_get_and_set_fmu_state,
+        serializes: flags.can_serialize_fmu_state,
     });
-    let simulation = description.co_simulation.as_ref().map(|own| Interface {
+    let simulation = description.co_simulation.as_ref().map(|flags| Interface {
         name: "CoSimulation",
-        identifier: &own.model_identifier,
-        keeps: own.can_get_and_set_fmu_state,
-        serializes: own.can_serialize_fmu_state,
+        identifier: &flags.model_identifier,
+        keeps: flags.can_get_and_set_fmu_state,
+        serializes: flags.can_serialize_fmu_state,
     });
-    let scheduled = description.scheduled_execution.as_ref().map(|own| Interface {
+    let scheduled = description.scheduled_execution.as_ref().map(|flags| Interface {
         name: "ScheduledExecution",
-        identifier: &own.model_identifier,
-        keeps: own.can_get_and_set_fmu_state,
-        serializes: own.can_serialize_fmu_state,
+        identifier: &flags.model_identifier,
+        keeps: flags.can_get_and_set_fmu_state,
+        serializes: flags.can_serialize_fmu_state,
     });
     [exchange, simulation, scheduled].into_iter().flatten().collect()
 }
 
 fn check_co_simulation(
-    own: &CoSimulation,
+    flags: &CoSimulation,
     description: &ModelDescription,
     problems: &mut Problems,
 ) {
     const SECTION: &str = "4.4";
-    let returns = own.can_return_early_after_intermediate_update;
-    problems.demand(own.provides_intermediate_update || !returns, SECTION, || {
+    let returns = flags.can_return_early_after_intermediate_update;
+    problems.demand(flags.provides_intermediate_update || !returns, SECTION, || {
         "canReturnEarlyAfterIntermediateUpdate is true without providesIntermediateUpdate"
             .to_owned()
     });
-    let clocked = description.variables.iter().any(|own| matches!(own.kind, Kind::Clock(_)));
-    problems.demand(own.has_event_mode || !clocked, SECTION, || {
+    let clocked =
+        description.variables.iter().any(|variable| matches!(variable.kind, Kind::Clock(_)));
+    problems.demand(flags.has_event_mode || !clocked, SECTION, || {
         "there are clocks, and hasEventMode is false".to_owned()
     });
-    if let Some(step) = own.fixed_internal_step_size {
+    if let Some(step) = flags.fixed_internal_step_size {
         problems.demand(step > 0.0 && step.is_finite(), SECTION, || {
             format!("fixedInternalStepSize is {step:?}, not positive and finite")
         });

@@ -38,8 +38,8 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
 /// 2.2.9), each with the reason: the elements of an array are adjacent, with the last index running
 /// fastest. Only arrays of scalars are checked: names with indices at their end.
 pub fn misplaced_elements<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(usize, String)> {
-    let mut found = Vec::new();
-    let mut seen = HashSet::new();
+    let mut misplaced = Vec::new();
+    let mut arrays = HashSet::new();
     let mut last: Option<(&str, Vec<u32>)> = None;
     for (position, name) in names.enumerate() {
         let Some((array, indices)) = array_element(name) else {
@@ -49,14 +49,14 @@ pub fn misplaced_elements<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(usiz
         let text = match &last {
             Some((other, before)) if *other == array => (*before >= indices)
                 .then(|| format!("variable {name} does not follow in row-major order")),
-            _ => (!seen.insert(array)).then(|| {
+            _ => (!arrays.insert(array)).then(|| {
                 format!("variable {name} stands apart from the other elements of {array}")
             }),
         };
-        found.extend(text.map(|text| (position, text)));
+        misplaced.extend(text.map(|text| (position, text)));
         last = Some((array, indices));
     }
-    found
+    misplaced
 }
 
 /// Splits `a.b[1,2]` into `a.b` and its indices; `None` if the name does not end in indices.
@@ -101,9 +101,10 @@ fn is_identifier(text: &str) -> bool {
 /// Returns the rest after a `B-name`, which is plain or in apostrophes.
 fn after_name(text: &str) -> Option<&str> {
     let Some(quoted) = text.strip_prefix('\'') else {
-        let is_letter = |own: char| own.is_ascii_alphanumeric() || own == '_';
-        let length = text.find(|own| !is_letter(own)).unwrap_or(text.len());
-        let starts = text.starts_with(|own: char| is_letter(own) && !own.is_ascii_digit());
+        let is_letter = |character: char| character.is_ascii_alphanumeric() || character == '_';
+        let length = text.find(|character| !is_letter(character)).unwrap_or(text.len());
+        let starts =
+            text.starts_with(|character: char| is_letter(character) && !character.is_ascii_digit());
         return starts.then(|| &text[length..]);
     };
     let mut characters = quoted.char_indices();

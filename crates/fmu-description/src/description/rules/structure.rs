@@ -18,31 +18,35 @@ impl ModelDescription {
     }
 
     pub(super) fn name_of(&self, index: u32) -> String {
-        self.at(index).map_or_else(|| format!("number {index}"), |own| own.name.clone())
+        self.at(index).map_or_else(|| format!("number {index}"), |variable| variable.name.clone())
     }
 }
 
 pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     let structure = &description.structure;
     let states = states(description, problems);
-    let outputs = description.indices_of(|own| own.causality == Causality::Output);
-    check_members(("Outputs", SECTION), &structure.outputs, &outputs, description, problems);
+    let outputs = description.indices_of(|variable| variable.causality == Causality::Output);
+    let list = List { name: "Outputs", section: SECTION, rows: &structure.outputs };
+    check_members(&list, &outputs, description, problems);
     let unknowns = initial_unknowns(description, &states);
     let rows = &structure.initial_unknowns;
-    check_members(("InitialUnknowns", SECTION), rows, &unknowns, description, problems);
+    let list = List { name: "InitialUnknowns", section: SECTION, rows };
+    check_members(&list, &unknowns, description, problems);
     let ascending = rows.windows(2).all(|pair| pair[0].index <= pair[1].index);
     problems.demand(ascending, SECTION, || "InitialUnknowns are not in ascending order".to_owned());
 
-    let is_given =
-        |own: &ScalarVariable| matches!(own.causality, Causality::Input | Causality::Independent);
-    let known = |index: u32, own: &ScalarVariable| is_given(own) || states.contains(&index);
+    let is_given = |variable: &ScalarVariable| {
+        matches!(variable.causality, Causality::Input | Causality::Independent)
+    };
+    let known =
+        |index: u32, variable: &ScalarVariable| is_given(variable) || states.contains(&index);
     for (list, rows) in [("Outputs", &structure.outputs), ("Derivatives", &structure.derivatives)] {
         for row in rows {
             check_dependencies(list, row, description, known, problems);
         }
     }
-    let known_at_start = |_: u32, own: &ScalarVariable| {
-        is_given(own) || own.initial_in_force() == Some(Initial::Exact)
+    let known_at_start = |_: u32, variable: &ScalarVariable| {
+        is_given(variable) || variable.initial_in_force() == Some(Initial::Exact)
     };
     for row in rows {
         check_dependencies("InitialUnknowns", row, description, known_at_start, problems);
@@ -65,7 +69,7 @@ fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u3
     let mut states = HashSet::new();
     for row in &description.structure.derivatives {
         let name = description.name_of(row.index);
-        let derivative = description.at(row.index).and_then(|own| match own.kind {
+        let derivative = description.at(row.index).and_then(|variable| match variable.kind {
             Kind::Real(RealType { derivative, .. }) => derivative,
             _ => None,
         });
@@ -76,9 +80,9 @@ fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u3
         problems.demand(states.insert(state), SECTION, || {
             format!("Derivatives, {name}: its state has another derivative in the list")
         });
-        let is_state = |own: &ScalarVariable| {
-            matches!(own.causality, Causality::Local | Causality::Output)
-                && own.variability == Variability::Continuous
+        let is_state = |variable: &ScalarVariable| {
+            matches!(variable.causality, Causality::Local | Causality::Output)
+                && variable.variability == Variability::Continuous
         };
         problems.demand(description.at(state).is_some_and(is_state), SECTION, || {
             let state = description.name_of(state);
@@ -92,36 +96,43 @@ fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u3
 fn initial_unknowns(description: &ModelDescription, states: &HashSet<u32>) -> BTreeSet<u32> {
     let derivatives = description.structure.derivatives.iter().map(|row| row.index);
     let exposed: HashSet<u32> = states.iter().copied().chain(derivatives).collect();
-    let computed = |own: &ScalarVariable| {
-        matches!(own.initial_in_force(), Some(Initial::Approx | Initial::Calculated))
+    let computed = |variable: &ScalarVariable| {
+        matches!(variable.initial_in_force(), Some(Initial::Approx | Initial::Calculated))
     };
-    let mut indices = description.indices_of(|own| match own.causality {
+    let mut indices = description.indices_of(|variable| match variable.causality {
         Causality::CalculatedParameter => true,
-        Causality::Output => computed(own),
+        Causality::Output => computed(variable),
         _ => false,
     });
     indices.extend(exposed.iter().filter(|index| description.at(**index).is_some_and(computed)));
     indices
 }
 
+/// A list of `ModelStructure`, with the section of the standard that says what belongs there.
+pub(super) struct List<'a> {
+    pub(super) name: &'static str,
+    pub(super) section: &'static str,
+    pub(super) rows: &'a [Unknown],
+}
+
 /// Checks that a list has exactly the required members, each once.
 pub(super) fn check_members(
-    (list, section): (&str, &'static str),
-    rows: &[Unknown],
-    wanted: &BTreeSet<u32>,
+    list: &List<'_>,
+    required: &BTreeSet<u32>,
     description: &ModelDescription,
     problems: &mut Problems,
 ) {
-    let mut found = BTreeSet::new();
+    let List { name: list, section, rows } = *list;
+    let mut members = BTreeSet::new();
     for row in rows {
-        problems.demand(found.insert(row.index), section, || {
+        problems.demand(members.insert(row.index), section, || {
             format!("{list} has variable {} twice", description.name_of(row.index))
         });
     }
-    for index in wanted.difference(&found) {
+    for index in required.difference(&members) {
         problems.add(section, format!("{list} lacks variable {}", description.name_of(*index)));
     }
-    for index in found.difference(wanted) {
+    for index in members.difference(required) {
         let name = description.name_of(*index);
         problems.add(section, format!("{list} has variable {name}, which does not belong there"));
     }
@@ -141,7 +152,7 @@ fn check_dependencies(
         format!("{list}, {name}: dependencies are not ascending and unique")
     });
     for index in dependencies {
-        let known = description.at(*index).is_some_and(|own| is_known(*index, own));
+        let known = description.at(*index).is_some_and(|variable| is_known(*index, variable));
         problems.demand(known, SECTION, || {
             let other = description.name_of(*index);
             format!("{list}, {name}: a dependency on {other} cannot be stated, it is no known")
@@ -153,7 +164,8 @@ fn check_dependencies(
         SECTION,
         || format!("{list}, {name}: dependenciesKind is not as long as dependencies"),
     );
-    let real = description.at(row.index).is_some_and(|own| matches!(own.kind, Kind::Real(_)));
+    let real =
+        description.at(row.index).is_some_and(|variable| matches!(variable.kind, Kind::Real(_)));
     let plain = kinds.iter().all(|kind| *kind == DependencyKind::Dependent);
     problems.demand(real || plain, SECTION, || {
         format!("{list}, {name}: only for a Real may dependenciesKind be other than dependent")

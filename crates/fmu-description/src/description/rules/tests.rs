@@ -143,20 +143,20 @@ fn causality_and_variability_follow_the_table() {
     for causality in [Parameter, CalculatedParameter, Input, Output, Local, Independent] {
         for variability in [Constant, Fixed, Tunable, Discrete, Continuous] {
             let pair = (causality, variability);
-            let mut problems = Problems { sections: &SECTIONS_OF_2, found: Vec::new() };
+            let mut problems = Problems { sections: &SECTIONS_OF_2, list: Vec::new() };
             let description = ModelDescription {
                 variables: vec![ScalarVariable {
                     initial: None,
-                    ..real("x", pair, needs_start(pair).then_some(1.0))
+                    ..real("x", causality, variability, needs_start(pair).then_some(1.0))
                 }],
                 ..ModelDescription::default()
             };
             variables::check(&description, &mut problems);
             assert_eq!(
-                problems.found.is_empty(),
+                problems.list.is_empty(),
                 allowed.contains(&pair),
                 "{pair:?} {:?}",
-                problems.found
+                problems.list
             );
         }
     }
@@ -261,9 +261,9 @@ fn aliases_are_checked() {
     let mut description = sample::complete();
     let kind = |start| Kind::Integer(IntegerType { start, ..IntegerType::default() });
     for (name, start) in [("one", 1), ("two", 2)] {
-        let constant = (Causality::Local, Variability::Constant);
         let value_reference = 500;
-        let variable = other(name, constant, kind(Some(start)));
+        let kind = kind(Some(start));
+        let variable = other(name, Causality::Local, Variability::Constant, kind);
         description.variables.push(ScalarVariable { value_reference, ..variable });
     }
     assert_eq!(description.problems().len(), 1, "constants with two values");

@@ -14,7 +14,8 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     problems.demand(!description.variables.is_empty(), SECTION, || {
         "ModelVariables has no variable".to_owned()
     });
-    let types = description.types.iter().map(|own| (own.name.as_str(), own)).collect();
+    let types =
+        description.types.iter().map(|declared| (declared.name.as_str(), declared)).collect();
     for variable in &description.variables {
         check_table(variable, problems);
         check_start(variable, problems);
@@ -25,7 +26,9 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
         problems.text(SECTION, &format!("description of {who}"), text);
         match &variable.kind {
             Kind::Real(real) => check_real(&who, real, problems),
-            Kind::Integer(own) | Kind::Enumeration(own) => check_integer(&who, own, problems),
+            Kind::Integer(integer) | Kind::Enumeration(integer) => {
+                check_integer(&who, integer, problems);
+            }
             Kind::String(start) => {
                 let start = start.as_deref().unwrap_or_default();
                 problems.text(SECTION, &format!("start of {who}"), start);
@@ -40,7 +43,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
             format!("{who} is an array, which FMI 2.0 does not have")
         });
     }
-    let is_independent = |own: &&ScalarVariable| own.causality == Causality::Independent;
+    let is_independent = |variable: &&ScalarVariable| variable.causality == Causality::Independent;
     let independent = description.variables.iter().filter(is_independent).count();
     problems.demand(independent <= 1, SECTION, || {
         format!("{independent} variables are independent, at most one may be")
@@ -150,8 +153,8 @@ fn check_declared_type(
 ) {
     let name = &variable.name;
     let declared = match &variable.kind {
-        Kind::Real(own) => own.declared_type.as_deref(),
-        Kind::Integer(own) | Kind::Enumeration(own) => own.declared_type.as_deref(),
+        Kind::Real(real) => real.declared_type.as_deref(),
+        Kind::Integer(integer) | Kind::Enumeration(integer) => integer.declared_type.as_deref(),
         _ => None,
     };
     let Some(declared) = declared else {
@@ -160,10 +163,10 @@ fn check_declared_type(
             format!("variable {name} is an Enumeration and has no declared type")
         });
     };
-    let Some(own) = types.get(declared) else {
+    let Some(declared_type) = types.get(declared) else {
         return problems.add(SECTION, format!("variable {name}: there is no type {declared:?}"));
     };
-    let inside = match (&variable.kind, &own.kind) {
+    let inside = match (&variable.kind, &declared_type.kind) {
         (Kind::Real(inner), Kind::Real(outer)) => {
             within((inner.min, inner.max), (outer.min, outer.max))
         }
@@ -171,14 +174,15 @@ fn check_declared_type(
             within((inner.min, inner.max), (outer.min, outer.max))
         }
         (Kind::Enumeration(inner), Kind::Enumeration(_)) => {
-            let is_item = |start| own.items.iter().any(|(_, value)| i128::from(*value) == start);
+            let is_item =
+                |start| declared_type.items.iter().any(|(_, value)| i128::from(*value) == start);
             problems.demand(inner.start.is_none_or(is_item), SECTION, || {
                 format!("variable {name}: the start value is no item of type {declared}")
             });
             true
         }
         _ => {
-            let (kind, other) = (variable.kind.element(), own.kind.element());
+            let (kind, other) = (variable.kind.element(), declared_type.kind.element());
             return problems.add(
                 SECTION,
                 format!("variable {name} is {kind}, its declared type {declared} is {other}"),
@@ -215,8 +219,8 @@ fn check_derivative(
         return;
     };
     let name = &variable.name;
-    let is_continuous = |own: &ScalarVariable| {
-        matches!(own.kind, Kind::Real(_)) && own.variability == Variability::Continuous
+    let is_continuous = |variable: &ScalarVariable| {
+        matches!(variable.kind, Kind::Real(_)) && variable.variability == Variability::Continuous
     };
     let Some(state) = description.at(index) else {
         let text = format!("variable {name}: derivative {index} is the index of no variable");
@@ -250,23 +254,26 @@ fn check_aliases(description: &ModelDescription, problems: &mut Problems) {
 }
 
 fn check_alias_set(set: &[&ScalarVariable], problems: &mut Problems) {
-    let names = set.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
-    let is_constant = |own: &&&ScalarVariable| own.variability == Variability::Constant;
+    let names = set.iter().map(|variable| variable.name.as_str()).collect::<Vec<_>>().join(", ");
+    let is_constant = |variable: &&&ScalarVariable| variable.variability == Variability::Constant;
     let constants = set.iter().filter(is_constant).count();
     problems.demand(constants == 0 || constants == set.len(), SECTION, || {
         format!("aliases {names}: constants can only be aliases of constants")
     });
-    let is_free = |own: &&&ScalarVariable| {
-        matches!(own.causality, Causality::Parameter | Causality::Input | Causality::Independent)
+    let is_free = |variable: &&&ScalarVariable| {
+        matches!(
+            variable.causality,
+            Causality::Parameter | Causality::Input | Causality::Independent
+        )
     };
     problems.demand(set.iter().filter(is_free).count() <= 1, SECTION, || {
         format!("aliases {names}: more than one can be set from outside")
     });
-    let starts = set.iter().filter(|own| own.has_start()).count();
+    let starts = set.iter().filter(|variable| variable.has_start()).count();
     problems.demand(constants > 0 || starts <= 1, SECTION, || {
         format!("aliases {names}: more than one has a start value")
     });
-    let unit = |own: &ScalarVariable| match &own.kind {
+    let unit = |variable: &ScalarVariable| match &variable.kind {
         Kind::Real(real) => real.unit.clone(),
         _ => None,
     };

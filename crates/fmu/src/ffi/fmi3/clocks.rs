@@ -13,8 +13,8 @@ entry_points_3! {
     get_clock = GetClock(vr: *const fmi3ValueReference, n: usize, values: *mut fmi3Clock),
         instance => {
             let to = borrow_output(values, n)?;
-            instance.located(Type::Clock, read(vr, n)?, n, |own, places| {
-                own.get_clock(places, to);
+            instance.located(Type::Clock, read(vr, n)?, n, |instance, places| {
+                instance.get_clock(places, to);
                 Ok(())
             })
         };
@@ -22,22 +22,22 @@ entry_points_3! {
         instance => {
             let values = read(values, n)?;
             instance
-                .located(Type::Clock, read(vr, n)?, n, |own, places| own.set_clock(places, values))
+                .located(Type::Clock, read(vr, n)?, n, |instance, places| instance.set_clock(places, values))
         };
     get_interval_decimal = GetIntervalDecimal(
         vr: *const fmi3ValueReference, n: usize, intervals: *mut fmi3Float64,
         qualifiers: *mut fmi3IntervalQualifier
     ), instance => {
         let (intervals, qualifiers) = (borrow_output(intervals, n)?, borrow_output(qualifiers, n)?);
-        instance.located(Type::Clock, read(vr, n)?, n, |own, places| {
-            own.get_intervals(places, intervals, qualifiers)
+        instance.located(Type::Clock, read(vr, n)?, n, |instance, places| {
+            instance.get_intervals(places, intervals, qualifiers)
         })
     };
     get_shift_decimal = GetShiftDecimal(
         vr: *const fmi3ValueReference, n: usize, shifts: *mut fmi3Float64
     ), instance => {
         let shifts = borrow_output(shifts, n)?;
-        instance.located(Type::Clock, read(vr, n)?, n, |own, places| own.get_shifts(places, shifts))
+        instance.located(Type::Clock, read(vr, n)?, n, |instance, places| instance.get_shifts(places, shifts))
     };
 }
 

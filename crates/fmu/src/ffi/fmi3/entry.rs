@@ -41,15 +41,15 @@ entry_points_3! {
         independents: *mut fmi3ValueReference, elements_of_independents: *mut usize,
         kinds: *mut fmi3DependencyKind, n: usize
     ), instance => {
-        let found = instance.dependencies(dependent)?;
-        if found.len() != n {
-            let expected = found.len();
+        let dependencies = instance.dependencies(dependent)?;
+        if dependencies.len() != n {
+            let expected = dependencies.len();
             return Err(Failure::Error(format!("nDependencies is {n}, expected {expected}")));
         }
         let (elements, independents) = (borrow_output(elements, n)?, borrow_output(independents, n)?);
         let of_independents = borrow_output(elements_of_independents, n)?;
         let kinds = borrow_output(kinds, n)?;
-        for (k, (element, known, element_of_known, kind)) in found.into_iter().enumerate() {
+        for (k, (element, known, element_of_known, kind)) in dependencies.into_iter().enumerate() {
             elements[k].write(element);
             independents[k].write(known);
             of_independents[k].write(element_of_known);
@@ -87,10 +87,11 @@ entry_points_3! {
         sensitivity: *mut fmi3Float64, n_sensitivity: usize
     ), instance => {
         let (unknowns, knowns) = (read(unknowns, n_unknowns)?, read(knowns, n_knowns)?);
-        let own = Jacobian { unknowns, knowns, unknown_count: n_sensitivity, known_count: n_seed };
-        instance.jacobian(&own, |instance, unknowns, knowns| instance.get_directional_derivative(
+        let jacobian = Jacobian { unknowns, knowns, unknown_count: n_sensitivity, known_count: n_seed };
+        instance.jacobian(&jacobian, |instance, unknowns, knowns| instance.get_directional_derivative(
             unknowns,
-            (knowns, read(seed, n_seed)?),
+            knowns,
+            read(seed, n_seed)?,
             borrow_output(sensitivity, n_sensitivity)?,
         ))
     };
@@ -102,8 +103,8 @@ entry_points_3! {
         sensitivity: *mut fmi3Float64, n_sensitivity: usize
     ), instance => {
         let (unknowns, knowns) = (read(unknowns, n_unknowns)?, read(knowns, n_knowns)?);
-        let own = Jacobian { unknowns, knowns, unknown_count: n_seed, known_count: n_sensitivity };
-        instance.jacobian(&own, |instance, unknowns, knowns| instance.get_adjoint_derivative(
+        let jacobian = Jacobian { unknowns, knowns, unknown_count: n_seed, known_count: n_sensitivity };
+        instance.jacobian(&jacobian, |instance, unknowns, knowns| instance.get_adjoint_derivative(
             unknowns,
             read(seed, n_seed)?,
             knowns,

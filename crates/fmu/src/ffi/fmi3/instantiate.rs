@@ -26,21 +26,21 @@ struct Pointers {
 
 /// Returns token, folder of resources and required intermediate variables; a null or empty path means that
 /// the importer has no resources.
-unsafe fn read_pointers<'a>(own: &Pointers) -> Result<(String, PathBuf, &'a [u32]), Failure> {
+unsafe fn read_pointers<'a>(pointers: &Pointers) -> Result<(String, PathBuf, &'a [u32]), Failure> {
     // SAFETY: strings are null or zero-terminated, and the array has the stated length, by the standard.
     unsafe {
-        let name = text(own.name, "instanceName")?;
+        let name = text(pointers.name, "instanceName")?;
         if name.trim().is_empty() {
             return Err(Failure::Error("instanceName is empty".to_owned()));
         }
-        let token = text(own.token, "instantiationToken")?;
-        let folder = if own.resources.is_null() {
+        let token = text(pointers.token, "instantiationToken")?;
+        let folder = if pointers.resources.is_null() {
             String::new()
         } else {
-            text(own.resources, "resourcePath")?
+            text(pointers.resources, "resourcePath")?
         };
         let folder = if folder.is_empty() { NO_FOLDER } else { &folder };
-        Ok((token, Path::new(folder).to_owned(), read(own.required, own.required_count)?))
+        Ok((token, Path::new(folder).to_owned(), read(pointers.required, pointers.required_count)?))
     }
 }
 
@@ -49,12 +49,13 @@ unsafe fn instantiate<M: Model>(
     function: &str,
     pointers: &Pointers,
     callbacks: &Callbacks,
-    made: &Instantiation<'_>,
+    instantiation: &Instantiation<'_>,
 ) -> fmi3Instance {
     // SAFETY: strings and array as the standard demands them.
     let instance = unsafe { read_pointers(pointers) }.and_then(|(token, resources, required)| {
-        let made = Instantiation { token: &token, resources: &resources, required, ..*made };
-        Instance::<M>::new_3(&made, callbacks.clone())
+        let complete =
+            Instantiation { token: &token, resources: &resources, required, ..*instantiation };
+        Instance::<M>::new_3(&complete, callbacks.clone())
     });
     match instance {
         Ok(mut instance) => {
@@ -94,9 +95,11 @@ pub unsafe fn instantiate_model_exchange<M: Model>(
     let callbacks = Callbacks::Version3 { environment, log };
     let pointers =
         Pointers { name, token, resources, required: std::ptr::null(), required_count: 0 };
-    let made = instantiation(InterfaceType::ModelExchange, logging_on);
+    let instantiation = instantiation(InterfaceType::ModelExchange, logging_on);
     // SAFETY: strings as the standard demands them.
-    unsafe { instantiate::<M>("fmi3InstantiateModelExchange", &pointers, &callbacks, &made) }
+    unsafe {
+        instantiate::<M>("fmi3InstantiateModelExchange", &pointers, &callbacks, &instantiation)
+    }
 }
 
 /// The importer may set inputs within a step; `requiredIntermediateVariables` names those inputs.
@@ -119,14 +122,16 @@ pub unsafe fn instantiate_co_simulation<M: Model>(
     let callbacks = Callbacks::Version3 { environment, log };
     let pointers = Pointers { name, token, resources, required, required_count };
     let update = |function| IntermediateUpdate { environment, function };
-    let made = Instantiation {
+    let instantiation = Instantiation {
         intermediate: intermediate_update.map(update),
         event_mode_used: event_mode_used != 0,
         early_return_allowed: early_return_allowed != 0,
         ..instantiation(InterfaceType::CoSimulation, logging_on)
     };
     // SAFETY: strings and array as the standard demands them.
-    unsafe { instantiate::<M>("fmi3InstantiateCoSimulation", &pointers, &callbacks, &made) }
+    unsafe {
+        instantiate::<M>("fmi3InstantiateCoSimulation", &pointers, &callbacks, &instantiation)
+    }
 }
 
 /// Scheduled execution is refused.

@@ -74,8 +74,8 @@ entry_points_3! {
         vr: *const fmi3ValueReference, n: usize, sizes: *const usize, values: *const fmi3Binary,
         n_values: usize
     ), instance => instance.set_located(Type::Binary, read(vr, n)?, n_values, |instance, places| {
-        let given = read(sizes, n_values)?.iter().zip(read(values, n_values)?);
-        let values = given.map(|(&size, &bytes)| Ok(read(bytes, size)?.to_vec()));
+        let arrays = read(sizes, n_values)?.iter().zip(read(values, n_values)?);
+        let values = arrays.map(|(&size, &bytes)| Ok(read(bytes, size)?.to_vec()));
         instance.set_typed(places, &values.collect::<Result<Vec<Vec<u8>>, Failure>>()?)
     });
 }

@@ -50,7 +50,8 @@ impl<M: Model> Instance<M> {
     pub(crate) fn get_clock(&mut self, places: &[u32], to: &mut [MaybeUninit<fmi3Clock>]) {
         let clocks = bool::slots(&self.interface.typed);
         for (&place, value) in places.iter().zip(to) {
-            let ticks = clocks.get(place as usize).map(|own| *(own.field)(&mut self.core.model));
+            let ticks =
+                clocks.get(place as usize).map(|clock| *(clock.field)(&mut self.core.model));
             value.write(ticks.unwrap_or(false).into());
         }
     }
@@ -63,7 +64,7 @@ impl<M: Model> Instance<M> {
     ) -> Result<(), Failure> {
         let clocks = bool::slots(&self.interface.typed);
         let named = places.iter().filter_map(|place| clocks.get(*place as usize));
-        if let Some(other) = named.into_iter().find(|own| own.causality != Causality::Input) {
+        if let Some(other) = named.into_iter().find(|clock| clock.causality != Causality::Input) {
             let (name, causality) = (&other.name, other.causality.as_str());
             return Err(Failure::Error(format!(
                 "{name} is a clock with causality {causality}: only an input clock can be set"
@@ -87,8 +88,8 @@ impl<M: Model> Instance<M> {
     ) -> Result<(), Failure> {
         self.refresh()?;
         for ((&place, interval), qualifier) in places.iter().zip(intervals).zip(qualifiers) {
-            let (found, how) = self.interval(place)?;
-            interval.write(found);
+            let (length, how) = self.interval(place)?;
+            interval.write(length);
             qualifier.write(how as i32);
         }
         Ok(())
@@ -102,13 +103,13 @@ impl<M: Model> Instance<M> {
     ) -> Result<(), Failure> {
         for (&place, shift) in places.iter().zip(shifts) {
             let clock = bool::slots(&self.interface.typed).get(place as usize);
-            let is_periodic = |own: &Slot<M, bool>| {
-                let variability = own.interval_variability;
-                own.interval.is_some()
+            let is_periodic = |clock: &Slot<M, bool>| {
+                let variability = clock.interval_variability;
+                clock.interval.is_some()
                     || matches!(variability, Some(Variability::Fixed | Variability::Tunable))
             };
             if !clock.is_some_and(is_periodic) {
-                let name = clock.map(|own| own.name.as_str()).unwrap_or_default();
+                let name = clock.map(|clock| clock.name.as_str()).unwrap_or_default();
                 return Err(Failure::Error(format!(
                     "{name} is no periodic clock: it has no shift"
                 )));
@@ -122,12 +123,12 @@ impl<M: Model> Instance<M> {
     /// new once.
     fn interval(&mut self, place: u32) -> Result<(f64, IntervalQualifier), Failure> {
         let clock = bool::slots(&self.interface.typed).get(place as usize);
-        if let Some(interval) = clock.and_then(|own| own.interval) {
+        if let Some(interval) = clock.and_then(|clock| clock.interval) {
             return Ok((interval, IntervalQualifier::Changed));
         }
-        let field = clock.and_then(|own| own.derivatives.first());
+        let field = clock.and_then(|clock| clock.derivatives.first());
         let model = &mut self.core.model;
-        Ok(match (clock.and_then(|own| own.interval_variability), field) {
+        Ok(match (clock.and_then(|clock| clock.interval_variability), field) {
             (Some(Variability::Fixed | Variability::Tunable), Some(field)) => {
                 (*field(model), IntervalQualifier::Changed)
             }
@@ -142,7 +143,7 @@ impl<M: Model> Instance<M> {
                 }
             }
             _ => {
-                let name = clock.map(|own| own.name.as_str()).unwrap_or_default();
+                let name = clock.map(|clock| clock.name.as_str()).unwrap_or_default();
                 let what = format!("{name} is a triggered clock: it has no interval");
                 return Err(Failure::Error(what));
             }

@@ -18,9 +18,9 @@ impl<M: Model> Instance<M> {
     /// Returns the values of the structural parameters.
     pub(super) fn structural_parameters(&mut self) -> Vec<u64> {
         let all = u64::slots(&self.interface.typed).iter();
-        let own = all.filter(|slot| slot.causality == Causality::StructuralParameter);
+        let structural = all.filter(|slot| slot.causality == Causality::StructuralParameter);
         let model = &mut self.core.model;
-        own.map(|slot| *(slot.field)(model)).collect()
+        structural.map(|slot| *(slot.field)(model)).collect()
     }
 
     /// `fmi3EnterConfigurationMode`.
@@ -59,7 +59,7 @@ impl<M: Model> Instance<M> {
         // In these modes arrays still have the extents of before, and no function accesses them.
         let is_open =
             matches!(self.core.state, State::ConfigurationMode | State::ReconfigurationMode);
-        if is_open || self.session.as_ref().is_none_or(|own| own.structural.is_empty()) {
+        if is_open || self.session.as_ref().is_none_or(|session| session.structural.is_empty()) {
             return Ok(());
         }
         let structural = self.structural_parameters();

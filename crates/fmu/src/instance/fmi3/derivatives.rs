@@ -19,15 +19,18 @@ impl<M: Model> Instance<M> {
     /// Finds the places of unknowns and knowns and runs `body` with them.
     pub(crate) fn jacobian(
         &mut self,
-        own: &Jacobian<'_>,
+        jacobian: &Jacobian<'_>,
         body: impl FnOnce(&mut Self, &[u32], &[u32]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let mut knowns = Vec::new();
         let table = &self.session()?.table;
-        table.locate(Type::Float64, own.knowns, own.known_count, &mut knowns)?;
-        self.located(Type::Float64, own.unknowns, own.unknown_count, |instance, unknowns| {
-            body(instance, unknowns, &knowns)
-        })
+        table.locate(Type::Float64, jacobian.knowns, jacobian.known_count, &mut knowns)?;
+        self.located(
+            Type::Float64,
+            jacobian.unknowns,
+            jacobian.unknown_count,
+            |instance, unknowns| body(instance, unknowns, &knowns),
+        )
     }
 
     /// `fmi3GetAdjointDerivative`: `to = seed^T (dh/dv)` for the unknowns h and the knowns v, by one
@@ -42,7 +45,7 @@ impl<M: Model> Instance<M> {
         Self::provides_derivatives()?;
         for (&known, place) in knowns.iter().zip(to) {
             let (mut sum, mut seed) = (0.0, seed.iter());
-            self.directional_derivative(unknowns, (&[known], &[1.0]), |entry| {
+            self.directional_derivative(unknowns, &[known], &[1.0], |entry| {
                 sum += entry * seed.next().copied().unwrap_or_default();
             })?;
             place.write(sum);

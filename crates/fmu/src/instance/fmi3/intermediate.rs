@@ -37,37 +37,39 @@ impl<M: Model> Instance<M> {
     /// importer has one and may step.
     pub(crate) fn begin_intermediate(&mut self, size: f64) -> Option<IntermediateUpdate> {
         let core = &mut self.core;
-        let own = self.session.as_mut()?.intermediate.as_mut()?;
-        own.asked = false;
+        let intermediate = self.session.as_mut()?.intermediate.as_mut()?;
+        intermediate.asked = false;
         if core.state != State::StepComplete
             || core.interface_type != InterfaceType::CoSimulation
             || !(size > 0.0 && size.is_finite())
         {
             return None;
         }
-        (own.asked, own.stale) = (true, core.stale);
+        (intermediate.asked, intermediate.stale) = (true, core.stale);
         core.state = State::IntermediateUpdateMode;
-        self.interface.read_interpolated(&mut core.model, &mut own.values[0]);
-        Some(own.update)
+        self.interface.read_interpolated(&mut core.model, &mut intermediate.values[0]);
+        Some(intermediate.update)
     }
 
     /// Records the inputs in the middle (1) or at the end (2) of the step.
     pub(crate) fn record_intermediate(&mut self, place: usize) {
-        let own = self.session.as_mut().and_then(|own| own.intermediate.as_mut());
-        if let Some(own) = own {
-            self.interface.read_interpolated(&mut self.core.model, &mut own.values[place]);
+        let intermediate = self.session.as_mut().and_then(|session| session.intermediate.as_mut());
+        if let Some(intermediate) = intermediate {
+            self.interface.read_interpolated(&mut self.core.model, &mut intermediate.values[place]);
         }
     }
 
     /// Leaves intermediate update mode, unless a call in it failed, with the inputs at the start.
     pub(crate) fn end_intermediate(&mut self, size: f64) {
-        let Some(own) = self.session.as_mut().and_then(|own| own.intermediate.as_mut()) else {
+        let Some(intermediate) =
+            self.session.as_mut().and_then(|session| session.intermediate.as_mut())
+        else {
             return;
         };
         let core = &mut self.core;
-        let [start, middle, end] = &own.values;
+        let [start, middle, end] = &intermediate.values;
         self.interface.write_interpolated(&mut core.model, start);
-        core.stale = own.stale;
+        core.stale = intermediate.stale;
         if core.state == State::IntermediateUpdateMode {
             core.state = State::StepComplete;
             core.sloped = self.interface.interpolate(&mut core.model, [start, middle, end], size);
@@ -78,14 +80,17 @@ impl<M: Model> Instance<M> {
     /// importer has been asked for them.
     pub(super) fn leave_inputs(&mut self, elapsed: f64, is_whole: bool) {
         let Self { core, interface, session, .. } = self;
-        let Some(own) = session.as_mut().and_then(|own| own.intermediate.as_mut()) else { return };
-        if !std::mem::take(&mut own.asked) {
+        let Some(intermediate) = session.as_mut().and_then(|session| session.intermediate.as_mut())
+        else {
+            return;
+        };
+        if !std::mem::take(&mut intermediate.asked) {
             return;
         }
         if is_whole {
-            interface.write_interpolated(&mut core.model, &own.values[2]);
+            interface.write_interpolated(&mut core.model, &intermediate.values[2]);
         } else {
-            interface.extrapolate(&mut core.model, &own.values[0], elapsed);
+            interface.extrapolate(&mut core.model, &intermediate.values[0], elapsed);
         }
         if std::mem::take(&mut core.sloped) {
             interface.clear_input_derivatives(&mut core.model);

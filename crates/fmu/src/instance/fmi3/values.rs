@@ -143,12 +143,12 @@ impl<M: Model> Instance<M> {
     ) -> Result<(), Failure> {
         self.refresh()?;
         let slots = <Vec<u8>>::slots(&self.interface.typed);
-        let found = places.iter().filter_map(|&place| slots.get(place as usize));
+        let slots_of_places = places.iter().filter_map(|&place| slots.get(place as usize));
         let model = &mut self.core.model;
-        let values: Vec<_> = found.map(|slot| (slot.field)(model).clone()).collect();
-        let kept = &mut self.session_mut()?.binaries;
-        *kept = values;
-        for (position, value) in kept.iter().enumerate() {
+        let values: Vec<_> = slots_of_places.map(|slot| (slot.field)(model).clone()).collect();
+        let binaries = &mut self.session_mut()?.binaries;
+        *binaries = values;
+        for (position, value) in binaries.iter().enumerate() {
             write(position, value);
         }
         Ok(())

@@ -55,7 +55,7 @@ fn set_side(instance: &mut Instance<Pendulum>, value: i32) -> Status {
 fn directional(instance: &mut Instance<Pendulum>, unknown: u32, known: u32) -> Result<f64, Status> {
     let mut value = [f64::NAN];
     let status = instance.call(Function::GetDirectionalDerivative, |own| {
-        own.get_directional_derivative(&[unknown], (&[known], &[2.0]), room_of(&mut value))
+        own.get_directional_derivative(&[unknown], &[known], &[2.0], room_of(&mut value))
     });
     if status == Status::OK { Ok(value[0] / 2.0) } else { Err(status) }
 }

@@ -78,7 +78,7 @@ fn a_state_is_set_in_event_mode_of_model_exchange_only() {
 fn derivatives_of_a_model_without_them_are_an_error_for_empty_lists_too() {
     type Body = fn(&mut Instance<Decay>) -> Result<(), Failure>;
     let adjoint: Body = |own| own.get_adjoint_derivative(&[], &[], &[], room_of(&mut []));
-    let directional: Body = |own| own.get_directional_derivative(&[], (&[], &[]), room_of(&mut []));
+    let directional: Body = |own| own.get_directional_derivative(&[], &[], &[], room_of(&mut []));
     for (function, body) in [
         (Function::GetAdjointDerivative, adjoint),
         (Function::GetDirectionalDerivative, directional),

@@ -24,10 +24,12 @@ pub(super) fn blocks(
 ) -> Vec<Block> {
     let mut singles: Vec<String> = Vec::new();
     loop {
-        let found = split_up(variables, &|own| is_single(own) || singles.contains(&own.name));
-        let unmatched = unmatched(variables, &found);
+        let blocks = split_up(variables, &|variable| {
+            is_single(variable) || singles.contains(&variable.name)
+        });
+        let unmatched = unmatched(variables, &blocks);
         if unmatched.is_empty() {
-            return found;
+            return blocks;
         }
         singles.extend(unmatched);
     }
@@ -35,7 +37,8 @@ pub(super) fn blocks(
 
 /// Returns the first scalars of arrays of states without an array of derivatives, and the reverse.
 fn unmatched(variables: &[ScalarVariable], blocks: &[Block]) -> Vec<String> {
-    let state = |position: usize| variables[position].kind.as_real().and_then(|own| own.derivative);
+    let state =
+        |position: usize| variables[position].kind.as_real().and_then(|real| real.derivative);
     let pairs = blocks.iter().filter_map(|block| {
         let state = state(block.start)? as usize - 1;
         let of = blocks.iter().find(|of| (of.start..of.start + of.count).contains(&state))?;
@@ -84,13 +87,14 @@ fn array(
         let fits = of == name && indices.len() == first.len() && !is_single(other);
         (fits && is_element(&rest[0], other, position)).then_some(indices)
     };
-    let found: Vec<_> = rest.iter().enumerate().map_while(like_first).collect();
-    let extents = found.last()?.clone();
-    let all = variables.iter().filter(|own| split(&own.name).is_some_and(|(of, _)| of == name));
-    let complete = all.count() == found.len()
-        && found.iter().enumerate().all(|(position, indices)| {
+    let indices: Vec<_> = rest.iter().enumerate().map_while(like_first).collect();
+    let extents = indices.last()?.clone();
+    let all =
+        variables.iter().filter(|variable| split(&variable.name).is_some_and(|(of, _)| of == name));
+    let complete = all.count() == indices.len()
+        && indices.iter().enumerate().all(|(position, element)| {
             let mut left = position as u64;
-            extents.iter().zip(indices).rev().all(|(extent, index)| {
+            extents.iter().zip(element).rev().all(|(extent, index)| {
                 let fits = left % extent == index - 1;
                 left /= extent;
                 fits
@@ -98,7 +102,7 @@ fn array(
         });
     let count = extents.iter().try_fold(1_u64, |product, &extent| product.checked_mul(extent))?;
     let count = usize::try_from(count).ok()?;
-    (complete && count == found.len()).then_some(Block { name, start, count, extents })
+    (complete && count == indices.len()).then_some(Block { name, start, count, extents })
 }
 
 /// Splits `name[1,2]` into `name` and its indices, `der(name[1,2])` into `der(name)` and its indices.
@@ -148,9 +152,10 @@ fn is_element(first: &ScalarVariable, other: &ScalarVariable, position: usize) -
 
 /// Returns the start values of the elements, if they have any.
 pub(super) fn starts(elements: &[ScalarVariable]) -> Option<Elements> {
-    let real = |own: &ScalarVariable| own.kind.as_real().and_then(|real| real.start);
-    let integer = |own: &ScalarVariable| own.kind.as_integer().and_then(|integer| integer.start);
-    let boolean = |own: &ScalarVariable| match own.kind {
+    let real = |variable: &ScalarVariable| variable.kind.as_real().and_then(|real| real.start);
+    let integer =
+        |variable: &ScalarVariable| variable.kind.as_integer().and_then(|integer| integer.start);
+    let boolean = |variable: &ScalarVariable| match variable.kind {
         Kind::Boolean(start) => start,
         _ => None,
     };

@@ -39,7 +39,7 @@ pub(crate) fn describe(old: &ModelDescription, indicators: usize) -> (Table, Mod
         guid: String::new(),
         number_of_event_indicators: None,
         model_exchange: old.model_exchange.as_ref().map(exchange),
-        co_simulation: old.co_simulation.as_ref().map(|own| simulation(own, old)),
+        co_simulation: old.co_simulation.as_ref().map(|flags| simulation(flags, old)),
         variables,
         structure: ModelStructure { event_indicators, ..structure },
         ..old.clone()
@@ -47,24 +47,24 @@ pub(crate) fn describe(old: &ModelDescription, indicators: usize) -> (Table, Mod
     (table, description)
 }
 
-fn exchange(own: &ModelExchange) -> ModelExchange {
+fn exchange(flags: &ModelExchange) -> ModelExchange {
     ModelExchange {
         can_not_use_memory_management_functions: false,
-        provides_adjoint_derivatives: own.provides_directional_derivative,
+        provides_adjoint_derivatives: flags.provides_directional_derivative,
         provides_per_element_dependencies: true,
-        ..own.clone()
+        ..flags.clone()
     }
 }
 
-fn simulation(own: &CoSimulation, old: &ModelDescription) -> CoSimulation {
+fn simulation(flags: &CoSimulation, old: &ModelDescription) -> CoSimulation {
     CoSimulation {
         can_not_use_memory_management_functions: false,
         can_interpolate_inputs: false,
         has_event_mode: old.model_exchange.is_some(),
         might_return_early_from_do_step: true,
-        provides_adjoint_derivatives: own.provides_directional_derivative,
+        provides_adjoint_derivatives: flags.provides_directional_derivative,
         provides_per_element_dependencies: true,
-        ..own.clone()
+        ..flags.clone()
     }
 }
 
@@ -89,22 +89,22 @@ fn kind_of(kind: &Kind) -> Type {
 }
 
 /// Key of the variables with the same value: base type and value reference of FMI 2.0.
-fn value_of(own: &ScalarVariable) -> (bool, &'static str, u32) {
-    let element = match own.kind {
+fn value_of(variable: &ScalarVariable) -> (bool, &'static str, u32) {
+    let element = match variable.kind {
         Kind::Enumeration(_) => "Integer",
         ref kind => kind.element(),
     };
-    (own.causality == Causality::Independent, element, own.value_reference)
+    (variable.causality == Causality::Independent, element, variable.value_reference)
 }
 
 /// Whether the variable precedes the others: time, and the structural parameters, because fmusim 0.0.39 crashes
 /// if an array precedes the parameter that is its extent. The standard states no order.
-fn is_early(own: &ScalarVariable) -> bool {
-    matches!(own.causality, Causality::Independent | Causality::StructuralParameter)
+fn is_early(variable: &ScalarVariable) -> bool {
+    matches!(variable.causality, Causality::Independent | Causality::StructuralParameter)
 }
 
 fn same_attributes(alias: &ScalarVariable, of: &ScalarVariable) -> bool {
-    let kind = |own: &ScalarVariable| match without_start(&own.kind) {
+    let kind = |variable: &ScalarVariable| match without_start(&variable.kind) {
         Kind::Real(real) => Kind::Real(RealType { reinit: false, ..real }),
         other => other,
     };
@@ -115,9 +115,11 @@ fn same_attributes(alias: &ScalarVariable, of: &ScalarVariable) -> bool {
 
 fn without_start(kind: &Kind) -> Kind {
     match kind {
-        Kind::Real(own) => Kind::Real(RealType { start: None, ..own.clone() }),
-        Kind::Integer(own) => Kind::Integer(IntegerType { start: None, ..own.clone() }),
-        Kind::Enumeration(own) => Kind::Enumeration(IntegerType { start: None, ..own.clone() }),
+        Kind::Real(real) => Kind::Real(RealType { start: None, ..real.clone() }),
+        Kind::Integer(integer) => Kind::Integer(IntegerType { start: None, ..integer.clone() }),
+        Kind::Enumeration(integer) => {
+            Kind::Enumeration(IntegerType { start: None, ..integer.clone() })
+        }
         Kind::Boolean(_) => Kind::Boolean(None),
         Kind::String(_) => Kind::String(None),
         other => {
@@ -142,18 +144,20 @@ impl Builder {
         for (position, variable) in old.iter().enumerate() {
             same.entry(value_of(variable)).or_default().push(position);
         }
-        let group = |own: &ScalarVariable| same.get(&value_of(own)).map_or(&[][..], Vec::as_slice);
+        let group = |variable: &ScalarVariable| {
+            same.get(&value_of(variable)).map_or(&[][..], Vec::as_slice)
+        };
         // The variable that an alias repeats is the one with a start value, otherwise the first one.
-        let main = |own: &ScalarVariable| {
-            let with_start = group(own).iter().copied().find(|&other| old[other].has_start());
-            with_start.unwrap_or_else(|| group(own)[0])
+        let main = |variable: &ScalarVariable| {
+            let with_start = group(variable).iter().copied().find(|&other| old[other].has_start());
+            with_start.unwrap_or_else(|| group(variable)[0])
         };
         let is_alias = |position: usize| {
             let main = main(&old[position]);
             main != position && same_attributes(&old[position], &old[main])
         };
         self.places = vec![(0, 0); old.len()];
-        let mut blocks = blocks(old, |own| group(own).len() > 1);
+        let mut blocks = blocks(old, |variable| group(variable).len() > 1);
         blocks.sort_by_key(|block| !is_early(&old[block.start]));
         for block in blocks {
             if block.count == 1 && block.extents.is_empty() && is_alias(block.start) {
@@ -202,7 +206,12 @@ impl Builder {
 
     fn add_alias(&mut self, alias: &ScalarVariable, position: usize, of: &str) {
         self.places[position] = (self.next_index(), 0);
-        let target = self.variables.iter().rfind(|own| own.name == of).cloned().unwrap_or_default();
+        let target = self
+            .variables
+            .iter()
+            .rfind(|variable| variable.name == of)
+            .cloned()
+            .unwrap_or_default();
         self.variables.push(ScalarVariable {
             name: alias.name.clone(),
             description: alias.description.clone(),
@@ -233,7 +242,7 @@ impl Builder {
     }
 
     fn structure(&self, old: &ModelDescription) -> ModelStructure {
-        let own = &old.structure;
+        let structure = &old.structure;
         let parameters: Vec<_> =
             parameters(old).into_iter().map(|parameter| self.index(parameter)).collect();
         let states = states(old);
@@ -241,9 +250,9 @@ impl Builder {
             self.rows(rows, |row| if states.contains(&row) { &[] } else { parameters.as_slice() })
         };
         ModelStructure {
-            outputs: later(&own.outputs),
-            derivatives: later(&own.derivatives),
-            initial_unknowns: self.rows(&own.initial_unknowns, |_| &[]),
+            outputs: later(&structure.outputs),
+            derivatives: later(&structure.derivatives),
+            initial_unknowns: self.rows(&structure.initial_unknowns, |_| &[]),
             ..ModelStructure::default()
         }
     }
@@ -289,19 +298,21 @@ impl Builder {
         };
         let knowns = |is_known: &dyn Fn(&ScalarVariable) -> bool| {
             let all = (1_u32..).zip(&old.variables);
-            all.filter(|(_, own)| is_known(own)).map(|(index, _)| index).collect::<Vec<_>>()
+            all.filter(|(_, variable)| is_known(variable))
+                .map(|(index, _)| index)
+                .collect::<Vec<_>>()
         };
         let states = states(old);
-        let initial = |own: &ScalarVariable| match own.causality {
+        let initial = |variable: &ScalarVariable| match variable.causality {
             Causality::Input | Causality::Independent => true,
             _ => {
-                own.initial_in_force() == Some(Initial::Exact)
-                    && own.variability != Variability::Constant
+                variable.initial_in_force() == Some(Initial::Exact)
+                    && variable.variability != Variability::Constant
             }
         };
-        let mut later = knowns(&|own| {
+        let mut later = knowns(&|variable| {
             matches!(
-                own.causality,
+                variable.causality,
                 Causality::Input | Causality::Independent | Causality::Parameter
             )
         });
@@ -312,7 +323,7 @@ impl Builder {
             entries: self
                 .entries
                 .iter()
-                .map(|own| Entry { name: own.name.clone(), ..*own })
+                .map(|entry| Entry { name: entry.name.clone(), ..*entry })
                 .collect(),
             scalars: old.structure.clone(),
             parameters: parameters(old),
@@ -325,14 +336,18 @@ impl Builder {
 /// Returns the indices of the parameters.
 fn parameters(old: &ModelDescription) -> Vec<u32> {
     let all = (1..).zip(&old.variables);
-    all.filter(|(_, own)| own.causality == Causality::Parameter).map(|(index, _)| index).collect()
+    all.filter(|(_, variable)| variable.causality == Causality::Parameter)
+        .map(|(index, _)| index)
+        .collect()
 }
 
 /// Returns the indices of the continuous states.
 fn derivative_states(old: &ModelDescription) -> Vec<u32> {
     let rows = old.structure.derivatives.iter();
     let derivative = rows.map(|row| &old.variables[row.index as usize - 1]);
-    derivative.filter_map(|own| own.kind.as_real().and_then(|real| real.derivative)).collect()
+    derivative
+        .filter_map(|variable| variable.kind.as_real().and_then(|real| real.derivative))
+        .collect()
 }
 
 /// Returns the indices of the continuous states and of the other variables with their values.
@@ -342,7 +357,9 @@ fn states(old: &ModelDescription) -> Vec<u32> {
         .map(|index| value_of(&old.variables[index as usize - 1]))
         .collect();
     let all = (1..).zip(&old.variables);
-    all.filter(|(_, own)| values.contains(&value_of(own))).map(|(index, _)| index).collect()
+    all.filter(|(_, variable)| values.contains(&value_of(variable)))
+        .map(|(index, _)| index)
+        .collect()
 }
 
 /// Returns the row with these dependencies. A known that occurs twice with different kinds has no

@@ -36,10 +36,10 @@ impl Origin {
         algorithm: &Algorithm,
         experiment: &Experiment,
     ) -> Result<(), SystemError> {
-        for (name, given) in settings(system, algorithm, experiment) {
+        for (name, requested) in settings(system, algorithm, experiment) {
             let known = self.settings.iter().find(|(known, _)| known == name);
-            if let Some((_, taken)) = known.filter(|(_, taken)| *taken != given) {
-                return Err(SystemError::Resume { name, taken: taken.clone(), given });
+            if let Some((_, saved)) = known.filter(|(_, saved)| *saved != requested) {
+                return Err(SystemError::Resume { name, saved: saved.clone(), requested });
             }
         }
         Ok(())

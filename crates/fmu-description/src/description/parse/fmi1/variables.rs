@@ -21,7 +21,8 @@ pub(super) fn read(
     list: Node<'_>,
     types: &[SimpleType],
 ) -> Result<(Vec<ScalarVariable>, ModelStructure), ParseError> {
-    let types: Types<'_> = types.iter().map(|own| (own.name.as_str(), own)).collect();
+    let types: Types<'_> =
+        types.iter().map(|declared| (declared.name.as_str(), declared)).collect();
     let elements: Vec<Node<'_>> = list.children_named("ScalarVariable").collect();
     if exceeds(elements.len(), VARIABLES) {
         let at = list.element.at;
@@ -86,15 +87,15 @@ fn variable(
 fn word(element: Node<'_>, name: &str, words: &[&'static str]) -> Option<&'static str> {
     let text = element.attribute(name)?;
     let trimmed = text.trim_matches(WHITE_SPACE);
-    let found = words.iter().find(|word| word.eq_ignore_ascii_case(trimmed)).copied();
-    if found != Some(text) {
-        let assumed = found.map_or_else(
+    let known = words.iter().find(|word| word.eq_ignore_ascii_case(trimmed)).copied();
+    if known != Some(text) {
+        let assumed = known.map_or_else(
             || "read as if it were not there".to_owned(),
             |word| format!("read as {word}"),
         );
         element.warn(name, &format!("one of {}", words.join(", ")), text, &assumed);
     }
-    found
+    known
 }
 
 /// Sets `alias_of` and `negated` by the attribute `alias`.
@@ -104,7 +105,7 @@ fn set_aliases(elements: &[Node<'_>], variables: &mut [ScalarVariable]) {
         .iter()
         .map(|element| word(*element, NAME, &["noAlias", "alias", "negatedAlias"]))
         .collect();
-    let is_alias = |own: Option<&str>| matches!(own, Some("alias" | "negatedAlias"));
+    let is_alias = |stated: Option<&str>| matches!(stated, Some("alias" | "negatedAlias"));
     let mut bases: HashMap<(u8, u32), String> = HashMap::new();
     for (variable, stated) in variables.iter().zip(&stated) {
         if !is_alias(*stated) {
@@ -116,14 +117,14 @@ fn set_aliases(elements: &[Node<'_>], variables: &mut [ScalarVariable]) {
         if !is_alias(stated) {
             continue;
         }
-        let own = bases.get(&(base(&variable.kind), variable.value_reference));
-        if own.is_none() {
+        let base_name = bases.get(&(base(&variable.kind), variable.value_reference));
+        if base_name.is_none() {
             let expected = "the value reference of a variable with alias=\"noAlias\"";
-            let found = variable.value_reference.to_string();
-            element.warn_text(NAME, expected, &found, "read as if it were not there");
+            let actual = variable.value_reference.to_string();
+            element.warn_text(NAME, expected, &actual, "read as if it were not there");
         }
-        variable.alias_of = own.cloned();
-        variable.negated = own.is_some() && stated == Some("negatedAlias");
+        variable.alias_of = base_name.cloned();
+        variable.negated = base_name.is_some() && stated == Some("negatedAlias");
     }
 }
 
@@ -133,14 +134,15 @@ fn outputs(
     elements: &[Node<'_>],
     variables: &[ScalarVariable],
 ) -> Result<Vec<Unknown>, ParseError> {
-    let inputs = (1..).zip(variables).filter(|(_, own)| own.causality == Causality::Input);
+    let inputs =
+        (1..).zip(variables).filter(|(_, variable)| variable.causality == Causality::Input);
     let inputs: HashMap<&str, u32> =
-        inputs.map(|(index, own)| (own.name.as_str(), index)).collect();
+        inputs.map(|(index, variable)| (variable.name.as_str(), index)).collect();
     let mut rows = Vec::new();
     for ((index, variable), element) in (1..).zip(variables).zip(elements) {
         if variable.causality == Causality::Output {
             let direct = element.optional_child("DirectDependency")?;
-            let dependencies = direct.and_then(|own| dependencies(own, &inputs));
+            let dependencies = direct.and_then(|list| dependencies(list, &inputs));
             rows.push(Unknown { index, dependencies, kinds: None });
         }
     }
@@ -148,18 +150,17 @@ fn outputs(
 }
 
 fn dependencies(element: Node<'_>, inputs: &HashMap<&str, u32>) -> Option<Vec<u32>> {
-    let mut found = Vec::new();
+    let mut indices = Vec::new();
     for name in element.children_named("Name") {
         let text = name.content_text();
         let Some(index) = inputs.get(text.as_str()) else {
             let place = "<Name> in <DirectDependency>".to_owned();
-            let said = ("the name of an input", format!("{text:?}"));
-            name.warn_of(false, place, said, ANYTHING);
+            name.warn_of(false, place, "the name of an input", format!("{text:?}"), ANYTHING);
             return None;
         };
-        found.push(*index);
+        indices.push(*index);
     }
-    found.sort_unstable();
-    found.dedup();
-    Some(found)
+    indices.sort_unstable();
+    indices.dedup();
+    Some(indices)
 }

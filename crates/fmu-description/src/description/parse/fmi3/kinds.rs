@@ -1,5 +1,7 @@
 //! Reads the types of FMI 3.0 with their attributes: definitions, and defaults of variables.
 
+use std::ops::RangeInclusive;
+
 use std::collections::HashMap;
 
 use crate::defect::ParseError;
@@ -61,7 +63,7 @@ pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
 
 fn item(element: Node<'_>) -> Result<(String, i64), ParseError> {
     let text = element.required("value")?;
-    let value = element.integer_within("value", (i64::MIN.into(), i64::MAX.into()))?;
+    let value = element.integer_within("value", &(i64::MIN.into()..=i64::MAX.into()))?;
     let value = value.and_then(|value| i64::try_from(value).ok());
     let value = value.ok_or_else(|| element.wrong("value", "an integer", text))?;
     Ok((element.required("name")?.to_owned(), value))
@@ -73,13 +75,16 @@ pub(super) fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(Stri
     let kind = element.element.name;
     let Some(name) = element.attribute(NAME) else {
         if kind == "Enumeration" {
-            let said = ("the name of an enumeration", "no such attribute".to_owned());
-            element.warn_of(true, element.place(NAME), said, "read without names of its items");
+            let (expected, actual) = ("the name of an enumeration", "no such attribute".to_owned());
+            let assumed = "read without names of its items";
+            element.warn_of(true, element.place(NAME), expected, actual, assumed);
         }
         return None;
     };
     match types.get(name) {
-        Some(own) if own.kind.element_in(Version::V3) == kind => Some((name.to_owned(), &own.kind)),
+        Some(declared_type) if declared_type.kind.element_in(Version::V3) == kind => {
+            Some((name.to_owned(), &declared_type.kind))
+        }
         _ => {
             let expected = format!("the name of a {kind}Type");
             element.warn_text(NAME, &expected, name, "read without declared type");
@@ -96,20 +101,24 @@ pub(super) fn attributes(
     defaults: Option<&Kind>,
 ) -> Result<(), ParseError> {
     let range = kind.integer_range(Version::V3);
-    if let (Some(own), Some(range)) = (kind.as_integer_mut(), range) {
-        *own = integer(element, range, defaults.and_then(Kind::as_integer))?;
+    if let (Some(integer_type), Some(range)) = (kind.as_integer_mut(), range) {
+        *integer_type = integer(element, &range, defaults.and_then(Kind::as_integer))?;
         return Ok(());
     }
     let precision = Precision::of(kind);
-    if let Some(own) = kind.as_real_mut() {
-        *own = real(element, precision, defaults.and_then(Kind::as_real))?;
+    if let Some(real_type) = kind.as_real_mut() {
+        *real_type = real(element, precision, defaults.and_then(Kind::as_real))?;
         return Ok(());
     }
     match (kind, defaults) {
-        (Kind::Binary(own), Some(Kind::Binary(defaults))) => *own = binary(element, defaults),
-        (Kind::Binary(own), _) => *own = binary(element, &BinaryType::default()),
-        (Kind::Clock(own), Some(Kind::Clock(defaults))) => *own = clock(element, Some(defaults))?,
-        (Kind::Clock(own), _) => *own = clock(element, None)?,
+        (Kind::Binary(binary_type), Some(Kind::Binary(defaults))) => {
+            *binary_type = binary(element, defaults);
+        }
+        (Kind::Binary(binary_type), _) => *binary_type = binary(element, &BinaryType::default()),
+        (Kind::Clock(clock_type), Some(Kind::Clock(defaults))) => {
+            *clock_type = clock(element, Some(defaults))?;
+        }
+        (Kind::Clock(clock_type), _) => *clock_type = clock(element, None)?,
         _ => {}
     }
     Ok(())
@@ -157,7 +166,7 @@ fn real(
 
 fn integer(
     element: Node<'_>,
-    range: (i128, i128),
+    range: &RangeInclusive<i128>,
     defaults: Option<&IntegerType>,
 ) -> Result<IntegerType, ParseError> {
     let defaults = defaults.cloned().unwrap_or_default();
@@ -178,14 +187,14 @@ fn binary(element: Node<'_>, defaults: &BinaryType) -> BinaryType {
 }
 
 fn clock(element: Node<'_>, defaults: Option<&ClockType>) -> Result<ClockType, ParseError> {
-    let given = defaults.is_some();
+    let has_defaults = defaults.is_some();
     let defaults = defaults.cloned().unwrap_or_default();
     let flag = |name, default| if element.has(name) { element.flag(name) } else { default };
     let interval_decimal = element.number("intervalDecimal")?.or(defaults.interval_decimal);
     let stated = element.word("intervalVariability", &INTERVALS);
     let interval_variability = match stated {
         Some(stated) => stated,
-        None if given => defaults.interval_variability,
+        None if has_defaults => defaults.interval_variability,
         None => assumed_interval(element, interval_decimal),
     };
     Ok(ClockType {
@@ -210,9 +219,11 @@ fn assumed_interval(element: Node<'_>, interval: Option<f64>) -> IntervalVariabi
         IntervalVariability::Triggered
     };
     if !element.has("intervalVariability") {
-        let said = (&*format!("one of {}", INTERVALS.join(", ")), "no such attribute".to_owned());
+        let expected = format!("one of {}", INTERVALS.join(", "));
+        let actual = "no such attribute".to_owned();
         let place = element.place("intervalVariability");
-        element.warn_of(true, place, said, &format!("read as {}", assumed.as_str()));
+        let assumed_as = format!("read as {}", assumed.as_str());
+        element.warn_of(true, place, &expected, actual, &assumed_as);
     }
     assumed
 }

@@ -1,5 +1,7 @@
 //! Reads the start values of variables and arrays of FMI 3.0.
 
+use std::ops::RangeInclusive;
+
 use super::kinds::Precision;
 use crate::defect::ParseError;
 use crate::description::parse::attributes::{Node, WHITE_SPACE};
@@ -9,19 +11,19 @@ use crate::description::{Elements, Kind, Version};
 /// `kind`; a list is returned.
 pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements>, ParseError> {
     let range = kind.integer_range(Version::V3);
-    if let (Some(own), Some(range)) = (kind.as_integer_mut(), range) {
+    if let (Some(integer_type), Some(range)) = (kind.as_integer_mut(), range) {
         let values = list(
             element,
-            |text| integer(text, range),
-            || format!("integers from {} to {}", range.0, range.1),
+            |text| integer(text, &range),
+            || format!("integers from {} to {}", range.start(), range.end()),
         )?;
-        return Ok(single(values, |value| own.start = Some(value)).map(Elements::Integer));
+        return Ok(single(values, |value| integer_type.start = Some(value)).map(Elements::Integer));
     }
     let precision = Precision::of(kind);
-    if let Some(own) = kind.as_real_mut() {
+    if let Some(real_type) = kind.as_real_mut() {
         let values =
             list(element, |text| Some(precision.round(real(text)?)), || "numbers".to_owned())?;
-        return Ok(single(values, |value| own.start = Some(value)).map(Elements::Real));
+        return Ok(single(values, |value| real_type.start = Some(value)).map(Elements::Real));
     }
     Ok(match kind {
         Kind::Boolean(start) => {
@@ -32,11 +34,11 @@ pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements
             let values = texts(element).map(str::to_owned).collect();
             single(values, |value| *start = Some(value)).map(Elements::String)
         }
-        Kind::Binary(own) => {
+        Kind::Binary(binary_type) => {
             let wrong = |text| element.wrong("value", "pairs of hexadecimal digits", text);
             let bytes = texts(element).map(|text| hexadecimal(text).ok_or_else(|| wrong(text)));
             let values = bytes.collect::<Result<_, ParseError>>()?;
-            single(values, |value| own.start = Some(value)).map(Elements::Binary)
+            single(values, |value| binary_type.start = Some(value)).map(Elements::Binary)
         }
         _ => None,
     })
@@ -69,13 +71,13 @@ fn list<T>(
     Ok(values)
 }
 
-fn integer(text: &str, (low, high): (i128, i128)) -> Option<i128> {
+fn integer(text: &str, range: &RangeInclusive<i128>) -> Option<i128> {
     let plain = text.parse().ok();
     let whole = || {
         let real = text.parse::<f64>().ok().filter(|real| real.fract() == 0.0)?;
         format!("{real:.0}").parse().ok()
     };
-    plain.or_else(whole).filter(|value| (low..=high).contains(value))
+    plain.or_else(whole).filter(|value| range.contains(value))
 }
 
 /// A number of XML Schema, which has `INF`, `-INF` and `NaN`.
@@ -99,7 +101,7 @@ fn texts(element: Node<'_>) -> impl Iterator<Item = &str> {
 /// Decodes hexadecimal digits; white space between bytes is skipped.
 fn hexadecimal(text: &str) -> Option<Vec<u8>> {
     let digits: Vec<u8> = text.bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
-    let digit = |byte: u8| char::from(byte).to_digit(16).and_then(|own| u8::try_from(own).ok());
+    let digit = |byte: u8| char::from(byte).to_digit(16).and_then(|digit| u8::try_from(digit).ok());
     digits
         .chunks(2)
         .map(|pair| match pair {

@@ -21,8 +21,8 @@ pub(super) fn read(
 ) -> Result<ModelStructure, ParseError> {
     let Some(element) = root.optional_child("ModelStructure")? else {
         let place = "<fmiModelDescription>".to_owned();
-        let said = ("an element ModelStructure", "none".to_owned());
-        root.warn_of(true, place, said, ANYTHING);
+        let expected = "an element ModelStructure";
+        root.warn_of(true, place, expected, "none".to_owned(), ANYTHING);
         return Ok(ModelStructure {
             outputs: missing(&[], variables, references).map(|(row, _)| row).collect(),
             ..ModelStructure::default()
@@ -33,16 +33,16 @@ pub(super) fn read(
     if !missing.is_empty() {
         let names: Vec<_> = missing.iter().take(5).map(|(_, name)| *name).collect();
         let more = if missing.len() > 5 { ", and others" } else { "" };
-        let found = format!("none for {}{more}", names.join(", "));
+        let actual = format!("none for {}{more}", names.join(", "));
         let place = "<ModelStructure>".to_owned();
-        element.warn_of(false, place, ("an Output for every output", found), ANYTHING);
+        element.warn_of(false, place, "an Output for every output", actual, ANYTHING);
         outputs.extend(missing.into_iter().map(|(row, _)| row));
     }
     for row in element.children_named("ContinuousStateDerivative") {
         if index(row, references)?.is_none() {
             // The rows determine the states.
-            let found = row.attribute("valueReference").unwrap_or_default();
-            return Err(row.wrong("valueReference", A_REFERENCE, found));
+            let stated = row.attribute("valueReference").unwrap_or_default();
+            return Err(row.wrong("valueReference", A_REFERENCE, stated));
         }
     }
     Ok(ModelStructure {
@@ -77,8 +77,8 @@ fn list(
     let mut rows = Vec::new();
     for row in element.children_named(name) {
         let Some(index) = index(row, references)? else {
-            let found = row.attribute("valueReference").unwrap_or_default();
-            row.warn_text("valueReference", A_REFERENCE, found, "the row was skipped");
+            let stated = row.attribute("valueReference").unwrap_or_default();
+            row.warn_text("valueReference", A_REFERENCE, stated, "the row was skipped");
             continue;
         };
         let dependencies = dependencies(row, references);
@@ -92,14 +92,14 @@ fn list(
 /// belongs to no variable.
 fn dependencies(row: Node<'_>, references: &References) -> Option<Vec<u32>> {
     let text = row.attribute("dependencies")?;
-    let mut found = Vec::new();
+    let mut indices = Vec::new();
     for word in words(text) {
         let index = word.parse().ok().and_then(|reference: u32| references.get(&reference));
         let Some(index) = index else {
             row.warn_text("dependencies", A_REFERENCE, word, ANYTHING);
             return None;
         };
-        found.push(*index);
+        indices.push(*index);
     }
-    Some(found)
+    Some(indices)
 }

@@ -36,7 +36,8 @@ pub(super) fn read(
     list: Node<'_>,
     types: &[SimpleType],
 ) -> Result<(Vec<ScalarVariable>, References), ParseError> {
-    let types: Types<'_> = types.iter().map(|own| (own.name.as_str(), own)).collect();
+    let types: Types<'_> =
+        types.iter().map(|declared| (declared.name.as_str(), declared)).collect();
     let (mut elements, mut variables) = (Vec::new(), Vec::new());
     // A few bytes of the file may name an alias of a variable with long texts and lists.
     let mut inherited = 0;
@@ -80,9 +81,9 @@ fn references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> References
         }
         if let Some(first) = references.get(&variable.value_reference) {
             let expected = format!("one that no other variable has, variable {first} has it");
-            let found = variable.value_reference.to_string();
+            let actual = variable.value_reference.to_string();
             let assumed = "references to it are read as the first variable";
-            element.warn_text("valueReference", &expected, &found, assumed);
+            element.warn_text("valueReference", &expected, &actual, assumed);
         } else {
             references.insert(variable.value_reference, index);
         }
@@ -99,9 +100,9 @@ fn variable(
     let (declared_type, defaults) = declared(element, types).unzip();
     attributes(element, &mut kind, defaults)?;
     set_declared_type(&mut kind, declared_type);
-    if let Some(own) = kind.as_real_mut() {
-        own.derivative = reference(element, "derivative")?;
-        own.reinit = element.flag("reinit");
+    if let Some(real) = kind.as_real_mut() {
+        real.derivative = reference(element, "derivative")?;
+        real.reinit = element.flag("reinit");
     }
     let start_elements = start::read(element, &mut kind)?;
     Ok(ScalarVariable {
@@ -125,14 +126,14 @@ fn variable(
 }
 
 fn set_declared_type(kind: &mut Kind, name: Option<String>) {
-    if let Some(own) = kind.as_real_mut() {
-        own.declared_type = name;
-    } else if let Some(own) = kind.as_integer_mut() {
-        own.declared_type = name;
+    if let Some(real) = kind.as_real_mut() {
+        real.declared_type = name;
+    } else if let Some(integer) = kind.as_integer_mut() {
+        integer.declared_type = name;
     } else {
         match kind {
-            Kind::Binary(own) => own.declared_type = name,
-            Kind::Clock(own) => own.declared_type = name,
+            Kind::Binary(binary) => binary.declared_type = name,
+            Kind::Clock(clock) => clock.declared_type = name,
             _ => {}
         }
     }
@@ -159,21 +160,22 @@ fn alias(element: Node<'_>, of: &ScalarVariable) -> Result<ScalarVariable, Parse
         alias_of: Some(of.name.clone()),
         negated: false,
     };
-    if let (Some(unit), Some(own)) = (element.text("displayUnit"), alias.kind.as_real_mut()) {
-        own.display_unit = Some(unit);
+    if let (Some(unit), Some(real)) = (element.text("displayUnit"), alias.kind.as_real_mut()) {
+        real.display_unit = Some(unit);
     }
     Ok(alias)
 }
 
 /// Returns the approximate number of bytes that an alias takes from its variable.
 fn weight(alias: &ScalarVariable) -> usize {
-    let text = |own: &Option<String>| own.as_ref().map_or(0, String::len);
+    let text = |attribute: &Option<String>| attribute.as_ref().map_or(0, String::len);
     let kind = match &alias.kind {
-        Kind::Binary(own) => text(&own.mime_type),
+        Kind::Binary(binary) => text(&binary.mime_type),
         other => {
             let real = other.as_real();
-            real.map_or(0, |own| text(&own.quantity) + text(&own.unit) + text(&own.display_unit))
-                + other.as_integer().map_or(0, |own| text(&own.quantity))
+            real.map_or(0, |real| {
+                text(&real.quantity) + text(&real.unit) + text(&real.display_unit)
+            }) + other.as_integer().map_or(0, |integer| text(&integer.quantity))
         }
     };
     let declared = alias.kind.declared_type().map_or(0, str::len);
@@ -205,8 +207,8 @@ fn dimension(element: Node<'_>) -> Result<Dimension, ParseError> {
     let reference = reference(element, "valueReference")?.map(Dimension::Variable);
     if start.is_some() && reference.is_some() {
         let place = "<Dimension>".to_owned();
-        let said = ("start or valueReference", "both".to_owned());
-        element.warn_of(false, place, said, "read with its start");
+        let expected = "start or valueReference";
+        element.warn_of(false, place, expected, "both".to_owned(), "read with its start");
     }
     let missing = || element.misses("start or valueReference", "neither".to_owned());
     start.or(reference).ok_or_else(missing)
@@ -239,8 +241,8 @@ fn check_dimensions(
     for position in 0..variables.len() {
         let (element, variable) = (elements[position], &variables[position]);
         let mut size = 1_u64;
-        for own in &variable.dimensions {
-            let found = match *own {
+        for dimension in &variable.dimensions {
+            let extent = match *dimension {
                 Dimension::Fixed(extent) => extent,
                 Dimension::Variable(reference) => {
                     extent(reference, variables).ok_or_else(|| {
@@ -249,15 +251,15 @@ fn check_dimensions(
                     })?
                 }
             };
-            size = size.saturating_mul(found);
+            size = size.saturating_mul(extent);
         }
         let count = variable.start_elements.as_ref().map(Elements::len);
         let fits = count.is_none_or(|count| u64::try_from(count) == Ok(size));
         if !fits {
-            let found = format!("{} values", count.unwrap_or_default());
+            let actual = format!("{} values", count.unwrap_or_default());
             let expected = format!("one value or {size}");
             let place = element.place("start");
-            element.warn_of(false, place, (&expected, found), "read without start values");
+            element.warn_of(false, place, &expected, actual, "read without start values");
         }
         if !fits {
             variables[position].start_elements = None;
@@ -273,11 +275,12 @@ fn resolve(
     references: &References,
 ) -> Result<(), ParseError> {
     let index = |name, reference: u32| {
-        let found = references.get(&reference).copied();
-        found.ok_or_else(|| element.wrong(name, A_REFERENCE, &reference.to_string()))
+        let position = references.get(&reference).copied();
+        position.ok_or_else(|| element.wrong(name, A_REFERENCE, &reference.to_string()))
     };
-    if let Some(own) = variable.kind.as_real_mut() {
-        own.derivative = own.derivative.map(|own| index("derivative", own)).transpose()?;
+    if let Some(real) = variable.kind.as_real_mut() {
+        real.derivative =
+            real.derivative.map(|reference| index("derivative", reference)).transpose()?;
     }
     if let Some(reference) = variable.previous {
         variable.previous = references.get(&reference).copied();

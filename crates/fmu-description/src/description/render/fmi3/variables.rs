@@ -17,9 +17,11 @@ impl Output {
                 aliases.entry(of).or_default().push(alias);
             }
         }
-        for variable in description.variables.iter().filter(|own| own.alias_of.is_none()) {
-            let own = aliases.get(variable.name.as_str()).map_or(&[][..], Vec::as_slice);
-            self.variable_3(variable, own, description);
+        for variable in description.variables.iter().filter(|variable| variable.alias_of.is_none())
+        {
+            let aliases_of_variable =
+                aliases.get(variable.name.as_str()).map_or(&[][..], Vec::as_slice);
+            self.variable_3(variable, aliases_of_variable, description);
         }
     }
 
@@ -45,8 +47,8 @@ impl Output {
             for start in &starts {
                 output.empty(Tag::new("Start").with("value", start));
             }
-            for own in aliases {
-                output.empty(alias(own, variable));
+            for variable_alias in aliases {
+                output.empty(alias(variable_alias, variable));
             }
         });
     }
@@ -54,7 +56,8 @@ impl Output {
 
 fn tag<'a>(variable: &'a ScalarVariable, description: &ModelDescription) -> Tag<'a> {
     let kind = &variable.kind;
-    let clocks = Some(references(description, &variable.clocks)).filter(|own| !own.is_empty());
+    let clocks =
+        Some(references(description, &variable.clocks)).filter(|references| !references.is_empty());
     let previous = variable.previous.map(|index| reference(description, index));
     let once = variable.can_handle_multiple_set_per_time_instant.as_ref();
     let tag = Tag::new(kind.element_in(Version::V3))
@@ -76,14 +79,14 @@ fn tag<'a>(variable: &'a ScalarVariable, description: &ModelDescription) -> Tag<
 }
 
 /// Returns what an alias states itself.
-fn alias<'a>(own: &'a ScalarVariable, of: &ScalarVariable) -> Tag<'a> {
-    let description = own.description.as_ref().filter(|_| own.description != of.description);
-    let display = |own: &'a ScalarVariable| own.kind.as_real()?.display_unit.as_ref();
-    let unit = of.kind.as_real().and_then(|own| own.display_unit.as_ref());
+fn alias<'a>(this: &'a ScalarVariable, of: &ScalarVariable) -> Tag<'a> {
+    let description = this.description.as_ref().filter(|_| this.description != of.description);
+    let display = |variable: &'a ScalarVariable| variable.kind.as_real()?.display_unit.as_ref();
+    let unit = of.kind.as_real().and_then(|real| real.display_unit.as_ref());
     Tag::new("Alias")
-        .with("name", &own.name)
+        .with("name", &this.name)
         .maybe("description", description)
-        .maybe("displayUnit", display(own).filter(|own| Some(*own) != unit))
+        .maybe("displayUnit", display(this).filter(|display| Some(*display) != unit))
 }
 
 /// Returns the attribute `start`: one value, or a list.
@@ -95,16 +98,16 @@ fn start_list(variable: &ScalarVariable) -> Option<String> {
         _ => format!("{value:?}"),
     };
     match &variable.start_elements {
-        Some(Elements::Real(own)) => return Some(joined(own, |value| number(*value))),
-        Some(Elements::Integer(own)) => return Some(joined(own, i128::to_string)),
-        Some(Elements::Boolean(own)) => return Some(joined(own, bool::to_string)),
+        Some(Elements::Real(values)) => return Some(joined(values, |value| number(*value))),
+        Some(Elements::Integer(values)) => return Some(joined(values, i128::to_string)),
+        Some(Elements::Boolean(values)) => return Some(joined(values, bool::to_string)),
         _ => {}
     }
     match &variable.kind {
-        Kind::Boolean(start) => start.map(|own| own.to_string()),
+        Kind::Boolean(start) => start.map(|start| start.to_string()),
         kind => match (kind.as_real(), kind.as_integer()) {
-            (Some(own), _) => own.start.map(number),
-            (_, own) => own?.start.map(|own| own.to_string()),
+            (Some(real), _) => real.start.map(number),
+            (_, integer) => integer?.start.map(|start| start.to_string()),
         },
     }
 }
@@ -115,15 +118,15 @@ fn joined<T>(values: &[T], text: impl Fn(&T) -> String) -> String {
 
 /// Returns the values of the elements `Start`, which a String and a Binary have.
 fn start_elements(variable: &ScalarVariable) -> Vec<String> {
-    let hexadecimal = |own: &Vec<u8>| {
-        let digits: Vec<String> = own.iter().map(|byte| format!("{byte:02x}")).collect();
+    let hexadecimal = |bytes: &Vec<u8>| {
+        let digits: Vec<String> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
         digits.concat()
     };
     match (&variable.start_elements, &variable.kind) {
-        (Some(Elements::String(own)), _) => own.clone(),
-        (Some(Elements::Binary(own)), _) => own.iter().map(hexadecimal).collect(),
+        (Some(Elements::String(texts)), _) => texts.clone(),
+        (Some(Elements::Binary(binaries)), _) => binaries.iter().map(hexadecimal).collect(),
         (_, Kind::String(start)) => start.iter().cloned().collect(),
-        (_, Kind::Binary(own)) => own.start.iter().map(hexadecimal).collect(),
+        (_, Kind::Binary(binary)) => binary.start.iter().map(hexadecimal).collect(),
         _ => Vec::new(),
     }
 }

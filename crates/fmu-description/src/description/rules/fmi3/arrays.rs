@@ -10,9 +10,9 @@ use crate::description::{
 const SECTION: &str = "2.4.7.2";
 
 pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
-    let variables = description.variables.iter().filter(|own| own.alias_of.is_none());
+    let variables = description.variables.iter().filter(|variable| variable.alias_of.is_none());
     let references: HashMap<u32, &ScalarVariable> =
-        variables.clone().map(|own| (own.value_reference, own)).collect();
+        variables.clone().map(|variable| (variable.value_reference, variable)).collect();
     for variable in variables {
         let name = &variable.name;
         let scalar = match variable.kind {
@@ -46,15 +46,15 @@ fn extent(
     references: &HashMap<u32, &ScalarVariable>,
     problems: &mut Problems,
 ) -> Option<u64> {
-    let found = match *dimension {
+    let extent = match *dimension {
         Dimension::Fixed(extent) => extent,
         Dimension::Variable(reference) => {
-            let size = references.get(&reference).filter(|own| {
-                matches!(own.kind, Kind::UInt64(_))
-                    && (own.causality == Causality::StructuralParameter
-                        || own.variability == Variability::Constant)
+            let size = references.get(&reference).filter(|variable| {
+                matches!(variable.kind, Kind::UInt64(_))
+                    && (variable.causality == Causality::StructuralParameter
+                        || variable.variability == Variability::Constant)
             });
-            let start = size.and_then(|own| own.kind.as_integer()?.start);
+            let start = size.and_then(|variable| variable.kind.as_integer()?.start);
             let Some(start) = start.and_then(|start| u64::try_from(start).ok()) else {
                 let text = format!(
                     "variable {name}: a dimension refers to {reference}, which is no constant or \
@@ -67,6 +67,6 @@ fn extent(
         }
     };
     problems
-        .demand(found > 0, SECTION, || format!("variable {name}: a dimension starts with size 0"));
-    Some(found)
+        .demand(extent > 0, SECTION, || format!("variable {name}: a dimension starts with size 0"));
+    Some(extent)
 }

@@ -12,7 +12,7 @@ const VARIABLES: &str = "2.4.7.4";
 
 pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     let mut previous = HashSet::new();
-    for variable in description.variables.iter().filter(|own| own.alias_of.is_none()) {
+    for variable in description.variables.iter().filter(|variable| variable.alias_of.is_none()) {
         if let Kind::Clock(clock) = &variable.kind {
             check_clock(variable, problems);
             check_interval(variable, clock, problems);
@@ -54,19 +54,19 @@ fn check_interval(variable: &ScalarVariable, clock: &ClockType, problems: &mut P
     use IntervalVariability::{Constant, Fixed, Tunable};
     let name = &variable.name;
     let periodic = matches!(clock.interval_variability, Constant | Fixed | Tunable);
-    let given = clock.interval_decimal.is_some();
+    let has_interval = clock.interval_decimal.is_some();
     let counted = clock.interval_counter.is_some();
     let mut demand = |holds: bool, text: &str| {
         problems.demand(holds, TYPES, || format!("clock {name}: {text}"));
     };
     // Section 2.4.4 wants it for every periodic clock; by section 2.2.8.2 fmi3GetInterval gives it for the others.
     let constant = clock.interval_variability == Constant;
-    demand(given || !constant, "a constant clock needs intervalDecimal");
-    demand(periodic || !given, "only a periodic clock has intervalDecimal");
-    let positive = |own: f64| own > 0.0 && own.is_finite();
+    demand(has_interval || !constant, "a constant clock needs intervalDecimal");
+    demand(periodic || !has_interval, "only a periodic clock has intervalDecimal");
+    let positive = |seconds: f64| seconds > 0.0 && seconds.is_finite();
     demand(clock.interval_decimal.is_none_or(positive), "intervalDecimal is not positive");
-    demand(given || clock.shift_decimal.is_none(), "shiftDecimal needs intervalDecimal");
-    let later = |own: f64| own >= 0.0 && own.is_finite();
+    demand(has_interval || clock.shift_decimal.is_none(), "shiftDecimal needs intervalDecimal");
+    let later = |seconds: f64| seconds >= 0.0 && seconds.is_finite();
     demand(clock.shift_decimal.is_none_or(later), "shiftDecimal is negative");
     demand(
         !counted || periodic && clock.supports_fraction,
@@ -89,7 +89,7 @@ fn check_clocks(
     for index in &variable.clocks {
         let clock = description.at(*index);
         problems.demand(
-            clock.is_some_and(|own| matches!(own.kind, Kind::Clock(_))),
+            clock.is_some_and(|variable| matches!(variable.kind, Kind::Clock(_))),
             VARIABLES,
             || {
                 let other = description.name_of(*index);
@@ -110,10 +110,10 @@ fn check_previous(
     problems: &mut Problems,
 ) {
     let name = &variable.name;
-    let own = !variable.clocks.is_empty()
+    let is_allowed = !variable.clocks.is_empty()
         && variable.variability == Variability::Discrete
         && !matches!(variable.kind, Kind::Clock(_));
-    problems.demand(own, VARIABLES, || {
+    problems.demand(is_allowed, VARIABLES, || {
         format!("variable {name}: only discrete clocked variables can have previous")
     });
     let fits = |other: &ScalarVariable| {

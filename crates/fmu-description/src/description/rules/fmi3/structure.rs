@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashSet};
 
 use crate::description::rules::Problems;
-use crate::description::rules::structure::check_members;
+use crate::description::rules::structure::{List, check_members};
 use crate::description::{
     Causality, DependencyKind, Initial, Kind, ModelDescription, ScalarVariable, Unknown,
     Variability,
@@ -17,23 +17,27 @@ pub(in crate::description::rules) fn check(
 ) {
     let structure = &description.structure;
     let states = states(description, problems);
-    let outputs =
-        description.indices_of(|own| own.causality == Causality::Output && own.alias_of.is_none());
-    check_members(("Output", SECTION), &structure.outputs, &outputs, description, problems);
+    let outputs = description.indices_of(|variable| {
+        variable.causality == Causality::Output && variable.alias_of.is_none()
+    });
+    let list = List { name: "Output", section: SECTION, rows: &structure.outputs };
+    check_members(&list, &outputs, description, problems);
     check_initial_unknowns(description, &states, problems);
     check_indicators(description, problems);
-    let clocked = description.indices_of(|own| own.previous.is_some() && own.alias_of.is_none());
+    let clocked = description
+        .indices_of(|variable| variable.previous.is_some() && variable.alias_of.is_none());
     let rows = &structure.clocked_states;
-    check_members(("ClockedState", SECTION), rows, &clocked, description, problems);
+    let list = List { name: "ClockedState", section: SECTION, rows };
+    check_members(&list, &clocked, description, problems);
 
-    let known = |index: u32, own: &ScalarVariable| {
-        is_given(own)
-            || own.causality == Causality::Parameter
-            || own.causality == Causality::StructuralParameter
-            || own.variability == Variability::Constant
+    let known = |index: u32, variable: &ScalarVariable| {
+        is_given(variable)
+            || variable.causality == Causality::Parameter
+            || variable.causality == Causality::StructuralParameter
+            || variable.variability == Variability::Constant
             || states.contains(&index)
             // The standard marks only clocked ones of the discrete-time states.
-            || own.variability == Variability::Discrete
+            || variable.variability == Variability::Discrete
     };
     for (list, rows) in [
         ("Output", &structure.outputs),
@@ -45,8 +49,8 @@ pub(in crate::description::rules) fn check(
             check_dependencies(list, row, description, known, problems);
         }
     }
-    let known_at_start = |_: u32, own: &ScalarVariable| {
-        is_given(own) || own.initial_in_force() == Some(Initial::Exact)
+    let known_at_start = |_: u32, variable: &ScalarVariable| {
+        is_given(variable) || variable.initial_in_force() == Some(Initial::Exact)
     };
     for row in &structure.initial_unknowns {
         check_dependencies("InitialUnknown", row, description, known_at_start, problems);
@@ -59,9 +63,9 @@ pub(in crate::description::rules) fn check(
     }
 }
 
-fn is_given(own: &ScalarVariable) -> bool {
-    matches!(own.causality, Causality::Input | Causality::Independent)
-        || matches!(own.kind, Kind::Clock(_))
+fn is_given(variable: &ScalarVariable) -> bool {
+    matches!(variable.causality, Causality::Input | Causality::Independent)
+        || matches!(variable.kind, Kind::Clock(_))
 }
 
 /// Returns the continuous states, whose derivatives are the rows of `ContinuousStateDerivative`.
@@ -69,7 +73,8 @@ fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u3
     let mut states = HashSet::new();
     for row in &description.structure.derivatives {
         let name = description.name_of(row.index);
-        let derivative = description.at(row.index).and_then(|own| own.kind.as_real()?.derivative);
+        let derivative =
+            description.at(row.index).and_then(|variable| variable.kind.as_real()?.derivative);
         let Some(state) = derivative else {
             let text = format!("ContinuousStateDerivative, {name}: it has no derivative");
             problems.add(SECTION, text);
@@ -80,9 +85,9 @@ fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u3
                 "ContinuousStateDerivative, {name}: its state has another derivative in the list"
             )
         });
-        let is_state = |own: &ScalarVariable| {
-            matches!(own.causality, Causality::Local | Causality::Output)
-                && own.variability == Variability::Continuous
+        let is_state = |variable: &ScalarVariable| {
+            matches!(variable.causality, Causality::Local | Causality::Output)
+                && variable.variability == Variability::Continuous
         };
         problems.demand(description.at(state).is_some_and(is_state), SECTION, || {
             let state = description.name_of(state);
@@ -93,8 +98,8 @@ fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u3
         });
     }
     for (index, variable) in (1..).zip(&description.variables) {
-        let own = variable.kind.as_real().is_some_and(|own| own.reinit);
-        let reinit = own && variable.alias_of.is_none();
+        let reinit = variable.kind.as_real().is_some_and(|real| real.reinit);
+        let reinit = reinit && variable.alias_of.is_none();
         problems.demand(!reinit || states.contains(&index), "2.4.7.5", || {
             format!("variable {}: only a continuous-time state can have reinit", variable.name)
         });
@@ -110,15 +115,15 @@ fn check_initial_unknowns(
 ) {
     let derivatives = description.structure.derivatives.iter().map(|row| row.index);
     let exposed: HashSet<u32> = states.iter().copied().chain(derivatives).collect();
-    let computed = |own: &ScalarVariable| {
-        matches!(own.initial_in_force(), Some(Initial::Approx | Initial::Calculated))
+    let computed = |variable: &ScalarVariable| {
+        matches!(variable.initial_in_force(), Some(Initial::Approx | Initial::Calculated))
     };
-    let mut required = description.indices_of(|own| {
-        let clocked = !own.clocks.is_empty() || matches!(own.kind, Kind::Clock(_));
-        own.alias_of.is_none()
-            && match own.causality {
+    let mut required = description.indices_of(|variable| {
+        let clocked = !variable.clocks.is_empty() || matches!(variable.kind, Kind::Clock(_));
+        variable.alias_of.is_none()
+            && match variable.causality {
                 Causality::CalculatedParameter => true,
-                Causality::Output => !clocked && computed(own),
+                Causality::Output => !clocked && computed(variable),
                 _ => false,
             }
     });
@@ -126,27 +131,28 @@ fn check_initial_unknowns(
     let rows = &description.structure.initial_unknowns;
     let listed: BTreeSet<u32> = rows.iter().map(|row| row.index).collect();
     let optional = listed.iter().filter(|index| {
-        description
-            .at(**index)
-            .is_some_and(|own| !own.clocks.is_empty() || matches!(own.kind, Kind::Clock(_)))
+        description.at(**index).is_some_and(|variable| {
+            !variable.clocks.is_empty() || matches!(variable.kind, Kind::Clock(_))
+        })
     });
     let allowed: BTreeSet<u32> = required.iter().chain(optional).copied().collect();
-    check_members(("InitialUnknown", SECTION), rows, &allowed, description, problems);
+    let list = List { name: "InitialUnknown", section: SECTION, rows };
+    check_members(&list, &allowed, description, problems);
 }
 
 fn check_indicators(description: &ModelDescription, problems: &mut Problems) {
-    let mut seen = HashSet::new();
+    let mut earlier = HashSet::new();
     for row in &description.structure.event_indicators {
         let name = description.name_of(row.index);
-        let fits = description.at(row.index).is_some_and(|own| {
-            own.kind.as_real().is_some()
-                && own.variability == Variability::Continuous
-                && matches!(own.causality, Causality::Local | Causality::Output)
+        let fits = description.at(row.index).is_some_and(|variable| {
+            variable.kind.as_real().is_some()
+                && variable.variability == Variability::Continuous
+                && matches!(variable.causality, Causality::Local | Causality::Output)
         });
         problems.demand(fits, SECTION, || {
             format!("EventIndicator, {name}: it is not a continuous local or output float")
         });
-        problems.demand(seen.insert(row.index), SECTION, || {
+        problems.demand(earlier.insert(row.index), SECTION, || {
             format!("EventIndicator has variable {name} twice")
         });
     }
@@ -167,7 +173,7 @@ fn check_dependencies(
         format!("{list}, {name}: a dependency is there twice")
     });
     for index in dependencies {
-        let known = description.at(*index).is_some_and(|own| is_known(*index, own));
+        let known = description.at(*index).is_some_and(|variable| is_known(*index, variable));
         problems.demand(known, SECTION, || {
             let other = description.name_of(*index);
             format!("{list}, {name}: a dependency on {other} cannot be stated, it is no known")
@@ -178,7 +184,7 @@ fn check_dependencies(
     problems.demand(paired, SECTION, || {
         format!("{list}, {name}: dependenciesKind is not as long as dependencies")
     });
-    let float = description.at(row.index).is_some_and(|own| own.kind.as_real().is_some());
+    let float = description.at(row.index).is_some_and(|variable| variable.kind.as_real().is_some());
     let plain = kinds.iter().all(|kind| *kind == DependencyKind::Dependent);
     problems.demand(float || plain, SECTION, || {
         format!("{list}, {name}: only for a float may dependenciesKind be other than dependent")

@@ -21,7 +21,8 @@ pub(in crate::description::rules) fn check(
     problems.demand(!description.variables.is_empty(), "2.4.7.1", || {
         "ModelVariables has no variable".to_owned()
     });
-    let types = description.types.iter().map(|own| (own.name.as_str(), own)).collect();
+    let types =
+        description.types.iter().map(|declared| (declared.name.as_str(), declared)).collect();
     for variable in &description.variables {
         let text = variable.description.as_deref().unwrap_or_default();
         problems.text(ATTRIBUTES, &format!("description of variable {}", variable.name), text);
@@ -37,15 +38,17 @@ pub(in crate::description::rules) fn check(
     let independent: Vec<&ScalarVariable> = description
         .variables
         .iter()
-        .filter(|own| own.causality == Causality::Independent && own.alias_of.is_none())
+        .filter(|variable| {
+            variable.causality == Causality::Independent && variable.alias_of.is_none()
+        })
         .collect();
     problems.demand(independent.len() == 1, ATTRIBUTES, || {
         format!("{} variables are independent, exactly one must be", independent.len())
     });
-    for own in independent {
-        let float = own.kind.as_real().is_some() && own.dimensions.is_empty();
+    for variable in independent {
+        let float = variable.kind.as_real().is_some() && variable.dimensions.is_empty();
         problems.demand(float, ATTRIBUTES, || {
-            format!("variable {}: the independent variable must be a scalar Float", own.name)
+            format!("variable {}: the independent variable must be a scalar Float", variable.name)
         });
     }
     check_references(description, problems);
@@ -130,29 +133,32 @@ fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
 fn check_numbers(variable: &ScalarVariable, problems: &mut Problems) {
     let who = format!("variable {}", variable.name);
     let kind = &variable.kind;
-    if let Some(own) = kind.as_real() {
-        check_real(&who, own, problems);
+    if let Some(real) = kind.as_real() {
+        check_real(&who, real, problems);
         if let Some(Elements::Real(starts)) = &variable.start_elements {
-            let outside = |start: &&f64| !inside(**start, own.min, own.max);
+            let outside = |start: &&f64| !inside(**start, real.min, real.max);
             if let Some(start) = starts.iter().find(outside) {
-                check_order(&who, own.min, Some(*start), own.max, problems);
+                check_order(&who, real.min, Some(*start), real.max, problems);
             }
         }
     }
-    if let (Some(own), Some((low, high))) = (kind.as_integer(), kind.integer_range(Version::V3)) {
-        check_integer(&who, own, problems);
+    if let (Some(integer), Some(range)) = (kind.as_integer(), kind.integer_range(Version::V3)) {
+        check_integer(&who, integer, problems);
         let starts = match &variable.start_elements {
             Some(Elements::Integer(starts)) => starts.as_slice(),
             _ => &[],
         };
-        let outside = |start: &&i128| !inside(**start, own.min, own.max);
+        let outside = |start: &&i128| !inside(**start, integer.min, integer.max);
         if let Some(start) = starts.iter().find(outside) {
-            check_order(&who, own.min, Some(*start), own.max, problems);
+            check_order(&who, integer.min, Some(*start), integer.max, problems);
         }
-        let mut numbers =
-            [own.min, own.max, own.start].into_iter().flatten().chain(starts.iter().copied());
-        if let Some(value) = numbers.find(|value| !(low..=high).contains(value)) {
+        let mut numbers = [integer.min, integer.max, integer.start]
+            .into_iter()
+            .flatten()
+            .chain(starts.iter().copied());
+        if let Some(value) = numbers.find(|value| !range.contains(value)) {
             let kind = kind.element_in(Version::V3);
+            let (low, high) = range.into_inner();
             let text = format!("{who}: {value} is no number of type {kind}, {low} to {high}");
             problems.add(TYPED, text);
         }
@@ -166,9 +172,9 @@ fn check_numbers(variable: &ScalarVariable, problems: &mut Problems) {
                 problems.text(TYPED, &format!("start of {who}"), start);
             }
         }
-        (Kind::Binary(own), None) => {
-            let length = own.start.as_ref().and_then(|start| u64::try_from(start.len()).ok());
-            let fits = length.zip(own.max_size).is_none_or(|(length, most)| length <= most);
+        (Kind::Binary(binary), None) => {
+            let length = binary.start.as_ref().and_then(|start| u64::try_from(start.len()).ok());
+            let fits = length.zip(binary.max_size).is_none_or(|(length, most)| length <= most);
             problems
                 .demand(fits, TYPED, || format!("{who}: the start value is longer than maxSize"));
         }
@@ -194,15 +200,17 @@ fn check_declared_type(
             format!("variable {name} is an Enumeration and has no declared type")
         });
     };
-    let Some(own) = types.get(declared) else {
+    let Some(declared_type) = types.get(declared) else {
         return problems.add(TYPED, format!("variable {name}: there is no type {declared:?}"));
     };
-    let (kind, other) = (variable.kind.element_in(Version::V3), own.kind.element_in(Version::V3));
+    let (kind, other) =
+        (variable.kind.element_in(Version::V3), declared_type.kind.element_in(Version::V3));
     problems.demand(kind == other, TYPED, || {
         format!("variable {name} is {kind}, its declared type {declared} is {other}")
     });
     if let Kind::Enumeration(integer) = &variable.kind {
-        let is_item = |start| own.items.iter().any(|(_, value)| i128::from(*value) == start);
+        let is_item =
+            |start| declared_type.items.iter().any(|(_, value)| i128::from(*value) == start);
         problems.demand(integer.start.is_none_or(is_item), TYPED, || {
             format!("variable {name}: the start value is no item of type {declared}")
         });
@@ -215,14 +223,14 @@ fn check_derivative(
     description: &ModelDescription,
     problems: &mut Problems,
 ) {
-    let Some(index) = variable.kind.as_real().and_then(|own| own.derivative) else { return };
+    let Some(index) = variable.kind.as_real().and_then(|real| real.derivative) else { return };
     let name = &variable.name;
     let Some(state) = description.at(index) else {
         let text = format!("variable {name}: derivative is the reference of no variable");
         return problems.add(TYPED, text);
     };
-    let is_continuous = |own: &ScalarVariable| {
-        own.kind.as_real().is_some() && own.variability == Variability::Continuous
+    let is_continuous = |variable: &ScalarVariable| {
+        variable.kind.as_real().is_some() && variable.variability == Variability::Continuous
     };
     let sound = !std::ptr::eq(state, variable) && is_continuous(state) && is_continuous(variable);
     problems.demand(sound && state.dimensions == variable.dimensions, TYPED, || {
@@ -237,7 +245,7 @@ fn check_derivative(
 /// Checks that only aliases share a value reference, and that they name their variable.
 fn check_references(description: &ModelDescription, problems: &mut Problems) {
     let mut variables: HashMap<u32, &ScalarVariable> = HashMap::new();
-    for variable in description.variables.iter().filter(|own| own.alias_of.is_none()) {
+    for variable in description.variables.iter().filter(|variable| variable.alias_of.is_none()) {
         if let Some(first) = variables.insert(variable.value_reference, variable) {
             let text = format!(
                 "variables {} and {} have the value reference {}",
@@ -248,13 +256,18 @@ fn check_references(description: &ModelDescription, problems: &mut Problems) {
     }
     for alias in &description.variables {
         let Some(of) = &alias.alias_of else { continue };
-        let variable = variables.get(&alias.value_reference).filter(|own| own.name == *of);
+        let variable =
+            variables.get(&alias.value_reference).filter(|variable| variable.name == *of);
         let kind = alias.kind.element();
-        problems.demand(variable.is_some_and(|own| own.kind.element() == kind), ALIASES, || {
-            format!(
-                "alias {}: there is no variable {of} of its type and value reference",
-                alias.name
-            )
-        });
+        problems.demand(
+            variable.is_some_and(|variable| variable.kind.element() == kind),
+            ALIASES,
+            || {
+                format!(
+                    "alias {}: there is no variable {of} of its type and value reference",
+                    alias.name
+                )
+            },
+        );
     }
 }
