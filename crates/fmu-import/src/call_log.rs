@@ -45,11 +45,12 @@ impl CallLog {
     #[must_use]
     pub fn listen(&self, instance: &str, slave: Box<dyn Slave>) -> LoggedSlave {
         let logged = self.wrap(instance, slave);
-        logged.created(match logged.version {
+        let (function, kind) = match logged.version {
             Version::V1 => ("fmiInstantiateSlave", ""),
             Version::V2 => ("fmi2Instantiate", "fmi2CoSimulation, "),
             Version::V3 => ("fmi3InstantiateCoSimulation", ""),
-        });
+        };
+        logged.created(function, kind);
         logged
     }
 
@@ -61,11 +62,12 @@ impl CallLog {
         slave: Box<dyn ModelExchange>,
     ) -> LoggedSlave<dyn ModelExchange> {
         let logged = self.wrap(instance, slave);
-        logged.created(match logged.version {
+        let (function, kind) = match logged.version {
             Version::V1 => ("fmiInstantiateModel", ""),
             Version::V2 => ("fmi2Instantiate", "fmi2ModelExchange, "),
             Version::V3 => ("fmi3InstantiateModelExchange", ""),
-        });
+        };
+        logged.created(function, kind);
         logged
     }
 
@@ -136,7 +138,7 @@ const MODELS: [(&str, &str); 4] = [
 
 impl<S: Slave + ?Sized> LoggedSlave<S> {
     /// Logs that `function` has created the instance of this `kind`.
-    fn created(&self, (function, kind): (&str, &str)) {
+    fn created(&self, function: &str, kind: &str) {
         let (instance, guid) = (&self.instance, &self.slave.description().guid);
         let prefix = self.prefix();
         self.log
@@ -155,12 +157,12 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
     /// Returns the name of a function of FMI 2.0 in the version of the FMU.
     fn spelt(&self, function: &str) -> String {
         if self.version == Version::V1 && self.slave.description().model_exchange.is_some() {
-            let known = MODELS.iter().find(|(own, _)| *own == function);
+            let known = MODELS.iter().find(|(name, _)| *name == function);
             if let Some((_, name)) = known {
                 return (*name).to_owned();
             }
         }
-        let known = NAMES.iter().find(|(own, ..)| *own == function);
+        let known = NAMES.iter().find(|(name, ..)| *name == function);
         match (self.version, known) {
             (Version::V3, Some((_, name, _))) | (Version::V1, Some((_, _, name))) => {
                 (*name).to_owned()
@@ -178,11 +180,12 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
     /// Writes `function(arguments)`, performs the call, and writes its status and results.
     fn call<T>(
         &mut self,
-        (function, arguments): (&str, String),
+        function: &str,
+        arguments: &str,
         call: impl FnOnce(&mut S) -> Result<T, CallError>,
         results: impl FnOnce(&T) -> String,
     ) -> Result<T, CallError> {
-        self.begin(function, &arguments);
+        self.begin(function, arguments);
         let done = call(self.slave.as_mut());
         let results = done.as_ref().map(results).unwrap_or_default();
         self.end(&done, &results);
@@ -213,7 +216,7 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
     ) -> Result<(), CallError> {
         let arguments = format!("{references:?}");
         let call = |slave: &mut S| get(slave, values).map(|()| format!("{values:?}"));
-        self.call((function, arguments), call, |values| format!(" {values}")).map(|_| ())
+        self.call(function, &arguments, call, |values| format!(" {values}")).map(|_| ())
     }
 
     fn set<T: Debug>(
@@ -223,16 +226,16 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
         values: &[T],
         set: impl FnOnce(&mut S) -> Result<(), CallError>,
     ) -> Result<(), CallError> {
-        self.plain(function, format!("{references:?}, {values:?}"), set)
+        self.plain(function, &format!("{references:?}, {values:?}"), set)
     }
 
     fn plain(
         &mut self,
         function: &str,
-        arguments: String,
+        arguments: &str,
         call: impl FnOnce(&mut S) -> Result<(), CallError>,
     ) -> Result<(), CallError> {
-        self.call((function, arguments), call, |()| String::new())
+        self.call(function, arguments, call, |()| String::new())
     }
 }
 
@@ -254,13 +257,13 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
     }
 
     fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
-        self.plain("fmi2SetDebugLogging", on.to_string(), |slave| slave.set_debug_logging(on))
+        self.plain("fmi2SetDebugLogging", &on.to_string(), |slave| slave.set_debug_logging(on))
     }
 
     fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         let arguments = format!("{references:?}, {values:?}");
         let call = |slave: &mut S| slave.configure(references, values);
-        self.plain("fmi3EnterConfigurationMode", arguments, call)
+        self.plain("fmi3EnterConfigurationMode", &arguments, call)
     }
 
     fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
@@ -291,21 +294,21 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
             None => write!(arguments, "no stop time"),
         };
         let call = |slave: &mut S| slave.setup_experiment(experiment);
-        self.plain("fmi2SetupExperiment", arguments, call)
+        self.plain("fmi2SetupExperiment", &arguments, call)
     }
 
     fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
         let call = |slave: &mut S| slave.enter_initialization_mode();
-        self.plain("fmi2EnterInitializationMode", String::new(), call)
+        self.plain("fmi2EnterInitializationMode", "", call)
     }
 
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
         let call = |slave: &mut S| slave.exit_initialization_mode();
-        self.plain("fmi2ExitInitializationMode", String::new(), call)
+        self.plain("fmi2ExitInitializationMode", "", call)
     }
 
     fn terminate(&mut self) -> Result<(), CallError> {
-        self.plain("fmi2Terminate", String::new(), S::terminate)
+        self.plain("fmi2Terminate", "", S::terminate)
     }
 
     fn free(&mut self) -> Result<(), CallError> {
@@ -363,7 +366,7 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
         values: &[f64],
     ) -> Result<(), CallError> {
         let arguments = format!("{references:?}, orders {orders:?}, {values:?}");
-        self.plain("fmi2SetRealInputDerivatives", arguments, |slave| {
+        self.plain("fmi2SetRealInputDerivatives", &arguments, |slave| {
             slave.set_input_derivatives(references, orders, values)
         })
     }
@@ -379,7 +382,7 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
             let done = slave.get_output_derivatives(references, orders, values);
             done.map(|()| format!(" {values:?}"))
         };
-        self.call(("fmi2GetRealOutputDerivatives", arguments), call, String::clone).map(|_| ())
+        self.call("fmi2GetRealOutputDerivatives", &arguments, call, String::clone).map(|_| ())
     }
 
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
@@ -409,29 +412,27 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
             let done = slave.directional_derivative(unknowns, knowns, seed, changes);
             done.map(|()| format!(" {changes:?}"))
         };
-        self.call(("fmi2GetDirectionalDerivative", arguments), call, String::clone).map(|_| ())
+        self.call("fmi2GetDirectionalDerivative", &arguments, call, String::clone).map(|_| ())
     }
 
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
         let call = |slave: &mut S| slave.save_state(slot);
-        self.plain("fmi2GetFMUstate", format!("state {slot}"), call)
+        self.plain("fmi2GetFMUstate", &format!("state {slot}"), call)
     }
 
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
         let call = |slave: &mut S| slave.restore_state(slot);
-        self.plain("fmi2SetFMUstate", format!("state {slot}"), call)
+        self.plain("fmi2SetFMUstate", &format!("state {slot}"), call)
     }
 
     fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         let call = |slave: &mut S| slave.serialize_state();
-        self.call(("fmi2SerializeFMUstate", String::new()), call, |bytes| {
-            format!(" {} bytes", bytes.len())
-        })
+        self.call("fmi2SerializeFMUstate", "", call, |bytes| format!(" {} bytes", bytes.len()))
     }
 
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let call = |slave: &mut S| slave.deserialize_state(bytes);
-        self.plain("fmi2DeSerializeFMUstate", format!("{} bytes", bytes.len()), call)
+        self.plain("fmi2DeSerializeFMUstate", &format!("{} bytes", bytes.len()), call)
     }
 
     fn guard_arrays(&mut self) {

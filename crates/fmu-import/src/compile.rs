@@ -128,8 +128,8 @@ pub fn compile(path: &Path) -> Result<PathBuf, CompileError> {
 
 /// Returns the names of the libraries of an FMU.
 fn identifiers(description: &ModelDescription) -> Vec<String> {
-    let simulation = description.stepped().map(|own| own.model_identifier);
-    let exchange = description.model_exchange.as_ref().map(|own| own.model_identifier.clone());
+    let simulation = description.stepped().map(|flags| flags.model_identifier);
+    let exchange = description.model_exchange.as_ref().map(|flags| flags.model_identifier.clone());
     let mut identifiers: Vec<String> = simulation.into_iter().chain(exchange).collect();
     identifiers.dedup();
     identifiers
@@ -143,14 +143,14 @@ fn file_name(path: &Path) -> String {
 
 /// Returns the folder for built FMUs.
 fn cache() -> PathBuf {
-    let variable = |name: &str| std::env::var_os(name).filter(|own| !own.is_empty());
+    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
     let home = || variable("HOME").map(PathBuf::from);
     let user = if cfg!(windows) {
         variable("LOCALAPPDATA").map(PathBuf::from)
     } else {
         let stated = variable("XDG_CACHE_HOME").map(PathBuf::from);
-        let own = if cfg!(target_os = "macos") { "Library/Caches" } else { ".cache" };
-        stated.or_else(|| home().map(|home| home.join(own)))
+        let folder = if cfg!(target_os = "macos") { "Library/Caches" } else { ".cache" };
+        stated.or_else(|| home().map(|home| home.join(folder)))
     };
     user.unwrap_or_else(std::env::temp_dir).join("aso-ftc").join("compiled")
 }
@@ -182,8 +182,9 @@ impl Compiler {
         } else {
             ("CC", ["cc", "gcc", "clang"], "C")
         };
-        let stated = std::env::var(variable).ok().filter(|own| !own.trim().is_empty());
-        let tried = stated.map_or_else(|| known.map(str::to_owned).to_vec(), |own| vec![own]);
+        let stated = std::env::var(variable).ok().filter(|command| !command.trim().is_empty());
+        let tried =
+            stated.map_or_else(|| known.map(str::to_owned).to_vec(), |command| vec![command]);
         let compilers = tried.iter().filter_map(|command| {
             let words: Vec<String> = command.split_whitespace().map(str::to_owned).collect();
             let output =
@@ -223,7 +224,7 @@ impl<'a> Build<'a> {
         let configurations = description::read(unpacked.folder());
         let configurations = configurations
             .map_err(|reason| CompileError::Description { path: path.to_owned(), reason })?;
-        let mut sets = configurations.iter().flat_map(|own| &own.sets);
+        let mut sets = configurations.iter().flat_map(|configuration| &configuration.sets);
         let has_cpp = sets.any(SourceFileSet::is_cpp);
         Ok(Self {
             path,
@@ -251,8 +252,9 @@ impl<'a> Build<'a> {
 
     /// Builds the library `identifier`.
     fn library(&self, identifier: &str) -> Result<Vec<u8>, CompileError> {
-        let is_own = |own: &&BuildConfiguration| own.model_identifier == identifier;
-        let configuration = self.configurations.iter().find(is_own);
+        let is_called =
+            |configuration: &&BuildConfiguration| configuration.model_identifier == identifier;
+        let configuration = self.configurations.iter().find(is_called);
         // Some FMUs state a former identifier.
         let only = || self.configurations.first().filter(|_| self.configurations.len() == 1);
         let configuration = configuration.or_else(only).ok_or_else(|| {
@@ -271,7 +273,7 @@ impl<'a> Build<'a> {
         for set in &configuration.sets {
             for file in &set.files {
                 let object = folder.path().join(format!("{}.o", objects.len()));
-                self.object(set, file, (&headers, &object))?;
+                self.object(set, file, &headers, &object)?;
                 objects.push(object);
             }
         }
@@ -290,7 +292,8 @@ impl<'a> Build<'a> {
         &self,
         set: &SourceFileSet,
         file: &str,
-        (headers, object): (&Path, &Path),
+        headers: &Path,
+        object: &Path,
     ) -> Result<(), CompileError> {
         let compiler = self.cpp.as_ref().filter(|_| set.is_cpp()).unwrap_or(&self.c);
         let mut command = compiler.command();

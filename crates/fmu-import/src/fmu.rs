@@ -205,12 +205,13 @@ impl Fmu {
     ///
     /// [`LoadError::Unsupported`] if the arrays have too many elements.
     pub fn elements(&self) -> Result<ModelDescription, FmuError> {
-        let own = self.description();
-        if own.version() != Version::V3 {
-            return Ok(own.clone());
+        let description = self.description();
+        if description.version() != Version::V3 {
+            return Ok(description.clone());
         }
-        let view = crate::v3::ElementView::new(own, &HashMap::new())
-            .map_err(|reason| LoadError::Unsupported { model: own.model_name.clone(), reason })?;
+        let view = crate::v3::ElementView::new(description, &HashMap::new()).map_err(|reason| {
+            LoadError::Unsupported { model: description.model_name.clone(), reason }
+        })?;
         Ok(view.description)
     }
 
@@ -235,12 +236,12 @@ impl Fmu {
         Arc::new(move |kind, reference| {
             let variables = &content.unpacked.description.variables;
             let by_reference = content.names.get_or_init(|| {
-                let mut found = HashMap::new();
+                let mut positions = HashMap::new();
                 for (position, variable) in variables.iter().enumerate() {
                     let key = (letter(&variable.kind), variable.value_reference);
-                    found.entry(key).or_insert(position);
+                    positions.entry(key).or_insert(position);
                 }
-                found
+                positions
             });
             by_reference.get(&(kind, reference)).map(|position| variables[*position].name.clone())
         })

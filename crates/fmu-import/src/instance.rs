@@ -42,8 +42,8 @@ impl Instance {
     /// limit. FMI 3.0 has no pending steps.
     pub fn set_time_limit(&mut self, limit: Option<Duration>) {
         match &mut self.inner {
-            Inner::V1(own) => own.component.time_limit = limit,
-            Inner::V2(own) => own.component.time_limit = limit,
+            Inner::V1(fmu) => fmu.component.time_limit = limit,
+            Inner::V2(fmu) => fmu.component.time_limit = limit,
             Inner::V3(_) => {}
         }
     }
@@ -52,139 +52,139 @@ impl Instance {
 impl Slave for Instance {
     fn description(&self) -> &ModelDescription {
         match &self.inner {
-            Inner::V1(own) => own.description(),
+            Inner::V1(instance) => instance.description(),
             Inner::V2(_) => self.fmu.description(),
-            Inner::V3(own) => own.description(),
+            Inner::V3(instance) => instance.description(),
         }
     }
 
     fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.component.set_debug_logging(on),
-            Inner::V2(own) => own.component.set_debug_logging(on),
-            Inner::V3(own) => own.set_debug_logging(on),
+            Inner::V1(instance) => instance.component.set_debug_logging(on),
+            Inner::V2(instance) => instance.component.set_debug_logging(on),
+            Inner::V3(instance) => instance.set_debug_logging(on),
         }
     }
 
     fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V3(own) => own.configure(self.fmu.description(), references, values),
+            Inner::V3(instance) => instance.configure(self.fmu.description(), references, values),
             _ => Err(absent("fmi3EnterConfigurationMode")),
         }
     }
 
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.setup_experiment(experiment),
-            Inner::V2(own) => return own.component.setup_experiment(experiment),
-            Inner::V3(own) => own.setup_experiment(experiment),
+            Inner::V1(instance) => instance.setup_experiment(experiment),
+            Inner::V2(instance) => return instance.component.setup_experiment(experiment),
+            Inner::V3(instance) => instance.setup_experiment(experiment),
         }
         Ok(())
     }
 
     fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.enter_initialization_mode(),
-            Inner::V2(own) => own.component.enter_initialization_mode(),
-            Inner::V3(own) => own.enter_initialization_mode(),
+            Inner::V1(instance) => instance.enter_initialization_mode(),
+            Inner::V2(instance) => instance.component.enter_initialization_mode(),
+            Inner::V3(instance) => instance.enter_initialization_mode(),
         }
     }
 
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => {
-                own.exit_initialization_mode();
+            Inner::V1(instance) => {
+                instance.exit_initialization_mode();
                 Ok(())
             }
-            Inner::V2(own) => own.component.exit_initialization_mode(),
-            Inner::V3(own) => own.exit_initialization_mode(),
+            Inner::V2(instance) => instance.component.exit_initialization_mode(),
+            Inner::V3(instance) => instance.exit_initialization_mode(),
         }
     }
 
     fn terminate(&mut self) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.component.terminate(),
-            Inner::V2(own) => own.component.terminate(),
-            Inner::V3(own) => own.terminate(),
+            Inner::V1(instance) => instance.component.terminate(),
+            Inner::V2(instance) => instance.component.terminate(),
+            Inner::V3(instance) => instance.terminate(),
         }
     }
 
     #[inline]
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.get_real(references, values),
-            Inner::V2(own) => own.component.get_real(references, values),
-            Inner::V3(own) => own.get_real(references, values),
+            Inner::V1(instance) => instance.get_real(references, values),
+            Inner::V2(instance) => instance.component.get_real(references, values),
+            Inner::V3(instance) => instance.get_real(references, values),
         }
     }
 
     #[inline]
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.set_real(references, values),
-            Inner::V2(own) => own.component.set_real(references, values),
-            Inner::V3(own) => own.set_real(references, values),
+            Inner::V1(instance) => instance.set_real(references, values),
+            Inner::V2(instance) => instance.component.set_real(references, values),
+            Inner::V3(instance) => instance.set_real(references, values),
         }
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.get_integer(references, values),
-            Inner::V2(own) => own.get_integer(references, values),
-            Inner::V3(own) => own.get_integer(references, values),
+            Inner::V1(instance) => instance.get_integer(references, values),
+            Inner::V2(instance) => instance.get_integer(references, values),
+            Inner::V3(instance) => instance.get_integer(references, values),
         }
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.set_integer(references, values),
-            Inner::V2(own) => own.set_integer(references, values),
-            Inner::V3(own) => own.set_integer(references, values),
+            Inner::V1(instance) => instance.set_integer(references, values),
+            Inner::V2(instance) => instance.set_integer(references, values),
+            Inner::V3(instance) => instance.set_integer(references, values),
         }
     }
 
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.get_boolean(references, values),
-            Inner::V2(own) => own.component.get_boolean(references, values),
-            Inner::V3(own) => own.get_boolean(references, values),
+            Inner::V1(instance) => instance.get_boolean(references, values),
+            Inner::V2(instance) => instance.component.get_boolean(references, values),
+            Inner::V3(instance) => instance.get_boolean(references, values),
         }
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.set_boolean(references, values),
-            Inner::V2(own) => own.component.set_boolean(references, values),
-            Inner::V3(own) => own.set_boolean(references, values),
+            Inner::V1(instance) => instance.set_boolean(references, values),
+            Inner::V2(instance) => instance.component.set_boolean(references, values),
+            Inner::V3(instance) => instance.set_boolean(references, values),
         }
     }
 
     fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.component.get_string(references, values),
-            Inner::V2(own) => own.component.get_string(references, values),
-            Inner::V3(own) => own.get_string(references, values),
+            Inner::V1(instance) => instance.component.get_string(references, values),
+            Inner::V2(instance) => instance.component.get_string(references, values),
+            Inner::V3(instance) => instance.get_string(references, values),
         }
     }
 
     fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.set_string(references, values),
-            Inner::V2(own) => own.component.set_string(references, values),
-            Inner::V3(own) => own.set_string(references, values),
+            Inner::V1(instance) => instance.set_string(references, values),
+            Inner::V2(instance) => instance.component.set_string(references, values),
+            Inner::V3(instance) => instance.set_string(references, values),
         }
     }
 
     fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V3(own) => own.get_binary(references, values),
+            Inner::V3(instance) => instance.get_binary(references, values),
             _ => Err(absent("fmi3GetBinary")),
         }
     }
 
     fn set_binary(&mut self, references: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V3(own) => own.set_binary(references, values),
+            Inner::V3(instance) => instance.set_binary(references, values),
             _ => Err(absent("fmi3SetBinary")),
         }
     }
@@ -196,9 +196,13 @@ impl Slave for Instance {
         values: &[f64],
     ) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.component.set_input_derivatives(references, orders, values),
-            Inner::V2(own) => own.component.set_real_input_derivatives(references, orders, values),
-            Inner::V3(own) => own.set_input_derivatives(references, orders, values),
+            Inner::V1(instance) => {
+                instance.component.set_input_derivatives(references, orders, values)
+            }
+            Inner::V2(instance) => {
+                instance.component.set_real_input_derivatives(references, orders, values)
+            }
+            Inner::V3(instance) => instance.set_input_derivatives(references, orders, values),
         }
     }
 
@@ -209,18 +213,22 @@ impl Slave for Instance {
         values: &mut [f64],
     ) -> Result<(), CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.component.get_output_derivatives(references, orders, values),
-            Inner::V2(own) => own.component.get_real_output_derivatives(references, orders, values),
-            Inner::V3(own) => own.get_output_derivatives(references, orders, values),
+            Inner::V1(instance) => {
+                instance.component.get_output_derivatives(references, orders, values)
+            }
+            Inner::V2(instance) => {
+                instance.component.get_real_output_derivatives(references, orders, values)
+            }
+            Inner::V3(instance) => instance.get_output_derivatives(references, orders, values),
         }
     }
 
     #[inline]
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
         match &mut self.inner {
-            Inner::V1(own) => own.component.do_step(time, size),
-            Inner::V2(own) => own.component.do_step(time, size, never_back),
-            Inner::V3(own) => own.do_step(time, size, never_back),
+            Inner::V1(instance) => instance.component.do_step(time, size),
+            Inner::V2(instance) => instance.component.do_step(time, size, never_back),
+            Inner::V3(instance) => instance.do_step(time, size, never_back),
         }
     }
 
@@ -233,40 +241,42 @@ impl Slave for Instance {
     ) -> Result<(), CallError> {
         match &mut self.inner {
             Inner::V1(_) => Err(absent("fmi2GetDirectionalDerivative")),
-            Inner::V2(own) => own.component.directional_derivative(unknowns, knowns, seed, changes),
-            Inner::V3(own) => own.directional_derivative(unknowns, knowns, seed, changes),
+            Inner::V2(instance) => {
+                instance.component.directional_derivative(unknowns, knowns, seed, changes)
+            }
+            Inner::V3(instance) => instance.directional_derivative(unknowns, knowns, seed, changes),
         }
     }
 
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
         match &mut self.inner {
             Inner::V1(_) => Err(absent("fmi2GetFMUstate")),
-            Inner::V2(own) => own.component.save_state(slot),
-            Inner::V3(own) => own.save_state(slot),
+            Inner::V2(instance) => instance.component.save_state(slot),
+            Inner::V3(instance) => instance.save_state(slot),
         }
     }
 
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
         match &mut self.inner {
             Inner::V1(_) => Err(absent("fmi2SetFMUstate")),
-            Inner::V2(own) => own.component.restore_state(slot),
-            Inner::V3(own) => own.restore_state(slot),
+            Inner::V2(instance) => instance.component.restore_state(slot),
+            Inner::V3(instance) => instance.restore_state(slot),
         }
     }
 
     fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         match &mut self.inner {
             Inner::V1(_) => Err(absent("fmi2SerializeFMUstate")),
-            Inner::V2(own) => own.component.serialize_state(),
-            Inner::V3(own) => own.serialize_state(),
+            Inner::V2(instance) => instance.component.serialize_state(),
+            Inner::V3(instance) => instance.serialize_state(),
         }
     }
 
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         match &mut self.inner {
             Inner::V1(_) => Err(absent("fmi2DeSerializeFMUstate")),
-            Inner::V2(own) => own.component.deserialize_state(bytes),
-            Inner::V3(own) => own.deserialize_state(bytes),
+            Inner::V2(instance) => instance.component.deserialize_state(bytes),
+            Inner::V3(instance) => instance.deserialize_state(bytes),
         }
     }
 
@@ -279,8 +289,8 @@ impl Slave for Instance {
         outputs: &[u32],
         results: &mut [f64],
     ) -> Result<StepResult, CallError> {
-        if let Inner::V2(own) = &mut self.inner {
-            return own.component.pass(inputs, values, step, outputs, results);
+        if let Inner::V2(instance) = &mut self.inner {
+            return instance.component.pass(inputs, values, step, outputs, results);
         }
         if !inputs.is_empty() {
             self.set_real(inputs, values)?;
@@ -293,18 +303,22 @@ impl Slave for Instance {
     }
 
     fn hand_over_events(&mut self, stop: bool) -> Result<bool, CallError> {
-        Ok(if let Inner::V3(own) = &mut self.inner { own.hand_over_events(stop) } else { false })
+        Ok(if let Inner::V3(instance) = &mut self.inner {
+            instance.hand_over_events(stop)
+        } else {
+            false
+        })
     }
 
     fn events(&mut self) -> Option<&mut dyn Events> {
-        if let Inner::V3(own) = &mut self.inner { Some(own.as_mut()) } else { None }
+        if let Inner::V3(instance) = &mut self.inner { Some(instance.as_mut()) } else { None }
     }
 
     fn log_calls(&mut self, sink: CallSink) -> bool {
         match &mut self.inner {
             Inner::V1(_) | Inner::V2(_) => false,
-            Inner::V3(own) => {
-                own.log_calls(sink);
+            Inner::V3(instance) => {
+                instance.log_calls(sink);
                 true
             }
         }
@@ -312,17 +326,17 @@ impl Slave for Instance {
 
     fn guard_arrays(&mut self) {
         match &mut self.inner {
-            Inner::V1(own) => own.component.guard_arrays(),
-            Inner::V2(own) => own.component.guard_arrays(),
-            Inner::V3(own) => own.guard_arrays(),
+            Inner::V1(instance) => instance.component.guard_arrays(),
+            Inner::V2(instance) => instance.component.guard_arrays(),
+            Inner::V3(instance) => instance.guard_arrays(),
         }
     }
 
     fn take_warning(&mut self) -> bool {
         match &mut self.inner {
-            Inner::V1(own) => own.component.take_warning(),
-            Inner::V2(own) => own.component.take_warning(),
-            Inner::V3(own) => own.take_warning(),
+            Inner::V1(instance) => instance.component.take_warning(),
+            Inner::V2(instance) => instance.component.take_warning(),
+            Inner::V3(instance) => instance.take_warning(),
         }
     }
 }

@@ -251,12 +251,12 @@ impl Package {
     /// [`IsolateError`] if the FMU lacks the interface, if no worker can be started, or if the FMU does
     /// not load, does not instantiate or ends its process.
     pub fn instantiate(&self, name: &str, options: &Options) -> Result<Isolated, IsolateError> {
-        let (own, path) = (self.description(), self.path.clone());
+        let (description, path) = (self.description(), self.path.clone());
         match options.integration {
-            None if own.stepped().is_none() => {
+            None if description.stepped().is_none() => {
                 return Err(IsolateError::NoCoSimulation { path });
             }
-            Some(_) if own.model_exchange.is_none() => {
+            Some(_) if description.model_exchange.is_none() => {
                 return Err(IsolateError::NoModelExchange { path });
             }
             _ => {}

@@ -129,12 +129,12 @@ impl Library {
         let version = functions
             .get_version
             .and_then(|function| unsafe { function().as_ref().map(|text| CStr::from_ptr(text)) });
-        let found = version.map(CStr::to_string_lossy).unwrap_or_default();
-        if functions.get_version.is_some() && !found.starts_with("2.") {
+        let version = version.map(CStr::to_string_lossy).unwrap_or_default();
+        if functions.get_version.is_some() && !version.starts_with("2.") {
             return Err(LoadError::Version {
                 path: path.to_owned(),
                 function: "fmi2GetVersion",
-                found: found.into_owned(),
+                found: version.into_owned(),
                 expected: "2.0",
             });
         }

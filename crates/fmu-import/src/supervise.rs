@@ -314,6 +314,6 @@ pub(crate) fn signal_name(signal: i32) -> &'static str {
         (Signal::IO, "SIGIO"),
         (Signal::SYS, "SIGSYS"),
     ];
-    let found = known.iter().find(|(known, _)| known.as_raw() == signal);
-    found.map_or("no common one", |(_, name)| name)
+    let entry = known.iter().find(|(known, _)| known.as_raw() == signal);
+    entry.map_or("no common one", |(_, name)| name)
 }

@@ -48,19 +48,20 @@ fn key(kind: ValueType) -> u8 {
 }
 
 /// Returns the description of an instance, in which negated aliases have value references of their own.
-pub(crate) fn scalar_description(own: &ModelDescription) -> ModelDescription {
-    let mut description = own.clone();
-    separate_negated(&mut description);
-    description
+pub(crate) fn scalar_description(description: &ModelDescription) -> ModelDescription {
+    let mut scalars = description.clone();
+    separate_negated(&mut scalars);
+    scalars
 }
 
 /// Gives the negated aliases of `description` value references that no variable has; returns each with
 /// that of the FMU.
 fn separate_negated(description: &mut ModelDescription) -> HashMap<u32, u32> {
-    let used: HashSet<u32> = description.variables.iter().map(|own| own.value_reference).collect();
+    let used: HashSet<u32> =
+        description.variables.iter().map(|variable| variable.value_reference).collect();
     let mut free = (0..=u32::MAX).rev().filter(|reference| !used.contains(reference));
     let mut negated = HashMap::new();
-    for variable in description.variables.iter_mut().filter(|own| own.negated) {
+    for variable in description.variables.iter_mut().filter(|variable| variable.negated) {
         if let Some(reference) = free.next() {
             negated.insert(reference, variable.value_reference);
             variable.value_reference = reference;
@@ -77,8 +78,10 @@ impl Instance {
     ) -> Self {
         let mut description = description.clone();
         let negated = separate_negated(&mut description);
-        let inputs = description.variables.iter().filter(|own| own.causality == Causality::Input);
-        let inputs = inputs.map(|own| (key(ValueType::of(&own.kind)), own.value_reference));
+        let inputs =
+            description.variables.iter().filter(|variable| variable.causality == Causality::Input);
+        let inputs =
+            inputs.map(|variable| (key(ValueType::of(&variable.kind)), variable.value_reference));
         Self {
             component,
             experiment: Experiment { start_time: 0.0, stop_time: None, tolerance: None },
@@ -99,7 +102,8 @@ impl Instance {
     /// The master repeats settings there; the FMU has them already.
     fn takes(&mut self, kind: ValueType, references: &[u32]) -> bool {
         self.initialized = None;
-        !self.settled || references.iter().all(|own| self.inputs.contains(&(key(kind), *own)))
+        !self.settled
+            || references.iter().all(|reference| self.inputs.contains(&(key(kind), *reference)))
     }
 
     pub(crate) fn setup_experiment(&mut self, experiment: &Experiment) {
@@ -130,12 +134,15 @@ impl Instance {
 
     /// Stores the value references of the FMU for a list, if they differ.
     fn translate(&mut self, list: &[u32]) -> bool {
-        if self.negated.is_empty() || !list.iter().any(|own| self.negated.contains_key(own)) {
+        if self.negated.is_empty()
+            || !list.iter().any(|reference| self.negated.contains_key(reference))
+        {
             return false;
         }
         self.references.clear();
         let negated = &self.negated;
-        self.references.extend(list.iter().map(|own| negated.get(own).unwrap_or(own)));
+        self.references
+            .extend(list.iter().map(|reference| negated.get(reference).unwrap_or(reference)));
         true
     }
 
@@ -144,7 +151,9 @@ impl Instance {
             return self.component.get_real(list, values);
         }
         self.component.get_real(&self.references, values)?;
-        for (value, _) in values.iter_mut().zip(list).filter(|(_, own)| self.is_negated(**own)) {
+        for (value, _) in
+            values.iter_mut().zip(list).filter(|(_, reference)| self.is_negated(**reference))
+        {
             *value = -*value;
         }
         Ok(())
@@ -162,8 +171,8 @@ impl Instance {
             return self.component.set_real(list, values);
         }
         self.reals.clear();
-        for (value, own) in values.iter().zip(list) {
-            self.reals.push(if self.negated.contains_key(own) { -value } else { *value });
+        for (value, reference) in values.iter().zip(list) {
+            self.reals.push(if self.negated.contains_key(reference) { -value } else { *value });
         }
         self.component.set_real(&self.references, &self.reals)
     }
@@ -178,9 +187,9 @@ impl Instance {
         let translated = self.translate(references);
         let list = if translated { &self.references } else { references };
         self.component.get_integer(list, &mut self.integers)?;
-        for ((value, own), reference) in values.iter_mut().zip(&self.integers).zip(references) {
-            let own = i64::from(*own);
-            *value = if translated && self.is_negated(*reference) { -own } else { own };
+        for ((value, integer), reference) in values.iter_mut().zip(&self.integers).zip(references) {
+            let integer = i64::from(*integer);
+            *value = if translated && self.is_negated(*reference) { -integer } else { integer };
         }
         Ok(())
     }
@@ -211,8 +220,8 @@ impl Instance {
         self.booleans.clear();
         self.booleans.resize(references.len(), 0);
         self.component.get_boolean(references, &mut self.booleans)?;
-        for (value, own) in values.iter_mut().zip(&self.booleans) {
-            *value = i32::from(*own != 0);
+        for (value, boolean) in values.iter_mut().zip(&self.booleans) {
+            *value = i32::from(*boolean != 0);
         }
         Ok(())
     }

@@ -35,8 +35,8 @@ impl Instance {
         self.integers.clear();
         self.integers.resize(references.len(), 0);
         self.component.get_integer(references, &mut self.integers)?;
-        for (value, own) in values.iter_mut().zip(&self.integers) {
-            *value = (*own).into();
+        for (value, integer) in values.iter_mut().zip(&self.integers) {
+            *value = (*integer).into();
         }
         Ok(())
     }

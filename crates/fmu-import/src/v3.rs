@@ -66,7 +66,7 @@ impl Instance {
     /// has one.
     pub(crate) fn new(
         library: &Arc<Library>,
-        own: &ModelDescription,
+        description: &ModelDescription,
         interface: Interface,
         name: &str,
         resources: Option<&str>,
@@ -74,18 +74,19 @@ impl Instance {
         let flags = match interface {
             Interface::ModelExchange => CoSimulation::default(),
             Interface::CoSimulation | Interface::ScheduledExecution => {
-                own.stepped().unwrap_or_default()
+                description.stepped().unwrap_or_default()
             }
         };
         let sizes = HashMap::new();
-        let view = ElementView::new(own, &sizes)
-            .map_err(|reason| LoadError::Unsupported { model: own.model_name.clone(), reason })?;
-        let followed = view.variables.iter().filter(|own| own.intermediate);
-        let intermediate: Vec<u32> = followed.map(|own| own.reference).collect();
+        let view = ElementView::new(description, &sizes).map_err(|reason| {
+            LoadError::Unsupported { model: description.model_name.clone(), reason }
+        })?;
+        let followed = view.variables.iter().filter(|variable| variable.intermediate);
+        let intermediate: Vec<u32> = followed.map(|variable| variable.reference).collect();
         let with = Instantiation {
             interface,
             name,
-            token: &own.guid,
+            token: &description.guid,
             resources,
             event_mode: flags.has_event_mode,
             early_return: flags.has_event_mode || flags.might_return_early_from_do_step,
@@ -106,15 +107,19 @@ impl Instance {
             }
             Err(error) => return Err(error),
         };
-        let known = |name: &&str| own.log_categories.iter().any(|own| own.name == *name);
+        let known =
+            |name: &&str| description.log_categories.iter().any(|category| category.name == *name);
         let categories: Vec<&str> = STATUS_CATEGORIES.into_iter().filter(known).collect();
         let mut component = component;
         if !categories.is_empty() {
             // An FMU that refuses this is one without messages.
             let _ = component.set_debug_logging(true, &categories);
         }
-        let state =
-            State { held: vec![None; view.shadows], clocks: Clocks::new(own), ..State::default() };
+        let state = State {
+            held: vec![None; view.shadows],
+            clocks: Clocks::new(description),
+            ..State::default()
+        };
         let experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };
         let (plans, slots, clocked) = (Plans::default(), Vec::new(), ClockedRuns::new(&view));
         Ok(Self {
@@ -141,7 +146,7 @@ impl Instance {
     /// Sets structural parameters in Configuration Mode; arrays of `own` change their sizes.
     pub(crate) fn configure(
         &mut self,
-        own: &ModelDescription,
+        description: &ModelDescription,
         references: &[u32],
         values: &[i64],
     ) -> Result<(), CallError> {
@@ -152,7 +157,7 @@ impl Instance {
                 sizes.insert(*reference, value);
             }
         }
-        let view = ElementView::new(own, &sizes)
+        let view = ElementView::new(description, &sizes)
             .map_err(|reason| refused(NAME, format!("was not called: {reason}")))?;
         self.component.enter_configuration_mode()?;
         let set = self.write("fmi3SetUInt64", references, values, Buffer::put_integer);
@@ -239,8 +244,8 @@ impl Instance {
         list: &[u32],
         values: &mut [String],
     ) -> Result<(), CallError> {
-        self.read_list("fmi3GetString", list, values, |own, references, values| {
-            own.component.get_string(references, values)
+        self.read_list("fmi3GetString", list, values, |instance, references, values| {
+            instance.component.get_string(references, values)
         })
     }
 
@@ -249,8 +254,8 @@ impl Instance {
             "fmi3SetString",
             list,
             values,
-            |own, references, values| own.component.get_string(references, values),
-            |own, references, values| own.component.set_string(references, values),
+            |instance, references, values| instance.component.get_string(references, values),
+            |instance, references, values| instance.component.set_string(references, values),
         )
     }
 
@@ -259,8 +264,8 @@ impl Instance {
         list: &[u32],
         values: &mut [Vec<u8>],
     ) -> Result<(), CallError> {
-        self.read_list("fmi3GetBinary", list, values, |own, references, values| {
-            own.component.get_binary(references, values)
+        self.read_list("fmi3GetBinary", list, values, |instance, references, values| {
+            instance.component.get_binary(references, values)
         })
     }
 
@@ -269,8 +274,8 @@ impl Instance {
             "fmi3SetBinary",
             list,
             values,
-            |own, references, values| own.component.get_binary(references, values),
-            |own, references, values| own.component.set_binary(references, values),
+            |instance, references, values| instance.component.get_binary(references, values),
+            |instance, references, values| instance.component.set_binary(references, values),
         )
     }
 

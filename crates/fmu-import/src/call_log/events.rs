@@ -17,7 +17,7 @@ impl<S: Slave + ?Sized> Events for LoggedSlave<S> {
 
     fn enter_event_mode(&mut self) -> Result<(), CallError> {
         let call = |slave: &mut S| events(slave)?.enter_event_mode();
-        self.plain("fmi2EnterEventMode", String::new(), call)
+        self.plain("fmi2EnterEventMode", "", call)
     }
 
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
@@ -26,7 +26,7 @@ impl<S: Slave + ?Sized> Events for LoggedSlave<S> {
             _ => "fmi2NewDiscreteStates",
         };
         let call = |slave: &mut S| events(slave)?.update_discrete_states();
-        self.call((function, String::new()), call, |info| format!(" {info:?}"))
+        self.call(function, "", call, |info| format!(" {info:?}"))
     }
 
     fn leave_event_mode(&mut self) -> Result<(), CallError> {
@@ -35,6 +35,6 @@ impl<S: Slave + ?Sized> Events for LoggedSlave<S> {
             _ => "fmi2EnterContinuousTimeMode",
         };
         let call = |slave: &mut S| events(slave)?.leave_event_mode();
-        self.plain(function, String::new(), call)
+        self.plain(function, "", call)
     }
 }

@@ -25,12 +25,12 @@ impl ModelExchange for LoggedSlave<Equations> {
     }
 
     fn set_time(&mut self, time: f64) -> Result<(), CallError> {
-        self.plain("fmi2SetTime", format!("{time:?}"), |slave| slave.set_time(time))
+        self.plain("fmi2SetTime", &format!("{time:?}"), |slave| slave.set_time(time))
     }
 
     fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), CallError> {
         let call = |slave: &mut Equations| slave.set_continuous_states(states);
-        self.call(("fmi2SetContinuousStates", format!("{states:?}")), call, |()| String::new())
+        self.call("fmi2SetContinuousStates", &format!("{states:?}"), call, |()| String::new())
     }
 
     fn get_continuous_states(&mut self, states: &mut [f64]) -> Result<(), CallError> {
@@ -53,7 +53,7 @@ impl ModelExchange for LoggedSlave<Equations> {
 
     fn completed_integrator_step(&mut self, never_back: bool) -> Result<CompletedStep, CallError> {
         let call = |slave: &mut Equations| slave.completed_integrator_step(never_back);
-        self.call(("fmi2CompletedIntegratorStep", never_back.to_string()), call, |done| {
+        self.call("fmi2CompletedIntegratorStep", &never_back.to_string(), call, |done| {
             let CompletedStep { enter_event_mode, terminate_simulation } = done;
             format!(
                 " enterEventMode {enter_event_mode}, terminateSimulation {terminate_simulation}"
@@ -62,18 +62,18 @@ impl ModelExchange for LoggedSlave<Equations> {
     }
 
     fn enter_event_mode(&mut self) -> Result<(), CallError> {
-        self.plain("fmi2EnterEventMode", String::new(), Equations::enter_event_mode)
+        self.plain("fmi2EnterEventMode", "", Equations::enter_event_mode)
     }
 
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         let call = |slave: &mut Equations| slave.update_discrete_states();
         let results = |info: &EventInfo| format!(" {info:?}");
-        self.call(("fmi2NewDiscreteStates", String::new()), call, results)
+        self.call("fmi2NewDiscreteStates", "", call, results)
     }
 
     fn enter_continuous_time_mode(&mut self) -> Result<(), CallError> {
         let call = |slave: &mut Equations| slave.enter_continuous_time_mode();
-        self.call(("fmi2EnterContinuousTimeMode", String::new()), call, |()| String::new())
+        self.call("fmi2EnterContinuousTimeMode", "", call, |()| String::new())
     }
 }
 
@@ -89,6 +89,6 @@ impl LoggedSlave<Equations> {
             let done = get(slave, values);
             done.map(|()| format!(" {values:?}"))
         };
-        self.call((function, String::new()), call, String::clone).map(|_| ())
+        self.call(function, "", call, String::clone).map(|_| ())
     }
 }

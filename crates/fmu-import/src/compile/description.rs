@@ -32,7 +32,7 @@ impl SourceFileSet {
     pub(super) fn is_cpp(&self) -> bool {
         let is_cpp = |file: &String| {
             let extension = Path::new(file).extension().unwrap_or_default();
-            ["cpp", "cc", "cxx"].iter().any(|own| extension.eq_ignore_ascii_case(own))
+            ["cpp", "cc", "cxx"].iter().any(|known| extension.eq_ignore_ascii_case(known))
         };
         match &self.language {
             Some(language) => language.starts_with("C++"),
@@ -52,7 +52,7 @@ impl SourceFileSet {
 /// Whether a stated file is no header, which is only included.
 fn is_source(path: &String) -> bool {
     let extension = Path::new(path).extension().unwrap_or_default();
-    !["h", "hh", "hpp", "hxx", "inc"].iter().any(|own| extension.eq_ignore_ascii_case(own))
+    !["h", "hh", "hpp", "hxx", "inc"].iter().any(|known| extension.eq_ignore_ascii_case(known))
 }
 
 /// Reads how the libraries of the FMU in `folder` are built; returns what is missing or wrong.
@@ -63,9 +63,9 @@ pub(super) fn read(folder: &Path) -> Result<Vec<BuildConfiguration>, String> {
         children(&root, "BuildConfiguration").map(configuration).collect::<Result<Vec<_>, _>>()?
     } else {
         let root = root(&folder.join(DESCRIPTION))?;
-        let interfaces = root.children.iter().filter(|own| {
-            ["CoSimulation", "ModelExchange"].contains(&own.name.as_str())
-                && children(own, "SourceFiles").next().is_some()
+        let interfaces = root.children.iter().filter(|child| {
+            ["CoSimulation", "ModelExchange"].contains(&child.name.as_str())
+                && children(child, "SourceFiles").next().is_some()
         });
         interfaces.map(source_files).collect::<Result<Vec<_>, _>>()?
     };
@@ -86,12 +86,12 @@ fn root(file: &Path) -> Result<Element, String> {
 }
 
 fn children<'a>(element: &'a Element, name: &'a str) -> impl Iterator<Item = &'a Element> {
-    element.children.iter().filter(move |own| own.name == name)
+    element.children.iter().filter(move |child| child.name == name)
 }
 
 fn attribute(element: &Element, name: &str) -> Option<String> {
-    let found = element.attributes.iter().find(|(own, _)| own == name);
-    found.map(|(_, value)| value.clone())
+    let attribute = element.attributes.iter().find(|(known, _)| known == name);
+    attribute.map(|(_, value)| value.clone())
 }
 
 /// Returns the attribute `name`, a path below `sources`.
@@ -99,7 +99,7 @@ fn path(element: &Element) -> Result<String, String> {
     let path = attribute(element, "name").unwrap_or_default();
     let mut parts = Path::new(&path).components();
     let is_inside = !path.is_empty()
-        && parts.all(|own| matches!(own, Component::Normal(_) | Component::CurDir));
+        && parts.all(|component| matches!(component, Component::Normal(_) | Component::CurDir));
     let expected = "expected the path of a file or folder below sources";
     is_inside.then_some(path.clone()).ok_or(format!("{}: found {path:?}, {expected}", element.name))
 }
@@ -111,24 +111,27 @@ fn sources<'a>(files: impl Iterator<Item = &'a Element>) -> Result<Vec<String>, 
 }
 
 fn configuration(element: &Element) -> Result<BuildConfiguration, String> {
-    let set = |own: &Element| -> Result<SourceFileSet, String> {
-        let definition = |own: &Element| {
-            Some((attribute(own, "name")?, attribute(own, "value").filter(|own| !own.is_empty())))
+    let set = |set: &Element| -> Result<SourceFileSet, String> {
+        let definition = |definition: &Element| {
+            Some((
+                attribute(definition, "name")?,
+                attribute(definition, "value").filter(|value| !value.is_empty()),
+            ))
         };
-        let is_used = |own: &&Element| attribute(own, "optional").as_deref() != Some("true");
+        let is_used = |child: &&Element| attribute(child, "optional").as_deref() != Some("true");
         Ok(SourceFileSet {
-            language: attribute(own, "language").filter(|own| !own.is_empty()),
-            files: sources(children(own, "SourceFile"))?,
-            definitions: children(own, "PreprocessorDefinition")
+            language: attribute(set, "language").filter(|language| !language.is_empty()),
+            files: sources(children(set, "SourceFile"))?,
+            definitions: children(set, "PreprocessorDefinition")
                 .filter(is_used)
                 .filter_map(definition)
                 .collect(),
-            include_folders: children(own, "IncludeDirectory")
+            include_folders: children(set, "IncludeDirectory")
                 .map(path)
                 .collect::<Result<_, _>>()?,
         })
     };
-    let libraries = children(element, "Library").filter_map(|own| attribute(own, "name"));
+    let libraries = children(element, "Library").filter_map(|library| attribute(library, "name"));
     Ok(BuildConfiguration {
         model_identifier: attribute(element, "modelIdentifier").unwrap_or_default(),
         sets: children(element, "SourceFileSet").map(set).collect::<Result<_, _>>()?,
@@ -138,7 +141,7 @@ fn configuration(element: &Element) -> Result<BuildConfiguration, String> {
 
 /// Returns the configuration of an interface of FMI 2.0.
 fn source_files(element: &Element) -> Result<BuildConfiguration, String> {
-    let files = children(element, "SourceFiles").flat_map(|own| children(own, "File"));
+    let files = children(element, "SourceFiles").flat_map(|list| children(list, "File"));
     let set = SourceFileSet { files: sources(files)?, ..SourceFileSet::default() };
     Ok(BuildConfiguration {
         model_identifier: attribute(element, "modelIdentifier").unwrap_or_default(),

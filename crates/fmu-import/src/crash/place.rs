@@ -89,7 +89,7 @@ impl fmt::Debug for Name {
 
 /// The current function and time of one instance. Entering and leaving a function cost a few stores.
 pub(crate) struct Slot {
-    taken: AtomicBool,
+    is_used: AtomicBool,
     /// The function that the instance executes; null between calls.
     function: AtomicPtr<&'static str>,
     /// Bits of the time of the instance, in s.
@@ -109,7 +109,7 @@ impl Place {
     /// Claims a slot for a new instance.
     pub(crate) fn new(instance: &str) -> Arc<Self> {
         let mut slots = RECORD.slots.iter();
-        let free = slots.position(|slot| !slot.taken.swap(true, Ordering::AcqRel));
+        let free = slots.position(|slot| !slot.is_used.swap(true, Ordering::AcqRel));
         let index = free.unwrap_or(SLOT_COUNT - 1);
         let slot = &RECORD.slots[index];
         RECORD.used.fetch_max(index + 1, Ordering::AcqRel);
@@ -154,7 +154,7 @@ impl Deref for Place {
 impl Slot {
     const fn new() -> Self {
         Self {
-            taken: AtomicBool::new(false),
+            is_used: AtomicBool::new(false),
             function: AtomicPtr::new(ptr::null_mut()),
             time: AtomicU64::new(0),
             name: [const { AtomicU8::new(0) }; NAME_LENGTH],
@@ -213,7 +213,7 @@ impl Slot {
 impl Drop for Place {
     fn drop(&mut self) {
         self.slot.leave();
-        self.slot.taken.store(false, Ordering::Release);
+        self.slot.is_used.store(false, Ordering::Release);
     }
 }
 
@@ -239,10 +239,10 @@ pub(super) fn instance(address: usize) -> Option<Name> {
 /// current calls of all instances. Does not allocate.
 pub(super) fn calls(address: usize) -> impl Iterator<Item = Call> {
     let slots = RECORD.used();
-    let own = slots.iter().find(|slot| slot.is_at(address) && slot.call().is_some());
+    let executing = slots.iter().find(|slot| slot.is_at(address) && slot.call().is_some());
     slots
         .iter()
-        .filter(move |slot| own.is_none_or(|own| ptr::eq(own, *slot)))
+        .filter(move |slot| executing.is_none_or(|executing| ptr::eq(executing, *slot)))
         .filter_map(Slot::call)
 }
 

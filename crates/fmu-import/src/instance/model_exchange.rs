@@ -66,11 +66,11 @@ impl Fmu {
 
 /// Calls a method of the instance in the version of its FMU.
 macro_rules! equations {
-    ($own:ident.$method:ident($($argument:expr),*)) => {
-        match &mut $own.inner {
-            Inner::V2(own) => own.component.$method($($argument),*),
-            Inner::V3(own) => own.$method($($argument),*),
-            Inner::V1(own) => own.$method($($argument),*),
+    ($equations:ident.$method:ident($($argument:expr),*)) => {
+        match &mut $equations.inner {
+            Inner::V2(instance) => instance.component.$method($($argument),*),
+            Inner::V3(instance) => instance.$method($($argument),*),
+            Inner::V1(instance) => instance.$method($($argument),*),
         }
     };
 }
@@ -78,18 +78,18 @@ macro_rules! equations {
 impl ModelExchange for Instance {
     fn number_of_continuous_states(&mut self) -> Result<usize, CallError> {
         match &mut self.inner {
-            Inner::V1(own) => {
-                let flags = own.description().model_exchange.as_ref();
+            Inner::V1(instance) => {
+                let flags = instance.description().model_exchange.as_ref();
                 Ok(flags.map_or(0, |flags| flags.number_of_continuous_states as usize))
             }
-            Inner::V3(own) => own.number_of_continuous_states(),
+            Inner::V3(instance) => instance.number_of_continuous_states(),
             Inner::V2(_) => Ok(self.fmu().description().structure.derivatives.len()),
         }
     }
 
     fn number_of_event_indicators(&mut self) -> Result<usize, CallError> {
-        if let Inner::V3(own) = &mut self.inner {
-            return own.number_of_event_indicators();
+        if let Inner::V3(instance) = &mut self.inner {
+            return instance.number_of_event_indicators();
         }
         let count = self.fmu().description().number_of_event_indicators.unwrap_or(0);
         check_number(count as usize).map_err(|failure| {
@@ -99,8 +99,8 @@ impl ModelExchange for Instance {
     }
 
     fn begin_communication_step(&mut self) {
-        if let Inner::V3(own) = &mut self.inner {
-            own.begin_communication_step();
+        if let Inner::V3(instance) = &mut self.inner {
+            instance.begin_communication_step();
         }
     }
 

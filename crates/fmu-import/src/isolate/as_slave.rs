@@ -64,12 +64,12 @@ impl Isolated {
         request: &Request<'_>,
         values: &mut [T],
     ) -> Result<(), CallError> {
-        let found: Vec<T> = self.request(request)?;
-        if found.len() != values.len() {
+        let answers: Vec<T> = self.request(request)?;
+        if answers.len() != values.len() {
             return Err(self.invalid_answer(request.function()));
         }
-        for (value, found) in values.iter_mut().zip(found) {
-            *value = found;
+        for (value, answer) in values.iter_mut().zip(answers) {
+            *value = answer;
         }
         Ok(())
     }

@@ -78,12 +78,12 @@ impl Isolated {
             let instance = name.to_owned();
             move |source| IsolateError::System { what, instance, source }
         };
-        let own = &package.description;
-        let (version, sizes) = (own.version(), HashMap::new());
-        let describe = options.integration.as_ref().map(|own| own.describe);
-        let description = description_of_instance(own, &sizes, describe)
+        let stated = &package.description;
+        let (version, sizes) = (stated.version(), HashMap::new());
+        let describe = options.integration.as_ref().map(|integration| integration.describe);
+        let description = description_of_instance(stated, &sizes, describe)
             .map_err(|reason| IsolateError::Refused { instance: name.to_owned(), reason })?;
-        let count = description.as_ref().unwrap_or(own).variables.len();
+        let count = description.as_ref().unwrap_or(stated).variables.len();
         refuse_in_worker()?;
         let (shared, memory) =
             Shared::create(count).map_err(system("cannot create shared memory"))?;
@@ -156,7 +156,10 @@ impl Isolated {
             guard_arrays: options.guard_arrays,
             memory_limit: options.memory_limit.unwrap_or(0),
             preload: options.preload.iter().map(|library| library.as_bytes()).collect(),
-            integration: options.integration.as_ref().map(|own| own.options.as_str()),
+            integration: options
+                .integration
+                .as_ref()
+                .map(|integration| integration.options.as_str()),
         }))
     }
 
@@ -379,17 +382,17 @@ pub(super) type Describe = fn(&ModelDescription) -> ModelDescription;
 /// Returns the description of an instance if it differs from that of its FMU. On failure returns the
 /// reason.
 pub(super) fn description_of_instance(
-    own: &ModelDescription,
+    description: &ModelDescription,
     sizes: &HashMap<u32, u64>,
     describe: Option<Describe>,
 ) -> Result<Option<ModelDescription>, String> {
-    let scalar = match own.version() {
-        Version::V1 => Some(crate::v1::scalar_description(own)),
+    let scalar = match description.version() {
+        Version::V1 => Some(crate::v1::scalar_description(description)),
         Version::V2 => None,
-        Version::V3 => Some(crate::v3::ElementView::new(own, sizes)?.description),
+        Version::V3 => Some(crate::v3::ElementView::new(description, sizes)?.description),
     };
     Ok(match describe {
-        Some(describe) => Some(describe(scalar.as_ref().unwrap_or(own))),
+        Some(describe) => Some(describe(scalar.as_ref().unwrap_or(description))),
         None => scalar,
     })
 }

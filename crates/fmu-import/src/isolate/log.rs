@@ -209,7 +209,7 @@ pub(super) struct Inbox {
     dropped: u64,
     quota: Quota,
     /// The last messages since the last [`Inbox::take`].
-    kept: VecDeque<String>,
+    recent: VecDeque<String>,
 }
 
 impl Inbox {
@@ -247,10 +247,10 @@ impl Inbox {
             if self.quota.admits(&self.instance, message.text.len()) {
                 log_message(&self.instance, level, &message);
             }
-            if self.kept.len() == KEPT {
-                self.kept.pop_front();
+            if self.recent.len() == KEPT {
+                self.recent.pop_front();
             }
-            self.kept.push_back(message.text);
+            self.recent.push_back(message.text);
         }
         shared.log_tail().store(self.tail, Ordering::Release);
         let dropped = shared.log_dropped().load(Ordering::Relaxed);
@@ -282,7 +282,7 @@ impl Inbox {
 
     /// Returns and clears the kept messages.
     pub(super) fn take(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.kept).into()
+        std::mem::take(&mut self.recent).into()
     }
 
     /// Logs an error that has no caller to return to.
@@ -294,8 +294,8 @@ impl Inbox {
     /// Discards the kept messages, before a new call.
     #[inline]
     pub(super) fn clear(&mut self) {
-        if !self.kept.is_empty() {
-            self.kept.clear();
+        if !self.recent.is_empty() {
+            self.recent.clear();
         }
     }
 }
@@ -382,7 +382,7 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             shared.log_head().store(state >> (state >> 58), Ordering::Relaxed);
             inbox.drain(&shared);
-            assert!(inbox.kept.len() <= KEPT);
+            assert!(inbox.recent.len() <= KEPT);
             assert_eq!(shared.log_tail().load(Ordering::Relaxed), inbox.tail);
         }
     }

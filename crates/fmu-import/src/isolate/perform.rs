@@ -183,8 +183,8 @@ impl Executor {
                 let done = instance.get_string(&references, &mut values);
                 return reply(done.map(|()| values), answer);
             }
-            Request::GetOutputDerivatives(wanted) => {
-                let (references, orders): (Vec<_>, Vec<_>) = wanted.into_iter().unzip();
+            Request::GetOutputDerivatives(derivatives) => {
+                let (references, orders): (Vec<_>, Vec<_>) = derivatives.into_iter().unzip();
                 let mut values = vec![0.0; references.len()];
                 let done = instance.get_output_derivatives(&references, &orders, &mut values);
                 return reply(done.map(|()| values), answer);

@@ -132,8 +132,8 @@ fn serve(channel: &mut Channel, integrator: Option<Integrator>) -> Result<(), Wo
             WaitResult::TimedOut => continue,
             WaitResult::Closed => return Ok(()),
         }
-        let found = worker.shared.command().load(Ordering::Relaxed);
-        let function = Function::from_word(found).ok_or(WorkerError::Corrupted { found })?;
+        let word = worker.shared.command().load(Ordering::Relaxed);
+        let function = Function::from_word(word).ok_or(WorkerError::Corrupted { found: word })?;
         worker.perform(function);
         turn = turn.wrapping_add(2);
         channel.post(turn);

@@ -45,8 +45,8 @@ impl Sink {
 
     /// Returns and clears the kept messages.
     pub(super) fn take(&self) -> Vec<String> {
-        let kept = self.messages.lock().map(|mut kept| std::mem::take(&mut *kept));
-        kept.map(Vec::from).unwrap_or_default()
+        let messages = self.messages.lock().map(|mut messages| std::mem::take(&mut *messages));
+        messages.map(Vec::from).unwrap_or_default()
     }
 
     /// Logs a message and keeps it for the next error.
@@ -56,11 +56,11 @@ impl Sink {
             None => text.to_owned(),
         };
         log_message(self.place.instance(), Some(self.place.time()), status, category, &text);
-        if let Ok(mut kept) = self.messages.lock() {
-            if kept.len() == KEPT {
-                kept.pop_front();
+        if let Ok(mut messages) = self.messages.lock() {
+            if messages.len() == KEPT {
+                messages.pop_front();
             }
-            kept.push_back(text);
+            messages.push_back(text);
         }
     }
 }

@@ -17,11 +17,12 @@ impl Surroundings {
     /// Returns those of this process at present.
     pub(crate) fn now() -> Self {
         let folder = std::env::current_dir();
-        let folder = folder.map_or_else(|error| error.to_string(), |own| own.display().to_string());
+        let folder =
+            folder.map_or_else(|error| error.to_string(), |folder| folder.display().to_string());
         // SAFETY: with null the function only returns the name of the locale.
         let locale = unsafe { libc::setlocale(libc::LC_ALL, std::ptr::null()).as_ref() };
         // SAFETY: a terminated string, which lives until the locale changes.
-        let locale = locale.map(|own| unsafe { CStr::from_ptr(own) }.to_string_lossy());
+        let locale = locale.map(|name| unsafe { CStr::from_ptr(name) }.to_string_lossy());
         // SAFETY: no conditions.
         let group = unsafe { libc::getpgrp() };
         Self {
@@ -37,7 +38,8 @@ impl Surroundings {
 
     /// Returns what differs in `later`, a phrase each.
     pub(crate) fn changes(&self, later: &Self) -> Vec<String> {
-        let others = self.others.iter().zip(&later.others).filter(|(own, later)| own != later);
+        let others =
+            self.others.iter().zip(&later.others).filter(|(earlier, later)| earlier != later);
         let others = others
             .map(|((what, before), (_, after))| format!("the {what} from {before} to {after}"));
         let names = self.environment.keys().chain(later.environment.keys());

@@ -79,12 +79,12 @@ pub(super) unsafe fn replace(handle: *mut c_void) -> Vec<String> {
         return Vec::new();
     };
     // SAFETY: the dynamic section of a loaded library ends with a tag of 0.
-    let entry = |wanted: i64| unsafe {
+    let entry = |tag: i64| unsafe {
         let mut at = map.dynamic;
-        while (*at).tag != 0 && (*at).tag != wanted {
+        while (*at).tag != 0 && (*at).tag != tag {
             at = at.add(1);
         }
-        ((*at).tag == wanted).then(|| (*at).value)
+        ((*at).tag == tag).then(|| (*at).value)
     };
     // These processors' dynamic linker has replaced addresses in the file by addresses in memory.
     let (Some(table), Some(bytes), Some(DT_RELA)) =
@@ -108,7 +108,7 @@ pub(super) unsafe fn replace(handle: *mut c_void) -> Vec<String> {
             let number = (relocation.info >> 32) as usize;
             let symbol = &*symbols.add(number);
             // A function of a known version of a library is defined there.
-            let versioned = versions.is_some_and(|own| *own.add(number) & 0x7fff > 1);
+            let versioned = versions.is_some_and(|versions| *versions.add(number) & 0x7fff > 1);
             let open = symbol.section == 0 && symbol.info >> 4 == STB_GLOBAL && !versioned;
             if !open || relocation.info & 0xffff_ffff != JUMP_SLOT {
                 continue;

@@ -48,17 +48,17 @@ impl Instance {
         values: &mut [T],
         convert: fn(&Buffer, usize) -> Option<T>,
     ) -> Result<(), CallError> {
-        self.for_runs(function, list, |own, run| {
+        self.for_runs(function, list, |instance, run| {
             if run.kind == NativeType::Clock {
-                own.read_clocks(run)?;
-            } else if own.is_silent(run) {
-                own.recall(run);
+                instance.read_clocks(run)?;
+            } else if instance.is_silent(run) {
+                instance.recall(run);
             } else {
-                run.buffer.get(&mut own.component, &run.references)?;
+                run.buffer.get(&mut instance.component, &run.references)?;
             }
             for &(position, place) in &run.places {
                 let Some(value) = convert(&run.buffer, place) else {
-                    let (name, kind) = (own.view.name(list[position]), run.kind.name());
+                    let (name, kind) = (instance.view.name(list[position]), run.kind.name());
                     let what = format!(
                         "gives {name} a value of type {kind} that the importer cannot represent: it \
                          has 64 bits with a sign"
@@ -79,16 +79,16 @@ impl Instance {
         values: &[T],
         put: fn(&mut Buffer, usize, T) -> Option<()>,
     ) -> Result<(), CallError> {
-        self.for_runs(function, list, |own, run| {
-            let silent = own.is_silent(run);
+        self.for_runs(function, list, |instance, run| {
+            let silent = instance.is_silent(run);
             if run.partial && silent {
-                own.recall(run);
+                instance.recall(run);
             } else if run.partial && run.kind != NativeType::Clock {
-                run.buffer.get(&mut own.component, &run.references)?;
+                run.buffer.get(&mut instance.component, &run.references)?;
             }
             for &(position, place) in &run.places {
                 if put(&mut run.buffer, place, values[position]).is_none() {
-                    let (name, kind) = (own.view.name(list[position]), run.kind.name());
+                    let (name, kind) = (instance.view.name(list[position]), run.kind.name());
                     let value = values[position];
                     let what = format!(
                         "cannot take the value {value:?} for {name}, expected a value of type {kind}"
@@ -97,17 +97,17 @@ impl Instance {
                 }
             }
             if run.kind == NativeType::Clock {
-                return own.let_tick(function, run);
+                return instance.let_tick(function, run);
             }
             if !run.clocks.is_empty() {
-                own.remember(run);
+                instance.remember(run);
             }
             if silent {
                 // Set when one of its clocks ticks.
                 return Ok(());
             }
-            if own.may_set(run.event, &run.shadows, |place| run.buffer.bits(place))? {
-                run.buffer.set(&mut own.component, &run.references)?;
+            if instance.may_set(run.event, &run.shadows, |place| run.buffer.bits(place))? {
+                run.buffer.set(&mut instance.component, &run.references)?;
             }
             Ok(())
         })
@@ -121,19 +121,19 @@ impl Instance {
         values: &mut [T],
         get: Get<T>,
     ) -> Result<(), CallError> {
-        self.for_runs(function, list, |own, run| {
-            if own.is_silent(run) {
-                let all = own.recall_list(run);
+        self.for_runs(function, list, |instance, run| {
+            if instance.is_silent(run) {
+                let all = instance.recall_list(run);
                 for &(position, place) in &run.places {
                     values[position] = all[place].clone().unwrap_or_default();
                 }
                 return Ok(());
             }
             if run.direct {
-                return get(own, &run.references, values);
+                return get(instance, &run.references, values);
             }
             let mut all = vec![T::default(); run.shadows.len()];
-            get(own, &run.references, &mut all)?;
+            get(instance, &run.references, &mut all)?;
             for &(position, place) in &run.places {
                 values[position].clone_from(&all[place]);
             }
@@ -150,26 +150,26 @@ impl Instance {
         get: Get<T>,
         set: Set<T>,
     ) -> Result<(), CallError> {
-        self.for_runs(function, list, |own, run| {
-            let silent = own.is_silent(run);
+        self.for_runs(function, list, |instance, run| {
+            let silent = instance.is_silent(run);
             let mut all = vec![T::default(); run.shadows.len()];
             if run.partial && silent {
-                let known = own.recall_list(run).into_iter();
+                let known = instance.recall_list(run).into_iter();
                 all = known.map(Option::unwrap_or_default).collect();
             } else if run.partial {
-                get(own, &run.references, &mut all)?;
+                get(instance, &run.references, &mut all)?;
             }
             for &(position, place) in &run.places {
                 all[place].clone_from(&values[position]);
             }
             if !run.clocks.is_empty() {
-                own.remember_list(run, &all);
+                instance.remember_list(run, &all);
             }
             if silent {
                 return Ok(());
             }
-            if own.may_set(run.event, &run.shadows, |place| hash(&all[place]))? {
-                set(own, &run.references, &all)?;
+            if instance.may_set(run.event, &run.shadows, |place| hash(&all[place]))? {
+                set(instance, &run.references, &all)?;
             }
             Ok(())
         })

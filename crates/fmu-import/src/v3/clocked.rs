@@ -62,11 +62,12 @@ pub(super) struct ClockedRuns {
 
 impl ClockedRuns {
     pub(super) fn new(view: &ElementView) -> Self {
-        let clocked = || view.variables.iter().filter(|own| !own.clocks.is_empty());
-        let is_input = |own: &&super::elements::Variable| own.causality == Causality::Input;
-        let inputs = clocked().filter(is_input).flat_map(|own| Run::of_whole([own]));
+        let clocked = || view.variables.iter().filter(|variable| !variable.clocks.is_empty());
+        let is_input =
+            |variable: &&super::elements::Variable| variable.causality == Causality::Input;
+        let inputs = clocked().filter(is_input).flat_map(|variable| Run::of_whole([variable]));
         let inputs = inputs.collect();
-        Self { inputs, others: Run::of_whole(clocked().filter(|own| !is_input(own))) }
+        Self { inputs, others: Run::of_whole(clocked().filter(|variable| !is_input(variable))) }
     }
 }
 
@@ -147,7 +148,9 @@ impl Instance {
     pub(super) fn set_clocked(&mut self, clocks: &[u32]) -> Result<(), CallError> {
         let mut runs = std::mem::take(&mut self.clocked.inputs);
         let done = runs.iter_mut().try_for_each(|run| {
-            if run.kind == NativeType::Clock || !run.clocks.iter().any(|own| clocks.contains(own)) {
+            if run.kind == NativeType::Clock
+                || !run.clocks.iter().any(|clock| clocks.contains(clock))
+            {
                 return Ok(());
             }
             match run.kind {

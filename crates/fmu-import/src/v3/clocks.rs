@@ -150,9 +150,14 @@ impl Clocks {
     /// Determines the first ticks, in Initialization Mode.
     pub(super) fn start(&mut self, component: &mut Component, start: f64) -> Result<(), CallError> {
         for clock in &mut self.timed {
-            let own = &clock.attributes;
-            let stated = seconds(own.interval_decimal, own.interval_counter, own.resolution);
-            let shift = seconds(own.shift_decimal, own.shift_counter, own.resolution);
+            let attributes = &clock.attributes;
+            let stated = seconds(
+                attributes.interval_decimal,
+                attributes.interval_counter,
+                attributes.resolution,
+            );
+            let shift =
+                seconds(attributes.shift_decimal, attributes.shift_counter, attributes.resolution);
             if !clock.is_periodic() {
                 let (interval, qualifier) = component.get_interval(clock.reference)?;
                 clock.next = (qualifier == CHANGED).then_some(start + interval);
@@ -178,9 +183,12 @@ impl Clocks {
                 );
                 return Err(refused("fmi3GetIntervalDecimal", what));
             }
-            let counted = own.interval_counter.zip(own.resolution.filter(|own| *own > 0));
-            clock.fraction =
-                counted.filter(|_| own.interval_decimal.is_none()).or_else(|| fraction(interval));
+            let counted = attributes
+                .interval_counter
+                .zip(attributes.resolution.filter(|resolution| *resolution > 0));
+            clock.fraction = counted
+                .filter(|_| attributes.interval_decimal.is_none())
+                .or_else(|| fraction(interval));
             (clock.interval, clock.first, clock.ticks) = (interval, start + shift, 0);
             clock.next = Some(clock.first);
         }
@@ -346,9 +354,9 @@ impl Clocks {
 
     /// Restores a serialised state; nothing ticks now.
     pub(super) fn restore(&mut self, state: &ClocksState) {
-        for (clock, own) in self.timed.iter_mut().zip(&state.timed) {
-            clock.set_interval(own.interval);
-            (clock.first, clock.ticks, clock.next) = (own.first, own.ticks, own.next);
+        for (clock, saved) in self.timed.iter_mut().zip(&state.timed) {
+            clock.set_interval(saved.interval);
+            (clock.first, clock.ticks, clock.next) = (saved.first, saved.ticks, saved.next);
         }
         self.active.clear();
         self.partitions.clear();

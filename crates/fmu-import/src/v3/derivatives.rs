@@ -17,10 +17,10 @@ impl Instance {
     /// Whether the references are those of scalars of the FMU.
     fn are_scalars(&self, list: &[u32]) -> bool {
         list.iter().all(|reference| {
-            let found = self.view.locate(*reference);
-            found.is_some_and(|(variable, _)| {
-                let own = &self.view.variables[variable];
-                own.reference == *reference && own.size == 1
+            let place = self.view.locate(*reference);
+            place.is_some_and(|(position, _)| {
+                let variable = &self.view.variables[position];
+                variable.reference == *reference && variable.size == 1
             })
         })
     }
@@ -60,14 +60,14 @@ impl Instance {
             return self.component.directional_derivative(unknowns, knowns, seed, changes);
         }
         let (unknowns, knowns) = (self.whole(NAME, unknowns)?, self.whole(NAME, knowns)?);
-        let (mut seeds, mut found) = (vec![0.0; knowns.count], vec![0.0; unknowns.count]);
+        let (mut seeds, mut derivatives) = (vec![0.0; knowns.count], vec![0.0; unknowns.count]);
         for (place, value) in knowns.places.iter().zip(seed) {
             seeds[*place] += value;
         }
         let (of, by) = (&unknowns.references, &knowns.references);
-        self.component.directional_derivative(of, by, &seeds, &mut found)?;
+        self.component.directional_derivative(of, by, &seeds, &mut derivatives)?;
         for (change, place) in changes.iter_mut().zip(&unknowns.places) {
-            *change = found[*place];
+            *change = derivatives[*place];
         }
         Ok(())
     }
@@ -82,8 +82,8 @@ impl Instance {
     ) -> Result<(), CallError> {
         let (view, time) = (&self.view, self.state.time);
         let is_followed = |reference| {
-            let found = view.locate(reference);
-            found.is_some_and(|(variable, _)| view.variables[variable].intermediate)
+            let place = view.locate(reference);
+            place.is_some_and(|(variable, _)| view.variables[variable].intermediate)
         };
         self.component.set_input_derivatives(list, orders, values, time, is_followed)
     }
@@ -103,14 +103,14 @@ impl Instance {
         let mut start = 0;
         while start < list.len() {
             let order = orders[start];
-            let same = orders[start..].iter().take_while(|own| **own == order).count();
+            let same = orders[start..].iter().take_while(|other| **other == order).count();
             let end = (start + same).min(list.len());
             let whole = self.whole(NAME, &list[start..end])?;
-            let mut found = vec![0.0; whole.count];
+            let mut derivatives = vec![0.0; whole.count];
             let orders = vec![order; whole.references.len()];
-            self.component.get_output_derivatives(&whole.references, &orders, &mut found)?;
+            self.component.get_output_derivatives(&whole.references, &orders, &mut derivatives)?;
             for (value, place) in values[start..end].iter_mut().zip(&whole.places) {
-                *value = found[*place];
+                *value = derivatives[*place];
             }
             start = end;
         }

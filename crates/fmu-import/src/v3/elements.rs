@@ -134,8 +134,11 @@ pub(crate) struct ElementView {
 impl ElementView {
     /// Creates the view of an FMU whose structural parameters have the values `sizes`, by value
     /// reference; others have their start values. On failure returns the reason.
-    pub(crate) fn new(own: &ModelDescription, sizes: &HashMap<u32, u64>) -> Result<Self, String> {
-        let starts: HashMap<u32, u64> = own
+    pub(crate) fn new(
+        description: &ModelDescription,
+        sizes: &HashMap<u32, u64>,
+    ) -> Result<Self, String> {
+        let starts: HashMap<u32, u64> = description
             .variables
             .iter()
             .filter_map(|variable| {
@@ -147,13 +150,13 @@ impl ElementView {
             view: Self {
                 description: ModelDescription {
                     variables: Vec::new(),
-                    co_simulation: own.stepped(),
+                    co_simulation: description.stepped(),
                     // Only of an FMU that runs by it.
-                    scheduled_execution: own
+                    scheduled_execution: description
                         .scheduled_execution
                         .clone()
-                        .filter(|_| own.co_simulation.is_none()),
-                    ..own.clone()
+                        .filter(|_| description.co_simulation.is_none()),
+                    ..description.clone()
                 },
                 variables: Vec::new(),
                 by_reference: HashMap::new(),
@@ -165,26 +168,26 @@ impl ElementView {
             first_cell: HashMap::new(),
             ranges: Vec::new(),
         };
-        let extents: Vec<Vec<u64>> = own
+        let extents: Vec<Vec<u64>> = description
             .variables
             .iter()
             .map(|variable| extents(variable, &starts, sizes))
             .collect::<Result<_, _>>()?;
         let counts: Vec<usize> = extents.iter().map(|extents| count(extents)).collect();
         let total = counts.iter().fold(0_usize, |sum, count| sum.saturating_add(*count));
-        if total > MOST_ELEMENTS.max(2 * own.variables.len()) {
+        if total > MOST_ELEMENTS.max(2 * description.variables.len()) {
             return Err(format!(
                 "its arrays have {total} elements, expected at most {MOST_ELEMENTS}"
             ));
         }
-        builder.view.base = free_references(own, total);
-        for (position, variable) in own.variables.iter().enumerate() {
+        builder.view.base = free_references(description, total);
+        for (position, variable) in description.variables.iter().enumerate() {
             let resized = variable.dimensions.iter().any(
                 |dimension| matches!(dimension, Dimension::Variable(by) if sizes.contains_key(by)),
             );
-            builder.add(own, (position, variable), &extents[position], resized);
+            builder.add(description, position, variable, &extents[position], resized);
         }
-        builder.finish(own)
+        builder.finish(description)
     }
 
     /// Returns variable and element of a value reference of [`ElementView::description`].
@@ -198,11 +201,11 @@ impl ElementView {
 
     /// Returns the name of a variable of the FMU.
     pub(super) fn name(&self, reference: u32) -> String {
-        let known = self.description.variables.iter().find(|own| {
-            self.locate(own.value_reference)
+        let known = self.description.variables.iter().find(|variable| {
+            self.locate(variable.value_reference)
                 .is_some_and(|(variable, _)| self.variables[variable].reference == reference)
         });
-        known.map_or_else(|| format!("the variable {reference}"), |own| own.name.clone())
+        known.map_or_else(|| format!("the variable {reference}"), |variable| variable.name.clone())
     }
 }
 
@@ -234,9 +237,9 @@ fn count(extents: &[u64]) -> usize {
 }
 
 /// Returns the first of `count` consecutive value references that no variable has.
-fn free_references(own: &ModelDescription, count: usize) -> u32 {
+fn free_references(description: &ModelDescription, count: usize) -> u32 {
     let mut used: Vec<u32> =
-        own.variables.iter().map(|variable| variable.value_reference).collect();
+        description.variables.iter().map(|variable| variable.value_reference).collect();
     used.sort_unstable();
     used.dedup();
     let count = u32::try_from(count).unwrap_or(u32::MAX);
@@ -272,16 +275,16 @@ fn with_start(kind: &Kind, values: Option<&Elements>, position: usize) -> Kind {
         _ => None,
     };
     match &mut kind {
-        Kind::Real(own) | Kind::Float32(own) => own.start = real(),
-        Kind::Integer(own)
-        | Kind::Enumeration(own)
-        | Kind::Int8(own)
-        | Kind::UInt8(own)
-        | Kind::Int16(own)
-        | Kind::UInt16(own)
-        | Kind::UInt32(own)
-        | Kind::Int64(own)
-        | Kind::UInt64(own) => own.start = integer(),
+        Kind::Real(attributes) | Kind::Float32(attributes) => attributes.start = real(),
+        Kind::Integer(attributes)
+        | Kind::Enumeration(attributes)
+        | Kind::Int8(attributes)
+        | Kind::UInt8(attributes)
+        | Kind::Int16(attributes)
+        | Kind::UInt16(attributes)
+        | Kind::UInt32(attributes)
+        | Kind::Int64(attributes)
+        | Kind::UInt64(attributes) => attributes.start = integer(),
         Kind::Boolean(start) => {
             *start = match values {
                 Some(Elements::Boolean(values)) => values.get(position).copied(),
@@ -294,8 +297,8 @@ fn with_start(kind: &Kind, values: Option<&Elements>, position: usize) -> Kind {
                 _ => None,
             }
         }
-        Kind::Binary(own) => {
-            own.start = match values {
+        Kind::Binary(attributes) => {
+            attributes.start = match values {
                 Some(Elements::Binary(values)) => values.get(position).cloned(),
                 _ => None,
             }
@@ -317,13 +320,14 @@ impl Builder {
     /// Adds the elements of a variable.
     fn add(
         &mut self,
-        own: &ModelDescription,
-        (position, variable): (usize, &ScalarVariable),
+        description: &ModelDescription,
+        position: usize,
+        variable: &ScalarVariable,
         extents: &[u64],
         resized: bool,
     ) {
         let size = count(extents);
-        self.add_native(own, variable, size);
+        self.add_native(description, variable, size);
         let start = self.view.description.variables.len();
         self.ranges.push((start, size));
         debug_assert_eq!(self.ranges.len(), position + 1);
@@ -332,7 +336,7 @@ impl Builder {
             return;
         }
         let first = self.first_cell[&variable.value_reference];
-        let starts = if resized { None } else { variable.start_values(own, MOST_ELEMENTS) };
+        let starts = if resized { None } else { variable.start_values(description, MOST_ELEMENTS) };
         for element in 0..size {
             let indices = indices(element, extents);
             let reference = u32::try_from(first + element).unwrap_or(u32::MAX);
@@ -349,7 +353,12 @@ impl Builder {
     }
 
     /// Adds a variable of the FMU unless it is an alias of a known one.
-    fn add_native(&mut self, own: &ModelDescription, variable: &ScalarVariable, size: usize) {
+    fn add_native(
+        &mut self,
+        description: &ModelDescription,
+        variable: &ScalarVariable,
+        size: usize,
+    ) {
         let view = &mut self.view;
         if view.by_reference.contains_key(&variable.value_reference) {
             return;
@@ -367,7 +376,10 @@ impl Builder {
         let event = !(variable.causality == Causality::Input
             && variable.variability == Variability::Continuous);
         let clocks = variable.clocks.iter().filter_map(|index| {
-            own.variables.get((*index as usize).checked_sub(1)?).map(|own| own.value_reference)
+            description
+                .variables
+                .get((*index as usize).checked_sub(1)?)
+                .map(|clock| clock.value_reference)
         });
         view.variables.push(Variable {
             reference: variable.value_reference,
@@ -379,7 +391,10 @@ impl Builder {
                 && kind == NativeType::Float64
                 && !is_array
                 && variable.intermediate_update
-                && own.co_simulation.as_ref().is_some_and(|own| own.provides_intermediate_update),
+                && description
+                    .co_simulation
+                    .as_ref()
+                    .is_some_and(|flags| flags.provides_intermediate_update),
             clocks: clocks.collect(),
             shadow: view.shadows,
         });
@@ -389,7 +404,7 @@ impl Builder {
     }
 
     /// Converts the indices between variables.
-    fn finish(mut self, own: &ModelDescription) -> Result<ElementView, String> {
+    fn finish(mut self, description: &ModelDescription) -> Result<ElementView, String> {
         let mut names = HashSet::new();
         let variables = &self.view.description.variables;
         if let Some(twice) = variables.iter().find(|variable| !names.insert(&variable.name)) {
@@ -404,7 +419,7 @@ impl Builder {
                     real.derivative = real.derivative.and_then(moved);
                 }
                 let previous = previous.and_then(moved);
-                let clocks = own.variables[position].clocks.iter();
+                let clocks = description.variables[position].clocks.iter();
                 let clocks = clocks.filter_map(|index| self.moved(*index, 0)).collect();
                 let variable = &mut self.view.description.variables[start + element];
                 (variable.kind, variable.previous, variable.clocks) = (kind, previous, clocks);
@@ -412,9 +427,10 @@ impl Builder {
         }
         if let Some(flags) = &mut self.view.description.co_simulation {
             // Replaces the input derivatives of FMI 2.0.
-            flags.can_interpolate_inputs = self.view.variables.iter().any(|own| own.intermediate);
+            flags.can_interpolate_inputs =
+                self.view.variables.iter().any(|variable| variable.intermediate);
         }
-        let structure = &own.structure;
+        let structure = &description.structure;
         let rows = |rows: &[Unknown]| self.rows(rows);
         let (outputs, derivatives) = (rows(&structure.outputs), rows(&structure.derivatives));
         let (initial_unknowns, clocked_states, event_indicators) = (

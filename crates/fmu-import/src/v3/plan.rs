@@ -55,9 +55,9 @@ impl Plan {
         for run in &mut runs {
             let count = run.shadows.len();
             run.buffer = Buffer::new(run.kind, count);
-            let mut given = vec![false; count];
-            run.places.iter().for_each(|(_, place)| given[*place] = true);
-            run.partial = given.contains(&false);
+            let mut stated = vec![false; count];
+            run.places.iter().for_each(|(_, place)| stated[*place] = true);
+            run.partial = stated.contains(&false);
         }
         let single = runs.len() == 1;
         for run in &mut runs {
@@ -116,7 +116,7 @@ impl Run {
 /// The plans of the lists used last.
 #[derive(Debug, Default)]
 pub(super) struct Plans {
-    kept: Vec<Plan>,
+    plans: Vec<Plan>,
     next: usize,
 }
 
@@ -124,31 +124,31 @@ impl Plans {
     /// Returns the position of the plan for a list. On failure returns the reference that no variable
     /// has.
     pub(super) fn find(&mut self, view: &ElementView, list: &[u32]) -> Result<usize, u32> {
-        if let Some(found) = self.kept.iter().position(|plan| plan.references == list) {
-            return Ok(found);
+        if let Some(position) = self.plans.iter().position(|plan| plan.references == list) {
+            return Ok(position);
         }
         let plan = Plan::new(view, list)?;
-        if self.kept.len() < KEPT {
-            self.kept.push(plan);
-            return Ok(self.kept.len() - 1);
+        if self.plans.len() < KEPT {
+            self.plans.push(plan);
+            return Ok(self.plans.len() - 1);
         }
         let place = self.next;
         self.next = (self.next + 1) % KEPT;
-        self.kept[place] = plan;
+        self.plans[place] = plan;
         Ok(place)
     }
 
     /// Returns the runs of a plan; [`Plans::put_back`] returns them.
     pub(super) fn take(&mut self, plan: usize) -> Vec<Run> {
-        std::mem::take(&mut self.kept[plan].runs)
+        std::mem::take(&mut self.plans[plan].runs)
     }
 
     pub(super) fn put_back(&mut self, plan: usize, runs: Vec<Run>) {
-        self.kept[plan].runs = runs;
+        self.plans[plan].runs = runs;
     }
 
     pub(super) fn clear(&mut self) {
-        self.kept.clear();
+        self.plans.clear();
         self.next = 0;
     }
 }

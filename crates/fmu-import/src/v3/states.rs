@@ -54,7 +54,7 @@ impl Instance {
         }
         let theirs = self.component.serialize_state()?;
         let State { mode, next_event, event, terminate, time, held, memory, clocks } = &self.state;
-        let own = Kept {
+        let kept_state = Kept {
             initialized: mode.is_initialized(),
             next_event: *next_event,
             event: *event,
@@ -64,26 +64,26 @@ impl Instance {
             memory: memory.clone(),
             clocks: clocks.state(),
         };
-        postcard::to_extend(&(own, theirs), MAGIC.to_vec())
+        postcard::to_extend(&(kept_state, theirs), MAGIC.to_vec())
             .map_err(|error| refused(SERIALIZE, format!("cannot store the state: {error}")))
     }
 
     pub(crate) fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let read = bytes.strip_prefix(MAGIC).and_then(|rest| postcard::from_bytes(rest).ok());
-        let read = read.filter(|(own, _): &(Kept, &[u8])| {
-            own.held.len() == self.state.held.len() && self.state.clocks.fits(&own.clocks)
+        let read = read.filter(|(saved, _): &(Kept, &[u8])| {
+            saved.held.len() == self.state.held.len() && self.state.clocks.fits(&saved.clocks)
         });
-        let Some((own, theirs)) = read else {
+        let Some((saved, theirs)) = read else {
             let what = "cannot restore the state: it is not one of this FMU".to_owned();
             return Err(refused(DESERIALIZE, what));
         };
         self.component.deserialize_state(theirs)?;
         let state = &mut self.state;
-        state.mode = if own.initialized { Mode::Step } else { Mode::Instantiated };
-        (state.next_event, state.event) = (own.next_event, own.event);
-        (state.terminate, state.time) = (own.terminate, own.time);
-        (state.held, state.memory) = (own.held, own.memory);
-        state.clocks.restore(&own.clocks);
+        state.mode = if saved.initialized { Mode::Step } else { Mode::Instantiated };
+        (state.next_event, state.event) = (saved.next_event, saved.event);
+        (state.terminate, state.time) = (saved.terminate, saved.time);
+        (state.held, state.memory) = (saved.held, saved.memory);
+        state.clocks.restore(&saved.clocks);
         Ok(())
     }
 }

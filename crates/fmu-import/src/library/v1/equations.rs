@@ -32,14 +32,14 @@ vectors! {
 }
 
 impl From<functions::EventInfo> for EventInfo {
-    fn from(own: functions::EventInfo) -> Self {
+    fn from(info: functions::EventInfo) -> Self {
         Self {
-            discrete_states_need_update: own.iteration_converged == 0,
-            terminate_simulation: own.terminate_simulation != 0,
+            discrete_states_need_update: info.iteration_converged == 0,
+            terminate_simulation: info.terminate_simulation != 0,
             // The states are other variables: so are their nominal values.
-            nominals_changed: own.state_value_references_changed != 0,
-            values_changed: own.state_values_changed != 0,
-            next_event_time: (own.upcoming_time_event != 0).then_some(own.next_event_time),
+            nominals_changed: info.state_value_references_changed != 0,
+            values_changed: info.state_values_changed != 0,
+            next_event_time: (info.upcoming_time_event != 0).then_some(info.next_event_time),
         }
     }
 }

@@ -134,12 +134,12 @@ const SCHEDULED_EXECUTION: [&str; 2] =
 impl Functions {
     /// Checks that the library exports the functions that `interface` cannot do without.
     pub(super) fn require(&self, interface: Interface, path: &Path) -> Result<(), LoadError> {
-        let own: &[&str] = match interface {
+        let of_interface: &[&str] = match interface {
             Interface::CoSimulation => &CO_SIMULATION,
             Interface::ModelExchange => &MODEL_EXCHANGE,
             Interface::ScheduledExecution => &SCHEDULED_EXECUTION,
         };
-        let missing = REQUIRED.iter().chain(own).find(|function| !self.has(function));
+        let missing = REQUIRED.iter().chain(of_interface).find(|function| !self.has(function));
         missing.map_or(Ok(()), |function| {
             Err(LoadError::Missing { path: path.to_owned(), function: (*function).to_owned() })
         })

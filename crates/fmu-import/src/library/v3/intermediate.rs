@@ -50,7 +50,9 @@ impl Inputs {
     ) -> Result<(), i32> {
         self.derivatives.fill([0.0; ORDERS]);
         let all = list.iter().zip(orders).zip(values);
-        for ((&reference, &order), &value) in all.filter(|((own, _), _)| is_followed(**own)) {
+        for ((&reference, &order), &value) in
+            all.filter(|((reference, _), _)| is_followed(**reference))
+        {
             let place = usize::try_from(order).ok().and_then(|order| order.checked_sub(1));
             let place = place.filter(|place| *place < ORDERS).ok_or(order)?;
             let index = *self.index.entry(reference).or_insert_with(|| {
