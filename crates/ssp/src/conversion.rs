@@ -27,9 +27,9 @@ impl Measure {
         match kind {
             Some(Type::Real(Some(unit))) => Measure::unit(unit, scopes),
             Some(Type::Enumeration(name)) => {
-                let mut all = scopes.iter().flat_map(|each| &each.enumerations);
-                let known = all.find(|each| each.name == *name);
-                Measure { unit: None, items: known.map(|each| each.items.clone()) }
+                let mut all = scopes.iter().flat_map(|scope| &scope.enumerations);
+                let known = all.find(|enumeration| enumeration.name == *name);
+                Measure { unit: None, items: known.map(|enumeration| enumeration.items.clone()) }
             }
             _ => Measure::default(),
         }
@@ -37,7 +37,7 @@ impl Measure {
 
     /// Creates the measure of a unit, defined by the first of `scopes` that knows its name.
     pub(super) fn unit(name: &str, scopes: &[&Definitions]) -> Self {
-        let mut all = scopes.iter().flat_map(|each| &each.units);
+        let mut all = scopes.iter().flat_map(|scope| &scope.units);
         let base = all.find(|unit| unit.name == name).map(|unit| unit.base);
         Measure { unit: Some((name.to_owned(), base)), items: None }
     }
@@ -54,7 +54,10 @@ impl Measure {
             }
             Kind::Enumeration(kind) => {
                 let declared = kind.declared_type.as_ref();
-                let known = description.types.iter().find(|each| Some(&each.name) == declared);
+                let known = description
+                    .types
+                    .iter()
+                    .find(|declared_type| Some(&declared_type.name) == declared);
                 Measure { unit: None, items: known.map(items_of) }
             }
             _ => Measure::default(),
@@ -138,9 +141,9 @@ impl ConversionChain {
             transformation = then(transformation, stated)?;
         }
         // After a suppressed conversion the unit of the source is no longer valid.
-        let kept = if conversion.suppress_units { None } else { self.measure.unit };
+        let unit = if conversion.suppress_units { None } else { self.measure.unit };
         let items = if stated.is_some() { None } else { self.measure.items };
-        let measure = there.or(Measure { unit: kept, items });
+        let measure = there.or(Measure { unit, items });
         Ok(ConversionChain { measure, transformation, warnings })
     }
 }
@@ -168,8 +171,8 @@ fn resolve(stated: &Stated, here: &Measure, there: &Measure) -> Result<Transform
         Stated::Enumeration(pairs) => {
             let number = |items: &Measure, name: &str| {
                 let items = items.items.as_deref().unwrap_or_default();
-                let found = items.iter().find(|(item, _)| item == name);
-                found.map(|(_, value)| *value).ok_or_else(|| {
+                let item = items.iter().find(|(item, _)| item == name);
+                item.map(|(_, value)| *value).ok_or_else(|| {
                     let items: Vec<&str> = items.iter().map(|(item, _)| item.as_str()).collect();
                     format!("expected an item of {}, found {name:?}", listed(&items))
                 })
@@ -183,9 +186,9 @@ fn resolve(stated: &Stated, here: &Measure, there: &Measure) -> Result<Transform
 }
 
 /// Returns the items of an enumeration with numbers of 32 bits, the integers of SSP.
-pub(super) fn items_of(own: &SimpleType) -> Vec<(String, i32)> {
+pub(super) fn items_of(declared: &SimpleType) -> Vec<(String, i32)> {
     let small = |(name, value): &(String, i64)| Some((name.clone(), i32::try_from(*value).ok()?));
-    own.items.iter().filter_map(small).collect()
+    declared.items.iter().filter_map(small).collect()
 }
 
 fn listed<'a>(items: &[&'a str]) -> Cow<'a, str> {
@@ -228,13 +231,13 @@ fn mapped(pairs: &[(i32, i32)], value: i32) -> i32 {
 }
 
 /// Returns a warning if the file and the FMU state different units for a connector.
-pub(super) fn contradiction(stated: &Measure, own: &Measure) -> Option<String> {
-    match between(stated, own) {
+pub(super) fn contradiction(stated: &Measure, declared: &Measure) -> Option<String> {
+    match between(stated, declared) {
         Ok(Some((factor, offset))) if (factor, offset) == (1.0, 0.0) => None,
         _ => Some(format!(
             "the unit is {} in the system structure and {} in the FMU: the former is taken",
             stated.name(),
-            own.name()
+            declared.name()
         )),
     }
 }

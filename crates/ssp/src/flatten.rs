@@ -250,13 +250,13 @@ fn check(tree: &Tree, edge: &Edge, transformation: &Transformation) -> Result<()
         Transformation::Integer(_) => ["Integer", "Enumeration"],
         Transformation::Boolean { .. } => ["Boolean", "Boolean"],
     };
-    let found = tree.variable(&edge.to).map_or("unknown", |variable| variable.kind.element());
-    if expected.contains(&found) {
+    let kind = tree.variable(&edge.to).map_or("unknown", |variable| variable.kind.element());
+    if expected.contains(&kind) {
         return Ok(());
     }
     let expected = expected[0];
     let sentence =
-        format!("{} is of type {found}, the transformation is for {expected}", tree.name(&edge.to));
+        format!("{} is of type {kind}, the transformation is for {expected}", tree.name(&edge.to));
     Err(at(tree, edge.system, edge.at, sentence))
 }
 
@@ -296,14 +296,14 @@ fn side(tree: &Tree, system: usize, end: &End, warnings: &mut Vec<String>) -> Re
         let kind = stated.ok_or_else(|| format!("there is no connector {end}"))?;
         return Ok(Side { vertex, kind, of_system });
     };
-    let own = kind_of(variable.causality);
+    let declared = kind_of(variable.causality);
     let name = tree.name(&vertex);
-    let stated = stated.filter(|kind| *kind != ConnectorKind::Unspecified || own.is_none());
-    match (stated, own) {
-        (Some(stated), Some(own)) if stated != own => warnings.push(format!(
+    let stated = stated.filter(|kind| *kind != ConnectorKind::Unspecified || declared.is_none());
+    match (stated, declared) {
+        (Some(stated), Some(declared)) if stated != declared => warnings.push(format!(
             "{name} is {} in the system structure and {} in the FMU",
             stated.as_str(),
-            own.as_str()
+            declared.as_str()
         )),
         (None, _) if connector.is_none() => {
             warnings.push(format!("{name} is connected, but is no connector"));
@@ -311,7 +311,7 @@ fn side(tree: &Tree, system: usize, end: &End, warnings: &mut Vec<String>) -> Re
         _ => {}
     }
     let causality = variable.causality.as_str();
-    let kind = stated.or(own).ok_or_else(|| format!("{name} is {causality}, no connector"))?;
+    let kind = stated.or(declared).ok_or_else(|| format!("{name} is {causality}, no connector"))?;
     Ok(Side { vertex, kind, of_system })
 }
 

@@ -76,7 +76,7 @@ impl Function {
             description: self.description(),
             dimension,
             inputs: vec![Polynomial::default(); count],
-            kept: Vec::new(),
+            saved: Vec::new(),
         }
     }
 
@@ -157,7 +157,7 @@ pub struct FunctionSlave {
     description: ModelDescription,
     dimension: usize,
     inputs: Vec<Polynomial>,
-    kept: Vec<Vec<Polynomial>>,
+    saved: Vec<Vec<Polynomial>>,
 }
 
 impl FunctionSlave {
@@ -169,8 +169,8 @@ impl FunctionSlave {
     }
 
     fn input(&mut self, reference: u32) -> Result<&mut Polynomial, CallError> {
-        let found = self.inputs.get_mut(reference as usize);
-        found.ok_or_else(|| unknown("fmi2SetReal", reference))
+        let input = self.inputs.get_mut(reference as usize);
+        input.ok_or_else(|| unknown("fmi2SetReal", reference))
     }
 }
 
@@ -259,16 +259,16 @@ impl Slave for FunctionSlave {
     }
 
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        if self.kept.len() <= slot {
-            self.kept.resize(slot + 1, self.inputs.clone());
+        if self.saved.len() <= slot {
+            self.saved.resize(slot + 1, self.inputs.clone());
         }
-        self.kept[slot].copy_from_slice(&self.inputs);
+        self.saved[slot].copy_from_slice(&self.inputs);
         Ok(())
     }
 
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        if let Some(kept) = self.kept.get(slot) {
-            self.inputs.copy_from_slice(kept);
+        if let Some(inputs) = self.saved.get(slot) {
+            self.inputs.copy_from_slice(inputs);
         }
         Ok(())
     }

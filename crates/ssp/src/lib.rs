@@ -156,13 +156,14 @@ fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
                 warnings.push(format!("{name}: the FMU has no such variable"));
                 continue;
             };
-            let (stated, own) = tree.measures(&vertex);
-            warnings.extend(contradiction(&stated, &own).map(|text| format!("{name}: {text}")));
+            let (stated, declared) = tree.measures(&vertex);
+            warnings
+                .extend(contradiction(&stated, &declared).map(|text| format!("{name}: {text}")));
             let stated = connector.kind_of_value.as_ref().and_then(element);
-            let own = variable.kind.element();
-            if let Some(stated) = stated.filter(|stated| *stated != own) {
+            let declared = variable.kind.element();
+            if let Some(stated) = stated.filter(|stated| *stated != declared) {
                 warnings.push(format!(
-                    "{name} is of type {stated} in the system structure and {own} in the FMU"
+                    "{name} is of type {stated} in the system structure and {declared} in the FMU"
                 ));
             }
         }

@@ -89,7 +89,8 @@ impl Loader {
     ) -> Result<usize, SspError> {
         self.count(base.connectors.len())?;
         let positions = base.connectors.iter().enumerate().rev();
-        let positions = positions.map(|(position, own)| (own.name.clone(), position)).collect();
+        let positions =
+            positions.map(|(position, connector)| (connector.name.clone(), position)).collect();
         self.tree.nodes.push(Node {
             path: place.path,
             parent: place.parent,
@@ -254,12 +255,12 @@ impl Loader {
             at: source.at,
             ..ElementBase::default()
         };
-        let own =
+        let definition =
             File { shown, base: file.base.clone(), definitions: dictionary.definitions.clone() };
         let path = format!("{}.{}", self.tree.nodes[system].path, source.name);
         let path = path.trim_start_matches('.').to_owned();
         let place = Place { parent: Some(system), path, depth: 0, outer: None };
-        let node = self.add(&base, place, &Rc::new(own))?;
+        let node = self.add(&base, place, &Rc::new(definition))?;
         self.tree.nodes[node].content = Content::Dictionary;
         Ok(node)
     }
@@ -272,19 +273,19 @@ impl Loader {
         place: Place<'_>,
     ) -> Result<usize, SspError> {
         let mut system = place.parent;
-        let found = loop {
+        let dictionary = loop {
             let Some(index) = system else {
                 let sentence = format!("no signal dictionary {:?}", reference.dictionary);
                 return Err(semantic_error(reference.base.at.0, sentence).in_file(&file.shown));
             };
             let node = &self.tree.nodes[index];
-            if let Some(found) = node.dictionaries.get(&reference.dictionary) {
-                break *found;
+            if let Some(node) = node.dictionaries.get(&reference.dictionary) {
+                break *node;
             }
             system = node.parent;
         };
         let node = self.add(&reference.base, place, file)?;
-        self.tree.nodes[node].content = Content::Reference(found);
+        self.tree.nodes[node].content = Content::Reference(dictionary);
         Ok(node)
     }
 
@@ -302,7 +303,8 @@ impl Loader {
             let values = self.files.values(&binding.values, file, component);
             let values = values.map_err(|error| error.or(here))?;
             let mapping = binding.mapping.as_ref();
-            let mapping = mapping.map(|each| self.files.mapping(each, file, component)).transpose();
+            let mapping =
+                mapping.map(|mapping| self.files.mapping(mapping, file, component)).transpose();
             let mapping = mapping.map_err(|error| error.or(here))?;
             self.count(values.parameters.len())?;
             self.count(mapping.as_ref().map_or(0, |mapping| mapping.entries.len()))?;

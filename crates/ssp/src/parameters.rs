@@ -80,19 +80,19 @@ impl Binder<'_> {
                 for parameter in &values.parameters {
                     let name = format!("{}{}", binding.prefix, parameter.name);
                     let entry = MappingEntry { target: name, ..MappingEntry::default() };
-                    self.apply(node, binding, (parameter, &entry), &mut unmatched)?;
+                    self.apply(node, binding, parameter, &entry, &mut unmatched)?;
                 }
             }
             Some(mapping) => {
                 let sources: HashMap<String, &Parameter> = values
                     .parameters
                     .iter()
-                    .map(|each| (format!("{}{}", binding.prefix, each.name), each))
+                    .map(|parameter| (format!("{}{}", binding.prefix, parameter.name), parameter))
                     .collect();
                 for entry in &mapping.entries {
                     match sources.get(&entry.source) {
                         Some(parameter) => {
-                            self.apply(node, binding, (parameter, entry), &mut unmatched)?;
+                            self.apply(node, binding, parameter, entry, &mut unmatched)?;
                         }
                         None => unmatched.push(entry.source.clone()),
                     }
@@ -152,7 +152,8 @@ impl Binder<'_> {
         &mut self,
         node: usize,
         binding: &Binding,
-        (parameter, entry): (&Parameter, &MappingEntry),
+        parameter: &Parameter,
+        entry: &MappingEntry,
         unmatched: &mut Vec<String>,
     ) -> Result<(), SspError> {
         let mut targets = Vec::new();
@@ -184,7 +185,8 @@ impl Binder<'_> {
         if matches!(self.tree.nodes[target.node].content, Content::Fmu(_)) {
             return self.set_variable(target, value);
         }
-        let kind = self.tree.connector(target.node, &target.connector).map(|each| each.kind);
+        let kind =
+            self.tree.connector(target.node, &target.connector).map(|connector| connector.kind);
         let is_input = matches!(kind, Some(ConnectorKind::Input | ConnectorKind::Parameter));
         if is_input { self.set_downstream(target, value) } else { self.set_upstream(target, value) }
     }
@@ -267,22 +269,22 @@ impl Binder<'_> {
 }
 
 /// Finds all connectors of `node` with the hierarchical name `name`, which need not be unique.
-fn find(tree: &Tree, node: usize, name: &str, found: &mut Vec<Vertex>) {
+fn find(tree: &Tree, node: usize, name: &str, vertices: &mut Vec<Vertex>) {
     let here = &tree.nodes[node];
     match here.content {
         Content::Fmu(_) => {
             let vertex = Vertex { node, connector: name.to_owned() };
             if tree.variable(&vertex).is_some() {
-                found.push(vertex);
+                vertices.push(vertex);
             }
         }
         Content::System => {
             if tree.connector(node, name).is_some() {
-                found.push(Vertex { node, connector: name.to_owned() });
+                vertices.push(Vertex { node, connector: name.to_owned() });
             }
             for (position, _) in name.match_indices('.') {
                 if let Some(child) = here.children.get(&name[..position]) {
-                    find(tree, *child, &name[position + 1..], found);
+                    find(tree, *child, &name[position + 1..], vertices);
                 }
             }
         }

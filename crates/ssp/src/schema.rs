@@ -64,11 +64,11 @@ const SYSTEM: [&str; 5] =
 /// Adds a warning for each unknown element or attribute below `node`, for repeated lists, and for
 /// signatures, which are not verified.
 pub(super) fn check(node: &Node, warnings: &mut Vec<String>) {
-    let mut found = BTreeMap::new();
-    visit(node, &mut found);
-    let mut found: Vec<_> = found.into_iter().collect();
-    found.sort_by_key(|(_, (at, _))| (at.line, at.column));
-    for (sentence, (at, count)) in found {
+    let mut findings = BTreeMap::new();
+    visit(node, &mut findings);
+    let mut findings: Vec<_> = findings.into_iter().collect();
+    findings.sort_by_key(|(_, (at, _))| (at.line, at.column));
+    for (sentence, (at, count)) in findings {
         let more = if count > 1 { format!(" ({count} times)") } else { String::new() };
         warnings.push(format!("{at}: {sentence}{more}"));
     }
@@ -77,13 +77,13 @@ pub(super) fn check(node: &Node, warnings: &mut Vec<String>) {
 /// Warnings with the position of the first case and the number of cases.
 type Findings = BTreeMap<String, (Position, usize)>;
 
-fn visit(node: &Node, found: &mut Findings) {
+fn visit(node: &Node, findings: &mut Findings) {
     let name = node.name.as_str();
     let Some((children, attributes)) = content(name) else { return };
     for attribute in node.attribute_names() {
         if !attributes.contains(&attribute) && !ANYWHERE.contains(&attribute) {
             add(
-                found,
+                findings,
                 format!("<{name}> has the attribute {attribute:?}, which is skipped"),
                 node.at,
             );
@@ -93,22 +93,30 @@ fn visit(node: &Node, found: &mut Findings) {
     for child in node.own_children() {
         let known = child.name.as_str();
         if !children.iter().any(|list| list.contains(&known)) {
-            add(found, format!("<{name}> has the element <{known}>, which is skipped"), child.at);
+            add(
+                findings,
+                format!("<{name}> has the element <{known}>, which is skipped"),
+                child.at,
+            );
             continue;
         }
         if lists.contains(&known) {
-            add(found, format!("<{name}> has a second element <{known}>: both are read"), child.at);
+            add(
+                findings,
+                format!("<{name}> has a second element <{known}>: both are read"),
+                child.at,
+            );
         }
         lists.extend(LISTS.contains(&known).then_some(known));
         if known == "Signature" {
-            add(found, format!("the signature of <{name}> is not verified"), child.at);
+            add(findings, format!("the signature of <{name}> is not verified"), child.at);
         }
-        visit(child, found);
+        visit(child, findings);
     }
 }
 
-fn add(found: &mut Findings, sentence: String, at: Position) {
-    found.entry(sentence).or_insert((at, 0)).1 += 1;
+fn add(findings: &mut Findings, sentence: String, at: Position) {
+    findings.entry(sentence).or_insert((at, 0)).1 += 1;
 }
 
 /// Lists of element names.

@@ -134,13 +134,14 @@ impl Tree {
 
     /// Whether the FMU of a node cannot have the types of FMI 3.0.
     pub(super) fn is_before_fmi3(&self, node: usize) -> bool {
-        self.description(node).is_some_and(|own| own.version() != Version::V3)
+        self.description(node).is_some_and(|description| description.version() != Version::V3)
     }
 
     /// Whether a connector is a terminal of its FMU, which stands for the variables that are its members.
     pub(super) fn is_terminal(&self, vertex: &Vertex) -> bool {
-        let terminals = self.description(vertex.node).map(|own| own.terminals.iter());
-        terminals.is_some_and(|mut all| all.any(|own| own.name == vertex.connector))
+        let terminals =
+            self.description(vertex.node).map(|description| description.terminals.iter());
+        terminals.is_some_and(|mut all| all.any(|terminal| terminal.name == vertex.connector))
     }
 
     /// Returns the connector as its file declares it.
@@ -156,23 +157,23 @@ impl Tree {
         let connector = self.connector(vertex.node, &vertex.connector);
         let kind = connector.and_then(|connector| connector.kind_of_value.as_ref());
         let stated = Measure::stated(kind, &[&node.file.definitions]);
-        let own = self.variable(vertex).zip(self.description(vertex.node));
-        let own = own.map(|(variable, fmu)| Measure::of_variable(variable, fmu));
-        (stated, own.unwrap_or_default())
+        let declared = self.variable(vertex).zip(self.description(vertex.node));
+        let declared = declared.map(|(variable, fmu)| Measure::of_variable(variable, fmu));
+        (stated, declared.unwrap_or_default())
     }
 
     /// Returns the unit or enumeration of a connector: as the file states it, otherwise as the FMU
     /// states it.
     pub(super) fn measure(&self, vertex: &Vertex) -> Measure {
-        let (stated, own) = self.measures(vertex);
-        stated.or(own)
+        let (stated, declared) = self.measures(vertex);
+        stated.or(declared)
     }
 
     /// Returns the unit or enumeration that the component states whose source is the system of this
     /// connector, if there is such a component.
     pub(super) fn measure_outside(&self, vertex: &Vertex) -> Option<Measure> {
         let (connectors, file) = self.nodes[vertex.node].outside.as_ref()?;
-        let connector = connectors.iter().find(|each| each.name == vertex.connector)?;
+        let connector = connectors.iter().find(|connector| connector.name == vertex.connector)?;
         Some(Measure::stated(connector.kind_of_value.as_ref(), &[&file.definitions]))
     }
 

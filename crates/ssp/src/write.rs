@@ -120,8 +120,8 @@ impl Exporter {
                 continue;
             }
             let kind = kind_of(variable.causality).ok_or_else(|| {
-                let found = variable.causality.as_str();
-                missing(&format!("{element}.{}", variable.name), "an input or an output", found)
+                let causality = variable.causality.as_str();
+                missing(&format!("{element}.{}", variable.name), "an input or an output", causality)
             })?;
             connectors.push(Connector {
                 name: variable.name.clone(),
@@ -142,8 +142,8 @@ impl Exporter {
         match &variable.kind {
             Kind::Real(real) => {
                 let unit = real.unit.as_ref().and_then(|name| {
-                    let own = description.units.iter().find(|unit| unit.name == *name)?;
-                    let base = own.base?;
+                    let unit = description.units.iter().find(|unit| unit.name == *name)?;
+                    let base = unit.base?;
                     let units = &mut self.definitions.units;
                     match units.iter().find(|known| known.name == *name) {
                         Some(known) if known.base != base => return None,
@@ -159,13 +159,13 @@ impl Exporter {
             Kind::String(_) => Some(Type::String),
             Kind::Enumeration(kind) => {
                 let name = kind.declared_type.as_ref()?;
-                let own = description.types.iter().find(|each| each.name == *name)?;
-                let own = Enumeration { name: name.clone(), items: items_of(own) };
+                let declared = description.types.iter().find(|declared| declared.name == *name)?;
+                let enumeration = Enumeration { name: name.clone(), items: items_of(declared) };
                 let known = &mut self.definitions.enumerations;
-                match known.iter().find(|each| each.name == *name) {
-                    Some(other) if *other != own => return None,
+                match known.iter().find(|enumeration| enumeration.name == *name) {
+                    Some(other) if *other != enumeration => return None,
                     Some(_) => {}
-                    None => known.push(own),
+                    None => known.push(enumeration),
                 }
                 Some(Type::Enumeration(name.clone()))
             }
@@ -245,9 +245,9 @@ impl Exporter {
     }
 }
 
-fn missing(what: &str, expected: &str, found: &str) -> SspError {
-    let (what, expected, found) = (what.to_owned(), expected.to_owned(), found.to_owned());
-    SspError::Missing { what, expected, found }
+fn missing(what: &str, expected: &str, actual: &str) -> SspError {
+    let (what, expected, actual) = (what.to_owned(), expected.to_owned(), actual.to_owned());
+    SspError::Missing { what, expected, found: actual }
 }
 
 /// Converts a setting to a value of the type of its variable.
@@ -274,11 +274,11 @@ fn value(
         }),
         Kind::String(_) => ParameterValue::String(setting.value.clone()),
         Kind::Enumeration(kind) => {
-            let own = description
+            let declared = description
                 .types
                 .iter()
-                .find(|each| Some(&each.name) == kind.declared_type.as_ref());
-            let items = own.map(|own| own.items.as_slice()).unwrap_or_default();
+                .find(|declared| Some(&declared.name) == kind.declared_type.as_ref());
+            let items = declared.map(|declared| declared.items.as_slice()).unwrap_or_default();
             let number = text.parse::<i64>().ok();
             let item = items.iter().find(|(name, value)| name == text || Some(*value) == number);
             let (item, _) = item.ok_or_else(|| wrong("an item of its enumeration"))?;

@@ -31,7 +31,7 @@ pub(super) struct Node {
     /// Name without prefix.
     pub(super) name: String,
     /// Whether the element belongs to an SSP namespace.
-    own: bool,
+    is_ssp: bool,
     attributes: Vec<(String, String)>,
     children: Vec<Node>,
     pub(super) at: Position,
@@ -50,25 +50,25 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<S
     let required = format!("{NAMESPACE}{space}");
     let mut scope = Scope::default();
     scope.open(&element);
-    let found = scope.space(&element).unwrap_or_default().to_owned();
+    let namespace = scope.space(&element).unwrap_or_default().to_owned();
     let local = element.name.rsplit(':').next().unwrap_or_default().to_owned();
-    let is_root = found == required || (found.is_empty() && scope.assumes(&element));
+    let is_root = namespace == required || (namespace.is_empty() && scope.assumes(&element));
     if !is_root || local != root {
         return Err(SspError::Content {
             at: element.at,
-            found: format!("namespace {found:?}"),
+            found: format!("namespace {namespace:?}"),
             element: element.name,
             expected: format!("the root element {root} of the namespace {required:?}"),
         });
     }
     let node = scope.node(element)?;
     node.version()?;
-    let warnings = scope.undeclared.into_iter().map(undeclared).collect();
+    let warnings = scope.undeclared.iter().map(|(prefix, at)| undeclared(prefix, *at)).collect();
     Ok((node, warnings))
 }
 
-fn undeclared((prefix, at): (String, Position)) -> String {
-    let assumed = if PREFIXES.contains(&prefix.as_str()) {
+fn undeclared(prefix: &str, at: Position) -> String {
+    let assumed = if PREFIXES.contains(&prefix) {
         "assumed to be the prefix of SSP"
     } else {
         "assumed not to be of SSP"
@@ -118,7 +118,8 @@ impl Scope {
     fn node(&mut self, element: xml::Element) -> Result<Node, SspError> {
         self.open(&element);
         let space = self.space(&element);
-        let own = space.is_some_and(|space| space.starts_with(NAMESPACE)) || self.assumes(&element);
+        let is_ssp =
+            space.is_some_and(|space| space.starts_with(NAMESPACE)) || self.assumes(&element);
         let prefix = prefix(&element);
         let is_known = space.is_some() || prefix.is_empty();
         if !is_known && !self.undeclared.iter().any(|(known, _)| known == prefix) {
@@ -128,7 +129,7 @@ impl Scope {
         let children = children.collect::<Result<Vec<Node>, SspError>>()?;
         self.close();
         let name = element.name.rsplit(':').next().unwrap_or_default().to_owned();
-        let node = Node { name, own, attributes: element.attributes, children, at: element.at };
+        let node = Node { name, is_ssp, attributes: element.attributes, children, at: element.at };
         node.characters()?;
         Ok(node)
     }
@@ -140,17 +141,17 @@ fn prefix(element: &xml::Element) -> &str {
 
 impl Node {
     /// Returns an error about the content of this element.
-    pub(super) fn wrong(&self, expected: impl Into<String>, found: impl Into<String>) -> SspError {
+    pub(super) fn wrong(&self, expected: impl Into<String>, actual: impl Into<String>) -> SspError {
         let (at, element) = (self.at, self.name.clone());
-        SspError::Content { at, element, expected: expected.into(), found: found.into() }
+        SspError::Content { at, element, expected: expected.into(), found: actual.into() }
     }
 
     /// Checks that the attributes contain XML characters only, so that they can be written again.
     fn characters(&self) -> Result<(), SspError> {
         for (name, value) in &self.attributes {
-            if let Some(found) = value.chars().find(|character| !is_character(*character)) {
+            if let Some(character) = value.chars().find(|character| !is_character(*character)) {
                 let expected = format!("characters of XML in the attribute {name}");
-                return Err(self.wrong(expected, format!("U+{:04X}", u32::from(found))));
+                return Err(self.wrong(expected, format!("U+{:04X}", u32::from(character))));
             }
         }
         Ok(())
@@ -175,8 +176,8 @@ impl Node {
     }
 
     pub(super) fn attribute(&self, name: &str) -> Option<&str> {
-        let own = self.attributes.iter().find(|(own, _)| own == name);
-        own.map(|(_, value)| value.as_str())
+        let attribute = self.attributes.iter().find(|(known, _)| known == name);
+        attribute.map(|(_, value)| value.as_str())
     }
 
     pub(super) fn text(&self, name: &str) -> Option<String> {
@@ -253,7 +254,7 @@ impl Node {
 
     /// Returns the children in SSP namespaces.
     pub(super) fn own_children(&self) -> impl Iterator<Item = &Node> {
-        self.children.iter().filter(|child| child.own)
+        self.children.iter().filter(|child| child.is_ssp)
     }
 
     /// Returns the first child called `name` in any namespace, for annotations.
@@ -294,8 +295,8 @@ impl Node {
         what: &str,
         names: impl IntoIterator<Item = &'a str>,
     ) -> Result<(), SspError> {
-        let mut seen = HashSet::new();
-        match names.into_iter().find(|name| !seen.insert(*name)) {
+        let mut earlier = HashSet::new();
+        match names.into_iter().find(|name| !earlier.insert(*name)) {
             None => Ok(()),
             Some(name) => {
                 Err(self

@@ -94,15 +94,19 @@ impl Files {
         let base = Base::archive(&folder, &target.shown);
         let name = target.fragment.as_deref().unwrap_or(DEFAULT);
         if name.contains('/') {
-            let (expected, found) = ("the name of an SSD at the root of the SSP", name.to_owned());
+            let (expected, actual) = ("the name of an SSD at the root of the SSP", name.to_owned());
             let what = target.shown.display().to_string();
-            return Err(SspError::Missing { what, expected: expected.to_owned(), found });
+            return Err(SspError::Missing { what, expected: expected.to_owned(), found: actual });
         }
         let inner = Target::new(folder.join(name), target.shown.join(name));
         if !inner.path.is_file() {
-            let found = definitions_in(&folder);
+            let definitions = definitions_in(&folder);
             let what = target.shown.display().to_string();
-            return Err(SspError::Missing { what, expected: format!("{name} at its root"), found });
+            return Err(SspError::Missing {
+                what,
+                expected: format!("{name} at its root"),
+                found: definitions,
+            });
         }
         self.ssd(&inner, base)
     }

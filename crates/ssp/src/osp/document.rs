@@ -80,8 +80,8 @@ impl std::fmt::Display for End {
 pub(super) fn read(bytes: &[u8]) -> Result<(Document, Vec<String>), SspError> {
     let root = xml::read(bytes)?;
     if local(&root) != "OspSystemStructure" {
-        let found = format!("<{}>", root.name);
-        return Err(wrong(&root, "the root element OspSystemStructure", found));
+        let actual = format!("<{}>", root.name);
+        return Err(wrong(&root, "the root element OspSystemStructure", actual));
     }
     let mut warnings = Vec::new();
     let mut document = Document {
@@ -162,8 +162,8 @@ fn function(element: &Element) -> Result<Function, SspError> {
         "VectorSum" => {
             let (inputs, dimension) = (count(element, "inputCount")?, count(element, "dimension")?);
             if inputs.saturating_mul(dimension) > COUNT {
-                let found = format!("{inputs} x {dimension}");
-                return Err(wrong(element, format!("at most {COUNT} inputs"), found));
+                let actual = format!("{inputs} x {dimension}");
+                return Err(wrong(element, format!("at most {COUNT} inputs"), actual));
             }
             Kind::Sum(Sum::VectorSum { inputs, dimension })
         }
@@ -211,11 +211,11 @@ fn all<T>(
     name: &str,
     read: impl Fn(&Element) -> Result<T, SspError>,
 ) -> Result<Vec<T>, SspError> {
-    let each = element.children.iter().map(|child| match local(child) {
-        found if found == name => read(child),
-        found => Err(wrong(child, format!("an element {name}"), found)),
+    let members = element.children.iter().map(|child| match local(child) {
+        local_name if local_name == name => read(child),
+        local_name => Err(wrong(child, format!("an element {name}"), local_name)),
     });
-    each.collect()
+    members.collect()
 }
 
 /// Returns the name without prefix, because libcosim uses one namespace.
@@ -224,8 +224,8 @@ pub(super) fn local(element: &Element) -> &str {
 }
 
 pub(super) fn attribute<'a>(element: &'a Element, name: &str) -> Option<&'a str> {
-    let found = element.attributes.iter().find(|(known, _)| known == name);
-    found.map(|(_, value)| value.as_str())
+    let attribute = element.attributes.iter().find(|(known, _)| known == name);
+    attribute.map(|(_, value)| value.as_str())
 }
 
 fn required<'a>(element: &'a Element, name: &str) -> Result<&'a str, SspError> {
@@ -256,11 +256,11 @@ fn time(element: &Element) -> Result<f64, SspError> {
     finite(&element.text).ok_or_else(wrong)
 }
 
-fn wrong(element: &Element, expected: impl Into<String>, found: impl Into<String>) -> SspError {
+fn wrong(element: &Element, expected: impl Into<String>, actual: impl Into<String>) -> SspError {
     SspError::Content {
         at: element.at,
         element: local(element).to_owned(),
         expected: expected.into(),
-        found: found.into(),
+        found: actual.into(),
     }
 }

@@ -35,8 +35,8 @@ fn group(element: &Element) -> Group {
 
 /// Returns the group called `name`: searches the groups of the model first, then nested groups.
 pub(super) fn find<'a>(groups: &'a [Group], name: &str) -> Option<&'a Group> {
-    let own = groups.iter().find(|group| group.name == name);
-    own.or_else(|| groups.iter().find_map(|group| find(&group.groups, name)))
+    let group = groups.iter().find(|group| group.name == name);
+    group.or_else(|| groups.iter().find_map(|group| find(&group.groups, name)))
 }
 
 impl Group {
@@ -54,8 +54,9 @@ impl Group {
                 self.name, other.name
             ));
         }
-        let own = self.variables.iter().zip(&other.variables);
-        let mut pairs: Vec<_> = own.map(|(here, there)| [here.as_str(), there.as_str()]).collect();
+        let variables = self.variables.iter().zip(&other.variables);
+        let mut pairs: Vec<_> =
+            variables.map(|(here, there)| [here.as_str(), there.as_str()]).collect();
         for (here, there) in self.groups.iter().zip(&other.groups) {
             pairs.extend(here.pairs(there)?);
         }

@@ -149,8 +149,8 @@ impl Number {
                 Ok(format!("{value:.0}"))
             }
             (Kind::Integer(_), Number::Item(_, Some(value))) => Ok(value.to_string()),
-            (Kind::Enumeration(_), Number::Item(item, own)) => {
-                let number = number_of(item, items).or(if items.is_none() { *own } else { None });
+            (Kind::Enumeration(_), Number::Item(item, value)) => {
+                let number = number_of(item, items).or(if items.is_none() { *value } else { None });
                 number.map(|number| number.to_string()).ok_or_else(|| {
                     let names = items.unwrap_or_default().iter().map(|(name, _)| name.as_str());
                     let names: Vec<&str> = names.collect();

@@ -15,8 +15,8 @@ use crate::xml::Node;
 pub(super) fn definitions(root: &Node) -> Result<Definitions, SspError> {
     let enumerations = root.list("Enumerations", "Enumeration", enumeration)?;
     let units = root.list("Units", "Unit", unit)?;
-    root.unique("enumerations", enumerations.iter().map(|each| each.name.as_str()))?;
-    root.unique("units", units.iter().map(|each| each.name.as_str()))?;
+    root.unique("enumerations", enumerations.iter().map(|enumeration| enumeration.name.as_str()))?;
+    root.unique("units", units.iter().map(|unit| unit.name.as_str()))?;
     Ok(Definitions { enumerations, units })
 }
 
@@ -46,7 +46,7 @@ fn unit(node: &Node) -> Result<Unit, SspError> {
 
 /// Reads the type that a child element states.
 pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
-    let mut found = None;
+    let mut stated = None;
     for child in node.own_children() {
         let kind = match child.name.as_str() {
             "Real" | "Float64" | "Float32" => Type::Real(child.stated("unit")),
@@ -60,12 +60,12 @@ pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
             "Clock" if child.attribute("name").is_none() => Type::Clock,
             _ => continue,
         };
-        if found.is_some() {
+        if stated.is_some() {
             return Err(node.wrong("one type", format!("another one, {}", child.name)));
         }
-        found = Some(kind);
+        stated = Some(kind);
     }
-    Ok(array(node)?.or_else(|| clocked(node)).or(found))
+    Ok(array(node)?.or_else(|| clocked(node)).or(stated))
 }
 
 /// Reads the dimensions; `None` if there is exactly one element in all.

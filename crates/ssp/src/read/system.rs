@@ -28,7 +28,10 @@ pub(super) fn system(node: &Node) -> Result<System, SspError> {
     }
     node.unique("elements", elements.iter().map(|element| element.base().name.as_str()))?;
     let dictionaries = node.list("SignalDictionaries", "SignalDictionary", dictionary)?;
-    node.unique("signal dictionaries", dictionaries.iter().map(|each| each.name.as_str()))?;
+    node.unique(
+        "signal dictionaries",
+        dictionaries.iter().map(|dictionary| dictionary.name.as_str()),
+    )?;
     Ok(System {
         base: base(node)?,
         elements,
@@ -43,7 +46,7 @@ fn base(node: &Node) -> Result<ElementBase, SspError> {
         return Err(node.wrong("a name", "an empty one"));
     }
     let connectors = node.list("Connectors", "Connector", connector)?;
-    node.unique("connectors", connectors.iter().map(|each| each.name.as_str()))?;
+    node.unique("connectors", connectors.iter().map(|connector| connector.name.as_str()))?;
     Ok(ElementBase {
         name,
         id: node.text("id"),
@@ -210,6 +213,7 @@ pub(super) fn experiment(node: &Node) -> Result<DefaultExperiment, SspError> {
 /// Returns the annotation of the Open Simulation Platform.
 fn annotation(node: &Node) -> Result<Option<&Node>, SspError> {
     let list = node.child("Annotations")?.into_iter().flat_map(Node::own_children);
-    let is_theirs = |each: &&Node| each.attribute("type") == Some(OPEN_SIMULATION_PLATFORM);
+    let is_theirs =
+        |annotation: &&Node| annotation.attribute("type") == Some(OPEN_SIMULATION_PLATFORM);
     Ok(list.into_iter().find(is_theirs))
 }

@@ -35,10 +35,11 @@ impl Archive {
         };
         let name: String = name.chars().map(plain).collect();
         let (stem, extension) = name.rsplit_once('.').unwrap_or((&name, ""));
-        let taken = |path: &str| self.entries.keys().any(|known| known.eq_ignore_ascii_case(path));
+        let is_used =
+            |path: &str| self.entries.keys().any(|known| known.eq_ignore_ascii_case(path));
         let first = format!("resources/{name}");
         let further = (2..).map(|number| format!("resources/{stem}_{number}.{extension}"));
-        let path = std::iter::once(first).chain(further).find(|path| !taken(path));
+        let path = std::iter::once(first).chain(further).find(|path| !is_used(path));
         let path = path.unwrap_or_default();
         self.entries.insert(path.clone(), bytes);
         path

@@ -56,7 +56,8 @@ fn a_connection_is_traced_through_systems_and_its_transformations_are_composed()
     );
     let connections = connection("outer.out", "other.in", &linear("1", "3"), "");
     let opened = bench().open(&root(&(outer + &other), &connections), "").unwrap();
-    let names: Vec<_> = opened.assembly.elements.iter().map(|each| each.name.as_str()).collect();
+    let names: Vec<_> =
+        opened.assembly.elements.iter().map(|element| element.name.as_str()).collect();
     assert_eq!(names, ["outer.inner.a", "other.b"]);
     // 10 (2 x + 1) + 3 = 20 x + 13.
     assert_eq!(

@@ -151,7 +151,8 @@ fn one_system_is_used_twice_by_its_id() {
     let second =
         r##"<ssd:Component name="second" type="application/x-ssp-definition" source="#it"/>"##;
     let opened = bench.open(&root(&(first.clone() + second), ""), "").unwrap();
-    let names: Vec<_> = opened.assembly.elements.iter().map(|each| each.name.as_str()).collect();
+    let names: Vec<_> =
+        opened.assembly.elements.iter().map(|element| element.name.as_str()).collect();
     assert_eq!(names, ["first.b", "second.b"]);
     let text = bench.refusal(&root(&(first + &second.replace("#it", "#that")), ""), "");
     assert!(text.ends_with("no system has the id \"that\""), "{text}");

@@ -111,7 +111,8 @@ fn a_name_that_means_two_variables_sets_both() {
     let outer = bindings(&[binding("", &real("x.c.sub.p", "6"), "")]);
     let opened = bench.open(&(outer + &root(&elements, "")), "").unwrap();
     assert_eq!(settings(&opened.assembly), ["x.c.sub.p = 6.0", "x.c.sub.p = 6.0"]);
-    let names: Vec<_> = opened.assembly.elements.iter().map(|each| each.name.as_str()).collect();
+    let names: Vec<_> =
+        opened.assembly.elements.iter().map(|element| element.name.as_str()).collect();
     assert_eq!(names, ["x.c", "x.c.sub"]);
 }
 

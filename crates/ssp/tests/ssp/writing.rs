@@ -242,7 +242,8 @@ fn an_assembly_comes_back_from_its_ssp_and_the_bytes_are_always_the_same() {
     // The step is there for libcosim: what is written here asks for no algorithm.
     assert!(!opened.fixed_step);
     assert_eq!(opened.warnings, [""; 0]);
-    let names: Vec<_> = opened.assembly.elements.iter().map(|each| each.name.as_str()).collect();
+    let names: Vec<_> =
+        opened.assembly.elements.iter().map(|element| element.name.as_str()).collect();
     assert_eq!(names, ["a", "my b", "again"]);
     assert_eq!(opened.assembly.elements[0].fmu, opened.assembly.elements[2].fmu);
     // An opened assembly, whose FMUs are folders, is written again.
@@ -277,24 +278,26 @@ fn assemblies_that_make_no_sense_are_not_written() {
     let good = assembly(&bench);
     for (change, expected) in [
         (
-            Box::new(|it: &mut Assembly| it.links[0].to.variable = "w".into())
+            Box::new(|assembly: &mut Assembly| assembly.links[0].to.variable = "w".into())
                 as Box<dyn Fn(&mut Assembly)>,
             "my b.w: expected a variable of a, found none of that name",
         ),
         (
-            Box::new(|it: &mut Assembly| it.links[0].to.element = "c".into()),
+            Box::new(|assembly: &mut Assembly| assembly.links[0].to.element = "c".into()),
             "c.u: expected an element of the assembly, found c",
         ),
         (
-            Box::new(|it: &mut Assembly| it.elements[2].name = "a".into()),
+            Box::new(|assembly: &mut Assembly| assembly.elements[2].name = "a".into()),
             "a: expected a name that no other element has, found a second one",
         ),
         (
-            Box::new(|it: &mut Assembly| it.elements[1].settings[1].value = "3".into()),
+            Box::new(|assembly: &mut Assembly| assembly.elements[1].settings[1].value = "3".into()),
             "my b.g: expected an item of its enumeration, found \"3\"",
         ),
         (
-            Box::new(|it: &mut Assembly| it.elements[1].settings[0].value = "NaN".into()),
+            Box::new(|assembly: &mut Assembly| {
+                assembly.elements[1].settings[0].value = "NaN".into();
+            }),
             "my b.p: expected a finite number, found \"NaN\"",
         ),
     ] {
