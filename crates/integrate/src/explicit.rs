@@ -4,6 +4,8 @@
 //! extension and measure of stiffness: E. Hairer, S. P. Norsett and G. Wanner, "Solving Ordinary
 //! Differential Equations I" (2nd ed.), section II.6, and part II (2nd ed.), section IV.2.
 
+use crate::start::StepStart;
+
 /// Nodes of the stages 2 to 7.
 const NODES: [f64; 6] = [0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
 
@@ -60,19 +62,18 @@ impl Explicit {
         }
     }
 
-    /// Attempts the step from `start` at `time` over `size`, where the derivative is `slope`.
+    /// Attempts the step from `start` over `size`.
     pub(crate) fn attempt<E>(
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), E>,
-        (time, size): (f64, f64),
-        start: &[f64],
-        slope: &[f64],
+        start: StepStart<'_>,
+        size: f64,
     ) -> Result<(), E> {
-        self.slopes[0].copy_from_slice(slope);
+        self.slopes[0].copy_from_slice(start.slope);
         for (stage, (weights, node)) in STAGES.iter().zip(NODES).enumerate() {
             let argument = if stage == 5 { &mut self.end } else { &mut self.stage };
-            combine(argument, Some(start), size, weights, &self.slopes);
-            derivative(time + node * size, argument, &mut self.slopes[stage + 1])?;
+            combine(argument, Some(start.states), size, weights, &self.slopes);
+            derivative(start.time + node * size, argument, &mut self.slopes[stage + 1])?;
         }
         combine(&mut self.error, None, size, &ERROR, &self.slopes);
         Ok(())
@@ -143,9 +144,10 @@ mod tests {
 
     fn step(size: f64) -> Explicit {
         let mut method = Explicit::new(2);
-        let (start, mut slope) = (exact(0.3), [0.0; 2]);
-        let Ok(()) = circle(0.3, &start, &mut slope);
-        let Ok(()) = method.attempt(&mut circle, (0.3, size), &start, &slope);
+        let (states, mut slope) = (exact(0.3), [0.0; 2]);
+        let Ok(()) = circle(0.3, &states, &mut slope);
+        let start = StepStart { time: 0.3, states: &states, slope: &slope };
+        let Ok(()) = method.attempt(&mut circle, start, size);
         method
     }
 
@@ -186,7 +188,8 @@ mod tests {
             Ok(())
         };
         let mut method = Explicit::new(1);
-        let Ok(()) = method.attempt(&mut decay, (0.0, 0.004), &[1.0], &[-1000.0]);
+        let start = StepStart { time: 0.0, states: &[1.0], slope: &[-1000.0] };
+        let Ok(()) = method.attempt(&mut decay, start, 0.004);
         let found = method.stiffness(0.004, |_| 1.0);
         assert!((found - 4.0).abs() < 1e-9, "{found}");
     }

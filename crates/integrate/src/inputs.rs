@@ -53,7 +53,7 @@ impl Inputs {
             _ => 0.0,
         };
         let mut all: Vec<_> =
-            continuous.map(|own| (own.value_reference, start(&own.kind))).collect();
+            continuous.map(|variable| (variable.value_reference, start(&variable.kind))).collect();
         all.sort_by_key(|(reference, _)| *reference);
         all.dedup_by_key(|(reference, _)| *reference);
         let (references, starts): (Vec<u32>, Vec<f64>) = all.into_iter().unzip();

@@ -61,9 +61,9 @@ struct Point {
 /// Returns the description of a model-exchange FMU with an element `CoSimulation` that states what
 /// [`Integrated`] offers.
 #[must_use]
-pub fn description_of(own: &ModelDescription) -> ModelDescription {
-    let mut description = own.clone();
-    let flags = own.model_exchange.clone().unwrap_or_default();
+pub fn description_of(equations: &ModelDescription) -> ModelDescription {
+    let mut description = equations.clone();
+    let flags = equations.model_exchange.clone().unwrap_or_default();
     description.co_simulation = Some(CoSimulation {
         model_identifier: flags.model_identifier,
         needs_execution_tool: flags.needs_execution_tool,
@@ -81,8 +81,9 @@ pub fn description_of(own: &ModelDescription) -> ModelDescription {
 
 /// Returns the value references of the clocks.
 fn clocks_of(description: &ModelDescription) -> Vec<u32> {
-    let clocks = description.variables.iter().filter(|own| matches!(own.kind, Kind::Clock(_)));
-    clocks.map(|own| own.value_reference).collect()
+    let clocks =
+        description.variables.iter().filter(|variable| matches!(variable.kind, Kind::Clock(_)));
+    clocks.map(|clock| clock.value_reference).collect()
 }
 
 /// A model-exchange instance that is integrated from one communication point to the next.
@@ -206,7 +207,7 @@ impl Integrated {
         let derivative = derivative.and_then(|unknown| at(unknown.index));
         derivative.map_or_else(
             || format!("continuous state {}", index + 1),
-            |own| format!("the continuous state with the derivative {}", own.name),
+            |variable| format!("the continuous state with the derivative {}", variable.name),
         )
     }
 

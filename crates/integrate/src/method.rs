@@ -35,7 +35,7 @@ impl FromStr for Method {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let all = [Method::Automatic, Method::Explicit, Method::Stiff];
-        let found = all.into_iter().find(|method| method.name() == text);
-        found.ok_or_else(|| format!("expected automatic, explicit or stiff, found {text:?}"))
+        let named = all.into_iter().find(|method| method.name() == text);
+        named.ok_or_else(|| format!("expected automatic, explicit or stiff, found {text:?}"))
     }
 }

@@ -7,6 +7,8 @@
 
 use solve::Factors;
 
+use crate::start::StepStart;
+
 const GAMMA: f64 = 0.25;
 
 /// Nodes of the stages 2 to 6.
@@ -92,18 +94,18 @@ impl Rosenbrock {
     }
 
     /// Computes the Jacobian and the derivative with respect to time at the start of a step of about
-    /// `size`, where the derivative is `slope`. `typical` is the size of a component.
+    /// `size`. `typical` is the size of a component.
     pub(crate) fn linearise<E>(
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), E>,
-        (time, size): (f64, f64),
-        start: &[f64],
-        slope: &[f64],
+        start: StepStart<'_>,
+        size: f64,
         typical: impl Fn(usize) -> f64,
     ) -> Result<(), E> {
-        let n = start.len();
-        self.argument.copy_from_slice(start);
-        for (column, &value) in start.iter().enumerate() {
+        let StepStart { time, states, slope } = start;
+        let n = states.len();
+        self.argument.copy_from_slice(states);
+        for (column, &value) in states.iter().enumerate() {
             let change = f64::EPSILON.sqrt() * value.abs().max(typical(column));
             self.argument[column] = value + change;
             let change = self.argument[column] - value;
@@ -117,7 +119,7 @@ impl Rosenbrock {
         // Within the step, because the time may not pass an event.
         let change = (f64::EPSILON * time.abs().max(1e-5)).sqrt().min(1e-3 * size);
         let there = time + change.max(4.0 * f64::EPSILON * time.abs());
-        derivative(there, start, &mut self.with_time)?;
+        derivative(there, states, &mut self.with_time)?;
         for (quotient, slope) in self.with_time.iter_mut().zip(slope) {
             *quotient = (*quotient - slope) / (there - time);
         }
@@ -135,16 +137,16 @@ impl Rosenbrock {
         (0..n).map(row).fold(0.0, f64::max)
     }
 
-    /// Attempts the step from `start` at `time` over `size`, where the derivative is `slope`, after
-    /// [`Rosenbrock::linearise`]. Returns false if its matrix is singular.
+    /// Attempts the step from `start` over `size` after [`Rosenbrock::linearise`]. Returns false if its
+    /// matrix is singular.
     pub(crate) fn attempt<E>(
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), E>,
-        (time, size): (f64, f64),
-        start: &[f64],
-        slope: &[f64],
+        start: StepStart<'_>,
+        size: f64,
     ) -> Result<bool, E> {
-        let n = start.len();
+        let StepStart { time, states, slope } = start;
+        let n = states.len();
         for (entry, value) in self.matrix.iter_mut().zip(&self.jacobian) {
             *entry = -value;
         }
@@ -159,7 +161,7 @@ impl Rosenbrock {
                 self.slope.copy_from_slice(slope);
             } else {
                 let weights = ARGUMENTS[stage - 1];
-                combine(&mut self.argument, start, weights, &self.increments);
+                combine(&mut self.argument, states, weights, &self.increments);
                 derivative(time + NODES[stage - 1] * size, &self.argument, &mut self.slope)?;
             }
             let couplings = if stage == 0 { &[][..] } else { COUPLINGS[stage - 1] };
@@ -229,11 +231,11 @@ mod tests {
 
     fn step(size: f64) -> Rosenbrock {
         let mut method = Rosenbrock::new(2);
-        let (start, mut slope) = (exact(0.5), [0.0; 2]);
-        let Ok(()) = equations(0.5, &start, &mut slope);
-        let span = (0.5, size);
-        let Ok(()) = method.linearise(&mut equations, span, &start, &slope, |_| 1.0);
-        let Ok(true) = method.attempt(&mut equations, span, &start, &slope) else { panic!() };
+        let (states, mut slope) = (exact(0.5), [0.0; 2]);
+        let Ok(()) = equations(0.5, &states, &mut slope);
+        let start = StepStart { time: 0.5, states: &states, slope: &slope };
+        let Ok(()) = method.linearise(&mut equations, start, size, |_| 1.0);
+        let Ok(true) = method.attempt(&mut equations, start, size) else { panic!() };
         method
     }
 
@@ -269,8 +271,9 @@ mod tests {
             Ok(())
         };
         let mut method = Rosenbrock::new(1);
-        let Ok(()) = method.linearise(&mut decay, (0.0, 1.0), &[1.0], &[-1e9], |_| 1.0);
-        let Ok(true) = method.attempt(&mut decay, (0.0, 1.0), &[1.0], &[-1e9]) else { panic!() };
+        let start = StepStart { time: 0.0, states: &[1.0], slope: &[-1e9] };
+        let Ok(()) = method.linearise(&mut decay, start, 1.0, |_| 1.0);
+        let Ok(true) = method.attempt(&mut decay, start, 1.0) else { panic!() };
         assert!(method.end[0].abs() < 1e-6, "{}", method.end[0]);
         assert!((method.bound_of_eigenvalues(|_| 1.0) / 1e9 - 1.0).abs() < 1e-6);
     }

@@ -7,6 +7,7 @@ use solve::Scale;
 use crate::explicit::Explicit;
 use crate::method::Method;
 use crate::rosenbrock::Rosenbrock;
+use crate::start::StepStart;
 
 /// Ratio of the chosen step to the largest step that meets the tolerance, and the bounds of the ratio of
 /// two steps.
@@ -124,7 +125,8 @@ impl Stepper {
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), CallError>,
         states: &[f64],
-        (time, limit): (f64, f64),
+        time: f64,
+        limit: f64,
     ) -> Result<f64, StepError> {
         self.start.copy_from_slice(states);
         if states.is_empty() {
@@ -148,7 +150,7 @@ impl Stepper {
                 let (state, is_finite) = self.worst();
                 return Err(StepError::Size { size, state, is_finite, cause });
             }
-            match self.attempt(derivative, (time, size), &mut linearised) {
+            match self.attempt(derivative, time, size, &mut linearised) {
                 Ok(error) if error <= 1.0 => {
                     self.accept(size, error, rejected);
                     return Ok(if is_last { limit } else { time + size });
@@ -172,22 +174,24 @@ impl Stepper {
     fn attempt(
         &mut self,
         derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), CallError>,
-        span: (f64, f64),
+        time: f64,
+        size: f64,
         linearised: &mut bool,
     ) -> Result<f64, CallError> {
         let Self { explicit, stiff, start, slope, scale, .. } = self;
-        (self.size, self.last_is_stiff) = (span.1, self.memory.is_stiff);
+        (self.size, self.last_is_stiff) = (size, self.memory.is_stiff);
+        let step_start = StepStart { time, states: start, slope };
         if !self.memory.is_stiff {
-            explicit.attempt(derivative, span, start, slope)?;
+            explicit.attempt(derivative, step_start, size)?;
             return Ok(norm(scale, &explicit.error, start, &explicit.end));
         }
         let method = stiff.get_or_insert_with(|| Rosenbrock::new(start.len()));
         if !*linearised {
             let nominals = scale.nominals();
-            method.linearise(derivative, span, start, slope, |i| SMALL * nominals[i])?;
+            method.linearise(derivative, step_start, size, |i| SMALL * nominals[i])?;
             *linearised = true;
         }
-        if !method.attempt(derivative, span, start, slope)? {
+        if !method.attempt(derivative, step_start, size)? {
             return Ok(f64::INFINITY);
         }
         Ok(norm(scale, method.error(), start, &method.end))

@@ -4,20 +4,29 @@
 use crate::memory::{Layout, Number, Part, Vector};
 use nalgebra::DMatrix;
 
-/// A matrix argument with its option TRANS.
+/// A matrix argument A with its option TRANS, and the size of op(A).
 pub(crate) struct Operand<T> {
     pub(crate) data: *const T,
     pub(crate) leading: i32,
     pub(crate) transpose: u8,
+    pub(crate) rows: i32,
+    pub(crate) cols: i32,
 }
 
 impl<T: Number> Operand<T> {
-    /// op(A), `rows` x `cols`; None for an illegal argument.
+    /// The operand of an array with `m` rows and `n` columns.
+    pub(crate) fn of_array(data: *const T, leading: i32, transpose: u8, m: i32, n: i32) -> Self {
+        let (rows, cols) = if transpose.eq_ignore_ascii_case(&b'N') { (m, n) } else { (n, m) };
+        Self { data, leading, transpose, rows, cols }
+    }
+
+    /// op(A); None for an illegal argument.
     ///
     /// # Safety
     ///
     /// The array is valid for reads.
-    unsafe fn read(&self, rows: i32, cols: i32) -> Option<DMatrix<f64>> {
+    unsafe fn read(&self) -> Option<DMatrix<f64>> {
+        let (rows, cols) = (self.rows, self.cols);
         match self.transpose.to_ascii_uppercase() {
             b'N' => {
                 let layout = Layout::new(rows, cols, self.leading)?;
@@ -69,15 +78,14 @@ impl<T: Number> Target<T> {
 ///
 /// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn general<T: Number>(
-    (m, n, k): (i32, i32, i32),
     a: &Operand<T>,
     b: &Operand<T>,
     c: &Target<T>,
 ) -> Option<()> {
     // SAFETY: the caller guarantees it.
     unsafe {
-        let (left, right) = (a.read(m, k)?, b.read(k, n)?);
-        c.update(m, n, left * right)
+        let (left, right) = (a.read()?, b.read()?);
+        c.update(a.rows, b.cols, left * right)
     }
 }
 
@@ -86,15 +94,11 @@ pub(crate) unsafe fn general<T: Number>(
 /// # Safety
 ///
 /// The pointers are valid for the sizes that the arguments state.
-pub(crate) unsafe fn rank_k<T: Number>(
-    (n, k): (i32, i32),
-    a: &Operand<T>,
-    c: &Target<T>,
-) -> Option<()> {
+pub(crate) unsafe fn rank_k<T: Number>(a: &Operand<T>, c: &Target<T>) -> Option<()> {
     // SAFETY: the caller guarantees it.
     unsafe {
-        let left = a.read(n, k)?;
-        c.update(n, n, &left * left.transpose())
+        let left = a.read()?;
+        c.update(a.rows, a.rows, &left * left.transpose())
     }
 }
 
@@ -104,37 +108,55 @@ pub(crate) unsafe fn rank_k<T: Number>(
 ///
 /// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn rank_2k<T: Number>(
-    (n, k): (i32, i32),
     a: &Operand<T>,
     b: &Operand<T>,
     c: &Target<T>,
 ) -> Option<()> {
     // SAFETY: the caller guarantees it.
     unsafe {
-        let (left, right) = (a.read(n, k)?, b.read(n, k)?);
+        let (left, right) = (a.read()?, b.read()?);
         let half = left * right.transpose();
-        c.update(n, n, &half + half.transpose())
+        c.update(a.rows, a.rows, &half + half.transpose())
     }
 }
 
-/// y := alpha op(A) x + beta y with A of m x n.
+/// A symmetric matrix argument, n x n, of which one triangle is read.
+pub(crate) struct Symmetric<T> {
+    pub(crate) data: *const T,
+    pub(crate) leading: i32,
+    pub(crate) triangle: u8,
+    pub(crate) n: i32,
+}
+
+/// A vector argument with its option INC.
+pub(crate) struct VectorOperand<T> {
+    pub(crate) data: *const T,
+    pub(crate) increment: i32,
+}
+
+/// The output vector y and the two factors.
+pub(crate) struct VectorTarget<T> {
+    pub(crate) data: *mut T,
+    pub(crate) increment: i32,
+    pub(crate) alpha: T,
+    pub(crate) beta: T,
+}
+
+/// y := alpha op(A) x + beta y.
 ///
 /// # Safety
 ///
 /// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn matrix_vector<T: Number>(
-    (m, n): (i32, i32),
     a: &Operand<T>,
-    x: (*const T, i32),
-    (alpha, beta): (T, T),
-    y: (*mut T, i32),
+    x: &VectorOperand<T>,
+    y: &VectorTarget<T>,
 ) -> Option<()> {
-    let (rows, cols) = if a.transpose.eq_ignore_ascii_case(&b'N') { (m, n) } else { (n, m) };
-    let (input, output) = (Vector::new(cols, x.1)?, Vector::new(rows, y.1)?);
+    let (input, output) = (Vector::new(a.cols, x.increment)?, Vector::new(a.rows, y.increment)?);
     // SAFETY: the caller guarantees it.
     unsafe {
-        let product = a.read(rows, cols)? * input.read(x.0);
-        output.update(y.0, &(product * alpha.wide()), beta);
+        let product = a.read()? * input.read(x.data);
+        output.update(y.data, &(product * y.alpha.wide()), y.beta);
     }
     Some(())
 }
@@ -145,20 +167,18 @@ pub(crate) unsafe fn matrix_vector<T: Number>(
 ///
 /// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn symmetric_vector<T: Number>(
-    (triangle, n): (u8, i32),
-    (a, leading): (*const T, i32),
-    x: (*const T, i32),
-    (alpha, beta): (T, T),
-    y: (*mut T, i32),
+    a: &Symmetric<T>,
+    x: &VectorOperand<T>,
+    y: &VectorTarget<T>,
 ) -> Option<()> {
-    let (part, layout) = (Part::triangle(triangle)?, Layout::new(n, n, leading)?);
-    let (input, output) = (Vector::new(n, x.1)?, Vector::new(n, y.1)?);
+    let (part, layout) = (Part::triangle(a.triangle)?, Layout::new(a.n, a.n, a.leading)?);
+    let (input, output) = (Vector::new(a.n, x.increment)?, Vector::new(a.n, y.increment)?);
     // SAFETY: the caller guarantees it.
     unsafe {
-        let half = layout.read(a, part);
+        let half = layout.read(a.data, part);
         let mut whole = &half + half.transpose();
         whole.set_diagonal(&half.diagonal());
-        output.update(y.0, &(whole * input.read(x.0) * alpha.wide()), beta);
+        output.update(y.data, &(whole * input.read(x.data) * y.alpha.wide()), y.beta);
     }
     Some(())
 }

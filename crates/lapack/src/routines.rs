@@ -61,7 +61,8 @@ pub(crate) unsafe fn potrf<T: Number>(triangle: u8, n: i32, a: Array<T>) -> Resu
 /// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn potrs<T: Number>(
     triangle: u8,
-    (n, right_sides): (i32, i32),
+    n: i32,
+    right_sides: i32,
     a: Array<T>,
     b: Array<T>,
 ) -> Result<(), i32> {
@@ -69,9 +70,9 @@ pub(crate) unsafe fn potrs<T: Number>(
     let layout = a.layout(size(n, 2)?, n, 5)?;
     let right = b.layout(n, size(right_sides, 3)?, 7)?;
     // SAFETY: the caller guarantees it.
-    let (factor, given) = unsafe { (layout.read(a.at, part), right.read(b.at, Part::All)) };
+    let (factor, right_side) = unsafe { (layout.read(a.at, part), right.read(b.at, Part::All)) };
     let l = if part == Part::Lower { factor } else { factor.transpose() };
-    let x = backward(&l.transpose(), &forward(&l, &given));
+    let x = backward(&l.transpose(), &forward(&l, &right_side));
     // SAFETY: the caller guarantees it.
     unsafe { right.write(b.at, &x, Part::All) };
     Ok(())
@@ -83,7 +84,8 @@ pub(crate) unsafe fn potrs<T: Number>(
 ///
 /// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn gesv<T: Number>(
-    (n, right_sides): (i32, i32),
+    n: i32,
+    right_sides: i32,
     a: Array<T>,
     pivots: *mut i32,
     b: Array<T>,
@@ -91,7 +93,8 @@ pub(crate) unsafe fn gesv<T: Number>(
     let layout = a.layout(size(n, 1)?, n, 4)?;
     let right = b.layout(n, size(right_sides, 2)?, 7)?;
     // SAFETY: the caller guarantees it.
-    let (matrix, given) = unsafe { (layout.read(a.at, Part::All), right.read(b.at, Part::All)) };
+    let (matrix, right_side) =
+        unsafe { (layout.read(a.at, Part::All), right.read(b.at, Part::All)) };
     let elimination = Elimination::new(&matrix);
     // SAFETY: the caller guarantees it; there are n pivots.
     unsafe {
@@ -104,8 +107,15 @@ pub(crate) unsafe fn gesv<T: Number>(
         return Err(from_one(pivot));
     }
     // SAFETY: the caller guarantees it.
-    unsafe { right.write(b.at, &elimination.solve(&given), Part::All) };
+    unsafe { right.write(b.at, &elimination.solve(&right_side), Part::All) };
     Ok(())
+}
+
+/// The options JOBZ, RANGE and UPLO of [`syevr`].
+pub(crate) struct EigenOptions {
+    pub(crate) job: u8,
+    pub(crate) range: u8,
+    pub(crate) triangle: u8,
 }
 
 /// The output arrays of [`syevr`].
@@ -122,20 +132,20 @@ pub(crate) struct Spectrum<T> {
 ///
 /// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn syevr<T: Number>(
-    (job, range, triangle): (u8, u8, u8),
+    options: &EigenOptions,
     n: i32,
     a: Array<T>,
     to: &Spectrum<T>,
 ) -> Result<(), i32> {
-    let compute_vectors = match job.to_ascii_uppercase() {
+    let compute_vectors = match options.job.to_ascii_uppercase() {
         b'N' => false,
         b'V' => true,
         _ => return Err(-1),
     };
-    if !range.eq_ignore_ascii_case(&b'A') {
+    if !options.range.eq_ignore_ascii_case(&b'A') {
         return Err(-2);
     }
-    let part = Part::triangle(triangle).ok_or(-3)?;
+    let part = Part::triangle(options.triangle).ok_or(-3)?;
     let layout = a.layout(size(n, 4)?, n, 6)?;
     // SAFETY: the caller guarantees it.
     let half = unsafe { layout.read(a.at, part) };
@@ -201,7 +211,8 @@ pub(crate) struct Factors<T> {
 ///
 /// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn singular_values<T: Number>(
-    (m, n): (i32, i32),
+    m: i32,
+    n: i32,
     a: Array<T>,
     to: &Factors<T>,
     first: i32,

@@ -5,8 +5,13 @@
 #![expect(unsafe_code, reason = "the boundary to callers in C and Fortran")]
 
 use crate::memory::{Number, Part};
-use crate::products::{Operand, Target, general, matrix_vector, rank_2k, rank_k, symmetric_vector};
-use crate::routines::{Array, Factors, Spectrum, gesv, potrf, potrs, singular_values, syevr};
+use crate::products::{
+    Operand, Symmetric, Target, VectorOperand, VectorTarget, general, matrix_vector, rank_2k,
+    rank_k, symmetric_vector,
+};
+use crate::routines::{
+    Array, EigenOptions, Factors, Spectrum, gesv, potrf, potrs, singular_values, syevr,
+};
 
 /// The INFO of a result.
 fn code(answer: Result<(), i32>) -> i32 {
@@ -36,12 +41,12 @@ macro_rules! gemm {
             c: *mut $number,
             ldc: &i32,
         ) {
-            let left = Operand { data: a, leading: *lda, transpose: *transa };
-            let right = Operand { data: b, leading: *ldb, transpose: *transb };
+            let left = Operand { data: a, leading: *lda, transpose: *transa, rows: *m, cols: *k };
+            let right = Operand { data: b, leading: *ldb, transpose: *transb, rows: *k, cols: *n };
             let part = Some(Part::All);
             let target = Target { data: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
             // SAFETY: the caller guarantees it.
-            unsafe { general((*m, *n, *k), &left, &right, &target) };
+            unsafe { general(&left, &right, &target) };
         }
     };
 }
@@ -67,9 +72,11 @@ macro_rules! gemv {
             y: *mut $number,
             incy: &i32,
         ) {
-            let matrix = Operand { data: a, leading: *lda, transpose: *trans };
+            let matrix = Operand::of_array(a, *lda, *trans, *m, *n);
+            let vector = VectorOperand { data: x, increment: *incx };
+            let target = VectorTarget { data: y, increment: *incy, alpha: *alpha, beta: *beta };
             // SAFETY: the caller guarantees it.
-            unsafe { matrix_vector((*m, *n), &matrix, (x, *incx), (*alpha, *beta), (y, *incy)) };
+            unsafe { matrix_vector(&matrix, &vector, &target) };
         }
     };
 }
@@ -94,9 +101,11 @@ macro_rules! symv {
             y: *mut $number,
             incy: &i32,
         ) {
-            let factors = (*alpha, *beta);
+            let matrix = Symmetric { data: a, leading: *lda, triangle: *uplo, n: *n };
+            let vector = VectorOperand { data: x, increment: *incx };
+            let target = VectorTarget { data: y, increment: *incy, alpha: *alpha, beta: *beta };
             // SAFETY: the caller guarantees it.
-            unsafe { symmetric_vector((*uplo, *n), (a, *lda), (x, *incx), factors, (y, *incy)) };
+            unsafe { symmetric_vector(&matrix, &vector, &target) };
         }
     };
 }
@@ -121,11 +130,11 @@ macro_rules! syrk {
             c: *mut $number,
             ldc: &i32,
         ) {
-            let left = Operand { data: a, leading: *lda, transpose: *trans };
+            let left = Operand { data: a, leading: *lda, transpose: *trans, rows: *n, cols: *k };
             let part = Part::triangle(*uplo);
             let target = Target { data: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
             // SAFETY: the caller guarantees it.
-            unsafe { rank_k((*n, *k), &left, &target) };
+            unsafe { rank_k(&left, &target) };
         }
     };
 }
@@ -152,12 +161,12 @@ macro_rules! syr2k {
             c: *mut $number,
             ldc: &i32,
         ) {
-            let left = Operand { data: a, leading: *lda, transpose: *trans };
-            let right = Operand { data: b, leading: *ldb, transpose: *trans };
+            let left = Operand { data: a, leading: *lda, transpose: *trans, rows: *n, cols: *k };
+            let right = Operand { data: b, leading: *ldb, transpose: *trans, rows: *n, cols: *k };
             let part = Part::triangle(*uplo);
             let target = Target { data: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
             // SAFETY: the caller guarantees it.
-            unsafe { rank_2k((*n, *k), &left, &right, &target) };
+            unsafe { rank_2k(&left, &right, &target) };
         }
     };
 }
@@ -205,7 +214,7 @@ macro_rules! potrs {
             let factor = Array { at: a.cast_mut(), leading: *lda };
             let right = Array { at: b, leading: *ldb };
             // SAFETY: the caller guarantees it; the factor is only read.
-            let answer = unsafe { potrs(*uplo, (*n, *nrhs), factor, right) };
+            let answer = unsafe { potrs(*uplo, *n, *nrhs, factor, right) };
             *info = code(answer);
         }
     };
@@ -231,7 +240,7 @@ macro_rules! gesv {
         ) {
             let (matrix, right) = (Array { at: a, leading: *lda }, Array { at: b, leading: *ldb });
             // SAFETY: the caller guarantees it.
-            let answer = unsafe { gesv((*n, *nrhs), matrix, ipiv, right) };
+            let answer = unsafe { gesv(*n, *nrhs, matrix, ipiv, right) };
             *info = code(answer);
         }
     };
@@ -276,9 +285,10 @@ macro_rules! syevr {
             }
             let vectors = Array { at: z, leading: *ldz };
             let matrix = Array { at: a, leading: *lda };
+            let options = EigenOptions { job: *jobz, range: *range, triangle: *uplo };
             let to = Spectrum { count: m, values: w, vectors, support: isuppz };
             // SAFETY: the caller guarantees it.
-            let answer = unsafe { syevr((*jobz, *range, *uplo), *n, matrix, &to) };
+            let answer = unsafe { syevr(&options, *n, matrix, &to) };
             *info = code(answer);
         }
     };
@@ -319,7 +329,7 @@ macro_rules! gesdd {
             let matrix = Array { at: a, leading: *lda };
             let to = Factors { values: s, left, right };
             // SAFETY: the caller guarantees it.
-            let answer = unsafe { singular_values((*m, *n), matrix, &to, 2) };
+            let answer = unsafe { singular_values(*m, *n, matrix, &to, 2) };
             *info = code(answer);
         }
     };
@@ -360,7 +370,7 @@ macro_rules! gesvd {
             let matrix = Array { at: a, leading: *lda };
             let to = Factors { values: s, left, right };
             // SAFETY: the caller guarantees it.
-            let answer = unsafe { singular_values((*m, *n), matrix, &to, 3) };
+            let answer = unsafe { singular_values(*m, *n, matrix, &to, 3) };
             *info = code(answer);
         }
     };

@@ -100,7 +100,8 @@ impl Samples {
     fn of(
         mut function: impl FnMut(f64) -> Result<Vec<f64>, LineariseError>,
         value: f64,
-        (side, first): (Side, f64),
+        side: Side,
+        first: f64,
     ) -> Result<Self, LineariseError> {
         let middle = function(value)?;
         let empty = vec![Vec::with_capacity(LEVELS); middle.len()];
@@ -160,7 +161,7 @@ pub(super) fn of_equations(
 ) -> Result<Differences, LineariseError> {
     let (n, m) = (equations.states.len(), equations.parts.inputs.len());
     let rows = n + equations.parts.outputs.len();
-    let mut found = Differences {
+    let mut differences = Differences {
         jacobian: DMatrix::zeros(rows, n + m),
         errors: DMatrix::zeros(rows, n + m),
         steps: Vec::with_capacity(n + m),
@@ -176,23 +177,24 @@ pub(super) fn of_equations(
             let input = column - n;
             (Known::Input(input), equations.u[input], &equations.parts.inputs[input])
         };
-        let reach = reach(part, value, FIRST * scale)?;
-        let samples = Samples::of(|at| equations.evaluate(Some((known, at))), value, reach)?;
+        let (side, first) = reach(part, value, FIRST * scale)?;
+        let function = |at| equations.evaluate(Some((known, at)));
+        let samples = Samples::of(function, value, side, first)?;
         for (row, magnitude) in magnitudes.iter_mut().enumerate() {
-            let term = samples.slopes[row][LEVELS / 2] * value.abs().max(reach.1);
+            let term = samples.slopes[row][LEVELS / 2] * value.abs().max(first);
             *magnitude = magnitude.max(samples.middle[row].abs()).max(term.abs());
         }
-        found.steps.push(reach.1);
+        differences.steps.push(first);
         columns.push(samples);
     }
     for (column, samples) in columns.iter().enumerate() {
         for (row, &magnitude) in magnitudes.iter().enumerate() {
             let (slope, error) = samples.slope(row, magnitude);
-            found.jacobian[(row, column)] = slope;
-            found.errors[(row, column)] = error;
+            differences.jacobian[(row, column)] = slope;
+            differences.errors[(row, column)] = error;
         }
     }
-    Ok(found)
+    Ok(differences)
 }
 
 #[cfg(test)]
@@ -200,7 +202,7 @@ mod tests {
     use super::*;
 
     fn slope_at(value: f64, side: Side, function: impl Fn(f64) -> f64) -> Estimate {
-        let samples = Samples::of(|at| Ok(vec![function(at)]), value, (side, 1e-2)).unwrap();
+        let samples = Samples::of(|at| Ok(vec![function(at)]), value, side, 1e-2).unwrap();
         samples.slope(0, samples.middle[0].abs().max(value.abs()))
     }
 

@@ -121,12 +121,12 @@ pub enum LineariseError {
         model: String,
     },
     /// A state that is left out influences a remaining state or output.
-    #[error("the state {left_out} may not be left out: {kept} depends on it")]
+    #[error("the state {left_out} may not be left out: {dependent} depends on it")]
     Coupled {
         /// The state.
         left_out: String,
         /// The state derivative or output that depends on it.
-        kept: String,
+        dependent: String,
     },
     /// The FMU offers none of the three methods.
     #[error(

@@ -180,8 +180,8 @@ fn by_equations(
         }
     };
     let (x, u) = (equations.x, equations.u);
-    let found = RawResult { states: with_nominals, x, u, y: outputs, rates: values, jacobian, how };
-    assemble(parts, request, found)
+    let raw = RawResult { states: with_nominals, x, u, y: outputs, rates: values, jacobian, how };
+    assemble(parts, request, raw)
 }
 
 fn scales(states: &[Part], x: &[f64], inputs: &[Part], u: &[f64]) -> Vec<f64> {
@@ -232,7 +232,7 @@ fn by_steps(
         return Err(LineariseError::StatesNotNamed { model, candidates });
     }
     let preferred = parts.description.default_experiment.and_then(|default| default.step_size);
-    let (step, found) = match request.step.or(preferred) {
+    let (step, record) = match request.step.or(preferred) {
         None => by_derived_step(fmu, parts, &states, request)?,
         Some(step) if step.is_finite() && step > 0.0 => {
             (step, steps::of_steps(fmu, parts, &states, request, step)?)
@@ -242,16 +242,16 @@ fn by_steps(
             return Err(LineariseError::Number { what, value, expected });
         }
     };
-    let heights = parts.inputs.iter().map(|part| part.name.clone()).zip(found.heights).collect();
-    let how = Differences::OfSteps { step, count: found.count, heights, missed: found.missed };
+    let heights = parts.inputs.iter().map(|part| part.name.clone()).zip(record.heights).collect();
+    let how = Differences::OfSteps { step, count: record.count, heights, missed: record.missed };
     let findings = RawResult {
         states,
-        x: found.x,
-        u: found.u,
-        y: found.y,
-        rates: found.rates,
-        jacobian: found.jacobian,
-        how: MethodResult::Differences(how, found.errors),
+        x: record.x,
+        u: record.u,
+        y: record.y,
+        rates: record.rates,
+        jacobian: record.jacobian,
+        how: MethodResult::Differences(how, record.errors),
     };
     assemble(parts, request, findings)
 }
@@ -265,7 +265,8 @@ fn by_derived_step(
     request: &Linearise,
 ) -> Result<(f64, steps::RecordResult), LineariseError> {
     let experiment = parts.description.default_experiment;
-    let length = experiment.and_then(|own| Some(own.stop_time? - own.start_time.unwrap_or(0.0)));
+    let length = experiment
+        .and_then(|experiment| Some(experiment.stop_time? - experiment.start_time.unwrap_or(0.0)));
     let of_length = length.filter(|length| length.is_finite() && *length > 0.0);
     let mut tried: Vec<f64> = of_length.map(|length| length / 1000.0).into_iter().collect();
     tried.extend(
@@ -275,10 +276,10 @@ fn by_derived_step(
     let mut reason = None;
     for &step in &tried {
         match steps::of_steps(fmu, parts, states, request, step) {
-            Ok(found) => {
-                let enough = found.relative < ACCURATE;
-                if best.as_ref().is_none_or(|(_, known)| found.relative < known.relative) {
-                    best = Some((step, found));
+            Ok(record) => {
+                let enough = record.relative < ACCURATE;
+                if best.as_ref().is_none_or(|(_, known)| record.relative < known.relative) {
+                    best = Some((step, record));
                 }
                 if enough {
                     break;

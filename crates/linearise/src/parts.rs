@@ -24,8 +24,8 @@ impl Part {
     /// Returns the typical size of a change about `value`: `typical`, otherwise |value|, or 1 if
     /// that is zero.
     pub(super) fn scale(&self, value: f64) -> f64 {
-        let own = if value == 0.0 { 1.0 } else { value.abs() };
-        self.typical.unwrap_or(own)
+        let magnitude = if value == 0.0 { 1.0 } else { value.abs() };
+        self.typical.unwrap_or(magnitude)
     }
 }
 
@@ -132,12 +132,12 @@ fn distinct<'n>(
     names: impl IntoIterator<Item = &'n String>,
     list: &'static str,
 ) -> Result<(), LineariseError> {
-    let mut seen = Vec::new();
+    let mut earlier = Vec::new();
     for name in names {
-        if seen.contains(&name) {
+        if earlier.contains(&name) {
             return Err(LineariseError::Twice { name: name.clone(), list });
         }
-        seen.push(name);
+        earlier.push(name);
     }
     Ok(())
 }
@@ -162,20 +162,23 @@ fn part(
     expected: &'static str,
 ) -> Result<Part, LineariseError> {
     let name = variable.name.clone();
-    let role =
-        |found: String, expected| LineariseError::Role { name: name.clone(), found, expected };
+    let role = |actual: String, expected| LineariseError::Role {
+        name: name.clone(),
+        found: actual,
+        expected,
+    };
     if !allowed.contains(&variable.causality) {
-        let found = format!("a variable of causality {}", variable.causality.as_str());
-        return Err(role(found, expected));
+        let actual = format!("a variable of causality {}", variable.causality.as_str());
+        return Err(role(actual, expected));
     }
     let Kind::Real(real) = &variable.kind else {
         return Err(role(format!("a variable of type {}", variable.kind.element()), "a Real"));
     };
     if variable.variability != Variability::Continuous {
-        let found = format!("a variable of variability {}", variable.variability.as_str());
-        return Err(role(found, "a continuous one"));
+        let actual = format!("a variable of variability {}", variable.variability.as_str());
+        return Err(role(actual, "a continuous one"));
     }
-    let given = request.typical.iter().find(|(known, _)| *known == name).map(|(_, size)| *size);
+    let typical = request.typical.iter().find(|(known, _)| *known == name).map(|(_, size)| *size);
     let usable = |size: &f64| size.is_finite() && *size > 0.0;
     let nominal = attribute(description, real, |real| real.nominal).filter(usable);
     Ok(Part {
@@ -183,7 +186,7 @@ fn part(
         unit: attribute(description, real, |real| real.unit.clone()),
         min: attribute(description, real, |real| real.min).unwrap_or(f64::NEG_INFINITY),
         max: attribute(description, real, |real| real.max).unwrap_or(f64::INFINITY),
-        typical: given.or(nominal),
+        typical: typical.or(nominal),
         name,
     })
 }

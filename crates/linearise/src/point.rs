@@ -69,8 +69,8 @@ pub(super) fn all_settable(parts: &Parts, states: &[State]) -> Result<(), Linear
         }
         _ => "a parameter, an input, a start value or a state",
     };
-    let found = format!("a variable of causality {} that cannot be set", causality.as_str());
-    Err(LineariseError::Role { name: setting.name.clone(), found, expected })
+    let actual = format!("a variable of causality {} that cannot be set", causality.as_str());
+    Err(LineariseError::Role { name: setting.name.clone(), found: actual, expected })
 }
 
 /// Reads Reals and checks that they are finite.
@@ -134,10 +134,10 @@ impl<'p> Equations<'p> {
             settle(&mut *component)?;
             let mut reached = x.clone();
             component.get_continuous_states(&mut reached)?;
-            for (state, (&required, &found)) in states.iter().zip(x.iter().zip(&reached)) {
-                if (required - found).abs() > 1e-12 * state.part.scale(required) {
+            for (state, (&required, &actual)) in states.iter().zip(x.iter().zip(&reached)) {
+                if (required - actual).abs() > 1e-12 * state.part.scale(required) {
                     let name = state.part.name.clone();
-                    return Err(LineariseError::Moved { name, required, found });
+                    return Err(LineariseError::Moved { name, required, found: actual });
                 }
             }
         }

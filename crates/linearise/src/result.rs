@@ -162,8 +162,8 @@ impl Display for Method {
                     Interface::CoSimulation => "co-simulation",
                 };
                 write!(formatter, "directional derivatives of the FMU in {interface}")?;
-                let Some(found) = disagreement else { return Ok(()) };
-                let Disagreement { of, to, derivative, difference, .. } = found;
+                let Some(disagreement) = disagreement else { return Ok(()) };
+                let Disagreement { of, to, derivative, difference, .. } = disagreement;
                 write!(
                     formatter,
                     "; they contradict its own differences: d {of} / d {to} is {derivative} by \
@@ -257,10 +257,10 @@ pub(super) fn disagreement(
 pub(super) fn assemble(
     parts: &Parts,
     request: &Linearise,
-    found: RawResult,
+    raw: RawResult,
 ) -> Result<Linearisation, LineariseError> {
-    let chosen = chosen(parts, request, &found)?;
-    let all = found.states.len();
+    let chosen = chosen(parts, request, &raw)?;
+    let all = raw.states.len();
     let signal = |part: &Part, value: f64| Signal {
         name: part.name.clone(),
         unit: part.unit.clone(),
@@ -270,24 +270,24 @@ pub(super) fn assemble(
     let signals = |list: &[Part], values: &[f64]| {
         list.iter().zip(values).map(|(part, &value)| signal(part, value)).collect::<Vec<_>>()
     };
-    let mut inputs = signals(&parts.inputs, &found.u);
+    let mut inputs = signals(&parts.inputs, &raw.u);
     let faults = inputs.split_off(parts.controlled);
     let blocks = |m: &DMatrix<f64>| blocks(m, &chosen, all, parts);
-    let scales = super::scales(&found.states, &found.x, &parts.inputs, &found.u);
+    let scales = super::scales(&raw.states, &raw.x, &parts.inputs, &raw.u);
     let residual = |&row: &usize| {
         let terms = scales.iter().enumerate();
-        let sum: f64 = terms.map(|(j, scale)| found.jacobian[(row, j)].abs() * scale).sum();
-        ratio(found.rates[row].abs(), sum)
+        let sum: f64 = terms.map(|(j, scale)| raw.jacobian[(row, j)].abs() * scale).sum();
+        ratio(raw.rates[row].abs(), sum)
     };
     Ok(Linearisation {
-        matrices: blocks(&found.jacobian),
-        states: chosen.iter().map(|&k| signal(&found.states[k], found.x[k])).collect(),
-        outputs: signals(&parts.outputs, &found.y),
-        rates: chosen.iter().map(|&k| found.rates[k]).collect(),
+        matrices: blocks(&raw.jacobian),
+        states: chosen.iter().map(|&k| signal(&raw.states[k], raw.x[k])).collect(),
+        outputs: signals(&parts.outputs, &raw.y),
+        rates: chosen.iter().map(|&k| raw.rates[k]).collect(),
         residual: chosen.iter().map(residual).fold(0.0, f64::max),
         inputs,
         faults,
-        method: match found.how {
+        method: match raw.how {
             MethodResult::Derivatives(interface, disagreement) => {
                 Method::DirectionalDerivatives { interface, disagreement }
             }
@@ -318,17 +318,17 @@ fn blocks(m: &DMatrix<f64>, chosen: &[usize], all: usize, parts: &Parts) -> Matr
 fn chosen(
     parts: &Parts,
     request: &Linearise,
-    found: &RawResult,
+    raw: &RawResult,
 ) -> Result<Vec<usize>, LineariseError> {
-    let all = found.states.len();
+    let all = raw.states.len();
     if request.states.is_empty() {
         return Ok((0..all).collect());
     }
     let position = |name: &String| {
         super::parts::find(parts.description, name)?;
-        let known = found.states.iter().position(|part| part.name == *name);
+        let known = raw.states.iter().position(|part| part.name == *name);
         known.ok_or_else(|| {
-            let known: Vec<_> = found.states.iter().map(|part| part.name.as_str()).collect();
+            let known: Vec<_> = raw.states.iter().map(|part| part.name.as_str()).collect();
             LineariseError::Role {
                 name: name.clone(),
                 found: format!("no continuous state, which are {}", known.join(", ")),
@@ -337,23 +337,23 @@ fn chosen(
         })
     };
     let chosen = request.states.iter().map(position).collect::<Result<Vec<_>, _>>()?;
-    let scales = super::scales(&found.states, &found.x, &parts.inputs, &found.u);
-    let rows = chosen.iter().copied().chain(all..found.jacobian.nrows());
+    let scales = super::scales(&raw.states, &raw.x, &parts.inputs, &raw.u);
+    let rows = chosen.iter().copied().chain(all..raw.jacobian.nrows());
     for row in rows {
-        let size = row_size(&found.jacobian, row, &scales);
+        let size = row_size(&raw.jacobian, row, &scales);
         for left_out in (0..all).filter(|column| !chosen.contains(column)) {
-            let error = match &found.how {
+            let error = match &raw.how {
                 MethodResult::Derivatives(..) => 0.0,
                 MethodResult::Differences(_, errors) => errors[(row, left_out)],
             };
-            let entry = found.jacobian[(row, left_out)].abs();
+            let entry = raw.jacobian[(row, left_out)].abs();
             if entry > error && entry * scales[left_out] > NEGLIGIBLE * size {
-                let kept = match found.states.get(row) {
+                let dependent = match raw.states.get(row) {
                     Some(state) => format!("der({})", state.name),
                     None => parts.outputs[row - all].name.clone(),
                 };
-                let left_out = found.states[left_out].name.clone();
-                return Err(LineariseError::Coupled { left_out, kept });
+                let left_out = raw.states[left_out].name.clone();
+                return Err(LineariseError::Coupled { left_out, dependent });
             }
         }
     }

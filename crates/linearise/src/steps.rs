@@ -96,9 +96,9 @@ pub(super) fn of_steps(
     let mut refusal = None;
     while count <= MAX_STEPS {
         match of_count(&mut benches, parts, states, count) {
-            Ok(found) if best.as_ref().is_none_or(|known| found.relative < known.relative) => {
-                let enough = found.relative < SUFFICIENT_ERROR;
-                best = Some(found);
+            Ok(record) if best.as_ref().is_none_or(|known| record.relative < known.relative) => {
+                let enough = record.relative < SUFFICIENT_ERROR;
+                best = Some(record);
                 if enough {
                     break;
                 }
@@ -303,9 +303,9 @@ fn prediction_error(
     };
     let both = record.pulses.iter().all(|(side, _)| *side == Side::Both);
     let side = if both { Side::Both } else { Side::Above };
-    let (found, _) = bench.response(count, 2, (side, 1.0), shape)?;
+    let (response, _) = bench.response(count, 2, (side, 1.0), shape)?;
     let mut state = DMatrix::zeros(n, 1);
-    let mut expected = DMatrix::zeros(count + 1, found.ncols());
+    let mut expected = DMatrix::zeros(count + 1, response.ncols());
     for step in 0..count {
         let with_inputs = |state: &DMatrix<f64>| {
             let inputs = (0..record.pulses.len()).map(|input| shape(step, input));
@@ -319,10 +319,10 @@ fn prediction_error(
         }
     }
     let sizes: Vec<f64> =
-        (0..found.ncols()).map(|k| found.column(k).amax() / bench.scale(k)).collect();
+        (0..response.ncols()).map(|k| response.column(k).amax() / bench.scale(k)).collect();
     let least = 1e-6 * sizes.iter().fold(0.0_f64, |largest, &size| largest.max(size));
-    let relative = (0..found.ncols()).map(|k| {
-        let difference = (found.column(k) - expected.column(k)).amax() / bench.scale(k);
+    let relative = (0..response.ncols()).map(|k| {
+        let difference = (response.column(k) - expected.column(k)).amax() / bench.scale(k);
         difference / sizes[k].max(least).max(f64::MIN_POSITIVE)
     });
     Ok(relative.fold(0.0, f64::max))

@@ -41,32 +41,32 @@ impl Integrated {
     }
 
     pub(super) fn serialize(&mut self) -> Result<Vec<u8>, CallError> {
-        let own = Saved {
+        let saved = Saved {
             point: Some(Point { memory: self.stepper.memory, ..self.point }),
             states: self.states.clone(),
             indicators: self.indicators.clone(),
             tracks: self.inputs.tracks.clone(),
         };
         let theirs = self.instance.serialize_state()?;
-        postcard::to_allocvec(&(own, theirs))
+        postcard::to_allocvec(&(saved, theirs))
             .map_err(|error| failed(format!("cannot serialise its state: {error}")))
     }
 
     pub(super) fn deserialize(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let read: Result<(Saved, Vec<u8>), _> = postcard::from_bytes(bytes);
-        let (own, theirs) =
+        let (saved, theirs) =
             read.map_err(|error| failed(format!("cannot read a serialised state: {error}")))?;
-        let fits = own.point.is_some()
-            && own.states.len() == self.states.len()
-            && own.indicators.len() == self.indicators.len()
-            && own.tracks.len() == self.inputs.tracks.len();
+        let fits = saved.point.is_some()
+            && saved.states.len() == self.states.len()
+            && saved.indicators.len() == self.indicators.len()
+            && saved.tracks.len() == self.inputs.tracks.len();
         if !fits {
             let what = "cannot read a serialised state: it is one of another FMU";
             return Err(failed(what.to_owned()));
         }
         self.instance.deserialize_state(&theirs)?;
         let slot = self.saved.len();
-        self.saved.push(own);
+        self.saved.push(saved);
         self.restore_own(slot);
         self.saved.pop();
         Ok(())

@@ -117,7 +117,7 @@ impl Integrated {
             instance.set_continuous_states(states)?;
             instance.get_derivatives(slope)
         };
-        let reached = self.stepper.advance(&mut derivative, &self.states, (start, limit));
+        let reached = self.stepper.advance(&mut derivative, &self.states, start, limit);
         let reached = reached.map_err(|error| self.stopped(error))?;
         let event = self.locate(start, reached)?;
         let time = event.unwrap_or(reached);
@@ -147,7 +147,7 @@ impl Integrated {
 
     /// Reads the event indicators at `time` within the step from `start` to `end` into
     /// `search.between`, the states into `search.states`.
-    fn look(&mut self, time: f64, (start, end): (f64, f64)) -> Result<(), CallError> {
+    fn look(&mut self, time: f64, start: f64, end: f64) -> Result<(), CallError> {
         if !self.states.is_empty() {
             if time >= end {
                 self.search.states.copy_from_slice(self.stepper.end());
@@ -176,12 +176,12 @@ impl Integrated {
         self.search.left.0 = start;
         self.search.left.1.copy_from_slice(&self.indicators);
         for time in [start + 0.5 * (end - start), end] {
-            self.look(time, (start, end))?;
+            self.look(time, start, end)?;
             let search = &mut self.search;
             if changed(&search.left.1, &search.between).is_some() {
                 search.right.0 = time;
                 search.right.1.copy_from_slice(&search.between);
-                return self.narrow((start, end)).map(Some);
+                return self.narrow(start, end).map(Some);
             }
             search.left.0 = time;
             search.left.1.copy_from_slice(&search.between);
@@ -190,9 +190,10 @@ impl Integrated {
         Ok(None)
     }
 
-    /// Narrows the interval of `search` around its first change of sign; returns its end.
-    fn narrow(&mut self, span: (f64, f64)) -> Result<f64, CallError> {
-        let width = WIDTH * (span.1 - span.0);
+    /// Narrows the interval of `search`, in the step from `start` to `end`, around its first change of
+    /// sign; returns its end.
+    fn narrow(&mut self, start: f64, end: f64) -> Result<f64, CallError> {
+        let width = WIDTH * (end - start);
         while let Some(index) = changed(&self.search.left.1, &self.search.right.1) {
             let Search { left, right, .. } = &self.search;
             let ends = ((left.0, left.1[index]), (right.0, right.1[index]));
@@ -202,22 +203,22 @@ impl Integrated {
                 break;
             }
             while let Some(time) = bracket.ask() {
-                self.look(time, span)?;
+                self.look(time, start, end)?;
                 let search = &mut self.search;
                 bracket.tell(time, search.between[index]);
-                let own = (search.left.1[index] > 0.0) != (search.between[index] > 0.0);
+                let changes = (search.left.1[index] > 0.0) != (search.between[index] > 0.0);
                 let any = changed(&search.left.1, &search.between).is_some();
                 let side = if any { &mut search.right } else { &mut search.left };
                 side.0 = time;
                 side.1.copy_from_slice(&search.between);
-                if any && !own {
+                if any && !changes {
                     // Another indicator changes earlier.
                     break;
                 }
             }
         }
         let time = self.search.right.0;
-        self.look(time, span)?;
+        self.look(time, start, end)?;
         Ok(time)
     }
 }

@@ -17,7 +17,7 @@ fn run(
     };
     let (mut time, mut states, mut steps) = (0.0, start.to_vec(), 0);
     while time < end {
-        time = match stepper.advance(&mut derivative, &states, (time, end)) {
+        time = match stepper.advance(&mut derivative, &states, time, end) {
             Ok(reached) => reached,
             Err(error) => panic!("{error:?}"),
         };
@@ -87,7 +87,7 @@ fn a_state_without_a_derivative_ends_the_run_by_its_name() {
     };
     let (mut time, mut states) = (0.0, vec![0.0; 2]);
     let error = loop {
-        match stepper.advance(&mut derivative, &states, (time, 1.0)) {
+        match stepper.advance(&mut derivative, &states, time, 1.0) {
             Ok(reached) => time = reached,
             Err(error) => break error,
         }
