@@ -252,11 +252,11 @@ impl Motion {
             return Err(Failure::NotFinite { time: start });
         }
         let whole = Interval { start, duration, elapsed: 0.0 };
-        let continued = self.interrupted.take().filter(|own| {
-            let alike = force.is_constant() && own.force.to_bits() == force.value.to_bits();
-            alike && own.parameters == *parameters && own.interval.ends_with(&whole)
+        let continued = self.interrupted.take().filter(|interrupted| {
+            let alike = force.is_constant() && interrupted.force.to_bits() == force.value.to_bits();
+            alike && interrupted.parameters == *parameters && interrupted.interval.ends_with(&whole)
         });
-        let mut interval = continued.as_ref().map_or(whole, |own| own.interval);
+        let mut interval = continued.as_ref().map_or(whole, |interrupted| interrupted.interval);
         let memory = std::mem::take(&mut self.memory);
         let plant = Plant::new(parameters, force.seen_from(interval.start), &memory);
         if continued.is_none() {

@@ -25,8 +25,8 @@ fn with(body: &mut dyn FnMut(&mut Paper) -> Result<(), String>) -> i32 {
 #[unsafe(no_mangle)]
 pub extern "C" fn start(step: f64, stop: f64) -> i32 {
     ROWS.with_borrow_mut(Vec::clear);
-    let made = Paper::new(&read(), step, stop).and_then(|mut paper| Ok((paper.row()?, paper)));
-    answer(made.map(|(row, paper)| {
+    let paper = Paper::new(&read(), step, stop).and_then(|mut paper| Ok((paper.row()?, paper)));
+    answer(paper.map(|(row, paper)| {
         keep(row);
         RUN.with_borrow_mut(|run| *run = Some(paper));
         None

@@ -74,10 +74,10 @@ impl<M: Model + Send> Slave for LinkedSlave<M> {
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
-        let mut found = vec![0; values.len()];
-        let status = self.0.get_integer(references, &mut found);
-        for (value, found) in values.iter_mut().zip(found) {
-            *value = found.into();
+        let mut integers = vec![0; values.len()];
+        let status = self.0.get_integer(references, &mut integers);
+        for (value, integer) in values.iter_mut().zip(integers) {
+            *value = integer.into();
         }
         self.done("fmi2GetInteger", status)
     }

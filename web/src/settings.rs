@@ -76,9 +76,9 @@ impl Settings {
         inputs.dedup();
         for input in inputs {
             let port = system.port(input).map_err(told)?;
-            let own = self.faults.iter().filter(|(name, ..)| name == input).enumerate();
+            let faults = self.faults.iter().filter(|(name, ..)| name == input).enumerate();
             let chain =
-                own.map(|(place, (_, kind, value))| self.fault(input, place, *kind, *value));
+                faults.map(|(place, (_, kind, value))| self.fault(input, place, *kind, *value));
             let chain = FaultChain::new(chain.collect(), step).map_err(told)?;
             scenario.faults.push((port, chain));
         }
@@ -100,8 +100,8 @@ impl Settings {
     }
 }
 
-fn number(line: &str, found: &str) -> Result<f64, String> {
-    text::number(found).ok_or_else(|| format!("{line}: expected a number, found {found:?}"))
+fn number(line: &str, word: &str) -> Result<f64, String> {
+    text::number(word).ok_or_else(|| format!("{line}: expected a number, found {word:?}"))
 }
 
 /// An error and its causes as a sentence.

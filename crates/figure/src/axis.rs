@@ -38,7 +38,7 @@ impl Axis {
     /// Creates a linear axis with exactly this range; an empty or infinite range is replaced by a
     /// usable one.
     #[must_use]
-    pub fn exact((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
+    pub fn exact(low: f64, high: f64, pixels: (f64, f64), ticks: u8) -> Self {
         let (low, high) = if low <= high && low.is_finite() && high.is_finite() {
             (low.clamp(-HUGE, HUGE), high.clamp(-HUGE, HUGE))
         } else {
@@ -59,7 +59,7 @@ impl Axis {
     /// Creates an axis that is linear between minus and plus `knee` and logarithmic beyond.
     #[must_use]
     pub fn symmetric(ends: (f64, f64), knee: f64, pixels: (f64, f64), ticks: u8) -> Self {
-        Self { scale: Scale::Symmetric(knee), ..Self::exact(ends, pixels, ticks) }
+        Self { scale: Scale::Symmetric(knee), ..Self::exact(ends.0, ends.1, pixels, ticks) }
     }
 
     /// Creates a linear axis with a margin around finite values, up to a maximum magnitude.
@@ -70,11 +70,12 @@ impl Axis {
         ticks: u8,
     ) -> Self {
         let cap = cap.unwrap_or(HUGE).abs();
-        let ends = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        let infinities = (f64::INFINITY, f64::NEG_INFINITY);
+        let (low, high) = values.fold(infinities, |(low, high), value| {
             let value = value.clamp(-cap, cap);
             (low.min(value), high.max(value))
         });
-        let tight = Self::exact(ends, pixels, ticks);
+        let tight = Self::exact(low, high, pixels, ticks);
         let air = 0.06 * (tight.high - tight.low);
         Self { low: tight.low - air, high: tight.high + air, ..tight }
     }
@@ -115,13 +116,13 @@ impl Axis {
             Scale::Symmetric(knee) => {
                 let decades = |end: f64| (end / knee).max(1.0).log10();
                 let stride = self.stride(decades(-self.low) + decades(self.high));
-                let negative = powers((knee.max(-self.high), -self.low), stride);
+                let negative = powers(knee.max(-self.high), -self.low, stride);
                 negative
                     .into_iter()
                     .rev()
                     .map(|(value, label)| (-value, format!("\u{2212}{label}")))
                     .chain(self.contains(0.0).then(|| (0.0, "0".to_owned())))
-                    .chain(powers((knee.max(self.low), self.high), stride))
+                    .chain(powers(knee.max(self.low), self.high, stride))
                     .collect()
             }
         }
@@ -148,7 +149,7 @@ impl Axis {
 }
 
 /// Returns each power of ten from `low` to `high` whose exponent is a multiple of `stride`, with labels.
-fn powers((low, high): (f64, f64), stride: i32) -> Vec<(f64, String)> {
+fn powers(low: f64, high: f64, stride: i32) -> Vec<(f64, String)> {
     (-300..=300)
         .filter(|power| power % stride == 0)
         .map(|power| (10_f64.powi(power), power_label(power)))
@@ -217,7 +218,7 @@ mod tests {
             (-1e7, -1e7 + 3.0),
             (f64::NAN, 1.0),
         ] {
-            let axis = Axis::exact((low, high), (0.0, 100.0), 5);
+            let axis = Axis::exact(low, high, (0.0, 100.0), 5);
             let ticks = axis.ticks();
             assert!((2..=8).contains(&ticks.len()), "{low} to {high}: {ticks:?}");
             let step = ticks[1].0 - ticks[0].0;
@@ -234,7 +235,7 @@ mod tests {
     #[test]
     fn labels_have_as_many_digits_as_the_step() {
         let labels = |low, high| -> Vec<String> {
-            let axis = Axis::exact((low, high), (0.0, 1.0), 5);
+            let axis = Axis::exact(low, high, (0.0, 1.0), 5);
             axis.ticks().into_iter().map(|(_, label)| label).collect()
         };
         assert_eq!(labels(-0.2, 0.2), ["\u{2212}0.2", "\u{2212}0.1", "0", "0.1", "0.2"]);

@@ -218,27 +218,29 @@ impl Panel<'_> {
 
     /// Returns the left margin that the tick labels and the axis label need.
     fn left(&self) -> f64 {
-        let vertical = self.vertical(self.horizontal(LEFT).range(), (PLOT_HEIGHT, 0.0));
+        let vertical = self.vertical(&self.horizontal(LEFT), (PLOT_HEIGHT, 0.0));
         let width = |(_, label): (f64, String)| canvas::digits_width(&label, TEXT_SIZE);
         36.0 + vertical.ticks().into_iter().map(width).fold(0.0, f64::max)
     }
 
     fn horizontal(&self, left: f64) -> Axis {
         let (start, end) = self.x_range.unwrap_or_else(|| self.times());
-        Axis::exact((start, end), (left, WIDTH - RIGHT), 10)
+        Axis::exact(start, end, (left, WIDTH - RIGHT), 10)
     }
 
-    fn vertical(&self, times: (f64, f64), pixels: (f64, f64)) -> Axis {
+    fn vertical(&self, horizontal: &Axis, pixels: (f64, f64)) -> Axis {
+        let (start, end) = horizontal.range();
         let limit = self.limit.into_iter().flat_map(|(size, _)| [size, -size]);
-        Axis::around(self.values_between(times).chain(limit), self.y_cap, pixels, 7)
+        Axis::around(self.values_between(start, end).chain(limit), self.y_cap, pixels, 7)
     }
 
     fn draw(&self, canvas: &mut Canvas, left: f64, top: f64) {
         let top = top + self.legend_height(left);
         let (right, bottom) = (WIDTH - RIGHT, top + self.frame_height());
         let horizontal = self.horizontal(left);
-        let visible = self.values_between(horizontal.range());
-        let vertical = self.vertical(horizontal.range(), (bottom, top));
+        let (start, end) = horizontal.range();
+        let visible = self.values_between(start, end);
+        let vertical = self.vertical(&horizontal, (bottom, top));
 
         self.draw_grid(canvas, &horizontal, &vertical);
         if let Some((size, _)) = self.limit {
@@ -278,7 +280,7 @@ impl Panel<'_> {
     }
 
     /// Returns the finite values of all curves within a time range.
-    fn values_between(&self, (start, end): (f64, f64)) -> impl Iterator<Item = f64> + Clone {
+    fn values_between(&self, start: f64, end: f64) -> impl Iterator<Item = f64> + Clone {
         self.series
             .iter()
             .flat_map(|series| series.time.iter().zip(series.values))

@@ -27,7 +27,7 @@ fn finite_place(axis: &Axis, value: f64) -> f64 {
 
 /// Reduces a run of points without gaps.
 fn outline(run: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let mut kept = Vec::new();
+    let mut points = Vec::new();
     for column in run.chunk_by(|a, b| (a.0.floor() - b.0.floor()).abs() < 0.5) {
         let by_height = |a: &usize, b: &usize| column[*a].1.total_cmp(&column[*b].1);
         let lowest = (0..column.len()).min_by(by_height).unwrap_or(0);
@@ -36,11 +36,11 @@ fn outline(run: &[(f64, f64)]) -> Vec<(f64, f64)> {
         indices.sort_unstable();
         for (place, index) in indices.iter().enumerate() {
             if place == 0 || indices[place - 1] != *index {
-                kept.push(column[*index]);
+                points.push(column[*index]);
             }
         }
     }
-    kept
+    points
 }
 
 /// Formats one stroke. The first point occurs twice, so that a single point is drawn as a dot.
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     fn axes() -> (Axis, Axis) {
-        (Axis::exact((0.0, 100.0), (0.0, 900.0), 10), Axis::exact((-10.0, 10.0), (200.0, 0.0), 5))
+        (Axis::exact(0.0, 100.0, (0.0, 900.0), 10), Axis::exact(-10.0, 10.0, (200.0, 0.0), 5))
     }
 
     fn points(path: &str) -> Vec<Vec<(f64, f64)>> {
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn a_window_shows_only_its_own_samples() {
-        let horizontal = Axis::exact((50.0, 60.0), (0.0, 900.0), 10);
+        let horizontal = Axis::exact(50.0, 60.0, (0.0, 900.0), 10);
         let time: Vec<f64> = (0..=100).map(f64::from).collect();
         let drawn = points(&path(&time, &[0.0; 101], &horizontal, &axes().1)).concat();
         assert_eq!(drawn.len(), 11 + 1);

@@ -47,7 +47,7 @@ pub fn check_distinct(
 
 /// Whether the path leads to a pipe or a device.
 fn is_stream(path: &Path) -> bool {
-    fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+    fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }
 
 fn same_file(one: &Path, other: &Path) -> bool {
@@ -57,8 +57,8 @@ fn same_file(one: &Path, other: &Path) -> bool {
 
 /// The path without links and relative parts; the file itself need not exist.
 fn resolved(path: &Path) -> PathBuf {
-    if let Ok(found) = fs::canonicalize(path) {
-        return found;
+    if let Ok(canonical) = fs::canonicalize(path) {
+        return canonical;
     }
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     match (absolute.parent(), absolute.file_name()) {
@@ -70,8 +70,9 @@ fn resolved(path: &Path) -> PathBuf {
 #[cfg(unix)]
 fn same_by_link(one: &Path, other: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
-    let number = |path: &Path| fs::metadata(path).map(|found| (found.dev(), found.ino())).ok();
-    number(one).is_some_and(|own| number(other) == Some(own))
+    let number =
+        |path: &Path| fs::metadata(path).map(|metadata| (metadata.dev(), metadata.ino())).ok();
+    number(one).is_some_and(|first| number(other) == Some(first))
 }
 
 #[cfg(not(unix))]

@@ -180,14 +180,14 @@ impl<'a> Table<'a> {
         let Some(key) = unknown else {
             return Ok(());
         };
-        let found = key.get_ref();
-        let near = known.iter().min_by_key(|name| strsim::damerau_levenshtein(name, found));
-        let near = near.filter(|name| strsim::damerau_levenshtein(name, found) <= 3);
+        let name_of_entry = key.get_ref();
+        let near = known.iter().min_by_key(|name| strsim::damerau_levenshtein(name, name_of_entry));
+        let near = near.filter(|name| strsim::damerau_levenshtein(name, name_of_entry) <= 3);
         let advice = match near {
             Some(name) => format!("did you mean `{name}`?"),
             None => format!("expected one of {}", known.join(", ")),
         };
-        let message = format!("unknown entry `{}`; {advice}", self.path(found));
+        let message = format!("unknown entry `{}`; {advice}", self.path(name_of_entry));
         Err(self.source.error(&key.span(), message))
     }
 

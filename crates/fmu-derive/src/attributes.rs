@@ -71,21 +71,21 @@ pub(crate) struct Attributes {
     pub(crate) initially: Option<Vec<Ident>>,
     pub(crate) derivatives: Vec<Ident>,
     /// All names, with repetitions.
-    seen: Vec<String>,
+    names: Vec<String>,
 }
 
 impl Attributes {
     /// Reads all attributes `#[fmu(...)]` of the field; `None` if it has none.
     pub(crate) fn of(field: &Field) -> Result<Option<Self>> {
-        let mut found = None;
-        for attribute in field.attrs.iter().filter(|own| own.path().is_ident("fmu")) {
-            let own: &mut Self = found.get_or_insert_with(Self::default);
+        let mut attributes = None;
+        for attribute in field.attrs.iter().filter(|attribute| attribute.path().is_ident("fmu")) {
+            let list: &mut Self = attributes.get_or_insert_with(Self::default);
             if !matches!(attribute.meta, syn::Meta::List(_)) {
                 return Err(Error::new(attribute.span(), "expected #[fmu(...)]"));
             }
-            attribute.parse_nested_meta(|meta| own.read(&meta))?;
+            attribute.parse_nested_meta(|meta| list.read(&meta))?;
         }
-        Ok(found)
+        Ok(attributes)
     }
 
     /// The role, local if none is stated.
@@ -100,12 +100,12 @@ impl Attributes {
 
     /// The value of the attribute `name`.
     pub(crate) fn value(&self, name: &str) -> Option<&Expr> {
-        self.values.iter().find(|(own, _)| own == name).map(|(_, value)| value)
+        self.values.iter().find(|(known, _)| known == name).map(|(_, value)| value)
     }
 
     /// The text of the attribute `name`.
     pub(crate) fn text(&self, name: &str) -> Option<&LitStr> {
-        self.texts.iter().find(|(own, _)| own == name).map(|(_, text)| text)
+        self.texts.iter().find(|(known, _)| known == name).map(|(_, text)| text)
     }
 
     fn read(&mut self, meta: &ParseNestedMeta<'_>) -> Result<()> {
@@ -113,10 +113,10 @@ impl Attributes {
             return Err(meta.error(format!("unknown attribute, expected one of: {KNOWN}")));
         };
         let text = name.to_string();
-        if self.seen.contains(&text) {
+        if self.names.contains(&text) {
             return Err(meta.error(format!("`{text}` is there twice")));
         }
-        self.seen.push(text.clone());
+        self.names.push(text.clone());
         if let Some(role) = Role::parse(&text) {
             if let Some((_, _)) = self.role {
                 return Err(meta.error("a variable has one role, and this is the second one"));

@@ -38,22 +38,22 @@ fn mark_states(variables: &mut [Variable<'_>]) -> Vec<Error> {
         let refuse = |message: String| Error::new(state.span(), message);
         match find(variables, state) {
             None => errors.push(refuse(format!("`{state}` is no variable of this struct"))),
-            Some(found) if found.field == variable.field => {
+            Some(other) if other.field == variable.field => {
                 errors.push(refuse(format!("`{state}` cannot be its own derivative")));
             }
-            Some(found) if found.base != Base::Real || variable.base != Base::Real => {
+            Some(other) if other.base != Base::Real || variable.base != Base::Real => {
                 errors
                     .push(refuse("a state and its derivative are f64 or arrays of f64".to_owned()));
             }
-            Some(found) if found.extents.len() != variable.extents.len() => {
+            Some(other) if other.extents.len() != variable.extents.len() => {
                 let message = "a state and its derivative have the same dimensions";
                 errors.push(refuse(message.to_owned()));
             }
             Some(_) if states.contains(state) => {
                 errors.push(refuse(format!("`{state}` has two derivatives")));
             }
-            Some(found)
-                if !found.role().is_computed() || found.attributes.flag("discrete").is_some() =>
+            Some(other)
+                if !other.role().is_computed() || other.attributes.flag("discrete").is_some() =>
             {
                 let message = format!("the state `{state}` must be an output or local, continuous");
                 errors.push(refuse(message));
@@ -171,8 +171,8 @@ fn references(variables: &[Variable<'_>], variable: &Variable<'_>) -> Vec<Error>
         }
     }
     for name in attributes.depends.iter().flatten().filter(|name| *name != "time") {
-        let fits = |found: &Variable<'_>| found.role() == Role::Input || found.is_state;
-        if find(variables, name).is_some_and(|found| !fits(found)) {
+        let fits = |known: &Variable<'_>| known.role() == Role::Input || known.is_state;
+        if find(variables, name).is_some_and(|known| !fits(known)) {
             let message = format!(
                 "`{name}` is neither an input nor a state (FMI 2.0.5, section 2.2.8: knowns)"
             );
@@ -190,8 +190,8 @@ fn references(variables: &[Variable<'_>], variable: &Variable<'_>) -> Vec<Error>
 }
 
 fn span_of(variable: &Variable<'_>, name: &str) -> Span {
-    let found = variable.attributes.values.iter().find(|(own, _)| own == name);
-    found.map_or_else(Span::call_site, |(own, _)| own.span())
+    let value = variable.attributes.values.iter().find(|(known, _)| known == name);
+    value.map_or_else(Span::call_site, |(known, _)| known.span())
 }
 
 /// The value of a number that is written out, possibly with a minus.

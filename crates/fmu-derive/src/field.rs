@@ -169,7 +169,7 @@ fn is_bytes(of: &Type) -> bool {
 /// The first paragraph of the doc comment, in one line.
 fn description(field: &Field) -> String {
     let mut lines = Vec::new();
-    for attribute in field.attrs.iter().filter(|own| own.path().is_ident("doc")) {
+    for attribute in field.attrs.iter().filter(|attribute| attribute.path().is_ident("doc")) {
         let Meta::NameValue(meta) = &attribute.meta else { continue };
         let Expr::Lit(ExprLit { lit: Lit::Str(text), .. }) = &meta.value else { continue };
         lines.extend(text.value().lines().map(|line| line.trim().to_owned()));

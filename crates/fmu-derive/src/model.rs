@@ -45,10 +45,10 @@ pub(crate) fn expand(arguments: &Arguments, mut block: ItemImpl) -> Result<Token
         return Err(Error::new_spanned(&block.self_ty, "expected `impl Model for` a struct"));
     }
     let present: Vec<String> = block.items.iter().filter_map(name).collect();
-    for (item, given) in items(arguments) {
+    for (item, source) in items(arguments) {
         if !name(&item).is_some_and(|name| present.contains(&name)) {
             block.items.push(item);
-        } else if let Some(argument) = given {
+        } else if let Some(argument) = source {
             let message = "the block has the function that this argument is for";
             return Err(Error::new(argument.span(), message));
         }
@@ -69,7 +69,8 @@ fn name(item: &ImplItem) -> Option<String> {
 fn items(arguments: &Arguments) -> Vec<(ImplItem, Option<Ident>)> {
     let is_indicators = |(name, _): &&(Ident, Expr)| name == "event_indicators";
     let indicators = arguments.0.iter().find(is_indicators);
-    let experiment: Vec<_> = arguments.0.iter().filter(|own| !is_indicators(own)).collect();
+    let experiment: Vec<_> =
+        arguments.0.iter().filter(|argument| !is_indicators(argument)).collect();
     let fields = experiment.iter().map(|(name, value)| quote!(#name: #value));
     let exchange: ImplItem = match indicators {
         Some((_, count)) => parse_quote! {

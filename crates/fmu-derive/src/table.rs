@@ -89,12 +89,12 @@ fn read_all(fields: &syn::FieldsNamed) -> Result<Model<'_>> {
 fn default(ident: &Ident, model: &Model<'_>) -> Option<TokenStream> {
     model.starts.iter().any(|(_, start)| start.is_some()).then_some(())?;
     let dimensions = |field: &Ident| {
-        let variable = model.variables.iter().find(|own| own.field == field);
-        variable.map_or(0, |own| own.extents.len())
+        let variable = model.variables.iter().find(|known| known.field == field);
+        variable.map_or(0, |known| known.extents.len())
     };
     let base = |field: &Ident| {
-        let variable = model.variables.iter().find(|own| own.field == field);
-        variable.map(|own| own.base)
+        let variable = model.variables.iter().find(|known| known.field == field);
+        variable.map(|known| known.base)
     };
     let fields = model.starts.iter().map(|(field, start)| {
         if let Some(value) = start {
@@ -151,43 +151,43 @@ fn constructor(variable: &Variable<'_>) -> TokenStream {
 
 /// The argument with the enumeration, with a comma behind it.
 fn enumeration(variable: &Variable<'_>) -> Option<TokenStream> {
-    let own = variable.attributes.enumeration.as_ref()?;
-    let name = &own.name;
-    let items = own.values.iter().map(|(name, value)| quote!((#name, #value)));
+    let enumeration = variable.attributes.enumeration.as_ref()?;
+    let name = &enumeration.name;
+    let items = enumeration.values.iter().map(|(name, value)| quote!((#name, #value)));
     Some(quote!(::fmu::Enumeration::new(#name, [#(#items),*]),))
 }
 
 /// Calls of the methods of `fmu::Variable`.
 fn attributes(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStream {
-    let own = &variable.attributes;
+    let attributes = &variable.attributes;
     let mut calls = role(variable);
-    if own.flag("discrete").is_some() {
+    if attributes.flag("discrete").is_some() {
         calls.extend(quote!(.discrete()));
     }
     let free = variable.role().is_computed();
-    if own.flag("approximate").is_some() {
+    if attributes.flag("approximate").is_some() {
         calls.extend(quote!(.approximate()));
-    } else if free && (variable.is_state || own.value("start").is_some())
-        || own.flag("exact").is_some()
+    } else if free && (variable.is_state || attributes.value("start").is_some())
+        || attributes.flag("exact").is_some()
     {
         calls.extend(quote!(.exact()));
     }
-    if own.flag("reinit").is_some() {
+    if attributes.flag("reinit").is_some() {
         calls.extend(quote!(.reinit()));
     }
-    for (name, text) in own.texts.iter().filter(|(name, _)| name != "name") {
+    for (name, text) in attributes.texts.iter().filter(|(name, _)| name != "name") {
         calls.extend(quote_spanned!(text.span()=> .#name(#text)));
     }
-    for (name, value) in own.values.iter().filter(|(name, _)| name != "start") {
+    for (name, value) in attributes.values.iter().filter(|(name, _)| name != "start") {
         calls.extend(quote!(.#name(::core::convert::Into::into(#value))));
     }
-    for field in &own.derivatives {
+    for field in &attributes.derivatives {
         calls.extend(quote_spanned!(field.span()=> .derivative(|model| &mut model.#field)));
     }
-    if let Some(state) = &own.derivative_of {
+    if let Some(state) = &attributes.derivative_of {
         let name = state.to_string();
-        let found = variables.iter().find(|variable| variable.field == state);
-        let name = found.map_or(&name, |found| &found.name);
+        let known = variables.iter().find(|variable| variable.field == state);
+        let name = known.map_or(&name, |known| &known.name);
         let name = array::element_name(name, variable.extents.len());
         calls.extend(quote!(.derivative_of(#name)));
     }
@@ -215,9 +215,9 @@ fn list<'a>(
     let mut names = quote!(let mut names = ::std::vec::Vec::<::std::string::String>::new(););
     for field in fields {
         let name = field.to_string();
-        let found = variables.iter().find(|variable| variable.field == field);
+        let known = variables.iter().find(|variable| variable.field == field);
         let (name, extents) =
-            found.map_or((&name, &[][..]), |found| (&found.name, &found.extents[..]));
+            known.map_or((&name, &[][..]), |known| (&known.name, &known.extents[..]));
         let name = array::element_name(name, extents.len());
         names.extend(array::for_each(extents, quote!(names.push(#name.into());)));
     }
@@ -226,21 +226,21 @@ fn list<'a>(
 
 /// The dependencies of an output or a derivative.
 fn dependencies(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStream {
-    let own = &variable.attributes;
+    let attributes = &variable.attributes;
     let mut calls = TokenStream::new();
     let depends = variable.role() == Role::Output || variable.is_derivative();
     // A state depends on itself alone, which the exporter knows.
-    if depends && !(variable.is_state && own.depends.is_none()) {
+    if depends && !(variable.is_state && attributes.depends.is_none()) {
         let all = || {
             let known = |other: &&Variable<'_>| other.is_state || other.role() == Role::Input;
             variables.iter().filter(known).map(|other| other.field.clone()).collect()
         };
-        let fields: Vec<Ident> = own.depends.clone().unwrap_or_else(all);
+        let fields: Vec<Ident> = attributes.depends.clone().unwrap_or_else(all);
         let names = list(variables, &fields);
         let kind = quote!(::fmu::description::DependencyKind::Dependent);
         calls.extend(quote!(.depends(#kind, #names)));
     }
-    if let Some(fields) = &own.initially {
+    if let Some(fields) = &attributes.initially {
         let names = list(variables, fields);
         calls.extend(quote!(.initially(#names)));
     }

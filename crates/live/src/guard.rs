@@ -30,10 +30,10 @@ impl Token {
 
     /// Whether both are equal, in a time that does not depend on the place of a difference.
     pub(crate) fn is(&self, other: &str) -> bool {
-        let (own, other) = (self.0.as_bytes(), other.as_bytes());
-        let pairs = own.iter().zip(other);
-        let differences = pairs.fold(0, |found, (one, two)| found | (one ^ two));
-        own.len() == other.len() && std::hint::black_box(differences) == 0
+        let (token, other) = (self.0.as_bytes(), other.as_bytes());
+        let pairs = token.iter().zip(other);
+        let differences = pairs.fold(0, |bits, (one, two)| bits | (one ^ two));
+        token.len() == other.len() && std::hint::black_box(differences) == 0
     }
 }
 

@@ -35,8 +35,8 @@ type Head = (Parsed, usize, usize);
 pub(crate) fn read(stream: &mut TcpStream, deadline: Instant) -> Result<Parsed, Refusal> {
     let mut bytes = Vec::new();
     let (mut parsed, head, length) = loop {
-        if let Some(found) = head(&bytes).map_err(Some)? {
-            break found;
+        if let Some(complete) = head(&bytes).map_err(Some)? {
+            break complete;
         }
         receive(stream, deadline, &mut bytes)?;
     };

@@ -87,7 +87,7 @@ pub(crate) struct Store {
     outcome: Option<String>,
     /// When a page last asked, and whether it has seen the outcome.
     asked: Option<Instant>,
-    pub(crate) seen: bool,
+    pub(crate) outcome_shown: bool,
 }
 
 impl Store {
@@ -104,7 +104,7 @@ impl Store {
             interventions: Vec::new(),
             outcome: None,
             asked: None,
-            seen: false,
+            outcome_shown: false,
         }
     }
 
@@ -158,7 +158,7 @@ impl Store {
 
     /// Returns what the page asks for; values that are not finite are null.
     pub(crate) fn state(&mut self, query: &Query, phase: &str, dropped: u64) -> Value {
-        self.seen |= self.outcome.is_some();
+        self.outcome_shown |= self.outcome.is_some();
         let rows: Vec<&Row> =
             self.rows.iter().filter(|row| row.number > query.rows_after).collect();
         let column = |signal: &usize| -> Vec<Option<f64>> {

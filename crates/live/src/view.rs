@@ -151,7 +151,7 @@ impl View {
         let start = Instant::now();
         while start.elapsed() < patience {
             let store = self.shared.store();
-            if store.seen || !store.is_watched() {
+            if store.outcome_shown || !store.is_watched() {
                 break;
             }
             drop(store);

@@ -41,7 +41,8 @@ pub(crate) struct Compared {
 /// of `table`. Between rows, the other run is interpolated linearly; integers and Booleans are held. Rows
 /// with the same time, as at events, are compared in their order.
 pub(crate) fn compare(
-    (table, positions): (&Table, &[usize]),
+    table: &Table,
+    positions: &[usize],
     other: &Table,
 ) -> Result<Compared, Error> {
     let named =
@@ -56,7 +57,7 @@ pub(crate) fn compare(
         let missing = names.filter(|(_, column)| named(rest, &column.name).is_none());
         missing.map(|(_, column)| column.name.clone()).collect()
     };
-    let mut found = Compared {
+    let mut compared = Compared {
         differences: Vec::new(),
         curves: vec![None; positions.len()],
         only_here: only(table, other),
@@ -78,15 +79,15 @@ pub(crate) fn compare(
             }
             None => outside += 1,
         })?;
-        found.outside = outside;
+        compared.outside = outside;
         for ((at, _), sum) in chunk.iter().zip(sums) {
             let (difference, curves) = sum.finish();
-            found.differences.push(difference);
-            found.curves[*at] = Some(curves);
+            compared.differences.push(difference);
+            compared.curves[*at] = Some(curves);
         }
     }
-    found.differences.sort_by(|one, other| other.relative.total_cmp(&one.relative));
-    Ok(found)
+    compared.differences.sort_by(|one, other| other.relative.total_cmp(&one.relative));
+    Ok(compared)
 }
 
 /// Columns of the other run.

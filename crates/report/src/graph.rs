@@ -45,7 +45,7 @@ pub(crate) fn graph(run: &Run) -> Markup {
                 }
             }
             @for ((from, to), connections) in &arrows {
-                (arrow((corner(*from), corner(*to)), connections))
+                (arrow(corner(*from), corner(*to), connections))
             }
             @for (fmu, place) in run.fmus.iter().zip((0..).map(corner)) {
                 g {
@@ -60,7 +60,7 @@ pub(crate) fn graph(run: &Run) -> Markup {
 
 type Corner = (usize, usize);
 
-fn arrow((from, to): (Corner, Corner), connections: &[&Connection]) -> Markup {
+fn arrow(from: Corner, to: Corner, connections: &[&Connection]) -> Markup {
     let start = (from.0 + WIDTH, from.1 + HEIGHT / 2);
     let (path, label) = if to.0 > from.0 {
         let end = (to.0, to.1 + HEIGHT / 2);

@@ -155,7 +155,7 @@ pub fn page(request: &Request<'_>) -> Result<Page, Error> {
     let Read { positions, columns, statistics, traces, texts, left_out } = read(&table, request)?;
     let against = request.against.map(Table::open).transpose()?;
     let compared =
-        against.map(|other| difference::compare((&table, &positions), &other)).transpose()?;
+        against.map(|other| difference::compare(&table, &positions, &other)).transpose()?;
     if let (Some(compared), Some(other)) = (&compared, request.against)
         && compared.differences.is_empty()
     {
@@ -173,7 +173,7 @@ pub fn page(request: &Request<'_>) -> Result<Page, Error> {
         frames: frames.as_deref(),
     };
     let html = page::render(&content, &plots, compared.as_ref());
-    Ok(Page { html, differences: compared.map_or_else(Vec::new, |found| found.differences) })
+    Ok(Page { html, differences: compared.map_or_else(Vec::new, |compared| compared.differences) })
 }
 
 /// The results file, read once.
@@ -224,7 +224,7 @@ fn read(table: &Table, request: &Request<'_>) -> Result<Read, Error> {
             }
             // CSV states no types: a column of texts is found by its first one.
             Err(ResultsError::Number { name, .. })
-                if columns.iter().any(|own| own.name == name) =>
+                if columns.iter().any(|column| column.name == name) =>
             {
                 chosen.retain(|at| table.columns()[*at].name != name);
                 texts.push(name);

@@ -144,7 +144,7 @@ fn number(value: f64) -> Markup {
 
 fn statistics(content: &Content<'_>) -> Markup {
     let rows = content.columns.iter().zip(content.statistics);
-    let gaps = content.statistics.iter().any(|found| found.not_finite > 0);
+    let gaps = content.statistics.iter().any(|statistics| statistics.not_finite > 0);
     html! {
         section aria-labelledby="statistics" {
             h2 #statistics { "Statistics" }
@@ -161,15 +161,15 @@ fn statistics(content: &Content<'_>) -> Markup {
                         }
                     }
                     tbody {
-                        @for (column, found) in rows {
+                        @for (column, statistics) in rows {
                             tr {
                                 th scope="row" { (column.name) }
                                 td { (column.unit.as_deref().unwrap_or_default()) }
                                 @for value in [
-                                    found.first, found.last, found.smallest.0, found.smallest.1,
-                                    found.largest.0, found.largest.1, found.mean, found.rms,
+                                    statistics.first, statistics.last, statistics.smallest.0, statistics.smallest.1,
+                                    statistics.largest.0, statistics.largest.1, statistics.mean, statistics.rms,
                                 ] { (number(value)) }
-                                @if gaps { td.number { (found.not_finite) } }
+                                @if gaps { td.number { (statistics.not_finite) } }
                             }
                         }
                     }
@@ -196,11 +196,11 @@ fn frames(messages: &[Message], file: &Path) -> Markup {
                         }
                     }
                     tbody {
-                        @for own in messages.iter().take(LISTED) {
+                        @for message in messages.iter().take(LISTED) {
                             tr {
-                                th scope="row" { (own.name) }
-                                td.number title=(own.count) { (own.count) }
-                                @for value in [own.first, own.last, 1e3 * own.shortest, 1e3 * own.mean(), 1e3 * own.longest] { (number(value)) }
+                                th scope="row" { (message.name) }
+                                td.number title=(message.count) { (message.count) }
+                                @for value in [message.first, message.last, 1e3 * message.shortest, 1e3 * message.mean(), 1e3 * message.longest] { (number(value)) }
                             }
                         }
                     }
@@ -216,7 +216,7 @@ fn frames(messages: &[Message], file: &Path) -> Markup {
 }
 
 fn differences(compared: &Compared, other: &str) -> Markup {
-    let equal = compared.differences.iter().all(|found| found.largest <= 0.0);
+    let equal = compared.differences.iter().all(|difference| difference.largest <= 0.0);
     html! {
         section aria-labelledby="differences" {
             h2 #differences { "Difference to " (other) }
@@ -240,10 +240,10 @@ fn differences(compared: &Compared, other: &str) -> Markup {
                         }
                     }
                     tbody {
-                        @for found in &compared.differences {
+                        @for difference in &compared.differences {
                             tr {
-                                th scope="row" { (found.name) }
-                                @for value in [found.largest, found.at, found.rms, found.relative] { (number(value)) }
+                                th scope="row" { (difference.name) }
+                                @for value in [difference.largest, difference.at, difference.rms, difference.relative] { (number(value)) }
                             }
                         }
                     }

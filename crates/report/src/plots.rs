@@ -42,7 +42,8 @@ pub(crate) struct Curve {
     holds: bool,
     /// Whether the points are not connected.
     dots: bool,
-    own: Points,
+    #[serde(rename = "own")]
+    this_run: Points,
     other: Option<Points>,
     difference: Option<Points>,
 }
@@ -66,7 +67,7 @@ pub(crate) fn plots(
             name: column.name.clone(),
             holds: crate::holds(column),
             dots: false,
-            own: points(trace, limit),
+            this_run: points(trace, limit),
             other: pair.map(|(other, _)| points(other, limit)),
             difference: pair.map(|(_, difference)| points(difference, limit)),
         };
@@ -87,7 +88,7 @@ pub(crate) fn of_frames(messages: &[Message]) -> Vec<Plot> {
         name: message.name.clone(),
         holds: false,
         dots: true,
-        own: points(&message.intervals, limit),
+        this_run: points(&message.intervals, limit),
         other: None,
         difference: None,
     };
@@ -102,7 +103,7 @@ pub(crate) fn of_frames(messages: &[Message]) -> Vec<Plot> {
 /// All rows of a trace, if they are at most `limit`; otherwise the lowest and the highest of each group of
 /// neighbours.
 fn points(trace: &Trace, limit: usize) -> Points {
-    let kept: Vec<(f64, f64)> = if trace.count <= limit {
+    let samples: Vec<(f64, f64)> = if trace.count <= limit {
         trace.rows.clone()
     } else {
         let (times, values) = trace.envelope.samples();
@@ -111,7 +112,7 @@ fn points(trace: &Trace, limit: usize) -> Points {
         samples.chunks(group).flat_map(extremes).chain(samples.last().copied()).collect()
     };
     let value = |value: f64| value.is_finite().then(|| seven_digits(value));
-    let (times, values) = kept.into_iter().map(|(time, found)| (time, value(found))).unzip();
+    let (times, values) = samples.into_iter().map(|(time, height)| (time, value(height))).unzip();
     Points(times, values)
 }
 
@@ -121,10 +122,10 @@ fn extremes(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let lowest = finite().min_by(|a, b| a.1.total_cmp(&b.1));
     let highest = finite().max_by(|a, b| a.1.total_cmp(&b.1));
     let gap = samples.iter().find(|sample| !sample.1.is_finite());
-    let mut kept: Vec<_> = [lowest, highest, gap].into_iter().flatten().copied().collect();
-    kept.sort_by(|a, b| a.0.total_cmp(&b.0));
-    kept.dedup();
-    kept
+    let mut points: Vec<_> = [lowest, highest, gap].into_iter().flatten().copied().collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    points.dedup();
+    points
 }
 
 /// The value rounded to seven significant digits, which a plot does not show.

@@ -26,7 +26,7 @@ pub struct Statistics {
 
 /// Collects the statistics of a variable row by row.
 pub(crate) struct Builder {
-    found: Statistics,
+    statistics: Statistics,
     holds: bool,
     before: Option<(f64, f64)>,
     length: f64,
@@ -37,7 +37,7 @@ pub(crate) struct Builder {
 impl Builder {
     pub(crate) fn new(column: &Column) -> Self {
         let nan = f64::NAN;
-        let found = Statistics {
+        let statistics = Statistics {
             first: nan,
             last: nan,
             smallest: (nan, nan),
@@ -47,25 +47,33 @@ impl Builder {
             not_finite: 0,
         };
         let holds = crate::holds(column);
-        Self { found, holds, before: None, length: 0.0, integral: 0.0, integral_of_square: 0.0 }
+        Self {
+            statistics,
+            holds,
+            before: None,
+            length: 0.0,
+            integral: 0.0,
+            integral_of_square: 0.0,
+        }
     }
 
     pub(crate) fn push(&mut self, time: f64, value: f64) {
         if !(value.is_finite() && time.is_finite()) {
-            self.found.not_finite += 1;
+            self.statistics.not_finite += 1;
             self.before = None;
             return;
         }
-        let found = &mut self.found;
-        if found.first.is_nan() {
-            (found.first, found.smallest, found.largest) = (value, (value, time), (value, time));
+        let statistics = &mut self.statistics;
+        if statistics.first.is_nan() {
+            (statistics.first, statistics.smallest, statistics.largest) =
+                (value, (value, time), (value, time));
         }
-        found.last = value;
-        if value < found.smallest.0 {
-            found.smallest = (value, time);
+        statistics.last = value;
+        if value < statistics.smallest.0 {
+            statistics.smallest = (value, time);
         }
-        if value > found.largest.0 {
-            found.largest = (value, time);
+        if value > statistics.largest.0 {
+            statistics.largest = (value, time);
         }
         if let Some((at, old)) = self.before {
             let (step, end) = ((time - at).max(0.0), if self.holds { old } else { value });
@@ -77,12 +85,13 @@ impl Builder {
     }
 
     pub(crate) fn finish(self) -> Statistics {
-        let Self { mut found, length, integral, integral_of_square, .. } = self;
+        let Self { mut statistics, length, integral, integral_of_square, .. } = self;
         if length > 0.0 {
-            (found.mean, found.rms) = (integral / length, (integral_of_square / length).sqrt());
+            (statistics.mean, statistics.rms) =
+                (integral / length, (integral_of_square / length).sqrt());
         } else {
-            (found.mean, found.rms) = (found.last, found.last.abs());
+            (statistics.mean, statistics.rms) = (statistics.last, statistics.last.abs());
         }
-        found
+        statistics
     }
 }

@@ -7,15 +7,15 @@ const BUCKETS: usize = 8192;
 /// sample that is not finite, if any.
 #[derive(Debug, Clone, Copy)]
 struct Bucket {
-    kept: Option<[(f64, f64); 4]>,
+    samples: Option<[(f64, f64); 4]>,
     gap: Option<f64>,
 }
 
-const EMPTY: Bucket = Bucket { kept: None, gap: None };
+const EMPTY: Bucket = Bucket { samples: None, gap: None };
 
 impl Bucket {
     fn merge(self, later: Self) -> Self {
-        let kept = match (self.kept, later.kept) {
+        let samples = match (self.samples, later.samples) {
             (Some([first, low, high, _]), Some([_, next_low, next_high, last])) => {
                 let low = if next_low.1 < low.1 { next_low } else { low };
                 let high = if next_high.1 > high.1 { next_high } else { high };
@@ -23,7 +23,7 @@ impl Bucket {
             }
             (one, other) => one.or(other),
         };
-        Self { kept, gap: self.gap.or(later.gap) }
+        Self { samples, gap: self.gap.or(later.gap) }
     }
 }
 
@@ -73,9 +73,9 @@ impl Envelope {
         let place = (place as usize).max(last);
         self.buckets.resize(place + 1, EMPTY);
         let sample = if value.is_finite() {
-            Bucket { kept: Some([(time, value); 4]), gap: None }
+            Bucket { samples: Some([(time, value); 4]), gap: None }
         } else {
-            Bucket { kept: None, gap: Some(time) }
+            Bucket { samples: None, gap: Some(time) }
         };
         self.buckets[place] = self.buckets[place].merge(sample);
     }
@@ -98,12 +98,12 @@ impl Envelope {
     pub fn samples(&self) -> (Vec<f64>, Vec<f64>) {
         let (mut times, mut values) = (Vec::new(), Vec::new());
         for bucket in &self.buckets {
-            let mut kept = bucket.kept.map_or(Vec::new(), |all| all.to_vec());
-            kept.sort_by(|a, b| a.0.total_cmp(&b.0));
-            kept.dedup();
-            kept.extend(bucket.gap.map(|time| (time, f64::NAN)));
-            times.extend(kept.iter().map(|sample| sample.0));
-            values.extend(kept.iter().map(|sample| sample.1));
+            let mut samples = bucket.samples.map_or(Vec::new(), |all| all.to_vec());
+            samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+            samples.dedup();
+            samples.extend(bucket.gap.map(|time| (time, f64::NAN)));
+            times.extend(samples.iter().map(|sample| sample.0));
+            values.extend(samples.iter().map(|sample| sample.1));
         }
         (times, values)
     }

@@ -176,19 +176,19 @@ fn append(
     if Identity::new(&metadata) != identity {
         return Ok(Some("another file took its place during the run".to_owned()));
     }
-    let (found, whole) = (metadata.len(), length + rows.len() as u64);
+    let (size, whole) = (metadata.len(), length + rows.len() as u64);
     // The last write of a Parquet file, which has no rows here, may be unfinished: the one before it counts.
-    let is_unfinished = found > whole && rows.is_empty() && !was_complete;
-    if found < length || found > whole && !is_unfinished {
+    let is_unfinished = size > whole && rows.is_empty() && !was_complete;
+    if size < length || size > whole && !is_unfinished {
         return Ok(Some(format!(
-            "it has {found} bytes where the run wrote {length}: something else wrote to it"
+            "it has {size} bytes where the run wrote {length}: something else wrote to it"
         )));
     }
     if rows.is_empty() {
         return Ok(None);
     }
     // The process may have ended while it wrote the rows.
-    let (there, missing) = rows.split_at(usize::try_from(found - length).unwrap_or(0));
+    let (there, missing) = rows.split_at(usize::try_from(size - length).unwrap_or(0));
     let mut written = vec![0; there.len()];
     file.seek(SeekFrom::Start(length))?;
     file.read_exact(&mut written)?;

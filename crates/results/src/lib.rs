@@ -305,14 +305,14 @@ impl Widths {
     }
 
     fn check(&self, row: &Row<'_>) -> Result<(), ResultsError> {
-        for (kind, expected, found) in [
+        for (kind, expected, actual) in [
             (ColumnKind::Real, self.reals, row.reals.len()),
             (ColumnKind::Integer, self.integers, row.integers.len()),
             (ColumnKind::Boolean, self.booleans, row.booleans.len()),
             (ColumnKind::String, self.strings, row.strings.len()),
         ] {
-            if expected != found {
-                return Err(ResultsError::Values { kind, expected, found });
+            if expected != actual {
+                return Err(ResultsError::Values { kind, expected, found: actual });
             }
         }
         Ok(())

@@ -102,15 +102,15 @@ impl Columns {
         let mut strings = row.strings.iter();
         for (_, values) in &mut self.columns {
             match values {
-                Values::Real(own) => own.push(reals.next().unwrap_or_default()),
-                Values::Integer(own) => own.push(limited(integers.next().unwrap_or_default())),
-                Values::Long(own) => own.push(integers.next().unwrap_or_default()),
-                Values::Boolean(own) => own.push(booleans.next().unwrap_or_default() != 0),
-                Values::String(own) => own.push(strings.next().map_or("", String::as_str)),
+                Values::Real(list) => list.push(reals.next().unwrap_or_default()),
+                Values::Integer(list) => list.push(limited(integers.next().unwrap_or_default())),
+                Values::Long(list) => list.push(integers.next().unwrap_or_default()),
+                Values::Boolean(list) => list.push(booleans.next().unwrap_or_default() != 0),
+                Values::String(list) => list.push(strings.next().map_or("", String::as_str)),
             }
         }
-        for (number, own) in self.present.iter_mut().enumerate() {
-            own.push(row.present.get(number).copied().unwrap_or(true));
+        for (number, flags) in self.present.iter_mut().enumerate() {
+            flags.push(row.present.get(number).copied().unwrap_or(true));
         }
     }
 
@@ -131,15 +131,15 @@ impl Columns {
             strings.clear();
             for (_, values) in &self.columns {
                 match values {
-                    Values::Real(own) => reals.push(own[row]),
-                    Values::Integer(own) => integers.push(own[row].into()),
-                    Values::Long(own) => integers.push(own[row]),
-                    Values::Boolean(own) => booleans.push(own[row].into()),
-                    Values::String(own) => strings.push(own.get(row).unwrap_or("").to_owned()),
+                    Values::Real(list) => reals.push(list[row]),
+                    Values::Integer(list) => integers.push(list[row].into()),
+                    Values::Long(list) => integers.push(list[row]),
+                    Values::Boolean(list) => booleans.push(list[row].into()),
+                    Values::String(list) => strings.push(list.get(row).unwrap_or("").to_owned()),
                 }
             }
             present.clear();
-            present.extend(self.present.iter().map(|own| own[row]));
+            present.extend(self.present.iter().map(|flags| flags[row]));
             let (reals, integers) = (&reals[..], &integers[..]);
             let (booleans, strings, present) = (&booleans[..], &strings[..], &present[..]);
             sink.row(time, &Row { reals, integers, booleans, strings, present })?;

@@ -126,20 +126,20 @@ impl OutputFile {
         if links(&metadata) == 0 {
             return Err(ResultsError::Gone { path: self.path.clone() });
         }
-        let found = metadata.len();
+        let size = metadata.len();
         let position = (&self.file).stream_position().map_err(|error| self.failed(error))?;
-        if found == self.length && position == self.length {
+        if size == self.length && position == self.length {
             return Ok(());
         }
-        if found >= self.length {
+        if size >= self.length {
             // The rows that are not yet in the file can then be added.
             let length = self.length;
             self.set_length(length)?;
         }
-        Err(if found == self.length {
+        Err(if size == self.length {
             ResultsError::Overwritten { path: self.path.clone() }
         } else {
-            ResultsError::Length { path: self.path.clone(), expected: self.length, found }
+            ResultsError::Length { path: self.path.clone(), expected: self.length, found: size }
         })
     }
 
@@ -287,7 +287,7 @@ fn lifted(file: File) -> File {
 #[must_use]
 pub fn is_stream(path: &Path) -> bool {
     path == Path::new(STANDARD_OUTPUT)
-        || fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+        || fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }
 
 /// Opens a file for exclusive writing without changing its content; `None` if another process has it

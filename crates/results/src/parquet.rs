@@ -140,7 +140,8 @@ impl ParquetSink {
         let mut reader = self.block.reader(rows);
         let mut clocked = self.clocked.iter();
         while let Some(mut column) = group.next_column()? {
-            let levels = clocked.next().copied().flatten().map(|own| self.block.levels(own, rows));
+            let levels =
+                clocked.next().copied().flatten().map(|number| self.block.levels(number, rows));
             let levels = levels.as_deref();
             match column.untyped() {
                 ColumnWriter::DoubleColumnWriter(writer) => {

@@ -83,11 +83,11 @@ impl Table {
         positions: &[usize],
         visitor: &mut Visitor<'_>,
     ) -> Result<(), ResultsError> {
-        let mut wanted = vec![self.time];
-        wanted.extend(positions);
+        let mut columns = vec![self.time];
+        columns.extend(positions);
         match self.format {
-            Format::Csv => lines::visit(&self.path, &self.columns, &wanted, visitor),
-            Format::Parquet => groups::visit(&self.path, &self.columns, &wanted, visitor),
+            Format::Csv => lines::visit(&self.path, &self.columns, &columns, visitor),
+            Format::Parquet => groups::visit(&self.path, &self.columns, &columns, visitor),
         }
     }
 

@@ -71,19 +71,19 @@ fn matching<N: AsRef<str>>(pattern: &str, names: &[N]) -> Result<Vec<usize>, Sel
         return Ok(vec![same]);
     }
     let pieces: Vec<char> = pattern.chars().collect();
-    let found: Vec<usize> = names
+    let matches: Vec<usize> = names
         .iter()
         .enumerate()
         .filter(|(_, name)| matches_pattern(&pieces, name.as_ref()))
         .map(|(position, _)| position)
         .collect();
-    if found.is_empty() {
+    if matches.is_empty() {
         return Err(SelectionError::NoMatch {
             pattern: pattern.to_owned(),
             near: similar_hint(pattern, names),
         });
     }
-    Ok(found)
+    Ok(matches)
 }
 
 /// Whether the whole name matches the pattern. Backtracks to the last `*` only, so the cost is at most
@@ -98,14 +98,14 @@ fn matches_pattern(pattern: &[char], name: &str) -> bool {
                 star = Some((at, letter));
                 at += 1;
             }
-            Some(own) if *own == '?' || *own == name[letter] => {
+            Some(character) if *character == '?' || *character == name[letter] => {
                 at += 1;
                 letter += 1;
             }
             _ => match star {
-                Some((place, taken)) => {
-                    star = Some((place, taken + 1));
-                    (at, letter) = (place + 1, taken + 1);
+                Some((place, end)) => {
+                    star = Some((place, end + 1));
+                    (at, letter) = (place + 1, end + 1);
                 }
                 None => return false,
             },
@@ -126,10 +126,10 @@ fn similar<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str>
             || name.to_lowercase().contains(&known.to_lowercase())
             || edits(known) <= EDITS
     };
-    let mut found: Vec<_> = names.filter(near).collect();
-    found.sort_by_key(|known| edits(known));
-    found.truncate(5);
-    found
+    let mut similar: Vec<_> = names.filter(near).collect();
+    similar.sort_by_key(|known| edits(known));
+    similar.truncate(5);
+    similar
 }
 
 /// Returns a hint for a message: names similar to the pattern without its wildcards, or else the first

@@ -76,7 +76,7 @@ impl Map<'_> {
         let reach = self.poles().flatten().fold(1.0, |most: f64, part| most.max(part.abs()));
         let (wide, tall) = (size_of(SIZE.horizontal()), size_of(SIZE.vertical()));
         let (x, y) = (1.12 * reach * wide / tall, 1.12 * reach);
-        (Axis::exact((-x, x), SIZE.horizontal(), 5), Axis::exact((-y, y), SIZE.vertical(), 5))
+        (Axis::exact(-x, x, SIZE.horizontal(), 5), Axis::exact(-y, y, SIZE.vertical(), 5))
     }
 
     /// Returns axes of the s-plane: both with the same linear scale, or both logarithmic.
@@ -104,8 +104,8 @@ impl Map<'_> {
         let pixel = (1.24 * (right - left) / wide).max(2.4 * high.max(-low) / tall);
         let (center, reach) = (f64::midpoint(left, right), 0.5 * pixel * wide);
         (
-            Axis::exact((center - reach, center + reach), SIZE.horizontal(), 6),
-            Axis::exact((-0.5 * pixel * tall, 0.5 * pixel * tall), SIZE.vertical(), 6),
+            Axis::exact(center - reach, center + reach, SIZE.horizontal(), 6),
+            Axis::exact(-0.5 * pixel * tall, 0.5 * pixel * tall, SIZE.vertical(), 6),
         )
     }
 

@@ -51,8 +51,8 @@ impl Block {
             longs: vec![0; longs * stride],
             is_long: columns
                 .iter()
-                .filter(|own| matches!(own.kind, ColumnKind::Integer | ColumnKind::Long))
-                .map(|own| own.kind == ColumnKind::Long)
+                .filter(|column| matches!(column.kind, ColumnKind::Integer | ColumnKind::Long))
+                .map(|column| column.kind == ColumnKind::Long)
                 .collect(),
             booleans: vec![false; booleans * stride],
             texts: Vec::new(),
@@ -108,15 +108,16 @@ impl Block {
             self.texts.extend_from_slice(text.as_bytes());
             self.ends.push(self.texts.len());
         }
-        let present = (0..self.clocked).map(|own| row.present.get(own).copied().unwrap_or(true));
+        let present =
+            (0..self.clocked).map(|number| row.present.get(number).copied().unwrap_or(true));
         self.present.extend(present);
         self.rows += 1;
     }
 
     /// Returns the definition levels of the first `rows` of a clocked column: 0 is null.
     pub(super) fn levels(&self, clocked: usize, rows: usize) -> Vec<i16> {
-        let own = self.present.iter().skip(clocked).step_by(self.clocked.max(1));
-        own.take(rows).map(|present| i16::from(*present)).collect()
+        let flags = self.present.iter().skip(clocked).step_by(self.clocked.max(1));
+        flags.take(rows).map(|present| i16::from(*present)).collect()
     }
 
     /// Returns a reader of the first `rows` of the columns.

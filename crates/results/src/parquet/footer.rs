@@ -68,7 +68,7 @@ impl Footer {
         &mut self,
         last: Option<RowGroupMetaData>,
     ) -> Result<Vec<u8>, ParquetError> {
-        let kept = self.groups.len();
+        let count = self.groups.len();
         let mut groups = std::mem::take(&mut self.groups);
         groups.extend(last);
         let rows = groups.iter().map(RowGroupMetaData::num_rows).sum();
@@ -84,7 +84,7 @@ impl Footer {
         let mut bytes = Vec::new();
         let done = ParquetMetaDataWriter::new(&mut bytes, &all).finish();
         self.groups = all.into_builder().take_row_groups();
-        self.groups.truncate(kept);
+        self.groups.truncate(count);
         done.map(|()| bytes)
     }
 }

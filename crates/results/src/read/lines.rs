@@ -46,8 +46,8 @@ pub(super) fn visit(
         }
         let line = record.position().map_or(0, ::csv::Position::line);
         if record.len() != columns.len() {
-            let (expected, found) = (columns.len(), record.len());
-            let reason = format!("line {line} has {found} values, expected {expected}");
+            let (expected, actual) = (columns.len(), record.len());
+            let reason = format!("line {line} has {actual} values, expected {expected}");
             wrong = Some(unreadable(path, &reason));
             continue;
         }
