@@ -74,13 +74,13 @@ impl Options {
 pub(crate) fn campaign(options: &Options) -> u8 {
     let python = std::env::var_os(VARIABLE).unwrap_or_else(|| PYTHON.into());
     let shown = python.to_string_lossy().into_owned();
-    let found = Command::new(&python)
+    let status = Command::new(&python)
         .args([
             "-c",
             "import importlib.util as u, sys; sys.exit(0 if u.find_spec('aso_ftc') else 9)",
         ])
         .status();
-    let sentence = match found {
+    let sentence = match status {
         Ok(status) if status.success() => {
             let mut command = Command::new(&python);
             command.args(["-m", "aso_ftc", "campaign"]).args(options.arguments());

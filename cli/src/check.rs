@@ -77,7 +77,7 @@ pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
     let unpacked = Unpacked::open_whole(&options.fmu)?;
     let (here, findings) = findings(options, &unpacked)?;
     let answer = Answer::new(here, &unpacked.description, &findings);
-    let count = |severity| findings.iter().filter(|own| own.severity == severity).count();
+    let count = |severity| findings.iter().filter(|finding| finding.severity == severity).count();
     let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
     let notes = count(Severity::Note);
     let fmu = &options.fmu;
@@ -88,7 +88,7 @@ pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
         return Ok(errors == 0);
     }
     println!("{answer}");
-    let variables = unpacked.description.variables.iter().map(|own| own.name.as_str());
+    let variables = unpacked.description.variables.iter().map(|variable| variable.name.as_str());
     for line in fold::fold(&findings, &variables.collect::<HashSet<_>>()) {
         println!("{line}");
     }
@@ -116,18 +116,18 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResu
     let here = if let Some(here) = without_trial(options, unpacked) {
         here
     } else {
-        let (mut here, mut found) = run(options, unpacked)?;
+        let (mut here, mut trial_findings) = run(options, unpacked)?;
         let folder = format!("{}/", unpacked.folder().display());
         if let TrialResult::No { reason } = &mut here {
             *reason = sections::renamed(&reason.replace(&folder, ""), description.version());
         }
         let version = description.version();
-        for finding in &mut found {
+        for finding in &mut trial_findings {
             finding.what = sections::renamed(&finding.what.replace(&folder, ""), version);
             finding.place = sections::renamed(&finding.place, version);
         }
-        sections::renumber(&mut found, version);
-        findings.extend(found);
+        sections::renumber(&mut trial_findings, version);
+        findings.extend(trial_findings);
         here
     };
     findings.sort_by_key(|finding| (finding.severity, finding.stops.is_empty(), finding.part));
@@ -140,10 +140,12 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
         return Some(TrialResult::NotTried { reason: "--no-run".to_owned() });
     }
     let not_tried = |reason: &str| Some(TrialResult::NotTried { reason: reason.to_owned() });
-    let own = &unpacked.description;
-    let simulation = own.stepped().map(|own| (own.model_identifier, own.needs_execution_tool));
-    let exchange = own.model_exchange.as_ref();
-    let exchange = exchange.map(|own| (own.model_identifier.clone(), own.needs_execution_tool));
+    let description = &unpacked.description;
+    let simulation =
+        description.stepped().map(|flags| (flags.model_identifier, flags.needs_execution_tool));
+    let exchange = description.model_exchange.as_ref();
+    let exchange =
+        exchange.map(|flags| (flags.model_identifier.clone(), flags.needs_execution_tool));
     let is_simulation = simulation.is_some();
     let (identifier, needs_tool) = simulation.or(exchange)?;
     if !is_simulation && cfg!(not(target_os = "linux")) {
@@ -151,7 +153,7 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
     }
     // With its libraries, an FMU of PythonFMU needs nothing beside it.
     let is_python = |tool: &str| tool.starts_with("PythonFMU");
-    let alone = own.generation_tool.as_deref().is_some_and(is_python);
+    let alone = description.generation_tool.as_deref().is_some_and(is_python);
     if needs_tool && !alone && options.preload.is_empty() {
         let tool = unpacked.description.generation_tool.as_deref().unwrap_or("the exporting tool");
         let reason = format!("it needs {tool} beside it (needsExecutionTool)");
@@ -192,8 +194,8 @@ fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, V
 }
 
 /// Returns the description of an FMU with the steps of its scheduled execution, if it has no co-simulation.
-fn as_stepped(own: &ModelDescription) -> ModelDescription {
-    ModelDescription { co_simulation: own.stepped(), ..own.clone() }
+fn as_stepped(description: &ModelDescription) -> ModelDescription {
+    ModelDescription { co_simulation: description.stepped(), ..description.clone() }
 }
 
 /// Runs the FMU in separate processes. A failure that is not the FMU's fault is an error of the
@@ -205,8 +207,8 @@ fn isolated(
 ) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let package = Package::open(unpacked.folder())?;
     let (preload, thorough) = (options.preload.clone(), options.thorough);
-    let own = as_stepped(&unpacked.description);
-    let exchange = own.co_simulation.is_none();
+    let stepped = as_stepped(&unpacked.description);
+    let exchange = stepped.co_simulation.is_none();
     let integration = exchange.then(|| isolate::Integration {
         options: integrate::Method::default().name().to_owned(),
         describe: integrate::description_of,
@@ -219,17 +221,17 @@ fn isolated(
         integration,
         ..Default::default()
     };
-    let description = if exchange { integrate::description_of(&own) } else { own };
+    let description = if exchange { integrate::description_of(&stepped) } else { stepped };
     let description = &description;
     let flags = description.co_simulation.as_ref();
     let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
     let mut broken = None;
     let mut make = |name: &str, before: Option<Isolated>| -> anyhow::Result<Isolated> {
-        let made = match before.filter(|_| !once) {
+        let instance = match before.filter(|_| !once) {
             Some(mut slave) => slave.renew(name, &options).map(|()| slave),
             None => package.instantiate(name, &options),
         };
-        made.map_err(|error| match error {
+        instance.map_err(|error| match error {
             IsolateError::Refused { reason, .. } => anyhow!(reason),
             IsolateError::Call { source, .. } => source.into(),
             other => {
@@ -239,12 +241,12 @@ fn isolated(
             }
         })
     };
-    let (here, mut found) = behaviour::check(description, thorough, &mut make);
+    let (here, mut findings) = behaviour::check(description, thorough, &mut make);
     if exchange {
         // The rules are those of co-simulation.
-        found.retain(|finding| {
+        findings.retain(|finding| {
             finding.severity == Severity::Error && matches!(here, TrialResult::No { .. })
         });
     }
-    broken.map_or(Ok((here, found)), |error| Err(error.into()))
+    broken.map_or(Ok((here, findings)), |error| Err(error.into()))
 }

@@ -32,8 +32,8 @@ fn end(ending: &Ending) -> u8 {
     // Suppress panic messages: memory that the FMU has overwritten can cause them; the failure is
     // reported below.
     std::panic::set_hook(Box::new(|_| {}));
-    for (path, kept) in study::keep_results() {
-        match kept {
+    for (path, outcome) in study::keep_results() {
+        match outcome {
             Ok(()) => tracing::error!("the results up to this step are in {}", path.display()),
             Err(error) => tracing::error!("the last rows are lost: {error}"),
         }

@@ -103,22 +103,22 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     for library in &options.preload {
         fmu_import::preload(library)?;
     }
-    let mut made = {
+    let mut design = {
         let bar = Bar::new();
         design::design_within(&options.plant, options.certificate_time, &|step| bar.show(step))?
     };
-    let code = code(options, &made)?;
+    let code = code(options, &design)?;
     for (option, path, _) in &code.files {
         outputs.push((option, path));
     }
-    check_distinct(&inputs(options, from.as_deref(), made.model.as_deref()), &outputs)?;
+    check_distinct(&inputs(options, from.as_deref(), design.model.as_deref()), &outputs)?;
     if !options.force {
-        outputs.iter().try_for_each(|(_, path)| check_own(path, &made.identity))?;
+        outputs.iter().try_for_each(|(_, path)| check_own(path, &design.identity))?;
     }
-    let fmu = from.map(|from| made.fmu(&from)).transpose()?;
-    let page = made.page();
+    let fmu = from.map(|from| design.fmu(&from)).transpose()?;
+    let page = design.page();
     let mut staged = Outputs::default();
-    staged.stage(&out, |path| fs::write(path, &made.file))?;
+    staged.stage(&out, |path| fs::write(path, &design.file))?;
     staged.stage(&report, |path| fs::write(path, &page))?;
     if let (Some(fmu), Some(path)) = (fmu, &options.fmu) {
         staged.stage(path, |path| fmu.write(path, &page))?;
@@ -127,7 +127,7 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         staged.stage(path, |path| fs::write(path, text))?;
     }
     if let Some(path) = &options.worst_case {
-        let text = made.worst_case.as_ref();
+        let text = design.worst_case.as_ref();
         let text = text.context(
             "no worst case can be written: the loop is not stable, or a fault enters measurements by \
              an input of the plant's FMU",
@@ -140,16 +140,16 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     }
     if options.json {
         let mut output = std::io::stdout().lock();
-        serde_json::to_writer_pretty(&mut output, &made.report)
+        serde_json::to_writer_pretty(&mut output, &design.report)
             .context("cannot print the report")?;
         writeln!(output)?;
     } else {
-        terminal::summarise(&made.report);
+        terminal::summarise(&design.report);
         for (_, path) in outputs {
             println!("{}", path.display());
         }
     }
-    Ok(made.holds())
+    Ok(design.holds())
 }
 
 /// The source code of the controller: the option that asks for each file, its path, its content.
@@ -159,14 +159,14 @@ struct CodeFiles {
     warnings: Vec<String>,
 }
 
-fn code(options: &Options, made: &Design) -> anyhow::Result<CodeFiles> {
+fn code(options: &Options, design: &Design) -> anyhow::Result<CodeFiles> {
     let precision = if options.float { Precision::Single } else { Precision::Double };
     let mut all = CodeFiles::default();
     for (option, folder, language) in
         [("--c-code", &options.c_code, Language::C), ("--no-std", &options.no_std, Language::Rust)]
     {
         let Some(folder) = folder else { continue };
-        let code = made
+        let code = design
             .code(language, precision)
             .with_context(|| format!("{option}: no code for {}", options.plant.display()))?;
         let files = code.files.into_iter();
@@ -186,21 +186,22 @@ fn compare(options: &Options) -> anyhow::Result<()> {
     for library in &options.preload {
         fmu_import::preload(library)?;
     }
-    let found = design::compare(&options.plant)?;
-    check_distinct(&inputs(options, None, found.model.as_deref()), &outputs)?;
+    let comparison = design::compare(&options.plant)?;
+    check_distinct(&inputs(options, None, comparison.model.as_deref()), &outputs)?;
     if !options.force {
-        check_own(&path, &found.identity)?;
+        check_own(&path, &comparison.identity)?;
     }
-    let text = found.page();
+    let text = comparison.page();
     let mut staged = Outputs::default();
     staged.stage(&path, |path| fs::write(path, &text))?;
     staged.commit()?;
     if options.json {
         let mut output = std::io::stdout().lock();
-        serde_json::to_writer_pretty(&mut output, &found).context("cannot print the comparison")?;
+        serde_json::to_writer_pretty(&mut output, &comparison)
+            .context("cannot print the comparison")?;
         writeln!(output)?;
     } else {
-        terminal::compare(&found);
+        terminal::compare(&comparison);
         println!("{}", path.display());
     }
     Ok(())

@@ -58,7 +58,8 @@ fn identifier(name: &str) -> anyhow::Result<String> {
                     first, such as heat-pump";
     let words: Vec<&str> = name.split(['-', '_']).collect();
     let letters = |word: &&str| {
-        !word.is_empty() && word.chars().all(|own| own.is_ascii_lowercase() || own.is_ascii_digit())
+        !word.is_empty()
+            && word.chars().all(|letter| letter.is_ascii_lowercase() || letter.is_ascii_digit())
     };
     if !words.iter().all(letters) || !name.starts_with(|first: char| first.is_ascii_lowercase()) {
         bail!("the name {name:?} gives no identifier: {expected}");
@@ -68,7 +69,7 @@ fn identifier(name: &str) -> anyhow::Result<String> {
     }
     let camel = |word: &str| word[..1].to_ascii_uppercase() + &word[1..];
     let identifier: String = words.into_iter().map(camel).collect();
-    if TAKEN.split(' ').any(|taken| identifier.eq_ignore_ascii_case(taken)) {
+    if TAKEN.split(' ').any(|reserved| identifier.eq_ignore_ascii_case(reserved)) {
         bail!("the name {name:?} is taken: Rust or the template use it for something else");
     }
     Ok(identifier)

@@ -285,7 +285,9 @@ fn add_terminals(
     }
     let bytes = read(&file)?;
     let all = terminals::read(&bytes).with_context(|| file.display().to_string())?;
-    for (terminal, member) in all.iter().flat_map(|own| own.members.iter().map(move |m| (own, m))) {
+    for (terminal, member) in
+        all.iter().flat_map(|terminal| terminal.members.iter().map(move |m| (terminal, m)))
+    {
         if description.variable(&member.variable).is_none() {
             bail!(
                 "{}: terminal {}: expected the name of a variable of {}, found `{}`",

@@ -71,11 +71,11 @@ impl<'a> Run<'a> {
         let time = columns("time").ok_or(PaperFigureError::MissingColumn("time"))?;
         let column = |name: &'static str| {
             let values = columns(name).ok_or(PaperFigureError::MissingColumn(name))?;
-            let (expected, found) = (time.len(), values.len());
-            if expected == found {
+            let (expected, actual) = (time.len(), values.len());
+            if expected == actual {
                 Ok(values)
             } else {
-                Err(PaperFigureError::UnequalLengths { name, expected, found })
+                Err(PaperFigureError::UnequalLengths { name, expected, found: actual })
             }
         };
         let (x_p, theta) = (column("plant.x_p")?, column("plant.theta")?);

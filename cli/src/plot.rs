@@ -113,14 +113,14 @@ fn panels(curves: &[Curve]) -> Vec<Panel<'_>> {
             x_label: if place + 1 == count { "time in s" } else { "" },
             y_label: group[0].unit.as_deref().unwrap_or_default(),
             frame_height,
-            series: group.into_iter().zip(INKS).map(series).collect(),
+            series: group.into_iter().zip(INKS).map(|(curve, ink)| series(curve, ink)).collect(),
             ..Panel::default()
         });
     }
     panels
 }
 
-fn series((curve, ink): (&Curve, Ink)) -> Series<'_> {
+fn series(curve: &Curve, ink: Ink) -> Series<'_> {
     Series { label: &curve.label, time: &curve.time, values: &curve.values, ink, broad: false }
 }
 

@@ -108,7 +108,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     describe(options, system, plan, by_name);
     let units = units(system, ports);
     let report = options.results.report.then(|| facts::facts(system, plan));
-    let is_shown = |path: &PathBuf| path.extension().is_some_and(|own| own == "log");
+    let is_shown = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "log");
     let bus_trace = config.results.bus_trace.clone().filter(is_shown);
     let ports = prepared.ports.clone();
     let mut run = prepared.start(saved.as_ref())?;
@@ -131,10 +131,10 @@ fn check_outputs(options: &Options, loaded: &LoadedConfig) -> anyhow::Result<()>
     let source = loaded.source.as_ref().map(|source| ("the configuration", source.path()));
     config.check_outputs(source.as_slice(), &outputs.collect::<Vec<_>>())?;
     let Some(results) = results.filter(|file| is_stream(file)) else { return Ok(()) };
-    for (option, given) in
+    for (option, is_stated) in
         [("--report", options.results.report), ("--plot", !config.results.plot.is_empty())]
     {
-        if given {
+        if is_stated {
             bail!("{option} reads the results again, and {} is no file", results.display());
         }
     }

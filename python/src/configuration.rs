@@ -91,36 +91,36 @@ pub(crate) fn merge(base: &mut Config, changes: Config) {
     set(&mut base.isolation.isolate, changes.isolation.isolate);
     set(&mut base.isolation.time_limit, changes.isolation.time_limit);
     set(&mut base.isolation.memory_limit, changes.isolation.memory_limit);
-    let (own, new) = (&mut base.algorithm, changes.algorithm);
-    set(&mut own.method, new.method);
-    set(&mut own.extrapolation, new.extrapolation);
-    set(&mut own.coupling, new.coupling);
-    set(&mut own.step_control, new.step_control);
-    set(&mut own.step, new.step);
-    set(&mut own.relative_tolerance, new.relative_tolerance);
-    set(&mut own.absolute_tolerance, new.absolute_tolerance);
-    set(&mut own.smallest_step, new.smallest_step);
-    set(&mut own.largest_step, new.largest_step);
-    set(&mut own.iterations, new.iterations);
-    set(&mut own.fallback, new.fallback);
-    own.every.extend(new.every);
-    replace(&mut own.next_event, new.next_event);
-    replace(&mut own.crossing, new.crossing);
-    replace(&mut own.discrete, new.discrete);
-    replace(&mut own.power_bonds, new.power_bonds);
-    set(&mut own.jobs, new.jobs);
-    set(&mut own.rollback, new.rollback);
-    set(&mut own.allow_nan, new.allow_nan);
+    let (algorithm, new) = (&mut base.algorithm, changes.algorithm);
+    set(&mut algorithm.method, new.method);
+    set(&mut algorithm.extrapolation, new.extrapolation);
+    set(&mut algorithm.coupling, new.coupling);
+    set(&mut algorithm.step_control, new.step_control);
+    set(&mut algorithm.step, new.step);
+    set(&mut algorithm.relative_tolerance, new.relative_tolerance);
+    set(&mut algorithm.absolute_tolerance, new.absolute_tolerance);
+    set(&mut algorithm.smallest_step, new.smallest_step);
+    set(&mut algorithm.largest_step, new.largest_step);
+    set(&mut algorithm.iterations, new.iterations);
+    set(&mut algorithm.fallback, new.fallback);
+    algorithm.every.extend(new.every);
+    replace(&mut algorithm.next_event, new.next_event);
+    replace(&mut algorithm.crossing, new.crossing);
+    replace(&mut algorithm.discrete, new.discrete);
+    replace(&mut algorithm.power_bonds, new.power_bonds);
+    set(&mut algorithm.jobs, new.jobs);
+    set(&mut algorithm.rollback, new.rollback);
+    set(&mut algorithm.allow_nan, new.allow_nan);
 }
 
-fn set<T>(own: &mut Option<T>, new: Option<T>) {
+fn set<T>(value: &mut Option<T>, new: Option<T>) {
     if new.is_some() {
-        *own = new;
+        *value = new;
     }
 }
 
-fn replace<T>(own: &mut Vec<T>, new: Vec<T>) {
+fn replace<T>(list: &mut Vec<T>, new: Vec<T>) {
     if !new.is_empty() {
-        *own = new;
+        *list = new;
     }
 }

@@ -36,29 +36,29 @@ pub(crate) fn compile(py: Python<'_>, path: PathBuf) -> PyResult<PathBuf> {
         .map_err(|error| Exception::new("FmuError", "Compile", files::sentence(&error)).raise(py))
 }
 
-fn describe<'py>(py: Python<'py>, own: &ModelDescription) -> PyResult<Bound<'py, PyDict>> {
+fn describe<'py>(py: Python<'py>, fmu: &ModelDescription) -> PyResult<Bound<'py, PyDict>> {
     let description = PyDict::new(py);
-    description.set_item("fmi_version", &own.fmi_version)?;
-    description.set_item("model_name", &own.model_name)?;
-    description.set_item("guid", &own.guid)?;
-    description.set_item("description", &own.description)?;
-    description.set_item("author", &own.author)?;
-    description.set_item("version", &own.version)?;
-    description.set_item("copyright", &own.copyright)?;
-    description.set_item("license", &own.license)?;
-    description.set_item("generation_tool", &own.generation_tool)?;
-    description.set_item("generation_date_and_time", &own.generation_date_and_time)?;
+    description.set_item("fmi_version", &fmu.fmi_version)?;
+    description.set_item("model_name", &fmu.model_name)?;
+    description.set_item("guid", &fmu.guid)?;
+    description.set_item("description", &fmu.description)?;
+    description.set_item("author", &fmu.author)?;
+    description.set_item("version", &fmu.version)?;
+    description.set_item("copyright", &fmu.copyright)?;
+    description.set_item("license", &fmu.license)?;
+    description.set_item("generation_tool", &fmu.generation_tool)?;
+    description.set_item("generation_date_and_time", &fmu.generation_date_and_time)?;
     let mut interfaces = Vec::new();
-    interfaces.extend(own.co_simulation.as_ref().map(|_| "co-simulation"));
-    interfaces.extend(own.model_exchange.as_ref().map(|_| "model-exchange"));
-    interfaces.extend(own.scheduled_execution.as_ref().map(|_| "scheduled-execution"));
+    interfaces.extend(fmu.co_simulation.as_ref().map(|_| "co-simulation"));
+    interfaces.extend(fmu.model_exchange.as_ref().map(|_| "model-exchange"));
+    interfaces.extend(fmu.scheduled_execution.as_ref().map(|_| "scheduled-execution"));
     description.set_item("interfaces", interfaces)?;
-    let identifier = own.co_simulation.as_ref().map(|flags| &flags.model_identifier);
+    let identifier = fmu.co_simulation.as_ref().map(|flags| &flags.model_identifier);
     let identifier =
-        identifier.or(own.model_exchange.as_ref().map(|flags| &flags.model_identifier));
+        identifier.or(fmu.model_exchange.as_ref().map(|flags| &flags.model_identifier));
     description.set_item("model_identifier", identifier)?;
-    description.set_item("capabilities", capabilities(py, own)?)?;
-    let experiment = own.default_experiment.unwrap_or_default();
+    description.set_item("capabilities", capabilities(py, fmu)?)?;
+    let experiment = fmu.default_experiment.unwrap_or_default();
     let default = PyDict::new(py);
     default.set_item("start_time", experiment.start_time)?;
     default.set_item("stop_time", experiment.stop_time)?;
@@ -66,17 +66,17 @@ fn describe<'py>(py: Python<'py>, own: &ModelDescription) -> PyResult<Bound<'py,
     default.set_item("step_size", experiment.step_size)?;
     description.set_item("default_experiment", default)?;
     let variables = PyList::empty(py);
-    for own_variable in &own.variables {
-        variables.append(variable(py, own_variable, own)?)?;
+    for own_variable in &fmu.variables {
+        variables.append(variable(py, own_variable, fmu)?)?;
     }
     description.set_item("variables", variables)?;
     Ok(description)
 }
 
 /// Returns the capability flags of co-simulation, by the names of FMI 2.0.
-fn capabilities<'py>(py: Python<'py>, own: &ModelDescription) -> PyResult<Bound<'py, PyDict>> {
+fn capabilities<'py>(py: Python<'py>, fmu: &ModelDescription) -> PyResult<Bound<'py, PyDict>> {
     let capabilities = PyDict::new(py);
-    if let Some(flags) = &own.co_simulation {
+    if let Some(flags) = &fmu.co_simulation {
         for (name, flag) in [
             ("needsExecutionTool", flags.needs_execution_tool),
             (
@@ -101,24 +101,25 @@ fn capabilities<'py>(py: Python<'py>, own: &ModelDescription) -> PyResult<Bound<
 /// Returns a variable as a dict.
 pub(crate) fn variable(
     py: Python<'_>,
-    own: &ScalarVariable,
+    declared: &ScalarVariable,
     of: &ModelDescription,
 ) -> PyResult<Py<PyDict>> {
     let variable = PyDict::new(py);
-    variable.set_item("name", &own.name)?;
-    variable.set_item("value_reference", own.value_reference)?;
-    variable.set_item("type", own.kind.element_in(of.version()))?;
-    variable.set_item("causality", own.causality.as_str())?;
-    variable.set_item("variability", own.variability.as_str())?;
-    variable.set_item("initial", own.initial_in_force().map(fmu_description::Initial::as_str))?;
-    variable.set_item("description", &own.description)?;
-    variable.set_item("declared_type", own.kind.declared_type())?;
-    variable.set_item("shape", own.extents(of))?;
-    variable.set_item("start", start(py, own, of)?)?;
-    let real = own.kind.as_real();
+    variable.set_item("name", &declared.name)?;
+    variable.set_item("value_reference", declared.value_reference)?;
+    variable.set_item("type", declared.kind.element_in(of.version()))?;
+    variable.set_item("causality", declared.causality.as_str())?;
+    variable.set_item("variability", declared.variability.as_str())?;
+    variable
+        .set_item("initial", declared.initial_in_force().map(fmu_description::Initial::as_str))?;
+    variable.set_item("description", &declared.description)?;
+    variable.set_item("declared_type", declared.kind.declared_type())?;
+    variable.set_item("shape", declared.extents(of))?;
+    variable.set_item("start", start(py, declared, of)?)?;
+    let real = declared.kind.as_real();
     variable.set_item("unit", real.and_then(|real| real.unit.as_ref()))?;
     variable.set_item("nominal", real.and_then(|real| real.nominal))?;
-    match (real, own.kind.as_integer()) {
+    match (real, declared.kind.as_integer()) {
         (Some(real), _) => {
             variable.set_item("min", real.min)?;
             variable.set_item("max", real.max)?;
@@ -134,18 +135,20 @@ pub(crate) fn variable(
 /// Returns the start value, for an array the list of its elements in row-major order.
 fn start<'py>(
     py: Python<'py>,
-    own: &ScalarVariable,
+    declared: &ScalarVariable,
     of: &ModelDescription,
 ) -> PyResult<Option<Bound<'py, PyAny>>> {
-    let Some(elements) = own.start_values(of, ELEMENTS) else { return Ok(None) };
+    let Some(elements) = declared.start_values(of, ELEMENTS) else { return Ok(None) };
     let list = match elements {
-        Elements::Real(own) => PyList::new(py, own)?,
-        Elements::Integer(own) => PyList::new(py, own)?,
-        Elements::Boolean(own) => PyList::new(py, own)?,
-        Elements::String(own) => PyList::new(py, own)?,
-        Elements::Binary(own) => PyList::new(py, own.iter().map(|own| PyBytes::new(py, own)))?,
+        Elements::Real(values) => PyList::new(py, values)?,
+        Elements::Integer(values) => PyList::new(py, values)?,
+        Elements::Boolean(values) => PyList::new(py, values)?,
+        Elements::String(values) => PyList::new(py, values)?,
+        Elements::Binary(values) => {
+            PyList::new(py, values.iter().map(|bytes| PyBytes::new(py, bytes)))?
+        }
     };
-    let is_scalar = own.dimensions.is_empty() || matches!(own.kind, Kind::Clock(_));
+    let is_scalar = declared.dimensions.is_empty() || matches!(declared.kind, Kind::Clock(_));
     match list.len() {
         1 if is_scalar => Ok(Some(list.get_item(0)?)),
         _ => list.into_bound_py_any(py).map(Some),

@@ -19,8 +19,8 @@ pub(crate) struct Designed {
 /// Designs the controller of the plant file at `path`.
 #[pyfunction]
 pub(crate) fn design_file(py: Python<'_>, path: PathBuf) -> PyResult<Designed> {
-    let made = guarded(py, || design::design(&path))?;
-    let design = made.map_err(|error| error::design(&error).raise(py))?;
+    let result = guarded(py, || design::design(&path))?;
+    let design = result.map_err(|error| error::design(&error).raise(py))?;
     Ok(Designed { design: Mutex::new(design) })
 }
 
@@ -33,8 +33,8 @@ pub(crate) fn design_plant(plant: &Bound<'_, PyAny>, path: PathBuf) -> PyResult<
         Ok(text) => text,
         Err(_) => Node::from_python(plant)?.render()?,
     };
-    let made = guarded(py, || design::design_text(&path, text))?;
-    let design = made.map_err(|error| error::design(&error).raise(py))?;
+    let result = guarded(py, || design::design_text(&path, text))?;
+    let design = result.map_err(|error| error::design(&error).raise(py))?;
     Ok(Designed { design: Mutex::new(design) })
 }
 
@@ -77,19 +77,19 @@ impl Designed {
     fn code(&self, py: Python<'_>, rust: bool, single: bool) -> PyResult<SourceFiles> {
         let language = if rust { design::Language::Rust } else { design::Language::C };
         let precision = if single { design::Precision::Single } else { design::Precision::Double };
-        let made = guarded(py, || self.with(|design| design.code(language, precision)))?;
-        let code = made.map_err(|error| error::design(&error).raise(py))?;
+        let result = guarded(py, || self.with(|design| design.code(language, precision)))?;
+        let code = result.map_err(|error| error::design(&error).raise(py))?;
         Ok((code.files, code.warnings))
     }
 
     /// Makes the controller FMU from the packed controller at `base`.
     fn fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
-        let made = guarded(py, || {
+        let result = guarded(py, || {
             self.with(|design| {
                 let fmu = design.fmu(&base)?;
                 fmu.write(&path, &design.page())
             })
         })?;
-        made.map_err(|error| error::design(&error).raise(py))
+        result.map_err(|error| error::design(&error).raise(py))
     }
 }

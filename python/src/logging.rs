@@ -63,14 +63,14 @@ pub(crate) fn pass_on(py: Python<'_>) -> PyResult<()> {
         return Ok(());
     }
     let logging = py.import("logging")?;
-    let own = logging.call_method1("getLogger", ("aso_ftc",))?;
+    let package = logging.call_method1("getLogger", ("aso_ftc",))?;
     let fmu = logging.call_method1("getLogger", ("aso_ftc.fmu",))?;
     for message in messages {
-        let logger = if message.from_fmu { &fmu } else { &own };
+        let logger = if message.from_fmu { &fmu } else { &package };
         logger.call_method1("log", (message.level, "%s", message.text))?;
     }
     if lost > 0 {
-        own.call_method1("warning", ("%s further messages were dropped", lost))?;
+        package.call_method1("warning", ("%s further messages were dropped", lost))?;
     }
     Ok(())
 }

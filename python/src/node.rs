@@ -117,7 +117,8 @@ impl Node {
             Self::Real(value) => value.into_bound_py_any(py),
             Self::Text(value) => value.into_bound_py_any(py),
             Self::List(values) => {
-                let values: PyResult<Vec<_>> = values.iter().map(|own| own.to_python(py)).collect();
+                let values: PyResult<Vec<_>> =
+                    values.iter().map(|value| value.to_python(py)).collect();
                 Ok(PyList::new(py, values?)?.into_any())
             }
             Self::Table(entries) => {
@@ -136,8 +137,8 @@ fn convert(value: &Bound<'_, PyAny>, place: &str, depth: usize) -> PyResult<Node
         return Err(PyValueError::new_err(format!("{place}: more than {DEPTH} nested values")));
     }
     // A bool is an int in Python.
-    if let Ok(own) = value.cast::<PyBool>() {
-        return Ok(Node::Boolean(own.is_true()));
+    if let Ok(boolean) = value.cast::<PyBool>() {
+        return Ok(Node::Boolean(boolean.is_true()));
     }
     if value.is_instance_of::<PyInt>() {
         let integer = value.extract().map_err(|_| {

@@ -51,8 +51,9 @@ impl PythonSlave {
             }
         }
         let all = |causality| {
-            let own = variables.iter().enumerate();
-            own.filter(|(_, variable): &(_, &ScalarVariable)| variable.causality == causality)
+            let numbered = variables.iter().enumerate();
+            numbered
+                .filter(|(_, variable): &(_, &ScalarVariable)| variable.causality == causality)
                 .map(|(k, _)| k)
                 .collect::<Vec<_>>()
         };
@@ -85,13 +86,13 @@ impl PythonSlave {
         })
     }
 
-    fn given<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let given = PyDict::new(py);
+    fn input_values<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let inputs = PyDict::new(py);
         for &position in &self.inputs {
             let variable = &self.description.variables[position];
-            set(&given, variable, self.values[position])?;
+            set(&inputs, variable, self.values[position])?;
         }
-        Ok(given)
+        Ok(inputs)
     }
 
     /// Takes over the outputs that a call returned; `None` keeps all of them.
@@ -104,39 +105,40 @@ impl PythonSlave {
             let what = format!("expected a dict of outputs or None, found {kind}");
             return Err(PyTypeError::new_err(what));
         };
-        let mut taken = Vec::new();
+        let mut outputs = Vec::new();
         for item in answer.items()?.iter() {
             let (name, value): (String, Bound<'_, PyAny>) = item.extract()?;
             let named = |position: &&usize| self.description.variables[**position].name == name;
             let Some(&position) = self.outputs.iter().find(named) else {
-                let name_of = |own: &usize| self.description.variables[*own].name.as_str();
+                let name_of =
+                    |position: &usize| self.description.variables[*position].name.as_str();
                 let known: Vec<_> = self.outputs.iter().map(name_of).collect();
                 let what = format!("no output {name}, expected one of {}", known.join(", "));
                 return Err(PyValueError::new_err(what));
             };
-            taken.push((position, value.extract()?));
+            outputs.push((position, value.extract()?));
         }
-        Ok(taken)
+        Ok(outputs)
     }
 
-    fn store(&mut self, taken: Vec<(usize, f64)>) {
-        for (position, value) in taken {
+    fn store(&mut self, outputs: Vec<(usize, f64)>) {
+        for (position, value) in outputs {
             self.values[position] = value;
         }
     }
 
     fn read<T>(&self, references: &[u32], values: &mut [T], convert: impl Fn(f64) -> T) {
         for (reference, value) in references.iter().zip(values) {
-            let found = usize::try_from(*reference).ok().and_then(|k| self.values.get(k));
-            *value = convert(found.copied().unwrap_or(f64::NAN));
+            let known = usize::try_from(*reference).ok().and_then(|k| self.values.get(k));
+            *value = convert(known.copied().unwrap_or(f64::NAN));
         }
     }
 
     fn write(&mut self, references: &[u32], values: impl Iterator<Item = f64>) {
         for (reference, value) in references.iter().zip(values) {
-            let own = usize::try_from(*reference).ok().and_then(|k| self.values.get_mut(k));
-            if let Some(own) = own {
-                *own = value;
+            let place = usize::try_from(*reference).ok().and_then(|k| self.values.get_mut(k));
+            if let Some(place) = place {
+                *place = value;
             }
         }
     }
@@ -154,14 +156,14 @@ impl Slave for PythonSlave {
 
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
         let start = self.start;
-        let taken = self.call("start", |object| match object.getattr_opt("start")? {
+        let outputs = self.call("start", |object| match object.getattr_opt("start")? {
             Some(function) => {
-                let given = self.given(object.py())?;
-                self.take(&function.call1((start, given))?)
+                let inputs = self.input_values(object.py())?;
+                self.take(&function.call1((start, inputs))?)
             }
             None => Ok(Vec::new()),
         })?;
-        self.store(taken);
+        self.store(outputs);
         Ok(())
     }
 
@@ -204,11 +206,11 @@ impl Slave for PythonSlave {
     }
 
     fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
-        let taken = self.call("step", |object| {
-            let given = self.given(object.py())?;
-            self.take(&object.call_method1("step", (time, size, given))?)
+        let outputs = self.call("step", |object| {
+            let inputs = self.input_values(object.py())?;
+            self.take(&object.call_method1("step", (time, size, inputs))?)
         })?;
-        self.store(taken);
+        self.store(outputs);
         Ok(StepResult::Whole)
     }
 
@@ -269,8 +271,8 @@ impl Start {
 
 /// Returns the variables that an attribute of the object declares.
 fn declared(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(String, Start)>> {
-    let Some(own) = object.getattr_opt(attribute)? else { return Ok(Vec::new()) };
-    if let Ok(mapping) = own.cast::<PyMapping>() {
+    let Some(declaration) = object.getattr_opt(attribute)? else { return Ok(Vec::new()) };
+    if let Ok(mapping) = declaration.cast::<PyMapping>() {
         let items = mapping.items()?;
         let item = |item: Bound<'_, PyAny>| {
             let (name, value): (String, Bound<'_, PyAny>) = item.extract()?;
@@ -278,7 +280,7 @@ fn declared(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(String,
         };
         return items.iter().map(item).collect();
     }
-    own.try_iter()?.map(|name| Ok((name?.extract()?, Start::Real(0.0)))).collect()
+    declaration.try_iter()?.map(|name| Ok((name?.extract()?, Start::Real(0.0)))).collect()
 }
 
 fn start(value: &Bound<'_, PyAny>) -> PyResult<Start> {
@@ -349,10 +351,10 @@ fn describe(
 
 /// Sets an entry of `given` in the type of the variable.
 #[expect(clippy::cast_possible_truncation, reason = "an integer")]
-fn set(given: &Bound<'_, PyDict>, variable: &ScalarVariable, value: f64) -> PyResult<()> {
+fn set(inputs: &Bound<'_, PyDict>, variable: &ScalarVariable, value: f64) -> PyResult<()> {
     match &variable.kind {
-        Kind::Boolean(_) => given.set_item(&variable.name, value != 0.0),
-        Kind::Integer(_) => given.set_item(&variable.name, value as i64),
-        _ => given.set_item(&variable.name, value),
+        Kind::Boolean(_) => inputs.set_item(&variable.name, value != 0.0),
+        Kind::Integer(_) => inputs.set_item(&variable.name, value as i64),
+        _ => inputs.set_item(&variable.name, value),
     }
 }

@@ -85,9 +85,9 @@ impl Study {
         let mut variables = Vec::new();
         for (name, slave) in &prepared.system.slaves {
             for variable in &slave.description().variables {
-                let own = crate::description::variable(py, variable, slave.description())?;
-                own.bind(py).set_item("name", format!("{name}.{}", variable.name))?;
-                variables.push(own);
+                let described = crate::description::variable(py, variable, slave.description())?;
+                described.bind(py).set_item("name", format!("{name}.{}", variable.name))?;
+                variables.push(described);
             }
         }
         Ok(variables)
@@ -124,13 +124,13 @@ impl Study {
             (Some(Stop::TimeLimit(limit)), _) => {
                 let sentence =
                     format!("the run reached its time limit of {limit} s at t = {shown} s");
-                let own = Exception::new("TimeLimitError", "TimeLimit", sentence);
-                ("time limit".to_owned(), Some(own.number("time", time).raise(py)))
+                let exception = Exception::new("TimeLimitError", "TimeLimit", sentence);
+                ("time limit".to_owned(), Some(exception.number("time", time).raise(py)))
             }
             (Some(Stop::Cancelled), _) => {
                 let sentence = format!("the run was cancelled at t = {shown} s");
-                let own = Exception::new("CancelledError", "Cancelled", sentence);
-                ("cancelled".to_owned(), Some(own.number("time", time).raise(py)))
+                let exception = Exception::new("CancelledError", "Cancelled", sentence);
+                ("cancelled".to_owned(), Some(exception.number("time", time).raise(py)))
             }
             (None, RunEnd::ByFmu(name)) => (name, None),
             (None, RunEnd::Failed(error)) => {

@@ -98,8 +98,8 @@ impl Stepper {
     fn names(&self, py: Python<'_>) -> PyResult<Vec<String>> {
         self.with(py, |run| {
             let slaves = run.simulation.system().slaves.iter();
-            let names = slaves.flat_map(|(slave, own)| {
-                let variables = own.description().variables.iter();
+            let names = slaves.flat_map(|(slave, instance)| {
+                let variables = instance.description().variables.iter();
                 variables.map(move |variable| format!("{slave}.{}", variable.name))
             });
             Ok(names.collect())

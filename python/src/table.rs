@@ -41,9 +41,9 @@ impl Table {
         let mut columns = vec![time];
         let mut present = recorded.present.into_iter();
         for (mut column, values) in recorded.columns {
-            let own = prefix.and_then(|prefix| column.name.strip_prefix(prefix));
-            let own = own.filter(|name| *name != TIME).map(str::to_owned);
-            if let Some(name) = own {
+            let short = prefix.and_then(|prefix| column.name.strip_prefix(prefix));
+            let short = short.filter(|name| *name != TIME).map(str::to_owned);
+            if let Some(name) = short {
                 column.name = name;
             }
             fields.push(field(&column));
@@ -111,13 +111,13 @@ fn reals(mut values: Vec<f64>, nulls: Option<NullBuffer>) -> ArrayRef {
 /// Returns an array with the memory of `values`; Booleans become bits.
 fn array(values: Values, nulls: Option<NullBuffer>) -> Result<ArrayRef, ArrowError> {
     Ok(match values {
-        Values::Real(own) => reals(own, nulls),
-        Values::Integer(own) => Arc::new(Int32Array::new(ScalarBuffer::from(own), nulls)),
-        Values::Long(own) => Arc::new(Int64Array::new(ScalarBuffer::from(own), nulls)),
-        Values::Boolean(own) => Arc::new(BooleanArray::new(own.into(), nulls)),
-        Values::String(own) => {
-            let offsets = OffsetBuffer::new(ScalarBuffer::from(own.offsets));
-            Arc::new(LargeStringArray::try_new(offsets, Buffer::from_vec(own.bytes), nulls)?)
+        Values::Real(values) => reals(values, nulls),
+        Values::Integer(values) => Arc::new(Int32Array::new(ScalarBuffer::from(values), nulls)),
+        Values::Long(values) => Arc::new(Int64Array::new(ScalarBuffer::from(values), nulls)),
+        Values::Boolean(values) => Arc::new(BooleanArray::new(values.into(), nulls)),
+        Values::String(values) => {
+            let offsets = OffsetBuffer::new(ScalarBuffer::from(values.offsets));
+            Arc::new(LargeStringArray::try_new(offsets, Buffer::from_vec(values.bytes), nulls)?)
         }
     })
 }
@@ -130,8 +130,8 @@ fn values(array: &ArrayRef) -> Values {
         DataType::Int64 => Values::Long(array.as_primitive::<Int64Type>().values().to_vec()),
         DataType::Boolean => Values::Boolean(array.as_boolean().values().iter().collect()),
         DataType::LargeUtf8 => {
-            let own = array.as_string::<i64>();
-            let (offsets, bytes) = (own.offsets().to_vec(), own.values().to_vec());
+            let texts = array.as_string::<i64>();
+            let (offsets, bytes) = (texts.offsets().to_vec(), texts.values().to_vec());
             Values::String(results::Texts { offsets, bytes })
         }
         _ => Values::Real(array.as_primitive::<Float64Type>().values().to_vec()),
@@ -142,8 +142,8 @@ fn values(array: &ArrayRef) -> Values {
 fn with_gaps(array: &ArrayRef) -> ArrayRef {
     #[expect(clippy::cast_precision_loss, reason = "as in pandas")]
     let numbers = match values(array) {
-        Values::Integer(own) => own.into_iter().map(f64::from).collect(),
-        Values::Long(own) => own.into_iter().map(|value| value as f64).collect(),
+        Values::Integer(values) => values.into_iter().map(f64::from).collect(),
+        Values::Long(values) => values.into_iter().map(|value| value as f64).collect(),
         _ => return array.clone(),
     };
     reals(numbers, array.nulls().cloned())
@@ -188,13 +188,13 @@ impl Table {
             return Ok(Some(PyList::new(py, all.collect::<PyResult<Vec<_>>>()?)?));
         }
         Ok(Some(match values(self.batch.column(position)) {
-            Values::Real(own) => PyList::new(py, own)?,
-            Values::Integer(own) => PyList::new(py, own)?,
-            Values::Long(own) => PyList::new(py, own)?,
-            Values::Boolean(own) => PyList::new(py, own)?,
-            Values::String(own) => {
-                let rows = own.offsets.len().saturating_sub(1);
-                PyList::new(py, (0..rows).map(|row| own.get(row).unwrap_or("")))?
+            Values::Real(list) => PyList::new(py, list)?,
+            Values::Integer(list) => PyList::new(py, list)?,
+            Values::Long(list) => PyList::new(py, list)?,
+            Values::Boolean(list) => PyList::new(py, list)?,
+            Values::String(list) => {
+                let rows = list.offsets.len().saturating_sub(1);
+                PyList::new(py, (0..rows).map(|row| list.get(row).unwrap_or("")))?
             }
         }))
     }
@@ -210,10 +210,10 @@ impl Table {
             return Ok(py.None().into_bound(py));
         }
         match values(&one) {
-            Values::Real(own) => own[0].into_bound_py_any(py),
-            Values::Integer(own) => own[0].into_bound_py_any(py),
-            Values::Long(own) => own[0].into_bound_py_any(py),
-            Values::Boolean(own) => own[0].into_bound_py_any(py),
+            Values::Real(list) => list[0].into_bound_py_any(py),
+            Values::Integer(list) => list[0].into_bound_py_any(py),
+            Values::Long(list) => list[0].into_bound_py_any(py),
+            Values::Boolean(list) => list[0].into_bound_py_any(py),
             // The offsets of a slice count from the start of the whole array.
             Values::String(_) => one.as_string::<i64>().value(0).into_bound_py_any(py),
         }

@@ -15,7 +15,7 @@ pub(crate) fn settable(system: &System, name: &str) -> Result<Port, Exception> {
     let is_input = variable.causality == Causality::Input;
     let is_tunable =
         variable.causality == Causality::Parameter && variable.variability == Variability::Tunable;
-    let found = match system.source(port) {
+    let actual = match system.source(port) {
         Some(connection) => format!("is connected to {}", system.name(connection.from)),
         None if is_input || is_tunable => return Ok(port),
         None => {
@@ -24,7 +24,7 @@ pub(crate) fn settable(system: &System, name: &str) -> Result<Port, Exception> {
         }
     };
     let expected = "an input without a connection or a tunable parameter";
-    let sentence = format!("{name} {found}, expected {expected}");
+    let sentence = format!("{name} {actual}, expected {expected}");
     Err(Exception::new("ConfigurationError", "Role", sentence))
 }
 

@@ -206,6 +206,6 @@ impl Watch {
 /// Whether the present thread is Python's main thread, the only one that handles signals.
 fn is_main(py: Python<'_>) -> PyResult<bool> {
     let threading = py.import("threading")?;
-    let own = threading.call_method0("get_ident")?;
-    own.eq(threading.call_method0("main_thread")?.getattr("ident")?)
+    let thread = threading.call_method0("get_ident")?;
+    thread.eq(threading.call_method0("main_thread")?.getattr("ident")?)
 }

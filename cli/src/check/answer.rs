@@ -85,8 +85,9 @@ pub(super) struct Signals {
 impl Signals {
     fn of(description: &ModelDescription) -> Self {
         let mut signals = Self::default();
-        let is_signal =
-            |own: &&ScalarVariable| matches!(own.causality, Causality::Input | Causality::Output);
+        let is_signal = |variable: &&ScalarVariable| {
+            matches!(variable.causality, Causality::Input | Causality::Output)
+        };
         for variable in description.variables.iter().filter(is_signal) {
             let names = match SignalType::of(variable) {
                 SignalType::Continuous => &mut signals.continuous,
@@ -138,7 +139,7 @@ impl Answer {
         for finding in findings {
             for &tool in &finding.stops {
                 let reason = || format!("{}: {}", finding.place, finding.what);
-                let known = tools.entry(tool).and_modify(|own| own.more += 1);
+                let known = tools.entry(tool).and_modify(|reason| reason.more += 1);
                 known.or_insert_with(|| ToolRefusal { tool, reason: reason(), more: 0 });
             }
         }

@@ -43,7 +43,8 @@ pub(super) fn check(
             Error,
             path.display().to_string(),
             "expected the extension .fmu",
-            (why, SECTION),
+            why,
+            SECTION,
         );
     }
     let unread = || format!("cannot read {}", path.display());
@@ -54,7 +55,7 @@ pub(super) fn check(
     }
     if let Err(error) = archive.validate_header_consistency() {
         let why = "Tools that read an archive front to back see other files than those that use its list.";
-        findings.add(Error, "the archive", error.to_string(), (why, SECTION));
+        findings.add(Error, "the archive", error.to_string(), why, SECTION);
     }
     case(names, &mut findings);
     top_level(names, description.version(), &mut findings);
@@ -76,7 +77,7 @@ fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
     let Ok(name) = entry.name().map(std::borrow::Cow::into_owned) else { return };
     if name.contains('\\') || name.split('/').any(|part| part == ".") {
         let what = "a path with backslashes or parts that are a dot";
-        findings.add(Error, &name, what, ("Importers on Linux do not find the file.", SECTION));
+        findings.add(Error, &name, what, "Importers on Linux do not find the file.", SECTION);
     }
     if entry.version_needed() > 20 {
         let needed = f64::from(entry.version_needed()) / 10.0;
@@ -85,14 +86,15 @@ fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
             Error,
             &name,
             what,
-            ("It may be a Zip64 archive, which not every importer reads.", SECTION),
+            "It may be a Zip64 archive, which not every importer reads.",
+            SECTION,
         );
     }
     if entry.flags().is_using_data_descriptor() && entry.compression() == CompressionMethod::Stored
     {
         let what = "stored with a data descriptor, expected one with deflate only";
         let why = "Tools that read front to back do not find its end. Archives written as a stream have this.";
-        findings.add(Error, &name, what, (why, SECTION));
+        findings.add(Error, &name, what, why, SECTION);
     }
     if !name.is_ascii() && entry.flags().as_u16() & UTF8 == 0 {
         let why = "Importers decode the name in different ways.";
@@ -100,12 +102,13 @@ fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
             Error,
             &name,
             "a name that is not ASCII, without the flag for UTF-8",
-            (why, SECTION),
+            why,
+            SECTION,
         );
     }
     if name.contains(['<', '>', '"', '|', '?', '*']) || name.split('/').any(breaks_windows) {
         let why = "It cannot be unpacked on Windows.";
-        findings.add(Warning, &name, "a name that Windows does not allow", (why, ""));
+        findings.add(Warning, &name, "a name that Windows does not allow", why, "");
     }
     if name.len() > LONG {
         let what = format!("a path of {} bytes", name.len());
@@ -113,12 +116,13 @@ fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
             Note,
             &name,
             what,
-            ("With more than 260 in all, Windows may refuse to unpack it.", ""),
+            "With more than 260 in all, Windows may refuse to unpack it.",
+            "",
         );
     }
     if entry.unix_mode().is_some_and(|mode| mode & 0o400 == 0) {
         let why = "unzip on UNIX makes a file that nobody can read.";
-        findings.add(Warning, &name, "UNIX mode without the right to read", (why, ""));
+        findings.add(Warning, &name, "UNIX mode without the right to read", why, "");
     }
 }
 
@@ -128,27 +132,27 @@ fn breaks_windows(part: &str) -> bool {
 }
 
 fn case(names: &[String], findings: &mut Findings) {
-    let mut seen: HashMap<String, &str> = HashMap::new();
+    let mut earlier: HashMap<String, &str> = HashMap::new();
     for name in names {
-        if let Some(other) = seen.insert(name.to_lowercase(), name) {
+        if let Some(other) = earlier.insert(name.to_lowercase(), name) {
             let what = format!("differs from {other} in upper and lower case only");
             let why = "On Windows and macOS one overwrites the other.";
-            findings.add(Warning, name, what, (why, ""));
+            findings.add(Warning, name, what, why, "");
         }
     }
 }
 
 fn top_level(names: &[String], version: Version, findings: &mut Findings) {
-    let mut seen = HashSet::new();
+    let mut entries = HashSet::new();
     // FMI 3.0 has its picture in terminalsAndIcons.
-    let allowed = |own: &&&str| version != Version::V3 || **own != "model.png";
+    let allowed = |entry: &&&str| version != Version::V3 || **entry != "model.png";
     let tops: Vec<&str> = TOP.iter().filter(allowed).copied().collect();
     for name in names {
         let top = name.split('/').next().unwrap_or(name);
-        if !seen.insert(top) || tops.contains(&top) {
+        if !entries.insert(top) || tops.contains(&top) {
             continue;
         }
-        let near = tops.iter().find(|own| own.eq_ignore_ascii_case(top));
+        let near = tops.iter().find(|entry| entry.eq_ignore_ascii_case(top));
         let what = match near {
             Some(near) => format!("expected {near}, in this case"),
             None if top == "icons" => "expected terminalsAndIcons".to_owned(),
@@ -156,12 +160,12 @@ fn top_level(names: &[String], version: Version, findings: &mut Findings) {
         };
         let why =
             near.map_or("", |_| "Importers do not find it where upper and lower case differ.");
-        findings.add(Error, top, what, (why, SECTION));
+        findings.add(Error, top, what, why, SECTION);
     }
     let has = |folder: &str| names.iter().any(|name| name.starts_with(folder));
     if !has("binaries/") && !has("sources/") {
         let what = "expected binaries or sources, found neither";
-        findings.add(Error, "the archive", what, ("Nobody can run it.", SECTION));
+        findings.add(Error, "the archive", what, "Nobody can run it.", SECTION);
     }
     for name in names {
         let reserved = ["org.modelica", "org.fmi-standard"];
@@ -173,7 +177,7 @@ fn top_level(names: &[String], version: Version, findings: &mut Findings) {
         }
         if reserved.iter().any(|prefix| inner.starts_with(prefix)) || !inner.contains('.') {
             let what = "expected a folder called by a reverse domain name of its own";
-            findings.add(Warning, name, what, ("", "2.3.1"));
+            findings.add(Warning, name, what, "", "2.3.1");
         }
     }
 }
@@ -182,11 +186,11 @@ fn documentation(names: &[String], findings: &mut Findings) {
     let has = |path: &str| names.iter().any(|name| name.starts_with(path) && !name.ends_with('/'));
     if has("documentation/") && !has("documentation/index.html") {
         let what = "expected index.html in it, the entry to the documentation";
-        findings.add(Warning, "documentation", what, ("Tools have nothing to show.", SECTION));
+        findings.add(Warning, "documentation", what, "Tools have nothing to show.", SECTION);
     }
     if !has("documentation/licenses/license.") {
         let what = "expected documentation/licenses/license.txt or .html, found neither";
-        findings.add(Note, "documentation", what, ("Users do not know what they may do.", SECTION));
+        findings.add(Note, "documentation", what, "Users do not know what they may do.", SECTION);
     }
 }
 
@@ -195,7 +199,7 @@ fn build_description(names: &[String], findings: &mut Findings) {
     let has = |path: &str| names.iter().any(|name| name.starts_with(path) && !name.ends_with('/'));
     if has("sources/") && !has("sources/buildDescription.xml") {
         let what = "expected buildDescription.xml in it";
-        findings.add(Error, "sources", what, ("It cannot be built.", SECTION));
+        findings.add(Error, "sources", what, "It cannot be built.", SECTION);
     }
 }
 
@@ -204,8 +208,8 @@ fn sources(names: &[String], description: &ModelDescription, findings: &mut Find
     let there: HashSet<String> = names.iter().filter_map(|name| normal(name)).collect();
     let lower: HashSet<String> = there.iter().map(|name| name.to_lowercase()).collect();
     for (interface, files) in [
-        ("ModelExchange", description.model_exchange.as_ref().map(|own| &own.source_files)),
-        ("CoSimulation", description.co_simulation.as_ref().map(|own| &own.source_files)),
+        ("ModelExchange", description.model_exchange.as_ref().map(|flags| &flags.source_files)),
+        ("CoSimulation", description.co_simulation.as_ref().map(|flags| &flags.source_files)),
     ] {
         for file in files.into_iter().flatten() {
             let path = normal(&format!("sources/{file}"));
@@ -218,17 +222,17 @@ fn sources(names: &[String], description: &ModelDescription, findings: &mut Find
             let path = path.filter(|path| path.starts_with("sources/"));
             let Some(path) = path else {
                 let what = format!("expected a file in sources, {interface} names {file:?}");
-                findings.add(Error, "sources", what, ("It cannot be built.", "2.3"));
+                findings.add(Error, "sources", what, "It cannot be built.", "2.3");
                 continue;
             };
             let what =
                 format!("expected {path}, which SourceFiles of {interface} names, found none");
             if lower.contains(&path.to_lowercase()) {
                 let why = "It is there in other upper and lower case: it cannot be built on Linux.";
-                findings.add(Warning, "sources", what, (why, "2.3"));
+                findings.add(Warning, "sources", what, why, "2.3");
             } else {
                 let why = "It cannot be built for another platform.";
-                findings.add(Error, "sources", what, (why, "2.3"));
+                findings.add(Error, "sources", what, why, "2.3");
             }
         }
     }
@@ -257,7 +261,8 @@ fn picture<R: std::io::Read>(mut file: ZipFile<'_, R>, findings: &mut Findings) 
             Warning,
             "model.png",
             "expected a PNG file",
-            ("Tools show no picture.", SECTION),
+            "Tools show no picture.",
+            SECTION,
         );
     }
 }

@@ -10,7 +10,7 @@ use super::answer::TrialResult;
 use super::finding::Severity::{Error, Note, Warning};
 use super::finding::{Finding, Findings, Part, Tool};
 use super::messages::MessageRecorder;
-use super::values::{Value, distance, get, kept, outputs, start, unknown_reference};
+use super::values::{Value, distance, get, outputs, start, stated_values, unknown_reference};
 
 /// Number of steps of a trial.
 const STEPS: u32 = 10;
@@ -47,7 +47,7 @@ pub(super) fn check<S: Slave>(
     if told.messages > FLOOD {
         let what = format!("sends {} messages in this trial, with logging off", told.messages);
         let why = "They slow every run down and bury what others say.";
-        trial.findings.add(Warning, "logger", what, (why, "2.1.5"));
+        trial.findings.add(Warning, "logger", what, why, "2.1.5");
     }
     (trial.here, trial.findings.all)
 }
@@ -105,19 +105,19 @@ impl<S: Slave> Trial<'_, S> {
     /// Records that the first instance completed its steps.
     fn record_success(&mut self, trajectory: &Trajectory) {
         let steps = u32::try_from(trajectory.len().saturating_sub(1)).unwrap_or(u32::MAX);
-        let in_part = self.findings.all.iter().rfind(|own| own.severity == Note);
+        let in_part = self.findings.all.iter().rfind(|finding| finding.severity == Note);
         self.here = TrialResult::Yes {
             steps,
             step: self.step_size(),
             start: self.start_time(),
             tolerance: self.tolerance(),
-            but: in_part.filter(|_| steps < self.count).map(|own| own.what.clone()),
+            but: in_part.filter(|_| steps < self.count).map(|finding| finding.what.clone()),
         };
     }
 
     /// Records that the first instance failed; the last error is the reason.
     fn record_failure(&mut self) {
-        let mut errors = self.findings.all.iter_mut().filter(|own| own.severity == Error);
+        let mut errors = self.findings.all.iter_mut().filter(|finding| finding.severity == Error);
         let Some(error) = errors.next_back() else { return };
         self.here = TrialResult::No { reason: format!("{}: {}", error.place, error.what) };
         if error.why.as_ref().is_some_and(|why| why.starts_with(ENDS_IT)) {
@@ -129,7 +129,7 @@ impl<S: Slave> Trial<'_, S> {
         let point = first.iter().zip(second).position(|(one, other)| one != other);
         let what = format!("a second instance has other outputs, from step {}", point.unwrap_or(0));
         let why = "A run cannot be repeated: statics, uninitialised memory or the clock are used.";
-        self.findings.add(Warning, "fmi2DoStep", what, (why, "2.1"));
+        self.findings.add(Warning, "fmi2DoStep", what, why, "2.1");
     }
 
     /// Creates an instance and brings it to step mode; adds a finding if that fails.
@@ -168,7 +168,7 @@ impl<S: Slave> Trial<'_, S> {
                 let why = "No importer can use it here.";
                 let what = format!("{error:#}");
                 let unresolved = what.contains("undefined symbol");
-                self.findings.add(Error, "fmi2Instantiate", what, (why, "2.1.5"));
+                self.findings.add(Error, "fmi2Instantiate", what, why, "2.1.5");
                 if unresolved {
                     self.findings.stopping(&[Tool::Fmpy]);
                 }
@@ -184,25 +184,28 @@ impl<S: Slave> Trial<'_, S> {
             Some(harm) => format!("{harm} Its last messages: {messages}"),
             None => messages,
         };
-        self.findings.add(Error, error.function, what, (&why, section));
+        self.findings.add(Error, error.function, what, &why, section);
         if error.messages.is_empty() && matches!(error.failure, Failure::Status(_)) {
             let why = "Nobody learns what was wrong.";
-            self.findings.add(Warning, error.function, "fails without a message", (why, "2.1.3"));
+            self.findings.add(Warning, error.function, "fails without a message", why, "2.1.3");
         }
     }
 
     fn tolerance(&self) -> Option<f64> {
-        self.description.default_experiment.and_then(|own| own.tolerance)
+        self.description.default_experiment.and_then(|experiment| experiment.tolerance)
     }
 
     fn start_time(&self) -> f64 {
-        self.description.default_experiment.and_then(|own| own.start_time).unwrap_or(0.0)
+        self.description
+            .default_experiment
+            .and_then(|experiment| experiment.start_time)
+            .unwrap_or(0.0)
     }
 
     fn step_size(&self) -> f64 {
-        let own = self.description.default_experiment.unwrap_or_default();
-        let span = own.stop_time.map(|stop| (stop - self.start_time()) / 1000.0);
-        own.step_size.or(span).filter(|size| *size > 0.0).unwrap_or(0.001)
+        let experiment = self.description.default_experiment.unwrap_or_default();
+        let span = experiment.stop_time.map(|stop| (stop - self.start_time()) / 1000.0);
+        experiment.step_size.or(span).filter(|size| *size > 0.0).unwrap_or(0.001)
     }
 
     /// Returns the time of communication point `k`.
@@ -235,7 +238,7 @@ impl<S: Slave> Trial<'_, S> {
             Some(Err(error)) if name == "first" => {
                 let what = format!("{} after fmi2Terminate", error.failure);
                 let why = "Final values cannot be read, as the table of calls allows.";
-                self.findings.add(Warning, error.function, what, (why, "4.2.4"));
+                self.findings.add(Warning, error.function, what, why, "4.2.4");
             }
             _ => {}
         }
@@ -244,7 +247,7 @@ impl<S: Slave> Trial<'_, S> {
 
     /// Returns the number of steps from the start to the stop time of the default experiment.
     fn steps_of_experiment(&self) -> u32 {
-        let stop = self.description.default_experiment.and_then(|own| own.stop_time);
+        let stop = self.description.default_experiment.and_then(|experiment| experiment.stop_time);
         let count = stop.map(|stop| ((stop - self.start_time()) / self.step_size()).round());
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
         count.map_or(STEPS, |count| (count as u32).max(1))
@@ -256,7 +259,7 @@ impl<S: Slave> Trial<'_, S> {
             if self.changes.insert(change.clone()) {
                 let why = "In the process of an importer it changes this for all others.";
                 let what = format!("changes {change} {when}");
-                self.findings.add(Warning, "process", what, (why, ""));
+                self.findings.add(Warning, "process", what, why, "");
             }
         }
     }
@@ -276,7 +279,7 @@ impl<S: Slave> Trial<'_, S> {
                         seconds(reached)
                     );
                     let why = "FMPy and others end the run there.";
-                    self.findings.add(Note, "fmi2DoStep", what, (why, "4.2.2"));
+                    self.findings.add(Note, "fmi2DoStep", what, why, "4.2.2");
                     break;
                 }
                 Err(error) => {
@@ -289,7 +292,7 @@ impl<S: Slave> Trial<'_, S> {
     }
 
     fn read(&mut self, slave: &mut S) -> Option<Vec<Value>> {
-        let values = outputs(self.description).take(LOOKED_AT).map(|own| get(slave, own));
+        let values = outputs(self.description).take(LOOKED_AT).map(|variable| get(slave, variable));
         values
             .collect::<Result<_, _>>()
             .map_err(|error| self.failed(&error, "for an output", "2.1.7"))
@@ -298,21 +301,21 @@ impl<S: Slave> Trial<'_, S> {
 
     /// Compares the start values with the description; `None` if the process of the FMU ended.
     fn start_values(&mut self, slave: &mut S) -> Option<()> {
-        for variable in kept(self.description).take(LOOKED_AT) {
+        for variable in stated_values(self.description).take(LOOKED_AT) {
             let Some(stated) = start(variable) else { continue };
-            let found = match get(slave, variable) {
-                Ok(found) if found.agrees(&stated) => continue,
+            let difference = match get(slave, variable) {
+                Ok(value) if value.agrees(&stated) => continue,
                 Err(error) if gone(&error) => {
                     self.failed(&error, &format!("when {} is read", variable.name), "2.1.7");
                     return None;
                 }
-                Ok(found) => format!("the library starts with {found}, the XML says {stated}"),
+                Ok(value) => format!("the library starts with {value}, the XML says {stated}"),
                 Err(error) => format!("{error}"),
             };
             let place = format!("variable {}", variable.name);
             let why =
                 "Importers that do not set start values simulate another model than they show.";
-            self.findings.add(Error, place, found, (why, "2.2.7"));
+            self.findings.add(Error, place, difference, why, "2.2.7");
         }
         Some(())
     }
@@ -321,12 +324,12 @@ impl<S: Slave> Trial<'_, S> {
         for (index, variable) in outputs(self.description).take(LOOKED_AT).enumerate() {
             let step = trajectory
                 .iter()
-                .position(|row| row.get(index).is_some_and(|own| !own.is_finite()));
+                .position(|row| row.get(index).is_some_and(|value| !value.is_finite()));
             if let Some(step) = step {
                 let place = format!("variable {}", variable.name);
                 let what = format!("is no finite number after {step} steps");
                 let why = "Most masters carry it on to the end of the run.";
-                self.findings.add(Warning, place, what, (why, "2.2.7"));
+                self.findings.add(Warning, place, what, why, "2.2.7");
             }
         }
     }
@@ -342,7 +345,7 @@ impl<S: Slave> Trial<'_, S> {
             Ok(()) => {
                 let what = "accepts a value reference that no variable has, expected fmi2Error";
                 let why = "A wrong connection goes unnoticed.";
-                self.findings.add(Error, "fmi2GetReal", what, (why, "2.1.2"));
+                self.findings.add(Error, "fmi2GetReal", what, why, "2.1.2");
             }
             Err(error) if gone(&error) => {
                 self.failed(&error, "for a value reference that no variable has", "2.1.2");
@@ -353,7 +356,8 @@ impl<S: Slave> Trial<'_, S> {
                     Warning,
                     "fmi2GetReal",
                     what,
-                    ("Nobody learns what was wrong.", "2.1.3"),
+                    "Nobody learns what was wrong.",
+                    "2.1.3",
                 );
             }
             Err(_) => {}
@@ -362,10 +366,11 @@ impl<S: Slave> Trial<'_, S> {
 
     /// Sets inputs to their present values. An FMU may refuse that, but must change nothing of the importer.
     fn settings(&mut self) {
-        let inputs = |own: &&ScalarVariable| own.causality == Causality::Input;
-        let is_real = |own: &&ScalarVariable| ValueType::of(&own.kind) == ValueType::Real;
+        let inputs = |variable: &&ScalarVariable| variable.causality == Causality::Input;
+        let is_real = |variable: &&ScalarVariable| ValueType::of(&variable.kind) == ValueType::Real;
         let inputs = self.description.variables.iter().filter(inputs).filter(is_real);
-        let references: Vec<u32> = inputs.take(LOOKED_AT).map(|own| own.value_reference).collect();
+        let references: Vec<u32> =
+            inputs.take(LOOKED_AT).map(|variable| variable.value_reference).collect();
         if references.is_empty() {
             return;
         }
@@ -390,7 +395,7 @@ impl<S: Slave> Trial<'_, S> {
             Ok(StepResult::Whole) => {
                 let what = "steps past a stopTime that was defined, expected fmi2Error";
                 let why = "What an FMU computes beyond the end of its data goes unnoticed.";
-                self.findings.add(Warning, "fmi2DoStep", what, (why, "2.1.6"));
+                self.findings.add(Warning, "fmi2DoStep", what, why, "2.1.6");
             }
             Err(error) if gone(&error) => {
                 self.failed(&error, "for a step past a stopTime that was defined", "2.1.6");
@@ -446,7 +451,7 @@ impl<S: Slave> Trial<'_, S> {
             );
             let severity = if apart > ROUNDED { Error } else { Warning };
             let why = "Masters that repeat a step, and optimisers, get wrong results.";
-            self.findings.add(severity, function, what, (why, "2.1.8"));
+            self.findings.add(severity, function, what, why, "2.1.8");
         }
         second.is_some()
     }
@@ -456,13 +461,14 @@ impl<S: Slave> Trial<'_, S> {
         if self.description.version() == Version::V1 {
             return;
         }
-        for category in used.iter().filter(|own| !own.is_empty()) {
-            let declared = self.description.log_categories.iter().any(|own| own.name == *category);
+        for category in used.iter().filter(|category| !category.is_empty()) {
+            let declared =
+                self.description.log_categories.iter().any(|known| known.name == *category);
             if !declared {
                 let what =
                     format!("uses the category {category:?}, which LogCategories does not list");
                 let why = "Users cannot switch it on or off.";
-                self.findings.add(Error, "logger", what, (why, "2.2.4"));
+                self.findings.add(Error, "logger", what, why, "2.2.4");
             }
         }
     }

@@ -54,6 +54,12 @@ const PLATFORMS: [Platform; 15] = {
 /// A function that reads the bytes of a file of the FMU, by its name in the archive.
 pub(crate) type Read<'a> = dyn Fn(&str) -> io::Result<Vec<u8>> + 'a;
 
+/// The files of an FMU.
+struct Archive<'a> {
+    read: &'a Read<'a>,
+    names: &'a [String],
+}
+
 /// Checks the folder `binaries` of an FMU with the files `names`.
 pub(crate) fn check(
     read: &Read<'_>,
@@ -61,15 +67,16 @@ pub(crate) fn check(
     description: &ModelDescription,
 ) -> Vec<Finding> {
     let mut findings = Findings::about(Part::Binaries);
-    let found: BTreeSet<&str> = names
+    let folders: BTreeSet<&str> = names
         .iter()
         .filter_map(|name| name.strip_prefix("binaries/")?.split_once('/').map(|(top, _)| top))
         .collect();
     let version = description.version();
-    for name in found {
+    for name in folders {
         // FMI 3.0 has platform tuples only.
-        let named =
-            |own: &&Platform| own.folder == name && (version != Version::V3 || name.contains('-'));
+        let named = |platform: &&Platform| {
+            platform.folder == name && (version != Version::V3 || name.contains('-'))
+        };
         let Some(platform) = PLATFORMS.iter().find(named) else {
             let what = if version == Version::V3 {
                 "expected a platform tuple, as x86_64-windows, x86_64-linux, aarch64-darwin"
@@ -77,7 +84,7 @@ pub(crate) fn check(
                 "expected the name of a platform, as win64, linux64, darwin64, aarch64-linux"
             };
             let why = "Importers do not look there, unless a library does.";
-            findings.add(Note, format!("binaries/{name}"), what, (why, SECTION));
+            findings.add(Note, format!("binaries/{name}"), what, why, SECTION);
             continue;
         };
         for (interfaces, identifier) in interfaces(description) {
@@ -88,7 +95,7 @@ pub(crate) fn check(
             }
             let before = findings.all.len();
             let required = required(version, &interfaces, &identifier);
-            library(read, &path, platform, (&required, names), &mut findings);
+            library(&Archive { read, names }, &path, platform, &required, &mut findings);
             for finding in &mut findings.all[before..] {
                 finding.stops = match version {
                     Version::V2 => stops(finding, platform, &interfaces),
@@ -123,14 +130,14 @@ fn loading(finding: &Finding, platform: &Platform) -> Vec<Tool> {
 /// Adds a finding for a missing library.
 fn missing(path: String, platform: &Platform, names: &[String], findings: &mut Findings) {
     let folder = format!("binaries/{}/", platform.folder);
-    let mut there = names.iter().filter(|own| own.starts_with(&folder) && !own.ends_with('/'));
+    let mut there = names.iter().filter(|name| name.starts_with(&folder) && !name.ends_with('/'));
     let there: Vec<&str> = there.by_ref().take(5).map(String::as_str).collect();
     if there.is_empty() {
         let why = "It is the same as no folder for this platform.";
-        return findings.add(Note, folder, "an empty folder", (why, SECTION));
+        return findings.add(Note, folder, "an empty folder", why, SECTION);
     }
     let what = format!("expected this library, found {}", there.join(", "));
-    findings.add(Error, path, what, ("Importers look for modelIdentifier.", SECTION));
+    findings.add(Error, path, what, "Importers look for modelIdentifier.", SECTION);
     findings.stopping(&[Tool::Platform(platform.folder)]);
 }
 
@@ -156,8 +163,9 @@ fn stops(finding: &Finding, platform: &Platform, interfaces: &[InterfaceType]) -
     let simulation = [InterfaceType::CoSimulation];
     let called = if interfaces.contains(&simulation[0]) { &simulation[..] } else { interfaces };
     let called: BTreeSet<_> = required_functions(called).collect();
-    let lacking: Vec<_> = lacking.split(", ").filter(|own| called.contains(own)).collect();
-    match lacking.iter().all(|own| BY_FLAG.contains(own)) {
+    let lacking: Vec<_> =
+        lacking.split(", ").filter(|function| called.contains(function)).collect();
+    match lacking.iter().all(|function| BY_FLAG.contains(function)) {
         _ if lacking.is_empty() => Vec::new(),
         true => vec![Tool::Fmpy],
         false => vec![Tool::Fmpy, Tool::FmiLibrary],
@@ -167,8 +175,8 @@ fn stops(finding: &Finding, platform: &Platform, interfaces: &[InterfaceType]) -
 /// Returns the names of the libraries, each with the interface types that it serves.
 fn interfaces(description: &ModelDescription) -> Vec<(Vec<InterfaceType>, String)> {
     use InterfaceType::{CoSimulation, ModelExchange};
-    let exchange = description.model_exchange.as_ref().map(|own| own.model_identifier.clone());
-    let simulation = description.co_simulation.as_ref().map(|own| own.model_identifier.clone());
+    let exchange = description.model_exchange.as_ref().map(|flags| flags.model_identifier.clone());
+    let simulation = description.co_simulation.as_ref().map(|flags| flags.model_identifier.clone());
     match (simulation, exchange) {
         (Some(one), Some(other)) if one == other => vec![(vec![CoSimulation, ModelExchange], one)],
         (one, other) => [(CoSimulation, one), (ModelExchange, other)]
@@ -179,25 +187,25 @@ fn interfaces(description: &ModelDescription) -> Vec<(Vec<InterfaceType>, String
 }
 
 fn library(
-    read: &Read<'_>,
+    archive: &Archive<'_>,
     path: &str,
     platform: &Platform,
-    (required, names): (&[String], &[String]),
+    required: &[String],
     findings: &mut Findings,
 ) {
-    let bytes = match read(path) {
+    let bytes = match (archive.read)(path) {
         Ok(bytes) => bytes,
-        Err(error) => return findings.add(Error, path, error.to_string(), ("", "")),
+        Err(error) => return findings.add(Error, path, error.to_string(), "", ""),
     };
     let Some(bytes) = slice_of(&bytes, platform.machine) else {
         let what = format!("expected a part for {:?} in it", platform.machine);
-        return findings.add(Error, path, what, ("It does not load.", SECTION));
+        return findings.add(Error, path, what, "It does not load.", SECTION);
     };
     let file = match object::File::parse(bytes) {
         Ok(file) => file,
         Err(error) => {
             let what = format!("expected a shared library, found a file that is none: {error}");
-            return findings.add(Error, path, what, ("It does not load.", SECTION));
+            return findings.add(Error, path, what, "It does not load.", SECTION);
         }
     };
     let (format, machine) = (file.format(), file.architecture());
@@ -206,10 +214,10 @@ fn library(
             "expected {:?} for {:?}, found {format:?} for {machine:?}",
             platform.format, platform.machine
         );
-        return findings.add(Error, path, what, ("The system refuses to load it.", SECTION));
+        return findings.add(Error, path, what, "The system refuses to load it.", SECTION);
     }
     functions(&file, path, required, findings);
-    needs(&file, path, names, findings);
+    needs(&file, path, archive.names, findings);
     versions(&file, path, findings);
 }
 
@@ -234,24 +242,25 @@ const ALWAYS: [&str; 3] = ["fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Instan
 fn required_functions(interfaces: &[InterfaceType]) -> impl Iterator<Item = &'static str> {
     let belongs = |function: &Function| {
         let mut states = State::EVERY.iter();
-        states.any(|state| interfaces.iter().any(|own| allowed(*own, *function, *state)))
+        states
+            .any(|state| interfaces.iter().any(|interface| allowed(*interface, *function, *state)))
     };
-    let own = Function::EVERY.iter().copied().filter(belongs).map(Function::name);
-    ALWAYS.into_iter().chain(own)
+    let names = Function::EVERY.iter().copied().filter(belongs).map(Function::name);
+    ALWAYS.into_iter().chain(names)
 }
 
 fn functions(file: &object::File<'_>, path: &str, required: &[String], findings: &mut Findings) {
     let mut exported = BTreeSet::new();
     let Ok(exports) = file.exports() else {
-        return findings.add(Error, path, "expected a readable list of exports", ("", "2.1"));
+        return findings.add(Error, path, "expected a readable list of exports", "", "2.1");
     };
     for export in exports.flatten() {
         if let NameOrOrdinal::Name(name) = export.name() {
             let name = String::from_utf8_lossy(name);
             // On macOS, the export list has C names with a leading underscore.
-            let plain = name
-                .strip_prefix('_')
-                .filter(|rest| rest.starts_with("fmi") || required.iter().any(|own| own == rest));
+            let plain = name.strip_prefix('_').filter(|rest| {
+                rest.starts_with("fmi") || required.iter().any(|function| function == rest)
+            });
             exported.insert(plain.unwrap_or(&name).to_owned());
         }
     }
@@ -260,14 +269,14 @@ fn functions(file: &object::File<'_>, path: &str, required: &[String], findings:
     if missing.is_empty() {
         return;
     }
-    let step = ["fmi2DoStep", "fmi3DoStep"].into_iter().find(|own| missing.contains(own));
+    let step = ["fmi2DoStep", "fmi3DoStep"].into_iter().find(|name| missing.contains(name));
     let prefixed = step.and_then(|step| exported.iter().find(|name| name.ends_with(step)));
     if let Some(prefixed) = prefixed {
         let what = format!("expected functions without prefix, found {prefixed}");
         let why = "Importers look for the plain names; prefixes are for source code.";
-        return findings.add(Error, path, what, (why, "2.1.1"));
+        return findings.add(Error, path, what, why, "2.1.1");
     }
-    let second = missing.iter().any(|own| own.starts_with("fmi2"));
+    let second = missing.iter().any(|function| function.starts_with("fmi2"));
     let missing: Vec<_> = missing.into_iter().collect();
     let what = format!("lacks {}", missing.join(", "));
     let why = if second {
@@ -275,7 +284,7 @@ fn functions(file: &object::File<'_>, path: &str, required: &[String], findings:
     } else {
         "The standard demands all functions; importers may refuse to load it."
     };
-    findings.add(Error, path, what, (why, "2.1.1"));
+    findings.add(Error, path, what, why, "2.1.1");
 }
 
 /// Start of the names, in lower case, of libraries that belong to the operating system.
@@ -347,12 +356,12 @@ fn needs(file: &object::File<'_>, path: &str, names: &[String], findings: &mut F
     for library in file.import_libraries().into_iter().flatten().flatten() {
         let name = String::from_utf8_lossy(library.name()).into_owned();
         let lower = name.to_ascii_lowercase();
-        if SYSTEM.iter().any(|own| lower.starts_with(own)) {
+        if SYSTEM.iter().any(|prefix| lower.starts_with(prefix)) {
             continue;
         }
         let last = name.rsplit('/').next().unwrap_or(&name);
         let beside = format!("{folder}/{last}");
-        if names.iter().any(|own| own.eq_ignore_ascii_case(&beside)) {
+        if names.iter().any(|name| name.eq_ignore_ascii_case(&beside)) {
             continue;
         }
         let what = format!("needs {name}, which is neither beside it nor part of the system");
@@ -365,7 +374,7 @@ fn needs(file: &object::File<'_>, path: &str, names: &[String], findings: &mut F
                 "It loads only where that is installed; list it in documentation/externalDependencies.txt."
             }
         };
-        findings.add(Warning, path, what, (why, SECTION));
+        findings.add(Warning, path, what, why, SECTION);
     }
 }
 
@@ -375,7 +384,7 @@ fn versions(file: &object::File<'_>, path: &str, findings: &mut Findings) {
     for import in file.imports().into_iter().flatten().flatten() {
         let ImportFlags::Elf { version: Some(version), .. } = import.flags() else { continue };
         let Some(text) =
-            std::str::from_utf8(version).ok().and_then(|own| own.strip_prefix("GLIBC_"))
+            std::str::from_utf8(version).ok().and_then(|text| text.strip_prefix("GLIBC_"))
         else {
             continue;
         };
@@ -386,6 +395,6 @@ fn versions(file: &object::File<'_>, path: &str, findings: &mut Findings) {
     }
     if let Some((_, version)) = newest {
         let what = format!("needs glibc {version} or later");
-        findings.add(Note, path, what, ("It does not load on older systems.", ""));
+        findings.add(Note, path, what, "It does not load on older systems.", "");
     }
 }

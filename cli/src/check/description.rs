@@ -87,7 +87,7 @@ pub(super) fn check(description: &ModelDescription, warnings: &[Warning]) -> Vec
         let (tools, why) = stops(warning);
         let why =
             format!("{why}{}Here {}.", if why.is_empty() { "" } else { " " }, warning.assumed);
-        findings.add(Severity::Error, place, what, (&why, warning.section));
+        findings.add(Severity::Error, place, what, &why, warning.section);
         findings.stopping(tools);
     }
     for problem in description.problems() {
@@ -96,7 +96,7 @@ pub(super) fn check(description: &ModelDescription, warnings: &[Warning]) -> Vec
         let advice = problem.text.starts_with("generationDateAndTime");
         let severity = if advice { Severity::Warning } else { Severity::Error };
         let why = rule.map_or("", |rule| rule.why);
-        findings.add(severity, FILE, problem.text, (why, problem.section));
+        findings.add(severity, FILE, problem.text, why, problem.section);
         findings.stopping(rule.map_or(&[], |rule| rule.stops));
     }
     notes(description, &mut findings);
@@ -112,26 +112,31 @@ fn notes(description: &ModelDescription, findings: &mut Findings) {
     };
     let experiment = description.default_experiment.unwrap_or_default();
     let stated = [("stopTime", experiment.stop_time), ("stepSize", experiment.step_size)];
-    let absent: Vec<_> = stated.iter().filter(|own| own.1.is_none()).map(|own| own.0).collect();
+    let absent: Vec<_> = stated
+        .iter()
+        .filter(|attribute| attribute.1.is_none())
+        .map(|attribute| attribute.0)
+        .collect();
     if !absent.is_empty() {
         let what = format!("no {} in DefaultExperiment", absent.join(" and no "));
         let why =
             "FMPy, OMSimulator and fmusim take them where the user states none; others guess.";
-        findings.add(Note, FILE, what, (why, experiment_section));
+        findings.add(Note, FILE, what, why, experiment_section);
     }
-    let unnamed = description.variables.iter().filter(|own| own.description.is_none()).count();
+    let unnamed =
+        description.variables.iter().filter(|variable| variable.description.is_none()).count();
     if unnamed > 0 {
         let what =
             format!("{unnamed} of {} variables without description", description.variables.len());
-        findings.add(Note, FILE, what, ("Importers show it to the user.", variables));
+        findings.add(Note, FILE, what, "Importers show it to the user.", variables);
     }
     let simulation = description.co_simulation.as_ref();
-    if simulation.is_some_and(|own| own.needs_execution_tool) {
+    if simulation.is_some_and(|flags| flags.needs_execution_tool) {
         let what = "needsExecutionTool is true";
-        findings.add(Note, FILE, what, ("It runs only beside the tool that made it.", flags));
+        findings.add(Note, FILE, what, "It runs only beside the tool that made it.", flags);
     }
-    if simulation.is_some_and(|own| own.can_be_instantiated_only_once_per_process) {
+    if simulation.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process) {
         let what = "canBeInstantiatedOnlyOncePerProcess is true";
-        findings.add(Note, FILE, what, ("Two of it need two processes.", flags));
+        findings.add(Note, FILE, what, "Two of it need two processes.", flags);
     }
 }

@@ -129,7 +129,8 @@ impl Findings {
         severity: Severity,
         place: impl Into<String>,
         what: impl Into<String>,
-        (why, section): (&str, &'static str),
+        why: &str,
+        section: &'static str,
     ) {
         self.all.push(Finding {
             severity,

@@ -61,11 +61,11 @@ pub(super) fn fold<'a>(
 /// Removes the parts that may differ within a kind; sets `names` to true if a part is the name of a
 /// variable.
 fn kind(text: &str, variables: &HashSet<&str>, numbers: bool, names: &mut bool) -> String {
-    let mut kept = String::with_capacity(text.len());
+    let mut pattern = String::with_capacity(text.len());
     // Every second part is within quotation marks.
     for (index, part) in text.split('"').enumerate() {
         if index % 2 == 1 {
-            kept.push('"');
+            pattern.push('"');
             continue;
         }
         for word in part.split_inclusive(' ') {
@@ -73,11 +73,11 @@ fn kind(text: &str, variables: &HashSet<&str>, numbers: bool, names: &mut bool) 
             if variables.contains(bare) {
                 *names = true;
             } else if !(bare.contains('/') || numbers && bare.parse::<f64>().is_ok()) {
-                kept.push_str(word);
+                pattern.push_str(word);
             }
         }
     }
-    kept
+    pattern
 }
 
 #[cfg(test)]
@@ -95,9 +95,9 @@ mod tests {
         let mut findings = Findings::about(Part::Description);
         for name in ["x", "tank.h[1]", "der(x)"] {
             let what = format!("InitialUnknowns lacks variable {name}");
-            findings.add(Severity::Error, "xml", what, ("Few use it.", "2.2.8"));
+            findings.add(Severity::Error, "xml", what, "Few use it.", "2.2.8");
         }
-        findings.add(Severity::Error, "xml", "Outputs lacks variable x", ("", "2.2.8"));
+        findings.add(Severity::Error, "xml", "Outputs lacks variable x", "", "2.2.8");
         let expected = [
             "error: xml: InitialUnknowns lacks variable x; and 2 more variables (section 2.2.8)\n    \
              Few use it.",
@@ -110,17 +110,12 @@ mod tests {
     fn paths_quoted_texts_and_numbers_do_not_keep_findings_apart_but_versions_of_libraries_do() {
         let mut findings = Findings::about(Part::Archive);
         for name in ["sources/a.c", "sources/b.c"] {
-            findings.add(Severity::Error, "sources", format!("expected {name}"), ("", ""));
+            findings.add(Severity::Error, "sources", format!("expected {name}"), "", "");
         }
         assert_eq!(lines(&findings), ["error: sources: expected sources/a.c; and 1 more files"]);
         let mut findings = Findings::about(Part::Binaries);
         for version in ["2.14", "2.34"] {
-            findings.add(
-                Severity::Note,
-                "binaries/a.so",
-                format!("needs glibc {version}"),
-                ("", ""),
-            );
+            findings.add(Severity::Note, "binaries/a.so", format!("needs glibc {version}"), "", "");
         }
         assert_eq!(lines(&findings).len(), 2);
     }
@@ -128,8 +123,8 @@ mod tests {
     #[test]
     fn a_finding_that_stops_a_tool_is_not_folded_into_one_that_does_not() {
         let mut findings = Findings::about(Part::Description);
-        findings.add(Severity::Error, "xml", "variable x is odd", ("", ""));
-        findings.add(Severity::Error, "xml", "variable der(x) is odd", ("", ""));
+        findings.add(Severity::Error, "xml", "variable x is odd", "", "");
+        findings.add(Severity::Error, "xml", "variable der(x) is odd", "", "");
         findings.stopping(&[Tool::FmiLibrary]);
         assert_eq!(lines(&findings).len(), 2);
     }

@@ -31,7 +31,7 @@ impl MessageRecorder {
     pub(super) fn during<T>(body: impl FnOnce() -> T) -> (T, MessageSummary) {
         let heard = Self::default();
         let result = tracing::subscriber::with_default(heard.clone(), body);
-        let messages = heard.messages.lock().map(|mut own| std::mem::take(&mut *own));
+        let messages = heard.messages.lock().map(|mut messages| std::mem::take(&mut *messages));
         (result, messages.unwrap_or_default())
     }
 }

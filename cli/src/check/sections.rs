@@ -48,11 +48,11 @@ pub(super) fn renamed(text: &str, version: Version) -> String {
 /// Replaces sections of FMI 2.0.5 by those of `version`; a section that has no counterpart is left out.
 pub(super) fn renumber(findings: &mut [Finding], version: Version) {
     for finding in findings {
-        let own = PAIRS.iter().find(|(second, _)| finding.section == Some(*second));
+        let pair = PAIRS.iter().find(|(second, _)| finding.section == Some(*second));
         finding.section = match version {
             Version::V1 => None,
             Version::V2 => finding.section,
-            Version::V3 => own.map(|(_, third)| *third),
+            Version::V3 => pair.map(|(_, third)| *third),
         };
     }
 }

@@ -29,9 +29,9 @@ impl Value {
     /// Whether the value equals the number in the XML, whose last digit may be rounded.
     pub(super) fn agrees(&self, stated: &Value) -> bool {
         match (self, stated) {
-            (Value::Real(found), Value::Real(stated)) => {
-                let (found, stated) = (f64::from_bits(*found), f64::from_bits(*stated));
-                (found - stated).abs() <= 1e-14 * stated.abs().max(found.abs())
+            (Value::Real(actual), Value::Real(stated)) => {
+                let (actual, stated) = (f64::from_bits(*actual), f64::from_bits(*stated));
+                (actual - stated).abs() <= 1e-14 * stated.abs().max(actual.abs())
             }
             _ => self == stated,
         }
@@ -48,7 +48,7 @@ impl Value {
                 if (one - other).abs() <= 0.0 {
                     0.0
                 } else {
-                    Some(relative).filter(|own| !own.is_nan()).unwrap_or(f64::INFINITY)
+                    Some(relative).filter(|distance| !distance.is_nan()).unwrap_or(f64::INFINITY)
                 }
             }
             _ => f64::INFINITY,
@@ -108,7 +108,7 @@ pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Va
 pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
     match &variable.kind {
         Kind::String(start) => start.clone().map(Value::String),
-        Kind::Binary(own) => own.start.clone().map(Value::Binary),
+        Kind::Binary(binary) => binary.start.clone().map(Value::Binary),
         other => match master::Value::start(other)? {
             master::Value::Real(value) => Some(Value::Real(value.to_bits())),
             master::Value::Integer(value) => Some(Value::Integer(value)),
@@ -120,21 +120,23 @@ pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
 
 /// Returns the variables that keep their start value during the initialization: parameters, inputs,
 /// constants.
-pub(super) fn kept(description: &ModelDescription) -> impl Iterator<Item = &ScalarVariable> {
-    description.variables.iter().filter(|own| {
-        matches!(own.causality, Causality::Parameter | Causality::Input)
-            || own.variability == Variability::Constant
+pub(super) fn stated_values(
+    description: &ModelDescription,
+) -> impl Iterator<Item = &ScalarVariable> {
+    description.variables.iter().filter(|variable| {
+        matches!(variable.causality, Causality::Parameter | Causality::Input)
+            || variable.variability == Variability::Constant
     })
 }
 
 /// Returns the variables whose trajectories are compared.
 pub(super) fn outputs(description: &ModelDescription) -> impl Iterator<Item = &ScalarVariable> {
-    description.variables.iter().filter(|own| own.causality == Causality::Output)
+    description.variables.iter().filter(|variable| variable.causality == Causality::Output)
 }
 
 /// Returns a value reference that no variable has.
 pub(super) fn unknown_reference(description: &ModelDescription) -> u32 {
     let used: std::collections::HashSet<u32> =
-        description.variables.iter().map(|own| own.value_reference).collect();
+        description.variables.iter().map(|variable| variable.value_reference).collect();
     (0..=u32::MAX).rev().find(|reference| !used.contains(reference)).unwrap_or(u32::MAX)
 }

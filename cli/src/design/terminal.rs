@@ -21,15 +21,15 @@ pub(crate) fn summarise(report: &Report) {
     for matrix in &report.gains {
         print_gain(matrix);
     }
-    for own in [&report.feedback, &report.observer] {
-        print_loop(own);
+    for feedback_loop in [&report.feedback, &report.observer] {
+        print_loop(feedback_loop);
     }
     for step in &report.references {
         print_reference(step);
     }
     println!("estimation law: {}", report.estimation.law);
-    if let Some(found) = &report.robustness {
-        let peaks: Vec<_> = found
+    if let Some(robustness) = &report.robustness {
+        let peaks: Vec<_> = robustness
             .points
             .iter()
             .map(|point| format!("{} at the {}", number(point.judged), point.point))
@@ -38,10 +38,10 @@ pub(crate) fn summarise(report: &Report) {
         let hold = if report.sampling.is_some() { "longest sample time" } else { "longest hold" };
         println!(
             "delay margin: {} s; {hold}: {} s",
-            number(found.delay_margin),
-            number(found.longest_hold)
+            number(robustness.delay_margin),
+            number(robustness.longest_hold)
         );
-        let tolerance = &found.tolerance;
+        let tolerance = &robustness.tolerance;
         let worst = match tolerance.first_unstable {
             limit if limit.is_infinite() => "no unstable case found".to_owned(),
             limit => format!("an unstable case from {} of them on", number(limit)),
@@ -52,14 +52,14 @@ pub(crate) fn summarise(report: &Report) {
             tolerance.cases,
         );
     }
-    if let Some(found) = &report.family {
-        let members: Vec<_> = found.members.iter().collect();
+    if let Some(family) = &report.family {
+        let members: Vec<_> = family.members.iter().collect();
         print_members("member", &members);
-        match &found.whole {
-            Ok(found) => println!(
+        match &family.whole {
+            Ok(whole) => println!(
                 "one P for the whole family: proven for a plant that moves between its members in any \
                  way, margin {:.1e}",
-                found.margin
+                whole.margin
             ),
             Err(reason) => println!(
                 "a plant that moves between the members: not proven ({reason}); the above is for \
@@ -67,20 +67,20 @@ pub(crate) fn summarise(report: &Report) {
             ),
         }
     }
-    if let Some(found) = &report.schedule {
-        print_schedule(found);
+    if let Some(schedule) = &report.schedule {
+        print_schedule(schedule);
     }
-    if let Some(found) = &report.detection {
-        print_detection(found);
+    if let Some(detection) = &report.detection {
+        print_detection(detection);
     }
     if let Some(losses) = &report.losses {
         losses.loops.iter().for_each(print_losses);
     }
-    if let Some(found) = &report.reconfiguration {
-        print_reconfigurations(found);
+    if let Some(reconfiguration) = &report.reconfiguration {
+        print_reconfigurations(reconfiguration);
     }
-    if let Some(found) = &report.fallback {
-        print_fallback(found);
+    if let Some(fallback) = &report.fallback {
+        print_fallback(fallback);
     }
     for check in report.checks.iter().filter(|check| !check.holds) {
         println!("does not hold: {} ({})", check.condition, check.explanation);
@@ -96,19 +96,20 @@ pub(crate) fn summarise(report: &Report) {
 }
 
 /// Prints what the controller does without actuators.
-fn print_reconfigurations(found: &ReconfigurationReport) {
-    let single = found.without.iter().map(|own| (own.actuator.clone(), &own.outcome));
-    let several = found.several.iter().map(|own| (own.actuators.join(", "), &own.outcome));
+fn print_reconfigurations(reconfiguration: &ReconfigurationReport) {
+    let single = reconfiguration.without.iter().map(|loss| (loss.actuator.clone(), &loss.outcome));
+    let several =
+        reconfiguration.several.iter().map(|loss| (loss.actuators.join(", "), &loss.outcome));
     for (names, outcome) in single.chain(several) {
         match outcome {
-            Ok(found) => println!("without {names}: {}", found.method),
+            Ok(outcome) => println!("without {names}: {}", outcome.method),
             Err(reason) => println!("without {names}: no controller: {reason}"),
         }
     }
-    for own in &found.by_fallback {
-        let names = own.actuators.join(", ");
-        if own.stable {
-            println!("without {names}: the fall-back, decay {} 1/s", number(own.decay));
+    for loss in &reconfiguration.by_fallback {
+        let names = loss.actuators.join(", ");
+        if loss.stable {
+            println!("without {names}: the fall-back, decay {} 1/s", number(loss.decay));
         } else {
             println!("without {names}: the fall-back, which is not stable then");
         }
@@ -116,21 +117,21 @@ fn print_reconfigurations(found: &ReconfigurationReport) {
 }
 
 /// Prints decay and price of the fall-back in each case.
-fn print_fallback(found: &FallbackReport) {
-    let compensates = if found.compensates { "compensated" } else { "not compensated" };
-    println!("fall-back: {} Estimated faults are {compensates}.", found.method);
-    for own in &found.cases {
-        let price = own.worst_price().map_or(String::new(), |price| {
+fn print_fallback(fallback: &FallbackReport) {
+    let compensates = if fallback.compensates { "compensated" } else { "not compensated" };
+    println!("fall-back: {} Estimated faults are {compensates}.", fallback.method);
+    for case in &fallback.cases {
+        let price = case.worst_price().map_or(String::new(), |price| {
             format!(
                 ", noise on the commands to {} {} times as large",
                 price.name,
                 number(price.value)
             )
         });
-        println!("    {}: decay {} 1/s{price}", own.name, number(own.decay));
+        println!("    {}: decay {} 1/s{price}", case.name, number(case.decay));
     }
-    println!("    intact controller: decay {} 1/s", number(found.intact_decay));
-    if let Err(reason) = &found.whole {
+    println!("    intact controller: decay {} 1/s", number(fallback.intact_decay));
+    if let Err(reason) = &fallback.whole {
         println!("    losses that change with time: not proven ({reason})");
     }
 }
@@ -138,62 +139,62 @@ fn print_fallback(found: &FallbackReport) {
 /// Prints peaks of S and tolerances with each plant.
 fn print_members(kind: &str, members: &[&MemberReport]) {
     for member in members {
-        let Some(own) = &member.margins else {
+        let Some(margins) = &member.margins else {
             println!("{kind} {}: not stable", member.name);
             continue;
         };
-        let peaks: Vec<_> = own
+        let peaks: Vec<_> = margins
             .points
             .iter()
             .map(|point| format!("{} at the {}", number(point.judged), point.point))
             .collect();
-        let tolerance = own.tolerance.as_ref().map_or(String::new(), |found| {
+        let tolerance = margins.tolerance.as_ref().map_or(String::new(), |tolerance| {
             format!(
                 "; {} % of {} random cases are stable",
-                number(100.0 * found.stable),
-                found.cases
+                number(100.0 * tolerance.stable),
+                tolerance.cases
             )
         });
         println!("{kind} {}: peak of S {}{tolerance}", member.name, peaks.join(", "));
     }
 }
 
-fn print_schedule(found: &ScheduleReport) {
-    print_members("point", &found.points.iter().map(|point| &point.closed).collect::<Vec<_>>());
-    match (&found.any_rate, &found.bounded_rate) {
-        (Ok(own), _) => println!(
+fn print_schedule(schedule: &ScheduleReport) {
+    print_members("point", &schedule.points.iter().map(|point| &point.closed).collect::<Vec<_>>());
+    match (&schedule.any_rate, &schedule.bounded_rate) {
+        (Ok(proof), _) => println!(
             "schedule: proven between the points for any rate of {}, margin {:.1e}",
-            found.variable, own.margin
+            schedule.variable, proof.margin
         ),
-        (_, Ok(own)) => println!(
+        (_, Ok(proof)) => println!(
             "schedule: proven between the points while {} changes by at most {} per s, margin {:.1e}",
-            found.variable,
-            number(own.rate),
-            own.margin
+            schedule.variable,
+            number(proof.rate),
+            proof.margin
         ),
         (Err(any), Err(bounded)) => println!(
             "schedule: not proven while {} changes (any rate: {any}; bounded rate: {bounded})",
-            found.variable
+            schedule.variable
         ),
     }
     println!(
         "schedule: the worst of {} constant values is {} = {}, stability figure {}",
-        found.checked,
-        found.variable,
-        number(found.worst_at),
-        number(found.worst_instability)
+        schedule.checked,
+        schedule.variable,
+        number(schedule.worst_at),
+        number(schedule.worst_instability)
     );
 }
 
 /// Prints thresholds and predictions of the detection.
-fn print_detection(found: &Detection) {
+fn print_detection(detection: &Detection) {
     println!(
         "detection ({}) every {} s: a false alarm every {} s on average",
-        found.method,
-        number(found.sample_time),
-        number(found.false_alarm_interval)
+        detection.method,
+        number(detection.sample_time),
+        number(detection.false_alarm_interval)
     );
-    for fault in &found.faults {
+    for fault in &detection.faults {
         let seconds = |time: Option<f64>| {
             time.map_or_else(|| "never for sure".to_owned(), |time| format!("{} s", number(time)))
         };
@@ -207,8 +208,8 @@ fn print_detection(found: &Detection) {
             number(fault.within),
         );
     }
-    for (test, reacts) in found.tests.iter().zip(&found.reacts) {
-        let faults = found.faults.iter().zip(reacts).filter(|(_, reacts)| **reacts);
+    for (test, reacts) in detection.tests.iter().zip(&detection.reacts) {
+        let faults = detection.faults.iter().zip(reacts).filter(|(_, reacts)| **reacts);
         let names: Vec<_> = faults.map(|(fault, _)| fault.fault.as_str()).collect();
         println!(
             "    test {}: threshold {}, reacts to {}",
@@ -220,26 +221,26 @@ fn print_detection(found: &Detection) {
 }
 
 /// Prints what is proven about the losses of effectiveness of one loop.
-fn print_losses(own: &LossLoop) {
+fn print_losses(loss: &LossLoop) {
     let described = |losses: &[Number]| {
         let one = |loss: &Number| format!("{} {}", loss.name, number(loss.value));
         losses.iter().map(one).collect::<Vec<_>>().join(", ")
     };
-    let proven = match &own.proof {
+    let proven = match &loss.proof {
         Ok(_) => "the stated losses are proven".to_owned(),
         Err(reason) => format!("the stated losses are not proven: {reason}"),
     };
-    println!("losses of effectiveness, {}: {proven}", own.name);
-    if let Some(certified) = own.certified.first() {
+    println!("losses of effectiveness, {}: {proven}", loss.name);
+    if let Some(certified) = loss.certified.first() {
         println!("    proven, also if they vary, up to {}", described(&certified.losses));
     }
-    let limit = &own.constant[0];
+    let limit = &loss.constant[0];
     let stable = if limit.stable { "stable up to" } else { "unstable beyond" };
     println!("    constant losses: {stable} {}", described(&limit.losses));
 }
 
 /// Prints a row for each law and fault, and why the other laws do not exist.
-pub(crate) fn compare(found: &Comparison) {
+pub(crate) fn compare(comparison: &Comparison) {
     let heads = [
         "law",
         "fault",
@@ -254,9 +255,10 @@ pub(crate) fn compare(found: &Comparison) {
         "verdict",
     ];
     let mut rows = vec![heads.map(str::to_owned).to_vec()];
-    for law in &found.laws {
+    for law in &comparison.laws {
         let Some(result) = &law.result else { continue };
-        let disk = |at: usize| result.disk_margin.map_or("-".to_owned(), |own| number(own[at]));
+        let disk =
+            |at: usize| result.disk_margin.map_or("-".to_owned(), |margins| number(margins[at]));
         for one in &result.estimation.errors {
             let stated = |value: Option<f64>| value.map_or("-".to_owned(), number);
             rows.push(vec![
@@ -280,7 +282,7 @@ pub(crate) fn compare(found: &Comparison) {
         let cells = row.iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}"));
         println!("{}", cells.collect::<Vec<_>>().join("  ").trim_end());
     }
-    for law in &found.laws {
+    for law in &comparison.laws {
         if let Some(reason) = &law.reason {
             println!("{} does not exist: {reason}", law.law);
         }
@@ -322,10 +324,10 @@ fn print_reference(step: &ReferenceStep) {
             100.0 * step.steady_state_error
         }),
     );
-    let command = |own: &CommandPeak| {
-        let [low, high] = own.range.map(number);
-        let unit = own.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
-        format!("{} from {low} to {high}{unit}", own.name)
+    let command = |peak: &CommandPeak| {
+        let [low, high] = peak.range.map(number);
+        let unit = peak.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+        format!("{} from {low} to {high}{unit}", peak.name)
     };
     let commands: Vec<_> = step.commands.iter().take(LARGEST_SHOWN).map(command).collect();
     println!("    commands, as deviations: {}", commands.join(", "));
@@ -335,17 +337,17 @@ fn print_reference(step: &ReferenceStep) {
     }
 }
 
-fn print_loop(own: &Loop) {
-    println!("{}: {}", own.matrix, own.method);
-    let shown: Vec<_> = own.eigenvalues.iter().filter(|[_, im]| *im >= 0.0).collect();
+fn print_loop(feedback_loop: &Loop) {
+    println!("{}: {}", feedback_loop.matrix, feedback_loop.method);
+    let shown: Vec<_> = feedback_loop.eigenvalues.iter().filter(|[_, im]| *im >= 0.0).collect();
     let text = shown.iter().take(LARGEST_SHOWN).map(|[re, im]| {
         if *im == 0.0 { number(*re) } else { format!("{} ± {}i", number(*re), number(*im)) }
     });
     let rest = shown.len().saturating_sub(LARGEST_SHOWN);
     let rest = if rest > 0 { format!(" and {rest} more") } else { String::new() };
     println!("    eigenvalues {}{rest}", text.collect::<Vec<_>>().join(", "));
-    if let Some(condition) = own.condition {
-        let error = own.pole_error.map_or(String::new(), |error| {
+    if let Some(condition) = feedback_loop.condition {
+        let error = feedback_loop.pole_error.map_or(String::new(), |error| {
             format!(", error of the eigenvalues {error:.1e}, relative")
         });
         println!("    condition of the eigenvectors {condition:.3e}{error}");

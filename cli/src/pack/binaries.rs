@@ -38,8 +38,9 @@ const TUPLES: [(&str, &str); 5] = [
 pub(super) fn targets(folder: &Path) -> anyhow::Result<Vec<&'static str>> {
     let there = folders(folder)?;
     let is_there = |name: &str| there.iter().any(|path| path.ends_with(name));
-    let found = TARGETS.iter().filter(|(name, _)| is_there(name)).flat_map(|(_, targets)| *targets);
-    Ok(found.copied().collect())
+    let triples =
+        TARGETS.iter().filter(|(name, _)| is_there(name)).flat_map(|(_, targets)| *targets);
+    Ok(triples.copied().collect())
 }
 
 /// Returns the libraries of a model in `folder`, such as `win64/MODEL.dll`: path in the FMU, and
@@ -54,7 +55,7 @@ pub(super) fn collect(
     description: &ModelDescription,
 ) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
     let model = &description.model_name;
-    let mut found = Vec::new();
+    let mut libraries = Vec::new();
     for platform in folders(folder)? {
         for file in files(&platform)? {
             if file.file_stem().is_some_and(|stem| stem.to_str() == Some(model)) {
@@ -62,20 +63,20 @@ pub(super) fn collect(
                     |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
                 let names = part(&platform).zip(part(&file));
                 let (platform, name) = names.context("a file without a name")?;
-                found.push((format!("binaries/{platform}/{name}"), read(&file)?));
+                libraries.push((format!("binaries/{platform}/{name}"), read(&file)?));
             }
         }
     }
-    if found.is_empty() {
+    if libraries.is_empty() {
         let folder = folder.display();
         bail!(
             "there is no library of {model} in {folder}: expected \
              {folder}/win64/{model}.dll, {folder}/linux64/{model}.so or the like"
         );
     }
-    refuse_broken(&found, description)
+    refuse_broken(&libraries, description)
         .with_context(|| format!("the libraries of {model} in {}", folder.display()))?;
-    Ok(found)
+    Ok(libraries)
 }
 
 /// Returns the path of a library in an FMU of `version`: FMI 3.0 has platform tuples only (section
@@ -91,13 +92,13 @@ pub(super) fn path_in(version: Version, path: String) -> String {
 }
 
 fn refuse_broken(
-    found: &[(String, Vec<u8>)],
+    libraries: &[(String, Vec<u8>)],
     description: &ModelDescription,
 ) -> anyhow::Result<()> {
-    let names: Vec<_> = found.iter().map(|(path, _)| path.clone()).collect();
+    let names: Vec<_> = libraries.iter().map(|(path, _)| path.clone()).collect();
     let bytes = |path: &str| {
-        let own = found.iter().find(|(name, _)| name == path);
-        own.map(|(_, bytes)| bytes.clone()).ok_or_else(|| std::io::ErrorKind::NotFound.into())
+        let library = libraries.iter().find(|(name, _)| name == path);
+        library.map(|(_, bytes)| bytes.clone()).ok_or_else(|| std::io::ErrorKind::NotFound.into())
     };
     let faults: Vec<_> = binaries::check(&bytes, &names, description)
         .into_iter()

@@ -106,12 +106,14 @@ impl Source {
         let Self { folder, metadata, package, toolchain } = self;
         let mut dependencies = dependencies(metadata, package, artifacts);
         let everywhere: HashSet<_> =
-            reached(metadata, package).into_iter().map(|own| &own.id).collect();
+            reached(metadata, package).into_iter().map(|package| &package.id).collect();
         for target in others {
             let there = self::metadata(folder, target, locked)?;
-            let more =
-                reached(&there, package).into_iter().filter(|own| !everywhere.contains(&own.id));
-            let more: Vec<_> = more.filter(|own| !dependencies.contains(own)).cloned().collect();
+            let more = reached(&there, package)
+                .into_iter()
+                .filter(|package| !everywhere.contains(&package.id));
+            let more: Vec<_> =
+                more.filter(|other| !dependencies.contains(other)).cloned().collect();
             dependencies.extend(more);
         }
         dependencies
@@ -256,28 +258,34 @@ fn has_profile(root: &Path) -> anyhow::Result<bool> {
 
 /// Returns the packages in the library: dependencies that were built.
 fn dependencies(metadata: &Metadata, root: &Package, artifacts: &[Artifact]) -> Vec<Package> {
-    let built: HashSet<&PackageId> = artifacts.iter().map(|own| &own.package_id).collect();
-    reached(metadata, root).into_iter().filter(|own| built.contains(&own.id)).cloned().collect()
+    let built: HashSet<&PackageId> =
+        artifacts.iter().map(|artifact| &artifact.package_id).collect();
+    reached(metadata, root)
+        .into_iter()
+        .filter(|package| built.contains(&package.id))
+        .cloned()
+        .collect()
 }
 
 /// Returns the dependencies of `root`, without build scripts, tests and procedural macros.
 fn reached<'a>(metadata: &'a Metadata, root: &Package) -> Vec<&'a Package> {
     let nodes = metadata.resolve.iter().flat_map(|resolve| &resolve.nodes);
     let nodes: Vec<_> = nodes.collect();
-    let (mut open, mut found) = (vec![&root.id], Vec::<&Package>::new());
+    let (mut open, mut packages) = (vec![&root.id], Vec::<&Package>::new());
     while let Some(id) = open.pop() {
-        let own = nodes.iter().filter(|node| node.id == *id).flat_map(|node| &node.deps);
-        for dependency in own {
-            let normal = dependency.dep_kinds.iter().any(|own| own.kind == DependencyKind::Normal);
+        let dependencies = nodes.iter().filter(|node| node.id == *id).flat_map(|node| &node.deps);
+        for dependency in dependencies {
+            let normal =
+                dependency.dep_kinds.iter().any(|kind| kind.kind == DependencyKind::Normal);
             let package = &metadata[&dependency.pkg];
-            let known = found.iter().any(|known| known.id == package.id);
+            let known = packages.iter().any(|known| known.id == package.id);
             if normal && !known && !is_macro(package) {
                 open.push(&dependency.pkg);
-                found.push(package);
+                packages.push(package);
             }
         }
     }
-    found
+    packages
 }
 
 fn is_macro(package: &Package) -> bool {

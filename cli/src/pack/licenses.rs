@@ -64,12 +64,12 @@ fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
         }
         let unread = || format!("cannot read {}", manifest.display());
         let manifest: toml::Table = fs::read_to_string(&manifest).with_context(unread)?.parse()?;
-        let mut found = named(folder)?;
-        found.extend(stated.clone());
-        found.sort();
-        found.dedup();
-        if !found.is_empty() || manifest.contains_key("workspace") {
-            return Ok(found);
+        let mut files = named(folder)?;
+        files.extend(stated.clone());
+        files.sort();
+        files.dedup();
+        if !files.is_empty() || manifest.contains_key("workspace") {
+            return Ok(files);
         }
     }
     Ok(Vec::new())
@@ -77,19 +77,19 @@ fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
 
 /// Returns the files in `folder` with names of licences, and the files in a folder `LICENSES`.
 fn named(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let mut found = Vec::new();
+    let mut files = Vec::new();
     let failed = || format!("cannot read {}", folder.display());
     for item in fs::read_dir(folder).with_context(failed)? {
         let path = item.with_context(failed)?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
         if path.is_dir() && name == "licenses" {
             for item in fs::read_dir(&path).with_context(failed)? {
-                found.push(item.with_context(failed)?.path());
+                files.push(item.with_context(failed)?.path());
             }
-            found.retain(|path| path.is_file());
+            files.retain(|path| path.is_file());
         } else if path.is_file() && NAMES.iter().any(|start| name.starts_with(start)) {
-            found.push(path);
+            files.push(path);
         }
     }
-    Ok(found)
+    Ok(files)
 }

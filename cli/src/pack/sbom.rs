@@ -27,8 +27,8 @@ pub(super) fn bill(
     library: &Library,
     foreign: bool,
 ) -> anyhow::Result<Vec<u8>> {
-    let own = &library.package;
-    let mut model = component(own, Classification::Application)?;
+    let package = &library.package;
+    let mut model = component(package, Classification::Application)?;
     model.name = NormalizedString::new(&description.model_name);
     model.description = description.description.as_deref().map(NormalizedString::new);
     let mut parts = library
@@ -38,7 +38,7 @@ pub(super) fn bill(
         .collect::<anyhow::Result<Vec<_>>>()?;
     parts.push(standard_library((!foreign).then_some(&library.toolchain.release)));
     let needs = Dependency {
-        dependency_ref: reference(own),
+        dependency_ref: reference(package),
         dependencies: parts.iter().filter_map(|part| part.bom_ref.clone()).collect(),
     };
     let bom = Bom {
@@ -53,11 +53,11 @@ pub(super) fn bill(
     if result.has_errors() {
         let faults: Vec<_> =
             result.errors().map(|(field, fault)| format!("{field}: {fault:?}")).collect();
-        bail!("the bill of materials of {} is not valid: {}", own.name, faults.join("; "));
+        bail!("the bill of materials of {} is not valid: {}", package.name, faults.join("; "));
     }
     let mut bytes = Vec::new();
     bom.output_as_json(&mut bytes, SpecVersion::V1_5)
-        .with_context(|| format!("the bill of materials of {}", own.name))?;
+        .with_context(|| format!("the bill of materials of {}", package.name))?;
     bytes.push(b'\n');
     Ok(bytes)
 }

@@ -42,6 +42,6 @@ fn places(library: &[u8], needed: impl Fn(&[u8]) -> bool) -> object::Result<Vec<
             |name: &[u8]| name.starts_with(b"fmi") || name.starts_with(DESCRIBE.as_bytes());
         name.is_ok_and(|name| is_own(name) && !needed(name))
     };
-    let found = symbols.iter().enumerate().filter(|(_, symbol)| is_other(symbol));
-    Ok(found.map(|(index, _)| start.saturating_add(index * size)).collect())
+    let undefined = symbols.iter().enumerate().filter(|(_, symbol)| is_other(symbol));
+    Ok(undefined.map(|(index, _)| start.saturating_add(index * size)).collect())
 }

@@ -16,10 +16,10 @@ pub(super) fn facts(system: &System, plan: &Plan) -> Run {
         input: variable(connection.to),
     });
     let fmus = system.slaves.iter().map(|(name, slave)| {
-        let own = slave.description();
-        let model = format!("model {}", own.model_name);
-        let version = format!("FMI {}", own.fmi_version);
-        let tool = own.generation_tool.as_ref().map(|tool| format!("written by {tool}"));
+        let description = slave.description();
+        let model = format!("model {}", description.model_name);
+        let version = format!("FMI {}", description.fmi_version);
+        let tool = description.generation_tool.as_ref().map(|tool| format!("written by {tool}"));
         Fmu { name: name.clone(), details: [model, version].into_iter().chain(tool).collect() }
     });
     Run {

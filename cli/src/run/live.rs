@@ -293,9 +293,10 @@ fn probe(run: &mut Run, ports: &[Port]) -> anyhow::Result<Probe> {
     let time = run.simulation.time();
     let system = run.simulation.system();
     let refused = Readout::new(system, ports).unreadable(system, ports, time)?;
-    let kept = ports.iter().copied().filter(|port| refused.iter().all(|(known, _)| known != port));
-    let kept: Vec<Port> = kept.take(SIGNALS).collect();
-    Ok(Probe::new(system, &kept))
+    let readable =
+        ports.iter().copied().filter(|port| refused.iter().all(|(known, _)| known != port));
+    let readable: Vec<Port> = readable.take(SIGNALS).collect();
+    Ok(Probe::new(system, &readable))
 }
 
 fn named(system: &System, name: &str) -> Option<Variable> {

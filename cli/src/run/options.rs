@@ -556,13 +556,13 @@ fn is_fmu(path: &Path) -> bool {
 /// name.
 fn free_name(path: &Path, config: &Config) -> String {
     let stem = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-    let taken = |name: &String| config.fmus.0.iter().any(|(known, _)| known == name);
+    let is_used = |name: &String| config.fmus.0.iter().any(|(known, _)| known == name);
     let numbered = (2..).map(|number| format!("{stem}_{number}"));
-    std::iter::once(stem.clone()).chain(numbered).find(|name| !taken(name)).unwrap_or(stem)
+    std::iter::once(stem.clone()).chain(numbered).find(|name| !is_used(name)).unwrap_or(stem)
 }
 
 fn has_ending(path: &Path, ending: &str) -> bool {
-    path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending))
 }
 
 /// Checks the numbers of the command line; numbers of a file were checked when it was read.
