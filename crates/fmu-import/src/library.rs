@@ -92,6 +92,44 @@ fn c_string(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
 }
 
+/// Copies the strings that an FMU returned; null is an empty string.
+///
+/// # Safety
+///
+/// The pointers are null or point to terminated strings.
+unsafe fn copy_strings(pointers: &[*const c_char], values: &mut [String]) {
+    for (value, pointer) in values.iter_mut().zip(pointers) {
+        value.clear();
+        // SAFETY: the caller guarantees it.
+        if let Some(text) = unsafe { pointer.as_ref().map(|text| CStr::from_ptr(text)) } {
+            value.push_str(&text.to_string_lossy());
+        }
+    }
+}
+
+/// Checks that the version of FMI that `function` returns is `expected` up to its last digit. A library may lack the
+/// function.
+fn check_version(
+    path: &Path,
+    get_version: Option<unsafe extern "C" fn() -> *const c_char>,
+    function: &'static str,
+    expected: &'static str,
+) -> Result<(), LoadError> {
+    let Some(get_version) = get_version else { return Ok(()) };
+    // SAFETY: takes no argument and returns null or a static string.
+    let version = unsafe { get_version().as_ref().map(|text| CStr::from_ptr(text)) };
+    let version = version.map(CStr::to_string_lossy).unwrap_or_default();
+    if version.starts_with(expected.trim_end_matches('0')) {
+        return Ok(());
+    }
+    Err(LoadError::Version {
+        path: path.to_owned(),
+        function,
+        found: version.into_owned(),
+        expected,
+    })
+}
+
 /// `fmi2Type`: the interface of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
@@ -125,19 +163,7 @@ impl Library {
         let path = loading.path;
         let handle = loading.load()?;
         let functions = Functions::load(&handle, "");
-        // SAFETY: takes no argument and returns a static string.
-        let version = functions
-            .get_version
-            .and_then(|function| unsafe { function().as_ref().map(|text| CStr::from_ptr(text)) });
-        let version = version.map(CStr::to_string_lossy).unwrap_or_default();
-        if functions.get_version.is_some() && !version.starts_with("2.") {
-            return Err(LoadError::Version {
-                path: path.to_owned(),
-                function: "fmi2GetVersion",
-                found: version.into_owned(),
-                expected: "2.0",
-            });
-        }
+        check_version(path, functions.get_version, "fmi2GetVersion", "2.0")?;
         functions.require(interface, path)?;
         let corrupted = AtomicBool::new(false);
         Ok(Self { functions, path: path.to_owned(), corrupted, _handle: handle })

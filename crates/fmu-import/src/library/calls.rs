@@ -1,11 +1,11 @@
 //! The calls of an instance: one method for each function of the standard.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
-use std::ffi::{CStr, CString};
+use std::ffi::CString;
 
 use fmu_description::abi::{fmi2Boolean, fmi2EventInfo};
 
-use super::{Component, c_string, canary};
+use super::{Component, c_string, canary, copy_strings};
 use slave::{CallError, CompletedStep, EventInfo, absent};
 
 /// Evaluates to the C function in `$field` and marks it as entered; returns an error from the caller
@@ -222,14 +222,8 @@ impl Component {
         let call = |list, array| unsafe { function(self.pointer, list, count, array) };
         self.check_guarded(NAME, canary::read(self.guards, references, &mut pointers, call))?;
         self.place.enter(&NAME);
-        for (value, pointer) in values.iter_mut().zip(pointers) {
-            value.clear();
-            // SAFETY: the FMU returns null or terminated strings, which live until the next call.
-            let text = unsafe { pointer.as_ref().map(|text| CStr::from_ptr(text)) };
-            if let Some(text) = text {
-                value.push_str(&text.to_string_lossy());
-            }
-        }
+        // SAFETY: the FMU returns null or terminated strings, which live until the next call.
+        unsafe { copy_strings(&pointers, values) };
         self.place.leave();
         Ok(())
     }

@@ -19,7 +19,7 @@ use fmu_description::abi::Status;
 use super::calls::{function, same_length};
 use super::canary::{self, Guarded};
 use super::log::{Names, Sink, logger};
-use super::{Handle, Interface, Loading, c_string, calloc, free};
+use super::{Handle, Interface, Loading, c_string, calloc, check_version, copy_strings, free};
 use crate::crash::{self, Place};
 use crate::error::LoadError;
 use functions::{Callbacks, Functions, Instance, ModelCallbacks};
@@ -48,19 +48,7 @@ impl Library {
         let path = loading.path;
         let handle = loading.load()?;
         let functions = Functions::load(&handle, &format!("{model_identifier}_"));
-        // SAFETY: takes no argument and returns a static string.
-        let version = functions
-            .get_version
-            .and_then(|function| unsafe { function().as_ref().map(|text| CStr::from_ptr(text)) });
-        let version = version.map(CStr::to_string_lossy).unwrap_or_default();
-        if functions.get_version.is_some() && !version.starts_with("1.") {
-            return Err(LoadError::Version {
-                path: path.to_owned(),
-                function: "fmiGetVersion",
-                found: version.into_owned(),
-                expected: "1.0",
-            });
-        }
+        check_version(path, functions.get_version, "fmiGetVersion", "1.0")?;
         functions.require(path, model_identifier, interface)?;
         let corrupted = AtomicBool::new(false);
         Ok(Self { functions, interface, path: path.to_owned(), corrupted, _handle: handle })
@@ -336,14 +324,8 @@ impl Component {
         let call = |list, array| unsafe { function(self.pointer, list, count, array) };
         self.check_guarded(NAME, canary::read(self.guards, references, &mut pointers, call))?;
         self.place.enter(&NAME);
-        for (value, pointer) in values.iter_mut().zip(pointers) {
-            value.clear();
-            // SAFETY: the FMU returns null or terminated strings, which live until the next call.
-            let text = unsafe { pointer.as_ref().map(|text| CStr::from_ptr(text)) };
-            if let Some(text) = text {
-                value.push_str(&text.to_string_lossy());
-            }
-        }
+        // SAFETY: the FMU returns null or terminated strings, which live until the next call.
+        unsafe { copy_strings(&pointers, values) };
         self.place.leave();
         Ok(())
     }

@@ -13,7 +13,7 @@ mod step;
 mod values;
 
 use std::cell::{Cell, RefCell};
-use std::ffi::{CStr, c_void};
+use std::ffi::c_void;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,7 +22,7 @@ use fmu_description::abi::Status;
 
 use super::canary::Guarded;
 use super::log::{Sink, receive_message};
-use super::{Handle, Loading, c_string};
+use super::{Handle, Loading, c_string, check_version};
 use crate::crash::{self, Place};
 use crate::error::LoadError;
 use functions::{ClockUpdate, Functions, Instance, IntermediateUpdate, Preemption, State};
@@ -90,19 +90,7 @@ impl Library {
         let path = loading.path;
         let handle = loading.load()?;
         let functions = Functions::load(&handle, "");
-        // SAFETY: takes no argument and returns a static string.
-        let version = functions
-            .get_version
-            .and_then(|function| unsafe { function().as_ref().map(|text| CStr::from_ptr(text)) });
-        let version = version.map(CStr::to_string_lossy).unwrap_or_default();
-        if functions.get_version.is_some() && !version.starts_with("3.") {
-            return Err(LoadError::Version {
-                path: path.to_owned(),
-                function: "fmi3GetVersion",
-                found: version.into_owned(),
-                expected: "3.0",
-            });
-        }
+        check_version(path, functions.get_version, "fmi3GetVersion", "3.0")?;
         functions.require(interface, path)?;
         let corrupted = AtomicBool::new(false);
         Ok(Self { functions, path: path.to_owned(), corrupted, _handle: handle })

@@ -1,10 +1,10 @@
 //! Get and set: one method for each type. As many values as the elements of all variables together.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
-use std::ffi::{CStr, CString};
+use std::ffi::CString;
 
 use super::super::calls::function;
-use super::super::{c_string, canary};
+use super::super::{c_string, canary, copy_strings};
 use super::Component;
 use slave::{CallError, absent};
 
@@ -100,14 +100,8 @@ impl Component {
         let done = canary::read(self.guards, references, &mut pointers, call);
         self.check_guarded(NAME, done, String::new)?;
         self.place.enter(&NAME);
-        for (value, pointer) in values.iter_mut().zip(pointers) {
-            value.clear();
-            // SAFETY: the FMU returns null or terminated strings, which live until the next call.
-            let text = unsafe { pointer.as_ref().map(|text| CStr::from_ptr(text)) };
-            if let Some(text) = text {
-                value.push_str(&text.to_string_lossy());
-            }
-        }
+        // SAFETY: the FMU returns null or terminated strings, which live until the next call.
+        unsafe { copy_strings(&pointers, values) };
         self.place.leave();
         Ok(())
     }
