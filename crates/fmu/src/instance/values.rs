@@ -104,6 +104,22 @@ impl<M: Model> Core<M> {
         Ok(())
     }
 
+    /// Reads values and converts each with `convert`.
+    fn get<T, V>(
+        &mut self,
+        slots: &[Slot<M, T>],
+        references: &[u32],
+        values: &mut [MaybeUninit<V>],
+        convert: impl Fn(&T) -> V,
+        kind: &str,
+    ) -> Result<(), Failure> {
+        for (&reference, value) in references.iter().zip(values) {
+            let slot = slot(slots, reference, kind)?;
+            value.write(convert((slot.field)(&mut self.model)));
+        }
+        Ok(())
+    }
+
     /// Sets all `values`, or none if one of them cannot be set.
     pub(super) fn set<T, V>(
         &mut self,
@@ -148,11 +164,7 @@ impl<M: Model> Instance<M> {
         to: &mut [MaybeUninit<i32>],
     ) -> Result<(), Failure> {
         self.refresh()?;
-        for (&reference, value) in from.iter().zip(to) {
-            let slot = slot(&self.interface.integers, reference, "Integer")?;
-            value.write(*(slot.field)(&mut self.core.model));
-        }
-        Ok(())
+        self.core.get(&self.interface.integers, from, to, |value| *value, "Integer")
     }
 
     /// `fmi2GetBoolean`.
@@ -162,11 +174,7 @@ impl<M: Model> Instance<M> {
         to: &mut [MaybeUninit<i32>],
     ) -> Result<(), Failure> {
         self.refresh()?;
-        for (&reference, value) in from.iter().zip(to) {
-            let slot = slot(&self.interface.booleans, reference, "Boolean")?;
-            value.write(i32::from(*(slot.field)(&mut self.core.model)));
-        }
-        Ok(())
+        self.core.get(&self.interface.booleans, from, to, |value| i32::from(*value), "Boolean")
     }
 
     /// `fmi2GetString`. The pointers stay valid until the next call.
