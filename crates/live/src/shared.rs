@@ -11,14 +11,14 @@ use crate::store::{Event, Store};
 const SAMPLE: u8 = 1;
 const REQUEST: u8 = 2;
 
-/// What the run does.
+/// The state of the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// It steps.
+    /// The run steps.
     Running,
-    /// It is held at a communication point.
+    /// The run waits at a communication point until it is resumed.
     Paused,
-    /// It has ended.
+    /// The run has ended.
     Ended,
 }
 

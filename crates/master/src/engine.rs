@@ -25,7 +25,7 @@ use threads::{Threads, run};
 
 /// Largest number of partial steps in which a slave may complete a step.
 const PARTS: u32 = 1000;
-/// Part of a step below which the missing rest is rounding.
+/// A step is complete if the rest is less than this fraction of it.
 const ROUNDING: f64 = 1e-9;
 /// Smallest part of a step that is made before or after an event within it.
 const DIVISION: f64 = 1e-6;

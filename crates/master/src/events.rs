@@ -13,7 +13,7 @@ use solve::Bracket;
 const SLOT: usize = 2;
 /// Relative width, as a part of a step, within which a crossing is located.
 const WIDTH: f64 = 1e-9;
-/// Part of a step below which a difference of times is rounding.
+/// Two times are equal if they differ by less than this fraction of the step.
 const ROUNDING: f64 = 1e-9;
 
 /// The event sources, and the state from which a crossing is located.

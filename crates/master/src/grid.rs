@@ -9,7 +9,7 @@ use crate::system::System;
 use fmu_description::number::seconds;
 use slave::Slave;
 
-/// Part of a step below which the rest of a run is rounding and gets no step.
+/// A rest of the run that is less than this fraction of the step gets no step of its own.
 const ROUNDING: f64 = 1e-6;
 
 /// The communication points of a run, and the one reached.

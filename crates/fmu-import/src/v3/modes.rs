@@ -13,7 +13,7 @@ use fmu_description::abi::Status;
 const UPDATES: u32 = 1000;
 /// Largest number of parts of a step that make no progress.
 const STANDSTILLS: u32 = 1000;
-/// Part of a step below which a difference of times is rounding.
+/// Two times are equal if they differ by less than this fraction of the step.
 const ROUNDING: f64 = 1e-9;
 /// Smallest part of a step that is tried after `fmi3Discard`.
 const SMALLEST: f64 = 1e-6;

@@ -2,7 +2,7 @@
 
 use super::reals::Reals;
 
-/// Part of a step below which a difference of times is rounding.
+/// Two times are equal if they differ by less than this fraction of the step.
 const ROUNDING: f64 = 1e-6;
 
 impl Reals {

@@ -13,7 +13,7 @@ use crate::fault::FaultChain;
 use crate::system::{Port, System};
 use slave::{CallError, CommunicationStep, Slave, StepRequest, StepResult};
 
-/// Part of a step below which a difference of times is rounding.
+/// Two times are equal if they differ by less than this fraction of the step.
 const ROUNDING: f64 = 1e-9;
 
 /// The connected Reals of a system.
