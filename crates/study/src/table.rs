@@ -162,8 +162,12 @@ pub fn parse(bytes: &[u8]) -> Result<Table, TableError> {
     let mut columns = vec![Vec::new(); names.len()];
     while advance(&mut reader, &mut record)? {
         if record.len() != names.len() {
-            let (expected, found) = (names.len(), record.len());
-            return Err(TableError::Width { line: line_of(bytes, &record), expected, found });
+            let (expected, actual) = (names.len(), record.len());
+            return Err(TableError::Width {
+                line: line_of(bytes, &record),
+                expected,
+                found: actual,
+            });
         }
         for ((field, column), name) in record.iter().zip(&mut columns).zip(&names) {
             let number = number(field).ok_or_else(|| TableError::Number {
@@ -173,10 +177,10 @@ pub fn parse(bytes: &[u8]) -> Result<Table, TableError> {
             })?;
             column.push(number);
         }
-        if let [.., before, found] = columns[0][..]
-            && found < before
+        if let [.., before, time] = columns[0][..]
+            && time < before
         {
-            return Err(TableError::Order { line: line_of(bytes, &record), before, found });
+            return Err(TableError::Order { line: line_of(bytes, &record), before, found: time });
         }
     }
     if columns[0].is_empty() {

@@ -128,7 +128,7 @@ fn serve(channel: &mut Channel, integrator: Option<Integrator>) -> Result<(), Wo
     while !worker.freed {
         match channel.wait(turn) {
             WaitResult::Turn(posted) if posted == turn.wrapping_add(1) => {}
-            WaitResult::Turn(found) => return Err(WorkerError::Corrupted { found }),
+            WaitResult::Turn(word) => return Err(WorkerError::Corrupted { found: word }),
             WaitResult::TimedOut => continue,
             WaitResult::Closed => return Ok(()),
         }

@@ -149,8 +149,8 @@ impl System {
             if setting.value.is_near(&value) {
                 continue;
             }
-            let (value, found) = (setting.text, value.to_string());
-            let error = SystemError::LostSetting { name, value, found };
+            let (value, actual) = (setting.text, value.to_string());
+            let error = SystemError::LostSetting { name, value, found: actual };
             if causality == Causality::Parameter {
                 return Err(error);
             }

@@ -73,20 +73,24 @@ impl<'a> Resolver<'a> {
         let target = self.target(input)?;
         let source_port = self.names.source(target.port);
         if source_port.is_none() && self.driver(target.port).is_none() {
-            let found = match target.variable.causality {
+            let description = match target.variable.causality {
                 Causality::Input => "an input without a source",
                 Causality::Output => "an output",
                 _ => "no input",
             };
-            return Err(Reason::NoConnection { name: target.name, found });
+            return Err(Reason::NoConnection { name: target.name, found: description });
         }
         if let Some(source) = source {
             let stated_source = self.names.port(source)?;
             if source_port != Some(stated_source) {
-                let found =
+                let description =
                     source_port.map_or_else(|| "a signal".to_owned(), |port| self.names.name(port));
                 let stated = self.names.name(stated_source);
-                return Err(Reason::OtherSource { target: target.name, found, stated });
+                return Err(Reason::OtherSource {
+                    target: target.name,
+                    found: description,
+                    stated,
+                });
             }
         }
         Ok(target)

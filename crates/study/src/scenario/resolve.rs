@@ -161,14 +161,17 @@ impl<'a> Resolver<'a> {
         let (causality, variability) = (target.variable.causality, target.variable.variability);
         let tunable = causality == Causality::Parameter && variability == Variability::Tunable;
         if causality != Causality::Input && !tunable {
-            let found = format!("{} {}", variability.as_str(), causality.as_str());
-            return Err(Reason::NotSettable { name: target.name, found: with_article(&found) });
+            let description = format!("{} {}", variability.as_str(), causality.as_str());
+            return Err(Reason::NotSettable {
+                name: target.name,
+                found: with_article(&description),
+            });
         }
         if let Kind::Clock(clock) = &target.variable.kind
             && clock.interval_variability != IntervalVariability::Triggered
         {
-            let found = "a clock that ticks by itself".to_owned();
-            return Err(Reason::NotSettable { name: target.name, found });
+            let description = "a clock that ticks by itself".to_owned();
+            return Err(Reason::NotSettable { name: target.name, found: description });
         }
         if let Some(source) = self.names.source(target.port) {
             let source_name = self.names.name(source);

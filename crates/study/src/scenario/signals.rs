@@ -282,13 +282,13 @@ fn column_signal(
         _ => return Err(unfit("csv", target, "constant or steps")),
     };
     if let Some(row) = wrong {
-        let found = format!("{} in row {} of {}", values[row], row + 1, path.display());
+        let actual = format!("{} in row {} of {}", values[row], row + 1, path.display());
         let expected = match kind {
             Kind::Boolean(_) | Kind::Clock(_) => "0 or 1".to_owned(),
             _ if target.is_real() => "a finite number".to_owned(),
             _ => integers(kind, description),
         };
-        return Err(Reason::Value { name: target.name.clone(), found, expected });
+        return Err(Reason::Value { name: target.name.clone(), found: actual, expected });
     }
     let between = match kind {
         Kind::Clock(_) => Interpolation::Points,
