@@ -317,20 +317,24 @@ impl Loader {
 
 /// Returns an error sentence if the FMU cannot run here, before its library is loaded.
 pub(super) fn check_runnable(fmu: &Unpacked) -> Result<(), String> {
-    let description = &fmu.description;
-    let simulation = description.co_simulation.as_ref().map(|flags| &flags.model_identifier);
-    let exchange = description.model_exchange.as_ref().map(|flags| &flags.model_identifier);
-    let Some(identifier) = simulation.or(exchange) else {
-        return Err(
-            "the FMU lacks an interface, expected the element CoSimulation or ModelExchange"
-                .to_owned(),
-        );
-    };
     // A library may be built from source code when the FMU is opened.
-    if fmu.has_sources() {
-        return Ok(());
-    }
+    if fmu.has_sources() && identifier(fmu).is_some() { Ok(()) } else { check_library(fmu) }
+}
+
+/// Returns an error sentence if the FMU has no library for this platform.
+fn check_library(fmu: &Unpacked) -> Result<(), String> {
+    let identifier = identifier(fmu).ok_or_else(|| {
+        "the FMU lacks an interface, expected the element CoSimulation or ModelExchange".to_owned()
+    })?;
     fmu.library(identifier).map(|_| ()).map_err(|error| error.to_string())
+}
+
+/// The name of the library that a system uses.
+fn identifier(fmu: &Unpacked) -> Option<&str> {
+    let description = &fmu.description;
+    let simulation =
+        description.co_simulation.as_ref().map(|flags| flags.model_identifier.as_str());
+    simulation.or(description.model_exchange.as_ref().map(|flags| flags.model_identifier.as_str()))
 }
 
 /// Returns the system with the identifier `id` at any depth.

@@ -150,6 +150,12 @@ impl Files {
         }
         let path = &target.path;
         let unpacked = if path.is_dir() { Unpacked::in_folder(path) } else { Unpacked::open(path) };
+        let unpacked = unpacked.and_then(|fmu| {
+            // Its library may be built from its source code, which is unpacked for this.
+            let is_built =
+                !path.is_dir() && fmu.has_sources() && super::check_library(&fmu).is_err();
+            if is_built { Unpacked::open_whole(path) } else { Ok(fmu) }
+        });
         let unpacked = unpacked.map_err(|error| with_shown_path(error, target))?;
         self.warn(&target.shown, unpacked.archive_warnings.clone());
         self.warn(&target.shown, unpacked.warnings.iter().map(ToString::to_string));
