@@ -12,7 +12,7 @@ impl Fmu {
     ///
     /// # Errors
     ///
-    /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`LoadError::Instantiate`] with the
+    /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`Instantiate`](crate::LoadError::Instantiate) with the
     /// FMU's messages if the FMU does not instantiate; [`FmuError::NoInterface`] without co-simulation.
     pub fn instantiate(&self, name: &str) -> Result<Instance, FmuError> {
         let flags = self.description().stepped();
