@@ -70,7 +70,7 @@ pub struct Design {
     /// L_f, q x p.
     #[serde(rename = "L_f")]
     pub l_f: Matrix,
-    /// H, t x p, of the integral action x_i' = r - H y + ...; see `equations.rs`.
+    /// H, t x p, of the integral action x_i' = r - H y + ...; see `fmu-controller/src/equations.rs`.
     #[serde(rename = "H", default)]
     pub h: Option<Matrix>,
     /// K_i, m x t: the gain of the integral action, stated together with H.
@@ -115,7 +115,7 @@ pub struct Design {
     pub detection: Option<DetectionDesign>,
 }
 
-/// What the controller does without an actuator; see `reconfiguration.rs`.
+/// What the controller does without an actuator; see `fmu-controller/src/reconfiguration.rs`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reconfiguration {
@@ -169,7 +169,7 @@ pub struct Combination {
     pub k_s: Matrix,
 }
 
-/// The fall-back; see `reconfiguration.rs`.
+/// The fall-back; see `fmu-controller/src/reconfiguration.rs`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fallback {

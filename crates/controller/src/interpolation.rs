@@ -32,7 +32,7 @@ impl Schedule {
         design.measurements.iter().position(|signal| signal.name == self.variable)
     }
 
-    /// The first and the last value of the grid.
+    /// The first and the last value of the grid, which has two points at least.
     #[must_use]
     pub fn range(&self) -> [f64; 2] {
         [self.points[0].at, self.points[self.points.len() - 1].at]

@@ -3,8 +3,7 @@
 
 use crate::algorithm::{Algorithm, Coupling};
 use crate::engine::{Engine, SavedState, Swept};
-use crate::error::SystemError;
-use crate::error::call;
+use crate::error::{SystemError, call};
 use solve::{Anderson, Newton, Progress, QuasiNewton, Scale, Solver};
 
 use fmu_description::CoSimulation;

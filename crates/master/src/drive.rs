@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::SystemError;
-use crate::error::call;
+use crate::error::{SystemError, call};
 use crate::fault::FaultChain;
 use crate::signal::{Cursor, Sample, Signal, earliest, near, reached};
 use crate::system::{Port, System};

@@ -12,8 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::algorithm::Algorithm;
 use crate::drive::Drives;
-use crate::error::SystemError;
-use crate::error::call;
+use crate::error::{SystemError, call};
 use crate::exchange::{Exchange, Values};
 use crate::grid::{Grid, size_between};
 use crate::system::{Port, System};

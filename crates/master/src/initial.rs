@@ -7,8 +7,7 @@ use fmu_description::Experiment;
 use fmu_description::{DefaultExperiment, Kind, ModelDescription};
 
 use crate::drive::{Drive, Scenario};
-use crate::error::SystemError;
-use crate::error::call;
+use crate::error::{SystemError, call};
 use crate::fault::FaultChain;
 use crate::limits::check_start;
 use crate::order::Rows;

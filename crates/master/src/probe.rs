@@ -1,7 +1,6 @@
 //! Reads chosen variables of a system as numbers.
 
-use crate::error::SystemError;
-use crate::error::call;
+use crate::error::{SystemError, call};
 use crate::system::{Port, System};
 use slave::ValueType;
 

@@ -4,8 +4,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::drive::{DriveKind, Drives, integer};
-use crate::error::SystemError;
-use crate::error::call;
+use crate::error::{SystemError, call};
 use crate::system::{Port, System};
 use slave::{CallError, Slave, Value, ValueType, to_hex};
 

@@ -32,41 +32,41 @@ pub struct Point {
     pub u_op: Vec<f64>,
     /// The measurements at the operating point.
     pub y_op: Vec<f64>,
+    /// In place of the matrix of this name of the design.
     #[serde(rename = "A")]
-    /// In place of the matrix of this name of the design.
     pub a: Matrix,
+    /// In place of the matrix of this name of the design.
     #[serde(rename = "B")]
-    /// In place of the matrix of this name of the design.
     pub b: Matrix,
+    /// In place of the matrix of this name of the design.
     #[serde(rename = "C")]
-    /// In place of the matrix of this name of the design.
     pub c: Matrix,
+    /// In place of the matrix of this name of the design.
     #[serde(rename = "F_a")]
-    /// In place of the matrix of this name of the design.
     pub f_a: Matrix,
+    /// In place of the matrix of this name of the design.
     #[serde(rename = "K_x")]
-    /// In place of the matrix of this name of the design.
     pub k_x: Matrix,
+    /// In place of the matrix of this name of the design.
     #[serde(rename = "K_f")]
-    /// In place of the matrix of this name of the design.
     pub k_f: Matrix,
+    /// In place of the matrix of this name of the design.
     #[serde(rename = "L_x")]
-    /// In place of the matrix of this name of the design.
     pub l_x: Matrix,
-    #[serde(rename = "L_f")]
     /// In place of the matrix of this name of the design.
+    #[serde(rename = "L_f")]
     pub l_f: Matrix,
+    /// In place of the matrix of this name of the design, if it has one.
     #[serde(rename = "P_f", default)]
-    /// In place of the matrix of this name of the design, if it has one.
     pub p_f: Option<Matrix>,
+    /// In place of the matrix of this name of the design, if it has one.
     #[serde(rename = "K_i", default)]
-    /// In place of the matrix of this name of the design, if it has one.
     pub k_i: Option<Matrix>,
+    /// In place of the matrix of this name of the design, if it has one.
     #[serde(rename = "L_w", default)]
-    /// In place of the matrix of this name of the design, if it has one.
     pub l_w: Option<Matrix>,
-    #[serde(rename = "N_r", default)]
     /// In place of the matrix of this name of the design, if it has one.
+    #[serde(rename = "N_r", default)]
     pub n_r: Option<Matrix>,
     /// The references at the operating point; empty without references.
     #[serde(default)]
@@ -88,7 +88,7 @@ impl Point {
         ];
         let stated =
             [("P_f", &self.p_f), ("K_i", &self.k_i), ("L_w", &self.l_w), ("N_r", &self.n_r)];
-        let stated = stated.into_iter().filter_map(|(name, own)| Some((name, own.as_ref()?)));
+        let stated = stated.into_iter().filter_map(|(name, matrix)| Some((name, matrix.as_ref()?)));
         always.into_iter().chain(stated)
     }
 }

@@ -1,8 +1,7 @@
 //! Output derivatives at the start time, before the first step.
 
 use super::Exchange;
-use crate::error::SystemError;
-use crate::error::call;
+use crate::error::{SystemError, call};
 use crate::exchange::Reals;
 use crate::system::System;
 use slave::{CallError, Slave};

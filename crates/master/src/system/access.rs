@@ -1,8 +1,7 @@
 //! Reads and sets single variables of any type.
 
 use super::{Port, System};
-use crate::error::SystemError;
-use crate::error::call;
+use crate::error::{SystemError, call};
 use fmu_description::Causality;
 use slave::{CallError, Slave, Transformation, Value, ValueType};
 

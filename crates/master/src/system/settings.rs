@@ -7,8 +7,7 @@ use std::collections::hash_map::Entry;
 use fmu_description::{Causality, Initial, Kind};
 
 use super::{Port, System};
-use crate::error::SystemError;
-use crate::error::call;
+use crate::error::{SystemError, call};
 use slave::{CallError, Value};
 
 /// A value for a variable.
