@@ -6,9 +6,12 @@
 
 mod arithmetic;
 mod c;
+mod constants;
 mod controller;
 mod detection;
+mod fields;
 mod names;
+mod parts;
 mod reconfiguration;
 mod recursion;
 mod rounding;
@@ -17,13 +20,14 @@ mod schedule;
 mod summary;
 mod symbols;
 mod tables;
+mod text;
 
 use std::path::PathBuf;
 
 use controller::Controller;
+use fields::Fields;
 use recursion::Recursion;
 use rounding::RoundingBound;
-use summary::Fields;
 
 use crate::{Design, Error};
 

@@ -169,10 +169,6 @@ fn no_modules_use_each_other_but_parent_and_child() {
         ["cli", "fmu-controller", "fmu-plant", "python", "web"].map(|name| root().join(name));
     for folder in crates.chain(others) {
         for (module, imports) in imports(&folder.join("src")) {
-            // The source code of controllers is being written anew.
-            if folder.ends_with("design") && module == ["code"] {
-                continue;
-            }
             let found = circular(&imports);
             assert!(found.is_empty(), "{}, {}: {found:#?}", folder.display(), module.join("::"));
         }

@@ -3,12 +3,12 @@
 use nalgebra::DMatrix;
 
 use super::Precision;
+use super::constants::Constants;
 use super::controller::Controller;
 use super::detection::{Detection, Method};
 use super::recursion::{Operation, Recursion, Statement, Term};
-use super::schedule::operating_vectors;
 use super::symbols::{Kind, Matrix, Vector};
-use super::tables::{Constants, locals, stored, tables};
+use super::tables::{locals, operating_vectors, stored, tables};
 
 /// The most operations of one sample: while compensating, with every command at its upper limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -173,8 +173,9 @@ impl Memory {
             stack += limits * Kind::Actuator.count(controller);
         }
         let integers = controller.detection.as_ref().map_or(0, Detection::integer_bytes);
-        let of_cases =
-            controller.reconfiguration.as_ref().map_or(0, |own| own.integer_bytes(controller));
+        let [actuators, faults] = [Kind::Actuator, Kind::Fault].map(|kind| kind.count(controller));
+        let of_cases = controller.reconfiguration.as_ref();
+        let of_cases = of_cases.map_or(0, |cases| cases.integer_bytes(actuators, faults));
         let tables: usize = tables(controller, recursion).iter().map(Constants::count).sum();
         Self {
             state: (stored * size + 4 * counters + flags).next_multiple_of(size),

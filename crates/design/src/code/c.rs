@@ -11,12 +11,14 @@ pub(super) use detection::reactions;
 use std::path::PathBuf;
 
 use super::arithmetic::Memory;
+use super::constants::Constants;
 use super::controller::Controller;
+use super::fields::Fields;
 use super::recursion::Recursion;
 use super::rounding::RoundingBound;
-use super::summary::{Fields, Vocabulary};
+use super::summary::Vocabulary;
 use super::symbols::Kind;
-use super::tables::{Constants, has_constant_matrix, starts, tables};
+use super::tables::{has_constant_matrix, starts, tables};
 use super::{Precision, Request};
 
 /// The longest line of a table.
@@ -116,7 +118,7 @@ impl Source<'_> {
         let mut lines = vec![
             format!(
                 "/* Written by {}; {name}.h describes it. */",
-                super::summary::ascii(request.identity)
+                super::text::ascii(request.identity)
             ),
             format!("#include \"{name}.h\""),
             String::new(),

@@ -6,9 +6,10 @@ use nalgebra::DMatrix;
 
 use super::Precision;
 use super::detection::Detection;
+use super::parts::{Loss, Signal, dense, first_at};
 use super::reconfiguration::{Plant, Reconfiguration};
 use super::schedule::Schedule;
-use super::symbols::Matrix;
+use super::symbols::{Kind, Matrix};
 use crate::Error;
 
 /// The controller of a sampled design: matrices, signals, switches. Shapes as in the design file.
@@ -56,60 +57,6 @@ pub(super) struct Controller {
     pub(super) schedule: Option<Schedule>,
     pub(super) detection: Option<Detection>,
     pub(super) reconfiguration: Option<Reconfiguration>,
-}
-
-/// A state, an actuator, a measurement, a reference or a fault, as the code describes it.
-pub(super) struct Signal {
-    pub(super) name: String,
-    pub(super) unit: Option<String>,
-    pub(super) description: String,
-    /// The value at the operating point.
-    pub(super) operating: f64,
-    pub(super) limits: Option<[f64; 2]>,
-}
-
-impl Signal {
-    pub(super) fn new(
-        name: String,
-        unit: Option<String>,
-        description: String,
-        operating: f64,
-    ) -> Self {
-        Self { name, unit, description, operating, limits: None }
-    }
-}
-
-impl From<aso_controller::design::Signal> for Signal {
-    fn from(signal: aso_controller::design::Signal) -> Self {
-        let aso_controller::design::Signal { name, unit, description, operating } = signal;
-        Self::new(name, unit, description, operating.unwrap_or_default())
-    }
-}
-
-impl From<Actuator> for Signal {
-    fn from(actuator: Actuator) -> Self {
-        let Actuator { name, unit, description, operating, limits } = actuator;
-        Self { limits, ..Self::new(name, unit, description, operating.unwrap_or_default()) }
-    }
-}
-
-impl From<Fault> for Signal {
-    fn from(fault: Fault) -> Self {
-        Self::new(fault.name, fault.unit, fault.description, 0.0)
-    }
-}
-
-/// A fault that is a loss of effectiveness, with its position and that of its actuator.
-pub(super) struct Loss {
-    pub(super) fault: usize,
-    pub(super) actuator: usize,
-    /// `u_e`.
-    pub(super) least_command: f64,
-}
-
-/// A matrix of the design file for linear algebra.
-pub(super) fn dense(matrix: &aso_controller::Matrix) -> DMatrix<f64> {
-    DMatrix::from_row_slice(matrix.rows, matrix.columns, &matrix.values)
 }
 
 impl Controller {
@@ -334,21 +281,6 @@ fn first_compensated(t_on: f64, sample_time: f64) -> Result<u32, Error> {
     })
 }
 
-/// The number of the first sample at which the FMU compensates, from a start at time 0; `None` if it
-/// does not fit into 32 bits.
-pub(super) fn first_at(t_on: f64, period: f64) -> Option<u32> {
-    let is_on = |sample: f64| {
-        let time = sample * period;
-        time >= t_on - 8.0 * f64::EPSILON * time
-    };
-    let mut sample = ((t_on / period).floor() - 2.0).max(0.0);
-    while !is_on(sample) && sample <= f64::from(u32::MAX) {
-        sample += 1.0;
-    }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number")]
-    (sample <= f64::from(u32::MAX)).then_some(sample as u32)
-}
-
 fn losses(faults: &[Fault], actuators: &[Actuator]) -> Vec<Loss> {
     let loss = |(fault, own): (usize, &Fault)| {
         let name = own.loss_of.as_ref()?;
@@ -358,22 +290,64 @@ fn losses(faults: &[Fault], actuators: &[Actuator]) -> Vec<Loss> {
     faults.iter().enumerate().filter_map(loss).collect()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::first_at;
+impl Matrix {
+    /// The matrix of a controller, if it has it.
+    pub(super) fn of(self, controller: &Controller) -> Option<&DMatrix<f64>> {
+        Some(match self {
+            Self::A => &controller.a,
+            Self::B => &controller.b,
+            Self::C => &controller.c,
+            Self::D => return controller.d.as_ref(),
+            Self::FA => &controller.f_a,
+            Self::AF => &controller.a_f,
+            Self::KX => &controller.k_x,
+            Self::KF => &controller.k_f,
+            Self::LX => &controller.l_x,
+            Self::LF => &controller.l_f,
+            Self::PF => return controller.p_f.as_ref(),
+            Self::H => return controller.h.as_ref(),
+            Self::KI => return controller.k_i.as_ref(),
+            Self::FI => return controller.f_i.as_ref(),
+            Self::LW => return controller.l_w.as_ref(),
+            Self::NR => return controller.n_r.as_ref(),
+            Self::ResidualA
+            | Self::ResidualBu
+            | Self::ResidualBy
+            | Self::ResidualC
+            | Self::ResidualDu
+            | Self::ResidualDy => {
+                let own = controller.detection.as_ref()?;
+                match self {
+                    Self::ResidualA => &own.a,
+                    Self::ResidualBu => &own.b_u,
+                    Self::ResidualBy => &own.b_y,
+                    Self::ResidualC => &own.c,
+                    Self::ResidualDu => &own.d_u,
+                    _ => &own.d_y,
+                }
+            }
+        })
+    }
+}
 
-    #[test]
-    fn the_first_compensated_sample_is_the_first_one_at_t_on() {
-        for (t_on, period, expected) in [
-            (0.0, 0.1, 0),
-            (-3.0, 0.1, 0),
-            (0.3, 0.1, 3), // 3 * 0.1 is above 0.3, 0.3 / 0.1 below 3
-            (0.31, 0.1, 4),
-            (5.0, 1e-3, 5000),
-            (0.7, 0.1, 7),
-        ] {
-            assert_eq!(first_at(t_on, period), Some(expected), "{t_on} {period}");
+impl Kind {
+    /// The number of these of a controller.
+    pub(super) fn count(self, controller: &Controller) -> usize {
+        let detection = controller.detection.as_ref();
+        match self {
+            Self::State => controller.states.len(),
+            Self::Fault => controller.faults.len(),
+            Self::Actuator => controller.actuators.len(),
+            Self::Measurement => controller.measurements.len(),
+            Self::Reference => controller.references.len(),
+            Self::Integral => controller.h.as_ref().map_or(0, DMatrix::nrows),
+            Self::Point => controller.schedule.as_ref().map_or(0, |own| own.points.len()),
+            Self::GainSet => controller.reconfiguration.as_ref().map_or(0, |own| own.sets.len()),
+            Self::Case => controller.reconfiguration.as_ref().map_or(0, |own| own.cases.len()),
+            Self::ResidualState => detection.map_or(0, |detection| detection.a.nrows()),
+            Self::Residual => detection.map_or(0, |detection| detection.c.nrows()),
+            Self::Test => detection.map_or(0, |detection| detection.tests.len()),
+            Self::Suspect => detection.map_or(0, |detection| detection.faults.len()),
         }
-        assert_eq!(first_at(1e9, 1e-3), None);
     }
 }

@@ -4,9 +4,9 @@
 use aso_controller::design::detection::{DetectionDesign, TestDesign};
 use nalgebra::DMatrix;
 
-use super::controller::{Controller, dense, first_at};
+use super::constants::Constants;
+use super::parts::{dense, first_at};
 use super::symbols::{Kind, Vector};
-use super::tables::Constants;
 use crate::Error;
 
 /// The detection of a design.
@@ -143,17 +143,6 @@ impl Detection {
     pub(super) fn flags(&self) -> usize {
         self.tests.len() + 1
     }
-}
-
-/// The number of a kind of [`Kind::Residual`], [`Kind::ResidualState`], [`Kind::Test`] or
-/// [`Kind::Suspect`].
-pub(super) fn count(kind: Kind, controller: &Controller) -> usize {
-    controller.detection.as_ref().map_or(0, |own| match kind {
-        Kind::Residual => own.c.nrows(),
-        Kind::ResidualState => own.a.nrows(),
-        Kind::Test => own.tests.len(),
-        _ => own.faults.len(),
-    })
 }
 
 /// The vectors that the filter stores.

@@ -4,9 +4,9 @@
 use aso_controller::design::{self, Actuator, Fault};
 use nalgebra::DMatrix;
 
-use super::controller::{Controller, Loss, Signal, dense};
+use super::constants::Constants;
+use super::parts::{Loss, Signal, dense};
 use super::symbols::{Kind, Matrix};
-use super::tables::Constants;
 use crate::Error;
 
 /// What a controller does without some actuators.
@@ -137,11 +137,10 @@ impl Reconfiguration {
     }
 
     /// The bytes of the constants that are no real numbers.
-    pub(super) fn integer_bytes(&self, controller: &Controller) -> usize {
-        let [m, faults] = [Kind::Actuator, Kind::Fault].map(|kind| kind.count(controller));
-        let singles = if self.fallback.is_none() { 4 * m } else { 0 };
+    pub(super) fn integer_bytes(&self, actuators: usize, faults: usize) -> usize {
+        let singles = if self.fallback.is_none() { 4 * actuators } else { 0 };
         let of_cases = self.cases.len() * (8 + faults);
-        self.sets.len() * m + if self.cases.is_empty() { 0 } else { singles + of_cases }
+        self.sets.len() * actuators + if self.cases.is_empty() { 0 } else { singles + of_cases }
     }
 
     /// The largest number of actuators that a set does without.

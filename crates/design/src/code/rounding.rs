@@ -43,9 +43,10 @@ use nalgebra::DMatrix;
 
 use self::analysis::Analysis;
 use super::controller::Controller;
+use super::fields::Fields;
 use super::recursion::Recursion;
-use super::summary::{Fields, aligned, filled};
 use super::symbols::Kind;
+use super::text::{aligned, filled};
 
 /// For products of rounding errors, for the width of the peak gains, for the printed digits.
 const SECOND_ORDER: f64 = 1.001;

@@ -9,12 +9,15 @@ mod types;
 use std::path::PathBuf;
 
 use super::c::wrapped;
+use super::constants::Constants;
 use super::controller::Controller;
+use super::fields::Fields;
 use super::recursion::Recursion;
 use super::rounding::RoundingBound;
-use super::summary::{Fields, Vocabulary, ascii, summary};
+use super::summary::{Vocabulary, summary};
 use super::symbols::Kind;
-use super::tables::{Constants, has_constant_matrix, tables};
+use super::tables::{has_constant_matrix, tables};
+use super::text::ascii;
 use super::{Precision, Request};
 
 /// What every function of this file renders from.

@@ -12,7 +12,7 @@ use aso_controller::design::{self, schedule};
 use nalgebra::DMatrix;
 
 use super::Precision;
-use super::controller::{Controller, Signal, dense};
+use super::parts::{Signal, dense};
 use super::symbols::{Matrix, Vector};
 use crate::Error;
 
@@ -64,7 +64,7 @@ impl Schedule {
         self.points.iter().map(|point| Some(&point.matrices[at(point)?].1)).collect()
     }
 
-    /// A part of the operating point at each point: one of [`operating_vectors`].
+    /// A part of the operating point at each point: one of [`super::tables::operating_vectors`].
     pub(super) fn operating(&self, vector: Vector) -> Vec<Vec<f64>> {
         let own = |point: &Point| match vector {
             Vector::XOp => point.x_op.clone(),
@@ -112,12 +112,4 @@ impl Point {
         let schedule::Point { at, x_op, u_op, y_op, r_op, .. } = file;
         Self { at, x_op, u_op, y_op, r_op, matrices }
     }
-}
-
-/// The parts of the operating point, with the name of their tables in a schedule.
-pub(super) fn operating_vectors(controller: &Controller) -> Vec<(Vector, &'static str)> {
-    let mut all =
-        vec![(Vector::XOp, "x_op_at"), (Vector::UOp, "u_op_at"), (Vector::YOp, "y_op_at")];
-    all.extend((!controller.references.is_empty()).then_some((Vector::ROp, "r_op_at")));
-    all
 }

@@ -3,10 +3,12 @@
 mod options;
 
 use super::arithmetic::{Arithmetic, Memory};
-use super::controller::{Controller, Loss, Signal};
-use super::names::fields;
+use super::controller::Controller;
+use super::fields::Fields;
+use super::parts::{Loss, Signal};
 use super::recursion::Recursion;
 use super::rounding::RoundingBound;
+use super::text::{aligned, ascii, filled, one_line};
 use super::{Precision, Request};
 use aso_controller::design::{Estimator, SlidingMode};
 
@@ -22,54 +24,6 @@ pub(super) struct Vocabulary {
     pub(super) real: &'static str,
     /// How the compiler keeps the order of operations.
     pub(super) compiler: &'static str,
-}
-
-/// The identifiers of the signals.
-pub(super) struct Fields {
-    pub(super) states: Vec<String>,
-    pub(super) faults: Vec<String>,
-    pub(super) actuators: Vec<String>,
-    pub(super) measurements: Vec<String>,
-    pub(super) references: Vec<String>,
-    /// The scheduling variable, if it is an input of its own.
-    pub(super) schedule: Vec<String>,
-    /// The integrals, named like their references.
-    pub(super) integrals: Vec<String>,
-}
-
-impl Fields {
-    pub(super) fn of(controller: &Controller) -> Self {
-        let own = |signals: &[Signal]| fields(signals.iter().map(|signal| signal.name.as_str()));
-        Self {
-            states: own(&controller.states),
-            faults: own(&controller.faults),
-            actuators: own(&controller.actuators),
-            measurements: own(&controller.measurements),
-            integrals: match controller.h {
-                Some(_) => own(&controller.references),
-                None => Vec::new(),
-            },
-            references: own(&controller.references),
-            schedule: own(controller.schedule_inputs()),
-        }
-    }
-
-    /// The fields of what is known about the actuators: those that may be gone, and the fall-back.
-    pub(super) fn switches(&self, controller: &Controller) -> Vec<String> {
-        let Some(own) = &controller.reconfiguration else { return Vec::new() };
-        let gone = own.cases.iter().map(|case| format!("gone_{}", self.actuators[case.actuator]));
-        gone.chain(own.fallback.map(|_| "fall_back".to_owned())).collect()
-    }
-
-    /// The fields of the estimates, in order: states, faults, losses, integrals.
-    pub(super) fn estimates(&self, controller: &Controller) -> Vec<String> {
-        let states = self.states.iter().map(|field| format!("x_hat_{field}"));
-        let faults = self.faults.iter().map(|field| format!("f_hat_{field}"));
-        let losses = controller.losses.iter();
-        let losses = losses.map(|loss| format!("E_hat_{}", self.faults[loss.fault]));
-        let integrals = self.integrals.iter().map(|field| format!("x_i_{field}"));
-        states.chain(faults).chain(losses).chain(integrals).collect()
-    }
 }
 
 /// One line on each signal: name, unit and description.
@@ -132,9 +86,6 @@ pub(super) fn summary(
     lines
 }
 
-/// The longest line of a paragraph.
-const WIDTH: usize = 92;
-
 /// Adds a title and paragraphs, broken into lines; nothing without paragraphs.
 fn section(lines: &mut Vec<String>, title: &str, paragraphs: &[String]) {
     if paragraphs.is_empty() {
@@ -144,18 +95,6 @@ fn section(lines: &mut Vec<String>, title: &str, paragraphs: &[String]) {
     for paragraph in paragraphs {
         lines.extend(filled(paragraph));
     }
-}
-
-/// Breaks a paragraph into lines.
-pub(super) fn filled(paragraph: &str) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for word in paragraph.split(' ') {
-        match lines.last_mut() {
-            Some(line) if line.len() + word.len() < WIDTH => line.extend([" ", word]),
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
 }
 
 fn usage(controller: &Controller, vocabulary: &Vocabulary) -> String {
@@ -388,53 +327,4 @@ fn precision(request: &Request<'_>, vocabulary: &Vocabulary) -> [String; 1] {
              of the FMU of the same design."
         ),
     }]
-}
-
-/// Columns of equal width.
-pub(super) fn aligned<const N: usize>(rows: &[[String; N]]) -> Vec<String> {
-    let width =
-        |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<_> = (0..N).map(width).collect();
-    let line = |row: &[String; N]| {
-        let cells = row.iter().zip(&widths).map(|(cell, width)| format!("{cell:width$}"));
-        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
-    };
-    rows.iter().map(line).collect()
-}
-
-/// The text without line breaks.
-pub(super) fn one_line(text: &str) -> String {
-    text.replace(|sign: char| sign.is_control(), " ")
-}
-
-/// Replaces characters beyond ASCII, and what ends a comment.
-pub(super) fn ascii(text: &str) -> String {
-    let mut plain = String::new();
-    for sign in text.chars() {
-        match sign {
-            '\\' => plain.push('/'),
-            ' '..='~' => plain.push(sign),
-            _ => plain
-                .extend(sign.escape_unicode().map(|sign| if sign == '\\' { '&' } else { sign })),
-        }
-    }
-    for (mark, apart) in
-        [("*/", "* /"), ("/*", "/ *"), ("??", "? ?"), ("//", "/ /"), ("```", "` ` `")]
-    {
-        while plain.contains(mark) {
-            plain = plain.replace(mark, apart);
-        }
-    }
-    plain
-}
-
-#[cfg(test)]
-mod tests {
-    use super::ascii;
-
-    #[test]
-    fn no_text_ends_a_comment() {
-        assert_eq!(ascii("a */ b /* // ??/ \\"), "a * / b / * / / ? ?/ /");
-        assert_eq!(ascii("\u{b0}C"), "&u{b0}C");
-    }
 }

@@ -1,10 +1,5 @@
 //! The vectors and matrices of the recursion.
 
-use nalgebra::DMatrix;
-
-use super::controller::Controller;
-use super::detection;
-
 /// A vector of the recursion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Vector {
@@ -111,44 +106,6 @@ impl Matrix {
         Self::ResidualDu,
         Self::ResidualDy,
     ];
-
-    /// The matrix of a controller, if it has it.
-    pub(super) fn of(self, controller: &Controller) -> Option<&DMatrix<f64>> {
-        Some(match self {
-            Self::A => &controller.a,
-            Self::B => &controller.b,
-            Self::C => &controller.c,
-            Self::D => return controller.d.as_ref(),
-            Self::FA => &controller.f_a,
-            Self::AF => &controller.a_f,
-            Self::KX => &controller.k_x,
-            Self::KF => &controller.k_f,
-            Self::LX => &controller.l_x,
-            Self::LF => &controller.l_f,
-            Self::PF => return controller.p_f.as_ref(),
-            Self::H => return controller.h.as_ref(),
-            Self::KI => return controller.k_i.as_ref(),
-            Self::FI => return controller.f_i.as_ref(),
-            Self::LW => return controller.l_w.as_ref(),
-            Self::NR => return controller.n_r.as_ref(),
-            Self::ResidualA
-            | Self::ResidualBu
-            | Self::ResidualBy
-            | Self::ResidualC
-            | Self::ResidualDu
-            | Self::ResidualDy => {
-                let own = controller.detection.as_ref()?;
-                match self {
-                    Self::ResidualA => &own.a,
-                    Self::ResidualBu => &own.b_u,
-                    Self::ResidualBy => &own.b_y,
-                    Self::ResidualC => &own.c,
-                    Self::ResidualDu => &own.d_u,
-                    _ => &own.d_y,
-                }
-            }
-        })
-    }
 
     /// The name in the design file.
     pub(super) fn name(self) -> &'static str {
@@ -293,23 +250,6 @@ impl Kind {
         Self::Reference,
         Self::Integral,
     ];
-
-    pub(super) fn count(self, controller: &Controller) -> usize {
-        match self {
-            Self::State => controller.states.len(),
-            Self::Fault => controller.faults.len(),
-            Self::Actuator => controller.actuators.len(),
-            Self::Measurement => controller.measurements.len(),
-            Self::Reference => controller.references.len(),
-            Self::Integral => controller.h.as_ref().map_or(0, DMatrix::nrows),
-            Self::Point => controller.schedule.as_ref().map_or(0, |own| own.points.len()),
-            Self::GainSet => controller.reconfiguration.as_ref().map_or(0, |own| own.sets.len()),
-            Self::Case => controller.reconfiguration.as_ref().map_or(0, |own| own.cases.len()),
-            Self::ResidualState | Self::Residual | Self::Test | Self::Suspect => {
-                detection::count(self, controller)
-            }
-        }
-    }
 
     /// The kinds that are no signals.
     pub(super) const OTHERS: [Self; 7] = [

@@ -2,10 +2,11 @@
 
 use nalgebra::DMatrix;
 
-use super::controller::{Controller, Signal};
+use super::constants::Constants;
+use super::controller::Controller;
 use super::detection::{self, Detection};
+use super::parts::Signal;
 use super::recursion::{Operation, Recursion, Term};
-use super::schedule::operating_vectors;
 use super::symbols::{Kind, Matrix, Vector};
 
 /// The vectors that are kept from sample to sample.
@@ -53,33 +54,6 @@ pub(super) fn locals(recursion: &Recursion) -> Vec<Vector> {
         }
     }
     all
-}
-
-/// A constant: its name in the design file and its rows; one row for a vector.
-pub(super) struct Constants {
-    pub(super) name: &'static str,
-    pub(super) meaning: &'static str,
-    /// The signals of the rows and, of a matrix, of the columns.
-    pub(super) rows: Kind,
-    pub(super) columns: Option<Kind>,
-    /// What the rows of a matrix are repeated for: each point of a schedule, each set of gains.
-    pub(super) layers: Option<Kind>,
-    pub(super) values: Vec<Vec<f64>>,
-}
-
-impl Constants {
-    pub(super) fn count(&self) -> usize {
-        self.values.iter().map(Vec::len).sum()
-    }
-
-    pub(super) fn vector(
-        name: &'static str,
-        meaning: &'static str,
-        rows: Kind,
-        values: Vec<f64>,
-    ) -> Self {
-        Self { name, meaning, rows, columns: None, layers: None, values: vec![values] }
-    }
 }
 
 /// The limits of the commands: names and meaning, as deviations and as values, lower and upper.
@@ -225,4 +199,12 @@ fn matrices(recursion: &Recursion) -> Vec<(Matrix, Vector, Kind)> {
         .filter_map(|matrix| all.iter().find(|own| own.0 == *matrix))
         .copied()
         .collect()
+}
+
+/// The parts of the operating point, with the name of their tables in a schedule.
+pub(super) fn operating_vectors(controller: &Controller) -> Vec<(Vector, &'static str)> {
+    let mut all =
+        vec![(Vector::XOp, "x_op_at"), (Vector::UOp, "u_op_at"), (Vector::YOp, "y_op_at")];
+    all.extend((!controller.references.is_empty()).then_some((Vector::ROp, "r_op_at")));
+    all
 }

@@ -1,8 +1,8 @@
 //! The place of the scheduling variable in its grid, and the numbers between two points of it.
 
 use super::Source;
-use crate::code::schedule::operating_vectors;
 use crate::code::symbols::Kind;
+use crate::code::tables::operating_vectors;
 
 impl Source<'_> {
     /// The variables of a sample that a schedule needs.

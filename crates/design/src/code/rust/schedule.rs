@@ -1,8 +1,8 @@
 //! The place of the scheduling variable in its grid, and the numbers between two points of it.
 
 use super::Source;
-use crate::code::schedule::operating_vectors;
 use crate::code::symbols::Matrix;
+use crate::code::tables::operating_vectors;
 use crate::code::tables::scheduled;
 
 /// The names of a matrix at the points before and after the scheduling variable.

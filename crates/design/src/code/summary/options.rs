@@ -1,9 +1,11 @@
 //! Sections on what only some controllers have: other gains, a detection, a schedule.
 
-use super::{Fields, Vocabulary, one_line};
+use super::Vocabulary;
 use crate::code::Precision;
 use crate::code::controller::Controller;
 use crate::code::detection::Method;
+use crate::code::fields::Fields;
+use crate::code::text::one_line;
 
 /// The gains without some actuators, and the meaning of the switches.
 pub(super) fn reconfiguration(controller: &Controller, fields: &Fields) -> Vec<String> {

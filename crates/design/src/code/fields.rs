@@ -1,0 +1,53 @@
+//! The identifiers of the signals in the code.
+
+use super::controller::Controller;
+use super::names::fields;
+use super::parts::Signal;
+
+/// The identifiers, by kind of signal.
+pub(super) struct Fields {
+    pub(super) states: Vec<String>,
+    pub(super) faults: Vec<String>,
+    pub(super) actuators: Vec<String>,
+    pub(super) measurements: Vec<String>,
+    pub(super) references: Vec<String>,
+    /// The scheduling variable, if it is an input of its own.
+    pub(super) schedule: Vec<String>,
+    /// The integrals, named like their references.
+    pub(super) integrals: Vec<String>,
+}
+
+impl Fields {
+    pub(super) fn of(controller: &Controller) -> Self {
+        let own = |signals: &[Signal]| fields(signals.iter().map(|signal| signal.name.as_str()));
+        Self {
+            states: own(&controller.states),
+            faults: own(&controller.faults),
+            actuators: own(&controller.actuators),
+            measurements: own(&controller.measurements),
+            integrals: match controller.h {
+                Some(_) => own(&controller.references),
+                None => Vec::new(),
+            },
+            references: own(&controller.references),
+            schedule: own(controller.schedule_inputs()),
+        }
+    }
+
+    /// The fields of what is known about the actuators: those that may be gone, and the fall-back.
+    pub(super) fn switches(&self, controller: &Controller) -> Vec<String> {
+        let Some(own) = &controller.reconfiguration else { return Vec::new() };
+        let gone = own.cases.iter().map(|case| format!("gone_{}", self.actuators[case.actuator]));
+        gone.chain(own.fallback.map(|_| "fall_back".to_owned())).collect()
+    }
+
+    /// The fields of the estimates, in order: states, faults, losses, integrals.
+    pub(super) fn estimates(&self, controller: &Controller) -> Vec<String> {
+        let states = self.states.iter().map(|field| format!("x_hat_{field}"));
+        let faults = self.faults.iter().map(|field| format!("f_hat_{field}"));
+        let losses = controller.losses.iter();
+        let losses = losses.map(|loss| format!("E_hat_{}", self.faults[loss.fault]));
+        let integrals = self.integrals.iter().map(|field| format!("x_i_{field}"));
+        states.chain(faults).chain(losses).chain(integrals).collect()
+    }
+}

@@ -1,0 +1,93 @@
+//! What the parts of a controller share: signals, matrices, the numbers of samples.
+
+use aso_controller::design::{Actuator, Fault};
+use nalgebra::DMatrix;
+
+/// A state, an actuator, a measurement, a reference or a fault, as the code describes it.
+pub(super) struct Signal {
+    pub(super) name: String,
+    pub(super) unit: Option<String>,
+    pub(super) description: String,
+    /// The value at the operating point.
+    pub(super) operating: f64,
+    pub(super) limits: Option<[f64; 2]>,
+}
+
+impl Signal {
+    pub(super) fn new(
+        name: String,
+        unit: Option<String>,
+        description: String,
+        operating: f64,
+    ) -> Self {
+        Self { name, unit, description, operating, limits: None }
+    }
+}
+
+impl From<aso_controller::design::Signal> for Signal {
+    fn from(signal: aso_controller::design::Signal) -> Self {
+        let aso_controller::design::Signal { name, unit, description, operating } = signal;
+        Self::new(name, unit, description, operating.unwrap_or_default())
+    }
+}
+
+impl From<Actuator> for Signal {
+    fn from(actuator: Actuator) -> Self {
+        let Actuator { name, unit, description, operating, limits } = actuator;
+        Self { limits, ..Self::new(name, unit, description, operating.unwrap_or_default()) }
+    }
+}
+
+impl From<Fault> for Signal {
+    fn from(fault: Fault) -> Self {
+        Self::new(fault.name, fault.unit, fault.description, 0.0)
+    }
+}
+
+/// A fault that is a loss of effectiveness, with its position and that of its actuator.
+pub(super) struct Loss {
+    pub(super) fault: usize,
+    pub(super) actuator: usize,
+    /// `u_e`.
+    pub(super) least_command: f64,
+}
+
+/// A matrix of the design file for linear algebra.
+pub(super) fn dense(matrix: &aso_controller::Matrix) -> DMatrix<f64> {
+    DMatrix::from_row_slice(matrix.rows, matrix.columns, &matrix.values)
+}
+
+/// The number of the first sample at which the FMU compensates, from a start at time 0; `None` if it
+/// does not fit into 32 bits.
+pub(super) fn first_at(t_on: f64, period: f64) -> Option<u32> {
+    let is_on = |sample: f64| {
+        let time = sample * period;
+        time >= t_on - 8.0 * f64::EPSILON * time
+    };
+    let mut sample = ((t_on / period).floor() - 2.0).max(0.0);
+    while !is_on(sample) && sample <= f64::from(u32::MAX) {
+        sample += 1.0;
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number")]
+    (sample <= f64::from(u32::MAX)).then_some(sample as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::first_at;
+
+    #[test]
+    fn the_first_compensated_sample_is_the_first_one_at_t_on() {
+        for (t_on, period, expected) in [
+            (0.0, 0.1, 0),
+            (-3.0, 0.1, 0),
+            (0.3, 0.1, 3), // 3 * 0.1 is above 0.3, 0.3 / 0.1 below 3
+            (0.31, 0.1, 4),
+            (5.0, 1e-3, 5000),
+            (0.7, 0.1, 7),
+        ] {
+            assert_eq!(first_at(t_on, period), Some(expected), "{t_on} {period}");
+        }
+        assert_eq!(first_at(1e9, 1e-3), None);
+    }
+}

@@ -1,0 +1,65 @@
+//! Lines of comments: paragraphs, columns, ASCII.
+
+/// The longest line of a paragraph.
+const WIDTH: usize = 92;
+
+/// Breaks a paragraph into lines.
+pub(super) fn filled(paragraph: &str) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in paragraph.split(' ') {
+        match lines.last_mut() {
+            Some(line) if line.len() + word.len() < WIDTH => line.extend([" ", word]),
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+/// Columns of equal width.
+pub(super) fn aligned<const N: usize>(rows: &[[String; N]]) -> Vec<String> {
+    let width =
+        |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<_> = (0..N).map(width).collect();
+    let line = |row: &[String; N]| {
+        let cells = row.iter().zip(&widths).map(|(cell, width)| format!("{cell:width$}"));
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    rows.iter().map(line).collect()
+}
+
+/// The text without line breaks.
+pub(super) fn one_line(text: &str) -> String {
+    text.replace(|sign: char| sign.is_control(), " ")
+}
+
+/// Replaces characters beyond ASCII, and what ends a comment.
+pub(super) fn ascii(text: &str) -> String {
+    let mut plain = String::new();
+    for sign in text.chars() {
+        match sign {
+            '\\' => plain.push('/'),
+            ' '..='~' => plain.push(sign),
+            _ => plain
+                .extend(sign.escape_unicode().map(|sign| if sign == '\\' { '&' } else { sign })),
+        }
+    }
+    for (mark, apart) in
+        [("*/", "* /"), ("/*", "/ *"), ("??", "? ?"), ("//", "/ /"), ("```", "` ` `")]
+    {
+        while plain.contains(mark) {
+            plain = plain.replace(mark, apart);
+        }
+    }
+    plain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ascii;
+
+    #[test]
+    fn no_text_ends_a_comment() {
+        assert_eq!(ascii("a */ b /* // ??/ \\"), "a * / b / * / / ? ?/ /");
+        assert_eq!(ascii("\u{b0}C"), "&u{b0}C");
+    }
+}
