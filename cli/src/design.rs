@@ -12,7 +12,7 @@ use std::time::Duration;
 use crate::models;
 use crate::outputs::{Outputs, check_own};
 use anyhow::Context;
-use design::{Design, Language, Precision};
+use design::{Design, Language, Precision, RUNTIME};
 use files::check_distinct;
 use progress::Bar;
 
@@ -57,7 +57,7 @@ pub(crate) struct Options {
     json: bool,
     /// Also write the controller as C99
     ///
-    /// Needs a sampled design; the files are NAME.h and NAME.c in this folder.
+    /// Needs a sampled design; the files are NAME.h, NAME.c and aso_controller.h in this folder.
     #[arg(long, value_name = "FOLDER", group = "code", help_heading = "Source code")]
     c_code: Option<PathBuf>,
     /// Also write it as a Rust crate without std
@@ -113,7 +113,9 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     }
     check_distinct(&inputs(options, from.as_deref(), design.model.as_deref()), &outputs)?;
     if !options.force {
-        outputs.iter().try_for_each(|(_, path)| check_own(path, &design.identity))?;
+        for (_, path) in outputs.iter().filter(|(_, path)| !is_own_runtime(path)) {
+            check_own(path, &design.identity)?;
+        }
     }
     let fmu = from.map(|from| design.fmu(&from)).transpose()?;
     let page = design.page();
@@ -157,6 +159,12 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
 struct CodeFiles {
     files: Vec<(&'static str, PathBuf, String)>,
     warnings: Vec<String>,
+}
+
+/// Whether there is a file of ours that is the same for each design, and so names none of them.
+fn is_own_runtime(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name == RUNTIME)
+        && fs::read_to_string(path).is_ok_and(|text| text.contains(RUNTIME))
 }
 
 fn code(options: &Options, design: &Design) -> anyhow::Result<CodeFiles> {

@@ -214,7 +214,7 @@ class Controller:
         return os.fspath(path)
 
     def c_code(self, folder: PathLike, *, single: bool = False) -> list[str]:
-        """Write the controller of a sampled design as C99; return the paths: header and source.
+        """Write the controller of a sampled design as C99; return the paths: header, source, runtime.
 
         Args:
             folder: where to write; it is made if it is missing, and files of the same names are replaced.

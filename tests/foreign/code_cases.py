@@ -164,7 +164,7 @@ class Built:
         self.done = aso_ftc("design", plant, *wanted, "--certificate-time", "0", *options)
         assert self.done.returncode in (0, 1), self.done.stderr
         self.design = tomllib.loads((folder / "design.toml").read_text(encoding="utf-8"))
-        [header] = (folder / "c").glob("*.h")
+        [header] = (path for path in (folder / "c").glob("*.h") if path.name != "aso_controller.h")
         self.name, self.header = header.stem, header.read_text(encoding="utf-8")
 
     def compiled(self, *options, compiler="gcc"):

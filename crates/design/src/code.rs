@@ -24,6 +24,7 @@ mod text;
 
 use std::path::PathBuf;
 
+pub use c::RUNTIME;
 use controller::Controller;
 use fields::Fields;
 use recursion::Recursion;

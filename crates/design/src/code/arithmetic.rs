@@ -165,7 +165,8 @@ impl Memory {
             counters += cases + 2;
             flags += Kind::Actuator.count(controller) + 2 * cases;
         }
-        let mut stack: usize = locals(recursion).into_iter().map(count).sum();
+        let losses = controller.losses.len();
+        let mut stack: usize = losses + locals(recursion).into_iter().map(count).sum::<usize>();
         if controller.schedule.is_some() {
             let operating = operating_vectors(controller);
             stack += operating.into_iter().map(|(vector, _)| count(vector)).sum::<usize>() + 2;
@@ -176,11 +177,13 @@ impl Memory {
         let [actuators, faults] = [Kind::Actuator, Kind::Fault].map(|kind| kind.count(controller));
         let of_cases = controller.reconfiguration.as_ref();
         let of_cases = of_cases.map_or(0, |cases| cases.integer_bytes(actuators, faults));
+        // Of each loss its fault, its actuator and u_e^2.
+        let of_losses = losses * (8 + size);
         let tables: usize = tables(controller, recursion).iter().map(Constants::count).sum();
         Self {
             state: (stored * size + 4 * counters + flags).next_multiple_of(size),
             stack: stack * size,
-            constants: tables * size + integers + of_cases,
+            constants: tables * size + integers + of_cases + of_losses,
         }
     }
 }

@@ -1,16 +1,15 @@
-//! The controller in C99: a header and a source file.
+//! The controller in C99: a header and a source file with the tables of the design, and `aso_controller.h`, which is
+//! the same for each design and takes the samples.
 
-mod detection;
 mod header;
-mod reconfiguration;
-mod sample;
-mod schedule;
+mod integers;
+mod source;
+mod switches;
 
-pub(super) use detection::reactions;
+pub(super) use integers::reactions;
 
 use std::path::PathBuf;
 
-use super::arithmetic::Memory;
 use super::constants::Constants;
 use super::controller::Controller;
 use super::fields::Fields;
@@ -18,11 +17,14 @@ use super::recursion::Recursion;
 use super::rounding::RoundingBound;
 use super::summary::Vocabulary;
 use super::symbols::Kind;
-use super::tables::{has_constant_matrix, starts, tables};
 use super::{Precision, Request};
 
 /// The longest line of a table.
 const WIDTH: usize = 100;
+/// The file of C code that is the same for each design.
+pub const RUNTIME: &str = "aso_controller.h";
+/// Its text, which takes the samples.
+const RUNTIME_TEXT: &str = include_str!("../../runtime/aso_controller.h");
 
 /// What every function of this file renders from.
 struct Source<'a> {
@@ -51,6 +53,7 @@ pub(super) fn files(
     vec![
         (format!("{name}.h").into(), source.header(bound)),
         (format!("{name}.c").into(), source.implementation()),
+        (RUNTIME.into(), RUNTIME_TEXT.to_owned()),
     ]
 }
 
@@ -111,39 +114,6 @@ impl Source<'_> {
         )
     }
 
-    fn implementation(&self) -> String {
-        let Self { request, controller, recursion, .. } = self;
-        let name = &request.prefix;
-        let Memory { constants, .. } = Memory::of(controller, recursion, request.precision);
-        let mut lines = vec![
-            format!(
-                "/* Written by {}; {name}.h describes it. */",
-                super::text::ascii(request.identity)
-            ),
-            format!("#include \"{name}.h\""),
-            String::new(),
-            "#include <float.h>".to_owned(),
-            String::new(),
-            "#if defined(__FAST_MATH__)".to_owned(),
-            "#error \"-ffast-math removes the checks of NaN and changes the results\"".to_owned(),
-            "#endif".to_owned(),
-            "#if defined(__clang__) || !defined(__GNUC__)".to_owned(),
-            "#pragma STDC FP_CONTRACT OFF".to_owned(),
-            "#endif".to_owned(),
-            String::new(),
-            format!("/* Constants: {constants} bytes. */"),
-        ];
-        for table in tables(controller, recursion) {
-            self.table(&mut lines, &table);
-        }
-        self.detection_tables(&mut lines);
-        self.reconfiguration_tables(&mut lines);
-        self.helpers(&mut lines);
-        self.initialisation(&mut lines);
-        self.step(&mut lines);
-        finished(&lines)
-    }
-
     fn table(&self, lines: &mut Vec<String>, table: &Constants) {
         let Constants { name, meaning, rows, columns, layers, values } = table;
         if !meaning.is_empty() {
@@ -191,169 +161,6 @@ impl Source<'_> {
             }
         }
         end_list(lines);
-    }
-
-    fn helpers(&self, lines: &mut Vec<String>) {
-        let real = self.real;
-        let most = self.literal(f64::INFINITY);
-        let (zero, one) = (self.literal(0.0), self.literal(1.0));
-        lines.push(format!(
-            "
-/* False for NaN, too. */
-static bool is_finite({real} value)
-{{
-    return (value >= -{most}) && (value <= {most});
-}}
-
-/* Keeps a value that is a number; returns the flag for one that is none. */
-static uint32_t take({real} *kept, {real} value, uint32_t flag)
-{{
-    uint32_t status = flag;
-
-    if (is_finite(value))
-    {{
-        *kept = value;
-        status = 0U;
-    }}
-    return status;
-}}"
-        ));
-        if has_constant_matrix(self.controller, self.recursion) {
-            lines.push(format!(
-                "
-/* Adds a row times a vector to a sum, one product after the other. */
-static {real} accumulate({real} start, const {real} row[], const {real} vector[], uint32_t count)
-{{
-    {real} sum = start;
-    uint32_t k;
-
-    for (k = 0U; k < count; k++)
-    {{
-        sum = sum + (row[k] * vector[k]);
-    }}
-    return sum;
-}}
-
-/* A row times a vector. -0.0 + x has the bits of x. */
-static {real} product(const {real} row[], const {real} vector[], uint32_t count)
-{{
-    return accumulate(-{zero}, row, vector, count);
-}}"
-            ));
-        }
-        self.schedule_helpers(lines);
-        if self.controller.sliding_mode.is_some() {
-            lines.push(format!(
-                "
-/* rho s / (|s| + delta): largest is rho, width is delta. */
-static {real} injection({real} s, {real} largest, {real} width)
-{{
-    const {real} size = (s < {zero}) ? (-s) : s;
-
-    return (largest * s) / (size + width);
-}}"
-            ));
-        }
-        self.detection_helpers(lines);
-        self.reconfiguration_helpers(lines);
-        if !self.controller.losses.is_empty() {
-            lines.push(format!(
-                "
-/* E_hat = -u f_hat / (u^2 + u_e^2), the largest number where it is beyond the range. */
-static {real} lost_effectiveness({real} u, {real} f_hat, {real} squared_least_command)
-{{
-    const {real} scale = {one} / ((u * u) + squared_least_command);
-    {real} loss = (-(u * scale)) * f_hat;
-
-    if (loss > {most})
-    {{
-        loss = {most};
-    }}
-    else if (loss < -{most})
-    {{
-        loss = -{most};
-    }}
-    else
-    {{
-        /* within the range */
-    }}
-    return loss;
-}}"
-            ));
-        }
-    }
-
-    fn initialisation(&self, lines: &mut Vec<String>) {
-        let Self { request, controller, real, .. } = self;
-        let name = &request.prefix;
-        let (n, q) = (self.count(Kind::State), self.count(Kind::Fault));
-        let [x_op, u, y, r] = starts(controller).map(|(name, _)| name);
-        let x = match controller.detection {
-            Some(_) => format!("\n    {real} x[{n}];"),
-            None => String::new(),
-        };
-        let zeros = vec![self.literal(0.0); controller.faults.len()];
-        let zeros = wrapped(zeros.into_iter(), "        ").join("\n");
-        let zeros = zeros.trim_end_matches(',');
-        lines.push(format!(
-            "
-void {name}_init({name}_State *state)
-{{
-    static const {real} no_faults[{q}] =
-    {{
-{zeros}
-    }};
-
-    {name}_init_at(state, {x_op}, no_faults);
-}}
-
-void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
-    const {real} f_hat_0[{q}])
-{{
-    uint32_t i;{x}
-"
-        ));
-        let filtered = match controller.filter {
-            Some(_) => format!("        state->y_f[i] = {y}[i];\n"),
-            None => String::new(),
-        };
-        let before = match controller.d {
-            Some(_) => format!("        state->u_before[i] = {};\n", self.literal(0.0)),
-            None => String::new(),
-        };
-        for (kind, body) in [
-            (Kind::State, "        state->x_hat[i] = x_hat_0[i];".to_owned()),
-            (Kind::Fault, "        state->f_hat[i] = f_hat_0[i];".to_owned()),
-            (Kind::Measurement, format!("{filtered}        state->y[i] = {y}[i];")),
-            (Kind::Actuator, format!("{before}        state->u[i] = {u}[i];")),
-            (Kind::Reference, format!("        state->r[i] = {r}[i];")),
-            (Kind::Integral, format!("        state->x_i[i] = {};", self.literal(0.0))),
-        ] {
-            if kind.count(controller) > 0 {
-                self.loop_over(lines, 1, kind, &[&body]);
-            }
-        }
-        if let [input] = controller.schedule_inputs() {
-            lines.push(format!("    state->theta = {};", self.literal(input.operating)));
-        }
-        if controller.has_counter() {
-            lines.push("    state->sample = 0U;".to_owned());
-        }
-        if controller.filter.is_some() {
-            lines.push("    state->started = false;".to_owned());
-        }
-        self.detection_start(lines, x_op);
-        self.reconfiguration_start(lines);
-        lines.push("}".to_owned());
-    }
-
-    /// A loop over the signals of a kind; `body` has its indent.
-    fn loop_over(&self, lines: &mut Vec<String>, depth: usize, kind: Kind, body: &[&str]) {
-        let indent = "    ".repeat(depth);
-        lines.push(format!("{indent}for (i = 0U; i < {}; i++)", self.count(kind)));
-        lines.push(format!("{indent}{{"));
-        lines.extend(body.iter().map(|line| (*line).to_owned()));
-        lines.push(format!("{indent}}}"));
     }
 }
 

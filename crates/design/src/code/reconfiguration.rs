@@ -139,7 +139,7 @@ impl Reconfiguration {
     /// The bytes of the constants that are no real numbers.
     pub(super) fn integer_bytes(&self, actuators: usize, faults: usize) -> usize {
         let singles = if self.fallback.is_none() { 4 * actuators } else { 0 };
-        let of_cases = self.cases.len() * (8 + faults);
+        let of_cases = self.cases.len() * (12 + faults);
         self.sets.len() * actuators + if self.cases.is_empty() { 0 } else { singles + of_cases }
     }
 

@@ -1,6 +1,7 @@
 //! The header: the description, the types, the functions.
 
 use super::{Source, finished};
+use crate::code::detection::Method;
 use crate::code::rounding::RoundingBound;
 use crate::code::summary::summary;
 use crate::code::symbols::{Kind, Vector};
@@ -86,9 +87,7 @@ impl Source<'_> {
     /// Numbers of signals, the sample time, bits of the status.
     fn macros(&self, lines: &mut Vec<String>) {
         let Self { controller, capital, .. } = self;
-        let kinds = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Integral);
-        let kinds = kinds.chain(Kind::OTHERS);
-        for kind in kinds.filter(|kind| kind.count(controller) > 0) {
+        for kind in self.kinds() {
             lines.push(format!("#define {} {}U", self.count(kind), kind.count(controller)));
         }
         lines.extend([
@@ -127,5 +126,85 @@ impl Source<'_> {
         lines.extend(["typedef struct".to_owned(), "{".to_owned()]);
         lines.extend(fields.iter().map(|field| format!("    {} {field};", self.real)));
         lines.extend([format!("}} {}_{what};", self.request.prefix), String::new()]);
+    }
+
+    /// The structure with decision, residuals and statistics of a sample.
+    pub(super) fn detection_structure(&self, lines: &mut Vec<String>) {
+        if self.controller.detection.is_none() {
+            return;
+        }
+        let (name, real) = (&self.request.prefix, self.real);
+        let (residuals, tests) = (self.count(Kind::Residual), self.count(Kind::Test));
+        lines.push(format!(
+            "typedef struct
+{{
+    bool detected;
+    int32_t isolated;
+    {real} t_detected;
+    {real} t_onset;
+    {real} residual[{residuals}];
+    {real} statistic[{tests}];
+}} {name}_Detection;
+"
+        ));
+    }
+
+    /// The fields of an instance: those of real numbers, or the counters and flags.
+    pub(super) fn detection_state(&self, lines: &mut Vec<String>, of_reals: bool) {
+        let Some(own) = &self.controller.detection else { return };
+        let (real, tests) = (self.real, self.count(Kind::Test));
+        lines.extend(match (of_reals, own.method) {
+            (true, Method::Cusum) => vec![
+                format!("    {real} statistic[{tests}];"),
+                format!("    {real} sums[{tests}][2];"),
+            ],
+            (true, Method::Window) => vec![
+                format!("    {real} statistic[{tests}];"),
+                format!("    {real} sums[{}];", self.count(Kind::Residual)),
+            ],
+            (false, method) => {
+                let since = match method {
+                    Method::Cusum => vec![format!("    uint32_t since[{tests}][2];")],
+                    Method::Window => vec![
+                        format!("    uint32_t since[{tests}];"),
+                        format!("    uint32_t taken[{tests}];"),
+                    ],
+                };
+                let rest = ["uint32_t detected_at;", "uint32_t onset;", "int32_t isolated;"]
+                    .map(|field| format!("    {field}"));
+                let flags =
+                    vec![format!("    bool alarmed[{tests}];"), "    bool detected;".to_owned()];
+                since.into_iter().chain(rest).chain(flags).collect()
+            }
+        });
+    }
+
+    /// The structure of what is known about the actuators in a sample.
+    pub(super) fn actuators_structure(&self, lines: &mut Vec<String>) {
+        if self.controller.reconfiguration.is_none() {
+            return;
+        }
+        lines.push("typedef struct\n{".to_owned());
+        let fields = self.fields.switches(self.controller);
+        lines.extend(fields.iter().map(|field| format!("    bool {field};")));
+        lines.push(format!("}} {}_Actuators;\n", self.request.prefix));
+    }
+
+    /// The fields of an instance: those of real numbers, or the counters and flags.
+    pub(super) fn reconfiguration_state(&self, lines: &mut Vec<String>, of_reals: bool) {
+        let Some(own) = &self.controller.reconfiguration else { return };
+        let (real, cases, actuators) =
+            (self.real, self.count(Kind::Case), self.count(Kind::Actuator));
+        let has_cases = !own.cases.is_empty();
+        if of_reals {
+            lines.extend(has_cases.then(|| format!("    {real} lost[{cases}];")));
+            return;
+        }
+        lines.extend(has_cases.then(|| format!("    uint32_t above_since[{cases}];")));
+        lines.extend(["    uint32_t set;", "    int32_t reconfiguration;"].map(str::to_owned));
+        lines.push(format!("    bool gone[{actuators}];"));
+        if has_cases {
+            lines.extend(["above", "decided"].map(|flag| format!("    bool {flag}[{cases}];")));
+        }
     }
 }
