@@ -12,7 +12,7 @@ use std::time::Duration;
 use crate::models;
 use crate::outputs::{Outputs, check_own};
 use anyhow::Context;
-use design::{Design, Language, Precision, RUNTIME};
+use design::{Design, Language, Precision};
 use files::check_distinct;
 use progress::Bar;
 
@@ -113,7 +113,9 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     }
     check_distinct(&inputs(options, from.as_deref(), design.model.as_deref()), &outputs)?;
     if !options.force {
-        for (_, path) in outputs.iter().filter(|(_, path)| !is_own_runtime(path)) {
+        for (_, path) in
+            outputs.iter().filter(|(_, path)| !code.has_runtime(path, &design.identity))
+        {
             check_own(path, &design.identity)?;
         }
     }
@@ -161,10 +163,16 @@ struct CodeFiles {
     warnings: Vec<String>,
 }
 
-/// Whether there is a file of ours that is the same for each design, and so names none of them.
-fn is_own_runtime(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name == RUNTIME)
-        && fs::read_to_string(path).is_ok_and(|text| text.contains(RUNTIME))
+impl CodeFiles {
+    /// Whether at `path` is a file that is the same for each design, and so does not name the `identity` of one: its first
+    /// line says what it is.
+    fn has_runtime(&self, path: &Path, identity: &str) -> bool {
+        let text = self.files.iter().find(|(_, own, _)| own == path).map(|(.., text)| text);
+        let start =
+            text.filter(|text| !text.contains(identity)).and_then(|text| text.lines().next());
+        start
+            .is_some_and(|start| fs::read_to_string(path).is_ok_and(|text| text.starts_with(start)))
+    }
 }
 
 fn code(options: &Options, design: &Design) -> anyhow::Result<CodeFiles> {

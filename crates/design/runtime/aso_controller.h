@@ -503,7 +503,6 @@ static void clear_detection(aso_State *state)
 #if ASO_HAS_WINDOWS
     clear(state->sums, ASO_RESIDUALS);
 #endif
-    state->detected = false;
     state->isolated = 0;
     state->detected_at = 0U;
     state->onset = 0U;
@@ -635,15 +634,15 @@ static void detect(aso_State *state, bool detection_reset)
             if (take_residuals(state, i, &onset) && (state->statistic[i] > threshold[i]))
             {
                 state->alarmed[i] = true;
-                if (!state->detected)
+                if (state->isolated == 0)
                 {
-                    state->detected = true;
+                    state->isolated = -1;
                     state->detected_at = state->sample;
                     state->onset = onset;
                 }
             }
         }
-        if (state->detected)
+        if (state->isolated != 0)
         {
             state->isolated = isolate(state->alarmed);
         }
@@ -653,7 +652,7 @@ static void detect(aso_State *state, bool detection_reset)
 /* The time in s of a sample that the decision has; -1 before an alarm. */
 static aso_real decision_time(const aso_State *state, uint32_t sample)
 {
-    return state->detected ? ((aso_real)sample * ASO_SAMPLE_TIME) : (-ASO_ONE);
+    return (state->isolated != 0) ? ((aso_real)sample * ASO_SAMPLE_TIME) : (-ASO_ONE);
 }
 
 /* The start of the filter of the residuals from that of the observer. */

@@ -1,8 +1,8 @@
 //! The sampled controller as source code: C99, or a Rust crate without the standard library.
 //!
-//! The design file, which the controller FMU reads, becomes a [`Controller`]; its [`Recursion`] states
-//! each operation once. Both renderers, the count of operations and the bound of rounding errors follow
-//! from it.
+//! The design file, which the controller FMU reads, becomes a [`Controller`]. Its equations stand in two files that are the
+//! same for each design: `aso_controller::sample`, which the Rust crate contains, and from which the count of operations
+//! and the bound of rounding errors follow, and `runtime/aso_controller.h`.
 
 mod arithmetic;
 mod c;
@@ -11,9 +11,9 @@ mod controller;
 mod detection;
 mod fields;
 mod names;
+mod numbers;
 mod parts;
 mod reconfiguration;
-mod recursion;
 mod rounding;
 mod rust;
 mod schedule;
@@ -24,10 +24,8 @@ mod text;
 
 use std::path::PathBuf;
 
-pub use c::RUNTIME;
 use controller::Controller;
 use fields::Fields;
-use recursion::Recursion;
 use rounding::RoundingBound;
 
 use crate::{Design, Error};
@@ -110,10 +108,9 @@ impl Design {
         let file = aso_controller::Design::parse(&self.file, "design.toml".to_owned());
         let controller = Controller::of(file.map_err(|error| Error::Invalid(error.to_string()))?)?;
         controller.check_range(precision)?;
-        let recursion = Recursion::of(&controller);
         let bound = match precision {
             Precision::Double => None,
-            Precision::Single => Some(RoundingBound::of(&controller, &recursion)),
+            Precision::Single => Some(RoundingBound::of(&controller)),
         };
         let stem = std::path::Path::new(&self.report.plant_file).file_stem().unwrap_or_default();
         let request = Request {
@@ -124,10 +121,9 @@ impl Design {
             delay_margin: self.report.robustness.as_ref().map(|found| found.delay_margin),
         };
         let fields = Fields::of(&controller);
-        let parts = (&controller, &recursion, &fields);
         let files = match language {
-            Language::C => c::files(&request, parts, bound.as_ref()),
-            Language::Rust => rust::files(&request, parts, bound.as_ref()),
+            Language::C => c::files(&request, &controller, &fields, bound.as_ref()),
+            Language::Rust => rust::files(&request, &controller, &fields, bound.as_ref()),
         };
         let warnings = bound.map(|bound| bound.warnings(&controller)).unwrap_or_default();
         Ok(Code { files, warnings })

@@ -31,7 +31,7 @@ use std::time::Duration;
 
 use files::{Source, Table};
 
-pub use code::{Code, Language, Precision, RUNTIME};
+pub use code::{Code, Language, Precision};
 pub use compare::compare;
 pub use controller_fmu::ControllerFmu;
 pub use error::Error;

@@ -1,14 +1,19 @@
 //! Operations per sample and bytes of a controller.
 
-use nalgebra::DMatrix;
+use std::cell::Cell;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use aso_controller::sample::detection::{Cumulative, Decision, Window};
+use aso_controller::sample::reconfiguration::Stuck;
+use aso_controller::sample::{self, Number};
 
 use super::Precision;
 use super::constants::Constants;
 use super::controller::Controller;
 use super::detection::{Detection, Method};
-use super::recursion::{Operation, Recursion, Statement, Term};
-use super::symbols::{Kind, Matrix, Vector};
-use super::tables::{locals, operating_vectors, stored, tables};
+use super::numbers::{Memory as Stored, Numbers, Vectors};
+use super::symbols::{Kind, Vector};
+use super::tables::{operating_vectors, stored, tables};
 
 /// The most operations of one sample: while compensating, with every command at its upper limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,118 +25,182 @@ pub(super) struct Arithmetic {
     pub(super) divisions: usize,
 }
 
+thread_local! {
+    static COUNT: Cell<Arithmetic> = const { Cell::new(Arithmetic::NONE) };
+}
+
+/// A number that counts what is done with it. It is finite, and neither below nor above another one.
+#[derive(Clone, Copy)]
+struct Counted;
+
+impl Counted {
+    fn count(add: impl Fn(&mut Arithmetic)) -> Self {
+        let mut count = COUNT.get();
+        add(&mut count);
+        COUNT.set(count);
+        Self
+    }
+}
+
+macro_rules! counted {
+    ($($operator:ident, $function:ident, $counter:ident;)*) => {
+        $(impl $operator for Counted {
+            type Output = Self;
+
+            fn $function(self, _: Self) -> Self {
+                Self::count(|count| count.$counter += 1)
+            }
+        })*
+    };
+}
+
+counted! {
+    Add, add, additions;
+    Sub, sub, additions;
+    Mul, mul, multiplications;
+    Div, div, divisions;
+}
+
+impl Neg for Counted {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        self
+    }
+}
+
+impl Number for Counted {
+    fn zero() -> Self {
+        Self
+    }
+
+    fn largest() -> Self {
+        Self
+    }
+
+    fn whole(_: u32) -> Self {
+        Self
+    }
+
+    fn is_finite(&self) -> bool {
+        Self::count(|count| count.comparisons += 2);
+        true
+    }
+
+    fn is_below(&self, _: &Self) -> bool {
+        Self::count(|count| count.comparisons += 1);
+        false
+    }
+
+    fn is_above(&self, _: &Self) -> bool {
+        Self::count(|count| count.comparisons += 1);
+        false
+    }
+}
+
 impl Arithmetic {
-    pub(super) fn of(controller: &Controller, recursion: &Recursion) -> Self {
-        let mut all = Self::default();
-        for statement in recursion.longest() {
-            all.add_statement(controller, statement);
+    const NONE: Self = Self { multiplications: 0, additions: 0, comparisons: 0, divisions: 0 };
+
+    pub(super) fn of(controller: &Controller) -> Self {
+        COUNT.set(Self::NONE);
+        take_inputs(controller);
+        take_sample(controller);
+        for _ in &controller.losses {
+            sample::lost_effectiveness(&Counted, &Counted, &Counted);
         }
-        let [n, q, p, m, t, integrals] = Kind::ALL.map(|kind| kind.count(controller));
-        let filtered = if controller.filter.is_some() { p } else { 0 };
-        all.add_schedule(controller, [n, p, m, t]);
-        // Finite or not: the inputs, the commands and estimates, the state for the next sample.
-        all.comparisons += 2 * (p + t + m + n + q + n + q + filtered + integrals);
-        if controller.is_limited() {
-            all.comparisons += 2 * m;
-        }
-        if controller.d.is_some() {
-            // Deviations of the commands for the next sample.
-            all.comparisons += 2 * m;
-        }
-        all.add_detection(controller);
-        if let Some(own) = &controller.reconfiguration {
-            // K_s times the commands of stuck actuators, the commands with that sum; the losses.
-            all.multiplications += m * own.most_gone();
-            all.additions += m * own.most_gone() + 2 * m;
-            all.comparisons += own.cases.len();
-        }
-        // E_hat = -(u scale) f_hat, scale = 1 / (u u + u_e^2); the two ends of the range.
-        let losses = controller.losses.len();
-        all.comparisons += 2 * losses;
-        all.multiplications += 3 * losses;
-        all.additions += losses;
-        all.divisions += losses;
+        let mut all = COUNT.get();
+        all.add_place(controller);
         all
     }
 
-    /// Adds what a schedule needs: its place in the grid, the operating point there, the limits as deviations from it.
-    fn add_schedule(&mut self, controller: &Controller, [n, p, m, t]: [usize; 4]) {
+    /// Adds what the code of a schedule needs beside the equations: the place in the grid, the operating point there, the
+    /// limits as deviations from it.
+    fn add_place(&mut self, controller: &Controller) {
         let Some(schedule) = &controller.schedule else { return };
-        let vectors = n + p + m + t;
+        let operating = operating_vectors(controller).into_iter();
+        let vectors: usize = operating.map(|(vector, _)| vector.kind().count(controller)).sum();
         self.multiplications += 2 * vectors;
         // theta + 0, two differences and their quotient, 1 - part.
         self.additions += vectors + 4;
         self.divisions += 1;
-        self.comparisons += schedule.points.len() + 2 * controller.schedule_inputs().len();
+        self.comparisons += schedule.points.len();
         if controller.is_limited() {
-            self.additions += 2 * m;
+            self.additions += 2 * Kind::Actuator.count(controller);
         }
     }
+}
 
-    /// Adds the most that the tests of a detection need in a sample: each window ends, and each test gives an alarm.
-    fn add_detection(&mut self, controller: &Controller) {
-        let Some(own) = &controller.detection else { return };
-        let (residuals, tests) = (own.c.nrows(), own.tests.len());
-        // Finite or not: the residuals and the next state of their filter.
-        self.comparisons += 2 * (residuals + own.a.nrows());
-        match own.method {
-            // Two sums of three terms; each from 0 on, finite or not, above 0; the larger one; the threshold.
-            Method::Cusum => {
-                self.additions += 4 * tests;
-                self.comparisons += 10 * tests;
-            }
-            // Sums of two terms, finite or not; their squares; s, finite or not; the threshold.
-            Method::Window => {
-                self.additions += 2 * residuals;
-                self.multiplications += residuals;
-                self.divisions += tests;
-                self.comparisons += 2 * residuals + 3 * tests;
-            }
-        }
-        // Two times in s.
-        self.multiplications += 2;
-    }
+/// Measurements, references and a scheduling variable: finite or not.
+fn take_inputs(controller: &Controller) {
+    let inputs = Kind::Measurement.count(controller) + Kind::Reference.count(controller);
+    sample::all_finite(&vec![Counted; inputs + controller.schedule_inputs().len()]);
+}
 
-    fn add_statement(&mut self, controller: &Controller, statement: &Statement) {
-        let rows = statement.target.kind().count(controller);
-        self.add_term(controller, statement.start, rows);
-        for operation in &statement.operations {
-            match *operation {
-                Operation::Add(term) | Operation::Subtract(term) => {
-                    self.additions += rows;
-                    self.add_term(controller, term, rows);
-                }
-                Operation::Accumulate(matrix, _) => self.add_products(controller, matrix, rows),
-                Operation::TimesPeriod => self.multiplications += rows,
-            }
+/// The longest sample: faults are compensated, the most actuators are gone, each window ends, each test gives an alarm.
+fn take_sample(controller: &Controller) {
+    let numbers = Numbers::of(controller, |_| Counted, |_| Counted);
+    let design = numbers.design();
+    let mut memory = Stored::of(|vector| vec![Counted; vector.length(controller)]);
+    let mut vectors = Vectors::zero(controller);
+    let (mut state, mut signals) = (memory.state(), vectors.signals());
+    signals.estimate(&design, &state, true);
+    signals.set_commands(&design, &state, true);
+    signals.set_command_values(&design);
+    if let Some(reconfiguration) = &controller.reconfiguration {
+        let actuators = controller.actuators.len();
+        let gains = vec![Counted; actuators * actuators];
+        let commands = vec![Counted; actuators];
+        let most = reconfiguration.most_gone();
+        let without: Vec<_> = (0..actuators).map(|actuator| actuator < most).collect();
+        let stuck = Stuck {
+            k_s: sample::Matrix::new(&gains, actuators),
+            without: &without,
+            gone: &vec![false; actuators],
+            commands: [&commands, &commands],
+        };
+        signals.add_stuck(&design, &stuck);
+        for _ in &reconfiguration.cases {
+            // The loss and its limit.
+            Counted.is_above(&Counted);
         }
     }
+    let is_finite = signals.are_values_finite();
+    signals.limit(&design, &[]);
+    signals.predict(&design, &state, true);
+    if let Some(detection) = &controller.detection {
+        let (k, rows) = (detection.a.nrows(), detection.c.nrows());
+        let (mut next, mut residuals) = (vec![Counted; k], vec![Counted; rows]);
+        let inputs: [&[_]; 3] = [&vec![Counted; k], signals.u, signals.y];
+        numbers.filter_of_residuals().advance(inputs, false, &mut next, &mut residuals);
+        test(detection, &residuals);
+    }
+    signals.keep(&mut state, is_finite);
+}
 
-    fn add_term(&mut self, controller: &Controller, term: Term, rows: usize) {
-        match term {
-            Term::Zero | Term::Element(_) => {}
-            Term::Product(matrix, _) => self.add_products(controller, matrix, rows),
-            Term::FilterStep => {
-                self.multiplications += rows;
-                self.additions += rows;
+fn test(detection: &Detection, residuals: &[Counted]) {
+    match detection.method {
+        Method::Cusum => {
+            let sums = [Counted; 2];
+            for residual in residuals {
+                Cumulative { sums, since: [0; 2] }.take(residual, &Counted, 0);
             }
-            Term::Injection => {
-                self.multiplications += rows;
-                self.comparisons += rows;
-                self.additions += rows;
-                self.divisions += rows;
+        }
+        Method::Window => {
+            let mut sums = residuals.to_vec();
+            let mut terms = sums.iter_mut().zip(residuals);
+            for test in &detection.tests {
+                let terms = terms.by_ref().take(test.residuals);
+                Window { since: 0, count: 0 }.take(terms, 1, 0);
             }
         }
     }
-
-    fn add_products(&mut self, controller: &Controller, matrix: Matrix, rows: usize) {
-        let count = rows * matrix.of(controller).map_or(0, DMatrix::ncols);
-        self.multiplications += count;
-        self.additions += count;
-        if controller.scheduled(matrix).is_some() {
-            self.multiplications += 2 * count;
-            self.additions += count;
-        }
+    for _ in &detection.tests {
+        // The statistic and its threshold.
+        Counted.is_above(&Counted);
+    }
+    let decision = Decision { isolated: 1, ..Decision::default() };
+    for sample in [decision.detected_at, decision.onset] {
+        decision.time(sample, Counted);
     }
 }
 
@@ -146,7 +215,7 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    pub(super) fn of(controller: &Controller, recursion: &Recursion, precision: Precision) -> Self {
+    pub(super) fn of(controller: &Controller, precision: Precision) -> Self {
         let size = precision.size();
         let count = |vector: Vector| vector.kind().count(controller);
         let mut stored: usize = stored(controller).into_iter().map(count).sum();
@@ -166,7 +235,9 @@ impl Memory {
             flags += Kind::Actuator.count(controller) + 2 * cases;
         }
         let losses = controller.losses.len();
-        let mut stack: usize = losses + locals(recursion).into_iter().map(count).sum::<usize>();
+        let detection = [Kind::ResidualState, Kind::Residual].map(|kind| kind.count(controller));
+        let mut stack = losses + detection.into_iter().sum::<usize>();
+        stack += Vector::of_sample(controller).map(count).sum::<usize>();
         if controller.schedule.is_some() {
             let operating = operating_vectors(controller);
             stack += operating.into_iter().map(|(vector, _)| count(vector)).sum::<usize>() + 2;
@@ -179,7 +250,7 @@ impl Memory {
         let of_cases = of_cases.map_or(0, |cases| cases.integer_bytes(actuators, faults));
         // Of each loss its fault, its actuator and u_e^2.
         let of_losses = losses * (8 + size);
-        let tables: usize = tables(controller, recursion).iter().map(Constants::count).sum();
+        let tables: usize = tables(controller).iter().map(Constants::count).sum();
         Self {
             state: (stored * size + 4 * counters + flags).next_multiple_of(size),
             stack: stack * size,

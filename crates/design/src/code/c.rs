@@ -13,7 +13,6 @@ use std::path::PathBuf;
 use super::constants::Constants;
 use super::controller::Controller;
 use super::fields::Fields;
-use super::recursion::Recursion;
 use super::rounding::RoundingBound;
 use super::summary::Vocabulary;
 use super::symbols::Kind;
@@ -22,7 +21,7 @@ use super::{Precision, Request};
 /// The longest line of a table.
 const WIDTH: usize = 100;
 /// The file of C code that is the same for each design.
-pub const RUNTIME: &str = "aso_controller.h";
+const RUNTIME: &str = "aso_controller.h";
 /// Its text, which takes the samples.
 const RUNTIME_TEXT: &str = include_str!("../../runtime/aso_controller.h");
 
@@ -30,7 +29,6 @@ const RUNTIME_TEXT: &str = include_str!("../../runtime/aso_controller.h");
 struct Source<'a> {
     request: &'a Request<'a>,
     controller: &'a Controller,
-    recursion: &'a Recursion,
     fields: &'a Fields,
     /// `double` or `float`, and the start of the names of macros.
     real: &'static str,
@@ -40,7 +38,8 @@ struct Source<'a> {
 /// Returns header and source with their names.
 pub(super) fn files(
     request: &Request<'_>,
-    (controller, recursion, fields): (&Controller, &Recursion, &Fields),
+    controller: &Controller,
+    fields: &Fields,
     bound: Option<&RoundingBound>,
 ) -> Vec<(PathBuf, String)> {
     let real = match request.precision {
@@ -48,7 +47,7 @@ pub(super) fn files(
         Precision::Single => "float",
     };
     let capital = request.prefix.to_ascii_uppercase();
-    let source = Source { request, controller, recursion, fields, real, capital };
+    let source = Source { request, controller, fields, real, capital };
     let name = &request.prefix;
     vec![
         (format!("{name}.h").into(), source.header(bound)),

@@ -195,11 +195,6 @@ impl Controller {
         self.reconfiguration.as_ref().and_then(|own| own.matrices(matrix))
     }
 
-    /// Whether faults are estimated while compensation is off because the fall-back is in force.
-    pub(super) fn estimates_in_fallback(&self) -> bool {
-        !self.monitor && self.reconfiguration.as_ref().is_some_and(|own| own.fallback.is_some())
-    }
-
     /// Whether any actuator has limits.
     pub(super) fn is_limited(&self) -> bool {
         self.actuators.iter().any(|actuator| actuator.limits.is_some())

@@ -139,9 +139,9 @@ impl Detection {
         windows + self.tests.len() * self.faults.len()
     }
 
-    /// The flags of an instance: the alarms of tests, and whether there is one.
+    /// The flags of an instance: the alarms of tests.
     pub(super) fn flags(&self) -> usize {
-        self.tests.len() + 1
+        self.tests.len()
     }
 }
 

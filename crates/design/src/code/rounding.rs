@@ -1,6 +1,6 @@
 //! A bound of what single precision changes.
 //!
-//! Every statement of the recursion computes its sum with an error of at most
+//! Each vector of a sample is computed with an error of at most
 //!
 //! ```text
 //! kappa s,   s = the largest deviations of x_hat, f_hat, y and u from the operating point, and 1
@@ -8,7 +8,7 @@
 //!
 //! from the rounding of its constants, products and partial sums: r |a| |v| for a product a v, r times the
 //! magnitudes added so far for a sum, r = 2^-24 (N. J. Higham, Accuracy and Stability of Numerical
-//! Algorithms, 2002, equation (2.4) and section 3.1). The errors w of all statements enter the loop of
+//! Algorithms, 2002, equation (2.4) and section 3.1). The errors w of all vectors enter the loop of
 //! plant and controller,
 //!
 //! ```text
@@ -44,7 +44,6 @@ use nalgebra::DMatrix;
 use self::analysis::Analysis;
 use super::controller::Controller;
 use super::fields::Fields;
-use super::recursion::Recursion;
 use super::symbols::Kind;
 use super::text::{aligned, filled};
 
@@ -71,7 +70,7 @@ pub(super) struct RoundingBound {
 }
 
 impl RoundingBound {
-    pub(super) fn of(controller: &Controller, recursion: &Recursion) -> Self {
+    pub(super) fn of(controller: &Controller) -> Self {
         if controller.schedule.is_some() {
             let reason = "matrices and operating point change with the scheduling variable";
             return Self::none(reason);
@@ -80,7 +79,7 @@ impl RoundingBound {
             Ok(gains) => gains,
             Err(error) => return Self::none(&error.to_string()),
         };
-        let analysis = Analysis::of(controller, recursion, state_of_filter);
+        let analysis = Analysis::of(controller, state_of_filter);
         let order = analysis.order();
         if order > LARGEST_ORDER {
             let reason =
@@ -214,7 +213,7 @@ fn named(start: &str, fields: &[String]) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Controller, Recursion, RoundingBound};
+    use super::{Controller, RoundingBound};
 
     /// x[k+1] = 0.9 x + u + f, u = -f_hat, f_hat = s / (|s| + delta), s = y - x_hat.
     fn bound(delta: f64) -> Result<f64, String> {
@@ -228,7 +227,7 @@ mod tests {
         );
         let file = aso_controller::Design::parse(&text, "design.toml".to_owned()).unwrap();
         let controller = Controller::of(file).unwrap();
-        let found = RoundingBound::of(&controller, &Recursion::of(&controller));
+        let found = RoundingBound::of(&controller);
         found.bound.map(|bound| bound[(1, 1)])
     }
 

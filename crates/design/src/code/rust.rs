@@ -1,30 +1,32 @@
-//! The controller as a Rust crate without the standard library.
+//! The controller as a Rust crate without the standard library: the sources of `aso_controller::sample`, which are the
+//! same for each design, and a library with its tables and named signals.
 
-mod detection;
-mod reconfiguration;
-mod sample;
-mod schedule;
+mod fields;
+mod step;
+mod tables;
 mod types;
 
 use std::path::PathBuf;
 
-use super::c::wrapped;
-use super::constants::Constants;
 use super::controller::Controller;
 use super::fields::Fields;
-use super::recursion::Recursion;
 use super::rounding::RoundingBound;
 use super::summary::{Vocabulary, summary};
 use super::symbols::Kind;
-use super::tables::{has_constant_matrix, tables};
 use super::text::ascii;
 use super::{Precision, Request};
+
+/// What takes the samples of each design.
+const RUNTIME: [(&str, &str); 3] = [
+    ("src/sample.rs", aso_controller::SOURCES[0]),
+    ("src/sample/detection.rs", aso_controller::SOURCES[1]),
+    ("src/sample/reconfiguration.rs", aso_controller::SOURCES[2]),
+];
 
 /// What every function of this file renders from.
 struct Source<'a> {
     request: &'a Request<'a>,
     controller: &'a Controller,
-    recursion: &'a Recursion,
     fields: &'a Fields,
     real: &'static str,
 }
@@ -32,14 +34,15 @@ struct Source<'a> {
 /// Returns manifest and library with their paths.
 pub(super) fn files(
     request: &Request<'_>,
-    (controller, recursion, fields): (&Controller, &Recursion, &Fields),
+    controller: &Controller,
+    fields: &Fields,
     bound: Option<&RoundingBound>,
 ) -> Vec<(PathBuf, String)> {
     let real = match request.precision {
         Precision::Double => "f64",
         Precision::Single => "f32",
     };
-    let source = Source { request, controller, recursion, fields, real };
+    let source = Source { request, controller, fields, real };
     let manifest = format!(
         "# Written by {}; src/lib.rs describes it.
 [package]
@@ -54,7 +57,9 @@ publish = false
         ascii(request.identity),
         request.prefix,
     );
-    vec![("Cargo.toml".into(), manifest), ("src/lib.rs".into(), source.library(bound))]
+    let own = [("Cargo.toml".into(), manifest), ("src/lib.rs".into(), source.library(bound))];
+    let runtime = RUNTIME.map(|(path, text)| (path.into(), text.to_owned()));
+    own.into_iter().chain(runtime).collect()
 }
 
 impl Source<'_> {
@@ -82,10 +87,9 @@ impl Source<'_> {
     }
 
     fn library(&self, bound: Option<&RoundingBound>) -> String {
-        let Self { request, controller, recursion, fields, real } = self;
+        let Self { request, controller, fields, real } = self;
         let mut lines = vec!["//! ```text".to_owned()];
-        let parts = (*recursion, *fields);
-        for line in summary(request, controller, parts, bound, &self.vocabulary()) {
+        for line in summary(request, controller, fields, bound, &self.vocabulary()) {
             lines.push(format!("//! {line}").trim_end().to_owned());
         }
         lines.extend([
@@ -93,6 +97,10 @@ impl Source<'_> {
             "#![no_std]".to_owned(),
             "#![forbid(unsafe_code)]".to_owned(),
             "#![allow(non_snake_case)] // Fields have the names of the signals.".to_owned(),
+            String::new(),
+            "pub mod sample;".to_owned(),
+            String::new(),
+            self.imports(),
             String::new(),
         ]);
         for (kind, what) in [
@@ -130,124 +138,12 @@ impl Source<'_> {
             lines.push("/// The first sample whose residuals are tested.".to_owned());
             lines.push(format!("const FIRST_TESTED: u32 = {};", own.first_tested));
         }
-        for table in tables(controller, recursion) {
-            self.table(&mut lines, &table);
-        }
-        self.detection_tables(&mut lines);
-        self.reconfiguration_tables(&mut lines);
+        self.tables(&mut lines);
         self.structures(&mut lines);
         self.start(&mut lines);
         self.step(&mut lines);
-        self.detection_methods(&mut lines);
-        self.reconfiguration_methods(&mut lines);
-        self.helpers(&mut lines);
         let mut text = lines.join("\n");
         text.push('\n');
         text
-    }
-
-    fn table(&self, lines: &mut Vec<String>, table: &Constants) {
-        let Constants { name, rows, columns, layers, values, .. } = table;
-        let count = rows.count(self.controller);
-        let (real, rows) = (self.real, rows.plural());
-        let kind = match columns {
-            Some(columns) => format!("[[{real}; {}]; {rows}]", columns.plural()),
-            None => format!("[{real}; {rows}]"),
-        };
-        let kind = match layers {
-            Some(layers) => format!("[{kind}; {}]", layers.plural()),
-            None => kind,
-        };
-        lines.push(format!("\nstatic {}: {kind} = [", name.to_ascii_uppercase()));
-        if layers.is_some() {
-            for rows in values.chunks(count) {
-                lines.push("    [".to_owned());
-                self.rows(lines, rows, ("        ", columns.is_some()));
-                lines.push("    ],".to_owned());
-            }
-        } else {
-            self.rows(lines, values, ("    ", columns.is_some()));
-        }
-        lines.push("];".to_owned());
-    }
-
-    /// The rows of a matrix, or the one of a vector.
-    fn rows(&self, lines: &mut Vec<String>, rows: &[Vec<f64>], (indent, is_matrix): (&str, bool)) {
-        for row in rows {
-            let numbers = row.iter().map(|value| self.literal(*value));
-            if is_matrix {
-                lines.push(format!("{indent}["));
-                lines.extend(wrapped(numbers, &format!("{indent}    ")));
-                lines.push(format!("{indent}],"));
-            } else {
-                lines.extend(wrapped(numbers, indent));
-            }
-        }
-    }
-
-    fn helpers(&self, lines: &mut Vec<String>) {
-        let real = self.real;
-        lines.push(format!(
-            "
-/// Keeps the values that are numbers; returns whether there is another one.
-fn take(kept: &mut [{real}], values: &[{real}]) -> bool {{
-    let mut held = false;
-    for (kept, value) in kept.iter_mut().zip(values) {{
-        if value.is_finite() {{
-            *kept = *value;
-        }} else {{
-            held = true;
-        }}
-    }}
-    held
-}}
-
-fn all_finite(vector: &[{real}]) -> bool {{
-    vector.iter().all(|value| value.is_finite())
-}}"
-        ));
-        if has_constant_matrix(self.controller, self.recursion) {
-            lines.push(format!(
-                "
-/// Adds a row times a vector to a sum, one product after the other.
-fn accumulate(start: {real}, row: &[{real}], vector: &[{real}]) -> {real} {{
-    row.iter().zip(vector).fold(start, |sum, (entry, element)| sum + entry * element)
-}}
-
-/// A row times a vector. -0.0 + x has the bits of x.
-fn product(row: &[{real}], vector: &[{real}]) -> {real} {{
-    accumulate(-0.0, row, vector)
-}}"
-            ));
-        }
-        self.schedule_helpers(lines);
-        if self.controller.sliding_mode.is_some() {
-            lines.push(format!(
-                "
-/// rho s / (|s| + delta).
-fn injection(s: {real}, rho: {real}, delta: {real}) -> {real} {{
-    let size = if s < 0.0 {{ -s }} else {{ s }};
-    rho * s / (size + delta)
-}}"
-            ));
-        }
-        self.detection_helpers(lines);
-        if !self.controller.losses.is_empty() {
-            lines.push(format!(
-                "
-/// E_hat = -u f_hat / (u^2 + u_e^2), the largest number where it is beyond the range.
-fn lost_effectiveness(u: {real}, f_hat: {real}, squared_least_command: {real}) -> {real} {{
-    let scale = 1.0 / (u * u + squared_least_command);
-    let loss = -(u * scale) * f_hat;
-    if loss > {real}::MAX {{
-        {real}::MAX
-    }} else if loss < {real}::MIN {{
-        {real}::MIN
-    }} else {{
-        loss
-    }}
-}}"
-            ));
-        }
     }
 }

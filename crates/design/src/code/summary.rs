@@ -6,7 +6,6 @@ use super::arithmetic::{Arithmetic, Memory};
 use super::controller::Controller;
 use super::fields::Fields;
 use super::parts::{Loss, Signal};
-use super::recursion::Recursion;
 use super::rounding::RoundingBound;
 use super::text::{aligned, ascii, filled, one_line};
 use super::{Precision, Request};
@@ -57,7 +56,7 @@ pub(super) fn descriptions_of_estimates(controller: &Controller) -> Vec<String> 
 pub(super) fn summary(
     request: &Request<'_>,
     controller: &Controller,
-    (recursion, fields): (&Recursion, &Fields),
+    fields: &Fields,
     bound: Option<&RoundingBound>,
     vocabulary: &Vocabulary,
 ) -> Vec<String> {
@@ -75,7 +74,7 @@ pub(super) fn summary(
     lines.extend([String::new(), "SIGNALS".to_owned()]);
     lines.extend(signals(controller, fields));
     section(&mut lines, "STATUS", &status(controller, vocabulary));
-    section(&mut lines, "COST", &costs(request, controller, recursion));
+    section(&mut lines, "COST", &costs(request, controller));
     section(&mut lines, "PRECISION", &precision(request, vocabulary));
     if let Some(bound) = bound {
         lines.extend(bound.lines(controller, fields));
@@ -299,10 +298,10 @@ fn status(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
     all
 }
 
-fn costs(request: &Request<'_>, controller: &Controller, recursion: &Recursion) -> [String; 2] {
+fn costs(request: &Request<'_>, controller: &Controller) -> [String; 2] {
     let Arithmetic { multiplications, additions, comparisons, divisions } =
-        Arithmetic::of(controller, recursion);
-    let Memory { state, stack, constants } = Memory::of(controller, recursion, request.precision);
+        Arithmetic::of(controller);
+    let Memory { state, stack, constants } = Memory::of(controller, request.precision);
     [
         format!(
             "Floating-point operations of a sample, at most: {multiplications} multiplications, \

@@ -1,6 +1,6 @@
-//! The vectors and matrices of the recursion.
+//! The vectors and matrices of a sample.
 
-/// A vector of the recursion.
+/// A vector of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Vector {
     /// The estimate for this sample from the measurements before it, as values.
@@ -35,14 +35,12 @@ pub(super) enum Vector {
     YF,
     U,
     R,
-    /// The command without limits, and how far the limits are from it.
-    V,
+    /// How far the limits are from the command without limits.
     Excess,
     /// The commands and estimates as values.
     Command,
     XValue,
     FValue,
-    XIValue,
     /// The estimate for the next sample, as values.
     NextXHat,
     NextFHat,
@@ -107,6 +105,26 @@ impl Matrix {
         Self::ResidualDy,
     ];
 
+    /// Those of `aso_controller::sample::Design`.
+    pub(super) const OF_SAMPLE: [Self; 16] = [
+        Self::A,
+        Self::B,
+        Self::C,
+        Self::D,
+        Self::FA,
+        Self::AF,
+        Self::KX,
+        Self::KF,
+        Self::LX,
+        Self::LF,
+        Self::PF,
+        Self::H,
+        Self::KI,
+        Self::FI,
+        Self::LW,
+        Self::NR,
+    ];
+
     /// The name in the design file.
     pub(super) fn name(self) -> &'static str {
         match self {
@@ -161,31 +179,13 @@ impl Vector {
             Self::Referred | Self::R => "r",
             Self::StoredXI => "x_i",
             Self::ROp => "r_op",
-            Self::V => "v",
             Self::Excess => "excess",
-            Self::XIValue => "x_i_value",
             Self::NextXI => "next_x_i",
             Self::StoredXR => "x_r",
             Self::StoredResidual => "residual",
             Self::Residual => "next_residual",
             Self::NextXR => "next_x_r",
         }
-    }
-
-    /// Whether it is part of the controller's state.
-    pub(super) fn is_stored(self) -> bool {
-        matches!(
-            self,
-            Self::StoredXHat
-                | Self::StoredFHat
-                | Self::StoredYF
-                | Self::StoredXI
-                | Self::StoredXR
-                | Self::StoredResidual
-                | Self::StoredU
-                | Self::Measured
-                | Self::Referred
-        )
     }
 
     /// The signals that its elements belong to.
@@ -200,11 +200,9 @@ impl Vector {
             | Self::S
             | Self::FValue
             | Self::NextFHat => Kind::Fault,
-            Self::StoredU | Self::UOp | Self::U | Self::V | Self::Excess | Self::Command => {
-                Kind::Actuator
-            }
+            Self::StoredU | Self::UOp | Self::U | Self::Excess | Self::Command => Kind::Actuator,
             Self::Referred | Self::ROp | Self::R => Kind::Reference,
-            Self::StoredXI | Self::XIValue | Self::NextXI => Kind::Integral,
+            Self::StoredXI | Self::NextXI => Kind::Integral,
             Self::StoredXR | Self::NextXR => Kind::ResidualState,
             Self::StoredResidual | Self::Residual => Kind::Residual,
             Self::StoredYF

@@ -6,7 +6,6 @@ use super::constants::Constants;
 use super::controller::Controller;
 use super::detection::{self, Detection};
 use super::parts::Signal;
-use super::recursion::{Operation, Recursion, Term};
 use super::symbols::{Kind, Matrix, Vector};
 
 /// The vectors that are kept from sample to sample.
@@ -23,39 +22,6 @@ pub(super) fn stored(controller: &Controller) -> Vec<Vector> {
     all
 }
 
-/// What is computed for the next sample, and where it is stored.
-pub(super) fn kept(controller: &Controller) -> Vec<(Vector, Vector)> {
-    let mut all =
-        vec![(Vector::NextXHat, Vector::StoredXHat), (Vector::NextFHat, Vector::StoredFHat)];
-    let filtered = (Vector::NextYF, Vector::StoredYF);
-    all.extend(controller.filter.is_some().then_some(filtered));
-    all.extend(controller.h.is_some().then_some((Vector::NextXI, Vector::StoredXI)));
-    all.extend(controller.d.is_some().then_some((Vector::U, Vector::StoredU)));
-    if controller.detection.is_some() {
-        let next = [Vector::NextXR, Vector::Residual];
-        all.extend(next.into_iter().zip(detection::STORED));
-    }
-    all
-}
-
-/// The estimates as a user sees them, and the stored ones, which they are after an overflow.
-pub(super) fn shown(controller: &Controller) -> Vec<(Vector, Vector)> {
-    let mut all = vec![(Vector::XValue, Vector::StoredXHat), (Vector::FValue, Vector::StoredFHat)];
-    all.extend(controller.h.is_some().then_some((Vector::XIValue, Vector::StoredXI)));
-    all
-}
-
-/// The vectors that the statements compute, in order.
-pub(super) fn locals(recursion: &Recursion) -> Vec<Vector> {
-    let mut all = Vec::new();
-    for statement in recursion.statements() {
-        if !all.contains(&statement.target) {
-            all.push(statement.target);
-        }
-    }
-    all
-}
-
 /// The limits of the commands: names and meaning, as deviations and as values, lower and upper.
 pub(super) const LIMITS: [(&str, &str); 4] = [
     ("u_low", "limits of u"),
@@ -64,21 +30,16 @@ pub(super) const LIMITS: [(&str, &str); 4] = [
     ("u_max", ""),
 ];
 
-/// The scheduled matrices that the statements use.
-pub(super) fn scheduled(controller: &Controller, recursion: &Recursion) -> Vec<Matrix> {
-    let all = matrices(recursion).into_iter().map(|(matrix, ..)| matrix);
-    all.filter(|matrix| controller.scheduled(*matrix).is_some()).collect()
-}
-
-/// Whether the statements use a matrix that is not scheduled.
-pub(super) fn has_constant_matrix(controller: &Controller, recursion: &Recursion) -> bool {
-    matrices(recursion).iter().any(|(matrix, ..)| controller.scheduled(*matrix).is_none())
+/// Whether the equations have a matrix that is not scheduled.
+pub(super) fn has_constant_matrix(controller: &Controller) -> bool {
+    Matrix::all_stated(controller).any(|matrix| controller.scheduled(matrix).is_none())
 }
 
 /// All constants of a controller.
-pub(super) fn tables(controller: &Controller, recursion: &Recursion) -> Vec<Constants> {
+pub(super) fn tables(controller: &Controller) -> Vec<Constants> {
     let mut all = Vec::new();
-    for (matrix, vector, rows) in matrices(recursion) {
+    for matrix in Matrix::all_stated(controller) {
+        let [rows, columns] = matrix.kinds();
         let points = controller.scheduled(matrix).map(|own| (Some(Kind::Point), own));
         let sets = controller.chosen(matrix).map(|own| (Some(Kind::GainSet), own));
         let one = || (None, matrix.of(controller).into_iter().collect());
@@ -88,7 +49,7 @@ pub(super) fn tables(controller: &Controller, recursion: &Recursion) -> Vec<Cons
             name: matrix.name(),
             meaning: "",
             rows,
-            columns: Some(vector.kind()),
+            columns: Some(columns),
             layers,
             values: values.map(|row| row.iter().copied().collect()).collect(),
         });
@@ -170,35 +131,6 @@ fn schedule(controller: &Controller) -> Vec<Constants> {
         });
     }
     all
-}
-
-/// The matrices that the statements use, with the vector that each is multiplied with and the kind of
-/// its rows.
-fn matrices(recursion: &Recursion) -> Vec<(Matrix, Vector, Kind)> {
-    let mut all: Vec<(Matrix, Vector, Kind)> = Vec::new();
-    for statement in recursion.statements() {
-        let rows = statement.target.kind();
-        let operations = statement.operations.iter().filter_map(|operation| match *operation {
-            Operation::Add(Term::Product(matrix, vector))
-            | Operation::Subtract(Term::Product(matrix, vector))
-            | Operation::Accumulate(matrix, vector) => Some((matrix, vector)),
-            _ => None,
-        });
-        let start = match statement.start {
-            Term::Product(matrix, vector) => Some((matrix, vector)),
-            _ => None,
-        };
-        for (matrix, vector) in start.into_iter().chain(operations) {
-            if !all.iter().any(|(other, ..)| *other == matrix) {
-                all.push((matrix, vector, rows));
-            }
-        }
-    }
-    Matrix::ALL
-        .iter()
-        .filter_map(|matrix| all.iter().find(|own| own.0 == *matrix))
-        .copied()
-        .collect()
 }
 
 /// The parts of the operating point, with the name of their tables in a schedule.

@@ -9,11 +9,10 @@ use crate::code::tables::stored;
 
 impl Source<'_> {
     pub(super) fn header(&self, bound: Option<&RoundingBound>) -> String {
-        let Self { request, controller, recursion, fields, real, capital } = self;
+        let Self { request, controller, fields, real, capital } = self;
         let name = &request.prefix;
         let mut lines = vec!["/*".to_owned()];
-        let parts = (*recursion, *fields);
-        for line in summary(request, controller, parts, bound, &self.vocabulary()) {
+        for line in summary(request, controller, fields, bound, &self.vocabulary()) {
             lines.push(format!(" * {line}").trim_end().to_owned());
         }
         lines.push(" */".to_owned());
@@ -172,9 +171,8 @@ impl Source<'_> {
                 };
                 let rest = ["uint32_t detected_at;", "uint32_t onset;", "int32_t isolated;"]
                     .map(|field| format!("    {field}"));
-                let flags =
-                    vec![format!("    bool alarmed[{tests}];"), "    bool detected;".to_owned()];
-                since.into_iter().chain(rest).chain(flags).collect()
+                let alarmed = format!("    bool alarmed[{tests}];");
+                since.into_iter().chain(rest).chain([alarmed]).collect()
             }
         });
     }

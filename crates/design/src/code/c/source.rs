@@ -7,9 +7,9 @@ use crate::code::tables::tables;
 
 impl Source<'_> {
     pub(super) fn implementation(&self) -> String {
-        let Self { request, controller, recursion, .. } = self;
+        let Self { request, controller, .. } = self;
         let name = &request.prefix;
-        let Memory { constants, .. } = Memory::of(controller, recursion, request.precision);
+        let Memory { constants, .. } = Memory::of(controller, request.precision);
         let mut lines = vec![
             format!(
                 "/* Written by {}; {name}.h describes it. */",
@@ -25,7 +25,7 @@ impl Source<'_> {
         ];
         self.settings(&mut lines);
         lines.extend([String::new(), format!("/* Constants: {constants} bytes. */")]);
-        for table in tables(controller, recursion) {
+        for table in tables(controller) {
             self.table(&mut lines, &table);
         }
         if let [input] = controller.schedule_inputs() {
@@ -125,7 +125,7 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
         if controller.detection.is_some() {
             lines.extend(
                 [
-                    "    detection->detected = state->detected;",
+                    "    detection->detected = state->isolated != 0;",
                     "    detection->isolated = state->isolated;",
                     "    detection->t_detected = decision_time(state, state->detected_at);",
                     "    detection->t_onset = decision_time(state, state->onset);",

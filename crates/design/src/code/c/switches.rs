@@ -70,7 +70,7 @@ impl Source<'_> {
             ("IS_CURRENT", own.estimator == Estimator::Current),
             ("MONITORS", own.monitor),
             ("COUNTS_SAMPLES", own.has_counter()),
-            ("HAS_CONSTANT_MATRIX", has_constant_matrix(own, self.recursion)),
+            ("HAS_CONSTANT_MATRIX", has_constant_matrix(own)),
             ("HAS_FEEDTHROUGH", own.d.is_some()),
             ("HAS_FILTER", own.filter.is_some()),
             ("HAS_FAULT_MODEL", !own.constant_faults),

@@ -1,14 +1,15 @@
 //! What the errors of a sample do to the loop of plant and controller.
 
-use std::ops::AddAssign as _;
+use std::ops::{Add, AddAssign as _, Div, Mul, Neg, Sub};
 
+use aso_controller::sample::{Design, Number};
 use control::{Domain, StateSpace};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::first_signal;
 use crate::code::controller::Controller;
-use crate::code::recursion::{Operation, Recursion, Statement, Term};
-use crate::code::symbols::{Kind, Matrix, Vector};
+use crate::code::numbers::{Memory, Numbers, Vectors};
+use crate::code::symbols::{Kind, Vector};
 use aso_controller::design::{Estimator, SlidingMode};
 
 /// The relative rounding error of single precision.
@@ -26,46 +27,168 @@ struct Elements {
 }
 
 impl Elements {
-    fn zero(rows: usize, (forms, signals): (usize, usize)) -> Self {
-        let none = DMatrix::zeros(rows, signals);
-        Self { form: DMatrix::zeros(rows, forms), magnitude: none.clone(), error: none }
+    fn zero(rows: usize, widths: Widths) -> Self {
+        let none = DMatrix::zeros(rows, widths.signals);
+        let form = DMatrix::zeros(rows, widths.forms);
+        Self { form, magnitude: none.clone(), error: none }
     }
 
-    /// Adds `sign` times other elements; a sum with zero has no error.
-    fn add(&mut self, other: &Self, sign: f64) {
-        self.form += &other.form * sign;
-        self.error += &other.error;
-        for (mut row, other) in self.magnitude.row_iter_mut().zip(other.magnitude.row_iter()) {
-            row += other;
+    /// The elements as numbers of the equations.
+    fn numbers(&self) -> Vec<Rounded> {
+        let row = |matrix: &DMatrix<f64>, i: usize| matrix.row(i).into_owned();
+        let element = |i| Element {
+            form: row(&self.form, i),
+            magnitude: row(&self.magnitude, i),
+            error: row(&self.error, i),
+        };
+        (0..self.form.nrows()).map(|i| Rounded::Signal(element(i))).collect()
+    }
+
+    /// The elements that the equations have computed.
+    fn of(numbers: &[Rounded], widths: Widths) -> Self {
+        let mut elements = Self::zero(numbers.len(), widths);
+        for (i, number) in numbers.iter().enumerate() {
+            // A sum of products with 0 is 0.
+            let Rounded::Signal(element) = number else { continue };
+            elements.form.row_mut(i).copy_from(&element.form);
+            elements.magnitude.row_mut(i).copy_from(&element.magnitude);
+            elements.error.row_mut(i).copy_from(&element.error);
         }
-        for i in 0..self.error.nrows() {
-            if other.magnitude.row(i).iter().any(|part| *part > 0.0) {
-                let rounding = self.magnitude.row(i) * UNIT;
-                self.error.row_mut(i).add_assign(&rounding);
+        elements
+    }
+}
+
+/// The columns of forms, and the signals with 1.
+#[derive(Clone, Copy)]
+struct Widths {
+    forms: usize,
+    signals: usize,
+}
+
+/// A row of [`Elements`].
+#[derive(Clone)]
+struct Element {
+    form: RowDVector<f64>,
+    magnitude: RowDVector<f64>,
+    error: RowDVector<f64>,
+}
+
+/// A number of the equations in single precision.
+#[derive(Clone)]
+enum Rounded {
+    Constant(f64),
+    Signal(Element),
+}
+
+impl Element {
+    /// An element of which nothing is known.
+    fn unknown(mut self) -> Rounded {
+        self.error.fill(f64::INFINITY);
+        Rounded::Signal(self)
+    }
+}
+
+impl Add for Rounded {
+    type Output = Self;
+
+    /// A sum with zero has no error.
+    fn add(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Constant(a), Self::Constant(b)) => Self::Constant(a + b),
+            (Self::Signal(a), Self::Constant(b)) | (Self::Constant(b), Self::Signal(a)) => {
+                if b == 0.0 { Self::Signal(a) } else { a.unknown() }
+            }
+            (Self::Signal(mut a), Self::Signal(b)) => {
+                let is_exact = a.magnitude.amax() == 0.0 || b.magnitude.amax() == 0.0;
+                a.form += b.form;
+                a.magnitude += b.magnitude;
+                a.error += b.error;
+                if !is_exact {
+                    a.error += &a.magnitude * UNIT;
+                }
+                Self::Signal(a)
             }
         }
     }
+}
 
-    /// Multiplies by a constant.
-    fn scale(&mut self, factor: f64) {
-        self.form *= factor;
-        self.error = &self.error * factor + &self.magnitude * product_error(factor);
-        self.magnitude *= factor;
+impl Neg for Rounded {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        match self {
+            Self::Constant(value) => Self::Constant(-value),
+            Self::Signal(element) => Self::Signal(Element { form: -element.form, ..element }),
+        }
+    }
+}
+
+impl Sub for Rounded {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl Mul for Rounded {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Constant(a), Self::Constant(b)) => Self::Constant(a * b),
+            (Self::Constant(factor), Self::Signal(element))
+            | (Self::Signal(element), Self::Constant(factor)) => {
+                if factor == 0.0 {
+                    return Self::Constant(0.0);
+                }
+                let Element { form, magnitude, error } = element;
+                Self::Signal(Element {
+                    form: form * factor,
+                    error: error * factor.abs() + &magnitude * product_error(factor),
+                    magnitude: magnitude * factor.abs(),
+                })
+            }
+            (Self::Signal(element), Self::Signal(_)) => element.unknown(),
+        }
+    }
+}
+
+impl Div for Rounded {
+    type Output = Self;
+
+    /// The quotient of a sliding-mode law has an analysis of its own.
+    fn div(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Constant(a), Self::Constant(b)) => Self::Constant(a / b),
+            (Self::Signal(element), _) | (_, Self::Signal(element)) => element.unknown(),
+        }
+    }
+}
+
+impl Number for Rounded {
+    fn zero() -> Self {
+        Self::Constant(0.0)
     }
 
-    /// Adds row i of `matrix` times `vector` to element i, one product after the other.
-    fn accumulate(&mut self, matrix: &DMatrix<f64>, vector: &Self) {
-        self.form += matrix * &vector.form;
-        for (i, row) in matrix.row_iter().enumerate() {
-            for (j, &entry) in row.iter().enumerate().filter(|(_, entry)| **entry != 0.0) {
-                let factor = vector.magnitude.row(j);
-                let is_first = self.magnitude.row(i).amax() == 0.0;
-                self.magnitude.row_mut(i).add_assign(&(factor * entry.abs()));
-                let sum = if is_first { 0.0 } else { UNIT };
-                let rounding = factor * product_error(entry) + self.magnitude.row(i) * sum;
-                self.error.row_mut(i).add_assign(&rounding);
-            }
-        }
+    fn largest() -> Self {
+        Self::Constant(f64::from(f32::MAX))
+    }
+
+    fn whole(count: u32) -> Self {
+        Self::Constant(f64::from(count))
+    }
+
+    fn is_finite(&self) -> bool {
+        true
+    }
+
+    fn is_below(&self, _: &Self) -> bool {
+        false
+    }
+
+    fn is_above(&self, _: &Self) -> bool {
+        false
     }
 }
 
@@ -83,7 +206,7 @@ fn constant_error(value: f64) -> f64 {
     (value - f64::from(value as f32)).abs()
 }
 
-/// Follows the statements of a sample.
+/// Follows the equations of a sample.
 pub(super) struct Analysis<'a> {
     controller: &'a Controller,
     /// A bound of the elements of `x_r`, states x signals; see [`residual_states`].
@@ -97,17 +220,11 @@ pub(super) struct Analysis<'a> {
 }
 
 impl<'a> Analysis<'a> {
-    /// The analysis of the longest sample.
-    pub(super) fn of(
-        controller: &'a Controller,
-        recursion: &Recursion,
-        state_of_filter: DMatrix<f64>,
-    ) -> Self {
-        let mut own = Self::new(controller, state_of_filter);
-        for statement in recursion.longest() {
-            own.follow(statement);
-        }
-        own
+    /// The analysis of the longest sample: faults are compensated, and no command is at a limit.
+    pub(super) fn of(controller: &'a Controller, state_of_filter: DMatrix<f64>) -> Self {
+        let mut analysis = Self::new(controller, state_of_filter);
+        analysis.follow();
+        analysis
     }
 
     fn new(controller: &'a Controller, state_of_filter: DMatrix<f64>) -> Self {
@@ -149,9 +266,10 @@ impl<'a> Analysis<'a> {
         // what remains is D times the rounding of these commands as values.
         own.start(Vector::StoredU, |_| {});
         if controller.d.is_some() {
-            let mut rounded = own.get(Vector::StoredU);
-            rounded.add(&own.get(Vector::UOp), 1.0);
-            own.learn(Vector::StoredU, rounded);
+            let deviations = own.get(Vector::StoredU).numbers();
+            let sums = deviations.into_iter().zip(own.get(Vector::UOp).numbers());
+            let rounded: Vec<_> = sums.map(|(deviation, point)| deviation + point).collect();
+            own.learn(Vector::StoredU, Elements::of(&rounded, own.widths()));
         }
         for vector in [Vector::Measured, Vector::Referred] {
             let mut rounded = own.get(vector);
@@ -173,10 +291,11 @@ impl<'a> Analysis<'a> {
     }
 
     /// The columns of forms, with room for the errors of 6 vectors of each kind and for v, and the signals.
-    fn widths(&self) -> (usize, usize) {
+    fn widths(&self) -> Widths {
         let signals: usize = Kind::ALL.map(|kind| self.count(kind)).iter().sum();
         let detection = self.count(Kind::ResidualState) + self.count(Kind::Residual);
-        (self.order() + 6 * signals + detection + self.count(Kind::Fault), signals + 1)
+        let forms = self.order() + 6 * signals + detection + self.count(Kind::Fault);
+        Widths { forms, signals: signals + 1 }
     }
 
     /// Sets the exact elements of a vector at the start of a sample.
@@ -264,7 +383,7 @@ impl<'a> Analysis<'a> {
 
     /// The largest deviations of a kind of signals.
     fn unit(&self, kind: Kind) -> DMatrix<f64> {
-        let (rows, signals) = (self.count(kind), self.widths().1);
+        let (rows, signals) = (self.count(kind), self.widths().signals);
         let mut own = DMatrix::zeros(rows, signals);
         own.columns_mut(first_signal(kind, self.controller), rows).fill_with_identity();
         own
@@ -296,7 +415,7 @@ impl<'a> Analysis<'a> {
     /// |r| <= |C| |x_r| + |D_u| |u| + |D_y| |y|, residuals x signals.
     fn residual_magnitude(&self) -> DMatrix<f64> {
         let Some(own) = &self.controller.detection else {
-            return DMatrix::zeros(0, self.widths().1);
+            return DMatrix::zeros(0, self.widths().signals);
         };
         let mut all = own.c.abs() * &self.state_of_filter;
         for (kind, matrix) in [(Kind::Actuator, &own.d_u), (Kind::Measurement, &own.d_y)] {
@@ -319,56 +438,95 @@ impl<'a> Analysis<'a> {
         self.known.push((vector, elements));
     }
 
-    fn follow(&mut self, statement: &Statement) {
-        match statement.target {
-            // No output of the loop and no later statement has these.
-            Vector::XIValue | Vector::V => return,
-            // Without limits it is exactly zero.
-            Vector::Excess => {
-                let zero = Elements::zero(self.count(Kind::Actuator), self.widths());
-                self.known.push((Vector::Excess, zero));
-                return;
-            }
-            _ => {}
+    /// Follows the equations in the order of `Signals::estimate`, `Signals::set_commands` and `Signals::predict`.
+    fn follow(&mut self) {
+        let controller = self.controller;
+        let numbers = Numbers::of(controller, Rounded::Constant, Rounded::Constant);
+        let points = [Vector::XOp, Vector::UOp, Vector::YOp, Vector::ROp];
+        let points = points.map(|vector| self.get(vector).numbers());
+        let [x_op, u_op, y_op, r_op] = &points;
+        let design = Design { x_op, u_op, y_op, r_op, ..numbers.design() };
+        let mut memory = Memory::of(|vector| match vector.length(controller) {
+            0 => Vec::new(),
+            _ => self.get(vector).numbers(),
+        });
+        let (state, mut vectors) = (memory.state(), Vectors::zero(controller));
+        let has_direct_term = controller.p_f.is_some();
+        let integral = if has_direct_term { Vector::FHatI } else { Vector::FHat };
+        vectors.signals().set_deviations(&design, &state);
+        self.take(&mut vectors, [Vector::Y, Vector::XHat, Vector::YF, Vector::R]);
+        self.take_as(&mut vectors, Vector::FHatI, integral);
+        if controller.d.is_some() {
+            vectors.signals().remove_feedthrough(&design, &state);
+            self.take(&mut vectors, [Vector::Y]);
         }
-        let rows = self.count(statement.target.kind());
-        let mut sum = self.term(statement.start, rows);
-        for operation in &statement.operations {
-            match *operation {
-                Operation::Add(term) => sum.add(&self.term(term, rows), 1.0),
-                Operation::Subtract(term) => sum.add(&self.term(term, rows), -1.0),
-                Operation::Accumulate(matrix, vector) => self.accumulate(&mut sum, matrix, vector),
-                Operation::TimesPeriod => sum.scale(self.controller.sample_time),
+        vectors.signals().set_innovation(&design);
+        self.take(&mut vectors, [Vector::E]);
+        if design.is_current {
+            vectors.signals().correct_states(&design);
+            self.take(&mut vectors, [Vector::XHat]);
+            if controller.sliding_mode.is_some() {
+                vectors.signals().set_sliding_variable(&design);
+                self.take_as(&mut vectors, Vector::FHatI, Vector::S);
+                let mut injected = Elements::zero(self.count(Kind::Fault), self.widths());
+                self.inject(&mut injected);
+                vectors.get_mut(Vector::FHatI).clone_from_slice(&injected.numbers());
+            } else {
+                vectors.signals().correct_faults(&design);
+            }
+            self.take_as(&mut vectors, Vector::FHatI, integral);
+            if has_direct_term {
+                vectors.signals().set_innovation(&design);
+                self.take(&mut vectors, [Vector::E]);
             }
         }
-        self.learn(statement.target, sum);
+        vectors.signals().add_direct_term(&design, true);
+        if has_direct_term {
+            self.take(&mut vectors, [Vector::FHat]);
+        }
+        vectors.signals().set_values(&design, &state);
+        vectors.signals().set_commands(&design, &state, true);
+        self.take(&mut vectors, [Vector::XValue, Vector::FValue, Vector::U]);
+        vectors.signals().set_command_values(&design);
+        self.take(&mut vectors, [Vector::Command]);
+        // Without limits u - v is exactly zero.
+        vectors.get_mut(Vector::Excess).fill(Rounded::zero());
+        vectors.signals().predict_states(&design);
+        vectors.signals().predict_faults(&design, true);
+        vectors.signals().predict_filter(&design);
+        vectors.signals().predict_integrals(&design, &state);
+        self.take(
+            &mut vectors,
+            [Vector::NextXHat, Vector::NextFHat, Vector::NextYF, Vector::NextXI],
+        );
+        if controller.detection.is_some() {
+            let of = |kind| vec![Rounded::zero(); kind];
+            let (mut next, mut residuals) =
+                (of(self.count(Kind::ResidualState)), of(self.count(Kind::Residual)));
+            let x_r = self.get(Vector::StoredXR).numbers();
+            let signals = vectors.signals();
+            let inputs: [&[_]; 3] = [&x_r, signals.u, signals.y];
+            numbers.filter_of_residuals().advance(inputs, false, &mut next, &mut residuals);
+            self.learn(Vector::Residual, Elements::of(&residuals, self.widths()));
+            self.learn(Vector::NextXR, Elements::of(&next, self.widths()));
+        }
     }
 
-    fn accumulate(&self, sum: &mut Elements, matrix: Matrix, vector: Vector) {
-        if let Some(matrix) = matrix.of(self.controller) {
-            sum.accumulate(matrix, &self.get(vector));
+    /// Takes vectors that the equations have computed; their errors become elements of w.
+    fn take<const N: usize>(&mut self, vectors: &mut Vectors<Rounded>, computed: [Vector; N]) {
+        for vector in computed {
+            self.take_as(vectors, vector, vector);
         }
     }
 
-    fn term(&mut self, term: Term, rows: usize) -> Elements {
-        let mut own = Elements::zero(rows, self.widths());
-        match term {
-            Term::Zero => {}
-            Term::Element(vector) => own = self.get(vector),
-            Term::Product(matrix, vector) => {
-                self.accumulate(&mut own, matrix, vector);
-            }
-            Term::FilterStep => {
-                let mut difference = self.get(Vector::Y);
-                difference.add(&self.get(Vector::YF), -1.0);
-                let filter = self.controller.filter.as_deref().unwrap_or_default();
-                let diagonal = DMatrix::from_diagonal(&DVector::from_column_slice(filter));
-                own.accumulate(&diagonal, &difference);
-                own.error += diagonal * difference.error;
-            }
-            Term::Injection => self.inject(&mut own),
+    /// The same for the vector `meaning`, which the equations have in the place of `place`.
+    fn take_as(&mut self, vectors: &mut Vectors<Rounded>, place: Vector, meaning: Vector) {
+        let numbers = vectors.get_mut(place);
+        if numbers.is_empty() {
+            return;
         }
-        own
+        self.learn(meaning, Elements::of(numbers, self.widths()));
+        numbers.clone_from_slice(&self.get(meaning).numbers());
     }
 
     /// Follows rho s / (|s| + delta): the chord of half the largest slope, and v.
@@ -381,7 +539,7 @@ impl<'a> Analysis<'a> {
             let position = self.errors.len();
             own.form.row_mut(i).copy_from(&(s.form.row(i) * half));
             own.form[(i, self.order() + position)] = 1.0;
-            self.errors.push(RowDVector::zeros(self.widths().1));
+            self.errors.push(RowDVector::zeros(self.widths().signals));
             self.chords.push((position, half));
             // Of the product, the sum, the quotient and the constants, relative to the result.
             let relative = 3.0 * UNIT + constant_error(*rho) / rho + constant_error(*delta) / delta;
@@ -419,7 +577,7 @@ impl<'a> Analysis<'a> {
     pub(super) fn contracts(&self, bound: &DMatrix<f64>) -> bool {
         let [n, q, p, m, _, integrals] = Kind::ALL.map(|kind| self.count(kind));
         let residuals = self.count(Kind::Residual);
-        let signals = self.widths().1 - 1;
+        let signals = self.widths().signals - 1;
         let mut all = DMatrix::zeros(signals, signals);
         let mut first = 0;
         for (kind, rows) in [
@@ -445,7 +603,7 @@ impl<'a> Analysis<'a> {
             (Kind::ALL.map(|kind| self.count(kind)), self.order());
         let inputs = self.errors.len();
         let command = self.get(Vector::Command).form;
-        let mut next = DMatrix::zeros(order, self.widths().0);
+        let mut next = DMatrix::zeros(order, self.widths().forms);
         next.view_mut((0, 0), (n, n)).copy_from(&self.controller.a);
         next.rows_mut(0, n).add_assign(&(&self.controller.b * &command));
         if self.controller.filter.is_some() {
@@ -458,7 +616,7 @@ impl<'a> Analysis<'a> {
         next.rows_mut(order - k, k).copy_from(&self.get(Vector::NextXR).form);
         let chords = self.chords.len();
         let sizes = [m, q, residuals, n, p, integrals, chords];
-        let mut outputs = DMatrix::zeros(sizes.iter().sum(), self.widths().0);
+        let mut outputs = DMatrix::zeros(sizes.iter().sum(), self.widths().forms);
         let mut first = 0;
         for (rows, vector) in sizes.into_iter().zip([
             Vector::Command,

@@ -7,7 +7,7 @@ use crate::code::tables::{starts, stored};
 
 impl Source<'_> {
     pub(super) fn structures(&self, lines: &mut Vec<String>) {
-        let Self { controller, recursion: _, fields, real, .. } = self;
+        let Self { controller, fields, real, .. } = self;
         let estimates = fields.estimates(controller);
         let described = [
             descriptions(&controller.measurements),
@@ -109,8 +109,8 @@ pub struct Controller {{"
         if !controller.schedule_inputs().is_empty() {
             lines.push(format!("    theta: [{real}; 1],"));
         }
-        self.detection_state(lines);
-        self.reconfiguration_state(lines);
+        let fields = self.fields_of_tests().into_iter().chain(self.fields_of_reconfiguration());
+        lines.extend(fields.map(|field| format!("    {}: {},", field.name, field.kind)));
         if controller.has_counter() {
             lines.push("    sample: u32,".to_owned());
         }
@@ -128,12 +128,10 @@ pub struct Controller {{"
             Some(_) => format!(
                 "
         let (mut deviations, mut x_r) = (x_hat, [0.0; RESIDUAL_STATES]);
-        for (own, x_op) in deviations.iter_mut().zip(&{x}) {{
-            *own -= *x_op;
+        for (deviation, x_op) in deviations.iter_mut().zip(&{x}) {{
+            *deviation -= *x_op;
         }}
-        for (own, row) in x_r.iter_mut().zip(&START_R) {{
-            *own = 0.0 + product(row, &deviations);
-        }}"
+        Matrix::new(&START_R, STATES).add_product(&deviations, &mut x_r);"
             ),
         };
         lines.push(format!(
@@ -161,8 +159,8 @@ impl Controller {{
         if controller.filter.is_some() {
             lines.push(format!("            y_f: {y},\n            started: false,"));
         }
-        self.detection_start(lines);
-        self.reconfiguration_start(lines);
+        let fields = self.fields_of_tests().into_iter().chain(self.fields_of_reconfiguration());
+        lines.extend(fields.map(|field| format!("            {}: {},", field.name, field.start)));
         if controller.has_counter() {
             lines.push("            sample: 0,".to_owned());
         }
@@ -181,6 +179,96 @@ impl Controller {{
         if let [input] = controller.schedule_inputs() {
             lines.push(format!("            theta: [{}],", self.literal(input.operating)));
         }
-        lines.push(format!("            y: {y},\n            u: {u},\n        }}\n    }}"));
+        lines.push(format!("            y: {y},\n            u: {u},\n        }}\n    }}\n}}"));
+    }
+
+    /// The structure with decision, residuals and statistics of a sample.
+    pub(super) fn detection_structure(&self, lines: &mut Vec<String>) {
+        if self.controller.detection.is_none() {
+            return;
+        }
+        let real = self.real;
+        lines.push(format!(
+            "
+/// Decision, residuals and statistics of a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detection {{
+    /// Whether a test has given an alarm since the last reset.
+    pub detected: bool,
+    /// The position from 1 of the fault that the alarms fit; 0 without an alarm, -1 if they fit none or several.
+    pub isolated: i32,
+    /// The time of the first alarm in s; -1 before.
+    pub t_detected: {real},
+    /// The estimated time in s at which the fault started; -1 before an alarm.
+    pub t_onset: {real},
+    /// The residuals in standard deviations.
+    pub residual: [{real}; RESIDUALS],
+    /// The statistics of the tests.
+    pub statistic: [{real}; TESTS],
+}}
+
+impl Default for Detection {{
+    fn default() -> Self {{
+        Self {{
+            detected: false,
+            isolated: 0,
+            t_detected: -1.0,
+            t_onset: -1.0,
+            residual: [0.0; RESIDUALS],
+            statistic: [0.0; TESTS],
+        }}
+    }}
+}}"
+        ));
+    }
+
+    /// The structure of what is known about the actuators in a sample.
+    pub(super) fn actuators_structure(&self, lines: &mut Vec<String>) {
+        if self.controller.reconfiguration.is_none() {
+            return;
+        }
+        let fields = self.fields.switches(self.controller);
+        let count = fields.len();
+        lines.push(format!(
+            "
+/// Number of [`Actuators`].
+pub const SWITCHES: usize = {count};
+
+/// What is known about the actuators in a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Actuators {{"
+        ));
+        for field in &fields {
+            let text = match field.strip_prefix("gone_") {
+                Some(actuator) => format!("Whether `{actuator}` is gone"),
+                None => {
+                    "Whether an unknown actuator has failed: the gains are those of the fall-back"
+                        .to_owned()
+                }
+            };
+            lines.push(format!("    /// {text}.\n    pub {field}: bool,"));
+        }
+        let values: Vec<_> = (1..=count).map(|k| format!("v{k}")).collect();
+        let pairs: Vec<_> =
+            fields.iter().zip(&values).map(|(field, value)| format!("{field}: {value}")).collect();
+        let reads: Vec<_> = fields.iter().map(|field| format!("own.{field}")).collect();
+        lines.push(format!(
+            "}}
+
+impl From<[bool; SWITCHES]> for Actuators {{
+    fn from([{}]: [bool; SWITCHES]) -> Self {{
+        Self {{ {} }}
+    }}
+}}
+
+impl From<Actuators> for [bool; SWITCHES] {{
+    fn from(own: Actuators) -> Self {{
+        [{}]
+    }}
+}}",
+            values.join(", "),
+            pairs.join(", "),
+            reads.join(", ")
+        ));
     }
 }

@@ -1,0 +1,288 @@
+//! A controller in numbers of any kind, for `aso_controller::sample`.
+
+use aso_controller::design::Estimator;
+use aso_controller::sample::{self, Number, Signals, State};
+
+use super::controller::Controller;
+use super::symbols::{Kind, Matrix, Vector};
+
+/// The numbers of a controller.
+pub(super) struct Numbers<N> {
+    is_current: bool,
+    sample_time: N,
+    /// The matrices that the controller states.
+    matrices: Vec<Entries<N>>,
+    filter: Vec<N>,
+    /// rho and delta.
+    bounds: [Vec<N>; 2],
+    /// The operating point: states, commands, measurements, references.
+    point: [Vec<N>; 4],
+    /// The limits, if there are any.
+    limits: Vec<N>,
+    /// The weights of two points of a schedule.
+    weights: Option<[N; 2]>,
+}
+
+struct Entries<N> {
+    matrix: Matrix,
+    columns: usize,
+    values: Vec<N>,
+    is_scheduled: bool,
+}
+
+impl<N: Number> Numbers<N> {
+    /// The controller with its constants and its operating point as such numbers.
+    pub(super) fn of(
+        controller: &Controller,
+        constant: impl Fn(f64) -> N,
+        point: impl Fn(f64) -> N,
+    ) -> Self {
+        let entries = |matrix: Matrix| {
+            let dense = matrix.stated(controller)?;
+            let rows = dense.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>());
+            Some(Entries {
+                matrix,
+                columns: dense.ncols(),
+                values: rows.map(&constant).collect(),
+                is_scheduled: controller.scheduled(matrix).is_some(),
+            })
+        };
+        let list = |values: &[f64]| values.iter().copied().map(&constant).collect();
+        let bounds = controller.sliding_mode.as_ref();
+        let signals = [
+            &controller.states,
+            &controller.actuators,
+            &controller.measurements,
+            &controller.references,
+        ];
+        let limits = if controller.is_limited() { controller.actuators.len() } else { 0 };
+        Self {
+            is_current: controller.estimator == Estimator::Current,
+            sample_time: constant(controller.sample_time),
+            matrices: Matrix::ALL.into_iter().filter_map(entries).collect(),
+            filter: list(controller.filter.as_deref().unwrap_or_default()),
+            bounds: [bounds.map(|law| &law.rho), bounds.map(|law| &law.delta)]
+                .map(|values| values.map_or_else(Vec::new, |values| list(values))),
+            point: signals
+                .map(|signals| signals.iter().map(|signal| point(signal.operating)).collect()),
+            limits: (0..limits).map(|_| constant(0.0)).collect(),
+            weights: controller.schedule.as_ref().map(|_| [0.5, 0.5].map(constant)),
+        }
+    }
+
+    /// A matrix, [`sample::Matrix::NONE`] if the controller does not state it.
+    pub(super) fn matrix(&self, matrix: Matrix) -> sample::Matrix<'_, N> {
+        let entries = self.matrices.iter().find(|entries| entries.matrix == matrix);
+        let Some(Entries { columns, values, is_scheduled, .. }) = entries else {
+            return sample::Matrix::NONE;
+        };
+        let whole = sample::Matrix::new(values, *columns);
+        match &self.weights {
+            Some(weights) if *is_scheduled => whole.towards(values, weights),
+            _ => whole,
+        }
+    }
+
+    pub(super) fn design(&self) -> sample::Design<'_, N> {
+        let [x_op, u_op, y_op, r_op] = &self.point;
+        let [rho, delta] = &self.bounds;
+        sample::Design {
+            sample_time: &self.sample_time,
+            is_current: self.is_current,
+            a: self.matrix(Matrix::A),
+            b: self.matrix(Matrix::B),
+            c: self.matrix(Matrix::C),
+            d: self.matrix(Matrix::D),
+            f_a: self.matrix(Matrix::FA),
+            a_f: self.matrix(Matrix::AF),
+            p_f: self.matrix(Matrix::PF),
+            k_x: self.matrix(Matrix::KX),
+            k_f: self.matrix(Matrix::KF),
+            l_x: self.matrix(Matrix::LX),
+            l_f: self.matrix(Matrix::LF),
+            h: self.matrix(Matrix::H),
+            k_i: self.matrix(Matrix::KI),
+            f_i: self.matrix(Matrix::FI),
+            l_w: self.matrix(Matrix::LW),
+            n_r: self.matrix(Matrix::NR),
+            filter: &self.filter,
+            rho,
+            delta,
+            x_op,
+            u_op,
+            y_op,
+            r_op,
+            low: [&self.limits, &self.limits],
+            high: [&self.limits, &self.limits],
+        }
+    }
+
+    /// The filter of the residuals.
+    pub(super) fn filter_of_residuals(&self) -> sample::detection::Filter<'_, N> {
+        use Matrix::{ResidualA, ResidualBu, ResidualBy, ResidualC, ResidualDu, ResidualDy};
+        sample::detection::Filter {
+            state: [ResidualA, ResidualBu, ResidualBy].map(|matrix| self.matrix(matrix)),
+            residual: [ResidualC, ResidualDu, ResidualDy].map(|matrix| self.matrix(matrix)),
+        }
+    }
+}
+
+/// The vectors of `sample::Signals` in their order.
+pub(super) const SIGNALS: [Vector; 16] = [
+    Vector::Y,
+    Vector::YF,
+    Vector::R,
+    Vector::E,
+    Vector::XHat,
+    Vector::FHatI,
+    Vector::FHat,
+    Vector::U,
+    Vector::Excess,
+    Vector::Command,
+    Vector::XValue,
+    Vector::FValue,
+    Vector::NextXHat,
+    Vector::NextFHat,
+    Vector::NextYF,
+    Vector::NextXI,
+];
+
+/// The vectors of a sample.
+pub(super) struct Vectors<N>([Vec<N>; 16]);
+
+impl<N: Number> Vectors<N> {
+    /// All of them zero.
+    pub(super) fn zero(controller: &Controller) -> Self {
+        Self(SIGNALS.map(|vector| vec![N::zero(); vector.length(controller)]))
+    }
+
+    pub(super) fn signals(&mut self) -> Signals<'_, N> {
+        let [
+            y,
+            y_f,
+            r,
+            e,
+            x_hat,
+            f_hat_i,
+            f_hat,
+            u,
+            excess,
+            command,
+            x_value,
+            f_value,
+            next_x_hat,
+            next_f_hat,
+            next_y_f,
+            next_x_i,
+        ] = &mut self.0;
+        Signals {
+            y,
+            y_f,
+            r,
+            e,
+            x_hat,
+            f_hat_i,
+            f_hat,
+            u,
+            excess,
+            command,
+            x_value,
+            f_value,
+            next_x_hat,
+            next_f_hat,
+            next_y_f,
+            next_x_i,
+        }
+    }
+
+    /// One of them; empty for a vector that is none of `sample::Signals`.
+    pub(super) fn get_mut(&mut self, vector: Vector) -> &mut [N] {
+        let place = SIGNALS.iter().position(|signal| *signal == vector);
+        place.and_then(|place| self.0.get_mut(place)).map_or(&mut [], |values| values)
+    }
+}
+
+/// What a sample knows from those before it, and its inputs.
+pub(super) struct Memory<N> {
+    /// `x_hat`, `f_hat`, `y_f`, `x_i`, `u_before`, u.
+    stored: [Vec<N>; 6],
+    /// y and r.
+    inputs: [Vec<N>; 2],
+}
+
+impl<N: Number> Memory<N> {
+    /// The numbers of each vector.
+    pub(super) fn of(mut numbers: impl FnMut(Vector) -> Vec<N>) -> Self {
+        use Vector::{
+            Command, Measured, Referred, StoredFHat, StoredU, StoredXHat, StoredXI, StoredYF,
+        };
+        let stored = [StoredXHat, StoredFHat, StoredYF, StoredXI, StoredU, Command];
+        Self { stored: stored.map(&mut numbers), inputs: [Measured, Referred].map(numbers) }
+    }
+
+    pub(super) fn state(&mut self) -> State<'_, N> {
+        let [x_hat, f_hat, y_f, x_i, u_before, u] = &mut self.stored;
+        let [y, r] = &self.inputs;
+        State { x_hat, f_hat, y_f, x_i, u_before, u, y, r }
+    }
+}
+
+impl Vector {
+    /// The number of its elements; 0 if the design does not have it.
+    pub(super) fn length(self, controller: &Controller) -> usize {
+        let is_stated = match self {
+            Self::YF | Self::NextYF | Self::StoredYF => controller.filter.is_some(),
+            Self::Excess => controller.l_w.is_some(),
+            Self::StoredU => controller.d.is_some(),
+            _ => true,
+        };
+        if is_stated { self.kind().count(controller) } else { 0 }
+    }
+
+    /// The vectors of `sample::Signals` that a design has.
+    pub(super) fn of_sample(controller: &Controller) -> impl Iterator<Item = Self> {
+        SIGNALS.into_iter().filter(|vector| vector.length(controller) > 0)
+    }
+}
+
+impl Matrix {
+    /// The matrix of a controller, if it states it: `A_f` not where faults are constant.
+    fn stated(self, controller: &Controller) -> Option<&nalgebra::DMatrix<f64>> {
+        self.of(controller).filter(|_| self != Self::AF || !controller.constant_faults)
+    }
+
+    /// The matrices that a controller states.
+    pub(super) fn all_stated(controller: &Controller) -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|matrix| matrix.stated(controller).is_some())
+    }
+
+    /// What its rows and columns belong to.
+    pub(super) fn kinds(self) -> [Kind; 2] {
+        use Kind::{
+            Actuator, Fault, Integral, Measurement, Reference, Residual, ResidualState, State,
+        };
+        match self {
+            Self::A => [State, State],
+            Self::B => [State, Actuator],
+            Self::C => [Measurement, State],
+            Self::D => [Measurement, Actuator],
+            Self::FA => [State, Fault],
+            Self::AF => [Fault, Fault],
+            Self::KX => [Actuator, State],
+            Self::KF => [Actuator, Fault],
+            Self::LX => [State, Measurement],
+            Self::LF | Self::PF => [Fault, Measurement],
+            Self::H => [Integral, Measurement],
+            Self::KI => [Actuator, Integral],
+            Self::FI => [Integral, Fault],
+            Self::LW => [Integral, Actuator],
+            Self::NR => [Actuator, Reference],
+            Self::ResidualA => [ResidualState, ResidualState],
+            Self::ResidualBu => [ResidualState, Actuator],
+            Self::ResidualBy => [ResidualState, Measurement],
+            Self::ResidualC => [Residual, ResidualState],
+            Self::ResidualDu => [Residual, Actuator],
+            Self::ResidualDy => [Residual, Measurement],
+        }
+    }
+}
