@@ -57,7 +57,7 @@ pub(crate) struct Options {
     json: bool,
     /// Also write the controller as C99
     ///
-    /// Needs a sampled design; the files are NAME.h, NAME.c and aso_controller.h in this folder.
+    /// Needs a sampled design; the files are NAME.h, NAME.c and `aso_controller.h` in this folder.
     #[arg(long, value_name = "FOLDER", group = "code", help_heading = "Source code")]
     c_code: Option<PathBuf>,
     /// Also write it as a Rust crate without std

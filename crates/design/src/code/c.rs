@@ -127,34 +127,40 @@ impl Source<'_> {
         };
         lines.push(format!("static const {} {name}{sizes} =", self.real));
         lines.push("{".to_owned());
+        let mut indent = "    ".to_owned();
         if layers.is_some() {
+            indent.push_str("    ");
             for rows in values.chunks(count) {
                 lines.push("    {".to_owned());
-                self.rows(lines, rows, ("        ", columns.is_some()));
+                self.rows(lines, rows, &indent);
                 lines.push("    },".to_owned());
             }
             end_list(lines);
+        } else if columns.is_some() {
+            self.rows(lines, values, &indent);
         } else {
-            self.rows(lines, values, ("    ", columns.is_some()));
+            for row in values {
+                lines.extend(self.numbers(row, &indent));
+            }
         }
         lines.push("};".to_owned());
     }
 
-    /// The rows of a matrix, or the one of a vector.
-    fn rows(&self, lines: &mut Vec<String>, rows: &[Vec<f64>], (indent, is_matrix): (&str, bool)) {
+    /// Numbers without a comma after the last one.
+    fn numbers(&self, values: &[f64], indent: &str) -> Vec<String> {
+        let mut lines = wrapped(values.iter().map(|value| self.literal(*value)), indent);
+        end_list(&mut lines);
+        lines
+    }
+
+    /// The rows of a matrix.
+    fn rows(&self, lines: &mut Vec<String>, rows: &[Vec<f64>], indent: &str) {
         for row in rows {
-            let numbers = row.iter().map(|value| self.literal(*value));
-            let inner = if is_matrix { format!("{indent}    ") } else { indent.to_owned() };
-            let mut wrapped = wrapped(numbers, &inner);
-            if is_matrix {
-                end_list(&mut wrapped);
-            }
-            match (is_matrix, wrapped.as_slice()) {
-                (false, _) => lines.extend(wrapped),
-                (true, [only]) => lines.push(format!("{indent}{{{}}},", only.trim())),
-                (true, _) => {
+            match self.numbers(row, &format!("{indent}    ")).as_slice() {
+                [only] => lines.push(format!("{indent}{{{}}},", only.trim())),
+                several => {
                     lines.push(format!("{indent}{{"));
-                    lines.extend(wrapped);
+                    lines.extend_from_slice(several);
                     lines.push(format!("{indent}}},"));
                 }
             }

@@ -1,5 +1,4 @@
-//! The detection of a controller: the filter of the residuals is part of the recursion, the tests and the
-//! decision are here as data. `fmu-controller/src/detection.rs` has the equations.
+//! The detection of a controller: its matrices and tests as data. `fmu-controller/src/detection.rs` has the equations.
 
 use aso_controller::design::detection::{DetectionDesign, TestDesign};
 use nalgebra::DMatrix;
@@ -121,7 +120,7 @@ impl Detection {
         all
     }
 
-    /// The real numbers of an instance besides the vectors of the recursion: statistics and sums.
+    /// The real numbers of an instance besides the vectors of the filter: statistics and sums.
     pub(super) fn stored(&self) -> usize {
         self.tests.len()
             + if self.method == Method::Cusum { 2 * self.tests.len() } else { self.c.nrows() }

@@ -69,11 +69,11 @@ impl Chart<'_> {
         let ((left, right), (bottom, top)) = (self.x.pixels(), self.y.pixels());
         html! {
             @for (at, label) in self.x.ticks() {
-                (line((self.x.place(at), top), (self.x.place(at), bottom), "grid"))
+                (line([self.x.place(at), top], [self.x.place(at), bottom], "grid"))
                 text.tick.middle x=(tenth(self.x.place(at))) y=(bottom + 16.0) { (label) }
             }
             @for (at, label) in self.y.ticks() {
-                (line((left, self.y.place(at)), (right, self.y.place(at)), "grid"))
+                (line([left, self.y.place(at)], [right, self.y.place(at)], "grid"))
                 text.tick.end x=(left - 6.0) y=(tenth(self.y.place(at) + 4.0)) { (label) }
             }
         }
@@ -106,17 +106,18 @@ impl Chart<'_> {
     /// Draws a vertical line.
     pub(super) fn upright(&self, at: f64, class: &str) -> Markup {
         let ((bottom, top), x) = (self.y.pixels(), self.x.place(at));
-        html! { @if self.x.contains(at) { (line((x, top), (x, bottom), class)) } }
+        html! { @if self.x.contains(at) { (line([x, top], [x, bottom], class)) } }
     }
 
     /// Draws a horizontal line.
     pub(super) fn level(&self, at: f64, class: &str) -> Markup {
         let ((left, right), y) = (self.x.pixels(), self.y.place(at));
-        html! { @if self.y.contains(at) { (line((left, y), (right, y), class)) } }
+        html! { @if self.y.contains(at) { (line([left, y], [right, y], class)) } }
     }
 }
 
-pub(super) fn line((x1, y1): (f64, f64), (x2, y2): (f64, f64), class: &str) -> Markup {
+/// Draws a line between two points `[x, y]`.
+pub(super) fn line([x1, y1]: [f64; 2], [x2, y2]: [f64; 2], class: &str) -> Markup {
     html! { line.(class) x1=(tenth(x1)) y1=(tenth(y1)) x2=(tenth(x2)) y2=(tenth(y2)) {} }
 }
 
@@ -138,5 +139,5 @@ pub(super) fn legend(entries: &[(Markup, String)]) -> Markup {
 
 /// Draws a sample line for a legend.
 pub(super) fn line_sample(class: &str) -> Markup {
-    line((1.0, 9.0), (29.0, 9.0), class)
+    line([1.0, 9.0], [29.0, 9.0], class)
 }

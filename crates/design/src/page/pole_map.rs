@@ -74,7 +74,7 @@ impl Map<'_> {
     /// Returns axes that contain the unit circle and all eigenvalues.
     fn sampled_view(&self) -> (Axis, Axis) {
         let reach = self.poles().flatten().fold(1.0, |most: f64, part| most.max(part.abs()));
-        let (wide, tall) = (size_of(SIZE.horizontal()), size_of(SIZE.vertical()));
+        let (wide, tall) = (extent(SIZE.horizontal().into()), extent(SIZE.vertical().into()));
         let (x, y) = (1.12 * reach * wide / tall, 1.12 * reach);
         (Axis::exact(-x, x, SIZE.horizontal(), 5), Axis::exact(-y, y, SIZE.vertical(), 5))
     }
@@ -100,7 +100,7 @@ impl Map<'_> {
             let marks = [disc.0 - disc.1, disc.0 + disc.1, -region.decay.unwrap_or(0.0)];
             (left, right) = ends(marks.into_iter().chain([left, right]));
         }
-        let (wide, tall) = (size_of(SIZE.horizontal()), size_of(SIZE.vertical()));
+        let (wide, tall) = (extent(SIZE.horizontal().into()), extent(SIZE.vertical().into()));
         let pixel = (1.24 * (right - left) / wide).max(2.4 * high.max(-low) / tall);
         let (center, reach) = (f64::midpoint(left, right), 0.5 * pixel * wide);
         (
@@ -206,6 +206,6 @@ fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
     })
 }
 
-fn size_of((first, last): (f64, f64)) -> f64 {
+fn extent([first, last]: [f64; 2]) -> f64 {
     (last - first).abs()
 }

@@ -17,36 +17,17 @@ impl Source<'_> {
         self.tables_of_losses(lines);
     }
 
-    fn numbers(
-        &self,
-        lines: &mut Vec<String>,
-        (name, size): (&str, &str),
-        values: impl Iterator<Item = usize>,
-    ) {
-        lines.push(format!("static const uint32_t {name}[{size}] =\n{{"));
-        lines.extend(wrapped(values.map(|value| format!("{value}U")), "    "));
-        end_list(lines);
-        lines.push("};".to_owned());
-    }
-
-    fn flags(&self, lines: &mut Vec<String>, head: &str, rows: impl Iterator<Item = Vec<String>>) {
-        lines.push(format!("static const bool {head} =\n{{"));
-        lines.extend(rows.map(|row| format!("    {{{}}},", row.join(", "))));
-        end_list(lines);
-        lines.push("};".to_owned());
-    }
-
     fn tables_of_tests(&self, lines: &mut Vec<String>, own: &Detection) {
         let (tests, suspects) = (self.count(Kind::Test), self.count(Kind::Suspect));
         if own.method == Method::Window {
             let of_tests = own.tests.iter();
             let residuals = |test: &Test| test.residuals;
-            self.numbers(lines, ("taken_residuals", &tests), of_tests.clone().map(residuals));
+            numbers(lines, ["taken_residuals", &tests], of_tests.clone().map(residuals));
             let samples = |test: &Test| test.window as usize;
-            self.numbers(lines, ("window", &tests), of_tests.map(samples));
+            numbers(lines, ["window", &tests], of_tests.map(samples));
         }
         lines.push("\n/* Which tests react to each fault. */".to_owned());
-        self.flags(lines, &format!("reacts[{suspects}][{tests}]"), reactions(own).into_iter());
+        flags(lines, &format!("reacts[{suspects}][{tests}]"), reactions(own).into_iter());
     }
 
     fn tables_of_reconfiguration(&self, lines: &mut Vec<String>, own: &Reconfiguration) {
@@ -55,7 +36,7 @@ impl Source<'_> {
         let row = |row: &[bool]| row.iter().map(bool::to_string).collect();
         lines.push("\n/* The actuators without which each set of gains is. */".to_owned());
         let gone = own.sets.iter().map(|own| row(&own.gone));
-        self.flags(lines, &format!("set_gone[{sets}][{actuators}]"), gone);
+        flags(lines, &format!("set_gone[{sets}][{actuators}]"), gone);
         if own.cases.is_empty() {
             return;
         }
@@ -63,24 +44,24 @@ impl Source<'_> {
             let text = "The set of gains without one actuator; 0 if there is none.";
             lines.push(format!("\n/* {text} */"));
             let singles = own.single_sets(self.controller.actuators.len());
-            self.numbers(lines, ("single_set", &actuators), singles.into_iter());
+            numbers(lines, ["single_set", &actuators], singles.into_iter());
         }
         let text = "The actuators that may be gone; the samples for which a loss must last; the loss, or the number \
                     of losses.";
         lines.push(format!("\n/* {text} */"));
         let of_cases = own.cases.iter();
         let place = |case: &Case| case.actuator;
-        self.numbers(lines, ("case_actuator", &cases), of_cases.clone().map(place));
+        numbers(lines, ["case_actuator", &cases], of_cases.clone().map(place));
         let samples = |case: &Case| case.decision.map_or(0, |own| own.2 as usize);
-        self.numbers(lines, ("case_samples", &cases), of_cases.clone().map(samples));
+        numbers(lines, ["case_samples", &cases], of_cases.clone().map(samples));
         let losses = self.controller.losses.len();
         if losses > 0 {
             let loss = |case: &Case| case.decision.map_or(losses, |own| own.0);
-            self.numbers(lines, ("case_loss", &cases), of_cases.clone().map(loss));
+            numbers(lines, ["case_loss", &cases], of_cases.clone().map(loss));
         }
         lines.push("\n/* The faults whose estimates restart at 0. */".to_owned());
         let restarts = of_cases.map(|own| row(&own.restarts));
-        self.flags(lines, &format!("case_restarts[{cases}][{faults}]"), restarts);
+        flags(lines, &format!("case_restarts[{cases}][{faults}]"), restarts);
     }
 
     fn tables_of_losses(&self, lines: &mut Vec<String>) {
@@ -92,9 +73,9 @@ impl Source<'_> {
             "\n/* Faults and actuators of the losses of effectiveness, and u_e^2. */".to_owned(),
         );
         let fault = |loss: &Loss| loss.fault;
-        self.numbers(lines, ("loss_fault", "ASO_LOSSES"), losses.iter().map(fault));
+        numbers(lines, ["loss_fault", "ASO_LOSSES"], losses.iter().map(fault));
         let actuator = |loss: &Loss| loss.actuator;
-        self.numbers(lines, ("loss_actuator", "ASO_LOSSES"), losses.iter().map(actuator));
+        numbers(lines, ["loss_actuator", "ASO_LOSSES"], losses.iter().map(actuator));
         let squared =
             losses.iter().map(|loss| self.literal(loss.least_command * loss.least_command));
         lines.push(format!("static const {} squared_least_command[ASO_LOSSES] =\n{{", self.real));
@@ -102,6 +83,22 @@ impl Source<'_> {
         end_list(lines);
         lines.push("};".to_owned());
     }
+}
+
+/// A table of whole numbers with this name and size.
+fn numbers(lines: &mut Vec<String>, [name, size]: [&str; 2], values: impl Iterator<Item = usize>) {
+    lines.push(format!("static const uint32_t {name}[{size}] =\n{{"));
+    lines.extend(wrapped(values.map(|value| format!("{value}U")), "    "));
+    end_list(lines);
+    lines.push("};".to_owned());
+}
+
+/// A table of truth values.
+fn flags(lines: &mut Vec<String>, head: &str, rows: impl Iterator<Item = Vec<String>>) {
+    lines.push(format!("static const bool {head} =\n{{"));
+    lines.extend(rows.map(|row| format!("    {{{}}},", row.join(", "))));
+    end_list(lines);
+    lines.push("};".to_owned());
 }
 
 /// For each fault whether each test reacts to it, as C and Rust write it.

@@ -37,11 +37,12 @@ impl Source<'_> {
         ] {
             if !fields.is_empty() {
                 parameters.extend([" ", name, ": &", owner, ","]);
-                inputs.push_str(&format!(
+                let input = format!(
                     "
         let {name}: [{real}; {count}] = (*{name}).into();
         status.held |= take(&mut self.{stored}, &{name});"
-                ));
+                );
+                inputs.push_str(&input);
             }
         }
         if controller.reconfiguration.is_some() {
@@ -385,11 +386,11 @@ impl Controller {{
         outcomes.widen(&mut self.tests, &mut sums, &COUNTS, &LENGTHS, self.sample);"
             }
         };
-        let clear: String = self
-            .fields_of_tests()
-            .into_iter()
+        let fields = self.fields_of_tests().into_iter();
+        let clear: Vec<_> = fields
             .map(|field| format!("\n            self.{} = {};", field.name, field.start))
             .collect();
+        let clear = clear.concat();
         lines.push(format!(
             "
     /// Tests the residuals of a sample.
