@@ -97,21 +97,20 @@ pub fn all_finite<N: Number>(vector: &[N]) -> bool {
     vector.iter().all(N::is_finite)
 }
 
-/// A matrix by rows. Between two points of a schedule it is the sum of both matrices with their weights.
+/// A matrix, row by row. Between two points of a schedule it is the sum of both matrices with their weights.
 #[derive(Clone, Copy)]
 pub struct Matrix<'a, N> {
     entries: &'a [N],
-    columns: usize,
     next: Option<(&'a [N], &'a [N; 2])>,
 }
 
 impl<'a, N> Matrix<'a, N> {
     /// A matrix that a design does not state.
-    pub const NONE: Self = Self { entries: &[], columns: 1, next: None };
+    pub const NONE: Self = Self::new(&[]);
 
     /// The matrix with these entries, row by row.
-    pub const fn new(entries: &'a [N], columns: usize) -> Self {
-        Self { entries, columns, next: None }
+    pub const fn new(entries: &'a [N]) -> Self {
+        Self { entries, next: None }
     }
 
     /// The sum of this matrix and another one with the entries `next`, with the weights of both.
@@ -148,8 +147,8 @@ impl<N: Number> Matrix<'_, N> {
         self.for_each_row(vector, target, N::clone, |_, sum| sum);
     }
 
-    /// `target[i]` = `end(target[i]`, the sum of the products of row i from `start(target[i])` on). -0 + x has the
-    /// bits of x.
+    /// `target[i]` = `end(target[i]`, the sum of the products of row i from `start(target[i])` on), where the design states
+    /// the matrix. A row is as long as the vector. -0 + x has the bits of x.
     #[inline]
     fn for_each_row(
         &self,
@@ -158,22 +157,23 @@ impl<N: Number> Matrix<'_, N> {
         start: impl Fn(&N) -> N,
         end: impl Fn(N, N) -> N,
     ) {
-        let columns = self.columns.max(1);
-        let targets = target.iter_mut().zip(self.entries.chunks_exact(columns));
+        let mut entries = self.entries.iter();
+        let targets = target.iter_mut().filter(|_| self.is_stated());
         match self.next {
             None => {
-                for (target, row) in targets {
-                    let terms = row.iter().zip(vector);
-                    let sum = terms.fold(start(target), |sum, (entry, element)| {
+                for target in targets {
+                    let terms = vector.iter().zip(&mut entries);
+                    let sum = terms.fold(start(target), |sum, (element, entry)| {
                         sum + entry.clone() * element.clone()
                     });
                     *target = end(target.clone(), sum);
                 }
             }
             Some((next, [before, after])) => {
-                for ((target, low), high) in targets.zip(next.chunks_exact(columns)) {
-                    let terms = low.iter().zip(high).zip(vector);
-                    let sum = terms.fold(start(target), |sum, ((low, high), element)| {
+                let mut entries = entries.zip(next);
+                for target in targets {
+                    let terms = vector.iter().zip(&mut entries);
+                    let sum = terms.fold(start(target), |sum, (element, (low, high))| {
                         let entry = low.clone() * before.clone() + high.clone() * after.clone();
                         sum + entry * element.clone()
                     });

@@ -125,13 +125,13 @@ impl<N: Number> Signals<'_, N> {
     /// u = u + `K_s` `u_stuck`; the command of an actuator that is gone is the one at which it is stuck.
     pub fn add_stuck(&mut self, design: &Design<'_, N>, stuck: &Stuck<'_, N>) {
         let [deviations, values] = stuck.commands;
-        let rows = stuck.k_s.entries.chunks_exact(stuck.k_s.columns.max(1));
-        let commands = self.u.iter_mut().zip(self.command.iter_mut()).zip(rows).zip(stuck.gone);
+        let mut gains = stuck.k_s.entries.iter();
+        let commands = self.u.iter_mut().zip(self.command.iter_mut()).zip(stuck.gone);
         let points = deviations.iter().zip(values).zip(design.u_op);
-        for ((((u, command), row), gone), ((deviation, value), u_op)) in commands.zip(points) {
-            let gains = row.iter().zip(deviations).zip(stuck.without);
-            let gains = gains.filter(|(_, without)| **without);
-            let sum = gains.fold(-N::zero(), |sum, ((gain, deviation), _)| {
+        for (((u, command), gone), ((deviation, value), u_op)) in commands.zip(points) {
+            let terms = deviations.iter().zip(stuck.without).zip(&mut gains);
+            let terms = terms.filter(|((_, without), _)| **without);
+            let sum = terms.fold(-N::zero(), |sum, ((deviation, _), gain)| {
                 sum + gain.clone() * deviation.clone()
             });
             if *gone {

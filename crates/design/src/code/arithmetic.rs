@@ -153,7 +153,7 @@ fn take_sample(controller: &Controller) {
         let most = reconfiguration.most_gone();
         let without: Vec<_> = (0..actuators).map(|actuator| actuator < most).collect();
         let stuck = Stuck {
-            k_s: sample::Matrix::new(&gains, actuators),
+            k_s: sample::Matrix::new(&gains),
             without: &without,
             gone: &vec![false; actuators],
             commands: [&commands, &commands],

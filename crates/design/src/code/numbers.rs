@@ -25,7 +25,6 @@ pub(super) struct Numbers<N> {
 
 struct Entries<N> {
     matrix: Matrix,
-    columns: usize,
     values: Vec<N>,
     is_scheduled: bool,
 }
@@ -42,7 +41,6 @@ impl<N: Number> Numbers<N> {
             let rows = dense.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>());
             Some(Entries {
                 matrix,
-                columns: dense.ncols(),
                 values: rows.map(&constant).collect(),
                 is_scheduled: controller.scheduled(matrix).is_some(),
             })
@@ -73,10 +71,10 @@ impl<N: Number> Numbers<N> {
     /// A matrix, [`sample::Matrix::NONE`] if the controller does not state it.
     pub(super) fn matrix(&self, matrix: Matrix) -> sample::Matrix<'_, N> {
         let entries = self.matrices.iter().find(|entries| entries.matrix == matrix);
-        let Some(Entries { columns, values, is_scheduled, .. }) = entries else {
+        let Some(Entries { values, is_scheduled, .. }) = entries else {
             return sample::Matrix::NONE;
         };
-        let whole = sample::Matrix::new(values, *columns);
+        let whole = sample::Matrix::new(values);
         match &self.weights {
             Some(weights) if *is_scheduled => whole.towards(values, weights),
             _ => whole,

@@ -176,7 +176,6 @@ impl Controller {{
     fn design(&self, lines: &mut Vec<String>) {
         let controller = self.controller;
         let stated: Vec<_> = Matrix::all_stated(controller).collect();
-        let columns = |matrix: Matrix| stated.contains(&matrix).then(|| matrix.kinds()[1]);
         let is_scheduled = controller.schedule.is_some();
         lines.push(
             "        let design = Design {\n            sample_time: &SAMPLE_TIME,".to_owned(),
@@ -186,18 +185,14 @@ impl Controller {{
         for matrix in Matrix::OF_SAMPLE {
             let (name, table) =
                 (matrix.name().to_ascii_lowercase(), matrix.name().to_ascii_uppercase());
-            let value = match columns(matrix) {
-                None => "Matrix::NONE".to_owned(),
-                Some(kind) if controller.scheduled(matrix).is_some() => {
-                    format!("at_place(&{table}, at, {}, &weights)", kind.plural())
-                }
-                Some(kind) if controller.chosen(matrix).is_some() => {
-                    format!(
-                        "Matrix::new(of_set(&{table}, self.choice.set).as_slice(), {})",
-                        kind.plural()
-                    )
-                }
-                Some(kind) => format!("Matrix::new(&{table}, {})", kind.plural()),
+            let value = if !stated.contains(&matrix) {
+                "Matrix::NONE".to_owned()
+            } else if controller.scheduled(matrix).is_some() {
+                format!("at_place(&{table}, at, &weights)")
+            } else if controller.chosen(matrix).is_some() {
+                format!("Matrix::new(of_set(&{table}, self.choice.set))")
+            } else {
+                format!("Matrix::new(&{table})")
             };
             lines.push(format!("            {name}: {value},"));
         }
@@ -273,8 +268,8 @@ impl Controller {{
         let gone = if controller.reconfiguration.is_some() {
             lines.push(
                 "        let stuck = Stuck {
-            k_s: Matrix::new(of_set(&K_S, self.choice.set).as_slice(), ACTUATORS),
-            without: of_set(&SET_GONE, self.choice.set).as_slice(),
+            k_s: Matrix::new(of_set(&K_S, self.choice.set)),
+            without: of_set(&SET_GONE, self.choice.set),
             gone: &self.gone,
             commands: [&U_STUCK, &STUCK_AT],
         };
@@ -475,11 +470,10 @@ fn between<const N: usize>(table: &[[{real}; N]; POINTS], at: usize, weights: [{
 fn at_place<'a, const N: usize>(
     table: &'a [[{real}; N]; POINTS],
     at: usize,
-    columns: usize,
     weights: &'a [{real}; 2],
 ) -> Matrix<'a, {real}> {{
     let [low, high] = ends(table, at);
-    Matrix::new(low, columns).towards(high, weights)
+    Matrix::new(low).towards(high, weights)
 }}"
         ));
     }

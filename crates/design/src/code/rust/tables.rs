@@ -66,14 +66,14 @@ impl Source<'_> {
             "
 static RESIDUAL_FILTER: Filter<'static, {}> = Filter {{
     state: [
-        Matrix::new(&A_R, RESIDUAL_STATES),
-        Matrix::new(&B_RU, ACTUATORS),
-        Matrix::new(&B_RY, MEASUREMENTS),
+        Matrix::new(&A_R),
+        Matrix::new(&B_RU),
+        Matrix::new(&B_RY),
     ],
     residual: [
-        Matrix::new(&C_R, RESIDUAL_STATES),
-        Matrix::new(&D_RU, ACTUATORS),
-        Matrix::new(&D_RY, MEASUREMENTS),
+        Matrix::new(&C_R),
+        Matrix::new(&D_RU),
+        Matrix::new(&D_RY),
     ],
 }};",
             self.real
@@ -110,7 +110,7 @@ fn sets() -> Sets<'static, ACTUATORS> {{
 }}
 
 /// An entry of a table of the sets of gains.
-fn of_set<T>(table: &[T; GAIN_SETS], set: u32) -> &T {{
+fn of_set<T, const N: usize>(table: &[[T; N]; GAIN_SETS], set: u32) -> &[T] {{
     let [intact, ..] = table;
     table.get(set as usize).unwrap_or(intact)
 }}",

@@ -131,7 +131,7 @@ pub struct Controller {{"
         for (deviation, x_op) in deviations.iter_mut().zip(&{x}) {{
             *deviation -= *x_op;
         }}
-        Matrix::new(&START_R, STATES).add_product(&deviations, &mut x_r);"
+        Matrix::new(&START_R).add_product(&deviations, &mut x_r);"
             ),
         };
         lines.push(format!(
