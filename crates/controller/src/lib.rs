@@ -5,6 +5,10 @@ mod channel;
 pub mod design;
 mod interpolation;
 mod matrix;
+#[expect(
+    clippy::inline_always,
+    reason = "in one function the compiler knows all sizes, and what a design lacks goes"
+)]
 pub mod sample;
 
 pub use channel::{channel, channels};

@@ -19,7 +19,8 @@
 //! after it. Without `P_f` the estimate `f_hat` is `f_hat_i`; each other term is there where the design states its matrix.
 //!
 //! Every sum has its terms in the order of its equation, so that the results have the bits of the controller FMU. Nothing
-//! here allocates, indexes or panics.
+//! here allocates, indexes or panics. All of it is inlined into the step of a design: there the compiler knows every size, and
+//! leaves out what the design does not have.
 
 pub mod detection;
 pub mod reconfiguration;
@@ -109,18 +110,21 @@ impl<'a, N> Matrix<'a, N> {
     pub const NONE: Self = Self::new(&[]);
 
     /// The matrix with these entries, row by row.
+    #[inline(always)]
     pub const fn new(entries: &'a [N]) -> Self {
         Self { entries, next: None }
     }
 
     /// The sum of this matrix and another one with the entries `next`, with the weights of both.
     #[must_use]
+    #[inline(always)]
     pub const fn towards(self, next: &'a [N], weights: &'a [N; 2]) -> Self {
         Self { next: Some((next, weights)), ..self }
     }
 
     /// Whether the design states it.
     #[must_use]
+    #[inline(always)]
     pub const fn is_stated(&self) -> bool {
         !self.entries.is_empty()
     }
@@ -128,28 +132,32 @@ impl<'a, N> Matrix<'a, N> {
 
 impl<N: Number> Matrix<'_, N> {
     /// `target[i]` = row i times the vector.
+    #[inline(always)]
     pub fn set_product(&self, vector: &[N], target: &mut [N]) {
         self.for_each_row(vector, target, |_| -N::zero(), |_, product| product);
     }
 
     /// `target[i]` = `target[i]` + (row i times the vector).
+    #[inline(always)]
     pub fn add_product(&self, vector: &[N], target: &mut [N]) {
         self.for_each_row(vector, target, |_| -N::zero(), |sum, product| sum + product);
     }
 
     /// `target[i]` = `target[i]` - (row i times the vector).
+    #[inline(always)]
     pub fn subtract_product(&self, vector: &[N], target: &mut [N]) {
         self.for_each_row(vector, target, |_| -N::zero(), |sum, product| sum - product);
     }
 
     /// Adds the products of row i and the vector to `target[i]`, one after the other.
+    #[inline(always)]
     pub fn accumulate(&self, vector: &[N], target: &mut [N]) {
         self.for_each_row(vector, target, N::clone, |_, sum| sum);
     }
 
     /// `target[i]` = `end(target[i]`, the sum of the products of row i from `start(target[i])` on), where the design states
     /// the matrix. A row is as long as the vector. -0 + x has the bits of x.
-    #[inline]
+    #[inline(always)]
     fn for_each_row(
         &self,
         vector: &[N],
@@ -329,6 +337,7 @@ fn copy<N: Number>(values: &[N], target: &mut [N]) {
 
 impl<N: Number> Signals<'_, N> {
     /// Signals as deviations from the operating point.
+    #[inline(always)]
     pub fn set_deviations(&mut self, design: &Design<'_, N>, state: &State<'_, N>) {
         subtract(state.y, design.y_op, self.y);
         add_zero(self.y);
@@ -340,32 +349,38 @@ impl<N: Number> Signals<'_, N> {
     }
 
     /// y = y - D u of the sample before
+    #[inline(always)]
     pub fn remove_feedthrough(&mut self, design: &Design<'_, N>, state: &State<'_, N>) {
         design.d.subtract_product(state.u_before, self.y);
     }
 
     /// e = y - C `x_hat`; with a filter, `y_f` - C `x_hat`
+    #[inline(always)]
     pub fn set_innovation(&mut self, design: &Design<'_, N>) {
         copy(if design.filter.is_empty() { self.y } else { self.y_f }, self.e);
         design.c.subtract_product(self.x_hat, self.e);
     }
 
     /// `x_hat` = `x_hat` + `L_x` e
+    #[inline(always)]
     pub fn correct_states(&mut self, design: &Design<'_, N>) {
         design.l_x.accumulate(self.e, self.x_hat);
     }
 
     /// `f_hat_i` = `f_hat_i` + `L_f` e
+    #[inline(always)]
     pub fn correct_faults(&mut self, design: &Design<'_, N>) {
         design.l_f.accumulate(self.e, self.f_hat_i);
     }
 
     /// s = `L_f` e of a sliding-mode law, in place of `f_hat_i`
+    #[inline(always)]
     pub fn set_sliding_variable(&mut self, design: &Design<'_, N>) {
         design.l_f.set_product(self.e, self.f_hat_i);
     }
 
     /// `f_hat_i` = rho s / (|s| + delta), element by element; `f_hat_i` has s before
+    #[inline(always)]
     pub fn inject(&mut self, design: &Design<'_, N>) {
         for ((f_hat, rho), delta) in self.f_hat_i.iter_mut().zip(design.rho).zip(design.delta) {
             let s = f_hat.clone();
@@ -375,6 +390,7 @@ impl<N: Number> Signals<'_, N> {
     }
 
     /// `f_hat` = `f_hat_i` + `P_f` e while estimating, else `f_hat_i`
+    #[inline(always)]
     pub fn add_direct_term(&mut self, design: &Design<'_, N>, estimating: bool) {
         copy(self.f_hat_i, self.f_hat);
         if estimating {
@@ -383,6 +399,7 @@ impl<N: Number> Signals<'_, N> {
     }
 
     /// The estimates as values. Those of a predictor are the ones that it was given.
+    #[inline(always)]
     pub fn set_values(&mut self, design: &Design<'_, N>, state: &State<'_, N>) {
         copy(self.f_hat, self.f_value);
         if design.is_current {
@@ -397,6 +414,7 @@ impl<N: Number> Signals<'_, N> {
     }
 
     /// u = `K_x` `x_hat` + `K_f` `f_hat` + `K_i` `x_i` + `N_r` r, the second term while compensating; limits ignored
+    #[inline(always)]
     pub fn set_commands(
         &mut self,
         design: &Design<'_, N>,
@@ -413,12 +431,14 @@ impl<N: Number> Signals<'_, N> {
     }
 
     /// The commands as values.
+    #[inline(always)]
     pub fn set_command_values(&mut self, design: &Design<'_, N>) {
         copy(self.u, self.command);
         add(design.u_op, self.command);
     }
 
     /// Keeps the commands within their limits; an actuator that is gone has none. Returns whether one is at a limit.
+    #[inline(always)]
     pub fn limit(&mut self, design: &Design<'_, N>, gone: &[bool]) -> bool {
         let ([low, min], [high, max]) = (design.low, design.high);
         let limits = low.iter().zip(min).zip(high.iter().zip(max));
@@ -441,6 +461,7 @@ impl<N: Number> Signals<'_, N> {
     }
 
     /// `x_hat`' = A `x_hat` + B u + `F_a` `f_hat_i` + `L_x` e, the last term of a predictor only
+    #[inline(always)]
     pub fn predict_states(&mut self, design: &Design<'_, N>) {
         design.a.set_product(self.x_hat, self.next_x_hat);
         design.b.add_product(self.u, self.next_x_hat);
@@ -452,6 +473,7 @@ impl<N: Number> Signals<'_, N> {
     }
 
     /// `f_hat_i`' = `A_f` `f_hat_i` + `L_f` e while estimating, else `f_hat_i`; the last term of a predictor only
+    #[inline(always)]
     pub fn predict_faults(&mut self, design: &Design<'_, N>, estimating: bool) {
         copy(self.f_hat_i, self.next_f_hat);
         if estimating {
@@ -470,6 +492,7 @@ impl<N: Number> Signals<'_, N> {
     }
 
     /// `y_f`' = W (y - `y_f`) + `y_f`
+    #[inline(always)]
     pub fn predict_filter(&mut self, design: &Design<'_, N>) {
         let gains = self.next_y_f.iter_mut().zip(design.filter);
         for ((next, gain), (y, y_f)) in gains.zip(self.y.iter().zip(self.y_f.iter())) {
@@ -479,6 +502,7 @@ impl<N: Number> Signals<'_, N> {
     }
 
     /// u - v, of a design with `L_w`
+    #[inline(always)]
     pub fn set_excess(&mut self) {
         for (excess, u) in self.excess.iter_mut().zip(self.u.iter()) {
             *excess = u.clone() - excess.clone();
@@ -486,6 +510,7 @@ impl<N: Number> Signals<'_, N> {
     }
 
     /// `x_i`' = T (r - H y + `F_i` `f_hat`) + `L_w` (u - v) + `x_i`
+    #[inline(always)]
     pub fn predict_integrals(&mut self, design: &Design<'_, N>, state: &State<'_, N>) {
         copy(self.r, self.next_x_i);
         design.h.subtract_product(self.y, self.next_x_i);
@@ -499,6 +524,7 @@ impl<N: Number> Signals<'_, N> {
     }
 
     /// The estimates before the commands: with a current estimator from the measurements of this sample.
+    #[inline(always)]
     pub fn estimate(&mut self, design: &Design<'_, N>, state: &State<'_, N>, estimating: bool) {
         self.set_deviations(design, state);
         self.remove_feedthrough(design, state);
@@ -521,6 +547,7 @@ impl<N: Number> Signals<'_, N> {
     }
 
     /// The estimate for the next sample.
+    #[inline(always)]
     pub fn predict(&mut self, design: &Design<'_, N>, state: &State<'_, N>, estimating: bool) {
         self.predict_states(design);
         self.predict_faults(design, estimating);
@@ -531,12 +558,14 @@ impl<N: Number> Signals<'_, N> {
 
     /// Whether commands and estimates are numbers.
     #[must_use]
+    #[inline(always)]
     pub fn are_values_finite(&self) -> bool {
         all_finite(self.command) && all_finite(self.x_value) && all_finite(self.f_value)
     }
 
     /// Keeps the estimate for the next sample, if all of it is numbers; else shows the one that was kept. Returns whether
     /// it is kept.
+    #[inline(always)]
     pub fn keep(&mut self, state: &mut State<'_, N>, is_finite: bool) -> bool {
         let next = [&*self.next_x_hat, &*self.next_f_hat, &*self.next_y_f, &*self.next_x_i];
         let has_deviations = !state.u_before.is_empty();

@@ -20,6 +20,7 @@ pub struct Filter<'a, N> {
 
 impl<N: Number> Filter<'_, N> {
     /// The sum of three products, from 0 on.
+    #[inline(always)]
     fn set_sums(matrices: &[Matrix<'_, N>; 3], vectors: [&[N]; 3], target: &mut [N]) {
         target.fill(N::zero());
         for (matrix, vector) in matrices.iter().zip(vectors) {
@@ -29,6 +30,7 @@ impl<N: Number> Filter<'_, N> {
 
     /// The next state, and the residuals of this sample; the sample at the start has none. Returns whether all are
     /// numbers.
+    #[inline(always)]
     pub fn advance(
         &self,
         vectors: [&[N]; 3],
@@ -67,6 +69,7 @@ pub struct Cumulative<N> {
 
 impl<N: Number> Cumulative<N> {
     /// Takes the residual of a sample. Returns the larger sum, and the sample since which it is above 0.
+    #[inline(always)]
     pub fn take(&mut self, residual: &N, drift: &N, sample: u32) -> (N, u32) {
         for (sum, since) in self.sums.iter().zip(self.since.iter_mut()) {
             if !sum.is_above(&N::zero()) {
@@ -94,6 +97,7 @@ pub struct Window {
 impl Window {
     /// Adds the residuals of a sample to their sums. Returns the statistic and the first sample of a window that is
     /// complete.
+    #[inline(always)]
     pub fn take<'a, N: Number + 'a>(
         &mut self,
         sums: impl Iterator<Item = (&'a mut N, &'a N)>,
@@ -133,15 +137,18 @@ pub struct Decision {
 impl Decision {
     /// Whether a test has given an alarm.
     #[must_use]
+    #[inline(always)]
     pub fn is_detected(&self) -> bool {
         self.isolated != 0
     }
 
     /// The time in s of a sample of the decision; -1 before an alarm.
+    #[inline(always)]
     pub fn time<N: Number>(&self, sample: u32, sample_time: N) -> N {
         if self.is_detected() { N::whole(sample) * sample_time } else { -N::whole(1) }
     }
 
+    #[inline(always)]
     fn alarm(&mut self, sample: u32, onset: u32) {
         if !self.is_detected() {
             *self = Self { isolated: -1, detected_at: sample, onset };
@@ -149,6 +156,7 @@ impl Decision {
     }
 
     /// Finds the one fault to which exactly the tests react that have given an alarm.
+    #[inline(always)]
     fn isolate<const TESTS: usize>(&mut self, alarmed: &[bool; TESTS], reacts: &[[bool; TESTS]]) {
         if self.is_detected() {
             let mut fitting = (1..).zip(reacts).filter(|(_, reacts)| *reacts == alarmed);
@@ -184,6 +192,7 @@ pub struct Outcomes<'a, N, const TESTS: usize> {
 
 impl<N: Number, const TESTS: usize> Outcomes<'_, N, TESTS> {
     /// Takes the residuals of a sample, one for each test by cumulative sums.
+    #[inline(always)]
     pub fn cumulate(
         &mut self,
         tests: &mut [Cumulative<N>; TESTS],
@@ -200,6 +209,7 @@ impl<N: Number, const TESTS: usize> Outcomes<'_, N, TESTS> {
 
     /// Takes the residuals of a sample, for each test by windows as many as `counts` says; `sums` has one number for each
     /// residual, `lengths` the samples of the windows.
+    #[inline(always)]
     pub fn widen(
         &mut self,
         windows: &mut [Window; TESTS],
@@ -219,6 +229,7 @@ impl<N: Number, const TESTS: usize> Outcomes<'_, N, TESTS> {
     }
 
     /// Compares the statistics that are complete with their thresholds, and decides.
+    #[inline(always)]
     fn compare(&mut self, sample: u32, statistics: impl Iterator<Item = Option<(N, u32)>>) {
         let outcomes = self.statistic.iter_mut().zip(self.alarmed.iter_mut()).zip(self.threshold);
         for (complete, ((statistic, alarmed), threshold)) in statistics.zip(outcomes) {

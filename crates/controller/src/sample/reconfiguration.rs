@@ -37,6 +37,7 @@ pub struct Request {
 impl<N: Number> Watch<'_, N> {
     /// Decides in a sample whether the actuator is gone: it is reported, or its loss has been above `limit` for long
     /// enough.
+    #[inline(always)]
     pub fn decide(&mut self, case: &Case<'_>, limit: &N, request: Request, sample: u32) -> bool {
         if !request.is_fall_back && self.lost.is_above(limit) {
             if !*self.above {
@@ -52,6 +53,7 @@ impl<N: Number> Watch<'_, N> {
 
 impl Case<'_> {
     /// Notes whether the actuator is gone; the estimates of its faults restart at 0 when it goes or comes back.
+    #[inline(always)]
     pub fn note<N: Number>(&self, is_gone: bool, gone: &mut [bool], f_hat: &mut [N]) {
         let Some(gone) = gone.get_mut(self.actuator) else { return };
         if is_gone != *gone {
@@ -89,6 +91,7 @@ impl<const ACTUATORS: usize> Sets<'_, ACTUATORS> {
     /// Chooses the set for the actuators that are gone: the one without exactly these; else the fall-back, or without a
     /// fall-back the set without the first of them.
     #[must_use]
+    #[inline(always)]
     pub fn choose(&self, gone: &[bool; ACTUATORS], is_fall_back: bool) -> Choice {
         let first = (1..).zip(gone).find(|(_, gone)| **gone);
         let reconfiguration = first.map_or(0, |(number, _)| number);
@@ -123,6 +126,7 @@ pub struct Stuck<'a, N> {
 
 impl<N: Number> Signals<'_, N> {
     /// u = u + `K_s` `u_stuck`; the command of an actuator that is gone is the one at which it is stuck.
+    #[inline(always)]
     pub fn add_stuck(&mut self, design: &Design<'_, N>, stuck: &Stuck<'_, N>) {
         let [deviations, values] = stuck.commands;
         let mut gains = stuck.k_s.entries.iter();
