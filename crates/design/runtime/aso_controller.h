@@ -620,15 +620,15 @@ static int32_t isolate(const bool alarmed[ASO_TESTS])
 /* Tests the residuals of a sample. */
 static void detect(aso_State *state, bool detection_reset)
 {
-    uint32_t onset = 0U;
-    uint32_t i;
-
     if (detection_reset)
     {
         clear_detection(state);
     }
     if (state->sample >= ASO_FIRST_TESTED)
     {
+        uint32_t onset = 0U;
+        uint32_t i;
+
         for (i = 0U; i < ASO_TESTS; i++)
         {
             if (take_residuals(state, i, &onset) && (state->statistic[i] > threshold[i]))
@@ -834,11 +834,11 @@ static void correct_faults(aso_Sample *sample, bool estimating)
 /* f_hat = f_hat + L_f e while estimating; with a direct term its integral part f_hat_i */
 static void correct_faults(aso_Sample *sample, bool estimating)
 {
-    aso_real *f_hat = sample->ASO_INTEGRAL_PART;
-    uint32_t i;
-
     if (estimating)
     {
+        aso_real *f_hat = sample->ASO_INTEGRAL_PART;
+        uint32_t i;
+
         for (i = 0U; i < ASO_FAULTS; i++)
         {
             f_hat[i] = ASO_ACCUMULATE(f_hat[i], sample, L_f, i, sample->e, ASO_MEASUREMENTS);
@@ -953,10 +953,11 @@ static void compute_commands(const aso_State *state, aso_Sample *sample, bool co
 }
 
 #if ASO_HAS_LIMITS
-/* Keeps the commands within their limits; the observer uses the limited ones. A stuck actuator has no limits. */
-static uint32_t limit_commands(const aso_State *state, aso_Sample *sample)
+/* Keeps the commands within their limits; the observer uses the limited ones. A stuck actuator has no limits. Returns
+ * whether a command is at a limit. */
+static bool limit_commands(const aso_State *state, aso_Sample *sample)
 {
-    uint32_t status = 0U;
+    bool at_limit = false;
     uint32_t i;
 
     (void)state;
@@ -972,20 +973,20 @@ static uint32_t limit_commands(const aso_State *state, aso_Sample *sample)
         {
             sample->u[i] = ASO_FOLLOWING(sample, u_low)[i];
             sample->command[i] = u_min[i];
-            status = ASO_AT_LIMIT;
+            at_limit = true;
         }
         else if (is_free && (sample->u[i] > ASO_FOLLOWING(sample, u_high)[i]))
         {
             sample->u[i] = ASO_FOLLOWING(sample, u_high)[i];
             sample->command[i] = u_max[i];
-            status = ASO_AT_LIMIT;
+            at_limit = true;
         }
         else
         {
             /* not at a limit */
         }
     }
-    return status;
+    return at_limit;
 }
 #endif
 
@@ -1227,7 +1228,10 @@ static uint32_t aso_sample(aso_State *state, aso_Sample *sample, bool compensate
     compute_commands(state, sample, compensating);
     finite = are_finite(sample->command, ASO_ACTUATORS) && finite;
 #if ASO_HAS_LIMITS
-    status = status | limit_commands(state, sample);
+    if (limit_commands(state, sample))
+    {
+        status = status | ASO_AT_LIMIT;
+    }
 #endif
     finite = predict(state, sample, estimating) && finite;
     if (finite)
