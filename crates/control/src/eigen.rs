@@ -54,12 +54,12 @@ pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     let alone = || francis::eigenvalues(balanced.clone().hessenberg().unpack_h());
     let of_the_form = || schur(&balanced).map(|form| diagonal_blocks(&form.unpack().1));
     let reflected = || schur(&reflected(&balanced)).map(|form| diagonal_blocks(&form.unpack().1));
-    let mut found = match (a.nrows() >= LARGE).then(alone).flatten() {
-        Some(found) => found,
+    let mut eigenvalues = match (a.nrows() >= LARGE).then(alone).flatten() {
+        Some(eigenvalues) => eigenvalues,
         None => of_the_form().or_else(|error| alone().ok_or(error)).or_else(|_| reflected())?,
     };
-    found.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
-    Ok(found)
+    eigenvalues.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
+    Ok(eigenvalues)
 }
 
 /// The Schur form, with a bounded number of iterations.
@@ -68,8 +68,8 @@ where
     T: ComplexField<RealField = f64>,
 {
     let iterations = ITERATIONS_PER_ROW * m.nrows();
-    let found = ZERO.iter().find_map(|&zero| Schur::try_new(m.clone(), zero, iterations));
-    found.ok_or(Error::NotConverged { what: WHAT, iterations })
+    let form = ZERO.iter().find_map(|&zero| Schur::try_new(m.clone(), zero, iterations));
+    form.ok_or(Error::NotConverged { what: WHAT, iterations })
 }
 
 /// H M H with the reflection H = I - 2 v v' / (v'v), v = (1, 1/2, 1/3, ...).
@@ -89,11 +89,11 @@ fn reflected(m: &DMatrix<f64>) -> DMatrix<f64> {
 /// Eigenvalues of a real block triangular matrix with blocks of order one and two.
 fn diagonal_blocks(t: &DMatrix<f64>) -> Vec<Complex<f64>> {
     let n = t.nrows();
-    let mut found = Vec::with_capacity(n);
+    let mut eigenvalues = Vec::with_capacity(n);
     let mut row = 0;
     while row < n {
         if row + 1 < n && t[(row + 1, row)] != 0.0 {
-            found.extend(pair(
+            eigenvalues.extend(pair(
                 t[(row, row)],
                 t[(row, row + 1)],
                 t[(row + 1, row)],
@@ -101,11 +101,11 @@ fn diagonal_blocks(t: &DMatrix<f64>) -> Vec<Complex<f64>> {
             ));
             row += 2;
         } else {
-            found.push(Complex::new(t[(row, row)], 0.0));
+            eigenvalues.push(Complex::new(t[(row, row)], 0.0));
             row += 1;
         }
     }
-    found
+    eigenvalues
 }
 
 /// Eigenvalues of [a, b; c, d], without cancellation.

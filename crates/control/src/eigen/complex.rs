@@ -31,7 +31,7 @@ pub(crate) fn complex_eigenvalues(m: &DMatrix<Complex<f64>>) -> Result<Vec<Compl
     }
     let mut h = m.clone().hessenberg().unpack_h();
     let norm = h.norm();
-    let mut found = Vec::with_capacity(n);
+    let mut eigenvalues = Vec::with_capacity(n);
     let mut end = n;
     while end > 0 {
         let last = end - 1;
@@ -42,7 +42,7 @@ pub(crate) fn complex_eigenvalues(m: &DMatrix<Complex<f64>>) -> Result<Vec<Compl
                 h[(first, first - 1)] = Complex::ZERO;
             }
             if first == last {
-                found.push(h[(last, last)]);
+                eigenvalues.push(h[(last, last)]);
                 end = last;
                 break;
             }
@@ -55,10 +55,10 @@ pub(crate) fn complex_eigenvalues(m: &DMatrix<Complex<f64>>) -> Result<Vec<Compl
             } else {
                 wilkinson(&h, last)
             };
-            sweep(&mut h, (first, last), shift);
+            sweep(&mut h, first, last, shift);
         }
     }
-    Ok(found)
+    Ok(eigenvalues)
 }
 
 /// The first row of the last block that no negligible subdiagonal entry divides. An entry is compared with its
@@ -83,7 +83,7 @@ fn wilkinson(h: &DMatrix<Complex<f64>>, last: usize) -> Complex<f64> {
 }
 
 /// H - s I = Q R, then R Q + s I, on the rows and columns from `first` to `last`.
-fn sweep(h: &mut DMatrix<Complex<f64>>, (first, last): (usize, usize), shift: Complex<f64>) {
+fn sweep(h: &mut DMatrix<Complex<f64>>, first: usize, last: usize, shift: Complex<f64>) {
     for k in first..=last {
         h[(k, k)] -= shift;
     }
@@ -136,9 +136,9 @@ mod tests {
             );
             let angle = |k: u32| 0.01 + TAU * f64::from(k) / f64::from(n);
             let expected = sorted((0..n).map(|k| Complex::from_polar(1.0, angle(k))).collect());
-            let found = sorted(complex_eigenvalues(&m).unwrap());
-            for (found, expected) in found.iter().zip(&expected) {
-                assert!((found - expected).norm() < 1e-13, "{n}: {found}, {expected}");
+            let eigenvalues = sorted(complex_eigenvalues(&m).unwrap());
+            for (value, expected) in eigenvalues.iter().zip(&expected) {
+                assert!((value - expected).norm() < 1e-13, "{n}: {value}, {expected}");
             }
         }
     }
@@ -154,10 +154,13 @@ mod tests {
         let mut diagonal = DMatrix::identity(n, n);
         diagonal[(7, 7)] = Complex::ZERO;
         let m = &v * diagonal * v.clone().try_inverse().unwrap();
-        let mut found = complex_eigenvalues(&m).unwrap();
-        found.sort_by(|x, y| x.norm().total_cmp(&y.norm()));
-        assert!(found[0].norm() < 1e-12);
-        assert!(found[1..].iter().all(|one| (one - Complex::ONE).norm() < 1e-10), "{found:?}");
+        let mut eigenvalues = complex_eigenvalues(&m).unwrap();
+        eigenvalues.sort_by(|x, y| x.norm().total_cmp(&y.norm()));
+        assert!(eigenvalues[0].norm() < 1e-12);
+        assert!(
+            eigenvalues[1..].iter().all(|one| (one - Complex::ONE).norm() < 1e-10),
+            "{eigenvalues:?}"
+        );
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::pair;
 use nalgebra::{Complex, DMatrix};
+use std::ops::Range;
 
 /// Largest number of sweeps for one eigenvalue or pair; three or four are usual.
 const SWEEPS: usize = 120;
@@ -22,7 +23,7 @@ const EXCEPTIONAL: usize = 10;
 pub(super) fn eigenvalues(mut h: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     let n = h.nrows();
     let smallest = f64::MIN_POSITIVE / f64::EPSILON;
-    let mut found = Vec::with_capacity(n);
+    let mut eigenvalues = Vec::with_capacity(n);
     let mut end = n;
     while end > 0 {
         let last = end - 1;
@@ -34,11 +35,11 @@ pub(super) fn eigenvalues(mut h: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
             }
             if first + 1 >= last {
                 if first == last {
-                    found.push(Complex::new(h[(last, last)], 0.0));
+                    eigenvalues.push(Complex::new(h[(last, last)], 0.0));
                 } else {
                     let [a, c, b, d] = [(0, 0), (1, 0), (0, 1), (1, 1)]
                         .map(|(row, column)| h[(first + row, first + column)]);
-                    found.extend(pair(a, b, c, d));
+                    eigenvalues.extend(pair(a, b, c, d));
                 }
                 end = first;
                 break;
@@ -47,11 +48,11 @@ pub(super) fn eigenvalues(mut h: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
                 return None;
             }
             sweeps += 1;
-            let shift = Shift::new(&h, (first, last), sweeps);
-            sweep(&mut h, (first, last), &shift);
+            let shift = Shift::new(&h, first, last, sweeps);
+            sweep(&mut h, first, last, &shift);
         }
     }
-    Some(found)
+    Some(eigenvalues)
 }
 
 /// The first row of the last block that no negligible subdiagonal entry divides.
@@ -91,7 +92,7 @@ struct Shift {
 
 impl Shift {
     /// The eigenvalues of the last 2 x 2 block; of two real ones the one nearer to the last entry, twice.
-    fn new(h: &DMatrix<f64>, (first, last): (usize, usize), sweeps: usize) -> Self {
+    fn new(h: &DMatrix<f64>, first: usize, last: usize, sweeps: usize) -> Self {
         if sweeps.is_multiple_of(EXCEPTIONAL) {
             let at_start = (sweeps / EXCEPTIONAL) % 2 == 1;
             let (corner, size) = if at_start {
@@ -126,7 +127,7 @@ impl Shift {
 }
 
 /// One implicit double QR step on the rows and columns from `first` to `last`, at least three.
-fn sweep(h: &mut DMatrix<f64>, (first, last): (usize, usize), shift: &Shift) {
+fn sweep(h: &mut DMatrix<f64>, first: usize, last: usize, shift: &Shift) {
     // The step may begin below two consecutive small subdiagonal entries.
     let mut start = last - 2;
     let mut column = shift.column(h, start);
@@ -157,7 +158,7 @@ fn sweep(h: &mut DMatrix<f64>, (first, last): (usize, usize), shift: &Shift) {
         } else if start > first {
             h[(k, k - 1)] *= 1.0 - reflection.weights[0];
         }
-        let rows = (first, (k + 3).min(last) + 1);
+        let rows = first..(k + 3).min(last) + 1;
         if three {
             reflection.apply(h, k, last, rows);
         } else {
@@ -188,8 +189,8 @@ impl Reflection {
         Some(Self { v, weights: [tau, tau * v[0], tau * v[1]], image: image * size })
     }
 
-    /// To rows k to k + 2, from column k to `last`, and to columns k to k + 2, rows `from` to `to`.
-    fn apply(&self, h: &mut DMatrix<f64>, k: usize, last: usize, (from, to): (usize, usize)) {
+    /// To rows k to k + 2, from column k to `last`, and to columns k to k + 2 in `rows`.
+    fn apply(&self, h: &mut DMatrix<f64>, k: usize, last: usize, rows: Range<usize>) {
         let n = h.nrows();
         let ([v, w], [x, y, z]) = (self.v, self.weights);
         let entries = h.as_mut_slice();
@@ -203,9 +204,9 @@ impl Reflection {
         }
         let (left, rest) = entries[k * n..(k + 3) * n].split_at_mut(n);
         let (middle, right) = rest.split_at_mut(n);
-        let columns =
-            left[from..to].iter_mut().zip(&mut middle[from..to]).zip(&mut right[from..to]);
-        for ((a, b), c) in columns {
+        let (left, middle, right) =
+            (&mut left[rows.clone()], &mut middle[rows.clone()], &mut right[rows]);
+        for ((a, b), c) in left.iter_mut().zip(middle).zip(right) {
             let sum = *a + v * *b + w * *c;
             *a -= sum * x;
             *b -= sum * y;
@@ -214,14 +215,14 @@ impl Reflection {
     }
 
     /// The same for two rows and columns.
-    fn apply_to_two(&self, h: &mut DMatrix<f64>, k: usize, last: usize, rows: (usize, usize)) {
+    fn apply_to_two(&self, h: &mut DMatrix<f64>, k: usize, last: usize, rows: Range<usize>) {
         let (v, [x, y, _]) = (self.v[0], self.weights);
         for column in k..=last {
             let sum = h[(k, column)] + v * h[(k + 1, column)];
             h[(k, column)] -= sum * x;
             h[(k + 1, column)] -= sum * y;
         }
-        for row in rows.0..rows.1 {
+        for row in rows {
             let sum = h[(row, k)] + v * h[(row, k + 1)];
             h[(row, k)] -= sum * x;
             h[(row, k + 1)] -= sum * y;

@@ -52,11 +52,11 @@ impl Hamiltonian {
         let order = a.nrows();
         for column in 0..order.saturating_sub(1) {
             let below = order - column - 1;
-            let own = square.k.view((column + 1, column), (below, 1)).column(0).into_owned();
-            square.reflect(column, own);
+            let entries = square.k.view((column + 1, column), (below, 1)).column(0).into_owned();
+            square.reflect(column, entries);
             square.rotate(column);
-            let own = square.m.view((column + 1, column), (below, 1)).column(0).into_owned();
-            square.reflect(column, own);
+            let entries = square.m.view((column + 1, column), (below, 1)).column(0).into_owned();
+            square.reflect(column, entries);
         }
         let squares = francis::eigenvalues(square.m)?;
         Some(squares.into_iter().map(Complex::sqrt).collect())
@@ -93,8 +93,8 @@ impl Square {
         let mut columns = self.n.columns_mut(first, below);
         let along = &columns * &v;
         columns.ger(-2.0, &along, &v, 1.0);
-        let own = along.rows(first, below);
-        self.n.view_mut((first, first), (below, below)).ger(2.0, &v, &own, 1.0);
+        let along = along.rows(first, below);
+        self.n.view_mut((first, first), (below, below)).ger(2.0, &v, &along, 1.0);
         let mut rest = self.k.view_mut((column, column), (below + 1, below + 1));
         let along = rest.columns(1, below) * &v;
         rest.columns_mut(1, below).ger(-2.0, &along, &v, 1.0);
@@ -146,10 +146,10 @@ mod tests {
             };
             let (g, q) = (symmetric() * 1e3, symmetric());
             let hamiltonian = Hamiltonian::balanced(&a, &g, &q);
-            let found = hamiltonian.eigenvalues().unwrap();
+            let roots = hamiltonian.eigenvalues().unwrap();
             let mut expected = eigenvalues(&block_2x2([&a, &g], [&q, &-a.transpose()])).unwrap();
-            assert_eq!(2 * found.len(), expected.len());
-            for value in found.iter().flat_map(|value| [*value, -value]) {
+            assert_eq!(2 * roots.len(), expected.len());
+            for value in roots.iter().flat_map(|value| [*value, -value]) {
                 let distance = |other: &Complex<f64>| (other - value).norm();
                 let nearest = (0..expected.len())
                     .min_by(|x, y| distance(&expected[*x]).total_cmp(&distance(&expected[*y])))

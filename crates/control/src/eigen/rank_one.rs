@@ -59,7 +59,7 @@ impl RankOne {
         // A is balanced; the feedback disturbs that only if it is larger.
         let balanced = if dominates { Balance::new(&matrix).matrix } else { matrix.clone() };
         match francis::eigenvalues(balanced) {
-            Some(found) => Ok(found),
+            Some(eigenvalues) => Ok(eigenvalues),
             None => eigenvalues(&matrix),
         }
     }
