@@ -7,6 +7,31 @@ use nalgebra::{DMatrix, DVector};
 /// Singular values below this part of the largest count as zero.
 const TOLERANCE: f64 = 1e-12;
 
+/// The actuators of a plant, some of which are gone.
+#[derive(Debug, Clone, Copy)]
+pub struct Actuators<'a> {
+    /// B, n x m: how the inputs act on the states.
+    pub b: &'a DMatrix<f64>,
+    /// The inputs that are gone, from zero.
+    pub gone: &'a [usize],
+    /// a, m numbers above zero, for example the distance from each command to its nearest limit.
+    pub authority: &'a [f64],
+}
+
+impl Actuators<'_> {
+    /// `B_r` D.
+    fn remaining(&self) -> Result<DMatrix<f64>, Error> {
+        let Self { b, gone, authority } = *self;
+        let column = DMatrix::from_column_slice(authority.len(), 1, authority);
+        check::shape("authority", &column, (b.ncols(), 1))?;
+        for limit in authority {
+            check::positive("authority", *limit)?;
+        }
+        let factor = |j: usize| if gone.contains(&j) { 0.0 } else { authority[j] };
+        Ok(DMatrix::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * factor(j)))
+    }
+}
+
 /// The distribution of the effect of all inputs over the remaining ones.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -26,10 +51,9 @@ pub struct Allocation {
 /// M = D (B_r D)^+ B,  D = diag(a), B_r = B with zero columns for the inputs that are gone
 /// ```
 ///
-/// `b`: n x m; `gone`: the inputs that are gone, from zero; `authority`: a, m numbers above zero, for
-/// example the distance from each command to its nearest limit. The effect is exact, and with it the loop
-/// that a feedback `u_d` = K x closes, if the columns of B are in the range of `B_r`: the remaining inputs are
-/// as many as the rank of B at least. Singular values below 1e-12 of the largest count as zero.
+/// The effect is exact, and with it the loop that a feedback `u_d` = K x closes, if the columns of B are in
+/// the range of `B_r`: the remaining inputs are as many as the rank of B at least. Singular values below
+/// 1e-12 of the largest count as zero.
 ///
 /// Source: W. C. Durham, Constrained control allocation, J. Guidance, Control and Dynamics 16 (1993); M. Bodson, Evaluation of
 /// optimization methods for control allocation, J. Guidance, Control and Dynamics 25 (2002), the weighted pseudo-inverse.
@@ -39,43 +63,35 @@ pub struct Allocation {
 /// Two of three forces that act on a mass take over what the third one did, the stronger one more:
 ///
 /// ```
-/// use control::allocation::allocate;
+/// use control::allocation::{Actuators, allocate};
 /// use nalgebra::DMatrix;
 /// let b = DMatrix::from_row_slice(2, 3, &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
-/// let found = allocate(&b, &[0], &[1.0, 1.0, 2.0])?;
-/// assert!(found.residual < 1e-15);
-/// assert!((found.matrix[(1, 0)] - 0.2).abs() < 1e-15 && (found.matrix[(2, 0)] - 0.8).abs() < 1e-15);
+/// let actuators = Actuators { b: &b, gone: &[0], authority: &[1.0, 1.0, 2.0] };
+/// let commands = allocate(&actuators)?;
+/// assert!(commands.residual < 1e-15);
+/// assert!((commands.matrix[(1, 0)] - 0.2).abs() < 1e-15);
+/// assert!((commands.matrix[(2, 0)] - 0.8).abs() < 1e-15);
 /// # Ok::<(), control::Error>(())
 /// ```
 ///
 /// # Errors
 ///
-/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad `b` or `authority`;
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad B or `authority`;
 /// [`Error::OutOfRange`] for an `authority` that is not above zero; [`Error::NotConverged`].
-pub fn allocate(b: &DMatrix<f64>, gone: &[usize], authority: &[f64]) -> Result<Allocation, Error> {
+pub fn allocate(actuators: &Actuators<'_>) -> Result<Allocation, Error> {
+    let Actuators { b, authority, .. } = *actuators;
     check::finite("B", b)?;
-    let scaled = remaining(b, gone, authority)?;
-    let found = Svd::new(&scaled)?;
-    let rank = found.rank(TOLERANCE);
-    let mut matrix = found.least_squares(b, rank);
-    matrix += found.least_squares(&(b - &scaled * &matrix), rank);
+    let scaled = actuators.remaining()?;
+    let svd = Svd::new(&scaled)?;
+    let rank = svd.rank(TOLERANCE);
+    let mut matrix = svd.least_squares(b, rank);
+    matrix += svd.least_squares(&(b - &scaled * &matrix), rank);
     let left = norm_2(&(&scaled * &matrix - b))?;
     let size = norm_2(b)?;
     Ok(Allocation {
         matrix: DMatrix::from_fn(b.ncols(), b.ncols(), |i, j| authority[i] * matrix[(i, j)]),
         residual: if size > 0.0 { left / size } else { 0.0 },
     })
-}
-
-/// `B_r` D.
-fn remaining(b: &DMatrix<f64>, gone: &[usize], authority: &[f64]) -> Result<DMatrix<f64>, Error> {
-    let given = DMatrix::from_column_slice(authority.len(), 1, authority);
-    check::shape("authority", &given, (b.ncols(), 1))?;
-    for own in authority {
-        check::positive("authority", *own)?;
-    }
-    let factor = |j: usize| if gone.contains(&j) { 0.0 } else { authority[j] };
-    Ok(DMatrix::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * factor(j)))
 }
 
 /// An equilibrium of a plant under a constant disturbance.
@@ -98,9 +114,9 @@ pub struct Equilibrium {
 /// least norm of x and u, u_j in units of a_j
 /// ```
 ///
-/// `a`: n x n; `b`: n x m; `outputs`: C, r x n, rows in units in which they compare; `disturbance`: w, n
-/// entries, for example a column of B times the command at which an actuator is stuck; `gone`,
-/// `authority`: as in [`allocate`]. An equilibrium exists if [A, `B_r`] has rank n, which holds for a
+/// `a`: n x n; `outputs`: C, r x n, rows in units in which they compare; `disturbance`: w, n entries, for
+/// example a column of B times the command at which an actuator is stuck. `B_r` has zero columns for the
+/// inputs that are gone. An equilibrium exists if [A, `B_r`] has rank n, which holds for a
 /// stabilisable (A, `B_r`). C x = 0 is reached for every w with as many independent remaining inputs as
 /// outputs, without an invariant zero at 0.
 ///
@@ -112,37 +128,38 @@ pub struct Equilibrium {
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::OutOfRange`] for a bad
 /// `authority`; [`Error::NotControllable`] if no equilibrium exists; [`Error::NotConverged`].
 pub fn equilibrium(
-    (a, b, outputs): (&DMatrix<f64>, &DMatrix<f64>, &DMatrix<f64>),
+    a: &DMatrix<f64>,
+    actuators: &Actuators<'_>,
+    outputs: &DMatrix<f64>,
     disturbance: &DVector<f64>,
-    gone: &[usize],
-    authority: &[f64],
 ) -> Result<Equilibrium, Error> {
+    let Actuators { b, gone, authority } = *actuators;
     let (n, m) = (check::square("A", a)?, b.ncols());
     check::shape("B", b, (n, m))?;
     check::shape("outputs", outputs, (outputs.nrows(), n))?;
     let w = DMatrix::from_column_slice(disturbance.len(), 1, disturbance.as_slice());
     check::shape("disturbance", &w, (n, 1))?;
     let mut all = a.clone().resize_horizontally(n + m, 0.0);
-    all.columns_mut(n, m).copy_from(&remaining(b, gone, authority)?);
-    let found = Svd::new(&all)?;
-    let rank = found.rank(TOLERANCE);
+    all.columns_mut(n, m).copy_from(&actuators.remaining()?);
+    let svd = Svd::new(&all)?;
+    let rank = svd.rank(TOLERANCE);
     if rank < n {
         return Err(Error::NotControllable { rank, n });
     }
-    let mut one = found.least_squares(&-&w, rank);
-    one -= found.least_squares(&(&all * &one + &w), rank);
-    let free = found.right.columns(rank, n + m - rank);
-    let seen = outputs * free.rows(0, n);
-    if !seen.is_empty() {
-        let seen = Svd::new(&seen)?;
-        let correction = seen.least_squares(&-(outputs * one.rows(0, n)), seen.rank(TOLERANCE));
-        one += free * correction;
+    let mut rest = svd.least_squares(&-&w, rank);
+    rest -= svd.least_squares(&(&all * &rest + &w), rank);
+    let free = svd.right.columns(rank, n + m - rank);
+    let free_outputs = outputs * free.rows(0, n);
+    if !free_outputs.is_empty() {
+        let svd = Svd::new(&free_outputs)?;
+        let correction = svd.least_squares(&-(outputs * rest.rows(0, n)), svd.rank(TOLERANCE));
+        rest += free * correction;
     }
-    let x: DVector<f64> = one.column(0).rows(0, n).into();
+    let x: DVector<f64> = rest.column(0).rows(0, n).into();
     Ok(Equilibrium {
         left: (outputs * &x).norm(),
         u: DVector::from_fn(m, |j, _| {
-            if gone.contains(&j) { 0.0 } else { authority[j] * one[(n + j, 0)] }
+            if gone.contains(&j) { 0.0 } else { authority[j] * rest[(n + j, 0)] }
         }),
         x,
     })

@@ -1,6 +1,6 @@
 //! Designs the controllers without actuators that are gone.
 
-use control::allocation::{allocate, equilibrium};
+use control::allocation::{Actuators, allocate, equilibrium};
 use control::aso::{FaultyPlant, Gains};
 use control::controller::controller;
 use control::eigen::eigenvalues;
@@ -152,7 +152,8 @@ impl Without<'_> {
             return Ok(Err(reason));
         }
         let authority = self.authority();
-        let allocation = allocate(&linear.b, &self.gone, &authority)?;
+        let actuators = Actuators { b: &linear.b, gone: &self.gone, authority: &authority };
+        let allocation = allocate(&actuators)?;
         let (feedbacks, method) = if allocation.residual < EXACT {
             let method = "Control allocation: the other actuators have the effect of all, with the least \
                           effort relative to their limits; the loop keeps its eigenvalues.";
@@ -338,11 +339,12 @@ impl Without<'_> {
         let mut k_f = sampled::compensation_gain(&reduced, *domain)?;
         let modelled = sampled::compensation_gain(extended, *domain)?;
         let (n, m) = linear.b.shape();
+        let actuators = Actuators { b: &linear.b, gone: &self.gone, authority };
         let mut k_s = DMatrix::zeros(m, self.gone.len());
         let (mut x, mut u, mut is_kept) = (DVector::zeros(n), DVector::zeros(m), true);
         for (position, (actuator, stuck_at)) in self.stuck().into_iter().enumerate() {
             let b_g: DVector<f64> = linear.b.column(actuator).into();
-            let unit = equilibrium((&linear.a, &linear.b, &kept), &b_g, &self.gone, authority)?;
+            let unit = equilibrium(&linear.a, &actuators, &kept, &b_g)?;
             let answer = &unit.u - k_x * &unit.x;
             for (at, channel) in self.faults_of(actuator) {
                 // The intact gain has the mean of the modelled fault over a sample.
