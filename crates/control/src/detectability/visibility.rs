@@ -28,18 +28,18 @@ pub struct Visibility {
 pub(super) fn table(plant: &FaultyPlant, domain: Domain) -> Result<Vec<Vec<Visibility>>, Error> {
     let ((n, q), p) = (plant.f_a.shape(), plant.c.nrows());
     let (a_0, outputs) = (plant.augmented_dynamics(), plant.augmented_output().transpose());
-    let of_fault = |fault: usize| {
+    let reach = |fault: usize| {
         let start = DMatrix::from_fn(n + q, 1, |i, _| f64::from(u8::from(i == n + fault)));
         let column = plant.f_a.columns(fault, 1).into_owned();
-        let reached = Staircase::new(&plant.a, &column)?;
-        Ok((Staircase::new(&a_0, &start)?, reached, column))
+        let controllable = Staircase::new(&plant.a, &column)?;
+        Ok(Reach { by_model: Staircase::new(&a_0, &start)?, controllable, column })
     };
-    let faults: Vec<_> = (0..q).map(of_fault).collect::<Result<_, Error>>()?;
-    let entry = |measurement: usize, (moved, reached, column): &Reached| {
-        let output = plant.c.rows(measurement, 1).transpose();
-        let part = minimal_part((reached, column), &output, domain)?;
+    let faults: Vec<_> = (0..q).map(reach).collect::<Result<_, Error>>()?;
+    let entry = |measurement: usize, fault: &Reach| {
+        let part = fault.minimal_part(&plant.c.rows(measurement, 1).transpose(), domain)?;
         let dc_gain = part.map_or(Ok(Some(0.0)), |part| dc_gain(&part))?;
-        let visible = seen(moved, &outputs.columns(measurement, 1).into()).is_some();
+        let output = outputs.columns(measurement, 1).into();
+        let visible = reached_output(&fault.by_model, &output).is_some();
         Ok(Visibility { visible, dc_gain })
     };
     (0..p)
@@ -47,37 +47,43 @@ pub(super) fn table(plant: &FaultyPlant, domain: Domain) -> Result<Vec<Vec<Visib
         .collect()
 }
 
-/// The states that a fault moves by its model, the states that its column b reaches, and b.
-type Reached = (Staircase, Staircase, DMatrix<f64>);
+/// The states that a fault reaches.
+struct Reach {
+    /// Those of the augmented plant that the fault moves while it develops by its model.
+    by_model: Staircase,
+    /// Those of the plant that `column` reaches.
+    controllable: Staircase,
+    /// The column of `F_a`, n x 1.
+    column: DMatrix<f64>,
+}
 
 /// The output c, n x 1, of the reached states; None if it is zero.
-fn seen(reached: &Staircase, c: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+fn reached_output(reached: &Staircase, c: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let (c, norm) = reached.reached_output(c);
     (c.norm() > TOLERANCE * norm).then_some(c)
 }
 
-/// The controllable and observable part of the system {a, b, c', 0}; None when its transfer
-/// function is identically zero.
-///
-/// `controllable`: the states that b reaches; `b`, `c`: n x 1.
-fn minimal_part(
-    (controllable, b): (&Staircase, &DMatrix<f64>),
-    c: &DMatrix<f64>,
-    domain: Domain,
-) -> Result<Option<StateSpace>, Error> {
-    let Some(c) = seen(controllable, c) else {
-        return Ok(None);
-    };
-    let b = controllable.reached_input(b);
-    let observable = Staircase::new(&controllable.reached_dynamics().transpose(), &c)?;
-    let (b, _) = observable.reached_output(&b);
-    Ok(Some(StateSpace {
-        a: observable.reached_dynamics().transpose(),
-        b,
-        c: observable.reached_input(&c).transpose(),
-        d: DMatrix::zeros(1, 1),
-        domain,
-    }))
+impl Reach {
+    /// The controllable and observable part of the system {a, b, c', 0}, with b = `column`; None when its
+    /// transfer function is identically zero.
+    ///
+    /// `c`: n x 1.
+    fn minimal_part(&self, c: &DMatrix<f64>, domain: Domain) -> Result<Option<StateSpace>, Error> {
+        let Some(c) = reached_output(&self.controllable, c) else {
+            return Ok(None);
+        };
+        let b = self.controllable.reached_input(&self.column);
+        let dynamics = self.controllable.reached_dynamics().transpose();
+        let observable = Staircase::new(&dynamics, &c)?;
+        let (b, _) = observable.reached_output(&b);
+        Ok(Some(StateSpace {
+            a: observable.reached_dynamics().transpose(),
+            b,
+            c: observable.reached_input(&c).transpose(),
+            d: DMatrix::zeros(1, 1),
+            domain,
+        }))
+    }
 }
 
 /// C (s I - A)^-1 B at s = 0, or z = 1 in sampled time; None at a pole.

@@ -156,8 +156,8 @@ mod tests {
         for (mean, x) in [(0.3, 1.0), (2.0, 9.0), (40.0, 1500.0), (200.0, 39_000.0)] {
             let root = f64::sqrt(x);
             let expected = normal_below(mean - root) + normal_below(-mean - root);
-            let found = noncentral_survival(1, mean * mean, x);
-            assert!((found / expected - 1.0).abs() < 1e-11, "{mean} {x}: {found} {expected}");
+            let above = noncentral_survival(1, mean * mean, x);
+            assert!((above / expected - 1.0).abs() < 1e-11, "{mean} {x}: {above} {expected}");
         }
     }
 

@@ -299,8 +299,8 @@ mod tests {
         {
             let test = Cusum { drift: 0.5, threshold };
             for (shift, expected) in [0.0, 0.5, 1.0, 2.0, 3.0].into_iter().zip(lengths) {
-                let found = test.between_false_alarms_with_bias(shift);
-                assert!((found / expected - 1.0).abs() < 3e-3, "{shift}: {found} {expected}");
+                let length = test.between_false_alarms_with_bias(shift);
+                assert!((length / expected - 1.0).abs() < 3e-3, "{shift}: {length} {expected}");
             }
         }
     }

@@ -30,12 +30,12 @@ pub fn mean_after_step(
         Domain::Continuous => averaged(effect, period)?,
     };
     let mut x = DVector::zeros(steps.a.nrows());
-    let mut found = DMatrix::zeros(steps.c.nrows(), samples);
+    let mut means = DMatrix::zeros(steps.c.nrows(), samples);
     for k in 0..samples {
-        found.set_column(k, &(&steps.c * &x + steps.d.column(0)));
+        means.set_column(k, &(&steps.c * &x + steps.d.column(0)));
         x = &steps.a * &x + steps.b.column(0);
     }
-    Ok(found)
+    Ok(means)
 }
 
 /// The limit of [`mean_after_step`] after many samples: the residuals' mean under a constant input.

@@ -173,25 +173,25 @@ impl UnknownInputObserver {
     fn new(plant: &NoisyPlant, unknown: &[UnknownInput]) -> Result<Option<Self>, Error> {
         let (n, p) = (plant.a.nrows(), plant.c.nrows());
         let columns = |of: fn(&UnknownInput) -> &DVector<f64>, rows: usize| {
-            let found = unknown.iter().map(of).filter(|column| column.amax() > 0.0);
-            let units: Vec<_> = found.map(|column| column / column.norm()).collect();
+            let columns = unknown.iter().map(of).filter(|column| column.amax() > 0.0);
+            let units: Vec<_> = columns.map(|column| column / column.norm()).collect();
             let mut matrix = DMatrix::zeros(rows, units.len());
             units.iter().enumerate().for_each(|(at, unit)| matrix.set_column(at, unit));
             matrix
         };
         let of_sensors = left_null_space(&columns(|input| &input.on_measurements, p))?;
-        let Some(kept) = of_sensors else { return Ok(None) };
+        let Some(unaffected) = of_sensors else { return Ok(None) };
         let e = columns(|input| &input.on_states, n);
-        let seen = &kept * &plant.c * &e;
-        if e.ncols() > 0 && rank(&scaled(&seen))? < rank(&e)? {
+        let visible = &unaffected * &plant.c * &e;
+        if e.ncols() > 0 && rank(&scaled(&visible))? < rank(&e)? {
             return Ok(None);
         }
-        let Some(left) = left_null_space(&seen)? else { return Ok(None) };
+        let Some(left) = left_null_space(&visible)? else { return Ok(None) };
         let mut h = DMatrix::zeros(n, p);
         if e.ncols() > 0 {
-            let inverse = Svd::new(&seen)?;
-            let of_measurements = DMatrix::identity(kept.nrows(), kept.nrows());
-            h = &e * inverse.least_squares(&of_measurements, inverse.rank(TOLERANCE)) * &kept;
+            let inverse = Svd::new(&visible)?;
+            let of_measurements = DMatrix::identity(unaffected.nrows(), unaffected.nrows());
+            h = &e * inverse.least_squares(&of_measurements, inverse.rank(TOLERANCE)) * &unaffected;
         }
         let t = DMatrix::identity(n, n) - &h * &plant.c;
         let range = Svd::new(&t)?;
@@ -200,7 +200,7 @@ impl UnknownInputObserver {
             return Ok(None);
         }
         let projection = basis.transpose() * &t;
-        Ok(Some(Self { basis, projection, h, selection: left * kept }))
+        Ok(Some(Self { basis, projection, h, selection: left * unaffected }))
     }
 
     fn filter(&self, plant: &NoisyPlant) -> Result<DetectionFilter, Error> {
@@ -209,13 +209,14 @@ impl UnknownInputObserver {
         let dynamics = projection * a * basis;
         let through = projection * a * h;
         let output = selection * c * basis;
-        let process = symmetric_part(
-            &(projection * w * projection.transpose() + &through * v * through.transpose()),
-        );
-        let measured = symmetric_part(&(selection * v * selection.transpose()));
-        let cross = -(&through * v * selection.transpose());
-        let (gain, covariance) =
-            correlated_filter((&dynamics, &output), (&process, &measured, &cross), *domain)?;
+        let noise = CorrelatedNoise {
+            process: symmetric_part(
+                &(projection * w * projection.transpose() + &through * v * through.transpose()),
+            ),
+            measurement: symmetric_part(&(selection * v * selection.transpose())),
+            cross: -(&through * v * selection.transpose()),
+        };
+        let (gain, covariance) = correlated_filter(&dynamics, &output, &noise, *domain)?;
         let factor = symmetric_part(&covariance)
             .cholesky()
             .ok_or(Error::NotPositiveDefinite { matrix: "V" })?
@@ -260,8 +261,8 @@ impl DetectionFilter {
         for (name, column, rows) in [("e", &input.on_states, n), ("e_s", &input.on_measurements, p)]
         {
             if column.len() != rows {
-                let found = (column.len(), 1);
-                return Err(Error::Shape { matrix: name, expected: (rows, 1), found });
+                let (expected, found) = ((rows, 1), (column.len(), 1));
+                return Err(Error::Shape { matrix: name, expected, found });
             }
         }
         let generator = &self.generator;
@@ -277,14 +278,25 @@ impl DetectionFilter {
     }
 }
 
+/// Covariances of a process noise w and a measurement noise v, in continuous time intensities.
+struct CorrelatedNoise {
+    /// W = E w w', n x n.
+    process: DMatrix<f64>,
+    /// V = E v v', p x p.
+    measurement: DMatrix<f64>,
+    /// S = E w v', n x p.
+    cross: DMatrix<f64>,
+}
+
 /// Gain and innovation covariance (in continuous time: intensity V) of the Kalman filter for correlated
-/// noise: with S = E w v', A - S V^-1 C and W - S V^-1 S' have uncorrelated noise and a gain less by
-/// S V^-1.
+/// noise: A - S V^-1 C and W - S V^-1 S' have uncorrelated noise and a gain less by S V^-1.
 fn correlated_filter(
-    (a, c): (&DMatrix<f64>, &DMatrix<f64>),
-    (w, v, s): (&DMatrix<f64>, &DMatrix<f64>, &DMatrix<f64>),
+    a: &DMatrix<f64>,
+    c: &DMatrix<f64>,
+    noise: &CorrelatedNoise,
     domain: Domain,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
+    let CorrelatedNoise { process: w, measurement: v, cross: s } = noise;
     let factor = v.clone().cholesky().ok_or(Error::NotPositiveDefinite { matrix: "V" })?;
     let part = factor.solve(&s.transpose()).transpose();
     let process = symmetric_part(&(w - &part * s.transpose()));

@@ -92,12 +92,12 @@ impl UncertainPlant {
         whole.a.view_mut((0, 0), (n, n)).copy_from(&phi);
         whole.b.view_mut((0, 0), (n, m)).copy_from(&gamma);
         whole.b.view_mut((0, m), (n, n)).copy_from(&unit);
-        for (at, to, through, [own, from_u, from_y]) in
+        for (at, to, through, [dynamics, from_u, from_y]) in
             [(n, &mut whole.a, &mut whole.b, state), (0, &mut whole.c, &mut whole.d, output)]
         {
-            let count = own.nrows();
+            let count = dynamics.nrows();
             to.view_mut((at, 0), (count, n)).copy_from(&(from_y * c));
-            to.view_mut((at, n), (count, k)).copy_from(own);
+            to.view_mut((at, n), (count, k)).copy_from(dynamics);
             through.view_mut((at, 0), (count, m)).copy_from(&(from_u + from_y * d));
             through.view_mut((at, m + n), (count, p)).copy_from(from_y);
         }
@@ -167,8 +167,8 @@ mod tests {
             domain: Domain::Continuous,
         };
         let plant = UncertainPlant { nominal, sizes: sizes.map(scalar) };
-        let found = plant.largest_mean(&filter(), &scalar(1.0), &DVector::from_element(1, 3.0));
-        found.unwrap().map(|bound| bound[0])
+        let bounds = plant.largest_mean(&filter(), &scalar(1.0), &DVector::from_element(1, 3.0));
+        bounds.unwrap().map(|bound| bound[0])
     }
 
     /// e' = -2 e + w, |w| <= 0.1 x + 0.2 u, x <= (1 + 0.2) u / (1 - 0.1).
@@ -176,8 +176,8 @@ mod tests {
     fn a_plant_of_first_order_reaches_the_bound() {
         let largest = 3.0 * 1.2 / 0.9;
         let expected = 0.5 * (0.1 * largest + 0.2 * 3.0);
-        let found = bound([0.1, 0.2, 0.0]).unwrap();
-        assert!(found >= expected && found < 1.03 * expected, "{found} {expected}");
+        let bound = bound([0.1, 0.2, 0.0]).unwrap();
+        assert!(bound >= expected && bound < 1.03 * expected, "{bound} {expected}");
     }
 
     #[test]

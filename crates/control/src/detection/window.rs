@@ -40,7 +40,8 @@ impl WindowTest {
     /// [`Error::OutOfRange`] for an empty window, no residuals, a bias that is not finite, or a number of
     /// samples that is not larger than the window.
     pub fn with_false_alarms(
-        (residuals, window): (u32, usize),
+        residuals: u32,
+        window: usize,
         samples: f64,
         bias: f64,
     ) -> Result<Self, Error> {
@@ -115,17 +116,17 @@ mod tests {
     #[test]
     fn the_false_alarms_are_the_stated_ones() {
         for (residuals, window) in [(1, 1), (2, 10), (5, 64)] {
-            let test = WindowTest::with_false_alarms((residuals, window), 1e5, 0.0).unwrap();
+            let test = WindowTest::with_false_alarms(residuals, window, 1e5, 0.0).unwrap();
             assert!((test.between_false_alarms() / 1e5 - 1.0).abs() < 1e-9);
         }
-        assert!(WindowTest::with_false_alarms((1, 10), 10.0, 0.0).is_err());
-        assert!(WindowTest::with_false_alarms((0, 10), 1e5, 0.0).is_err());
-        assert!(WindowTest::with_false_alarms((1, 10), 1e5, f64::NAN).is_err());
+        assert!(WindowTest::with_false_alarms(1, 10, 10.0, 0.0).is_err());
+        assert!(WindowTest::with_false_alarms(0, 10, 1e5, 0.0).is_err());
+        assert!(WindowTest::with_false_alarms(1, 10, 1e5, f64::NAN).is_err());
     }
 
     #[test]
     fn a_constant_mean_is_found_window_by_window() {
-        let test = WindowTest::with_false_alarms((2, 1), 1000.0, 0.0).unwrap();
+        let test = WindowTest::with_false_alarms(2, 1, 1000.0, 0.0).unwrap();
         let power = test.alarm_probability(3.0);
         let delay = test.delay(|_| vec![3.0, 0.0], 4000).mean().unwrap();
         assert!((delay - 1.0 / power).abs() < 1e-3, "{delay} {power}");
@@ -134,7 +135,7 @@ mod tests {
     #[test]
     fn a_mean_that_a_bias_explains_raises_the_threshold() {
         let [exact, biased] =
-            [0.0, 1.0].map(|bias| WindowTest::with_false_alarms((2, 4), 1e4, bias).unwrap());
+            [0.0, 1.0].map(|bias| WindowTest::with_false_alarms(2, 4, 1e4, bias).unwrap());
         assert!(biased.threshold > exact.threshold);
         assert!((4.0 / biased.alarm_probability(1.0) / 1e4 - 1.0).abs() < 1e-9);
     }

@@ -190,7 +190,7 @@ impl Planner<'_> {
                 let test = match window {
                     Some(window) => {
                         let samples_of_window = prediction::whole(window / problem.period).max(1);
-                        WindowTest::with_false_alarms((count, samples_of_window), samples, bias)
+                        WindowTest::with_false_alarms(count, samples_of_window, samples, bias)
                     }
                     None => prediction::best_window(count, samples, bias, &means),
                 };

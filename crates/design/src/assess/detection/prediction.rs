@@ -110,7 +110,7 @@ pub(super) fn best_window(
     let mut window = 1;
     #[expect(clippy::cast_precision_loss, reason = "at most 4096")]
     while window <= LONGEST && (window as f64) < 0.25 * samples {
-        let test = WindowTest::with_false_alarms((residuals, window), samples, bias)?;
+        let test = WindowTest::with_false_alarms(residuals, window, samples, bias)?;
         let kind = TestKind::Window(test);
         let delay = |means: &DMatrix<f64>| {
             let most = means.ncols().min(40 * window) + 40 * window;
@@ -127,7 +127,7 @@ pub(super) fn best_window(
     }
     match best {
         Some((_, test)) => Ok(test),
-        None => WindowTest::with_false_alarms((residuals, 1), samples, bias),
+        None => WindowTest::with_false_alarms(residuals, 1, samples, bias),
     }
 }
 
