@@ -61,13 +61,13 @@ impl DirectForm {
         plant.check()?;
         let FaultyPlant { a, c, f_a, .. } = plant;
         let (n, q) = f_a.shape();
-        let seen = c * f_a;
+        let c_f_a = c * f_a;
         let rank = scaled_rank(c, f_a)?;
         if rank < q {
             return Err(Error::FaultsNotDirect { rank, faults: q });
         }
-        let m_1 = Svd::new(&seen)?.least_squares(&DMatrix::identity(c.nrows(), c.nrows()), q);
-        let m_2 = left_null_space(&seen, q)?;
+        let m_1 = Svd::new(&c_f_a)?.least_squares(&DMatrix::identity(c.nrows(), c.nrows()), q);
+        let m_2 = left_null_space(&c_f_a, q)?;
         let rest = left_null_space(f_a, q)?;
         let mut to = DMatrix::zeros(n, n);
         to.rows_mut(0, q).copy_from(&(&m_1 * c));
@@ -123,9 +123,9 @@ impl DirectForm {
     /// Same as [`place_balanced`], in sampled time as [`place_estimator`].
     pub fn observer_gain(&self, pole: f64, rate: f64) -> Result<DMatrix<f64>, Error> {
         let (n, q, p) = (self.a.nrows(), self.faults(), self.m_1.ncols());
-        let own = self.a.view((0, 0), (q, q)) - DMatrix::identity(q, q) * pole;
+        let of_faults = self.a.view((0, 0), (q, q)) - DMatrix::identity(q, q) * pole;
         let mut gain = DMatrix::zeros(n, p);
-        gain.rows_mut(0, q).copy_from(&(own * &self.m_1));
+        gain.rows_mut(0, q).copy_from(&(of_faults * &self.m_1));
         gain.rows_mut(q, n - q).copy_from(&(self.a.view((q, 0), (n - q, q)) * &self.m_1));
         if !self.c_2.is_empty() {
             let shown = Svd::new(&self.c_2.transpose())?;
@@ -149,8 +149,8 @@ impl DirectForm {
         }
         let (a, c) = if part.fixed.is_empty() { (&a, &c) } else { (&part.a, &part.b) };
         #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-        let wanted = |i: usize| eigenvalue(rate * 2_f64.powf(i as f64 / order as f64), self.domain);
-        let poles: Vec<_> = (0..order).map(|i| Complex::new(wanted(i), 0.0)).collect();
+        let pole = |i: usize| eigenvalue(rate * 2_f64.powf(i as f64 / order as f64), self.domain);
+        let poles: Vec<_> = (0..order).map(|i| Complex::new(pole(i), 0.0)).collect();
         let gain = match self.domain {
             Domain::Continuous => -place_balanced(a, c, &poles)?.gain,
             Domain::Sampled { .. } => {

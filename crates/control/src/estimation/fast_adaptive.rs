@@ -42,7 +42,8 @@ pub struct FastAdaptive {
 /// Same as [`Gains::check`] and [`DirectForm::observer_gain`]; [`Error::OutOfRange`] for a parameter that is not
 /// above zero, for faults that are not modelled as constant, or for a sampled prediction estimator.
 pub fn fast_adaptive(
-    (plant, form): (&FaultyPlant, &DirectForm),
+    plant: &FaultyPlant,
+    form: &DirectForm,
     gains: &Gains,
     law: &FastAdaptive,
     rate: f64,
@@ -68,8 +69,8 @@ pub fn fast_adaptive(
         return Err(Error::OutOfRange { name: "the estimator", value: f64::NAN, rule });
     }
     // L = A_aug M with A_aug = [A, F_a; 0, I]: M_f = L_f, A M_x = L_x - F_a L_f.
-    let moved = &l_x - &plant.f_a * &l_f;
-    let m_x = plant.a.clone().lu().solve(&moved).ok_or(Error::Overflow { what: "A^-1 L_x" })?;
+    let of_states = &l_x - &plant.f_a * &l_f;
+    let m_x = plant.a.clone().lu().solve(&of_states).ok_or(Error::Overflow { what: "A^-1 L_x" })?;
     let mut gains = Gains { l_x: m_x, l_f, p_f: None, ..gains.clone() };
     let p_f = (direct - &gains.l_f) * before_correction(plant, &gains)?;
     gains.p_f = Some(check::in_range("P_f", p_f)?);

@@ -38,7 +38,8 @@ pub struct Learning {
 /// Same as [`Gains::check`] and [`DirectForm::observer_gain`]; [`Error::OutOfRange`] for a `kept` outside of its range,
 /// a continuous plant or a prediction estimator; [`Error::NotSchur`] if `K_1` is at most p^2.
 pub fn learning(
-    (plant, form): (&FaultyPlant, &DirectForm),
+    plant: &FaultyPlant,
+    form: &DirectForm,
     gains: &Gains,
     law: &Learning,
     rate: f64,
@@ -47,20 +48,20 @@ pub fn learning(
     require_constant_faults(plant, domain)?;
     require_current(domain, gains.estimator)?;
     gains.check(plant)?;
-    let kept = law.kept;
-    if !(kept > 0.0 && kept <= 1.0) {
+    let k_1 = law.kept;
+    if !(k_1 > 0.0 && k_1 <= 1.0) {
         let rule = "above 0 and at most 1";
-        return Err(Error::OutOfRange { name: "K_1", value: kept, rule });
+        return Err(Error::OutOfRange { name: "K_1", value: k_1, rule });
     }
     let fast = eigenvalue(rate, domain);
-    let pole = fast * fast / kept;
+    let pole = fast * fast / k_1;
     if pole >= 1.0 {
         return Err(Error::NotSchur { matrix: "lambda = p^2 / K_1", radius: pole });
     }
     let l_x = form.observer_gain(pole, rate)?;
     let l_x = plant.a.clone().lu().solve(&l_x).ok_or(Error::Overflow { what: "A^-1 L_x" })?;
-    let l_f = &form.m_1 * (pole + kept - 2.0 * fast);
+    let l_f = &form.m_1 * (pole + k_1 - 2.0 * fast);
     let (q, gains) = (plant.f_a.ncols(), Gains { l_x, l_f, p_f: None, ..gains.clone() });
     check::finite("L_f", &gains.l_f)?;
-    Ok(OwnModel { gains, a_f: DMatrix::identity(q, q) * kept })
+    Ok(OwnModel { gains, a_f: DMatrix::identity(q, q) * k_1 })
 }

@@ -48,7 +48,8 @@ pub struct SlidingMode {
 /// not above zero, a continuous plant or a prediction estimator; [`Error::NotSchur`] for a delta so small that the
 /// samples oscillate about s = 0.
 pub fn sliding_mode(
-    (plant, form): (&FaultyPlant, &DirectForm),
+    plant: &FaultyPlant,
+    form: &DirectForm,
     gains: &Gains,
     law: &SlidingMode,
     rate: f64,

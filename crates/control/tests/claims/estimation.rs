@@ -140,7 +140,7 @@ fn a_fast_adaptive_estimate_is_the_fault_behind_a_first_order_lag() {
     let plant = plant();
     let form = DirectForm::new(&plant, Domain::Continuous).unwrap();
     let law = FastAdaptive { sigma: 4.0, gamma: vec![10.0] };
-    let gains = fast_adaptive((&plant, &form), &augmented(&plant), &law, 5.0).unwrap();
+    let gains = fast_adaptive(&plant, &form, &augmented(&plant), &law, 5.0).unwrap();
     let found = sorted_real(&gains.error_dynamics(&plant));
     close(&found, &[-10.0, -5.0 * 2_f64.sqrt(), -5.0, -4.0], 1e-8);
     let step =
@@ -155,7 +155,7 @@ fn a_sampled_fast_adaptive_estimate_closes_the_same_part_of_its_error_in_each_sa
     let (plant, gains, domain) = sampled();
     let form = DirectForm::new(&plant, domain).unwrap();
     let law = FastAdaptive { sigma: 4.0, gamma: vec![10.0] };
-    let gains = fast_adaptive((&plant, &form), &gains, &law, 5.0).unwrap();
+    let gains = fast_adaptive(&plant, &form, &gains, &law, 5.0).unwrap();
     let step = step_response(&fault_system(&plant, &gains, domain).unwrap(), 0).unwrap();
     for (k, time) in step.time.iter().enumerate() {
         assert!((step.output[(6, k)] + (-(time / T).round()).exp()).abs() < 1e-9, "{time}");
@@ -209,7 +209,7 @@ fn the_boundary_layer_leaves_one_part_in_a_hundred_of_a_small_fault() {
     let form = DirectForm::new(&plant, domain).unwrap();
     let law = SlidingMode { rho: vec![3.0], delta: None };
     let (OwnModel { gains: found, a_f, .. }, delta) =
-        sliding_mode((&plant, &form), &gains, &law, 5.0).unwrap();
+        sliding_mode(&plant, &form, &gains, &law, 5.0).unwrap();
     plant.a_f = a_f;
     let fast = (-0.5_f64).exp();
     let step = step_response(&fault_system(&plant, &found, domain).unwrap(), 0).unwrap();
@@ -219,7 +219,7 @@ fn the_boundary_layer_leaves_one_part_in_a_hundred_of_a_small_fault() {
     assert!(eigenvalues.iter().any(|value| (value - fast).abs() < 1e-7), "{eigenvalues:?}");
     let law = SlidingMode { delta: Some(vec![delta[0] / 10.0]), ..law };
     plant.a_f = DMatrix::identity(1, 1);
-    let refused = sliding_mode((&plant, &form), &gains, &law, 5.0);
+    let refused = sliding_mode(&plant, &form, &gains, &law, 5.0);
     assert!(matches!(refused, Err(Error::NotSchur { .. })), "{refused:?}");
 }
 
@@ -230,7 +230,7 @@ fn a_learning_observer_has_the_double_eigenvalue_that_its_gains_are_for() {
     let fast = (-0.5_f64).exp();
     for kept in [1.0, 0.9] {
         plant.a_f = DMatrix::identity(1, 1);
-        let found = learning((&plant, &form), &gains, &Learning { kept }, 5.0).unwrap();
+        let found = learning(&plant, &form, &gains, &Learning { kept }, 5.0).unwrap();
         plant.a_f = found.a_f;
         let all = eigenvalues(&found.gains.error_dynamics(&plant)).unwrap();
         let near = all.iter().filter(|value| (*value - fast).norm() < 1e-5).count();
@@ -249,10 +249,10 @@ fn sliding_mode_and_learning_are_laws_of_sampled_controllers_with_a_current_esti
     let form = DirectForm::new(&plant, domain).unwrap();
     let gains = Gains { estimator: Estimator::Prediction, ..gains };
     let law = SlidingMode { rho: vec![3.0], delta: None };
-    assert!(sliding_mode((&plant, &form), &gains, &law, 5.0).is_err());
-    assert!(learning((&plant, &form), &gains, &Learning { kept: 0.9 }, 5.0).is_err());
+    assert!(sliding_mode(&plant, &form, &gains, &law, 5.0).is_err());
+    assert!(learning(&plant, &form, &gains, &Learning { kept: 0.9 }, 5.0).is_err());
     let law = FastAdaptive { sigma: 4.0, gamma: vec![10.0] };
-    assert!(fast_adaptive((&plant, &form), &gains, &law, 5.0).is_err());
+    assert!(fast_adaptive(&plant, &form, &gains, &law, 5.0).is_err());
 }
 
 #[test]

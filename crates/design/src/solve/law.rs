@@ -105,14 +105,14 @@ impl LawProblem<'_> {
         self.require_current()?;
         let dynamics = self.gains.error_dynamics(self.plant);
         let rate = mean_rate(&dynamics, self.domain).map_err(text)?;
-        let own = (self.plant, &form);
+        let (plant, gains) = (self.plant, self.gains);
         match law {
             Law::FastAdaptive { sigma, gamma } => {
                 // Different rates: equal ones would be a multiple eigenvalue.
                 let count = self.linear.faults.len();
                 let gamma = gamma.clone().unwrap_or_else(|| vec![rate * APART; count]);
                 let law = FastAdaptive { sigma: sigma.unwrap_or(rate / APART), gamma };
-                found.gains = fast_adaptive(own, self.gains, &law, rate).map_err(text)?;
+                found.gains = fast_adaptive(plant, &form, gains, &law, rate).map_err(text)?;
                 found.parameters.push(number("sigma", Some("1/s"), law.sigma));
                 found.parameters.extend(self.each("gamma", Some("1/s"), &law.gamma));
             }
@@ -120,7 +120,7 @@ impl LawProblem<'_> {
                 let rho = self.reach(rho.as_ref(), &mut found.conditions)?;
                 let law = SlidingMode { rho, delta: delta.clone() };
                 let (OwnModel { gains, a_f, .. }, delta) = sliding_mode(
-                    own, self.gains, &law, rate,
+                    plant, &form, gains, &law, rate,
                 )
                 .map_err(|error| match error {
                     Error::NotSchur { .. } => format!(
@@ -137,7 +137,7 @@ impl LawProblem<'_> {
             Law::Learning { kept } => {
                 let law = Learning { kept: kept.unwrap_or(KEPT) };
                 let OwnModel { gains, a_f, .. } =
-                    learning(own, self.gains, &law, rate).map_err(text)?;
+                    learning(plant, &form, gains, &law, rate).map_err(text)?;
                 (found.gains, found.a_f) = (gains, Some(a_f));
                 found.parameters.push(number("K_1", None, law.kept));
             }
