@@ -63,7 +63,8 @@ pub(crate) type Place =
 /// Computes `K_x` for the first `states` states, on which the other states do not act; the columns
 /// of the other states are zero.
 pub(crate) fn place_controller(
-    (plant, states): (&FaultyPlant, usize),
+    plant: &FaultyPlant,
+    states: usize,
     poles: &[Complex<f64>],
     place: Place,
 ) -> Result<Alternatives, Error> {
@@ -72,49 +73,66 @@ pub(crate) fn place_controller(
     Ok(placed.map(|gain| gain.clone().resize_horizontally(plant.a.ncols(), 0.0)))
 }
 
-/// The pair of a feedback and an observer whose loop [`least_sensitive`] prefers, and its gains.
-///
-/// `feedbacks`: `K_x`; `observers`: L.
-pub(crate) fn best_pair(
-    plant: &FaultyPlant,
-    (feedbacks, observers): (&Alternatives, &Alternatives),
-    (estimator, k_f): (Estimator, &DMatrix<f64>),
-    domain: Domain,
-) -> Result<(Gains, [Quality; 2]), Error> {
-    let (n, q) = plant.f_a.shape();
-    let with = |k: &Placement, l: &Placement| Gains {
-        estimator,
-        k_x: k.gain.clone(),
-        k_f: k_f.clone(),
-        l_x: l.gain.rows(0, n).into(),
-        l_f: -l.gain.rows(n, q),
-        p_f: None,
-        integral: None,
-    };
-    let [mut pairs, second] = pairs(&feedbacks.candidates(), &observers.candidates());
-    let standard: Vec<_> = feedbacks.standard_pairs(observers).collect();
-    let d = DMatrix::zeros(plant.c.nrows(), plant.b.ncols());
-    let FaultyPlant { a, b, c, .. } = plant.clone();
-    let system = StateSpace { a, b, c, d, domain };
-    let own = |(k, l): &(&Placement, &Placement)| {
-        Loop::new(system.clone(), controller(plant, &with(k, l), domain)?)
-    };
-    let loops = |pairs: &[_]| pairs.iter().map(own).collect::<Result<Vec<_>, Error>>();
-    let best = if pairs.len() + second.len() > 1 {
-        least_sensitive([&loops(&pairs)?, &loops(&second)?], &loops(&standard)?)
-    } else {
-        0
-    };
-    pairs.extend(second);
-    let (k, l) = pairs.swap_remove(best);
-    Ok((with(k, l), [k.quality, l.quality]))
+/// The feedbacks and observers of a plant, of which one pair becomes the controller.
+pub(crate) struct GainCandidates<'a> {
+    pub(crate) plant: &'a FaultyPlant,
+    /// `K_x`.
+    pub(crate) feedbacks: &'a Alternatives,
+    /// L.
+    pub(crate) observers: &'a Alternatives,
+    pub(crate) estimator: Estimator,
+    pub(crate) k_f: &'a DMatrix<f64>,
+    pub(crate) domain: Domain,
+}
+
+impl GainCandidates<'_> {
+    /// The gains of the pair whose loop [`least_sensitive`] prefers, and the quality of both assignments.
+    pub(crate) fn best(&self) -> Result<(Gains, [Quality; 2]), Error> {
+        let Self { feedbacks, observers, .. } = self;
+        let [mut pairs, second] = pairs(&feedbacks.candidates(), &observers.candidates());
+        let standard: Vec<_> = feedbacks.standard_pairs(observers).collect();
+        let loops = |pairs: &[(&Placement, &Placement)]| {
+            let each = pairs.iter().map(|(k, l)| self.closed(k, l));
+            each.collect::<Result<Vec<_>, Error>>()
+        };
+        let best = if pairs.len() + second.len() > 1 {
+            least_sensitive([&loops(&pairs)?, &loops(&second)?], &loops(&standard)?)
+        } else {
+            0
+        };
+        pairs.extend(second);
+        let (k, l) = pairs.swap_remove(best);
+        Ok((self.gains(k, l), [k.quality, l.quality]))
+    }
+
+    fn gains(&self, feedback: &Placement, observer: &Placement) -> Gains {
+        let (n, q) = self.plant.f_a.shape();
+        Gains {
+            estimator: self.estimator,
+            k_x: feedback.gain.clone(),
+            k_f: self.k_f.clone(),
+            l_x: observer.gain.rows(0, n).into(),
+            l_f: -observer.gain.rows(n, q),
+            p_f: None,
+            integral: None,
+        }
+    }
+
+    /// The loop of the plant and the controller with these gains.
+    fn closed(&self, feedback: &Placement, observer: &Placement) -> Result<Loop, Error> {
+        let Self { plant, domain, .. } = *self;
+        let d = DMatrix::zeros(plant.c.nrows(), plant.b.ncols());
+        let FaultyPlant { a, b, c, .. } = plant.clone();
+        let gains = self.gains(feedback, observer);
+        Loop::new(StateSpace { a, b, c, d, domain }, controller(plant, &gains, domain)?)
+    }
 }
 
 /// The pairs of the first candidates, and those with at least one of the second ones.
 #[must_use]
-pub fn pairs<T: Copy>(own: &[Vec<T>; 2], other: &[Vec<T>; 2]) -> [Vec<(T, T)>; 2] {
+pub fn pairs<T: Copy>(one: &[Vec<T>; 2], other: &[Vec<T>; 2]) -> [Vec<(T, T)>; 2] {
     let of = |i: usize, j: usize| {
-        let all = own[i].iter().flat_map(move |x| other[j].iter().map(move |y| (*x, *y)));
+        let all = one[i].iter().flat_map(move |x| other[j].iter().map(move |y| (*x, *y)));
         all.collect::<Vec<_>>()
     };
     [of(0, 0), [of(0, 1), of(1, 0), of(1, 1)].concat()]
@@ -176,17 +194,24 @@ fn design_feedback(
 ) -> Result<AsoDesign, Error> {
     plant.check_observer_exists()?;
     let k_f = match k_f {
-        Some(given) => given.clone(),
+        Some(k_f) => k_f.clone(),
         None => plant.compensation_gain()?,
     };
     check::shape("K_f", &k_f, (plant.b.ncols(), plant.f_a.ncols()))?;
-    let feedbacks = place_controller((plant, states), controller_poles, alternatives)?;
+    let feedbacks = place_controller(plant, states, controller_poles, alternatives)?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let observers = alternatives_balanced(&a_0.transpose(), &c_0.transpose(), observer_poles)?;
     let observers = observers.map(|gain| -gain.transpose());
     let residual = cancellation_residual(plant, states, &k_f);
-    let (pairs, given) = ((&feedbacks, &observers), (Estimator::Prediction, &k_f));
-    let (gains, [controller, observer]) = best_pair(plant, pairs, given, Domain::Continuous)?;
+    let candidates = GainCandidates {
+        plant,
+        feedbacks: &feedbacks,
+        observers: &observers,
+        estimator: Estimator::Prediction,
+        k_f: &k_f,
+        domain: Domain::Continuous,
+    };
+    let (gains, [controller, observer]) = candidates.best()?;
     Ok(AsoDesign { gains, cancellation_residual: residual, controller, observer })
 }
 

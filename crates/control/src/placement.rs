@@ -133,7 +133,7 @@ pub fn place(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Placement, Error> {
-    place_in(&Coordinates::Given, a, b, poles, &CONTINUOUS)
+    PlacementProblem { a, b, poles, tolerance: &CONTINUOUS }.place(&Coordinates::Given)
 }
 
 /// Like [`place`], but eigenvectors that are well conditioned in balanced coordinates come first.
@@ -151,7 +151,7 @@ pub fn place_balanced(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Placement, Error> {
-    place_in(&Coordinates::Balanced, a, b, poles, &CONTINUOUS)
+    PlacementProblem { a, b, poles, tolerance: &CONTINUOUS }.place(&Coordinates::Balanced)
 }
 
 /// Like [`place_balanced`], for the sampled plant `x[k+1] = A x[k] + B u[k]`.
@@ -186,7 +186,7 @@ pub fn place_discrete(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Placement, Error> {
-    place_in(&Coordinates::Balanced, a, b, poles, &DISCRETE)
+    PlacementProblem { a, b, poles, tolerance: &DISCRETE }.place(&Coordinates::Balanced)
 }
 
 /// The coordinates in which the eigenvectors of the candidate of least condition number are chosen.
@@ -199,102 +199,111 @@ pub(crate) enum Coordinates<'a> {
     Scaled(&'a DVector<f64>),
 }
 
-/// Assigns the eigenvalues, see [`place`].
-fn place_in(
-    coordinates: &Coordinates<'_>,
-    a: &DMatrix<f64>,
-    b: &DMatrix<f64>,
-    poles: &[Complex<f64>],
-    tolerance: &PoleTolerance,
-) -> Result<Placement, Error> {
-    Ok(alternatives_in(coordinates, (a, b), poles, tolerance, Wanted::One)?.chosen)
-}
-
-/// Whether alternatives are wanted.
+/// Which placements are computed.
 #[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Wanted {
-    One,
+pub(crate) enum Extent {
+    /// The chosen one.
+    Chosen,
+    /// Alternatives to it, too.
     Alternatives,
 }
 
-/// [`place_in`], with alternatives.
-pub(crate) fn alternatives_in(
-    coordinates: &Coordinates<'_>,
-    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
-    poles: &[Complex<f64>],
-    tolerance: &PoleTolerance,
-    wanted: Wanted,
-) -> Result<Alternatives, Error> {
-    let n = check::square("A", a)?;
-    check::shape("B", b, (n, b.ncols()))?;
-    check_poles(poles, n)?;
-    require_controllable(a, b)?;
-    let ones = DVector::from_element(n, 1.0);
-    let given = Assignable::new(a, b, poles, &ones)?;
-    let starts = widest_directions(&given.problem)?;
-    let best = Assignment::new(given, &starts)?;
-    let scaled = |units: &DVector<f64>| {
-        let assignable = Assignable::new(a, b, poles, units)?;
+/// Eigenvalues to be assigned to A + B K, see [`place`].
+pub(crate) struct PlacementProblem<'a> {
+    /// A, n x n.
+    pub(crate) a: &'a DMatrix<f64>,
+    /// B, n x m.
+    pub(crate) b: &'a DMatrix<f64>,
+    /// n eigenvalues.
+    pub(crate) poles: &'a [Complex<f64>],
+    pub(crate) tolerance: &'a PoleTolerance,
+}
+
+impl PlacementProblem<'_> {
+    /// Assigns the eigenvalues.
+    fn place(&self, coordinates: &Coordinates<'_>) -> Result<Placement, Error> {
+        Ok(self.alternatives(coordinates, Extent::Chosen)?.chosen)
+    }
+
+    /// Assigns the eigenvalues, if `extent` says so by several choices of eigenvectors.
+    pub(crate) fn alternatives(
+        &self,
+        coordinates: &Coordinates<'_>,
+        extent: Extent,
+    ) -> Result<Alternatives, Error> {
+        let Self { a, b, poles, tolerance } = *self;
+        let n = check::square("A", a)?;
+        check::shape("B", b, (n, b.ncols()))?;
+        check_poles(poles, n)?;
+        require_controllable(a, b)?;
+        let ones = DVector::from_element(n, 1.0);
+        let assignable = Assignable::new(a, b, poles, &ones)?;
         let starts = widest_directions(&assignable.problem)?;
-        Assignment::new(assignable, &starts)
-    };
-    let balance = |gain: &DMatrix<f64>| Balance::new(&(a + b * gain)).scale;
-    let mut scale = balance(&best.gain);
-    let other = match coordinates {
-        Coordinates::Given => None,
-        Coordinates::Balanced => Some(scaled(&scale)?),
-        Coordinates::Scaled(units) => Some(scaled(units)?),
-    };
-    if let (Coordinates::Scaled(_), Some(other)) = (coordinates, &other) {
-        scale = balance(&other.gain);
-    }
-    let Assignable { problem, basis, .. } = &best.assignable;
-    let independent = if problem.inputs() == b.ncols() { b } else { &best.assignable.b };
-    let standard = standard_directions((a, independent), problem)?;
-    let (mut choice, mut others) = (None, vec![]);
-    if problem.inputs() > 1 {
-        let feedback = FeedbackLoop::new(problem, basis, b, tolerance.sampled);
-        let other = other.iter().map(|other| {
-            problem.directions_of(&other.assignable.eigenvectors(&other.directions, &ones))
-        });
-        let candidates: Vec<_> = other.chain([best.directions.clone()]).collect();
-        let mut search = Search::new(&feedback);
-        choice = search.choose(&candidates, &starts)?;
-        if let (Some(chosen), Wanted::Alternatives) =
-            (choice.as_ref().or(candidates.first()), wanted)
-        {
-            others = search.others(chosen, &more_directions(problem)?)?;
-        }
-    }
-    let placement = |assignable: &Assignable, directions: &[DVector<f64>], gain| {
-        let quality = Quality {
-            condition: condition(&assignable.eigenvectors(directions, &ones))?,
-            balanced_condition: condition(&assignable.eigenvectors(directions, &scale))?,
-            pole_error: tolerance.pole_error(a, b, &gain, poles)?,
+        let best = Assignment::new(assignable, &starts)?;
+        let scaled = |units: &DVector<f64>| {
+            let assignable = Assignable::new(a, b, poles, units)?;
+            let starts = widest_directions(&assignable.problem)?;
+            Assignment::new(assignable, &starts)
         };
-        Ok::<_, Error>(Placement { gain, quality })
-    };
-    let Assignment { assignable, directions, gain } = best;
-    let is_unique = assignable.problem.inputs() == 1;
-    let chosen = match (choice, other) {
-        (Some(best), _) => placement(&assignable, &best, assignable.gain(&best)?)?,
-        (None, Some(other)) => placement(&other.assignable, &other.directions, other.gain)?,
-        (None, None) => placement(&assignable, &directions, gain)?,
-    };
-    let allowed = (LESS_EXACT * chosen.quality.pole_error).max(EXACT);
-    let others = others.iter().take(most_alternatives(n)).filter_map(|directions| {
-        let found = placement(&assignable, directions, assignable.gain(directions).ok()?).ok()?;
-        (found.quality.pole_error <= allowed).then_some(found)
-    });
-    let others = others.collect();
-    let alone = is_unique.then(|| chosen.clone());
-    let standard = standard.map(|found| match found {
-        Some(directions) => {
-            placement(&assignable, &directions, assignable.gain(&directions).ok()?).ok()
+        let balance = |gain: &DMatrix<f64>| Balance::new(&(a + b * gain)).scale;
+        let mut scale = balance(&best.gain);
+        let other = match coordinates {
+            Coordinates::Given => None,
+            Coordinates::Balanced => Some(scaled(&scale)?),
+            Coordinates::Scaled(units) => Some(scaled(units)?),
+        };
+        if let (Coordinates::Scaled(_), Some(other)) = (coordinates, &other) {
+            scale = balance(&other.gain);
         }
-        None => alone.clone(),
-    });
-    Ok(Alternatives { chosen, others, standard })
+        let Assignable { problem, basis, .. } = &best.assignable;
+        let independent = if problem.inputs() == b.ncols() { b } else { &best.assignable.b };
+        let standard = standard_directions(a, independent, problem)?;
+        let (mut choice, mut others) = (None, vec![]);
+        if problem.inputs() > 1 {
+            let feedback = FeedbackLoop::new(problem, basis, b, tolerance.sampled);
+            let other = other.iter().map(|other| {
+                problem.directions_of(&other.assignable.eigenvectors(&other.directions, &ones))
+            });
+            let candidates: Vec<_> = other.chain([best.directions.clone()]).collect();
+            let mut search = Search::new(&feedback);
+            choice = search.choose(&candidates, &starts)?;
+            if let (Some(chosen), Extent::Alternatives) =
+                (choice.as_ref().or(candidates.first()), extent)
+            {
+                others = search.others(chosen, &more_directions(problem)?)?;
+            }
+        }
+        let placement = |assignable: &Assignable, directions: &[DVector<f64>], gain| {
+            let quality = Quality {
+                condition: condition(&assignable.eigenvectors(directions, &ones))?,
+                balanced_condition: condition(&assignable.eigenvectors(directions, &scale))?,
+                pole_error: tolerance.pole_error(a, b, &gain, poles)?,
+            };
+            Ok::<_, Error>(Placement { gain, quality })
+        };
+        let Assignment { assignable, directions, gain } = best;
+        let is_unique = assignable.problem.inputs() == 1;
+        let chosen = match (choice, other) {
+            (Some(best), _) => placement(&assignable, &best, assignable.gain(&best)?)?,
+            (None, Some(other)) => placement(&other.assignable, &other.directions, other.gain)?,
+            (None, None) => placement(&assignable, &directions, gain)?,
+        };
+        let allowed = (LESS_EXACT * chosen.quality.pole_error).max(EXACT);
+        let others = others.iter().take(most_alternatives(n)).filter_map(|directions| {
+            let gain = assignable.gain(directions).ok()?;
+            let other = placement(&assignable, directions, gain).ok()?;
+            (other.quality.pole_error <= allowed).then_some(other)
+        });
+        let others = others.collect();
+        let alone = is_unique.then(|| chosen.clone());
+        let standard = standard.map(|directions| match directions {
+            Some(directions) => {
+                placement(&assignable, &directions, assignable.gain(&directions).ok()?).ok()
+            }
+            None => alone.clone(),
+        });
+        Ok(Alternatives { chosen, others, standard })
+    }
 }
 
 /// The eigenvectors that can be assigned, in given coordinates.

@@ -4,7 +4,7 @@
 //! model. All gains are designed for the sampled plant, so that the loop is stable at every sample
 //! time at which the sampled plant is controllable and observable.
 
-use crate::aso::{best_pair, place_controller};
+use crate::aso::{GainCandidates, place_controller};
 use crate::balance::power_of_two;
 use crate::blocks::{block_2x2, stacked};
 use crate::controller::{closed_loop, controller};
@@ -13,7 +13,7 @@ use crate::faulty_plant::FaultyPlant;
 use crate::gains::{Estimator, Gains};
 use crate::hold::FirstOrderHold;
 use crate::placement::{
-    Alternatives, Coordinates, DISCRETE, Quality, Wanted, alternatives_discrete, alternatives_in,
+    Alternatives, Coordinates, DISCRETE, Extent, PlacementProblem, Quality, alternatives_discrete,
 };
 use crate::stability::instability;
 use crate::{Domain, Error, check};
@@ -63,10 +63,10 @@ pub struct SampledDesign {
 /// ```
 /// use control::sampled::sampled_poles;
 /// use nalgebra::Complex;
-/// let wanted = [-10.0, -3000.0].map(|p| Complex::new(p, 0.0));
-/// let fine = sampled_poles(&wanted, 1e-3)?;
+/// let continuous = [-10.0, -3000.0].map(|p| Complex::new(p, 0.0));
+/// let fine = sampled_poles(&continuous, 1e-3)?;
 /// assert!((fine[1].re - (-3.0_f64).exp()).abs() < 1e-15);
-/// let coarse = sampled_poles(&wanted, 1e-2)?;
+/// let coarse = sampled_poles(&continuous, 1e-2)?;
 /// assert!((coarse[0].re - (-0.1_f64).exp()).abs() < 1e-15);
 /// assert!((coarse[1].re - (-4.0_f64).exp()).abs() < 1e-15);
 /// # Ok::<(), control::Error>(())
@@ -135,18 +135,17 @@ pub fn sample(extended: &ExtendedPlant, period: f64) -> Result<FaultyPlant, Erro
     let Some(rates) = filter else {
         return Ok(FaultyPlant { a, b, c: plant.c.clone(), f_a, a_f });
     };
-    let moved =
-        DVector::from_vec(rates.iter().map(|rate| filter_gain(*rate, period) / rate).collect());
-    let moved = DMatrix::from_diagonal(&moved);
-    let kept = DVector::from_vec(rates.iter().map(|rate| (-rate * period).exp()).collect());
+    let gain = rates.iter().map(|rate| filter_gain(*rate, period) / rate);
+    let gain = DMatrix::from_diagonal(&DVector::from_vec(gain.collect()));
+    let decay = DVector::from_vec(rates.iter().map(|rate| (-rate * period).exp()).collect());
     Ok(FaultyPlant {
         a: block_2x2(
             [&a, &DMatrix::zeros(n, filters)],
-            [&(&moved * plant.a.view((n, 0), (filters, n))), &DMatrix::from_diagonal(&kept)],
+            [&(&gain * plant.a.view((n, 0), (filters, n))), &DMatrix::from_diagonal(&decay)],
         ),
         b,
         c: plant.c.clone(),
-        f_a: stacked(&f_a, &(&moved * plant.f_a.rows(n, filters))),
+        f_a: stacked(&f_a, &(&gain * plant.f_a.rows(n, filters))),
         a_f,
     })
 }
@@ -208,23 +207,30 @@ pub fn design(
     let plant = sample(extended, period)?;
     plant.check_observer_exists()?;
     let k_f = match k_f {
-        Some(given) => given.clone(),
+        Some(k_f) => k_f.clone(),
         None => compensation_gain(extended, Domain::Sampled { period })?,
     };
     check::shape("K_f", &k_f, (plant.b.ncols(), plant.f_a.ncols()))?;
-    let states = (&plant, extended.states);
-    let feedbacks = place_controller(states, controller_poles, alternatives_discrete)?;
+    let feedbacks =
+        place_controller(&plant, extended.states, controller_poles, alternatives_discrete)?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-    let seen = estimator.output_matrix(&a_0, &c_0);
-    let observers = estimator_alternatives(&a_0, &seen, observer_poles)?;
+    let output = estimator.output_matrix(&a_0, &c_0);
+    let observers = estimator_alternatives(&a_0, &output, observer_poles)?;
     let domain = Domain::Sampled { period };
-    let (gains, [feedback, observer]) =
-        best_pair(&plant, (&feedbacks, &observers), (estimator, &k_f), domain)?;
+    let candidates = GainCandidates {
+        plant: &plant,
+        feedbacks: &feedbacks,
+        observers: &observers,
+        estimator,
+        k_f: &k_f,
+        domain,
+    };
+    let (gains, [feedback, observer]) = candidates.best()?;
     let controller_system = controller(&plant, &gains, domain)?;
     let dynamics = closed_loop(&plant, &controller_system, &vec![1.0; plant.b.ncols()])?;
     let radius = 1.0 + instability(&dynamics, domain)?;
-    let wanted = controller_poles.iter().chain(observer_poles);
-    let largest = wanted.fold(0.0, |largest: f64, pole| largest.max(pole.norm()));
+    let poles = controller_poles.iter().chain(observer_poles);
+    let largest = poles.fold(0.0, |largest: f64, pole| largest.max(pole.norm()));
     if largest < 1.0 && radius >= 1.0 {
         return Err(Error::PolesMissed { relative: radius - largest, allowed: 1.0 - largest });
     }
@@ -254,7 +260,7 @@ pub fn place_estimator(
     output: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<(DMatrix<f64>, Quality), Error> {
-    let placed = place_dual((a_0, output), poles, Wanted::One)?.chosen;
+    let placed = place_dual(a_0, output, poles, Extent::Chosen)?.chosen;
     Ok((placed.gain, placed.quality))
 }
 
@@ -269,14 +275,15 @@ pub fn estimator_alternatives(
     output: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Alternatives, Error> {
-    place_dual((a_0, output), poles, Wanted::Alternatives)
+    place_dual(a_0, output, poles, Extent::Alternatives)
 }
 
 /// See [`place_estimator`] and [`estimator_alternatives`].
 fn place_dual(
-    (a_0, output): (&DMatrix<f64>, &DMatrix<f64>),
+    a_0: &DMatrix<f64>,
+    output: &DMatrix<f64>,
     poles: &[Complex<f64>],
-    wanted: Wanted,
+    extent: Extent,
 ) -> Result<Alternatives, Error> {
     let n = check::square("A_0", a_0)?;
     check::shape("C_0", output, (output.nrows(), n))?;
@@ -292,8 +299,9 @@ fn place_dual(
     });
     let units = scale.map(|unit| 1.0 / unit);
     let (a, b) = (a_0.transpose(), output.transpose());
-    let found = alternatives_in(&Coordinates::Scaled(&units), (&a, &b), poles, &DISCRETE, wanted)?;
-    Ok(found.map(|gain| -gain.transpose()))
+    let problem = PlacementProblem { a: &a, b: &b, poles, tolerance: &DISCRETE };
+    let placed = problem.alternatives(&Coordinates::Scaled(&units), extent)?;
+    Ok(placed.map(|gain| -gain.transpose()))
 }
 
 /// The coefficients of the measurement filter in `domain`: the rates w, in sampled time the gains 1

@@ -1,7 +1,7 @@
 //! Feedbacks with the same eigenvalues and different eigenvectors.
 
 use super::eigenvectors::LARGEST_DESCENT;
-use super::{CONTINUOUS, Coordinates, DISCRETE, Placement, Wanted, alternatives_in};
+use super::{CONTINUOUS, Coordinates, DISCRETE, Extent, Placement, PlacementProblem};
 use crate::Error;
 use crate::svd::norm_2;
 use nalgebra::{Complex, DMatrix};
@@ -41,20 +41,21 @@ impl Alternatives {
     /// standard methods, unless there are none.
     #[must_use]
     pub fn candidates(&self) -> [Vec<&Placement>; 2] {
-        let figures =
-            |own: &Placement| [own.quality.condition, norm_2(&own.gain).unwrap_or(f64::INFINITY)];
+        let figures = |placement: &Placement| {
+            [placement.quality.condition, norm_2(&placement.gain).unwrap_or(f64::INFINITY)]
+        };
         let least = self.standard.iter().flatten().map(figures);
         let [condition, gain] =
             least.reduce(|x, y| [x[0].min(y[0]), x[1].min(y[1])]).unwrap_or([f64::INFINITY; 2]);
-        let is_near = |own: &&Placement| {
-            let [own_condition, own_gain] = figures(own);
-            own_condition <= NEAR * condition && own_gain <= NEAR * gain
+        let is_near = |placement: &&Placement| {
+            let [its_condition, its_gain] = figures(placement);
+            its_condition <= NEAR * condition && its_gain <= NEAR * gain
         };
-        let own: Vec<_> = self.all().filter(is_near).collect();
-        let standard = self.standard.iter().flatten().filter(|own| **own != self.chosen);
+        let near: Vec<_> = self.all().filter(is_near).collect();
+        let standard = self.standard.iter().flatten().filter(|one| **one != self.chosen);
         let standard: Vec<_> = standard.filter(is_near).collect();
-        match (own.is_empty(), standard.is_empty()) {
-            (false, _) => [own, standard],
+        match (near.is_empty(), standard.is_empty()) {
+            (false, _) => [near, standard],
             (true, false) => [standard, vec![]],
             (true, true) => [self.all().collect(), vec![]],
         }
@@ -66,7 +67,7 @@ impl Alternatives {
         other: &'a Self,
     ) -> impl Iterator<Item = (&'a Placement, &'a Placement)> {
         let pairs = self.standard.iter().zip(&other.standard);
-        pairs.filter_map(|(own, other)| own.as_ref().zip(other.as_ref()))
+        pairs.filter_map(|(feedback, observer)| feedback.as_ref().zip(observer.as_ref()))
     }
 
     /// Replaces each gain by `map` of it.
@@ -97,7 +98,8 @@ pub fn alternatives(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Alternatives, Error> {
-    alternatives_in(&Coordinates::Given, (a, b), poles, &CONTINUOUS, Wanted::Alternatives)
+    let problem = PlacementProblem { a, b, poles, tolerance: &CONTINUOUS };
+    problem.alternatives(&Coordinates::Given, Extent::Alternatives)
 }
 
 /// Computes the gain of [`super::place_balanced`] and alternatives to it, see [`alternatives`].
@@ -110,7 +112,8 @@ pub fn alternatives_balanced(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Alternatives, Error> {
-    alternatives_in(&Coordinates::Balanced, (a, b), poles, &CONTINUOUS, Wanted::Alternatives)
+    let problem = PlacementProblem { a, b, poles, tolerance: &CONTINUOUS };
+    problem.alternatives(&Coordinates::Balanced, Extent::Alternatives)
 }
 
 /// Computes the gain of [`super::place_discrete`] and alternatives to it, see [`alternatives`].
@@ -123,7 +126,8 @@ pub fn alternatives_discrete(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Alternatives, Error> {
-    alternatives_in(&Coordinates::Balanced, (a, b), poles, &DISCRETE, Wanted::Alternatives)
+    let problem = PlacementProblem { a, b, poles, tolerance: &DISCRETE };
+    problem.alternatives(&Coordinates::Balanced, Extent::Alternatives)
 }
 
 /// The largest number of alternatives for `n` states.

@@ -32,15 +32,15 @@ type Figures = [f64; COUNT];
 /// The search for directions by three figures: condition number, gain norm, peak of S.
 pub(crate) struct Search<'a> {
     feedback: &'a FeedbackLoop<'a>,
-    /// The directions that were found, with their figures.
-    found: Vec<(Figures, Directions)>,
+    /// The directions of all searches, with their figures.
+    results: Vec<(Figures, Directions)>,
     /// The least figures of the directions of largest volume in [`Self::choose`].
     widest: Figures,
 }
 
 impl<'a> Search<'a> {
     pub(crate) fn new(feedback: &'a FeedbackLoop<'a>) -> Self {
-        Self { feedback, found: vec![], widest: [f64::INFINITY; COUNT] }
+        Self { feedback, results: vec![], widest: [f64::INFINITY; COUNT] }
     }
 
     /// Chooses directions.
@@ -59,7 +59,7 @@ impl<'a> Search<'a> {
         widest: &[Directions],
     ) -> Result<Option<Directions>, Error> {
         let (of_candidates, smooth_of_candidates) = self.offer(candidates)?;
-        let own = self.found.first().map(|(figures, _)| *figures);
+        let first = self.results.first().map(|(figures, _)| *figures);
         let (of_widest, smooth_of_widest) = self.offer(widest)?;
         self.widest = of_widest;
         if !of_widest.iter().all(|figure| figure.is_normal()) {
@@ -75,13 +75,13 @@ impl<'a> Search<'a> {
         }
         let is_acceptable = |reference: Figures| {
             let limits = std::array::from_fn(|figure| ACCEPTABLE[figure] * reference[figure]);
-            own.is_some_and(|own| ratio(own, limits) <= 1.0)
+            first.is_some_and(|first| ratio(first, limits) <= 1.0)
         };
         // No loop has a lower peak than 1.
         if is_acceptable([reference[0], reference[1], 1.0]) {
             return Ok(None);
         }
-        let mut starts = self.found.clone();
+        let mut starts = self.results.clone();
         starts.sort_by(|x, y| ratio(x.0, reference).total_cmp(&ratio(y.0, reference)));
         for (_, start) in starts.iter().take(DESCENTS) {
             self.descend(start, &|figures| least_peak(figures, &smooth))?;
@@ -112,17 +112,17 @@ impl<'a> Search<'a> {
         let (of_more, _) = self.offer(more)?;
         let [condition, gain, _] = least(self.widest, of_more);
         let is_near = |figures: Figures| ratio(figures, [condition, gain, f64::INFINITY]);
-        self.found.retain(|(figures, _)| is_near(*figures) <= ALTERNATIVE);
-        self.found.sort_by(|x, y| x.0[2].total_cmp(&y.0[2]));
+        self.results.retain(|(figures, _)| is_near(*figures) <= ALTERNATIVE);
+        self.results.sort_by(|x, y| x.0[2].total_cmp(&y.0[2]));
         let mut known: Vec<Figures> = self.feedback.figures(chosen)?.into_iter().collect();
-        self.found.retain(|(figures, _)| {
+        self.results.retain(|(figures, _)| {
             let is_new = !known.iter().any(|known| is_same(*known, *figures));
             if is_new {
                 known.push(*figures);
             }
             is_new
         });
-        Ok(self.found.into_iter().map(|(_, directions)| directions).collect())
+        Ok(self.results.into_iter().map(|(_, directions)| directions).collect())
     }
 
     /// Adds directions; returns their least figures and the least logarithms of the smooth ones.
@@ -133,7 +133,7 @@ impl<'a> Search<'a> {
             if let (Some(figures), Some(logarithms)) = values {
                 exact = least(exact, figures);
                 smooth = least(smooth, logarithms);
-                self.found.push((figures, directions.clone()));
+                self.results.push((figures, directions.clone()));
             }
         }
         Ok((exact, smooth))
@@ -148,13 +148,16 @@ impl<'a> Search<'a> {
         };
         let order =
             |x: Figures, y: Figures| excess(x).total_cmp(&excess(y)).then(x[2].total_cmp(&y[2]));
-        self.found.iter().min_by(|x, y| order(x.0, y.0))
+        self.results.iter().min_by(|x, y| order(x.0, y.0))
     }
 
     /// The directions whose largest relative figure is least.
     fn best(&self, reference: Figures) -> Option<&Directions> {
         let worst = |(figures, _): &(Figures, Directions)| ratio(*figures, reference);
-        self.found.iter().min_by(|x, y| worst(x).total_cmp(&worst(y))).map(|(_, found)| found)
+        self.results
+            .iter()
+            .min_by(|x, y| worst(x).total_cmp(&worst(y)))
+            .map(|(_, directions)| directions)
     }
 
     fn descend(

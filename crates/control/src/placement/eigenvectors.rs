@@ -129,16 +129,21 @@ fn widest(space: &AssignableSubspace, normals: &DMatrix<f64>) -> Result<DVector<
     Ok(if size(&highest) >= size(&lowest) { highest } else { lowest })
 }
 
-/// The value of a function of directions, and its gradients with respect to the eigenvectors V and,
-/// unless it does not depend on them, to the responses G; None where it is not defined.
-pub(crate) type Slope = Option<(f64, DMatrix<f64>, Option<DMatrix<f64>>)>;
+/// The value of a function of directions and its gradients.
+pub(crate) struct Slope {
+    pub(crate) value: f64,
+    /// With respect to the eigenvectors V.
+    pub(crate) of_v: DMatrix<f64>,
+    /// With respect to the responses G; None if the function does not depend on them.
+    pub(crate) of_g: Option<DMatrix<f64>>,
+}
 
 /// Descent in local coordinates that are centred anew in each round, until a round lowers the value
-/// by less than `tolerance`.
+/// by less than `tolerance`. The function is None where it is not defined.
 pub(crate) fn descend(
     problem: &AssignableSubspaces,
     mut directions: Directions,
-    function: &dyn Fn(&[DVector<f64>]) -> Slope,
+    function: &dyn Fn(&[DVector<f64>]) -> Option<Slope>,
     tolerance: f64,
 ) -> Result<Directions, Error> {
     let mut value = f64::INFINITY;
@@ -146,8 +151,8 @@ pub(crate) fn descend(
         let chart = Chart::around(problem, directions)?;
         let local = |t: &DVector<f64>| {
             let directions = chart.directions(t);
-            let (value, of_v, of_g) = function(&directions)?;
-            Some((value, chart.gradient(problem, &directions, t, (&of_v, of_g.as_ref()))))
+            let slope = function(&directions)?;
+            Some((slope.value, chart.gradient(problem, &directions, t, &slope)))
         };
         let (at, lowest) = minimise(&local, chart.dimension(), tolerance);
         directions = chart.directions(&at);
@@ -160,13 +165,13 @@ pub(crate) fn descend(
 }
 
 /// ln(s1 / sn) of the eigenvector matrix V = sum of s x u', and its gradient: ds = x' dV u.
-fn condition_slope(problem: &AssignableSubspaces, directions: &[DVector<f64>]) -> Slope {
+fn condition_slope(problem: &AssignableSubspaces, directions: &[DVector<f64>]) -> Option<Slope> {
     let v = Svd::new(&problem.eigenvectors(directions).transpose()).ok()?;
     let last = v.values.len() - 1;
     let value = v.condition().ln();
-    let of_columns = v.right.column(0) * (v.left.column(0) / v.values[0]).transpose()
+    let of_v = v.right.column(0) * (v.left.column(0) / v.values[0]).transpose()
         - v.right.column(last) * (v.left.column(last) / v.values[last]).transpose();
-    value.is_finite().then_some((value, of_columns, None))
+    value.is_finite().then_some(Slope { value, of_v, of_g: None })
 }
 
 /// Directions near given ones: w = (w0 + N t) / |w0 + N t|.
@@ -199,23 +204,23 @@ impl Chart {
         self.centres.iter().zip(&self.normals).map(direction).collect()
     }
 
-    /// The gradient with respect to the local coordinates t of `directions`, from those with respect
-    /// to V and G.
+    /// The gradient with respect to the local coordinates t of `directions`.
     fn gradient(
         &self,
         problem: &AssignableSubspaces,
         directions: &[DVector<f64>],
         t: &DVector<f64>,
-        (of_v, of_g): (&DMatrix<f64>, Option<&DMatrix<f64>>),
+        slope: &Slope,
     ) -> DVector<f64> {
-        let of_g = of_g.map(|of_g| multiply_rows(of_g, &problem.response_scale));
+        let Slope { of_v, of_g, .. } = slope;
+        let of_g = of_g.as_ref().map(|of_g| multiply_rows(of_g, &problem.response_scale));
         let mut gradient = DVector::zeros(t.len());
         let (mut column, mut first) = (0, 0);
         for ((space, normals), w) in problem.spaces.iter().zip(&self.normals).zip(directions) {
             let (count, free) = (space.poles.count(), normals.ncols());
             let stacked = |m: &DMatrix<f64>| {
-                let own = m.columns(column, count).into_owned();
-                DVector::from_column_slice(own.as_slice())
+                let columns = m.columns(column, count).into_owned();
+                DVector::from_column_slice(columns.as_slice())
             };
             let mut slope = space.states.tr_mul(&stacked(of_v));
             if let Some(of_g) = &of_g {

@@ -86,14 +86,15 @@ impl<'a> FeedbackLoop<'a> {
         &self,
         directions: &[DVector<f64>],
     ) -> Result<Option<[f64; COUNT]>, Error> {
-        let Some(found) = self.at(directions) else {
+        let Some(structure) = self.at(directions) else {
             return Ok(None);
         };
-        let condition = condition(&found.v)?;
-        let gain = norm_2(&(&found.g * &found.inverse).transpose())?;
+        let condition = condition(&structure.v)?;
+        let gain = norm_2(&(&structure.g * &structure.inverse).transpose())?;
         let mut peak = 1.0_f64;
         for point in &self.points {
-            let s = self.sensitivity(&found, &self.resolvent(*point, &to_complex(&found.input)));
+            let z = self.resolvent(*point, &to_complex(&structure.input));
+            let s = self.sensitivity(&structure, &z);
             peak = peak.max(ComplexSvd::new(&s)?.values()[0]);
         }
         let figures = [condition, gain, peak];
@@ -103,28 +104,29 @@ impl<'a> FeedbackLoop<'a> {
     /// The logarithms of smooth bounds of the figures: Schatten norms of order 16 in place of the
     /// 2-norms, a mean over the frequencies in place of the maximum.
     pub(crate) fn smooth(&self, directions: &[DVector<f64>]) -> Option<[f64; COUNT]> {
-        let found = self.at(directions)?;
-        Some(self.all(&found).map(|figure| figure.value))
+        let structure = self.at(directions)?;
+        Some(self.all(&structure).map(|figure| figure.value))
     }
 
     /// `weigh` maps the values of [`Self::smooth`] to an objective and its partial derivatives;
     /// returns the objective and its gradients with respect to V and to G, in the given inputs.
-    pub(crate) fn objective(&self, directions: &[DVector<f64>], weigh: &Weigh) -> Slope {
-        let found = self.at(directions)?;
-        let figures = self.all(&found);
+    pub(crate) fn objective(&self, directions: &[DVector<f64>], weigh: &Weigh) -> Option<Slope> {
+        let structure = self.at(directions)?;
+        let figures = self.all(&structure);
         let (value, weights) = weigh(&[0, 1, 2].map(|figure: usize| figures[figure].value));
-        let mut of_v = DMatrix::zeros(found.v.nrows(), found.v.ncols());
-        let mut of_g = DMatrix::zeros(found.g.nrows(), found.g.ncols());
+        let mut of_v = DMatrix::zeros(structure.v.nrows(), structure.v.ncols());
+        let mut of_g = DMatrix::zeros(structure.g.nrows(), structure.g.ncols());
         for (figure, weight) in figures.iter().zip(weights) {
             of_v += &figure.of_v * weight;
             of_g += &figure.of_g * weight;
         }
         let finite = of_v.iter().chain(&of_g).copied().all(f64::is_finite);
-        (value.is_finite() && finite).then(|| (value, of_v, Some(self.basis.tr_mul(&of_g))))
+        let of_g = Some(self.basis.tr_mul(&of_g));
+        (value.is_finite() && finite).then_some(Slope { value, of_v, of_g })
     }
 
-    fn all(&self, found: &Eigenstructure) -> [Smooth; COUNT] {
-        [found.condition(), found.gain(), self.peak(found)]
+    fn all(&self, structure: &Eigenstructure) -> [Smooth; COUNT] {
+        [structure.condition(), structure.gain(), self.peak(structure)]
     }
 
     /// (s I - M)^-1 N.
@@ -152,25 +154,26 @@ impl<'a> FeedbackLoop<'a> {
     /// I + G Z, with Z = (s I - M)^-1 V^-1 B.
     fn sensitivity(
         &self,
-        found: &Eigenstructure,
+        structure: &Eigenstructure,
         z: &DMatrix<Complex<f64>>,
     ) -> DMatrix<Complex<f64>> {
         let m = self.b.ncols();
-        let (re, im) = (&found.g * z.map(|entry| entry.re), &found.g * z.map(|entry| entry.im));
+        let (re, im) =
+            (&structure.g * z.map(|entry| entry.re), &structure.g * z.map(|entry| entry.im));
         DMatrix::from_fn(m, m, |i, j| {
             Complex::new(re[(i, j)] + if i == j { 1.0 } else { 0.0 }, im[(i, j)])
         })
     }
 
     /// dS = dG Z - G (s I - M)^-1 V^-1 dV V^-1 B.
-    fn peak(&self, found: &Eigenstructure) -> Smooth {
-        let (n, m) = found.input.shape();
+    fn peak(&self, structure: &Eigenstructure) -> Smooth {
+        let (n, m) = structure.input.shape();
         let mut of_v = DMatrix::zeros(n, n);
         let mut of_g = DMatrix::zeros(m, n);
-        let input = to_complex(&found.input);
+        let input = to_complex(&structure.input);
         let norms = self.points.iter().map(|&point| {
             let z = self.resolvent(point, &input);
-            let (value, gradient) = schatten(&self.sensitivity(found, &z));
+            let (value, gradient) = schatten(&self.sensitivity(structure, &z));
             (point, z, value, gradient)
         });
         let norms: Vec<_> = norms.collect();
@@ -181,7 +184,7 @@ impl<'a> FeedbackLoop<'a> {
             return Smooth { value: 0.0, of_v, of_g };
         }
         let mut back = DMatrix::zeros(n, m);
-        let transposed = found.g.transpose();
+        let transposed = structure.g.transpose();
         for (point, z, value, gradient) in norms {
             let share = weight(value) / total;
             if share < f64::EPSILON {
@@ -196,7 +199,7 @@ impl<'a> FeedbackLoop<'a> {
             let d = DMatrix::from_fn(n, m, |i, j| Complex::new(re[(i, j)], -im[(i, j)]));
             back += self.transposed_resolvent(point, &d).map(|entry| entry.re) * share;
         }
-        of_v -= found.inverse.tr_mul(&back) * found.input.transpose();
+        of_v -= structure.inverse.tr_mul(&back) * structure.input.transpose();
         Smooth { value: largest + total.ln() / MEAN, of_v, of_g }
     }
 

@@ -30,7 +30,8 @@ const EIGEN_ITERATIONS: usize = 1000;
 ///
 /// Sources: see [`super::place`]; the start: scipy 1.17, `scipy.signal.place_poles`.
 pub(crate) fn standard_directions(
-    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
     problem: &AssignableSubspaces,
 ) -> Result<[Option<Directions>; 2], Error> {
     let (n, r) = b.shape();
@@ -38,7 +39,7 @@ pub(crate) fn standard_directions(
         return Ok([None, None]);
     }
     let is_real = problem.spaces.iter().all(|space| space.poles.count() == 1);
-    let start = Iteration::new((a, b), problem);
+    let start = Iteration::new(a, b, problem);
     if n == r {
         let unit = start.directions(problem);
         return Ok([is_real.then(|| unit.clone()), Some(unit)]);
@@ -69,7 +70,7 @@ struct Iteration {
 }
 
 impl Iteration {
-    fn new((a, b): (&DMatrix<f64>, &DMatrix<f64>), problem: &AssignableSubspaces) -> Self {
+    fn new(a: &DMatrix<f64>, b: &DMatrix<f64>, problem: &AssignableSubspaces) -> Self {
         let (n, r) = b.shape();
         let count = |number: &usize| problem.spaces[*number].poles.count();
         let mut order: Vec<usize> = (0..problem.spaces.len()).rev().collect();
@@ -129,9 +130,9 @@ impl Iteration {
     /// The projection of the normal of the plane that the others span.
     fn improve_one(&mut self, j: usize) {
         let kernel = self.kernel(j);
-        let found = &kernel * kernel.tr_mul(&self.normals(&[j]));
-        if found.amax() > ZERO {
-            self.vectors.set_column(j, &found.column(0).normalize());
+        let projection = &kernel * kernel.tr_mul(&self.normals(&[j]));
+        if projection.amax() > ZERO {
+            self.vectors.set_column(j, &projection.column(0).normalize());
         }
     }
 
@@ -140,25 +141,26 @@ impl Iteration {
         let n = self.vectors.nrows();
         let normals = self.normals(&[i.min(j), i.max(j)]);
         let (u, v) = (normals.column(0), normals.column(1));
-        let (own, other) = (self.kernel(i), self.kernel(j));
-        let (of_u, of_v) = (own.tr_mul(&u), own.tr_mul(&v));
-        let svd =
-            Svd::new(&(of_u * other.tr_mul(&v).transpose() - of_v * other.tr_mul(&u).transpose()))?;
+        let (first, second) = (self.kernel(i), self.kernel(j));
+        let (of_u, of_v) = (first.tr_mul(&u), first.tr_mul(&v));
+        let svd = Svd::new(
+            &(of_u * second.tr_mul(&v).transpose() - of_v * second.tr_mul(&u).transpose()),
+        )?;
         let count = if is_close(svd.values[0], svd.values[1]) { 2 } else { 1 };
         let mut plane = DMatrix::zeros(2 * n, count);
-        plane.rows_mut(0, n).copy_from(&(own * svd.left.columns(0, count)));
-        plane.rows_mut(n, n).copy_from(&(other * svd.right.columns(0, count)));
+        plane.rows_mut(0, n).copy_from(&(first * svd.left.columns(0, count)));
+        plane.rows_mut(n, n).copy_from(&(second * svd.right.columns(0, count)));
         let mut before = DVector::zeros(2 * n);
         before.rows_mut(0, n).copy_from(&self.vectors.column(i));
         before.rows_mut(n, n).copy_from(&self.vectors.column(j));
-        let mut found = &plane * plane.tr_mul(&before);
-        if found.amax() > ZERO {
-            found *= std::f64::consts::SQRT_2 / found.norm();
+        let mut pair = &plane * plane.tr_mul(&before);
+        if pair.amax() > ZERO {
+            pair *= std::f64::consts::SQRT_2 / pair.norm();
         } else {
-            found = plane.column(0).into();
+            pair = plane.column(0).into();
         }
-        self.vectors.set_column(i, &found.rows(0, n));
-        self.vectors.set_column(j, &found.rows(n, n));
+        self.vectors.set_column(i, &pair.rows(0, n));
+        self.vectors.set_column(j, &pair.rows(n, n));
         Ok(())
     }
 
@@ -170,29 +172,29 @@ impl Iteration {
         let entry = |re, im| Complex::new(re, im);
         let root = std::f64::consts::SQRT_2;
         let u = normals.column(0).zip_map(&normals.column(1), entry) * Complex::new(root, 0.0);
-        let (own, other) = (kernel.ad_mul(&u), kernel.ad_mul(&u.conjugate()));
-        let form = &own * own.adjoint() - &other * other.adjoint();
-        let found = SymmetricEigen::try_new(form, f64::EPSILON, EIGEN_ITERATIONS).ok_or(
+        let (of_u, of_conjugate) = (kernel.ad_mul(&u), kernel.ad_mul(&u.conjugate()));
+        let form = &of_u * of_u.adjoint() - &of_conjugate * of_conjugate.adjoint();
+        let eigen = SymmetricEigen::try_new(form, f64::EPSILON, EIGEN_ITERATIONS).ok_or(
             Error::NotConverged { what: "the eigenvalue iteration", iterations: EIGEN_ITERATIONS },
         )?;
-        let values = found.eigenvalues.map(f64::abs);
+        let values = eigen.eigenvalues.map(f64::abs);
         let mut numbers: Vec<usize> = (0..values.len()).collect();
         numbers.sort_by(|&x, &y| values[y].total_cmp(&values[x]));
         let count = if is_close(values[numbers[0]], values[numbers[1]]) { 2 } else { 1 };
         let before = self.vectors.column(i).zip_map(&self.vectors.column(i + 1), entry);
-        let axes = numbers.iter().take(count).map(|&k| kernel * found.eigenvectors.column(k));
+        let axes = numbers.iter().take(count).map(|&k| kernel * eigen.eigenvectors.column(k));
         let axes: Vec<DVector<_>> = axes.collect();
-        let mut found = DVector::zeros(before.len());
+        let mut vector = DVector::zeros(before.len());
         for axis in &axes {
-            found += axis * axis.dotc(&before);
+            vector += axis * axis.dotc(&before);
         }
-        if found.camax() > ZERO {
-            found.normalize_mut();
+        if vector.camax() > ZERO {
+            vector.normalize_mut();
         } else {
-            found.copy_from(&axes[0]);
+            vector.copy_from(&axes[0]);
         }
-        self.vectors.set_column(i, &found.map(|entry| entry.re));
-        self.vectors.set_column(i + 1, &found.map(|entry| entry.im));
+        self.vectors.set_column(i, &vector.map(|entry| entry.re));
+        self.vectors.set_column(i + 1, &vector.map(|entry| entry.im));
         Ok(())
     }
 

@@ -58,11 +58,11 @@ impl AssignableSubspaces {
         let space = |(solution, &poles): (&DMatrix<f64>, &PoleBlock)| {
             let count = poles.count();
             let (top, bottom) = (solution.rows(0, count * n), solution.rows(count * n, count * r));
-            let given = multiply_rows(&top.into(), &repeated(&scale, count));
-            let whitening = Svd::new(&given)?.whitening(count * r) * root(count);
+            let original = multiply_rows(&top.into(), &repeated(&scale, count));
+            let whitening = Svd::new(&original)?.whitening(count * r) * root(count);
             Ok(AssignableSubspace {
                 poles,
-                states: given * &whitening,
+                states: original * &whitening,
                 responses: bottom * whitening,
             })
         };
@@ -116,9 +116,9 @@ impl AssignableSubspaces {
     pub(crate) fn directions_of(&self, eigenvectors: &DMatrix<f64>) -> Vec<DVector<f64>> {
         let mut column = 0;
         let direction = |space: &AssignableSubspace| {
-            let own = eigenvectors.columns(column, space.poles.count()).into_owned();
+            let columns = eigenvectors.columns(column, space.poles.count()).into_owned();
             column += space.poles.count();
-            space.states.tr_mul(&DVector::from_column_slice(own.as_slice())).normalize()
+            space.states.tr_mul(&DVector::from_column_slice(columns.as_slice())).normalize()
         };
         self.spaces.iter().map(direction).collect()
     }
