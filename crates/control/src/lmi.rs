@@ -9,7 +9,7 @@
 //!   certificate P.
 //! * [`observer_gain`], [`state_feedback`]: compute a gain that places the eigenvalues in a region
 //!   and keeps or minimises such a bound.
-//! * [`weighted_observer_gain`], [`weighted_state_feedback`]: the same with weights over frequency;
+//! * [`ChannelWeights::observer_gain`], [`ChannelWeights::state_feedback`]: the same with weights over frequency;
 //!   [`weight_of_table`]: the weight whose magnitude is nearest to a table.
 //! * [`observer_norm_lower_bound`], [`feedback_norm_lower_bound`]: the H-infinity norm below which no gain
 //!   and no filter of any order is.
@@ -61,7 +61,7 @@ pub use synthesis::{observer_gain, state_feedback};
 pub use table_weight::{TableWeight, weight_of_table};
 pub(crate) use vertices::find_common;
 pub use vertices::{CommonFeedback, Vertex, certify_common, common_feedback, largest_scaling};
-pub use weighted::{ChannelWeights, weighted_observer_gain, weighted_state_feedback};
+pub use weighted::ChannelWeights;
 
 use nalgebra::{DMatrix, DVector};
 

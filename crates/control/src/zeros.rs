@@ -103,7 +103,7 @@ fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
     }
 }
 
-/// The subsystem with the same zeros whose D has full row rank, and further outputs z = `seen` x of its states.
+/// The subsystem with the same zeros whose D has full row rank, and further outputs z = `output` x of its states.
 ///
 /// One pass of the reduction, with `zero` the threshold of the ranks:
 ///
@@ -117,7 +117,7 @@ fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
 /// The passes end when C2 fixes no further state.
 fn reduced(
     mut system: StateSpace,
-    mut seen: DMatrix<f64>,
+    mut output: DMatrix<f64>,
     zero: f64,
 ) -> Result<(StateSpace, DMatrix<f64>), Error> {
     loop {
@@ -129,12 +129,12 @@ fn reduced(
         let states = Svd::new(&c.rows(reached, c.nrows() - reached).into_owned())?;
         let fixed = states.rank_above(zero);
         if fixed == 0 {
-            return Ok((StateSpace { a, b, c: c1, d: d1, domain }, seen));
+            return Ok((StateSpace { a, b, c: c1, d: d1, domain }, output));
         }
         let free = a.nrows() - fixed;
         let v = &states.right;
         let (a, b, c) = (v.tr_mul(&a) * v, v.tr_mul(&b), c1 * v);
-        seen = (seen * v).columns(fixed, free).into();
+        output = (output * v).columns(fixed, free).into();
         system = StateSpace {
             c: stacked(&c.columns(fixed, free).into(), &a.view((0, fixed), (fixed, free)).into()),
             d: stacked(&d1, &b.rows(0, fixed).into()),

@@ -67,8 +67,8 @@ pub fn constant_gain(
         check::shape("B", &system.b, (system.a.nrows(), m))?;
     }
     if let Some(&(row, column, _)) = fixed.iter().find(|entry| entry.0 >= s || entry.1 >= r) {
-        let found = (row + 1, column + 1);
-        return Err(Error::Shape { matrix: "fixed", expected: (s, r), found });
+        let (expected, found) = ((s, r), (row + 1, column + 1));
+        return Err(Error::Shape { matrix: "fixed", expected, found });
     }
     let width = width.max(1e-5);
     let mut points = Vec::new();
@@ -83,10 +83,10 @@ pub fn constant_gain(
             .ok_or(Error::NotConverged { what, iterations: ROUNDS })?;
         let mut norms = Vec::with_capacity(family.len());
         for system in family {
-            let found = h_infinity(&error_system(system, &gain, target), NORM_WIDTH)?;
-            norms.push(found.upper);
-            if found.lower > bound * (1.0 + 0.5 * width) {
-                points.push(response(system, found.frequency)?);
+            let norm = h_infinity(&error_system(system, &gain, target), NORM_WIDTH)?;
+            norms.push(norm.upper);
+            if norm.lower > bound * (1.0 + 0.5 * width) {
+                points.push(response(system, norm.frequency)?);
             }
         }
         let worst = norms.iter().copied().fold(0.0, f64::max);
@@ -95,8 +95,8 @@ pub fn constant_gain(
             Some(best) if best.worst <= worst => best.lower_bound = lower_bound,
             _ => best = Some(ConstantGain { gain, norms, worst, lower_bound }),
         }
-        if let Some(found) = best.take_if(|best| best.worst <= lower_bound * (1.0 + width)) {
-            return Ok(found);
+        if let Some(best) = best.take_if(|best| best.worst <= lower_bound * (1.0 + width)) {
+            return Ok(best);
         }
     }
     Err(Error::NotConverged { what: "the exchange of frequencies", iterations: ROUNDS })
@@ -137,10 +137,10 @@ fn minimum(
     let mut gain = Affine::zeros(s, r);
     for row in 0..s {
         for column in 0..r {
-            let given = fixed.iter().find(|entry| (entry.0, entry.1) == (row, column));
+            let fixed = fixed.iter().find(|entry| (entry.0, entry.1) == (row, column));
             let mut entry = DMatrix::zeros(s, r);
             entry[(row, column)] = 1.0;
-            let value = match given {
+            let value = match fixed {
                 Some(&(_, _, value)) => Affine::constant(&(entry * value)),
                 None => problem.scalar().times(&(entry / units[column])),
             };

@@ -58,20 +58,21 @@ impl Coordinates {
         unit: f64,
     ) -> Result<Self, Error> {
         let (n, p) = (a.nrows(), c.nrows());
-        let length = |norm: f64| if norm > 0.0 { 1.0 / power_of_two(norm) } else { 1.0 };
-        let moved = (a - DMatrix::identity(n, n) * mean_eigenvalue(a)) / speed;
-        let mut rows = multiply_rows(c, &DVector::from_fn(p, |row, _| length(c.row(row).norm())));
-        let mut seen = DMatrix::zeros(n * (p + 1), n);
+        let inverse_norm = |norm: f64| if norm > 0.0 { 1.0 / power_of_two(norm) } else { 1.0 };
+        let shifted = (a - DMatrix::identity(n, n) * mean_eigenvalue(a)) / speed;
+        let mut rows =
+            multiply_rows(c, &DVector::from_fn(p, |row, _| inverse_norm(c.row(row).norm())));
+        let mut observability = DMatrix::zeros(n * (p + 1), n);
         for k in 0..n {
-            seen.rows_mut(k * p, p).copy_from(&rows);
-            rows *= &moved;
+            observability.rows_mut(k * p, p).copy_from(&rows);
+            rows *= &shifted;
         }
-        let scale = DVector::from_fn(n, |at, _| length(seen.column(at).norm()));
-        seen = multiply_columns(&seen, &scale);
-        let hardly = seen.norm() / STRETCH;
-        seen.rows_mut(n * p, n).fill_diagonal(hardly);
-        let found = Svd::new(&seen.transpose())?;
-        let (directions, values) = (found.left.columns(0, n), found.values.rows(0, n).into_owned());
+        let scale = DVector::from_fn(n, |at, _| inverse_norm(observability.column(at).norm()));
+        observability = multiply_columns(&observability, &scale);
+        let regularisation = observability.norm() / STRETCH;
+        observability.rows_mut(n * p, n).fill_diagonal(regularisation);
+        let svd = Svd::new(&observability.transpose())?;
+        let (directions, values) = (svd.left.columns(0, n), svd.values.rows(0, n).into_owned());
         let root = multiply_rows(&directions.transpose(), &values);
         let inverse = divide_columns(&directions.into_owned(), &values);
         Ok(Self::within(&scale, &root, &inverse, unit))

@@ -48,14 +48,14 @@ impl GainNorm<'_> {
             d: DMatrix::zeros(self.e.nrows(), self.b.ncols()),
             domain: self.domain,
         };
-        let own = system.a.view((0, 0), (n, n)).into_owned();
-        if !self.region.violated(&eigenvalues(&own).ok()?, self.domain).is_empty() {
+        let first = system.a.view((0, 0), (n, n)).into_owned();
+        if !self.region.violated(&eigenvalues(&first).ok()?, self.domain).is_empty() {
             return None;
         }
-        let found = h_infinity(&system, WIDTH).ok()?;
+        let norm = h_infinity(&system, WIDTH).ok()?;
         let point = match self.domain {
-            Domain::Continuous => Complex::new(0.0, found.frequency),
-            Domain::Sampled { period } => Complex::from_polar(1.0, found.frequency * period),
+            Domain::Continuous => Complex::new(0.0, norm.frequency),
+            Domain::Sampled { period } => Complex::from_polar(1.0, norm.frequency * period),
         };
         let complex = |m: &DMatrix<f64>| m.map(|entry| Complex::new(entry, 0.0));
         let resolvent = (DMatrix::identity(order, order) * point - complex(&system.a)).lu();
@@ -63,13 +63,13 @@ impl GainNorm<'_> {
         let transfer = complex(self.e) * &states;
         let svd = transfer.svd(true, true);
         let (u, v) = (svd.u?.column(0).into_owned(), svd.v_t?.row(0).adjoint());
-        let seen = (complex(self.c) * states + complex(self.d)) * v;
+        let measured = (complex(self.c) * states + complex(self.d)) * v;
         // u' E R = (R' E' u)'
         let turned = (DMatrix::identity(order, order) * point - complex(&system.a)).adjoint().lu();
         let reached = turned.solve(&(complex(self.e).transpose() * u))?;
         let derivative =
-            DMatrix::from_fn(n, gain.ncols(), |i, j| -(reached[i].conj() * seen[j]).re);
-        Some((found.upper, derivative))
+            DMatrix::from_fn(n, gain.ncols(), |i, j| -(reached[i].conj() * measured[j]).re);
+        Some((norm.upper, derivative))
     }
 
     /// Lowers the norm from a gain that is stable and in the region.
@@ -104,13 +104,13 @@ impl GainNorm<'_> {
             let direction = -(&inverse * &slope);
             let rate = slope.dot(&direction);
             let (mut low, mut high, mut step) = (0.0, f64::INFINITY, 1.0);
-            let mut taken = None;
+            let mut accepted = None;
             for _ in 0..SEARCHES {
                 let next = &x + &direction * step;
                 match evaluate(&next) {
                     Some((other, gradient)) if other <= value + DECREASE * step * rate => {
                         let flat = gradient.dot(&direction) >= CURVATURE * rate;
-                        taken = Some((next, other, gradient));
+                        accepted = Some((next, other, gradient));
                         if flat {
                             break;
                         }
@@ -120,19 +120,19 @@ impl GainNorm<'_> {
                 }
                 step = if high.is_finite() { 0.5 * (low + high) } else { 2.0 * step };
             }
-            let Some((next, other, gradient)) = taken else {
+            let Some((next, other, gradient)) = accepted else {
                 if fresh {
                     break;
                 }
                 (inverse, fresh) = (&identity * first(&slope, &x), true);
                 continue;
             };
-            let (moved, bent) = (&next - &x, &gradient - &slope);
-            let product = moved.dot(&bent);
+            let (step, bend) = (&next - &x, &gradient - &slope);
+            let product = step.dot(&bend);
             (x, value, slope, fresh) = (next, other, gradient, false);
             if product > 0.0 {
-                let left = &identity - &moved * bent.transpose() / product;
-                inverse = &left * inverse * left.transpose() + &moved * moved.transpose() / product;
+                let left = &identity - &step * bend.transpose() / product;
+                inverse = &left * inverse * left.transpose() + &step * step.transpose() / product;
             }
             history.push(value);
             let before = history.len().checked_sub(PATIENCE + 1).map(|at| history[at]);

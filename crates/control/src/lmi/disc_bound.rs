@@ -1,11 +1,11 @@
 //! A lower bound of the H-infinity norm for gains whose eigenvalues are in a disc.
 
-use super::Performance;
 use super::noiseless::{ROUNDING, checked};
+use super::{Disc, Performance};
 use crate::Error;
 use crate::svd::Svd;
 use crate::zeros::{Zeros, zeros};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
 
 /// The points s > 0 at which det H is considered: up to so many on each side of R, so many in a decade.
 const POINTS: i32 = 60;
@@ -16,8 +16,8 @@ const BISECTIONS: usize = 30;
 /// A lower bound of the H-infinity norm of z = E x, x' = (A - L C) x + B w, for every L that places all eigenvalues
 /// in a disc of the left half plane, in continuous time.
 ///
-/// `center`, `radius`, `decay`: all eigenvalues have |s - center| <= radius and a real part of at most -`decay`
-/// <= 0; R = radius - center is the largest distance from 0. E B, q x q, must have an inverse; w enters y through
+/// `disc`, `decay`: all eigenvalues have |s - center| <= radius and a real part of at most -`decay` <= 0;
+/// R = radius - center is the largest distance from 0. E B, q x q, must have an inverse; w enters y through
 /// the states only (D = 0). With T(s) = E (s I - A + L C)^-1 B, the first bound is
 ///
 /// ```text
@@ -52,10 +52,12 @@ pub fn disc_norm_lower_bound(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,
     performance: &Performance,
-    (center, radius, decay): (f64, f64, f64),
+    disc: Disc,
+    decay: f64,
 ) -> Result<Option<f64>, Error> {
     let (n, k, r) = checked(a, c, performance)?;
     let Performance { disturbance: b, output: e, feedthrough, .. } = performance;
+    let Disc { center, radius } = disc;
     let reach = radius - center;
     if !(reach > 0.0 && radius > 0.0 && reach.is_finite()) {
         let rule = "a disc that reaches the left half plane";
@@ -78,16 +80,11 @@ pub fn disc_norm_lower_bound(
         let Zeros { finite, rank } = zeros(a, b, c)?;
         let eigenvalues = Inverses {
             count: n,
-            least: slowest_rate((center, radius), decay),
+            least: slowest_rate(disc, decay),
             largest: 1.0 / (-center - radius).max(decay).max(0.0),
         };
         if rank == k && finite.iter().all(|zero| zero.norm() > 0.0) {
-            bound = bound.max(by_zeros(
-                &eigenvalues,
-                &finite,
-                (sizes.min(), sizes.map(f64::recip).sum()),
-                inputs,
-            ));
+            bound = bound.max(by_zeros(&eigenvalues, &finite, &sizes));
         }
     }
     let bound = bound * (1.0 - ROUNDING);
@@ -122,14 +119,10 @@ impl Inverses {
     }
 }
 
-/// The bound by the trace at 0 and det H at points s > 0; `sizes`: the least singular value of E B, and the sum of their
-/// inverses.
-fn by_zeros(
-    eigenvalues: &Inverses,
-    zeros: &[Complex<f64>],
-    (least, inverses): (f64, f64),
-    inputs: f64,
-) -> f64 {
+/// The bound by the trace at 0 and det H at points s > 0; `sizes`: the q singular values of E B.
+fn by_zeros(eigenvalues: &Inverses, zeros: &[Complex<f64>], sizes: &DVector<f64>) -> f64 {
+    let (least, inverses) = (sizes.min(), sizes.map(f64::recip).sum());
+    let inputs = number(sizes.len());
     let zeta = zeros.iter().map(|zero| (-1.0 / zero).re).sum::<f64>();
     let by_trace = |sum: f64| (zeta - sum) / inverses;
     let by_points = |sum: f64| {
@@ -167,7 +160,8 @@ fn by_zeros(
 ///
 /// On the circle, with a = -Re s, |s|^2 = radius^2 - center^2 - 2 a center, so that the minimum is at an end of the
 /// range of a.
-fn slowest_rate((center, radius): (f64, f64), decay: f64) -> f64 {
+fn slowest_rate(disc: Disc, decay: f64) -> f64 {
+    let Disc { center, radius } = disc;
     let first = (-center - radius).max(decay).max(0.0);
     let square = radius * radius - center * center - 2.0 * first * center;
     let at_first = if square > 0.0 { first / square } else { 0.0 };
@@ -223,8 +217,8 @@ mod tests {
             [([1.0, 0.0, 0.0], 1.5), ([6.0, 5.0, 1.0], 5.0), ([1.0, -0.5, 0.0], 1.5)]
         {
             let (a, c, performance) = behind(numerator);
-            let disc = (center, radius, 0.0);
-            let least = disc_norm_lower_bound(&a, &c, &performance, disc).unwrap().unwrap();
+            let disc = Disc { center, radius };
+            let least = disc_norm_lower_bound(&a, &c, &performance, disc, 0.0).unwrap().unwrap();
             let mut nearest = f64::INFINITY;
             for case in &cases {
                 let pole = |at: usize| {
@@ -243,9 +237,9 @@ mod tests {
                         }
                     })
                     .collect();
-                let found = norm(&a - placed(&a, &c, &poles) * &c, &performance);
-                assert!(found > least, "{poles:?}: {found} {least}");
-                nearest = nearest.min(found);
+                let norm = norm(&a - placed(&a, &c, &poles) * &c, &performance);
+                assert!(norm > least, "{poles:?}: {norm} {least}");
+                nearest = nearest.min(norm);
             }
             assert!(nearest < gap * least, "{numerator:?}: {nearest} {least}");
         }
@@ -263,10 +257,11 @@ mod tests {
             gamma: None,
         };
         let c = DMatrix::identity(2, 2);
-        let found = disc_norm_lower_bound(&a, &c, &performance, (-3.0, 2.0, 0.0)).unwrap().unwrap();
-        assert!((found / (0.25 / 5.0) - 1.0).abs() < 1e-5, "{found}");
+        let disc = Disc { center: -3.0, radius: 2.0 };
+        let bound = disc_norm_lower_bound(&a, &c, &performance, disc, 0.0).unwrap().unwrap();
+        assert!((bound / (0.25 / 5.0) - 1.0).abs() < 1e-5, "{bound}");
         // With A - L C = diag(-5, -5) the norm is 1 / 5.
-        assert!(norm(matrix(2, 2, &[-5.0, 0.0, 0.0, -5.0]), &performance) > found);
+        assert!(norm(matrix(2, 2, &[-5.0, 0.0, 0.0, -5.0]), &performance) > bound);
     }
 
     #[test]
@@ -280,8 +275,8 @@ mod tests {
                     least = least.min((-1.0 / s).re);
                 }
             }
-            let found = slowest_rate((center, radius), decay);
-            assert!(found <= least && found > 0.99 * least, "{center} {radius}: {found} {least}");
+            let rate = slowest_rate(Disc { center, radius }, decay);
+            assert!(rate <= least && rate > 0.99 * least, "{center} {radius}: {rate} {least}");
         }
     }
 }

@@ -131,12 +131,14 @@ impl HiddenDisturbance {
         if part.a.is_empty() {
             return Ok(None);
         }
-        let seen = c * &part.basis;
+        let measured = c * &part.basis;
         let process = symmetric_part(&(&part.b * part.b.transpose()));
-        let Ok(filter) = kalman(&part.a, &seen, &process, &noise, domain) else { return Ok(None) };
+        let Ok(filter) = kalman(&part.a, &measured, &process, &noise, domain) else {
+            return Ok(None);
+        };
         let Some(scale) = filter.covariance.cholesky() else { return Ok(None) };
         Ok(Some(Self {
-            energy: inverse * seen,
+            energy: inverse * measured,
             output: output * &part.basis,
             scale: scale.unpack(),
             a: part.a,
@@ -171,10 +173,10 @@ impl HiddenDisturbance {
         let size = if of_z.norm() > 0.0 { of_z.norm() } else { return Ok(None) };
         problem.constrain(&(&Affine::identity(1, 1.0) - &product_trace(&covariance, &of_w)), 0.0);
         problem.minimise(&product_trace(&covariance, &(of_z * (-1.0 / size))));
-        let Some((_, found)) = problem.minimum() else { return Ok(None) };
+        let Some((_, unknowns)) = problem.minimum() else { return Ok(None) };
         let mut to = DMatrix::identity(order + free, order + free) * unit.sqrt();
         to.view_mut((0, 0), (order, order)).copy_from(scale);
-        self.verified(&symmetric_part(&(&to * covariance.evaluate(&found) * to.transpose())))
+        self.verified(&symmetric_part(&(&to * covariance.evaluate(&unknowns) * to.transpose())))
     }
 
     /// The ratio of a covariance of (x, d), if its inequalities hold by more than rounding.
@@ -201,12 +203,12 @@ impl HiddenDisturbance {
         let (order, free) = self.b.shape();
         let state = DMatrix::identity(order, order + free);
         let next = self.next();
-        let moved = &next * covariance;
+        let product = &next * covariance;
         match self.domain {
-            Domain::Continuous => (&moved * &state.transpose()).plus_transpose(),
+            Domain::Continuous => (&product * &state.transpose()).plus_transpose(),
             Domain::Sampled { .. } => {
                 let before = &(&state * covariance) * &state.transpose();
-                &(&moved * &next.transpose()) - &before
+                &(&product * &next.transpose()) - &before
             }
         }
     }
@@ -215,11 +217,11 @@ impl HiddenDisturbance {
     fn energies(&self) -> (DMatrix<f64>, DMatrix<f64>) {
         let (order, free) = self.b.shape();
         let whole = order + free;
-        let seen = match self.domain {
+        let output = match self.domain {
             Domain::Continuous => self.output.clone().resize_horizontally(whole, 0.0),
             Domain::Sampled { .. } => &self.output * self.next(),
         };
-        let of_z = seen.tr_mul(&seen);
+        let of_z = output.tr_mul(&output);
         let mut of_w = self.energy.tr_mul(&self.energy).resize(whole, whole, 0.0);
         of_w.view_mut((order, order), (free, free)).fill_with_identity();
         (of_z, of_w)
@@ -262,12 +264,16 @@ mod tests {
     /// solution for `gamma^2` above 1 / (1 + a^2).
     #[test]
     fn the_bound_of_a_scalar_filter_is_that_of_the_riccati_equation() {
-        let given = performance(row(&[1.0, 0.0]), row(&[1.0]), row(&[0.0, 1.0]));
+        let performance = performance(row(&[1.0, 0.0]), row(&[1.0]), row(&[0.0, 1.0]));
         for a in [-20.0_f64, -1.0, 0.0] {
-            let found =
-                observer_norm_lower_bound(&row(&[a]), &row(&[1.0]), &given, Domain::Continuous);
+            let outcome = observer_norm_lower_bound(
+                &row(&[a]),
+                &row(&[1.0]),
+                &performance,
+                Domain::Continuous,
+            );
             let least = 1.0 / (1.0 + a * a).sqrt();
-            let bound = found.unwrap().unwrap();
+            let bound = outcome.unwrap().unwrap();
             assert!(bound <= least && bound > 0.9999 * least, "{a}: {bound}, {least}");
         }
     }
@@ -275,10 +281,10 @@ mod tests {
     /// An unstable mode: `gamma^2` must make X of 0 = 2 a X - (1 - `1/gamma^2`) X^2 + 1 positive; gamma = 1.
     #[test]
     fn the_bound_with_an_unstable_mode_is_above_that_at_each_frequency() {
-        let given = performance(row(&[1.0, 0.0]), row(&[1.0]), row(&[0.0, 1.0]));
-        let found =
-            observer_norm_lower_bound(&row(&[3.0]), &row(&[1.0]), &given, Domain::Continuous);
-        let bound = found.unwrap().unwrap();
+        let performance = performance(row(&[1.0, 0.0]), row(&[1.0]), row(&[0.0, 1.0]));
+        let outcome =
+            observer_norm_lower_bound(&row(&[3.0]), &row(&[1.0]), &performance, Domain::Continuous);
+        let bound = outcome.unwrap().unwrap();
         assert!(bound <= 1.0 && bound > 0.9999, "{bound}");
     }
 
@@ -286,21 +292,21 @@ mod tests {
     /// `gamma^2` for `gamma^2` above a^2 + 1.
     #[test]
     fn the_sampled_bound_of_a_scalar_filter_is_that_of_the_riccati_equation() {
-        let given = performance(row(&[1.0, 0.0]), row(&[1.0]), row(&[0.0, 1.0]));
+        let performance = performance(row(&[1.0, 0.0]), row(&[1.0]), row(&[0.0, 1.0]));
         for a in [0.5_f64, -1.0, 1.0, 2.0] {
             let domain = Domain::Sampled { period: 1.0 };
-            let found = observer_norm_lower_bound(&row(&[a]), &row(&[1.0]), &given, domain);
+            let outcome = observer_norm_lower_bound(&row(&[a]), &row(&[1.0]), &performance, domain);
             let least = (1.0 + a * a).sqrt();
-            let bound = found.unwrap().unwrap();
+            let bound = outcome.unwrap().unwrap();
             assert!(bound <= least && bound > 0.9999 * least, "{a}: {bound}, {least}");
         }
     }
 
     #[test]
     fn a_measurement_without_noise_has_no_bound() {
-        let given = performance(row(&[1.0]), row(&[1.0]), row(&[0.0]));
-        let found =
-            observer_norm_lower_bound(&row(&[0.0]), &row(&[1.0]), &given, Domain::Continuous);
-        assert_eq!(found.unwrap(), None);
+        let performance = performance(row(&[1.0]), row(&[1.0]), row(&[0.0]));
+        let outcome =
+            observer_norm_lower_bound(&row(&[0.0]), &row(&[1.0]), &performance, Domain::Continuous);
+        assert_eq!(outcome.unwrap(), None);
     }
 }

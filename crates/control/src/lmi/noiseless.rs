@@ -80,9 +80,9 @@ pub fn noiseless_norm_lower_bound(
 ) -> Result<Option<f64>, Error> {
     let (n, k, r) = checked(a, c, performance)?;
     let Performance { disturbance: b, output: e, feedthrough: d, .. } = performance;
-    let own = StateSpace { a: a.clone(), b: b.clone(), c: c.clone(), d: d.clone(), domain };
+    let system = StateSpace { a: a.clone(), b: b.clone(), c: c.clone(), d: d.clone(), domain };
     let (system, e, g) = match domain {
-        Domain::Continuous => (own, e.clone(), DMatrix::zeros(r, k)),
+        Domain::Continuous => (system, e.clone(), DMatrix::zeros(r, k)),
         Domain::Sampled { .. } => {
             let Some(inverse) = (a + DMatrix::identity(n, n)).try_inverse() else {
                 return Ok(None);
@@ -101,7 +101,7 @@ pub fn noiseless_norm_lower_bound(
             (system, &next * &inverse * root, through - next * from_w)
         }
     };
-    let Some(nulling) = output_nulling(&system, (&e, &g))? else { return Ok(None) };
+    let Some(nulling) = output_nulling(&system, &e, &g)? else { return Ok(None) };
     let Some((basis, growing)) = unstable_part(&nulling.dynamics)? else { return Ok(None) };
     if growing.is_empty() {
         return Ok(Some(0.0));
@@ -129,7 +129,7 @@ fn largest_ratio(
 ) -> Result<Option<f64>, Error> {
     let energy = |of: &DMatrix<f64>| {
         let of = of * basis;
-        lyapunov(&-growing, &symmetric_part(&of.tr_mul(&of))).map(|found| found.p)
+        lyapunov(&-growing, &symmetric_part(&of.tr_mul(&of))).map(|solution| solution.p)
     };
     let (of_z, of_w) = (energy(&nulling.output)?, energy(&nulling.input)?);
     let Some(factor) = of_w.cholesky() else { return Ok(None) };
@@ -219,8 +219,8 @@ pub(super) mod tests {
     fn the_bound_is_that_of_the_interpolation_at_the_zeros() {
         assert!(bound([2.0, 3.0, 1.0]) <= 0.0, "zeros at -1 and -2");
         for zero in [0.2, 3.0] {
-            let found = bound([zero * 4.0, zero - 4.0, -1.0]);
-            assert!((found * zero - 1.0).abs() < 1e-5, "{zero}: {found}");
+            let bound = bound([zero * 4.0, zero - 4.0, -1.0]);
+            assert!((bound * zero - 1.0).abs() < 1e-5, "{zero}: {bound}");
         }
         // Two zeros: gamma^2 is the largest eigenvalue of 1 / (z_i z_j (z_i + z_j)) by 1 / (z_i + z_j).
         let (p, q) = (0.5_f64, 2.0_f64);
@@ -243,10 +243,10 @@ pub(super) mod tests {
         let mut before = f64::INFINITY;
         for noise in [1.0, 0.1, 0.01] {
             performance.feedthrough = matrix(1, 2, &[0.0, noise]);
-            let found = observer_norm_lower_bound(&a, &c, &performance, Domain::Continuous);
-            let found = found.unwrap().unwrap();
-            assert!(found > least && found < before, "{noise}: {found} {least}");
-            before = found;
+            let bound = observer_norm_lower_bound(&a, &c, &performance, Domain::Continuous);
+            let bound = bound.unwrap().unwrap();
+            assert!(bound > least && bound < before, "{noise}: {bound} {least}");
+            before = bound;
         }
         assert!(before < 1.05 * least, "{before} {least}");
     }
@@ -278,8 +278,8 @@ pub(super) mod tests {
                 f64::from(u8::from(row >= column))
             });
             let least = Svd::new(&toeplitz).unwrap().values.max();
-            let found = delayed(delay);
-            assert!((found / least - 1.0).abs() < 1e-5, "{delay}: {found} {least}");
+            let bound = delayed(delay);
+            assert!((bound / least - 1.0).abs() < 1e-5, "{delay}: {bound} {least}");
         }
     }
 }

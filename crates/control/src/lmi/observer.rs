@@ -143,6 +143,15 @@ struct ObserverProgram<'a> {
     units: DVector<f64>,
 }
 
+/// What the inequalities of a norm contain, linear in the unknowns.
+struct GainTerms {
+    p: Affine,
+    /// Z = P L.
+    z: Affine,
+    /// P (A - L C).
+    dynamics: Affine,
+}
+
 /// A semidefinite program and its unknowns P (n x n) and Z (n x p).
 struct Program {
     problem: Problem,
@@ -158,9 +167,10 @@ impl<'a> ObserverProgram<'a> {
             if norm > 0.0 { power_of_two(norm) } else { 1.0 }
         });
         let extended = requirements.weighted.zip(requirements.performance);
-        let extended = extended.map(|(WeightedDynamics { a, of_disturbance, .. }, given)| {
+        let extended = extended.map(|(WeightedDynamics { a, of_disturbance, .. }, performance)| {
             let order = coordinates.order();
-            let size = coordinates.output(&given.output.columns(0, order).into_owned()).norm();
+            let output = performance.output.columns(0, order).into_owned();
+            let size = coordinates.output(&output).norm();
             let size = if size > 0.0 { power_of_two(size) } else { 1.0 };
             coordinates.extended(&DVector::from_fn(a.nrows() - order, |at, _| {
                 if at < of_disturbance { 1.0 } else { size }
@@ -187,14 +197,14 @@ impl<'a> ObserverProgram<'a> {
     /// level is returned.
     fn candidate(&self) -> Result<Outcome<Candidate>, Error> {
         let performance = self.requirements.performance;
-        if let Some((performance, gamma)) =
-            performance.and_then(|given| Some((given, given.gamma?)))
+        if let Some(performance) = performance
+            && let Some(gamma) = performance.gamma
         {
             return self.solve(&self.program(Some(self.scaling(performance).level(gamma))));
         }
         let relaxation = match performance {
             None => RELAXED_GAIN,
-            Some(given) if given.norm == Norm::HInfinity => RELAXED_BOUND,
+            Some(performance) if performance.norm == Norm::HInfinity => RELAXED_BOUND,
             Some(_) => RELAXED_BOUND * RELAXED_BOUND,
         };
         let program = self.program(None);
@@ -240,18 +250,20 @@ impl<'a> ObserverProgram<'a> {
         for (name, matrix) in region.inequalities(&p, &dynamics, domain, self.coordinates.unit) {
             problem.require(name, &matrix, MARGIN);
         }
-        let given = level.map(|value| Affine::identity(1, value));
-        let level = given.unwrap_or_else(|| {
+        let level = if let Some(value) = level {
+            Affine::identity(1, value)
+        } else {
             let unknown = problem.scalar();
             problem.minimise(&unknown);
             unknown
-        });
+        };
         if let Some(performance) = performance {
             problem.constrain(&p, MARGIN);
             problem.constrain(&(&Affine::identity(n, LARGEST) - &p), MARGIN);
             problem.constrain(&norm_below(&z, &Affine::identity(1, LARGEST)), MARGIN);
-            let (p, z, dynamics) = self.of_weighted(&mut problem, (&p, &z), dynamics);
-            for matrix in self.gain_inequalities(performance, (&p, &z), dynamics, &level) {
+            let terms = GainTerms { p: p.clone(), z: z.clone(), dynamics };
+            let terms = self.of_weighted(&mut problem, terms);
+            for matrix in self.gain_inequalities(performance, terms, level) {
                 problem.require("gain", &matrix, MARGIN);
             }
         } else {
@@ -261,37 +273,32 @@ impl<'a> ObserverProgram<'a> {
         Program { problem, p, z }
     }
 
-    /// P, Z and P (A - L C) of the norm: with weights [P, 0; 0, `P_2`] and [Z; 0].
-    fn of_weighted(
-        &self,
-        problem: &mut Problem,
-        (p, z): (&Affine, &Affine),
-        dynamics: Affine,
-    ) -> (Affine, Affine, Affine) {
+    /// The terms of the norm: with weights [P, 0; 0, `P_2`] and [Z; 0].
+    fn of_weighted(&self, problem: &mut Problem, terms: GainTerms) -> GainTerms {
         let Some(WeightedDynamics { a, c, .. }) = self.requirements.weighted else {
-            return (p.clone(), z.clone(), dynamics);
+            return terms;
         };
-        let (n, outputs) = z.shape();
+        let (n, outputs) = terms.z.shape();
         let more = a.nrows() - n;
-        let own = problem.symmetric(more);
-        problem.constrain(&own, MARGIN);
-        problem.constrain(&(&Affine::identity(more, LARGEST) - &own), MARGIN);
+        let p_2 = problem.symmetric(more);
+        problem.constrain(&p_2, MARGIN);
+        problem.constrain(&(&Affine::identity(more, LARGEST) - &p_2), MARGIN);
         let side = Affine::zeros(n, more);
-        let p = Affine::blocks(&[&[p, &side], &[&side.transpose(), &own]]);
-        let z = Affine::blocks(&[&[z], &[&Affine::zeros(more, outputs)]]);
+        let p = Affine::blocks(&[&[&terms.p, &side], &[&side.transpose(), &p_2]]);
+        let z = Affine::blocks(&[&[&terms.z], &[&Affine::zeros(more, outputs)]]);
         let c = divide_rows(&self.of_norm().output(c), &self.units);
         let dynamics = &(&p * &self.of_norm().dynamics(a)) - &(&z * &c);
-        (p, z, dynamics)
+        GainTerms { p, z, dynamics }
     }
 
-    /// The inequalities of the norm of {A - L C, B - L `D_y`, E, 0}; `dynamics` is P (A - L C).
+    /// The inequalities of the norm of {A - L C, B - L `D_y`, E, 0}.
     fn gain_inequalities(
         &self,
         performance: &Performance,
-        (p, z): (&Affine, &Affine),
-        dynamics: Affine,
-        level: &Affine,
+        terms: GainTerms,
+        level: Affine,
     ) -> Vec<Affine> {
+        let GainTerms { p, z, dynamics } = terms;
         let scaling = self.scaling(performance);
         let (b, e, _) = scaling.scale(
             &self.of_norm().input(&performance.disturbance),
@@ -300,12 +307,12 @@ impl<'a> ObserverProgram<'a> {
         );
         let d_y = divide_rows(&performance.feedthrough, &self.units) / scaling.disturbance();
         let inequality = GainInequality {
-            p: p.clone(),
+            input: &(&p * &b) - &(&z * &d_y),
+            p,
             dynamics,
-            input: &(p * &b) - &(z * &d_y),
             output: Affine::constant(&e),
             feedthrough: Affine::zeros(e.nrows(), b.ncols()),
-            level: level.clone(),
+            level,
         };
         inequality.matrices(performance.norm, self.requirements.domain)
     }

@@ -67,8 +67,8 @@ impl Requirement {
         let size = power_of_two(self.matrix.largest_entry());
         let order = self.matrix.shape().0;
         let scaled = &self.matrix * (1.0 / if size.is_normal() { size } else { 1.0 });
-        let kept = Affine::identity(order, self.margin / size);
-        let matrix = &scaled - &kept;
+        let margin = Affine::identity(order, self.margin / size);
+        let matrix = &scaled - &margin;
         match slack {
             None => matrix,
             Some(slack) => &matrix - &slack.times(&DMatrix::identity(order, order)),
@@ -156,18 +156,18 @@ impl Problem {
     /// [`Error::NotConverged`] when eigenvalues are not found.
     pub fn solve(&self) -> Result<Outcome<Solution>, Error> {
         if self.objective.is_some()
-            && let Some(solution) = self.verified(self.minimum().map(|found| found.1))?
+            && let Some(solution) = self.verified(self.minimum().map(|(_, unknowns)| unknowns))?
         {
             return Ok(Outcome::Optimal(solution));
         }
         let all: Vec<_> = self.requirements.iter().collect();
-        let Some((slack, found)) = self.largest_slack(&all) else {
+        let Some((slack, unknowns)) = self.largest_slack(&all) else {
             return Ok(Outcome::Inconclusive("the interior point method did not end"));
         };
         if slack < -UNDECIDED {
             return Ok(Outcome::Infeasible { conflict: self.conflict() });
         }
-        match self.verified(Some(found))? {
+        match self.verified(Some(unknowns))? {
             None => {
                 Ok(Outcome::Inconclusive("the requirements are met or missed by a rounding error"))
             }
@@ -208,11 +208,11 @@ impl Problem {
         matrices.push(&Affine::identity(1, 1.0) - &slack);
         let mut costs = DVector::zeros(extended.unknowns);
         costs[self.unknowns] = -1.0;
-        let (found, end) = minimise(&costs, &matrices)?;
+        let (unknowns, end) = minimise(&costs, &matrices)?;
         if end == End::Stalled {
             return None;
         }
-        Some((found[self.unknowns], found.rows(0, self.unknowns).into_owned()))
+        Some((unknowns[self.unknowns], unknowns.rows(0, self.unknowns).into_owned()))
     }
 
     fn conflict(&self) -> Vec<&'static str> {
@@ -224,12 +224,12 @@ impl Problem {
         }
         for candidate in names.clone() {
             let rest: Vec<_> = names.iter().copied().filter(|name| *name != candidate).collect();
-            let kept: Vec<_> = self
+            let others: Vec<_> = self
                 .requirements
                 .iter()
                 .filter(|each| each.name.is_none_or(|name| rest.contains(&name)))
                 .collect();
-            if self.largest_slack(&kept).is_some_and(|(slack, _)| slack < -UNDECIDED) {
+            if self.largest_slack(&others).is_some_and(|(slack, _)| slack < -UNDECIDED) {
                 names = rest;
             }
         }

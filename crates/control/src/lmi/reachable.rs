@@ -61,7 +61,8 @@ impl ReachableSet {
 /// [`Error::OutOfRange`] for a bad `rate`.
 pub fn common_reachable_set(
     matrices: &[DMatrix<f64>],
-    (disturbance, outputs): (&DVector<f64>, &DMatrix<f64>),
+    disturbance: &DVector<f64>,
+    outputs: &DMatrix<f64>,
     rate: f64,
     domain: Domain,
 ) -> Result<Outcome<ReachableSet>, Error> {
@@ -120,17 +121,17 @@ impl Reachability {
     /// The smallest Q for one matrix, where the inequality is an equation; None if there is none.
     fn smallest(&self, a: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
         let spread = &self.b * self.b.transpose();
-        let (equation, moved, part) = match self.domain {
+        let (equation, shifted, part) = match self.domain {
             Domain::Continuous => {
                 let shift = DMatrix::from_diagonal_element(a.nrows(), a.nrows(), 0.5 * self.rate);
                 (&CONTINUOUS, a + shift, self.rate)
             }
             Domain::Sampled { .. } => (&DISCRETE, a / (1.0 - self.part()).sqrt(), self.part()),
         };
-        if instability(&moved, self.domain)? >= 0.0 {
+        if instability(&shifted, self.domain)? >= 0.0 {
             return Ok(None);
         }
-        equation.solve(&moved.transpose(), &(spread / part)).map(Some)
+        equation.solve(&shifted.transpose(), &(spread / part)).map(Some)
     }
 
     /// 1 - exp(-lambda period); lambda in continuous time.
@@ -142,14 +143,14 @@ impl Reachability {
     }
 
     fn matrix(&self, q: &Affine, a: &DMatrix<f64>) -> Affine {
-        let moved = a * q;
+        let product = a * q;
         let part = self.part();
         let spread = Affine::constant(&(&self.b * self.b.transpose() / part));
         match self.domain {
-            Domain::Continuous => -&(&(&moved.plus_transpose() + &(q * part)) + &spread),
+            Domain::Continuous => -&(&(&product.plus_transpose() + &(q * part)) + &spread),
             Domain::Sampled { .. } => {
-                let (first, kept) = (q - &spread, q * (1.0 - part));
-                Affine::blocks(&[&[&first, &moved], &[&moved.transpose(), &kept]])
+                let (rest, decayed) = (q - &spread, q * (1.0 - part));
+                Affine::blocks(&[&[&rest, &product], &[&product.transpose(), &decayed]])
             }
         }
     }

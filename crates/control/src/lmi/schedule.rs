@@ -149,17 +149,17 @@ pub fn certify_schedule(
     }
     let inside: Vec<_> = intervals
         .iter()
-        .map(|own| Interval {
-            length: own.length,
-            coefficients: own.coefficients.iter().map(|a| coordinates.dynamics(a)).collect(),
+        .map(|Interval { length, coefficients }| Interval {
+            length: *length,
+            coefficients: coefficients.iter().map(|a| coordinates.dynamics(a)).collect(),
         })
         .collect();
     let n = intervals[0].coefficients[0].nrows();
     let mut problem = Problem::new();
     let p: Vec<_> = (0..=intervals.len()).map(|_| problem.symmetric(n)).collect();
-    for own in &p {
-        problem.constrain(own, MARGIN);
-        problem.constrain(&(&Affine::identity(n, 1.0) - own), MARGIN);
+    for p in &p {
+        problem.constrain(p, MARGIN);
+        problem.constrain(&(&Affine::identity(n, 1.0) - p), MARGIN);
     }
     // In continuous time the unit of A~ is that of time, too.
     let scaled = change / coordinates.unit;
@@ -171,8 +171,8 @@ pub fn certify_schedule(
         problem.constrain(&matrix, MARGIN);
     }
     let Some(solution) = problem.solve()?.optimal() else { return Ok(None) };
-    let p: Vec<_> = p.iter().map(|own| coordinates.certificate(&solution.value(own))).collect();
-    verified(intervals, (change, domain), p)
+    let p: Vec<_> = p.iter().map(|p| coordinates.certificate(&solution.value(p))).collect();
+    verified(intervals, p, change, domain)
 }
 
 /// The largest change of the scheduling variable in a sample, or in continuous time its largest rate per s, that
@@ -191,15 +191,15 @@ pub fn largest_change(
 ) -> Result<Option<ScheduleCertificate>, Error> {
     let limit = limit(intervals, domain)?;
     let mut change = limit;
-    let mut found = None;
+    let mut certificate = None;
     for _ in 0..RATES {
-        found = certify_schedule(intervals, change, domain)?;
-        if found.is_some() {
+        certificate = certify_schedule(intervals, change, domain)?;
+        if certificate.is_some() {
             break;
         }
         change *= FACTOR;
     }
-    let Some(mut best) = found else { return Ok(None) };
+    let Some(mut best) = certificate else { return Ok(None) };
     if change >= limit {
         return Ok(Some(best));
     }
@@ -221,7 +221,7 @@ fn limit(intervals: &[Interval], domain: Domain) -> Result<f64, Error> {
         return Ok(shortest);
     }
     let mut fastest = f64::MIN_POSITIVE;
-    for a in intervals.iter().flat_map(|own| &own.coefficients) {
+    for a in intervals.iter().flat_map(|interval| &interval.coefficients) {
         fastest = eigenvalues(a)?.iter().map(|value| value.norm()).fold(fastest, f64::max);
     }
     Ok(shortest * fastest)
@@ -230,7 +230,8 @@ fn limit(intervals: &[Interval], domain: Domain) -> Result<f64, Error> {
 /// The length of the shortest interval of a consistent list.
 fn check(intervals: &[Interval]) -> Result<f64, Error> {
     let none = Error::Empty { matrix: "A", found: (0, 0) };
-    let first = intervals.first().and_then(|own| own.coefficients.first()).ok_or(none.clone())?;
+    let first = intervals.first().and_then(|interval| interval.coefficients.first());
+    let first = first.ok_or(none.clone())?;
     let n = check::square("A", first)?;
     let mut shortest = f64::INFINITY;
     for Interval { length, coefficients } in intervals {
@@ -336,8 +337,9 @@ fn accurate_decays(intervals: &[Interval], p: &[DMatrix<f64>], rate: f64) -> Vec
 /// The certificate, if P proves the inequalities in the units of the data.
 fn verified(
     intervals: &[Interval],
-    (change, domain): (f64, Domain),
     p: Vec<DMatrix<f64>>,
+    change: f64,
+    domain: Domain,
 ) -> Result<Option<ScheduleCertificate>, Error> {
     let claims = match domain {
         Domain::Continuous => accurate_decays(intervals, &p, change),

@@ -57,14 +57,14 @@ pub(super) fn minimise(
     let mut solver =
         DefaultSolver::new(&quadratic, costs, &left, &right, &cones, settings()).ok()?;
     solver.solve();
-    let found = &solver.solution;
-    let end = match found.status {
+    let solution = &solver.solution;
+    let end = match solution.status {
         SolverStatus::Solved | SolverStatus::AlmostSolved => End::Solved,
         SolverStatus::InsufficientProgress | SolverStatus::MaxIterations => End::Stalled,
         _ => return None,
     };
-    let finite = found.x.iter().all(|value| value.is_finite());
-    finite.then(|| (DVector::from_column_slice(&found.x), end))
+    let finite = solution.x.iter().all(|value| value.is_finite());
+    finite.then(|| (DVector::from_column_slice(&solution.x), end))
 }
 
 fn settings() -> DefaultSettings<f64> {

@@ -76,25 +76,25 @@ pub fn observer_gain(
     let n = check::square("A", a)?;
     check::shape("C", c, (c.nrows(), n))?;
     region.check(domain)?;
-    if let Some(given) = performance {
-        let (k, r) = (given.disturbance.ncols(), given.output.nrows());
-        given.check((n, k), (r, n), (c.nrows(), k))?;
+    if let Some(performance) = performance {
+        let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
+        performance.check((n, k), (r, n), (c.nrows(), k))?;
     }
     let requirements =
         ObserverRequirements { a, c, region: *region, performance, domain, weighted: None };
     requirements.search(|candidate| {
         let Candidate { gain, coordinates } = candidate;
         let dynamics = a - &gain * c;
-        let bound = performance.map(|given| Bound {
+        let bound = performance.map(|performance| Bound {
             system: StateSpace {
                 a: dynamics.clone(),
-                b: &given.disturbance - &gain * &given.feedthrough,
-                c: given.output.clone(),
-                d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
+                b: &performance.disturbance - &gain * &performance.feedthrough,
+                c: performance.output.clone(),
+                d: DMatrix::zeros(performance.output.nrows(), performance.disturbance.ncols()),
                 domain,
             },
-            norm: given.norm,
-            gamma: given.gamma,
+            norm: performance.norm,
+            gamma: performance.gamma,
         });
         prove(Candidate { gain, coordinates }, &dynamics, region, bound, domain)
     })
@@ -126,9 +126,9 @@ pub fn state_feedback(
     let n = check::square("A", a)?;
     check::shape("B", b, (n, b.ncols()))?;
     region.check(domain)?;
-    if let Some(given) = performance {
-        let (k, r) = (given.disturbance.ncols(), given.output.nrows());
-        given.check((n, k), (r, n), (r, b.ncols()))?;
+    if let Some(performance) = performance {
+        let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
+        performance.check((n, k), (r, n), (r, b.ncols()))?;
     }
     let dual = performance.map(Performance::transposed);
     let requirements = ObserverRequirements {
@@ -142,16 +142,16 @@ pub fn state_feedback(
     requirements.search(|candidate| {
         let gain = -candidate.gain.transpose();
         let dynamics = a + b * &gain;
-        let bound = performance.map(|given| Bound {
+        let bound = performance.map(|performance| Bound {
             system: StateSpace {
                 a: dynamics.clone(),
-                b: given.disturbance.clone(),
-                c: &given.output + &given.feedthrough * &gain,
-                d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
+                b: performance.disturbance.clone(),
+                c: &performance.output + &performance.feedthrough * &gain,
+                d: DMatrix::zeros(performance.output.nrows(), performance.disturbance.ncols()),
                 domain,
             },
-            norm: given.norm,
-            gamma: given.gamma,
+            norm: performance.norm,
+            gamma: performance.gamma,
         });
         let coordinates = candidate.coordinates.transposed();
         prove(Candidate { gain, coordinates }, &dynamics, region, bound, domain)
@@ -177,8 +177,8 @@ pub(super) fn prove(
     domain: Domain,
 ) -> Result<Outcome<Synthesis>, Error> {
     let Candidate { gain, coordinates } = candidate;
-    let own = region::certify_in(&coordinates, from_ref(dynamics), region, domain)?;
-    let certificate = match own.optimal() {
+    let outcome = region::certify_in(&coordinates, from_ref(dynamics), region, domain)?;
+    let certificate = match outcome.optimal() {
         None => certify_region(dynamics, region, domain)?.optimal(),
         certificate => certificate,
     };
@@ -186,9 +186,9 @@ pub(super) fn prove(
     let Some(Bound { system, norm, gamma }) = bound else {
         return Ok(Outcome::Optimal(Synthesis { gain, region, bound: None }));
     };
-    let kept = |bound: &GainBound| bound.gamma <= gamma.unwrap_or(f64::INFINITY);
-    let bound = match gain::certify_in(coordinates, &system, norm)?.optimal().filter(kept) {
-        None => certify_gain(&system, norm)?.optimal().filter(kept),
+    let is_met = |bound: &GainBound| bound.gamma <= gamma.unwrap_or(f64::INFINITY);
+    let bound = match gain::certify_in(coordinates, &system, norm)?.optimal().filter(is_met) {
+        None => certify_gain(&system, norm)?.optimal().filter(is_met),
         bound => bound,
     };
     Ok(match bound {

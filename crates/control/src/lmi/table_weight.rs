@@ -77,7 +77,7 @@ pub fn weight_of_table(table: &[(f64, f64)], order: usize) -> Result<TableWeight
     while high - low > NARROW * farthest.max(NARROW) {
         let middle = 0.5 * (low + high);
         match fit(middle.exp())? {
-            Some(found) => (best, high) = (Some(found), middle),
+            Some(quotient) => (best, high) = (Some(quotient), middle),
             None => low = middle,
         }
     }
@@ -149,9 +149,9 @@ fn coefficients(
         problem.constrain(&(&(&d * factor) - &n), 0.0);
         problem.constrain(&(&(&n * factor) - &d), 0.0);
     }
-    let Outcome::Optimal(found) = problem.solve()? else { return Ok(None) };
+    let Outcome::Optimal(solution) = problem.solve()? else { return Ok(None) };
     let root = |all: &[Affine]| {
-        let values: Vec<_> = all.iter().map(|one| found.value(one)[(0, 0)]).collect();
+        let values: Vec<_> = all.iter().map(|one| solution.value(one)[(0, 0)]).collect();
         spectral_factor(&values)
     };
     Ok(Some((root(&numerator), root(&denominator))))
@@ -176,14 +176,14 @@ mod tests {
     #[test]
     fn the_table_of_a_weight_gives_this_weight() {
         for order in [1, 2] {
-            let given = Weight::lead_lag(5.0, 3.0, 0.05, order).unwrap();
+            let weight = Weight::lead_lag(5.0, 3.0, 0.05, order).unwrap();
             let table: Vec<_> = (-20..=30)
                 .map(|k| 10_f64.powf(0.1 * f64::from(k)))
-                .map(|w| (w, given.magnitude(w)))
+                .map(|w| (w, weight.magnitude(w)))
                 .collect();
-            let found = weight_of_table(&table, order).unwrap();
-            assert!(found.deviation < 1.02, "{}", found.deviation);
-            let apart = found.weight.magnitude(1.0) / given.magnitude(1.0);
+            let fit = weight_of_table(&table, order).unwrap();
+            assert!(fit.deviation < 1.02, "{}", fit.deviation);
+            let apart = fit.weight.magnitude(1.0) / weight.magnitude(1.0);
             assert!((apart - 1.0).abs() < 0.02);
         }
     }
@@ -193,12 +193,12 @@ mod tests {
     #[test]
     fn the_stated_deviation_is_that_of_the_weight() {
         let table = [(1.0, 1.0), (2.0, 4.0), (100.0, 4.0)];
-        let found = weight_of_table(&table, 1).unwrap();
-        let most = table.iter().map(|(w, m)| (found.weight.magnitude(*w) / m).ln().abs());
-        assert!(most.fold(0.0, f64::max) <= found.deviation.ln() + 1e-9);
-        assert!(found.deviation > 1.05 && found.deviation < 1.5, "{}", found.deviation);
+        let first = weight_of_table(&table, 1).unwrap();
+        let most = table.iter().map(|(w, m)| (first.weight.magnitude(*w) / m).ln().abs());
+        assert!(most.fold(0.0, f64::max) <= first.deviation.ln() + 1e-9);
+        assert!(first.deviation > 1.05 && first.deviation < 1.5, "{}", first.deviation);
         let second = weight_of_table(&table, 2).unwrap();
-        assert!(second.deviation < found.deviation);
+        assert!(second.deviation < first.deviation);
     }
 
     #[test]

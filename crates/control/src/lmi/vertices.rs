@@ -1,7 +1,7 @@
 //! One certificate, and one state feedback, for all members of a family of systems.
 
 use super::coordinates::Coordinates;
-use super::observer::{RELAXED_GAIN, norm_below, speed};
+use super::observer::{Candidate, RELAXED_GAIN, norm_below, speed};
 use super::region::{MARGIN, NO_P, Region, RegionCertificate, certify_in};
 use super::{Affine, Outcome, Problem};
 use crate::balance::{divide_columns, divide_rows, power_of_two};
@@ -125,8 +125,8 @@ pub(crate) fn find_common(
     let mean = vertices[1..].iter().fold(vertices[0].clone(), |sum, a| sum + a) / count;
     for a in [&mean, &vertices[0]] {
         let Some(coordinates) = Coordinates::of_dynamics(a)? else { continue };
-        let found = certify_in(&coordinates, vertices, region, domain)?;
-        if let Outcome::Optimal(certificate) = found {
+        let outcome = certify_in(&coordinates, vertices, region, domain)?;
+        if let Outcome::Optimal(certificate) = outcome {
             return Ok(Some(certificate));
         }
     }
@@ -154,8 +154,8 @@ impl Analysis<'_> {
     ) -> Result<Outcome<RegionCertificate, usize>, Error> {
         let all: Vec<_> = (0..self.vertices.len()).collect();
         for refinement in 0..=REFINEMENTS {
-            let found = certify_in(&coordinates, self.vertices, self.region, self.domain)?;
-            if let Outcome::Optimal(certificate) = found {
+            let outcome = certify_in(&coordinates, self.vertices, self.region, self.domain)?;
+            if let Outcome::Optimal(certificate) = outcome {
                 return Ok(Outcome::Optimal(certificate));
             }
             let (problem, p) = self.decision(&coordinates, &all);
@@ -262,7 +262,7 @@ pub fn common_feedback(
     region: &Region,
     domain: Domain,
 ) -> Result<Outcome<CommonFeedback, usize>, Error> {
-    let n = order(plants.first().map(|own| &own.a))?;
+    let n = order(plants.first().map(|plant| &plant.a))?;
     let m = plants[0].b.ncols();
     for Vertex { a, b } in plants {
         check::square("A", a)?;
@@ -348,9 +348,9 @@ impl Synthesis<'_> {
         let all: Vec<_> = (0..self.plants.len()).collect();
         let mut proposed = false;
         for refinement in 0..=REFINEMENTS {
-            for (gain, own) in self.candidate(&coordinates, &all)? {
+            for Candidate { gain, coordinates } in self.candidates(&coordinates, &all)? {
                 proposed = true;
-                if let Some(certificate) = self.proof(&gain, &own)? {
+                if let Some(certificate) = self.proof(&gain, &coordinates)? {
                     return Ok(Outcome::Optimal(CommonFeedback { gain, certificate }));
                 }
             }
@@ -371,38 +371,39 @@ impl Synthesis<'_> {
     fn proof(
         &self,
         gain: &DMatrix<f64>,
-        own: &Coordinates,
+        coordinates: &Coordinates,
     ) -> Result<Option<RegionCertificate>, Error> {
         let closed: Vec<_> = self.plants.iter().map(|Vertex { a, b }| a + b * gain).collect();
-        let found = certify_in(own, &closed, self.region, self.domain)?;
-        match found.optimal() {
+        let outcome = certify_in(coordinates, &closed, self.region, self.domain)?;
+        match outcome.optimal() {
             None => Ok(certify_common(&closed, self.region, self.domain)?.optimal()),
-            found => Ok(found),
+            certificate => Ok(certificate),
         }
     }
 
     /// Gains K, the preferred one first, with coordinates in which their P is the identity: the most
     /// interior one for a norm of Z up to twice the smallest, and the one of the smallest norm.
-    fn candidate(
+    fn candidates(
         &self,
         coordinates: &Coordinates,
         members: &[usize],
-    ) -> Result<Vec<(DMatrix<f64>, Coordinates)>, Error> {
+    ) -> Result<Vec<Candidate>, Error> {
         let units = self.units(coordinates);
         let program = self.program(coordinates, members, Size::Least);
         let Some((smallest, _)) = program.problem.minimum() else { return Ok(Vec::new()) };
         let relaxed = self.program(coordinates, members, Size::AtMost(smallest * RELAXED_GAIN));
-        let mut found = Vec::new();
+        let mut candidates = Vec::new();
         for Program { problem, x, z } in [relaxed, program] {
             let Outcome::Optimal(solution) = problem.solve()? else { continue };
             let (x, z) = (solution.value(&x), solution.value(&z));
             let parts = x.clone().cholesky().zip(coordinates.refined(&x));
-            found.extend(parts.map(|(factor, own)| {
+            candidates.extend(parts.map(|(factor, refined)| {
                 let l = divide_columns(&factor.solve(&z), &units);
-                (-coordinates.gain(&l).transpose(), own.transposed())
+                let gain = -coordinates.gain(&l).transpose();
+                Candidate { gain, coordinates: refined.transposed() }
             }));
         }
-        Ok(found)
+        Ok(candidates)
     }
 
     /// Units of the commands: powers of two near the lengths of the columns of B in the coordinates.

@@ -69,7 +69,7 @@ impl ChannelWeights {
             d: DMatrix::zeros(r, k),
             domain: self.input.domain,
         });
-        let seen = grid(&[&[
+        let measured = grid(&[&[
             c,
             &(feedthrough * &self.input.c),
             &DMatrix::zeros(c.nrows(), self.output.a.nrows()),
@@ -81,7 +81,7 @@ impl ChannelWeights {
             norm: *norm,
             gamma: *gamma,
         };
-        (a, seen, performance)
+        (a, measured, performance)
     }
 
     /// The weights of the transposed system.
@@ -108,103 +108,129 @@ fn grid(rows: &[&[&DMatrix<f64>]]) -> DMatrix<f64> {
     whole
 }
 
-/// An observer gain L as by [`super::observer_gain`], for an H-infinity norm with weights.
-///
-/// `performance`: as there, with [`super::Norm::HInfinity`].
-///
-/// The gain does not act on the states of the weights: the extended error dynamics have the gain
-/// [L; 0], and the set of these gains with a norm below a bound is not convex. Up to three gains are
-/// computed: one for the region alone and one for region and norm, by linear matrix inequalities (P =
-/// diag(`P_1`, `P_2`), for which Z = `P_1` L makes the inequalities of the norm linear), and that of the
-/// Kalman filter for disturbances of unit intensity, without its rows for the states of the weights. From
-/// each of them the norm itself is lowered within the region, by its derivatives with respect to the
-/// entries of L, as far as possible. Of the results with a norm up to 5 % above the least one, or below a
-/// given bound, that with the smallest Frobenius norm of L is chosen. It is a local minimum; how far it
-/// is from the best gain of any observer, [`super::observer_norm_lower_bound`] for
-/// [`ChannelWeights::extend`] says.
-///
-/// The region is proven as in [`super::observer_gain`]. `bound` of the result is that of the weighted
-/// system, with P for the states of [`ChannelWeights::around`], or None if it could not be proven to 1 %;
-/// [`crate::response::h_infinity`] does not depend on it.
-///
-/// # Errors
-///
-/// Same as [`super::observer_gain`].
-pub fn weighted_observer_gain(
-    (a, c): (&DMatrix<f64>, &DMatrix<f64>),
-    region: &Region,
-    performance: &Performance,
-    weights: &ChannelWeights,
-    domain: Domain,
-) -> Result<Outcome<Synthesis>, Error> {
-    let n = check::square("A", a)?;
-    check::shape("C", c, (c.nrows(), n))?;
-    region.check(domain)?;
-    let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
-    performance.check((n, k), (r, n), (c.nrows(), k))?;
-    let free = Performance { gamma: None, ..performance.clone() };
-    let (wide_a, wide_c, wide) = weights.extend(a, c, &free);
-    let requirements = ObserverRequirements {
-        a,
-        c,
-        region: *region,
-        performance: Some(&wide),
-        domain,
-        weighted: Some(WeightedDynamics {
+impl ChannelWeights {
+    /// An observer gain L as by [`super::observer_gain`], for an H-infinity norm with weights.
+    ///
+    /// `performance`: as there, with [`super::Norm::HInfinity`].
+    ///
+    /// The gain does not act on the states of the weights: the extended error dynamics have the gain
+    /// [L; 0], and the set of these gains with a norm below a bound is not convex. Up to three gains are
+    /// computed: one for the region alone and one for region and norm, by linear matrix inequalities (P =
+    /// diag(`P_1`, `P_2`), for which Z = `P_1` L makes the inequalities of the norm linear), and that of the
+    /// Kalman filter for disturbances of unit intensity, without its rows for the states of the weights. From
+    /// each of them the norm itself is lowered within the region, by its derivatives with respect to the
+    /// entries of L, as far as possible. Of the results with a norm up to 5 % above the least one, or below a
+    /// given bound, that with the smallest Frobenius norm of L is chosen. It is a local minimum; how far it
+    /// is from the best gain of any observer, [`super::observer_norm_lower_bound`] for
+    /// [`Self::extend`] says.
+    ///
+    /// The region is proven as in [`super::observer_gain`]. `bound` of the result is that of the weighted
+    /// system, with P for the states of [`Self::around`], or None if it could not be proven to 1 %;
+    /// [`crate::response::h_infinity`] does not depend on it.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`super::observer_gain`].
+    pub fn observer_gain(
+        &self,
+        a: &DMatrix<f64>,
+        c: &DMatrix<f64>,
+        region: &Region,
+        performance: &Performance,
+        domain: Domain,
+    ) -> Result<Outcome<Synthesis>, Error> {
+        let n = check::square("A", a)?;
+        check::shape("C", c, (c.nrows(), n))?;
+        region.check(domain)?;
+        let (k, r) = (performance.disturbance.ncols(), performance.output.nrows());
+        performance.check((n, k), (r, n), (c.nrows(), k))?;
+        let free = Performance { gamma: None, ..performance.clone() };
+        let (wide_a, wide_c, wide) = self.extend(a, c, &free);
+        let requirements = ObserverRequirements {
+            a,
+            c,
+            region: *region,
+            performance: Some(&wide),
+            domain,
+            weighted: Some(WeightedDynamics {
+                a: &wide_a,
+                c: &wide_c,
+                of_disturbance: self.input.a.nrows(),
+            }),
+        };
+        let proven = |candidate: Candidate| {
+            let dynamics = a - &candidate.gain * c;
+            prove(candidate, &dynamics, region, None, domain)
+        };
+        let by_norm = requirements.search(proven)?;
+        let plain = observer_gain(a, c, region, None, domain)?;
+        let norm = GainNorm {
             a: &wide_a,
+            b: &wide.disturbance,
             c: &wide_c,
-            of_disturbance: weights.input.a.nrows(),
-        }),
-    };
-    let proven = |gain: DMatrix<f64>, coordinates| {
-        let dynamics = a - &gain * c;
-        prove(Candidate { gain, coordinates }, &dynamics, region, None, domain)
-    };
-    let by_norm = requirements.search(|found| proven(found.gain, found.coordinates))?;
-    let plain = observer_gain(a, c, region, None, domain)?;
-    let norm = GainNorm {
-        a: &wide_a,
-        b: &wide.disturbance,
-        c: &wide_c,
-        d: &wide.feedthrough,
-        e: &wide.output,
-        region,
-        domain,
-    };
-    let inequalities = [plain, by_norm];
-    let starts = inequalities.iter().filter_map(|outcome| match outcome {
-        Outcome::Optimal(found) => Some(found.gain.clone()),
-        _ => None,
-    });
-    let mut candidates = Vec::new();
-    for start in starts.chain(kalman_gain(&norm, n)) {
-        let lower = norm.descend(&start);
-        let Some((value, _)) = norm.value(&lower) else { continue };
-        if let Some(region) = certify_region(&(a - &lower * c), region, domain)?.optimal() {
-            candidates.push((value, Synthesis { gain: lower, region, bound: None }));
+            d: &wide.feedthrough,
+            e: &wide.output,
+            region,
+            domain,
+        };
+        let inequalities = [plain, by_norm];
+        let starts = inequalities.iter().filter_map(|outcome| match outcome {
+            Outcome::Optimal(synthesis) => Some(synthesis.gain.clone()),
+            _ => None,
+        });
+        let mut candidates = Vec::new();
+        for start in starts.chain(kalman_gain(&norm, n)) {
+            let lower = norm.descend(&start);
+            let Some((value, _)) = norm.value(&lower) else { continue };
+            if let Some(region) = certify_region(&(a - &lower * c), region, domain)?.optimal() {
+                candidates.push((value, Synthesis { gain: lower, region, bound: None }));
+            }
         }
+        let least = candidates.iter().map(|(value, _)| *value).fold(f64::INFINITY, f64::min);
+        let most = performance.gamma.map_or(NEARLY_LEAST * least, |gamma| gamma.max(least));
+        let good = candidates.into_iter().filter(|(value, _)| *value <= most);
+        let smallest = good.min_by(|one, other| one.1.gain.norm().total_cmp(&other.1.gain.norm()));
+        let Some((reached, mut synthesis)) = smallest else {
+            let [_, by_norm] = inequalities;
+            return Ok(by_norm);
+        };
+        if performance.gamma.is_some_and(|gamma| reached > gamma) {
+            return Ok(Outcome::Inconclusive(NOT_KEPT));
+        }
+        let system = self.around(&StateSpace {
+            a: a - &synthesis.gain * c,
+            b: &performance.disturbance - &synthesis.gain * &performance.feedthrough,
+            c: performance.output.clone(),
+            d: DMatrix::zeros(r, k),
+            domain,
+        });
+        synthesis.bound = certify_gain(&system, performance.norm)?.optimal();
+        synthesis.bound = synthesis.bound.filter(|bound| bound.gamma <= LOOSE * reached);
+        Ok(Outcome::Optimal(synthesis))
     }
-    let least = candidates.iter().map(|(value, _)| *value).fold(f64::INFINITY, f64::min);
-    let most = performance.gamma.map_or(NEARLY_LEAST * least, |gamma| gamma.max(least));
-    let good = candidates.into_iter().filter(|(value, _)| *value <= most);
-    let smallest = good.min_by(|one, other| one.1.gain.norm().total_cmp(&other.1.gain.norm()));
-    let Some((reached, mut found)) = smallest else {
-        let [_, by_norm] = inequalities;
-        return Ok(by_norm);
-    };
-    if performance.gamma.is_some_and(|gamma| reached > gamma) {
-        return Ok(Outcome::Inconclusive(NOT_KEPT));
+
+    /// A state feedback as by [`super::state_feedback`], for an H-infinity norm with weights; u = K x does not
+    /// depend on the states of the weights. It is the transposed [`Self::observer_gain`] of the transposed
+    /// system; `bound` and `region` are certificates of the transposed loop.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`super::state_feedback`].
+    pub fn state_feedback(
+        &self,
+        a: &DMatrix<f64>,
+        b: &DMatrix<f64>,
+        region: &Region,
+        performance: &Performance,
+        domain: Domain,
+    ) -> Result<Outcome<Synthesis>, Error> {
+        let (a, c, dual) = (a.transpose(), b.transpose(), performance.transposed());
+        let outcome = self.transposed().observer_gain(&a, &c, region, &dual, domain)?;
+        outcome.then(|synthesis| {
+            let gain = -synthesis.gain.transpose();
+            Ok(Outcome::Optimal(Synthesis { gain, ..synthesis }))
+        })
     }
-    let system = weights.around(&StateSpace {
-        a: a - &found.gain * c,
-        b: &performance.disturbance - &found.gain * &performance.feedthrough,
-        c: performance.output.clone(),
-        d: DMatrix::zeros(r, k),
-        domain,
-    });
-    found.bound = certify_gain(&system, performance.norm)?.optimal();
-    found.bound = found.bound.filter(|bound| bound.gamma <= LOOSE * reached);
-    Ok(Outcome::Optimal(found))
 }
 
 /// The first n rows of the gain of the Kalman filter, if there is one.
@@ -221,26 +247,6 @@ fn kalman_gain(norm: &GainNorm<'_>, n: usize) -> Option<DMatrix<f64>> {
     Some((filter.gain + correlated).rows(0, n).into_owned())
 }
 
-/// A state feedback as by [`super::state_feedback`], for an H-infinity norm with weights; u = K x does not depend on
-/// the states of the weights. It is the transposed [`weighted_observer_gain`] of the transposed system;
-/// `bound` and `region` are certificates of the transposed loop.
-///
-/// # Errors
-///
-/// Same as [`super::state_feedback`].
-pub fn weighted_state_feedback(
-    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
-    region: &Region,
-    performance: &Performance,
-    weights: &ChannelWeights,
-    domain: Domain,
-) -> Result<Outcome<Synthesis>, Error> {
-    let pair = (&a.transpose(), &b.transpose());
-    let dual = performance.transposed();
-    let outcome = weighted_observer_gain(pair, region, &dual, &weights.transposed(), domain)?;
-    outcome.then(|found| Ok(Outcome::Optimal(Synthesis { gain: -found.gain.transpose(), ..found })))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -253,7 +259,7 @@ mod tests {
     }
 
     /// x' = w, y = x + v with weights: a fault seen through noise.
-    fn given() -> Performance {
+    fn fault_through_noise() -> Performance {
         Performance {
             disturbance: row(&[1.0, 0.0]),
             output: row(&[1.0]),
@@ -275,18 +281,19 @@ mod tests {
             let noise = Weight::lead_lag(0.1, 3.0, 10.0, 1).unwrap();
             let error = Weight::lead_lag(20.0, 0.3, 0.2, 2).unwrap();
             let weights = weights(&noise, &error, domain);
-            let (a, mut given) = match domain {
-                Domain::Continuous => (row(&[0.0]), given()),
-                Domain::Sampled { .. } => (row(&[1.0]), given()),
+            let mut performance = fault_through_noise();
+            let a = match domain {
+                Domain::Continuous => row(&[0.0]),
+                Domain::Sampled { .. } => row(&[1.0]),
             };
             if domain != Domain::Continuous {
-                given.disturbance *= 0.1;
+                performance.disturbance *= 0.1;
             }
             let c = row(&[1.0]);
             let norm = |gain: f64| {
                 let closed = StateSpace {
                     a: &a - row(&[gain]),
-                    b: &given.disturbance - &given.feedthrough * gain,
+                    b: &performance.disturbance - &performance.feedthrough * gain,
                     c: row(&[1.0]),
                     d: DMatrix::zeros(1, 2),
                     domain,
@@ -294,13 +301,13 @@ mod tests {
                 h_infinity(&weights.around(&closed), 1e-4).map_or(f64::INFINITY, |norm| norm.upper)
             };
             let best = (0..400).map(|k| norm(1e-3 * 1.03_f64.powi(k))).fold(f64::MAX, f64::min);
-            let found =
-                weighted_observer_gain((&a, &c), &Region::default(), &given, &weights, domain);
-            let Outcome::Optimal(found) = found.unwrap() else { panic!() };
-            let reached = norm(found.gain[(0, 0)]);
+            let region = Region::default();
+            let outcome = weights.observer_gain(&a, &c, &region, &performance, domain);
+            let Outcome::Optimal(synthesis) = outcome.unwrap() else { panic!() };
+            let reached = norm(synthesis.gain[(0, 0)]);
             assert!(reached < 1.1 * best, "{domain:?}: {reached}, {best}");
-            assert!(found.bound.is_none_or(|bound| bound.gamma >= 0.999 * reached));
-            let (wide_a, wide_c, wide) = weights.extend(&a, &c, &given);
+            assert!(synthesis.bound.is_none_or(|bound| bound.gamma >= 0.999 * reached));
+            let (wide_a, wide_c, wide) = weights.extend(&a, &c, &performance);
             let least =
                 observer_norm_lower_bound(&wide_a, &wide_c, &wide, domain).unwrap().unwrap();
             assert!(least <= best, "{domain:?}: {least}, {best}");

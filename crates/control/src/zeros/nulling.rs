@@ -28,7 +28,8 @@ pub(crate) struct Nulling {
 /// [`Error::NotConverged`]; [`Error::Overflow`].
 pub(crate) fn output_nulling(
     system: &StateSpace,
-    (output, direct): (&DMatrix<f64>, &DMatrix<f64>),
+    output: &DMatrix<f64>,
+    direct: &DMatrix<f64>,
 ) -> Result<Option<Nulling>, Error> {
     let Balance { matrix: a, scale } = Balance::new(&system.a);
     let size = if a.norm().is_normal() { a.norm() } else { 1.0 };
@@ -47,15 +48,15 @@ pub(crate) fn output_nulling(
     let norms = [&scaled.a, &scaled.b, &scaled.c, &scaled.d].map(DMatrix::norm);
     #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
     let zero = TOLERANCE_PER_STATE * all as f64 * norms.into_iter().fold(0.0, f64::hypot);
-    let (found, seen) = reduced(scaled, multiply_columns(output, &scale), zero)?;
-    let inputs = found.b.ncols();
-    if found.d.nrows() != inputs || Svd::new(&found.d)?.rank_above(zero) < inputs {
+    let (core, output) = reduced(scaled, multiply_columns(output, &scale), zero)?;
+    let inputs = core.b.ncols();
+    if core.d.nrows() != inputs || Svd::new(&core.d)?.rank_above(zero) < inputs {
         return Ok(None);
     }
-    let through = found.d.lu().solve(&found.c).ok_or(Error::Overflow { what: "D^-1 C" })?;
-    let dynamics = check::in_range("A - B D^-1 C", found.a - found.b * &through)?;
+    let through = core.d.lu().solve(&core.c).ok_or(Error::Overflow { what: "D^-1 C" })?;
+    let dynamics = check::in_range("A - B D^-1 C", core.a - core.b * &through)?;
     let input = -(DMatrix::from_diagonal(&columns) * through);
-    Ok(Some(Nulling { dynamics, output: seen + direct * &input, input }))
+    Ok(Some(Nulling { dynamics, output: output + direct * &input, input }))
 }
 
 /// The length of each column; 1 for a column of zeros.

@@ -45,10 +45,10 @@ fn a_common_lyapunov_matrix_is_found_where_it_exists_and_only_there() {
 fn bad_families_are_refused() {
     let one = DVector::from_element(1, 1.0);
     let unit = DMatrix::identity(1, 1);
-    let none = common_reachable_set(&[], (&one, &unit), 1.0, Domain::Continuous);
+    let none = common_reachable_set(&[], &one, &unit, 1.0, Domain::Continuous);
     assert!(matches!(none, Err(Error::Empty { .. })));
     let mixed = [DMatrix::identity(1, 1) * -1.0, DMatrix::identity(3, 3) * -1.0];
-    let mixed = common_reachable_set(&mixed, (&one, &unit), 1.0, Domain::Continuous);
+    let mixed = common_reachable_set(&mixed, &one, &unit, 1.0, Domain::Continuous);
     assert!(matches!(mixed, Err(Error::Shape { .. })));
     let (plant, _) = carts_loop();
     let found = LossyLoop::new(&plant.0, &plant.1, &[2]);
@@ -65,7 +65,7 @@ fn the_reachable_set_of_a_scalar_family_is_that_of_its_slowest_member() {
     let one = DVector::from_element(1, 1.0);
     let peak = |family: &[f64], rate: f64, domain| {
         let family: Vec<_> = family.iter().map(|a| matrix(1, 1, &[*a])).collect();
-        let found = common_reachable_set(&family, (&one, &DMatrix::identity(1, 1)), rate, domain);
+        let found = common_reachable_set(&family, &one, &DMatrix::identity(1, 1), rate, domain);
         found.unwrap().optimal().map(|found| found.peak(&one))
     };
     let found = peak(&[-2.0, -3.0], 2.0, Domain::Continuous).unwrap();
@@ -134,12 +134,8 @@ fn losses_that_jump_keep_the_proven_decay_rate_and_the_bounds_of_the_states() {
     let order = lossy.intact.nrows();
     let disturbance = DVector::from_fn(order, |k, _| if k == 2 { 1.0 } else { 0.0 });
     let outputs = DMatrix::identity(4, order);
-    let set = common_reachable_set(
-        &lossy.corners(&largest),
-        (&disturbance, &outputs),
-        rate,
-        lossy.domain,
-    );
+    let set =
+        common_reachable_set(&lossy.corners(&largest), &disturbance, &outputs, rate, lossy.domain);
     let set = set.unwrap().optimal().unwrap();
     let step = 0.02;
     let corner = |loss: [f64; 2]| {

@@ -299,7 +299,8 @@ impl Examination<'_> {
                 }
                 let set = common_reachable_set(
                     &corners,
-                    (&column, &outputs),
+                    &column,
+                    &outputs,
                     2.0 * decay * rate,
                     self.lossy.domain,
                 )?;

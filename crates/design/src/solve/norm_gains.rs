@@ -6,8 +6,7 @@ use control::aso::Estimator;
 use control::faults::FaultChannel;
 use control::lmi::{
     self, ChannelWeights, Norm, Performance, disc_norm_lower_bound, feedback_norm_lower_bound,
-    noiseless_norm_lower_bound, observer_norm_lower_bound, weighted_observer_gain,
-    weighted_state_feedback,
+    noiseless_norm_lower_bound, observer_norm_lower_bound,
 };
 use control::response::h_infinity;
 use control::riccati::{NormFilter, NormFilterProblem};
@@ -188,8 +187,8 @@ impl ObserverProblem<'_> {
         let Region { decay, disc, .. } = required.region;
         let of_disc = match disc.filter(|_| !required.channel.has_states()) {
             Some((center, radius)) => {
-                let region = (center, radius, decay.unwrap_or(0.0));
-                disc_norm_lower_bound(self.a_0, &seen, &performance, region).unwrap_or(None)
+                let (disc, decay) = (lmi::Disc { center, radius }, decay.unwrap_or(0.0));
+                disc_norm_lower_bound(self.a_0, &seen, &performance, disc, decay).unwrap_or(None)
             }
             None => None,
         };
@@ -254,8 +253,7 @@ impl ObserverProblem<'_> {
             synthesise: &|region, performance| match performance.zip(weights.as_ref()) {
                 None => lmi::observer_gain(self.a_0, &seen, region, performance, domain),
                 Some((performance, weights)) => {
-                    let pair = (self.a_0, &seen);
-                    weighted_observer_gain(pair, region, performance, weights, domain)
+                    weights.observer_gain(self.a_0, &seen, region, performance, domain)
                 }
             },
             weights: weights.as_ref(),
@@ -339,8 +337,7 @@ impl FeedbackProblem<'_> {
             synthesise: &|region, performance| match performance.zip(weights.as_ref()) {
                 None => lmi::state_feedback(self.a, self.b, region, performance, domain),
                 Some((performance, weights)) => {
-                    let pair = (self.a, self.b);
-                    weighted_state_feedback(pair, region, performance, weights, domain)
+                    weights.state_feedback(self.a, self.b, region, performance, domain)
                 }
             },
             weights: weights.as_ref(),
