@@ -31,7 +31,7 @@ mod peak_gain;
 mod trace;
 mod transient;
 
-pub use between_samples::gains_between_samples;
+pub use between_samples::{SampledLoop, gains_between_samples};
 pub use bracket::Bracket;
 pub use energy::{Energy, energy};
 pub use fault::{FaultBounds, Reversal, fault_bounds, reversal};

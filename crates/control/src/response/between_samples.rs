@@ -9,6 +9,19 @@ use crate::hold::zero_order_hold;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
+/// A plant with a sampled controller.
+#[derive(Debug, Clone, Copy)]
+pub struct SampledLoop<'a> {
+    /// The plant in continuous time.
+    pub extended: &'a ExtendedPlant,
+    /// The same plant, sampled by [`crate::sampled::sample`].
+    pub plant: &'a FaultyPlant,
+    /// The gains, designed for `plant`.
+    pub gains: &'a Gains,
+    /// The sample time T in s.
+    pub period: f64,
+}
+
 /// Computes the peak gains of a sampled loop over all times, not over the samples only: from faults of
 /// any course, from f' of faults without jumps, and from the part of such faults that the compensation
 /// leaves.
@@ -17,9 +30,8 @@ use nalgebra::DMatrix;
 /// x(kT + t) = Phi(t) x[k] + Gamma(t) u[k] + integral of e^(A (t - s)) F_a f(kT + s) ds over s from 0 to t
 /// ```
 ///
-/// `extended`: in continuous time; `plant`: the same sampled by [`crate::sampled::sample`]; `gains`:
-/// for `plant`; `period`: T in s; `parts`: N, into how many parts each interval is divided; `rows`: the
-/// positions in [x; e; eps] of the outputs, where x has the plant's states at all times, and e and eps
+/// `parts`: N, into how many parts each interval is divided; `rows`: the positions in [x; e; eps] of the
+/// outputs, where x has the plant's states at all times, and e and eps
 /// those at the samples, where the estimates are made; each result has a row for each of them and q
 /// columns; `width`: see [`peak_gain`]. The fault is taken constant over each part, with
 /// any sequence of values, and x is read at the start of each part; with growing N the gains
@@ -36,17 +48,15 @@ use nalgebra::DMatrix;
 /// Same as [`Gains::check`], [`zero_order_hold`] and [`peak_gain`]; [`Error::OutOfRange`] for `parts`, and
 /// for a row beyond [x; e; eps].
 pub fn gains_between_samples(
-    extended: &ExtendedPlant,
-    plant: &FaultyPlant,
-    gains: &Gains,
-    (period, parts): (f64, u32),
-    (rows, width): (&[usize], f64),
+    sampled: &SampledLoop<'_>,
+    parts: u32,
+    rows: &[usize],
+    width: f64,
 ) -> Result<[DMatrix<f64>; 3], Error> {
-    gains.check(plant)?;
-    require_rows(plant, rows)?;
+    sampled.gains.check(sampled.plant)?;
+    require_rows(sampled.plant, rows)?;
     check::positive("parts", f64::from(parts))?;
-    let lifted = Lifted::new(extended, plant, gains, (period, parts))?;
-    lifted.gains(rows, width)
+    Lifted::new(sampled, parts)?.gains(rows, width)
 }
 
 /// The loop over one interval of length T, divided into parts of length h.
@@ -80,12 +90,8 @@ struct Effects {
 }
 
 impl<'a> Lifted<'a> {
-    fn new(
-        extended: &ExtendedPlant,
-        plant: &'a FaultyPlant,
-        gains: &'a Gains,
-        (period, parts): (f64, u32),
-    ) -> Result<Self, Error> {
+    fn new(sampled: &SampledLoop<'a>, parts: u32) -> Result<Self, Error> {
+        let SampledLoop { extended, plant, gains, period } = *sampled;
         let n = extended.states;
         let a: DMatrix<f64> = extended.plant.a.view((0, 0), (n, n)).into();
         let b = extended.plant.b.rows(0, n).into_owned();
@@ -173,17 +179,17 @@ impl<'a> Lifted<'a> {
         let Gains { k_x, k_f, integral, .. } = self.gains;
         let t = self.gains.integrals();
         let mut rows = DMatrix::zeros(self.states, 2 * n + q + t);
-        let own = self.states;
-        rows.view_mut((0, 0), (own, own)).copy_from(&self.phi[i]);
+        let states = self.states;
+        rows.view_mut((0, 0), (states, states)).copy_from(&self.phi[i]);
         let command = &self.gamma[i] * k_x;
-        let mut plant = rows.view_mut((0, 0), (own, n));
+        let mut plant = rows.view_mut((0, 0), (states, n));
         plant += &command;
-        rows.view_mut((0, n), (own, n)).copy_from(&-command);
+        rows.view_mut((0, n), (states, n)).copy_from(&-command);
         if let Some(direct) = self.gains.direct(self.plant) {
-            let mut of_error = rows.view_mut((0, n), (own, n));
+            let mut of_error = rows.view_mut((0, n), (states, n));
             of_error += &self.gamma[i] * k_f * direct;
         }
-        rows.view_mut((0, 2 * n), (own, q)).copy_from(&(&self.gamma[i] * k_f));
+        rows.view_mut((0, 2 * n), (states, q)).copy_from(&(&self.gamma[i] * k_f));
         if let Some(integral) = integral {
             rows.columns_mut(2 * n + q, t).copy_from(&(&self.gamma[i] * &integral.gain));
         }
@@ -194,15 +200,15 @@ impl<'a> Lifted<'a> {
     fn input(&self, inputs: &Effects, j: usize) -> DMatrix<f64> {
         let (n, q) = self.plant.f_a.shape();
         let states_after = &inputs.states_after[j];
-        let mut seen = states_after.clone().resize_vertically(n + q, 0.0);
-        seen.rows_mut(n, q).fill_diagonal(inputs.next_error[j]);
+        let mut errors = states_after.clone().resize_vertically(n + q, 0.0);
+        errors.rows_mut(n, q).fill_diagonal(inputs.next_error[j]);
         if self.gains.estimator == Estimator::Current {
-            seen -= self.gains.observer_gain() * &self.plant.c * states_after;
+            errors -= self.gains.observer_gain() * &self.plant.c * states_after;
         }
         let t = self.gains.integrals();
         let mut column = DMatrix::zeros(2 * n + q + t, q);
         column.view_mut((0, 0), (n, q)).copy_from(states_after);
-        column.view_mut((n, 0), (n + q, q)).copy_from(&seen);
+        column.view_mut((n, 0), (n + q, q)).copy_from(&errors);
         if let Some(integral) = &self.gains.integral {
             let sensed = &integral.faults * (self.period * inputs.present_error[j]);
             column.rows_mut(2 * n + q, t).copy_from(&sensed);
@@ -255,20 +261,20 @@ impl<'a> Lifted<'a> {
         let mut first = 0;
         Ok(inputs.map(|inputs| {
             let count = inputs.states_after.len();
-            let mut found = DMatrix::zeros(rows.len(), q);
+            let mut largest = DMatrix::zeros(rows.len(), q);
             let mut at = 0;
-            for (mut gains, &row) in found.row_iter_mut().zip(rows) {
+            for (mut gains, &row) in largest.row_iter_mut().zip(rows) {
                 for read in at..at + reads(row).len() {
                     for fault in 0..q {
                         // The parts of a fault act together; of x the largest value counts.
-                        let own = (0..count).map(|j| sums[(read, first + j * q + fault)]);
-                        gains[fault] = own.sum::<f64>().max(gains[fault]);
+                        let parts = (0..count).map(|j| sums[(read, first + j * q + fault)]);
+                        gains[fault] = parts.sum::<f64>().max(gains[fault]);
                     }
                 }
                 at += reads(row).len();
             }
             first += count * q;
-            found
+            largest
         }))
     }
 }

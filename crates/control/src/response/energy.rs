@@ -61,7 +61,7 @@ pub fn energy(system: &StateSpace) -> Result<Energy, Error> {
             Some(part) => covariance(&part)?,
             None => return Err(error),
         },
-        found => found?,
+        covariance => covariance?,
     };
     Ok(Energy {
         h2: covariance.trace().max(0.0).sqrt(),

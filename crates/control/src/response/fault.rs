@@ -70,7 +70,7 @@ pub fn fault_bounds(
     }
     let rows: Vec<usize> = (0..2 * plant.f_a.nrows() + q).collect();
     let [gain_of_fault, gain_of_rate, uncancelled] =
-        fault_gains(plant, gains, domain, (&rows, WIDTH))?;
+        fault_gains(plant, gains, domain, &rows, WIDTH)?;
     let bound = |output: usize| {
         let of_fault = |j: usize| {
             let by_size = gain_of_fault[(output, j)] * magnitudes[j];

@@ -39,11 +39,11 @@ pub fn fault_system(
     let order = 2 * n + q + gains.integrals();
     let mut b = DMatrix::zeros(order, q);
     b.view_mut((0, 0), (n, q)).copy_from(&plant.f_a);
-    let mut seen = plant.f_a.clone().resize_vertically(n + q, 0.0);
+    let mut errors = plant.f_a.clone().resize_vertically(n + q, 0.0);
     if gains.estimator == Estimator::Current {
-        seen -= gains.observer_gain() * &plant.c * &plant.f_a;
+        errors -= gains.observer_gain() * &plant.c * &plant.f_a;
     }
-    b.view_mut((n, 0), (n + q, q)).copy_from(&seen);
+    b.view_mut((n, 0), (n + q, q)).copy_from(&errors);
     if let Some(integral) = &gains.integral {
         b.rows_mut(2 * n + q, gains.integrals())
             .copy_from(&(&integral.faults * -integration(domain).0));
@@ -115,7 +115,8 @@ pub fn fault_gains(
     plant: &FaultyPlant,
     gains: &Gains,
     domain: Domain,
-    (rows, width): (&[usize], f64),
+    rows: &[usize],
+    width: f64,
 ) -> Result<[DMatrix<f64>; 3], Error> {
     require_rows(plant, rows)?;
     let mut all = fault_system(plant, gains, domain)?;
@@ -129,8 +130,8 @@ pub fn fault_gains(
     if rows.iter().all(|row| *row >= plant.a.nrows()) {
         all = error_part(plant, &all);
     }
-    let found = peak_gain(&all, width)?.upper;
-    Ok([0, 1, 2].map(|part| found.columns(part * q, q).into_owned()))
+    let gains = peak_gain(&all, width)?.upper;
+    Ok([0, 1, 2].map(|part| gains.columns(part * q, q).into_owned()))
 }
 
 /// Checks that `rows` are positions in [x; e; eps].
@@ -170,11 +171,11 @@ pub(super) fn loop_dynamics(plant: &FaultyPlant, gains: &Gains, domain: Domain) 
         of_error += &plant.b * &gains.k_f * direct;
     }
     if let Some(IntegralAction { output, faults, gain, .. }) = &gains.integral {
-        let (step, kept) = integration(domain);
+        let (step, last) = integration(domain);
         a.view_mut((0, first), (n, t)).copy_from(&(&plant.b * gain));
         a.view_mut((first, 0), (t, n)).copy_from(&(output * -step));
         a.view_mut((first, 2 * n), (t, q)).copy_from(&(faults * step));
-        a.view_mut((first, first), (t, t)).fill_diagonal(kept);
+        a.view_mut((first, first), (t, t)).fill_diagonal(last);
         if let Some(direct) = &direct {
             a.view_mut((first, n), (t, n)).copy_from(&(faults * direct * step));
         }

@@ -188,7 +188,7 @@ fn crossings(system: &StateSpace, gamma: f64) -> Result<Vec<f64>, Error> {
     let (g, q) = (&b * inverse * b.transpose(), -(c.tr_mul(&weight) * &c));
     let hamiltonian = block_2x2([&a, &g], [&q, &-a.transpose()]);
     let hamiltonian = check::in_range("the Hamiltonian matrix", hamiltonian)?;
-    let mut found = if hamiltonian.nrows() < LARGE {
+    let mut frequencies = if hamiltonian.nrows() < LARGE {
         eigenvalues(&hamiltonian)?.iter().map(|x| x.im.abs()).collect()
     } else {
         let halved = Hamiltonian::balanced(&a, &g, &q);
@@ -200,12 +200,13 @@ fn crossings(system: &StateSpace, gamma: f64) -> Result<Vec<f64>, Error> {
         };
         all.iter().filter(possible).map(|x| x.im.abs()).collect::<Vec<_>>()
     };
-    found.push(0.0);
-    found.sort_by(f64::total_cmp);
-    found.dedup();
-    let midpoints: Vec<f64> = found.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
-    found.extend(midpoints);
-    Ok(found)
+    frequencies.push(0.0);
+    frequencies.sort_by(f64::total_cmp);
+    frequencies.dedup();
+    let midpoints: Vec<f64> =
+        frequencies.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+    frequencies.extend(midpoints);
+    Ok(frequencies)
 }
 
 /// The frequency of a system at which its [`continuous_equivalent`] has the given frequency.

@@ -35,10 +35,10 @@ impl Length {
 
     /// The interval of twice the length, whose `phi` is given.
     fn doubled(&self, phi: Rc<DMatrix<f64>>) -> Self {
-        let own = &*self.phi;
+        let half = &*self.phi;
         // Products by blocks, which `tr_mul` does not use.
-        let moved = own.transpose() * (&self.gram * own);
-        Self::new(2.0 * self.time, phi, &self.sum + &self.sum * own, &self.gram + moved)
+        let later = half.transpose() * (&self.gram * half);
+        Self::new(2.0 * self.time, phi, &self.sum + &self.sum * half, &self.gram + later)
     }
 
     /// Bounds of the integral of |h|: |integral of h|, and by Cauchy and Schwarz the root of the

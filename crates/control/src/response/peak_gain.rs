@@ -124,10 +124,10 @@ fn integral(lengths: &[Length], start: DVector<f64>, width: f64) -> Result<(f64,
             break;
         }
         let least = share.max(widest / WIDEST);
-        let wanted = |piece: &Piece| piece.length > 0 && piece.open() > least;
+        let is_wide = |piece: &Piece| piece.length > 0 && piece.open() > least;
         pieces = pieces
             .into_iter()
-            .flat_map(|piece| if wanted(&piece) { halves(lengths, piece) } else { vec![piece] })
+            .flat_map(|piece| if is_wide(&piece) { halves(lengths, piece) } else { vec![piece] })
             .collect();
     }
     Err(Error::NotConverged { what: "the peak-to-peak gain", iterations: ROUNDS })

@@ -209,11 +209,11 @@ impl Modes {
             let resolving = 1.0 / (STEPS[usize::from(self.lives.len() >= LARGE)] * rate);
             #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
             let reserved = RESERVED * (self.lives.len() - first) as f64;
-            let wanted = resolving.max((until - from) / (left - reserved).max(RESERVED));
-            let is_coarse = wanted > resolving;
+            let spacing = resolving.max((until - from) / (left - reserved).max(RESERVED));
+            let is_coarse = spacing > resolving;
             if self.period == 0.0 && until < end {
                 // Powers of two, so that neighbouring segments share a step and its propagator.
-                let step = power_of_two(wanted / SQRT_2);
+                let step = power_of_two(spacing / SQRT_2);
                 let count = ((until - from) / step).ceil();
                 left -= count;
                 from += count * step;
@@ -221,10 +221,10 @@ impl Modes {
                 continue;
             }
             let count = if self.period > 0.0 {
-                let stride = (wanted / self.period).floor().max(1.0) * self.period;
+                let stride = (spacing / self.period).floor().max(1.0) * self.period;
                 ((until - from) / stride).ceil()
             } else {
-                ((until - from) / wanted).ceil()
+                ((until - from) / spacing).ceil()
             };
             left -= count;
             self.push(&mut segments, until - from, count, is_coarse);

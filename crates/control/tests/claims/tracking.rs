@@ -6,7 +6,8 @@ use control::eigen::eigenvalues;
 use control::faults::{ExtendedPlant, Fault, FaultEntry, FaultKind};
 use control::placement::{place, place_discrete, real_poles};
 use control::response::{
-    fault_rate_system, fault_system, frequency_response, gains_between_samples, peak_gain,
+    SampledLoop, fault_rate_system, fault_system, frequency_response, gains_between_samples,
+    peak_gain,
 };
 use control::robustness::Loop;
 use control::tracking::{
@@ -238,8 +239,8 @@ fn with_one_part_the_bounds_between_samples_are_those_of_the_samples() {
     for own in all_designs().into_iter().filter(|own| own.domain != Domain::Continuous) {
         let Designed { plant, gains, extended, domain, .. } = &own;
         let rows: Vec<_> = (0..2 * plant.f_a.nrows() + plant.f_a.ncols()).collect();
-        let [of_faults, ..] =
-            gains_between_samples(extended, plant, gains, (PERIOD, 1), (&rows, 1e-4)).unwrap();
+        let closed = SampledLoop { extended, plant, gains, period: PERIOD };
+        let [of_faults, ..] = gains_between_samples(&closed, 1, &rows, 1e-4).unwrap();
         let at_samples =
             peak_gain(&fault_system(plant, gains, *domain).unwrap(), 1e-4).unwrap().upper;
         for (found, expected) in of_faults.iter().zip(at_samples.iter()) {

@@ -1,7 +1,7 @@
 //! Analyses the closed loop of a design: the numbers of the report.
 
 use control::response::{
-    energy, error_part, fault_gains, fault_rate_system, fault_system, frequency_grid,
+    SampledLoop, energy, error_part, fault_gains, fault_rate_system, fault_system, frequency_grid,
     frequency_response, gains_between_samples, h_infinity,
 };
 use control::{Domain, Error, StateSpace};
@@ -131,9 +131,10 @@ impl<'a> Loops<'a> {
     fn gains_of(&self, rows: &[usize]) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
         let Solution { extended, plant, gains, domain, .. } = self.designed;
         let found = match *domain {
-            Domain::Continuous => fault_gains(plant, gains, *domain, (rows, WIDTH)),
+            Domain::Continuous => fault_gains(plant, gains, *domain, rows, WIDTH),
             Domain::Sampled { period } => {
-                gains_between_samples(extended, plant, gains, (period, PARTS), (rows, WIDTH))
+                let sampled = SampledLoop { extended, plant, gains, period };
+                gains_between_samples(&sampled, PARTS, rows, WIDTH)
             }
         };
         match found {

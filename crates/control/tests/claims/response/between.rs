@@ -6,7 +6,9 @@ use control::controller::controller;
 use control::faults::ExtendedPlant;
 use control::hold::zero_order_hold;
 use control::placement::real_poles;
-use control::response::{fault_rate_system, fault_system, gains_between_samples, peak_gain};
+use control::response::{
+    SampledLoop, fault_rate_system, fault_system, gains_between_samples, peak_gain,
+};
 use control::sampled::{design, sampled_poles};
 use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
@@ -68,8 +70,8 @@ fn gains_between_samples_are_those_of_a_simulation_in_small_steps() {
         let (extended, plant, gains) = sampled(period, estimator).unwrap();
         let domain = Domain::Sampled { period };
         let own = controller(&plant, &gains, domain).unwrap();
-        let [of_faults, of_rates, _] =
-            gains_between_samples(&extended, &plant, &gains, (period, 8), (&ALL, WIDTH)).unwrap();
+        let closed = SampledLoop { extended: &extended, plant: &plant, gains: &gains, period };
+        let [of_faults, of_rates, _] = gains_between_samples(&closed, 8, &ALL, WIDTH).unwrap();
         let samples = 4000 / milliseconds;
         let pulse = |at: u32| f64::from(u8::from(at == 0));
         let same = simulated(&extended, (&own, period), (8, samples), pulse).unwrap();
@@ -101,8 +103,8 @@ fn with_one_part_the_gains_are_those_at_the_samples() {
         let period = 0.005;
         let (extended, plant, gains) = sampled(period, estimator).unwrap();
         let domain = Domain::Sampled { period };
-        let [of_faults, of_rates, _] =
-            gains_between_samples(&extended, &plant, &gains, (period, 1), (&ALL, WIDTH)).unwrap();
+        let closed = SampledLoop { extended: &extended, plant: &plant, gains: &gains, period };
+        let [of_faults, of_rates, _] = gains_between_samples(&closed, 1, &ALL, WIDTH).unwrap();
         let expected = peak_gain(&fault_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
         let expected_of_rates =
             peak_gain(&fault_rate_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
@@ -116,11 +118,11 @@ fn with_one_part_the_gains_are_those_at_the_samples() {
 }
 
 #[test]
-fn a_slow_sampled_loop_is_farther_from_rest_between_its_samples_than_at_them() {
+fn a_slow_sampled_closedis_farther_from_rest_between_its_samples_than_at_them() {
     let period = 0.01;
     let (extended, plant, gains) = sampled(period, Estimator::Prediction).unwrap();
-    let [of_faults, ..] =
-        gains_between_samples(&extended, &plant, &gains, (period, 16), (&ALL, WIDTH)).unwrap();
+    let closed = SampledLoop { extended: &extended, plant: &plant, gains: &gains, period };
+    let [of_faults, ..] = gains_between_samples(&closed, 16, &ALL, WIDTH).unwrap();
     let domain = Domain::Sampled { period };
     let at_samples = peak_gain(&fault_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
     for state in 2..4 {
@@ -129,7 +131,7 @@ fn a_slow_sampled_loop_is_farther_from_rest_between_its_samples_than_at_them() {
 }
 
 #[test]
-fn a_slow_sampled_loop_has_the_gains_that_adding_all_samples_gives() {
+fn a_slow_sampled_closedhas_the_gains_that_adding_all_samples_gives() {
     // Sampled so fast that adding the samples would take longer than intervals of many samples.
     let pole = (-1e-5_f64).exp();
     let system = StateSpace {

@@ -50,12 +50,12 @@ fn the_gains_of_the_loop_agree_with_modal_decomposition_in_high_precision() {
     let from_rate = fault_rate_system(&plant, &gains, CONTINUOUS).unwrap();
     let from_rate = peak_gain(&from_rate, 1e-3).unwrap();
     let rows: Vec<usize> = (0..from_fault.upper.nrows()).collect();
-    let together = fault_gains(&plant, &gains, CONTINUOUS, (&rows, 1e-3)).unwrap();
-    let some = fault_gains(&plant, &gains, CONTINUOUS, (&rows[2..4], 1e-3)).unwrap();
+    let together = fault_gains(&plant, &gains, CONTINUOUS, &rows, 1e-3).unwrap();
+    let some = fault_gains(&plant, &gains, CONTINUOUS, &rows[2..4], 1e-3).unwrap();
     for (some, all) in some.iter().zip(&together) {
         assert!((some - all.rows(2, 2)).amax() <= 1e-12 * all.amax());
     }
-    assert!(fault_gains(&plant, &gains, CONTINUOUS, (&[rows.len()], 1e-3)).is_err());
+    assert!(fault_gains(&plant, &gains, CONTINUOUS, &[rows.len()], 1e-3).is_err());
     let [of_fault, of_rate, uncancelled] = together;
     assert!((of_fault - &from_fault.upper).amax() <= 1e-12 * from_fault.upper.amax());
     for (together, column) in [(of_rate, 0), (uncancelled, 1)] {
