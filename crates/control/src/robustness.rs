@@ -41,16 +41,15 @@ pub use channel::{ChannelMargins, channel_margins};
 pub use choice::least_sensitive;
 pub use delay::{delay_margin, sampled_delay_margin};
 pub use disk::{DiskMargin, disk_margin, scaled_peak};
-pub use entries::{PeakDerivatives, peak_derivatives};
-pub use family::PlantFamily;
+pub use entries::{PeakDerivatives, SensitivityPeak, peak_derivatives};
+pub use family::{PlantFamily, ToleranceCase};
 pub use hold_time::{longest_hold, longest_period};
 pub use noise::noise_gains;
 pub use opened::OpenedLoop;
 pub use scaling::ScaledPeak;
 pub use speed::regulator_of_same_speed;
 pub use tolerance::{
-    Deviated, EntryFamily, ToleranceSearch, ToleranceTest, Tolerances, random_deviations,
-    tolerance_test,
+    EntryFamily, ToleranceSearch, ToleranceTest, Tolerances, random_deviations, tolerance_test,
 };
 
 use crate::blocks::{block_2x2, stacked};
@@ -136,26 +135,35 @@ impl Loop {
     /// The dynamics of the states of plant and controller together.
     #[must_use]
     pub fn dynamics(&self) -> DMatrix<f64> {
-        let (plant, own) = (&self.plant, &self.controller);
+        let (plant, controller) = (&self.plant, &self.controller);
         block_2x2(
-            [&(&plant.a + &plant.b * &own.d * &plant.c), &(&plant.b * &own.c)],
-            [&(&own.b * &plant.c), &(&own.a + &own.b * &plant.d * &own.c)],
+            [&(&plant.a + &plant.b * &controller.d * &plant.c), &(&plant.b * &controller.c)],
+            [
+                &(&controller.b * &plant.c),
+                &(&controller.a + &controller.b * &plant.d * &controller.c),
+            ],
         )
     }
 
     /// Commands and measurements from the states of plant and controller: [`D_k` C, `C_k`] and [C, D `C_k`].
     fn signals(&self) -> [DMatrix<f64>; 2] {
-        let (plant, own) = (&self.plant, &self.controller);
+        let (plant, controller) = (&self.plant, &self.controller);
         let beside = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
             stacked(&left.transpose(), &right.transpose()).transpose()
         };
-        [beside(&(&own.d * &plant.c), &own.c), beside(&plant.c, &(&plant.d * &own.c))]
+        [
+            beside(&(&controller.d * &plant.c), &controller.c),
+            beside(&plant.c, &(&plant.d * &controller.c)),
+        ]
     }
 
     /// What is added to the commands, and to the measurements: [B; `B_k` D] and [B `D_k`; `B_k`].
     fn entries(&self) -> [DMatrix<f64>; 2] {
-        let (plant, own) = (&self.plant, &self.controller);
-        [stacked(&plant.b, &(&own.b * &plant.d)), stacked(&(&plant.b * &own.d), &own.b)]
+        let (plant, controller) = (&self.plant, &self.controller);
+        [
+            stacked(&plant.b, &(&controller.b * &plant.d)),
+            stacked(&(&plant.b * &controller.d), &controller.b),
+        ]
     }
 
     /// S as a system: from a signal that is added at `at` to the sum.
@@ -193,14 +201,14 @@ impl Loop {
     ///
     /// [`Error::Shape`] when `output` does not fit the controller.
     pub fn from_noise(&self, output: &StateSpace) -> Result<StateSpace, Error> {
-        let own = &self.controller;
-        check::shape("C of the output", &output.c, (output.c.nrows(), own.a.nrows()))?;
-        check::shape("D of the output", &output.d, (output.c.nrows(), own.b.ncols()))?;
+        let controller = &self.controller;
+        check::shape("C of the output", &output.c, (output.c.nrows(), controller.a.nrows()))?;
+        check::shape("D of the output", &output.d, (output.c.nrows(), controller.b.ncols()))?;
         let StateSpace { a, b, domain, .. } = self.response(Point::Output);
         let mut c = &output.d * &self.signals()[1];
         let n = self.plant.a.nrows();
-        let seen = c.columns(n, own.a.nrows()) + &output.c;
-        c.columns_mut(n, own.a.nrows()).copy_from(&seen);
+        let states = c.columns(n, controller.a.nrows()) + &output.c;
+        c.columns_mut(n, controller.a.nrows()).copy_from(&states);
         Ok(StateSpace { a, b, c, d: output.d.clone(), domain })
     }
 }

@@ -1,6 +1,6 @@
 //! Margins of one channel, the others closed.
 
-use super::crossing::narrowed;
+use super::crossing::{Evaluation, narrowed};
 use super::disk::single;
 use super::sweep::Sweep;
 use super::{Loop, Point};
@@ -116,20 +116,18 @@ impl Gains {
     /// The first unstable gain on the way from 1 to `end`, or `end`.
     fn confirmed(&self, end: f64) -> Result<f64, Error> {
         let far = end.clamp(1.0 / LARGEST_GAIN, LARGEST_GAIN);
-        let mut good = (1.0, f64::NAN);
+        let mut good = Evaluation { at: 1.0, value: f64::NAN };
         let large = self.order > LARGE;
         let count = if large { TESTED_GAINS_IF_LARGE } else { TESTED_GAINS };
         for step in 1..count {
             let gain = far.powf(f64::from(step) / f64::from(count));
             let value = self.instability(gain)?;
             if value < 0.0 {
-                good = (gain, value);
+                good = Evaluation { at: gain, value };
                 continue;
             }
-            return Ok(narrowed(good, (gain, value.max(f64::MIN_POSITIVE)), |gain| {
-                self.instability(gain)
-            })?
-            .0);
+            let bad = Evaluation { at: gain, value: value.max(f64::MIN_POSITIVE) };
+            return Ok(narrowed(good, bad, |gain| self.instability(gain))?.0);
         }
         Ok(end)
     }

@@ -39,20 +39,21 @@ pub fn least_sensitive(loops: [&[Loop]; 2], references: &[Loop]) -> usize {
     let system = any.sensitivity(Point::Input);
     let Ok(modes) = system.stable_eigenvalues() else { return 0 };
     let frequencies = frequencies(&system, &modes);
-    let stable = |own: &Loop| own.sensitivity(Point::Input).stable_eigenvalues().is_ok();
-    let stable_references = references.iter().filter(|own| stable(own));
-    let lowest = stable_references.filter_map(|own| peaks(own, &frequencies).ok());
-    let lowest = lowest
-        .fold([f64::INFINITY; 2], |[input, output], own| [input.min(own[0]), output.min(own[1])]);
-    let value = |(at, own): (usize, &Loop)| {
-        let [input, output] = peaks(own, &frequencies).ok()?;
+    let stable = |one: &Loop| one.sensitivity(Point::Input).stable_eigenvalues().is_ok();
+    let stable_references = references.iter().filter(|one| stable(one));
+    let lowest = stable_references.filter_map(|one| peaks(one, &frequencies).ok());
+    let lowest = lowest.fold([f64::INFINITY; 2], |[input, output], peaks| {
+        [input.min(peaks[0]), output.min(peaks[1])]
+    });
+    let value = |(at, one): (usize, &Loop)| {
+        let [input, output] = peaks(one, &frequencies).ok()?;
         let ratio = (input / lowest[0]).max(output / lowest[1]);
         let excess = if ratio <= ACCEPTABLE { 0.0 } else { ratio };
         Some((excess, input * input * output * if at == 0 { 1.0 } else { KEPT }, at))
     };
     let mut all = vec![];
-    for (from, own) in [(0, first), (first.len(), second)] {
-        all.extend((from..).zip(own).filter_map(value));
+    for (from, loops) in [(0, first), (first.len(), second)] {
+        all.extend((from..).zip(loops).filter_map(value));
         all.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.total_cmp(&y.1)));
         let best =
             all.iter().find(|(.., at)| stable(first.iter().chain(second).nth(*at).unwrap_or(any)));
@@ -65,8 +66,9 @@ pub fn least_sensitive(loops: [&[Loop]; 2], references: &[Loop]) -> usize {
 }
 
 /// The largest singular values of S at input and output over the frequencies.
-fn peaks(own: &Loop, frequencies: &[f64]) -> Result<[f64; 2], Error> {
-    let (at_input, at_output) = (own.sensitivity(Point::Input), own.sensitivity(Point::Output));
+fn peaks(closed: &Loop, frequencies: &[f64]) -> Result<[f64; 2], Error> {
+    let (at_input, at_output) =
+        (closed.sensitivity(Point::Input), closed.sensitivity(Point::Output));
     let (m, p) = (at_input.b.ncols(), at_output.b.ncols());
     let mut b = at_input.b.resize_horizontally(m + p, 0.0);
     b.columns_mut(m, p).copy_from(&at_output.b);

@@ -4,43 +4,49 @@
 const WIDTH: f64 = 1e-14;
 const STEPS: usize = 160;
 
+/// A number and the value of a function there.
+#[derive(Clone, Copy)]
+pub(super) struct Evaluation {
+    pub(super) at: f64,
+    pub(super) value: f64,
+}
+
 /// Narrows an interval in which a function changes its sign; returns its ends, in the order of the
 /// arguments.
 ///
-/// `low`, `high`: the ends, each with the value there, of different signs; a value that is no number
-/// counts as negative. The function need not be continuous. Method: regula falsi in the variant
+/// `low`, `high`: the ends, with values of different signs; a value that is no number counts as negative. The function need not be continuous. Method: regula falsi in the variant
 /// of M. Dowell and P. Jarratt (BIT 11, 1971, Illinois); every third step bisects.
 pub(super) fn narrowed<E>(
-    (mut low, mut at_low): (f64, f64),
-    (mut high, mut at_high): (f64, f64),
+    mut low: Evaluation,
+    mut high: Evaluation,
     of: impl Fn(f64) -> Result<f64, E>,
 ) -> Result<(f64, f64), E> {
-    let positive = at_low > 0.0;
+    let positive = low.value > 0.0;
     let mut before = None;
     for step in 1..=STEPS {
-        let width = high - low;
-        let least = WIDTH * low.abs().max(high.abs());
+        let width = high.at - low.at;
+        let least = WIDTH * low.at.abs().max(high.at.abs());
         if width.abs() <= least {
             break;
         }
-        let part = at_low / (at_low - at_high);
+        let part = low.value / (low.value - high.value);
         // A step away from both ends lets the interval close around the crossing.
         let edge = (0.5 * least / width.abs()).min(0.5);
-        let finite = [at_low, at_high, part].iter().all(|value| value.is_finite());
+        let finite = [low.value, high.value, part].iter().all(|value| value.is_finite());
         let inside = finite && step % 3 != 0;
-        let middle = low + width * if inside { part.clamp(edge, 1.0 - edge) } else { 0.5 };
+        let middle = low.at + width * if inside { part.clamp(edge, 1.0 - edge) } else { 0.5 };
         let value = of(middle)?;
         let replaces_low = (value > 0.0) == positive;
         if replaces_low {
-            (low, at_low) = (middle, value);
-            at_high *= if before == Some(true) { 0.5 } else { 1.0 };
+            low = Evaluation { at: middle, value };
+            high.value *= if before == Some(true) { 0.5 } else { 1.0 };
         } else {
-            (high, at_high) = (middle, value);
-            at_low *= if before == Some(false) { 0.5 } else { 1.0 };
+            high = Evaluation { at: middle, value };
+            low.value *= if before == Some(false) { 0.5 } else { 1.0 };
         }
         before = Some(replaces_low);
     }
-    Ok((low, high))
+    Ok((low.at, high.at))
 }
 
 #[cfg(test)]
@@ -54,7 +60,8 @@ mod tests {
             calls.set(calls.get() + 1);
             Ok::<_, ()>(of(x))
         };
-        (narrowed((low, of(low)), (high, of(high)), counted).unwrap(), calls.get())
+        let [low, high] = [low, high].map(|at| Evaluation { at, value: of(at) });
+        (narrowed(low, high, counted).unwrap(), calls.get())
     }
 
     #[test]

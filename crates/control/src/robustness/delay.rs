@@ -1,6 +1,6 @@
 //! The delay margin for a common delay in all channels.
 
-use super::crossing::narrowed;
+use super::crossing::{Evaluation, narrowed};
 use super::held::hold_inputs;
 use super::sweep::Sweep;
 use super::{Loop, Point, held_plant};
@@ -61,12 +61,12 @@ struct Locus {
 /// The eigenvalues of L = T (I - T)^-1, those of T divided by one less themselves, by modulus.
 fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Locus>, Error> {
     let one = Complex::new(1.0, 0.0);
-    let mut found: Vec<_> = complex_eigenvalues(t)?
+    let mut loci: Vec<_> = complex_eigenvalues(t)?
         .into_iter()
         .map(|t| Locus { value: t / (one - t), excess: t.norm() / (one - t).norm() - 1.0 })
         .collect();
-    found.sort_by(|x, y| x.excess.total_cmp(&y.excess));
-    Ok(found)
+    loci.sort_by(|x, y| x.excess.total_cmp(&y.excess));
+    Ok(loci)
 }
 
 /// Computes the delay margin of a sampled controller: the smallest delay of its held commands at
@@ -110,23 +110,32 @@ pub(super) fn refined(
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most twenty")]
     let samples = whole as usize;
     let value = |part: f64| {
-        let dynamics = delayed(plant, controller, period, (samples, part))?;
+        let dynamics = delayed(plant, controller, period, Delay { samples, part })?;
         instability(&dynamics, controller.domain)
     };
     // Rounding may hide that the loop is stable at the start and unstable at the end.
-    let start = (0.0, value(0.0)?.min(-f64::MIN_POSITIVE));
-    let end = (1.0, value(1.0)?.max(f64::MIN_POSITIVE));
+    let start = Evaluation { at: 0.0, value: value(0.0)?.min(-f64::MIN_POSITIVE) };
+    let end = Evaluation { at: 1.0, value: value(1.0)?.max(f64::MIN_POSITIVE) };
     Ok(period * (whole + narrowed(start, end, value)?.0))
 }
 
-/// The loop with commands delayed by `samples` samples and the part `part` of one: its states are
-/// those of plant and controller and the last `samples` + 1 commands, the newest first.
+/// A delay of whole samples and a part of one.
+#[derive(Clone, Copy)]
+struct Delay {
+    samples: usize,
+    /// 0 to 1.
+    part: f64,
+}
+
+/// The loop with delayed commands: its states are those of plant and controller and the last
+/// `samples` + 1 commands, the newest first.
 fn delayed(
     plant: &StateSpace,
     controller: &StateSpace,
     period: f64,
-    (samples, part): (usize, f64),
+    delay: Delay,
 ) -> Result<DMatrix<f64>, Error> {
+    let Delay { samples, part } = delay;
     let (n, m) = plant.b.shape();
     let k = controller.a.nrows();
     let mut a = DMatrix::identity(n, n);
@@ -138,18 +147,17 @@ fn delayed(
         let (rest, held) = hold_inputs(&plant.a, &plant.b, (1.0 - part) * period)?;
         (a, old, new) = (&rest * a, rest * old, held);
     }
-    let own = controller;
     let order = n + k + m * (samples + 1);
     let at = |age: usize| n + k + (age - 1) * m;
     let mut older = DMatrix::zeros(m, order);
     older.view_mut((0, at(samples + 1)), (m, m)).fill_with_identity();
     let measured = plant.c.clone().resize_horizontally(order, 0.0) + &plant.d * &older;
-    let now = block_2x2([&a, &DMatrix::zeros(n, k)], [&DMatrix::zeros(k, n), &own.a]);
+    let now = block_2x2([&a, &DMatrix::zeros(n, k)], [&DMatrix::zeros(k, n), &controller.a]);
     let mut dynamics = now.resize(order, order, 0.0);
-    let controller_rows = dynamics.rows(n, k) + &own.b * &measured;
+    let controller_rows = dynamics.rows(n, k) + &controller.b * &measured;
     dynamics.rows_mut(n, k).copy_from(&controller_rows);
-    let mut command = &own.d * &measured;
-    let states = command.columns(n, k) + &own.c;
+    let mut command = &controller.d * &measured;
+    let states = command.columns(n, k) + &controller.c;
     command.columns_mut(n, k).copy_from(&states);
     let mut newer = command.clone();
     if samples > 0 {

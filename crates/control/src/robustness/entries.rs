@@ -27,6 +27,18 @@ pub struct PeakDerivatives {
     pub d: DMatrix<f64>,
 }
 
+/// A peak of S whose derivatives are computed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SensitivityPeak {
+    /// Where the loop is opened.
+    pub point: Point,
+    /// The frequency of the peak, in rad/s.
+    pub frequency: f64,
+    /// Whether the peak is that of D S D^-1 with the diagonal D for which it is least, see
+    /// [`super::scaled_peak`].
+    pub scaled: bool,
+}
+
 /// Derivatives of the peak of S with respect to each entry of the plant, while the controller does
 /// not change.
 ///
@@ -35,10 +47,8 @@ pub struct PeakDerivatives {
 /// ```
 ///
 /// `plant`: in continuous time; `controller`: in its own domain, a sampled one with the plant under
-/// a zero-order hold; `frequency`: of the peak, in rad/s, where the derivative of sigma with respect
-/// to the frequency is zero, so that a move of the peak has an effect of second order only;
-/// `scaled`: whether sigma is that of D S D^-1 with the diagonal D for which it is least, see
-/// [`super::scaled_peak`]. The derivative exists if the largest singular value is simple. For a
+/// a zero-order hold. At the frequency of the peak the derivative of sigma with respect to the frequency
+/// is zero, so that a move of the peak has an effect of second order only. The derivative exists if the largest singular value is simple. For a
 /// sampled loop the derivatives with respect to A and B follow from those of the sampled plant by
 /// the adjoint of the derivative of the matrix exponential, L(M', G) for the gradient G. Cost: about
 /// that of three solutions of a complex system of the order of the loop. An infinite frequency gives
@@ -54,42 +64,38 @@ pub struct PeakDerivatives {
 pub fn peak_derivatives(
     plant: &StateSpace,
     controller: &StateSpace,
-    (point, frequency, scaled): (Point, f64, bool),
+    peak: &SensitivityPeak,
 ) -> Result<PeakDerivatives, Error> {
     let model = match controller.domain {
         Domain::Continuous => plant.clone(),
         Domain::Sampled { period } => held_plant(plant, period)?,
     };
-    let own = Loop::new(model, controller.clone())?;
-    let mut found = if frequency.is_finite() {
-        own.derivatives(point, frequency, scaled)?
+    let closed = Loop::new(model, controller.clone())?;
+    let mut derivatives = if peak.frequency.is_finite() {
+        closed.derivatives(peak)?
     } else {
         let zero = |m: &DMatrix<f64>| DMatrix::zeros(m.nrows(), m.ncols());
         let [a, b, c, d] = [&plant.a, &plant.b, &plant.c, &plant.d].map(zero);
         return Ok(PeakDerivatives { value: 1.0, a, b, c, d });
     };
     if let Domain::Sampled { period } = controller.domain {
-        (found.a, found.b) = through_hold(plant, period, &found)?;
+        (derivatives.a, derivatives.b) = through_hold(plant, period, &derivatives)?;
         let (n, m) = plant.b.shape();
-        if found.c.ncols() > n {
+        if derivatives.c.ncols() > n {
             // The command before is a state of the held plant, and D a part of its C.
-            found.d = found.c.columns(n, m).into();
-            found.c = found.c.columns(0, n).into();
+            derivatives.d = derivatives.c.columns(n, m).into();
+            derivatives.c = derivatives.c.columns(0, n).into();
         }
     }
-    Ok(found)
+    Ok(derivatives)
 }
 
 impl Loop {
     /// The derivatives with respect to the plant of the loop's own domain.
-    fn derivatives(
-        &self,
-        point: Point,
-        frequency: f64,
-        scaled: bool,
-    ) -> Result<PeakDerivatives, Error> {
-        let (plant, own) = (self.plant(), self.controller());
-        let (n, k) = (plant.a.nrows(), own.a.nrows());
+    fn derivatives(&self, peak: &SensitivityPeak) -> Result<PeakDerivatives, Error> {
+        let SensitivityPeak { point, frequency, scaled } = *peak;
+        let (plant, controller) = (self.plant(), self.controller());
+        let (n, k) = (plant.a.nrows(), controller.a.nrows());
         let s = match plant.domain {
             Domain::Continuous => Complex::new(0.0, frequency),
             Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
@@ -97,7 +103,7 @@ impl Loop {
         let dynamics = to_complex(&self.dynamics());
         let pencil = ComplexMatrix::identity(n + k, n + k) * s - dynamics;
         // Signals added to the commands and to the measurements; commands and measurements.
-        let (m, p) = own.d.shape();
+        let (m, p) = controller.d.shape();
         let ([from_u, from_y], [to_u, to_y]) = (self.entries(), self.signals());
         let inputs = stacked(&from_u.transpose(), &from_y.transpose()).transpose();
         let outputs = stacked(&to_u, &to_y);
@@ -108,7 +114,7 @@ impl Loop {
         let mut response = to_complex(&outputs) * &x;
         // The controller's D from y to u, the plant's from u to y; the added signals themselves.
         for (row, column) in (0..m).flat_map(|i| (0..p).map(move |j| (i, j))) {
-            response[(row, m + column)] += own.d[(row, column)];
+            response[(row, m + column)] += controller.d[(row, column)];
             response[(m + column, row)] += plant.d[(column, row)];
         }
         for at in 0..m + p {
@@ -125,12 +131,12 @@ impl Loop {
             nalgebra::DVector::from_element(count, 1.0)
         };
         let unit = |i: usize, j: usize| units[i] / units[j];
-        let seen = DMatrix::from_fn(count, count, |i, j| sensitivity[(i, j)] * unit(i, j));
-        let (value, right) = ComplexSvd::new(&seen)?.nth_smallest(count - 1);
+        let weighted = DMatrix::from_fn(count, count, |i, j| sensitivity[(i, j)] * unit(i, j));
+        let (value, right) = ComplexSvd::new(&weighted)?.nth_smallest(count - 1);
         if value <= 0.0 {
             return Err(Error::Overflow { what: "1 / S at its peak" });
         }
-        let left = (&seen * &right) / Complex::from(value);
+        let left = (&weighted * &right) / Complex::from(value);
         let right = right.zip_map(&units, |entry, unit| entry / unit);
         let left = left.zip_map(&units, |entry, unit| entry * unit);
         // u* (effect of what is added to x' and to y), and (x and u) under v.
@@ -176,6 +182,6 @@ fn through_hold(
     let unit = if size > 0.0 { adjoint.amax().max(f64::MIN_POSITIVE) / size } else { 1.0 };
     let zero = DMatrix::zeros(order, order);
     let block = block_2x2([&adjoint, &(gradient * unit)], [&zero, &adjoint]);
-    let moved = exponential(&block)?.view((0, order), (order, order)) * (period / unit);
-    Ok((moved.view((0, 0), (n, n)).into(), moved.view((0, n), (n, m)).into()))
+    let gradient = exponential(&block)?.view((0, order), (order, order)) * (period / unit);
+    Ok((gradient.view((0, 0), (n, n)).into(), gradient.view((0, n), (n, m)).into()))
 }

@@ -1,6 +1,6 @@
 //! The plants that a controller may meet, and their loops.
 
-use super::crossing::narrowed;
+use super::crossing::{Evaluation, narrowed};
 use super::{Loop, held_plant};
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace};
@@ -41,6 +41,15 @@ pub trait PlantFamily {
     }
 }
 
+/// A plant of a family in the loop with a controller.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToleranceCase {
+    /// [`crate::stability::instability`] of the loop.
+    pub instability: f64,
+    /// The deviations of the parameters, as parts of their tolerances.
+    pub deviations: Vec<f64>,
+}
+
 /// The loops of a controller and all plants of a family.
 pub(super) struct Loops<'a, F> {
     pub(super) family: &'a F,
@@ -68,14 +77,14 @@ impl<F: PlantFamily> Loops<'_, F> {
             let scaled: Vec<f64> = deviations.iter().map(|part| multiple * part).collect();
             self.instability(&scaled)
         };
-        let mut good = (0.0, f64::NAN);
+        let mut good = Evaluation { at: 0.0, value: f64::NAN };
         for multiple in self.family.multiples() {
-            let found = value(multiple)?;
-            if found < 0.0 {
-                good = (multiple, found);
+            let there = Evaluation { at: multiple, value: value(multiple)? };
+            if there.value < 0.0 {
+                good = there;
                 continue;
             }
-            let bad = (multiple, found.max(f64::MIN_POSITIVE));
+            let bad = Evaluation { value: there.value.max(f64::MIN_POSITIVE), ..there };
             return Ok(Some(narrowed(good, bad, value)?.0));
         }
         Ok(None)

@@ -1,6 +1,6 @@
 //! The longest time over which the signals between plant and controller may be held.
 
-use super::crossing::narrowed;
+use super::crossing::{Evaluation, narrowed};
 use super::held::Mean;
 use super::{Loop, held_plant};
 use crate::blocks::block_2x2;
@@ -31,18 +31,18 @@ const SHORT: f64 = 1e-2;
 ///
 /// [`Error::NotHurwitz`] for a loop that is not stable, or sampled; same as [`crate::hold::zero_order_hold`].
 pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
-    let (plant, own) = (closed.plant(), closed.controller());
-    let (of_plant, of_own) = (Mean::new(&plant.a), Mean::new(&own.a));
+    let (plant, controller) = (closed.plant(), closed.controller());
+    let (of_plant, of_controller) = (Mean::new(&plant.a), Mean::new(&controller.a));
     let value = |h: f64| {
-        let (mean, own_mean) = (of_plant.at(h)?, of_own.at(h)?);
+        let (mean, controller_mean) = (of_plant.at(h)?, of_controller.at(h)?);
         let (a, b) = (&plant.a * &mean, mean * &plant.b);
-        let (own_a, own_b) = (&own.a * &own_mean, own_mean * &own.b);
+        let (a_k, b_k) = (&controller.a * &controller_mean, controller_mean * &controller.b);
         let mut rate = block_2x2(
-            [&(a + &b * &own.d * &plant.c), &(b * &own.c)],
-            [&(&own_b * &plant.c), &own_a],
+            [&(a + &b * &controller.d * &plant.c), &(b * &controller.c)],
+            [&(&b_k * &plant.c), &a_k],
         );
         if plant.d.amax() > 0.0 {
-            rate = with_held_commands(&rate, closed, &own_b, h);
+            rate = with_held_commands(&rate, closed, &b_k, h);
         }
         // |1 + h r| < 1 for the eigenvalues r.
         let excess = |r: &nalgebra::Complex<f64>| 2.0 * r.re + h * r.norm_sqr();
@@ -59,14 +59,14 @@ pub fn longest_hold(closed: &Loop) -> Result<f64, Error> {
 fn with_held_commands(
     rate: &DMatrix<f64>,
     closed: &Loop,
-    own_b: &DMatrix<f64>,
+    b_k: &DMatrix<f64>,
     h: f64,
 ) -> DMatrix<f64> {
-    let (plant, own) = (closed.plant(), closed.controller());
-    let (n, k, m) = (plant.a.nrows(), own.a.nrows(), own.c.nrows());
+    let (plant, controller) = (closed.plant(), closed.controller());
+    let (n, k, m) = (plant.a.nrows(), controller.a.nrows(), controller.c.nrows());
     let mut all = rate.clone().resize(n + k + m, n + k + m, 0.0);
-    all.view_mut((n, n + k), (k, m)).copy_from(&(own_b * &plant.d));
-    all.view_mut((n + k, n), (m, k)).copy_from(&(&own.c / h));
+    all.view_mut((n, n + k), (k, m)).copy_from(&(b_k * &plant.d));
+    all.view_mut((n + k, n), (m, k)).copy_from(&(&controller.c / h));
     all.view_mut((n + k, n + k), (m, m)).fill_diagonal(-h.recip());
     all
 }
@@ -99,18 +99,19 @@ fn search(
     value: impl Fn(f64) -> Result<f64, Error>,
     [from, short, to]: [f64; 3],
 ) -> Result<f64, Error> {
-    let (mut good, mut h) = ((0.0, f64::NAN), from);
+    let (mut good, mut h) = (Evaluation { at: 0.0, value: f64::NAN }, from);
     while h <= to {
-        let found = value(h)?;
-        if found < 0.0 {
-            good = (h, found);
+        let there = Evaluation { at: h, value: value(h)? };
+        if there.value < 0.0 {
+            good = there;
             h *= FACTORS[usize::from(h >= short)];
             continue;
         }
-        if good.0 <= 0.0 {
+        if good.at <= 0.0 {
             return Ok(0.0);
         }
-        return Ok(narrowed(good, (h, found.max(f64::MIN_POSITIVE)), value)?.0);
+        let bad = Evaluation { value: there.value.max(f64::MIN_POSITIVE), ..there };
+        return Ok(narrowed(good, bad, value)?.0);
     }
     Ok(f64::INFINITY)
 }

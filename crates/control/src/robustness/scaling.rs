@@ -140,11 +140,11 @@ fn largest_singular(m: &DMatrix<Complex<f64>>) -> Result<(f64, DVector<Complex<f
         return Ok((0.0, DVector::zeros(m.ncols())));
     }
     let one = m.unscale(unit);
-    let found = SymmetricEigen::try_new(one.adjoint() * &one, f64::EPSILON, EIGEN_ITERATIONS);
+    let eigen = SymmetricEigen::try_new(one.adjoint() * &one, f64::EPSILON, EIGEN_ITERATIONS);
     let what = "the largest singular value";
-    let found = found.ok_or(Error::NotConverged { what, iterations: EIGEN_ITERATIONS })?;
-    let at = found.eigenvalues.imax();
-    let right = found.eigenvectors.column(at).into_owned();
+    let eigen = eigen.ok_or(Error::NotConverged { what, iterations: EIGEN_ITERATIONS })?;
+    let at = eigen.eigenvalues.imax();
+    let right = eigen.eigenvectors.column(at).into_owned();
     Ok((unit * (&one * &right).norm(), right))
 }
 
@@ -162,9 +162,9 @@ mod tests {
                 Complex::from_polar(a[i], 0.3) * Complex::from_polar(b[j], 1.1)
             });
             let exact: f64 = (0..k).map(|i: usize| f64::abs(a[i] * b[i])).sum();
-            let (found, _) = scaled_norm(&m).unwrap();
-            assert!((found / exact - 1.0).abs() < 2e-5, "{k}: {found} {exact}");
-            assert!(balanced_norm(&m).unwrap() >= found * (1.0 - 1e-12));
+            let (bound, _) = scaled_norm(&m).unwrap();
+            assert!((bound / exact - 1.0).abs() < 2e-5, "{k}: {bound} {exact}");
+            assert!(balanced_norm(&m).unwrap() >= bound * (1.0 - 1e-12));
         }
     }
 
@@ -176,9 +176,9 @@ mod tests {
         });
         let (least, _) = scaled_norm(&m).unwrap();
         for enough in [1.0001 * least, 1.05 * least] {
-            let (found, scaling) = scaled_norm_above(&m, enough).unwrap();
-            assert!(found <= enough && found >= least * (1.0 - 2e-5), "{found} {least}");
-            assert!((Scaled::new(&m, &scaling).unwrap().norm - found).abs() < 1e-12 * found);
+            let (bound, scaling) = scaled_norm_above(&m, enough).unwrap();
+            assert!(bound <= enough && bound >= least * (1.0 - 2e-5), "{bound} {least}");
+            assert!((Scaled::new(&m, &scaling).unwrap().norm - bound).abs() < 1e-12 * bound);
         }
         assert!((scaled_norm_above(&m, 0.9 * least).unwrap().0 / least - 1.0).abs() < 2e-5);
     }
@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn coupling_in_one_direction_does_not_count() {
         let m = DMatrix::from_row_slice(2, 2, &[2.0, 100.0, 0.0, 1.0]).map(Complex::from);
-        let (found, _) = scaled_norm(&m).unwrap();
-        assert!((found - 2.0).abs() < 1e-2, "{found}");
+        let (bound, _) = scaled_norm(&m).unwrap();
+        assert!((bound - 2.0).abs() < 1e-2, "{bound}");
     }
 }

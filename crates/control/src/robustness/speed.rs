@@ -47,7 +47,7 @@ pub fn regulator_of_same_speed(
     let r = DMatrix::from_diagonal(&lengths.into());
     let solve = |power: f64| {
         let weights = Weights { q: &q * 10_f64.powf(power), r: r.clone(), n: None };
-        lqr(a, b, &weights, domain).ok().map(|found| found.gain)
+        lqr(a, b, &weights, domain).ok().map(|regulator| regulator.gain)
     };
     // The ends, each with the logarithm of its speed relative to the required one, if it is known.
     let [mut slow, mut fast] = POWERS.map(|power| (power, f64::NAN));
@@ -55,14 +55,14 @@ pub fn regulator_of_same_speed(
         let part = slow.1 / (slow.1 - fast.1);
         let part = if part.is_finite() && step % 3 != 0 { part } else { 0.5 };
         let power = slow.0 + part * (fast.0 - slow.0);
-        let Some(found) = solve(power) else {
+        let Some(gain) = solve(power) else {
             // Extreme weights have no verified solution.
             *(if power < 0.0 { &mut slow } else { &mut fast }) = (power, f64::NAN);
             continue;
         };
-        let reached = speed(&(a + b * &found), domain)?;
+        let reached = speed(&(a + b * &gain), domain)?;
         if (reached - required).abs() <= CLOSE * required.abs() {
-            return Ok(Some(found));
+            return Ok(Some(gain));
         }
         let end = (power, (reached / required).ln());
         *(if reached < required { &mut slow } else { &mut fast }) = end;

@@ -1,6 +1,6 @@
 //! Frequencies at which margins are searched.
 
-use super::crossing::narrowed;
+use super::crossing::{Evaluation, narrowed};
 use crate::Error;
 use crate::response::KnownResponse;
 use nalgebra::{Complex, DMatrix};
@@ -42,17 +42,17 @@ impl<'a> Sweep<'a> {
         values: &[f64],
         of: impl Fn(&DMatrix<Complex<f64>>) -> Result<f64, Error>,
     ) -> Result<Vec<f64>, Error> {
-        let mut found = Vec::new();
+        let mut crossings = Vec::new();
         for at in 1..values.len() {
             let (before, after) = (values[at - 1], values[at]);
             if before.is_nan() || after.is_nan() || (before > 0.0) == (after > 0.0) {
                 continue;
             }
-            let ends = ((self.frequencies[at - 1], before), (self.frequencies[at], after));
-            let value = |frequency| of(&self.at(frequency)?);
-            let (low, high) = narrowed(ends.0, ends.1, value)?;
-            found.push(0.5 * (low + high));
+            let low = Evaluation { at: self.frequencies[at - 1], value: before };
+            let high = Evaluation { at: self.frequencies[at], value: after };
+            let (low, high) = narrowed(low, high, |frequency| of(&self.at(frequency)?))?;
+            crossings.push(0.5 * (low + high));
         }
-        Ok(found)
+        Ok(crossings)
     }
 }

@@ -1,6 +1,6 @@
 //! Errors of the plant's parameters: random cases and a search for the worst one.
 
-use super::family::{Loops, PlantFamily};
+use super::family::{Loops, PlantFamily, ToleranceCase};
 use super::worst_case::climb;
 use crate::{Error, StateSpace, check};
 use nalgebra::DMatrix;
@@ -74,19 +74,16 @@ pub struct ToleranceTest {
 pub fn tolerance_test<F: PlantFamily>(
     family: &F,
     controller: &StateSpace,
-    (cases, seed): (u32, u64),
+    cases: u32,
+    seed: u64,
 ) -> Result<ToleranceTest, F::Error> {
     let search = ToleranceSearch { family, controller };
-    let evaluate = |deviations: Vec<f64>| Ok((search.instability(&deviations)?, deviations));
-    let cases = search.cases(cases, seed).into_iter().map(evaluate);
+    let cases = search.cases(cases, seed).into_iter().map(|case| search.evaluate(case));
     let cases = cases.collect::<Result<Vec<_>, F::Error>>()?;
     let climbed = search.starts(&cases)?.into_iter().map(|start| search.climb(start));
     let climbed = climbed.collect::<Result<Vec<_>, _>>()?;
     search.result(&cases, climbed)
 }
-
-/// A plant of a family: its [`crate::stability::instability`] with the controller, and its deviations.
-pub type Deviated = (f64, Vec<f64>);
 
 /// The parts of [`tolerance_test`], for a caller that runs cases and climbs at the same time.
 pub struct ToleranceSearch<'a, F> {
@@ -103,35 +100,35 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
         random_deviations(self.family.count(), cases, seed)
     }
 
-    /// The [`crate::stability::instability`] of the loop with a plant of the family.
+    /// The plant of the family with these deviations, in the loop.
     ///
     /// # Errors
     ///
     /// Same as [`tolerance_test`].
-    pub fn instability(&self, deviations: &[f64]) -> Result<f64, F::Error> {
-        self.loops().instability(deviations)
+    pub fn evaluate(&self, deviations: Vec<f64>) -> Result<ToleranceCase, F::Error> {
+        let instability = self.loops().instability(&deviations)?;
+        Ok(ToleranceCase { instability, deviations })
     }
 
-    /// Where climbs begin: the two worst cases and the nominal plant.
+    /// Returns the start points of the worst-case search: the two worst cases and the nominal plant.
     ///
     /// # Errors
     ///
     /// Same as [`tolerance_test`].
-    pub fn starts(&self, cases: &[Deviated]) -> Result<Vec<Deviated>, F::Error> {
-        let mut worst: Vec<&Deviated> = cases.iter().collect();
-        worst.sort_by(|x, y| y.0.total_cmp(&x.0));
-        let mut starts: Vec<Deviated> = worst.into_iter().take(2).cloned().collect();
-        let nominal = vec![0.0; self.family.count()];
-        starts.push((self.instability(&nominal)?, nominal));
+    pub fn starts(&self, cases: &[ToleranceCase]) -> Result<Vec<ToleranceCase>, F::Error> {
+        let mut worst: Vec<&ToleranceCase> = cases.iter().collect();
+        worst.sort_by(|x, y| y.instability.total_cmp(&x.instability));
+        let mut starts: Vec<ToleranceCase> = worst.into_iter().take(2).cloned().collect();
+        starts.push(self.evaluate(vec![0.0; self.family.count()])?);
         Ok(starts)
     }
 
-    /// The worst plant that is reached from `start`.
+    /// The worst case that the search reaches from `start`.
     ///
     /// # Errors
     ///
     /// Same as [`tolerance_test`].
-    pub fn climb(&self, start: Deviated) -> Result<Deviated, F::Error> {
+    pub fn climb(&self, start: ToleranceCase) -> Result<ToleranceCase, F::Error> {
         climb(&self.loops(), start)
     }
 
@@ -142,18 +139,20 @@ impl<F: PlantFamily> ToleranceSearch<'_, F> {
     /// Same as [`tolerance_test`].
     pub fn result(
         &self,
-        cases: &[Deviated],
-        climbed: Vec<Deviated>,
+        cases: &[ToleranceCase],
+        climbed: Vec<ToleranceCase>,
     ) -> Result<ToleranceTest, F::Error> {
-        let worse = |best: Deviated, found: Deviated| if found.0 > best.0 { found } else { best };
+        let worse = |one: ToleranceCase, other: ToleranceCase| {
+            if other.instability > one.instability { other } else { one }
+        };
         let worst = climbed.into_iter().reduce(worse);
-        let (worst_instability, deviations) =
+        let ToleranceCase { instability, deviations } =
             worst.ok_or(Error::NotConverged { what: "the worst case", iterations: 0 })?;
         let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         Ok(ToleranceTest {
             cases: count(cases.len()),
-            stable: count(cases.iter().filter(|(value, _)| *value < 0.0).count()),
-            worst_instability,
+            stable: count(cases.iter().filter(|case| case.instability < 0.0).count()),
+            worst_instability: instability,
             worst: self.family.plant(&deviations)?,
             first_unstable: self.loops().first_unstable(&deviations)?,
             deviations,
@@ -240,13 +239,13 @@ impl PlantFamily for EntryFamily<'_> {
     fn plant(&self, deviations: &[f64]) -> Result<StateSpace, Error> {
         let mut plant = self.plant.clone();
         for (entry, deviation) in self.entries.iter().zip(deviations) {
-            let own = match entry.matrix {
+            let matrix = match entry.matrix {
                 0 => &mut plant.a,
                 1 => &mut plant.b,
                 2 => &mut plant.c,
                 _ => &mut plant.d,
             };
-            own[(entry.row, entry.column)] += entry.size * deviation;
+            matrix[(entry.row, entry.column)] += entry.size * deviation;
         }
         Ok(plant)
     }

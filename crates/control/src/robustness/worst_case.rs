@@ -1,6 +1,6 @@
 //! The search for the worst plant within tolerances.
 
-use super::family::{Loops, PlantFamily};
+use super::family::{Loops, PlantFamily, ToleranceCase};
 use crate::Domain;
 use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;
@@ -20,39 +20,40 @@ const LARGE: usize = 50;
 /// Relative shift of the eigenvalue in the inverse iteration.
 const SHIFT: f64 = 1e-9;
 
-/// Returns the largest instability that is found from a case, with its deviations.
+/// Returns the worst case that the search reaches from `start`.
 pub(super) fn climb<F: PlantFamily>(
     loops: &Loops<'_, F>,
-    (mut value, mut deviations): (f64, Vec<f64>),
-) -> Result<(f64, Vec<f64>), F::Error> {
+    start: ToleranceCase,
+) -> Result<ToleranceCase, F::Error> {
+    let mut worst = start;
     let large = loops.controller.a.nrows() > LARGE;
     for round in 0..ROUNDS {
         let count = if round == 0 { MODES } else { 1 };
         let mut improved = false;
-        for gradient in gradients(loops, &deviations, count)? {
+        for gradient in gradients(loops, &worst.deviations, count)? {
             let mut order: Vec<usize> = (0..gradient.len()).collect();
             order.sort_by(|i, j| gradient[*j].abs().total_cmp(&gradient[*i].abs()));
-            let mut moved = gradient.len();
-            while moved > 0 {
-                let mut candidate = deviations.clone();
-                for &at in &order[..moved] {
+            let mut count = gradient.len();
+            while count > 0 {
+                let mut deviations = worst.deviations.clone();
+                for &at in &order[..count] {
                     if gradient[at].abs() > 0.0 {
-                        candidate[at] = gradient[at].signum();
+                        deviations[at] = gradient[at].signum();
                     }
                 }
-                let reached = loops.instability(&candidate)?;
-                if reached > value {
-                    (value, deviations, improved) = (reached, candidate, true);
+                let instability = loops.instability(&deviations)?;
+                if instability > worst.instability {
+                    (worst, improved) = (ToleranceCase { instability, deviations }, true);
                     break;
                 }
-                moved /= if large { FEWER_IF_LARGE } else { FEWER };
+                count /= if large { FEWER_IF_LARGE } else { FEWER };
             }
         }
         if !improved {
             break;
         }
     }
-    Ok((value, deviations))
+    Ok(worst)
 }
 
 /// The derivatives of [`Domain::excess`] of the eigenvalues nearest to instability with respect to
@@ -78,19 +79,19 @@ fn gradients<F: PlantFamily>(
             Some((to_complex(&exponential(&block)?), period))
         }
     };
-    let own = loops.controller;
-    let command = to_complex(&own.c);
-    let direct = to_complex(&own.d);
-    let mut found = Vec::new();
+    let controller = loops.controller;
+    let command = to_complex(&controller.c);
+    let direct = to_complex(&controller.d);
+    let mut slopes = Vec::new();
     for mode in modes.into_iter().take(count) {
         let Some((left, right)) = eigenvectors(&dynamics, mode) else {
             continue;
         };
         let x: Vector = right.rows(0, n).into();
         // A held plant with a direct term has the commands before among its states.
-        let first = dynamics.nrows() - own.a.nrows();
+        let first = dynamics.nrows() - controller.a.nrows();
         let before: Vector = right.rows(n, first - n).into();
-        let fed_back = &command * right.rows(first, own.a.nrows());
+        let fed_back = &command * right.rows(first, controller.a.nrows());
         let through_d = if first > n { &before } else { &fed_back };
         let y = to_complex(&plant.c) * &x + to_complex(&plant.d) * through_d;
         let u = &fed_back + &direct * &y;
@@ -108,26 +109,27 @@ fn gradients<F: PlantFamily>(
             let before = half.view((0, 0), (n, n)).tr_mul(&of_plant);
             of_plant = before * Complex::new(*period, 0.0);
         }
-        let of_output =
-            direct.tr_mul(&through) + to_complex(&own.b).tr_mul(&left.rows(first, own.a.nrows()));
+        let of_output = direct.tr_mul(&through)
+            + to_complex(&controller.b).tr_mul(&left.rows(first, controller.a.nrows()));
         let turn = match domain {
             Domain::Continuous => Complex::new(1.0, 0.0),
             Domain::Sampled { .. } => mode.conj() / mode.norm().max(f64::MIN_POSITIVE),
         };
-        let outer = |effect: &Vector, (at, count): (usize, usize), by: &Vector| {
-            DMatrix::from_fn(effect.nrows(), count, |row, column| {
-                (turn * effect[row] * by[at + column]).re
+        let outer = |effect: &Vector, by: &[Complex<f64>]| {
+            DMatrix::from_fn(effect.nrows(), by.len(), |row, column| {
+                (turn * effect[row] * by[column]).re
             })
         };
+        let (of_x, of_u) = input.as_slice().split_at(n);
         let entries = [
-            outer(&of_plant, (0, n), &input),
-            outer(&of_plant, (n, m), &input),
-            outer(&of_output, (0, n), &x),
-            outer(&of_output, (0, m), through_d),
+            outer(&of_plant, of_x),
+            outer(&of_plant, of_u),
+            outer(&of_output, x.as_slice()),
+            outer(&of_output, through_d.as_slice()),
         ];
-        found.push(loops.family.slopes(&entries));
+        slopes.push(loops.family.slopes(&entries));
     }
-    Ok(found)
+    Ok(slopes)
 }
 
 /// Left and right eigenvector (row and column) with the product one, by inverse iteration; None if

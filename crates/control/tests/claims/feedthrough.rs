@@ -5,8 +5,8 @@ use control::controller::with_feedthrough;
 use control::hold::zero_order_hold;
 use control::response::h_infinity;
 use control::robustness::{
-    EntryFamily, Loop, Point, Tolerances, held_plant, longest_hold, longest_period,
-    peak_derivatives, sampled_delay_margin, tolerance_test,
+    EntryFamily, Loop, Point, SensitivityPeak, Tolerances, held_plant, longest_hold,
+    longest_period, peak_derivatives, sampled_delay_margin, tolerance_test,
 };
 use control::stability::instability;
 use control::{Domain, Error, StateSpace};
@@ -133,8 +133,8 @@ fn derivatives_of_the_peak_are_differences() {
     for domain in [Domain::Continuous, SAMPLED] {
         let own = controller(domain);
         for (point, scaled) in [(Point::Input, false), (Point::Output, true)] {
-            let at = (point, 2.3, scaled);
-            let value = |plant: &StateSpace| peak_derivatives(plant, &own, at).expect("a value");
+            let peak = SensitivityPeak { point, frequency: 2.3, scaled };
+            let value = |plant: &StateSpace| peak_derivatives(plant, &own, &peak).expect("a value");
             let found = value(&plant());
             for (which, slopes) in [&found.a, &found.b, &found.c, &found.d].into_iter().enumerate()
             {
@@ -214,7 +214,7 @@ fn the_worst_case_includes_the_feedthrough() {
         let tolerances = Tolerances::of_values(&plant(), [0.0, 0.0, 0.05, 0.2]);
         let nominal = plant();
         let family = EntryFamily::new(&nominal, &tolerances).expect("fits");
-        let found = tolerance_test(&family, &own, (20, 3)).expect("a test");
+        let found = tolerance_test(&family, &own, 20, 3).expect("a test");
         let value = |plant: &StateSpace| {
             let model = match domain {
                 Domain::Continuous => plant.clone(),

@@ -5,9 +5,9 @@ use crate::{entry_error, matrix};
 use control::hold::zero_order_hold;
 use control::response::h_infinity;
 use control::robustness::{
-    EntryFamily, Loop, Point, Tolerances, channel_margins, delay_margin, disk_margin, longest_hold,
-    longest_period, noise_gains, peak_derivatives, regulator_of_same_speed, sampled_delay_margin,
-    scaled_peak, tolerance_test,
+    EntryFamily, Loop, Point, SensitivityPeak, Tolerances, channel_margins, delay_margin,
+    disk_margin, longest_hold, longest_period, noise_gains, peak_derivatives,
+    regulator_of_same_speed, sampled_delay_margin, scaled_peak, tolerance_test,
 };
 use control::stability::instability;
 use control::{Domain, Error, StateSpace};
@@ -90,12 +90,13 @@ type Field = fn(&mut StateSpace) -> &mut DMatrix<f64>;
 /// largest effect of a relative change.
 fn assert_derivatives(
     case: &Case,
-    (point, frequency, scaled): (Point, f64, bool),
-    (step, tolerance): (f64, f64),
+    at: SensitivityPeak,
+    step: f64,
+    tolerance: f64,
     peak: impl Fn(&Loop) -> f64,
 ) {
     let (plant, controller) = parts(case);
-    let found = peak_derivatives(&plant, &controller, (point, frequency, scaled)).expect("a peak");
+    let found = peak_derivatives(&plant, &controller, &at).expect("a peak");
     let reached = peak(&closed(case));
     assert_near(found.value, reached, 1e-4, case.name);
     let fields: [(&DMatrix<f64>, Field); 3] =
@@ -119,10 +120,10 @@ fn assert_derivatives(
         }
     }
     let largest = effects.iter().map(|(_, expected)| expected.abs()).fold(0.0, f64::max);
-    assert!(largest > 0.1, "{} {point:?}: {largest}", case.name);
+    assert!(largest > 0.1, "{} {at:?}: {largest}", case.name);
     for (found, expected) in effects {
         let error = (found - expected).abs() / largest;
-        assert!(error < tolerance, "{} {point:?}: {found} {expected}", case.name);
+        assert!(error < tolerance, "{} {at:?}: {found} {expected}", case.name);
     }
 }
 
@@ -132,11 +133,12 @@ fn derivatives_of_the_peaks_are_those_of_the_peaks_of_changed_plants() {
         for (_, point) in POINTS {
             let norm = |own: &Loop| h_infinity(&own.sensitivity(point), 1e-8).unwrap();
             let frequency = norm(&closed(&case)).frequency;
-            let at = (point, frequency, false);
-            assert_derivatives(&case, at, (1e-4, 1e-3), |own| norm(own).lower);
+            let at = SensitivityPeak { point, frequency, scaled: false };
+            assert_derivatives(&case, at, 1e-4, 1e-3, |own| norm(own).lower);
             let scaled = |own: &Loop| scaled_peak(&own.sensitivity(point)).unwrap();
-            let at = (point, scaled(&closed(&case)).frequency, true);
-            assert_derivatives(&case, at, (5e-3, 5e-2), |own| scaled(own).value);
+            let frequency = scaled(&closed(&case)).frequency;
+            let at = SensitivityPeak { point, frequency, scaled: true };
+            assert_derivatives(&case, at, 5e-3, 5e-2, |own| scaled(own).value);
         }
     }
 }
@@ -230,7 +232,7 @@ fn the_worst_plant_of_two_parameters_is_a_vertex() {
     let tolerances = Tolerances::of_values(&plant, [0.1; 4]);
     let family = EntryFamily::new(&plant, &tolerances).expect("fits");
     assert_eq!(tolerances.count(), 2, "C is one");
-    let test = |k: f64| tolerance_test(&family, &gain(&one(-k), domain), (200, 1));
+    let test = |k: f64| tolerance_test(&family, &gain(&one(-k), domain), 200, 1);
     let found = test(3.0).expect("a test");
     assert_eq!((found.cases, found.stable), (200, 200));
     // The idle state of the controller has -1.
@@ -254,7 +256,7 @@ fn the_worst_case_is_at_least_as_bad_as_random_vertices() {
         let (plant, controller) = parts(&case);
         let tolerances = Tolerances::of_values(&plant, [0.03; 4]);
         let found = EntryFamily::new(&plant, &tolerances)
-            .and_then(|family| tolerance_test(&family, &controller, (40, 7)))
+            .and_then(|family| tolerance_test(&family, &controller, 40, 7))
             .expect("a test");
         let value = |plant: &StateSpace| {
             let mut plant = plant.clone();

@@ -10,8 +10,8 @@ use control::aso::Gains;
 use control::controller::{CompleteController, complete_controller, with_feedthrough};
 use control::response::{frequency_grid, frequency_response, h_infinity};
 use control::robustness::{
-    DiskMargin, Loop, OpenedLoop, Point, Tolerances, held_plant, longest_hold, longest_period,
-    peak_derivatives, regulator_of_same_speed,
+    DiskMargin, Loop, OpenedLoop, Point, SensitivityPeak, Tolerances, held_plant, longest_hold,
+    longest_period, peak_derivatives, regulator_of_same_speed,
 };
 use control::tracking::IntegralAction;
 use control::{Domain, Error, StateSpace};
@@ -258,8 +258,9 @@ fn slopes(
             Point::Input => &linear.actuators,
             Point::Output => &linear.measurements,
         };
-        let at = (point, found.judged_frequency, !same_unit(signals));
-        let slopes = peak_derivatives(&physical.plant, &physical.controller, at)?;
+        let frequency = found.judged_frequency;
+        let peak = SensitivityPeak { point, frequency, scaled: !same_unit(signals) };
+        let slopes = peak_derivatives(&physical.plant, &physical.controller, &peak)?;
         Ok([slopes.a, slopes.b, slopes.c, slopes.d])
     };
     POINTS.into_iter().zip(points).map(one).collect()

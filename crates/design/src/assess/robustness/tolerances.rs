@@ -1,6 +1,5 @@
 //! Whether a loop stays stable while the plant varies within its tolerances.
 
-use control::Error;
 use control::robustness::{
     EntryFamily, ToleranceSearch, ToleranceTest, Tolerances, tolerance_test,
 };
@@ -26,7 +25,7 @@ pub(crate) fn by_entries(
     let family = EntryFamily::new(&physical.plant, &tolerances)?;
     let search = ToleranceSearch { family: &family, controller: &physical.controller };
     let cases = search.cases(limits.cases, u64::from(limits.seed)).into_par_iter();
-    let cases = cases.map(|case| Ok::<_, Error>((search.instability(&case)?, case)));
+    let cases = cases.map(|case| search.evaluate(case));
     let cases = cases.collect::<Result<Vec<_>, _>>()?;
     let climbs = search.starts(&cases)?.into_par_iter().map(|start| search.climb(start));
     let found = search.result(&cases, climbs.collect::<Result<Vec<_>, _>>()?)?;
@@ -42,8 +41,8 @@ pub(super) fn by_parameters(
     family: &ParameterFamily<'_>,
     slopes: &[[DMatrix<f64>; 4]],
 ) -> Result<ToleranceResult, crate::Error> {
-    let request = (limits.cases, u64::from(limits.seed));
-    let found = tolerance_test(family, &physical.controller, request)?;
+    let seed = u64::from(limits.seed);
+    let found = tolerance_test(family, &physical.controller, limits.cases, seed)?;
     let parameters = family.report(&found.deviations, slopes);
     Ok(ToleranceResult { parameters, ..tested(designed, limits, &found) })
 }
