@@ -140,10 +140,10 @@ pub fn extended_pair(
     check::shape("B", b, (n, b.ncols()))?;
     check::shape("H C", output, (output.nrows(), n))?;
     let t = output.nrows();
-    let (step, kept) = integration(domain);
-    let kept = DMatrix::identity(t, t) * kept;
+    let (step, last) = integration(domain);
+    let last = DMatrix::identity(t, t) * last;
     Ok((
-        block_2x2([a, &DMatrix::zeros(n, t)], [&(output * -step), &kept]),
+        block_2x2([a, &DMatrix::zeros(n, t)], [&(output * -step), &last]),
         b.clone().resize_vertically(n + t, 0.0),
     ))
 }
@@ -171,7 +171,8 @@ pub(crate) fn integration(domain: Domain) -> (f64, f64) {
 /// Same as [`extended_pair`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for an unstable A + B `K_x`;
 /// [`Error::ResidualTooLarge`] when G `N_r` differs from I by more than 1e-9.
 pub fn feedforward(
-    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
     output: &DMatrix<f64>,
     k_x: &DMatrix<f64>,
     domain: Domain,
@@ -181,15 +182,15 @@ pub fn feedforward(
     check::shape("H C", output, (output.nrows(), n))?;
     check::shape("K_x", k_x, (b.ncols(), n))?;
     let (t, m) = (output.nrows(), b.ncols());
-    let own = StateSpace {
+    let controlled = StateSpace {
         a: a + b * k_x,
         b: b.clone(),
         c: output.clone(),
         d: DMatrix::zeros(t, m),
         domain,
     };
-    crate::stability::require_stable("A + B K_x", &own.a, domain)?;
-    let constant = own.dc_matrix().lu();
+    crate::stability::require_stable("A + B K_x", &controlled.a, domain)?;
+    let constant = controlled.dc_matrix().lu();
     let gain = |input: &DMatrix<f64>| {
         let states = constant.solve(&(b * input));
         states.map(|states| output * states).ok_or(Error::Overflow { what: "the gain at s = 0" })
@@ -204,13 +205,13 @@ pub fn feedforward(
     };
     let identity = DMatrix::identity(t, t);
     let first = solve(&identity);
-    let found = &first + solve(&(&identity - gain(&first)?));
-    let residual = (gain(&found)? - identity).amax();
+    let n_r = &first + solve(&(&identity - gain(&first)?));
+    let residual = (gain(&n_r)? - identity).amax();
     if residual.is_nan() || residual > 1e-9 {
         let (equation, allowed) = ("G N_r = I", 1e-9);
         return Err(Error::ResidualTooLarge { equation, residual, allowed });
     }
-    Ok(found)
+    Ok(n_r)
 }
 
 /// The loop from the references to [x; u], without faults and estimation errors.
@@ -227,7 +228,8 @@ pub fn feedforward(
 ///
 /// Same as [`extended_pair`]; [`Error::Shape`] for a gain that does not fit.
 pub fn reference_system(
-    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
     k_x: &DMatrix<f64>,
     action: &Action<'_>,
     domain: Domain,

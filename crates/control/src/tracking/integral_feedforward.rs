@@ -48,27 +48,29 @@ pub struct IntegralFeedforward {
 /// [`Error::NotConverged`]; [`Error::ResidualTooLarge`] when W is not invariant to 1e-8 or W' [B `N_r`; I]
 /// is above 1e-9, both relative.
 pub fn integral_feedforward(
-    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
     output: &DMatrix<f64>,
     k: &DMatrix<f64>,
     domain: Domain,
 ) -> Result<Result<IntegralFeedforward, &'static str>, Error> {
-    let controlled = closed_loop((a, b), output, k, domain)?;
+    let controlled = closed_loop(a, b, output, k, domain)?;
     crate::stability::require_stable("A_e + B_e K", &controlled, domain)?;
     let part = controllable_part(a, b)?;
     if part.fixed.is_empty() {
-        return of_controllable((a, b), output, k, domain);
+        return of_controllable(a, b, output, k, domain);
     }
     let (n, t, reached) = (a.nrows(), output.nrows(), part.a.nrows());
     let mut of_part = DMatrix::zeros(b.ncols(), reached + t);
     of_part.columns_mut(0, reached).copy_from(&(k.columns(0, n) * &part.basis));
     of_part.columns_mut(reached, t).copy_from(&k.columns(n, t));
-    of_controllable((&part.a, &part.b), &(output * &part.basis), &of_part, domain)
+    of_controllable(&part.a, &part.b, &(output * &part.basis), &of_part, domain)
 }
 
 /// `A_e` + `B_e` K.
 fn closed_loop(
-    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
     output: &DMatrix<f64>,
     k: &DMatrix<f64>,
     domain: Domain,
@@ -80,12 +82,13 @@ fn closed_loop(
 
 /// [`integral_feedforward`] of a controllable (A, B).
 fn of_controllable(
-    (a, b): (&DMatrix<f64>, &DMatrix<f64>),
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
     output: &DMatrix<f64>,
     k: &DMatrix<f64>,
     domain: Domain,
 ) -> Result<Result<IntegralFeedforward, &'static str>, Error> {
-    let controlled = closed_loop((a, b), output, k, domain)?;
+    let controlled = closed_loop(a, b, output, k, domain)?;
     let (n, t) = (a.nrows(), output.nrows());
     let Some(silent) = slowest(&eigenvalues(&controlled)?, t, domain) else {
         return Ok(Err(
@@ -112,11 +115,11 @@ fn of_controllable(
              are integrals",
         ));
     }
-    let wanted = w.rows(n, t).transpose() * -integration(domain).0;
+    let required = w.rows(n, t).transpose() * -integration(domain).0;
     // (W_x' B)^+ = (B' W_x)^+ transposed.
     let left = svd.left.columns(0, t);
-    let gain = left * svd.whitening(t).transpose() * &wanted;
-    let residual = (&acting * &gain - &wanted).norm() / wanted.norm();
+    let gain = left * svd.whitening(t).transpose() * &required;
+    let residual = (&acting * &gain - &required).norm() / required.norm();
     if residual.is_nan() || residual > 1e-9 {
         return Err(Error::ResidualTooLarge {
             equation: "W' [B N_r; I] = 0",
@@ -134,17 +137,17 @@ fn slowest(values: &[Complex<f64>], count: usize, domain: Domain) -> Option<Vec<
     upper.sort_by(|x, y| {
         domain.excess(*y).total_cmp(&domain.excess(*x)).then(x.im.total_cmp(&y.im))
     });
-    let mut found = Vec::new();
+    let mut slow = Vec::new();
     for value in upper {
-        if found.len() >= count {
+        if slow.len() >= count {
             break;
         }
-        found.push(value);
+        slow.push(value);
         if value.im > 0.0 {
-            found.push(value.conj());
+            slow.push(value.conj());
         }
     }
-    (found.len() == count).then_some(found)
+    (slow.len() == count).then_some(slow)
 }
 
 /// An orthonormal basis W of the left invariant subspace of `a` for some eigenvalues, pairs together.

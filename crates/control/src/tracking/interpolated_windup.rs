@@ -88,21 +88,23 @@ pub fn interpolated_windup(
     }
     let mut undecided = None;
     for set in 1_usize..1 << limited.len() {
-        let own: Vec<_> = limited
+        let at_limit: Vec<_> = limited
             .iter()
             .enumerate()
             .filter(|(bit, _)| set >> bit & 1 == 1)
             .map(|(_, j)| *j)
             .collect();
-        let units: Vec<_> = own.iter().filter_map(|&j| ranges[j]).collect();
-        let k = k_i.map(|k| DMatrix::from_fn(own.len(), t, |i, j| k[(own[i], j)] / units[i]));
-        let l = l_w.map(|l| DMatrix::from_fn(t, own.len(), |i, j| l[(i, own[j])] * units[j]));
+        let units: Vec<_> = at_limit.iter().filter_map(|&j| ranges[j]).collect();
+        let k =
+            k_i.map(|k| DMatrix::from_fn(at_limit.len(), t, |i, j| k[(at_limit[i], j)] / units[i]));
+        let l =
+            l_w.map(|l| DMatrix::from_fn(t, at_limit.len(), |i, j| l[(i, at_limit[j])] * units[j]));
         match examine(&follows(&k, &l, domain)?, [0.0, 1.0], BISECTIONS, domain)? {
             Examined::Stable => {}
             Examined::Unstable { part, instability } => {
-                return Ok(InterpolatedWindup::Unstable { part, limited: own, instability });
+                return Ok(InterpolatedWindup::Unstable { part, limited: at_limit, instability });
             }
-            Examined::Undecided => undecided = undecided.or(Some(own)),
+            Examined::Undecided => undecided = undecided.or(Some(at_limit)),
         }
     }
     Ok(undecided
@@ -124,14 +126,14 @@ fn follows(
         if rank <= t { q.transpose() * &k[i] * &l[j] * q } else { &l[j] * &k[i] }
     };
     let order = rank.min(t);
-    let kept = match domain {
+    let last = match domain {
         Domain::Continuous => DMatrix::zeros(order, order),
         Domain::Sampled { .. } => DMatrix::identity(order, order),
     };
     Ok([
-        &kept - product(0, 0),
-        &kept - (product(0, 1) + product(1, 0)) * 0.5,
-        &kept - product(1, 1),
+        &last - product(0, 0),
+        &last - (product(0, 1) + product(1, 0)) * 0.5,
+        &last - product(1, 1),
     ])
 }
 
@@ -143,12 +145,12 @@ enum Examined {
 
 /// Examines M(s) for s between `ends`, from its Bernstein coefficients there.
 fn examine(
-    own: &[DMatrix<f64>; 3],
+    coefficients: &[DMatrix<f64>; 3],
     ends: [f64; 2],
     bisections: usize,
     domain: Domain,
 ) -> Result<Examined, Error> {
-    let [first, inner, last] = own;
+    let [first, inner, last] = coefficients;
     if first.is_empty() {
         return Ok(Examined::Stable);
     }
@@ -158,7 +160,9 @@ fn examine(
     for (part, value) in [(ends[0], first), (centre, &middle), (ends[1], last)] {
         let instability = instability(value, domain)?;
         let neutral = match domain {
-            Domain::Continuous => NEUTRAL * own.iter().map(DMatrix::amax).fold(0.0, f64::max),
+            Domain::Continuous => {
+                NEUTRAL * coefficients.iter().map(DMatrix::amax).fold(0.0, f64::max)
+            }
             Domain::Sampled { .. } => NEUTRAL,
         };
         if instability > neutral {
@@ -169,8 +173,8 @@ fn examine(
         }
     }
     let proven = match domain {
-        Domain::Continuous => decreases(&middle, own)?,
-        Domain::Sampled { .. } => contracts(&middle, own)?,
+        Domain::Continuous => decreases(&middle, coefficients)?,
+        Domain::Sampled { .. } => contracts(&middle, coefficients)?,
     };
     if proven {
         return Ok(Examined::Stable);
@@ -183,26 +187,26 @@ fn examine(
         ([first.clone(), left, middle.clone()], [ends[0], centre]),
         ([middle, right, last.clone()], [centre, ends[1]]),
     ];
-    let mut found = Examined::Stable;
-    for (own, ends) in parts {
-        match examine(&own, ends, bisections - 1, domain)? {
+    let mut outcome = Examined::Stable;
+    for (coefficients, ends) in parts {
+        match examine(&coefficients, ends, bisections - 1, domain)? {
             Examined::Stable => {}
-            Examined::Undecided => found = Examined::Undecided,
+            Examined::Undecided => outcome = Examined::Undecided,
             unstable @ Examined::Unstable { .. } => return Ok(unstable),
         }
     }
-    Ok(found)
+    Ok(outcome)
 }
 
-/// Whether all of `own` have a norm below 1 in the coordinates in which `middle` contracts.
-fn contracts(middle: &DMatrix<f64>, own: &[DMatrix<f64>]) -> Result<bool, Error> {
+/// Whether all of `matrices` have a norm below 1 in the coordinates in which `middle` contracts.
+fn contracts(middle: &DMatrix<f64>, matrices: &[DMatrix<f64>]) -> Result<bool, Error> {
     let identity = DMatrix::identity(middle.nrows(), middle.nrows());
     let p = discrete_lyapunov(middle, &identity)?.p;
     let Some(factor) = p.cholesky().map(|factor| factor.l().transpose()) else {
         return Ok(false);
     };
     let Some(inverse) = factor.clone().try_inverse() else { return Ok(false) };
-    for value in own {
+    for value in matrices {
         if norm_2(&(&factor * value * &inverse))? >= 1.0 - MARGIN {
             return Ok(false);
         }
@@ -210,12 +214,12 @@ fn contracts(middle: &DMatrix<f64>, own: &[DMatrix<f64>]) -> Result<bool, Error>
     Ok(true)
 }
 
-/// Whether x' P x decreases along all of `own` for P with M' P + P M = -I, M = `middle`, by more than the
+/// Whether x' P x decreases along all of `matrices` for P with M' P + P M = -I, M = `middle`, by more than the
 /// rounding errors of the products.
-fn decreases(middle: &DMatrix<f64>, own: &[DMatrix<f64>]) -> Result<bool, Error> {
+fn decreases(middle: &DMatrix<f64>, matrices: &[DMatrix<f64>]) -> Result<bool, Error> {
     let identity = DMatrix::identity(middle.nrows(), middle.nrows());
     let p = lyapunov(middle, &identity)?.p;
-    for value in own {
+    for value in matrices {
         let product = &p * value;
         let decay = -(&product + product.transpose());
         let rounding = MARGIN * norm_2(&p)? * norm_2(value)?;

@@ -273,10 +273,10 @@ fn the_extended_plant_of_one_state_has_the_printed_matrices() {
 fn the_feedforward_of_one_state_is_its_closed_form() {
     // x' = a x + b u, u = k x + n r, y = c x: n = -(a + b k) / (b c).
     let (a, b, c, k) = (0.5, 3.0, 2.0, -1.0);
-    let found = feedforward((&one(a), &one(b)), &one(c), &one(k), Domain::Continuous).unwrap();
+    let found = feedforward(&one(a), &one(b), &one(c), &one(k), Domain::Continuous).unwrap();
     assert!((found[(0, 0)] + (a + b * k) / (b * c)).abs() < 1e-15);
     let domain = Domain::Sampled { period: 0.1 };
-    let found = feedforward((&one(a), &one(b)), &one(c), &one(0.1), domain).unwrap();
+    let found = feedforward(&one(a), &one(b), &one(c), &one(0.1), domain).unwrap();
     assert!((found[(0, 0)] - (1.0 - a - b * 0.1) / (b * c)).abs() < 1e-15);
 }
 
@@ -285,13 +285,13 @@ fn references_are_reached_without_error_by_both_actions() {
     let [a, b, c] = plant();
     let output = h() * &c;
     let k = -DMatrix::identity(2, 3) * 0.3;
-    let n_r = feedforward((&a, &b), &output, &k, Domain::Continuous).unwrap();
+    let n_r = feedforward(&a, &b, &output, &k, Domain::Continuous).unwrap();
     let (a_e, b_e) = extended_pair(&a, &b, &output, Domain::Continuous).unwrap();
     let whole = place(&a_e, &b_e, &real_poles(&[-1.0, -1.2, -1.4, -1.6, -1.8])).unwrap().gain;
     let (k_x, k_i) = (whole.columns(0, 3).into_owned(), whole.columns(3, 2).into_owned());
     let integral = Action::Integral { output: &output, gain: &k_i, feedforward: None };
     for (k_x, action) in [(&k, Action::Feedforward(&n_r)), (&k_x, integral)] {
-        let own = reference_system((&a, &b), k_x, &action, Domain::Continuous).unwrap();
+        let own = reference_system(&a, &b, k_x, &action, Domain::Continuous).unwrap();
         let found = at_constant_signals(&own);
         let error = &output * found.rows(0, 3) - DMatrix::identity(2, 2);
         assert!(error.amax() < 1e-13, "{error}");
@@ -360,11 +360,11 @@ fn feedforward_beside_integrals_leaves_the_slowest_modes_at_rest_and_the_constan
         let (a_e, b_e) = extended_pair(&own.0, &own.1, &output, domain).unwrap();
         let assign = if domain == Domain::Continuous { place } else { place_discrete };
         let k = assign(&a_e, &b_e, &poles).unwrap().gain;
-        let found = integral_feedforward((&own.0, &own.1), &output, &k, domain).unwrap().unwrap();
+        let found = integral_feedforward(&own.0, &own.1, &output, &k, domain).unwrap().unwrap();
         let (k_x, k_i) = (k.columns(0, 3).into_owned(), k.columns(3, 2).into_owned());
         let action =
             Action::Integral { output: &output, gain: &k_i, feedforward: Some(&found.gain) };
-        let system = reference_system((&own.0, &own.1), &k_x, &action, domain).unwrap();
+        let system = reference_system(&own.0, &own.1, &k_x, &action, domain).unwrap();
         // The constant response: H C x = r.
         let at_rest = match domain {
             Domain::Continuous => -&system.a,
@@ -394,7 +394,7 @@ fn a_slow_mode_that_no_command_moves_leaves_the_feedforward_beside_integrals_as_
     let output = h() * c;
     let (a_e, b_e) = extended_pair(&a, &b, &output, Domain::Continuous).unwrap();
     let k = place(&a_e, &b_e, &poles).unwrap().gain;
-    let alone = integral_feedforward((&a, &b), &output, &k, Domain::Continuous).unwrap().unwrap();
+    let alone = integral_feedforward(&a, &b, &output, &k, Domain::Continuous).unwrap().unwrap();
     // A fourth state x_4' = -0.1 x_4 moves the others, the controlled outputs and the commands.
     let mut wide = a.resize(4, 4, 0.0);
     wide.view_mut((0, 3), (3, 1)).copy_from(&matrix(3, &[1.0, -2.0, 0.5]));
@@ -409,8 +409,7 @@ fn a_slow_mode_that_no_command_moves_leaves_the_feedforward_beside_integrals_as_
     let (wide, b, output) = (&inverse * wide * &m, &inverse * b, output * &m);
     let k_x = k.columns(0, 4) * &m;
     let k = DMatrix::from_fn(k.nrows(), 6, |i, j| if j < 4 { k_x[(i, j)] } else { k[(i, j)] });
-    let found =
-        integral_feedforward((&wide, &b), &output, &k, Domain::Continuous).unwrap().unwrap();
+    let found = integral_feedforward(&wide, &b, &output, &k, Domain::Continuous).unwrap().unwrap();
     assert!((&found.gain - &alone.gain).amax() < 1e-9 * alone.gain.amax(), "{}", found.gain);
     assert!(found.silent.iter().all(|value| value.re < -0.9), "{:?}", found.silent);
 }
@@ -419,16 +418,16 @@ fn a_slow_mode_that_no_command_moves_leaves_the_feedforward_beside_integrals_as_
 fn half_of_a_pair_is_no_silent_mode_and_a_faster_one_does_not_take_its_place() {
     // One state, one integral, two complex eigenvalues.
     let k = matrix(1, &[-1.0, 4.0]);
-    let found = integral_feedforward((&one(-1.0), &one(1.0)), &one(1.0), &k, Domain::Continuous);
+    let found = integral_feedforward(&one(-1.0), &one(1.0), &one(1.0), &k, Domain::Continuous);
     assert!(found.unwrap().unwrap_err().contains("half of a complex pair"));
     // x'' = u with the eigenvalues -1 ± i and -3, of which the real one is the fastest.
     let [a, b, output] = double_integrator();
     let k = matrix(1, &[-8.0, -5.0, 6.0]);
-    let found = integral_feedforward((&a, &b), &output, &k, Domain::Continuous);
+    let found = integral_feedforward(&a, &b, &output, &k, Domain::Continuous);
     assert!(found.unwrap().unwrap_err().contains("half of a complex pair"));
     // With -0.5 in place of -3 the real one is the slowest: N_r = -W_i / (W_x' B) by its left eigenvector.
     let k = matrix(1, &[-3.0, -2.5, 1.0]);
-    let found = integral_feedforward((&a, &b), &output, &k, Domain::Continuous).unwrap().unwrap();
+    let found = integral_feedforward(&a, &b, &output, &k, Domain::Continuous).unwrap().unwrap();
     // s^3 + 2.5 s^2 + 3 s + 1 over s + 0.5: (s^2 + 2 s + 2); x = y responds by 2 / (s^2 + 2 s + 2).
     assert!((found.silent[0].re + 0.5).abs() < 1e-12 && found.silent.len() == 1);
     assert!((found.gain[(0, 0)] - 2.0).abs() < 1e-12, "{}", found.gain);

@@ -216,10 +216,8 @@ fn system(
     rows: &DMatrix<f64>,
 ) -> Result<StateSpace, Error> {
     let (n, m) = designed.linear.b.shape();
-    let own = (
-        designed.plant.a.view((0, 0), (n, n)).into_owned(),
-        designed.plant.b.rows(0, n).into_owned(),
-    );
+    let a = designed.plant.a.view((0, 0), (n, n)).into_owned();
+    let b = designed.plant.b.rows(0, n).into_owned();
     let k_x = designed.gains.k_x.columns(0, n).into_owned();
     let action = match (&designed.gains.integral, &tracking.action) {
         (Some(integral), _) => Action::Integral {
@@ -232,7 +230,7 @@ fn system(
             return Err(Error::Empty { matrix: "K_i", found: (0, 0) });
         }
     };
-    let whole = reference_system((&own.0, &own.1), &k_x, &action, designed.domain)?;
+    let whole = reference_system(&a, &b, &k_x, &action, designed.domain)?;
     let (states, commands) = (whole.c.rows(0, n).into_owned(), whole.c.rows(n, m).into_owned());
     let direct = whole.d.rows(n, m).into_owned();
     let mut system =

@@ -146,7 +146,8 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let problem = TrackingProblem {
         file,
         linear: &linear,
-        pair: (&own.0, &own.1),
+        a: &own.0,
+        b: &own.1,
         gains: &gains,
         feedback: &controlled,
         domain,

@@ -163,8 +163,9 @@ pub(crate) fn integral_action(
 pub(crate) struct TrackingProblem<'a> {
     pub(crate) file: &'a PlantFile<'a>,
     pub(crate) linear: &'a LinearPlant,
-    /// A and B of the plant, in the domain of the design.
-    pub(crate) pair: (&'a DMatrix<f64>, &'a DMatrix<f64>),
+    /// Of the plant, in the domain of the design.
+    pub(crate) a: &'a DMatrix<f64>,
+    pub(crate) b: &'a DMatrix<f64>,
     pub(crate) gains: &'a Gains,
     /// A + B K of [`feedback_pair`].
     pub(crate) feedback: &'a DMatrix<f64>,
@@ -174,7 +175,7 @@ pub(crate) struct TrackingProblem<'a> {
 impl TrackingProblem<'_> {
     /// Returns the references of the file and how they act; None if it has none.
     pub(crate) fn solve(&self) -> Result<Option<Tracking>, PlaceError> {
-        let Self { file, linear, pair, gains, feedback, domain } = *self;
+        let Self { file, linear, a, b, gains, feedback, domain } = *self;
         let Some(references) = &file.references else {
             return Ok(None);
         };
@@ -189,7 +190,7 @@ impl TrackingProblem<'_> {
             let k_x = gains.k_x.columns(0, linear.a.nrows()).into_owned();
             let k = beside(&k_x, &integral.gain);
             let own = references.feedforward.then(|| {
-                let found = integral_feedforward(pair, &output, &k, domain).map_err(refuse)?;
+                let found = integral_feedforward(a, b, &output, &k, domain).map_err(refuse)?;
                 found.map_err(|reason| references.without_feedforward(file, reason))
             });
             TrackingAction::Integral {
@@ -199,7 +200,7 @@ impl TrackingProblem<'_> {
             }
         } else {
             let k_x = gains.k_x.columns(0, linear.a.nrows()).into_owned();
-            let n_r = feedforward(pair, &output, &k_x, domain).map_err(refuse)?;
+            let n_r = feedforward(a, b, &output, &k_x, domain).map_err(refuse)?;
             TrackingAction::Feedforward(n_r)
         };
         Ok(Some(Tracking {
