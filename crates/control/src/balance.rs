@@ -35,8 +35,9 @@ impl Balance {
     }
 
     fn level(&mut self, transposed: &mut DMatrix<f64>, state: usize) -> bool {
-        let own = self.matrix[(state, state)].abs();
-        let sum = |m: &DMatrix<f64>| m.column(state).iter().map(|x| x.abs()).sum::<f64>() - own;
+        let diagonal = self.matrix[(state, state)].abs();
+        let sum =
+            |m: &DMatrix<f64>| m.column(state).iter().map(|x| x.abs()).sum::<f64>() - diagonal;
         let (column, row) = (sum(&self.matrix), sum(transposed));
         let factor = power_of_two((row / column).sqrt());
         if !factor.is_normal() || column * factor + row / factor >= WORTHWHILE * (column + row) {

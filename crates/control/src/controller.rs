@@ -44,13 +44,13 @@ pub fn controller(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<
     m.rows_mut(n, q).copy_from(&gains.l_f);
     let mut k = gains.k_x.clone().resize_horizontally(n + q, 0.0);
     k.columns_mut(n, q).copy_from(&gains.k_f);
-    let seen = plant.augmented_output();
-    let m_c = &m * &seen;
+    let output = plant.augmented_output();
+    let m_c = &m * &output;
     if let Some(p_f) = &gains.p_f {
         let direct = &gains.k_f * p_f;
-        k -= &direct * &seen;
+        k -= &direct * &output;
         let enters = (&plant.b * &direct).resize_vertically(n + q, 0.0);
-        let g = g - &enters * &seen;
+        let g = g - &enters * &output;
         return Ok(match gains.estimator {
             Estimator::Prediction => {
                 StateSpace { a: g - m_c, b: m + enters, c: k, d: direct, domain }
@@ -90,7 +90,7 @@ pub fn fault_estimates(
     gains: &Gains,
     domain: Domain,
 ) -> Result<StateSpace, Error> {
-    let own = controller(plant, gains, domain)?;
+    let system = controller(plant, gains, domain)?;
     let (n, q) = plant.f_a.shape();
     let mut c = DMatrix::zeros(q, n + q);
     c.columns_mut(n, q).fill_with_identity();
@@ -106,7 +106,7 @@ pub fn fault_estimates(
         c -= &corrected * plant.augmented_output();
         d += corrected;
     }
-    Ok(StateSpace { c, d, ..own })
+    Ok(StateSpace { c, d, ..system })
 }
 
 /// A controller from the measurements, as the sensors give them, to the commands.
@@ -140,16 +140,16 @@ pub fn complete_controller(
     filter: Option<&[f64]>,
     domain: Domain,
 ) -> Result<CompleteController, Error> {
-    let own = controller(plant, gains, domain)?;
-    let mut commands = filtered(&own, filter)?;
+    let system = controller(plant, gains, domain)?;
+    let mut commands = filtered(&system, filter)?;
     let mut estimates = filtered(&fault_estimates(plant, gains, domain)?, filter)?;
     if let Some(integral) = &gains.integral {
-        let b = plant.b.clone().resize_vertically(own.a.nrows(), 0.0);
-        let first = commands.a.nrows() - own.a.nrows();
+        let b = plant.b.clone().resize_vertically(system.a.nrows(), 0.0);
+        let first = commands.a.nrows() - system.a.nrows();
         let into = b.insert_rows(0, first, 0.0) * &integral.gain;
-        let (step, kept) = integration(domain);
+        let (step, last) = integration(domain);
         let (k, t) = (commands.a.nrows(), gains.integrals());
-        let identity = DMatrix::identity(t, t) * kept;
+        let identity = DMatrix::identity(t, t) * last;
         let below = &integral.faults * &estimates.c * step;
         let a = block_2x2([&commands.a, &into], [&below, &identity]);
         let integrand = (&integral.faults * &estimates.d - &integral.h) * step;
@@ -163,30 +163,30 @@ pub fn complete_controller(
 }
 
 /// Puts a measurement filter before a controller: its states are `y_f`, then the controller's.
-fn filtered(own: &StateSpace, filter: Option<&[f64]>) -> Result<StateSpace, Error> {
+fn filtered(controller: &StateSpace, filter: Option<&[f64]>) -> Result<StateSpace, Error> {
     let Some(filter) = filter else {
-        return Ok(own.clone());
+        return Ok(controller.clone());
     };
-    let (p, k, m) = (filter.len(), own.a.nrows(), own.c.nrows());
-    check::shape("W", &DMatrix::from_column_slice(p, 1, filter), (own.b.ncols(), 1))?;
+    let (p, k, m) = (filter.len(), controller.a.nrows(), controller.c.nrows());
+    check::shape("W", &DMatrix::from_column_slice(p, 1, filter), (controller.b.ncols(), 1))?;
     let w = DMatrix::from_diagonal(&filter.to_vec().into());
-    let kept = match own.domain {
+    let dynamics = match controller.domain {
         Domain::Continuous => -&w,
         Domain::Sampled { .. } => DMatrix::identity(p, p) - &w,
     };
     let mut a = DMatrix::zeros(p + k, p + k);
-    a.view_mut((0, 0), (p, p)).copy_from(&kept);
-    a.view_mut((p, 0), (k, p)).copy_from(&own.b);
-    a.view_mut((p, p), (k, k)).copy_from(&own.a);
+    a.view_mut((0, 0), (p, p)).copy_from(&dynamics);
+    a.view_mut((p, 0), (k, p)).copy_from(&controller.b);
+    a.view_mut((p, p), (k, k)).copy_from(&controller.a);
     let mut c = DMatrix::zeros(m, p + k);
-    c.columns_mut(0, p).copy_from(&own.d);
-    c.columns_mut(p, k).copy_from(&own.c);
+    c.columns_mut(0, p).copy_from(&controller.d);
+    c.columns_mut(p, k).copy_from(&controller.c);
     let (b, d) = (w.resize_vertically(p + k, 0.0), DMatrix::zeros(m, p));
-    Ok(StateSpace { a, b, c, d, domain: own.domain })
+    Ok(StateSpace { a, b, c, d, domain: controller.domain })
 }
 
-/// The controller of a plant with y = C x + D u, from `own`, which is for the plant without D: it gets
-/// y - D u, u being its own commands.
+/// The controller of a plant with y = C x + D u, from `controller`, which is for the plant without D: it
+/// gets y - D u, u being its own commands.
 ///
 /// ```text
 /// continuous:  z' = (A - B D C) z + B y,            u = C z
@@ -194,35 +194,35 @@ fn filtered(own: &StateSpace, filter: Option<&[f64]>) -> Result<StateSpace, Erro
 /// ```
 ///
 /// A sample `y[k]` is taken just before `u[k]` is applied, so that it contains `D u[k-1]`; the state is then
-/// [z; v]. `own`: k states, p inputs, and C for any output beside u; its direct term is zero, as with a
+/// [z; v]. `controller`: k states, p inputs, and C for any output beside u; its direct term is zero, as with a
 /// measurement filter; `feedthrough`: D, p x m; `commands`: C of u, m x k.
 ///
 /// # Errors
 ///
-/// [`Error::Shape`] for matrices that do not fit; [`Error::OutOfRange`] for a direct term of `own`.
+/// [`Error::Shape`] for matrices that do not fit; [`Error::OutOfRange`] for a direct term of `controller`.
 pub fn with_feedthrough(
-    own: &StateSpace,
+    controller: &StateSpace,
     commands: &DMatrix<f64>,
     feedthrough: &DMatrix<f64>,
 ) -> Result<StateSpace, Error> {
     let (p, m) = feedthrough.shape();
-    let k = check::square("A", &own.a)?;
-    check::shape("B", &own.b, (k, p))?;
+    let k = check::square("A", &controller.a)?;
+    check::shape("B", &controller.b, (k, p))?;
     check::shape("C of the commands", commands, (m, k))?;
-    let direct = own.d.amax();
+    let direct = controller.d.amax();
     if direct > 0.0 {
         let name = "the controller's D";
         return Err(Error::OutOfRange { name, value: direct, rule: "zero" });
     }
-    let entered = &own.b * feedthrough;
-    if own.domain == Domain::Continuous {
-        return Ok(StateSpace { a: &own.a - entered * commands, ..own.clone() });
+    let entered = &controller.b * feedthrough;
+    if controller.domain == Domain::Continuous {
+        return Ok(StateSpace { a: &controller.a - entered * commands, ..controller.clone() });
     }
     Ok(StateSpace {
-        a: block_2x2([&own.a, &-entered], [commands, &DMatrix::zeros(m, m)]),
-        b: own.b.clone().resize_vertically(k + m, 0.0),
-        c: own.c.clone().resize_horizontally(k + m, 0.0),
-        ..own.clone()
+        a: block_2x2([&controller.a, &-entered], [commands, &DMatrix::zeros(m, m)]),
+        b: controller.b.clone().resize_vertically(k + m, 0.0),
+        c: controller.c.clone().resize_horizontally(k + m, 0.0),
+        ..controller.clone()
     })
 }
 

@@ -176,8 +176,8 @@ fn columns(
     let (n, m) = b.shape();
     let (mut f_a, mut f_s) = (DMatrix::zeros(n, faults.len()), DMatrix::zeros(p, faults.len()));
     let set = |into: &mut DMatrix<f64>, at: usize, name, column: &DVector<f64>| {
-        let given = DMatrix::from_column_slice(column.len(), 1, column.as_slice());
-        check::shape(name, &given, (into.nrows(), 1))?;
+        let entries = DMatrix::from_column_slice(column.len(), 1, column.as_slice());
+        check::shape(name, &entries, (into.nrows(), 1))?;
         into.set_column(at, column);
         Ok(())
     };

@@ -105,20 +105,20 @@ pub fn observability(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Rank, Error> 
 
 /// Checks that a pair is controllable.
 pub(crate) fn require_controllable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error> {
-    let found = controllability(a, b)?;
-    if found.is_full() {
-        return Ok(found);
+    let rank = controllability(a, b)?;
+    if rank.is_full() {
+        return Ok(rank);
     }
-    Err(Error::NotControllable { rank: found.rank, n: found.n })
+    Err(Error::NotControllable { rank: rank.rank, n: rank.n })
 }
 
 /// Checks that a pair is observable.
 pub(crate) fn require_observable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Rank, Error> {
-    let found = observability(a, c)?;
-    if found.is_full() {
-        return Ok(found);
+    let rank = observability(a, c)?;
+    if rank.is_full() {
+        return Ok(rank);
     }
-    Err(Error::NotObservable { rank: found.rank, n: found.n })
+    Err(Error::NotObservable { rank: rank.rank, n: rank.n })
 }
 
 /// The uncontrollable modes of x' = A x + B u: as many as the rank is below n.
@@ -175,17 +175,17 @@ fn modes_of(staircase: &Staircase) -> Result<Vec<Mode>, Error> {
         return Ok(Vec::new());
     }
     let rest = to_complex(&staircase.rest.transpose());
-    let found = eigenvalues(&staircase.rest)?;
+    let values = eigenvalues(&staircase.rest)?;
     let same = staircase.answer.tolerance.sqrt() * (1.0 + staircase.rest.norm());
     let mode = |(at, &eigenvalue): (usize, &Complex<f64>)| {
-        let earlier = found[..at].iter().filter(|other| (*other - eigenvalue).norm() <= same);
+        let earlier = values[..at].iter().filter(|other| (*other - eigenvalue).norm() <= same);
         let shifted = &rest - DMatrix::identity(rest.nrows(), rest.nrows()) * eigenvalue;
         let svd = ComplexSvd::new(&shifted)?;
         let (value, vector) = svd.nth_smallest(earlier.count());
         let vector = if value <= same { vector } else { svd.nth_smallest(0).1 };
         Ok(mode_in_given_coordinates(eigenvalue, staircase, &vector))
     };
-    found.iter().enumerate().map(mode).collect()
+    values.iter().enumerate().map(mode).collect()
 }
 
 /// The mode whose left eigenvector has the given coordinates in the basis of the uncontrollable
@@ -201,8 +201,8 @@ fn mode_in_given_coordinates(
     dominant.sort_by(|&i, &j| size(j).total_cmp(&size(i)));
     let largest = size(dominant[0]);
     dominant.retain(|&state| size(state) >= DOMINANT * largest);
-    let given = balanced.zip_map(&staircase.scale, |entry, scale| entry / scale);
-    Mode { eigenvalue, vector: normalised(&given), dominant }
+    let original = balanced.zip_map(&staircase.scale, |entry, scale| entry / scale);
+    Mode { eigenvalue, vector: normalised(&original), dominant }
 }
 
 /// Scales a vector to length one with its largest entry real and positive.

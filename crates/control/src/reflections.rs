@@ -31,9 +31,9 @@ impl<T: ComplexField<RealField = f64>> Reflections<T> {
             v /= first - pivot;
             v[0] = T::one();
             for column in k + 1..columns {
-                let mut own = m.view_mut((k, column), (rows - k, 1));
-                let factor = tau.clone().conjugate() * v.dotc(&own);
-                own.zip_apply(&v, |entry, v| *entry -= v * factor.clone());
+                let mut part = m.view_mut((k, column), (rows - k, 1));
+                let factor = tau.clone().conjugate() * v.dotc(&part);
+                part.zip_apply(&v, |entry, v| *entry -= v * factor.clone());
             }
             all.push((tau, v));
         }
@@ -49,9 +49,9 @@ impl<T: ComplexField<RealField = f64>> Reflections<T> {
         }
         for (k, (tau, v)) in self.all.iter().enumerate().rev() {
             for column in 0..count {
-                let mut own = q.view_mut((k, column), (self.rows - k, 1));
-                let factor = tau.clone() * v.dotc(&own);
-                own.zip_apply(v, |entry, v| *entry -= v * factor.clone());
+                let mut part = q.view_mut((k, column), (self.rows - k, 1));
+                let factor = tau.clone() * v.dotc(&part);
+                part.zip_apply(v, |entry, v| *entry -= v * factor.clone());
             }
         }
         q

@@ -258,8 +258,8 @@ mod tests {
         let svd = ComplexSvd::new(&m).unwrap();
         assert_eq!(svd.rank(1e-12), 1);
         for (index, value) in svd.values().into_iter().rev().enumerate() {
-            let (found, v) = svd.nth_smallest(index);
-            assert!((found - value).abs() < 1e-15);
+            let (smallest, v) = svd.nth_smallest(index);
+            assert!((smallest - value).abs() < 1e-15);
             assert!(((&m * &v).norm() - value).abs() < 1e-15);
             assert!((v.norm() - 1.0).abs() < 1e-15);
         }

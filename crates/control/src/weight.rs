@@ -182,12 +182,12 @@ pub fn diagonal(weights: &[Weight], domain: Domain) -> Result<StateSpace, Error>
 
 fn powers_of_s(coefficients: &[f64], unit: f64) -> Vec<f64> {
     let mut factor = 1.0;
-    let mut found = Vec::new();
+    let mut scaled = Vec::new();
     for coefficient in coefficients {
-        found.push(coefficient * factor);
+        scaled.push(coefficient * factor);
         factor *= unit;
     }
-    found
+    scaled
 }
 
 /// The polynomial for p = `rate` (z - 1) / (z + 1), times (z + 1)^order.
@@ -231,10 +231,10 @@ mod tests {
                 let weight = Weight::lead_lag(20.0, map(3.0), 0.2, order).unwrap();
                 let system = weight.system(domain).unwrap();
                 for frequency in [0.01, 3.0, 11.0] {
-                    let found =
+                    let magnitude =
                         frequency_response(&system, &[frequency]).unwrap()[0].gain[(0, 0)].norm();
                     let expected = weight.magnitude(map(frequency));
-                    assert!((found / expected - 1.0).abs() < 1e-9, "{order} {domain:?}");
+                    assert!((magnitude / expected - 1.0).abs() < 1e-9, "{order} {domain:?}");
                 }
                 assert!((weight.magnitude(map(3.0)) - 2.0).abs() < 1e-9);
                 assert!((weight.magnitude(0.0) - 20.0).abs() < 1e-9);

@@ -116,10 +116,10 @@ mod tests {
                 for i in 0..n {
                     pencil[(i, m + i)] -= s;
                 }
-                let found = ComplexSvd::new(&triangular(pencil, m)).unwrap().values();
+                let values = ComplexSvd::new(&triangular(pencil, m)).unwrap().values();
                 let largest = exact[0];
-                for (found, exact) in found.iter().zip(&exact) {
-                    assert!((found - exact).abs() < 1e-13 * largest, "{n} {m}: {found} {exact}");
+                for (value, exact) in values.iter().zip(&exact) {
+                    assert!((value - exact).abs() < 1e-13 * largest, "{n} {m}: {value} {exact}");
                 }
                 let ratio = reduced.at(s).0 / exact[n - 1];
                 assert!((1.0 - 1e-12..1.05).contains(&ratio), "{n} {m}: {ratio}");

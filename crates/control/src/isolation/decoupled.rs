@@ -34,24 +34,24 @@ pub(super) struct DecoupledPart {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gap {
     /// The smallest that counted as nonzero.
-    pub(super) kept: f64,
+    pub(super) above: f64,
     /// The largest that counted as zero.
-    pub(super) dropped: f64,
+    pub(super) below: f64,
 }
 
 impl Gap {
     pub(super) fn none() -> Self {
-        Self { kept: f64::INFINITY, dropped: 0.0 }
+        Self { above: f64::INFINITY, below: 0.0 }
     }
 
     /// The number of singular values above `tolerance`.
     fn rank(&mut self, svd: &Svd, tolerance: f64) -> usize {
         let rank = svd.rank_above(tolerance);
         if rank > 0 {
-            self.kept = self.kept.min(svd.values[rank - 1]);
+            self.above = self.above.min(svd.values[rank - 1]);
         }
         if rank < svd.values.len() {
-            self.dropped = self.dropped.max(svd.values[rank]);
+            self.below = self.below.max(svd.values[rank]);
         }
         rank
     }
@@ -72,16 +72,16 @@ impl DecoupledPart {
         let mut gap = Gap::none();
         let w = reached_unseen([&a, &e, &c, &d], tolerance, &mut gap)?;
         let v = noted_complement(&w, tolerance, &mut gap)?;
-        let seen = beside(&(&c * &w), &d);
-        let h = noted_complement(&seen, tolerance, &mut gap)?.transpose();
+        let image = beside(&(&c * &w), &d);
+        let h = noted_complement(&image, tolerance, &mut gap)?.transpose();
         if h.nrows() == 0 {
             return Ok(None);
         }
-        let k = injection(&seen, &v.tr_mul(&beside(&(&a * &w), &e)), tolerance)?;
+        let k = injection(&image, &v.tr_mul(&beside(&(&a * &w), &e)), tolerance)?;
         let dynamics = (v.tr_mul(&a) - &k * &c) * &v;
         let (basis, blocks) = observable_states(&dynamics, &(&h * &c * &v), tolerance, &mut gap)?;
         let (z, k) = (basis.tr_mul(&v.transpose()), basis.tr_mul(&k));
-        let (dynamics, seen) = (basis.tr_mul(&dynamics) * &basis, &h * &c * &v * &basis);
+        let (dynamics, output) = (basis.tr_mul(&dynamics) * &basis, &h * &c * &v * &basis);
         // Given units of time and of the outputs.
         let k = multiply_columns(&(k * size), &outputs);
         let h = multiply_columns(&h, &outputs);
@@ -92,7 +92,7 @@ impl DecoupledPart {
         Ok(Some(Self {
             a: dynamics * size,
             b_u: &z * &plant.b_u - &k * &plant.d_u,
-            c: seen,
+            c: output,
             d_u: &h * &plant.d_u,
             k,
             h,
@@ -150,9 +150,9 @@ fn reached_unseen(
         return Ok(w);
     }
     loop {
-        let seen = Svd::new(&beside(&(c * &w), d))?;
-        let rank = gap.rank(&seen, tolerance);
-        let unseen = seen.right.columns(rank, seen.right.ncols() - rank).into_owned();
+        let svd = Svd::new(&beside(&(c * &w), d))?;
+        let rank = gap.rank(&svd, tolerance);
+        let unseen = svd.right.columns(rank, svd.right.ncols() - rank).into_owned();
         let image = beside(&(a * &w), e) * unseen;
         let all = Svd::new(&beside(&w, &image).transpose())?;
         let reached = gap.rank(&all, tolerance);
@@ -209,18 +209,18 @@ pub(super) fn observable_states(
     Ok((shown, blocks))
 }
 
-/// The K of least norm with K `seen` = `moved`.
+/// The K of least norm with K `image` = `target`.
 fn injection(
-    seen: &DMatrix<f64>,
-    moved: &DMatrix<f64>,
+    image: &DMatrix<f64>,
+    target: &DMatrix<f64>,
     tolerance: f64,
 ) -> Result<DMatrix<f64>, Error> {
-    if seen.ncols() == 0 {
-        return Ok(DMatrix::zeros(moved.nrows(), seen.nrows()));
+    if image.ncols() == 0 {
+        return Ok(DMatrix::zeros(target.nrows(), image.nrows()));
     }
-    let svd = Svd::new(&seen.transpose())?;
+    let svd = Svd::new(&image.transpose())?;
     let rank = svd.rank_above(tolerance);
-    Ok(svd.least_squares(&moved.transpose(), rank).transpose())
+    Ok(svd.least_squares(&target.transpose(), rank).transpose())
 }
 
 /// For each column the length of `part` over that of `whole`, 0 if both are zero.

@@ -83,7 +83,7 @@ fn multipliers(products: &DMatrix<f64>, signs: &[f64]) -> Option<DVector<f64>> {
 mod tests {
     use super::*;
 
-    fn found(gains: &[f64], faults: usize) -> Option<Direction> {
+    fn direction(gains: &[f64], faults: usize) -> Option<Direction> {
         let gains = DMatrix::from_column_slice(gains.len() / faults, faults, gains);
         let noise = DMatrix::identity(gains.nrows(), gains.nrows()).cholesky().unwrap();
         strongest_weakest(&gains, &noise)
@@ -91,10 +91,10 @@ mod tests {
 
     #[test]
     fn two_orthogonal_faults_get_the_diagonal_and_opposite_ones_opposite_signs() {
-        let diagonal = found(&[3.0, 0.0, 0.0, 5.0], 2).unwrap();
+        let diagonal = direction(&[3.0, 0.0, 0.0, 5.0], 2).unwrap();
         assert!((diagonal.quality - 0.5_f64.sqrt()).abs() < 1e-12);
         assert!((diagonal.factors[0] - diagonal.factors[1]).abs() < 1e-12);
-        let opposite = found(&[1.0, 0.1, -1.0, 0.1], 2).unwrap();
+        let opposite = direction(&[1.0, 0.1, -1.0, 0.1], 2).unwrap();
         assert!((opposite.quality - 1.0 / 1.01_f64.sqrt()).abs() < 1e-9);
         assert!(opposite.factors[0] > 0.9);
     }
@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn no_direction_of_a_fine_grid_is_better() {
         let gains = [1.0, 0.2, -0.3, 1.0, 0.8, 0.9];
-        let best = found(&gains, 3).unwrap().quality;
+        let best = direction(&gains, 3).unwrap().quality;
         let units: Vec<[f64; 2]> =
             gains.chunks(2).map(|g| [g[0] / g[0].hypot(g[1]), g[1] / g[0].hypot(g[1])]).collect();
         let on_grid = (0..100_000).map(|k| {

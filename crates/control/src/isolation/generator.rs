@@ -169,17 +169,18 @@ pub fn residual_generator(
     // All modes, in balanced coordinates.
     let (balanced, _) = plant.reachable_part(0.0)?;
     let verified = |tolerance: f64| {
-        let mut found = with_tolerance(plant, pattern, requirements, tolerance)?;
+        let mut residual = with_tolerance(plant, pattern, requirements, tolerance)?;
         let fastest = requirements.fastest(plant.domain);
-        found.decoupling_error = decoupling_error(&balanced, pattern, &found.generator, fastest);
-        Ok(found)
+        residual.decoupling_error =
+            decoupling_error(&balanced, pattern, &residual.generator, fastest);
+        Ok(residual)
     };
     let mut best: Residual = verified(requirements.tolerance)?;
     let mut tolerance = requirements.tolerance;
     while best.decoupling_error > DECOUPLED && tolerance > SMALLEST_TOLERANCE {
         tolerance *= 0.01;
         match verified(tolerance) {
-            Ok(found) if found.decoupling_error < best.decoupling_error => best = found,
+            Ok(other) if other.decoupling_error < best.decoupling_error => best = other,
             _ => {}
         }
     }
@@ -332,7 +333,7 @@ fn realised(part: &DecoupledPart, family: Family, frequency: f64) -> Residual {
         },
         quality: 0.0,
         unreachable: 0,
-        rank_gap: (part.gap.kept, part.gap.dropped),
+        rank_gap: (part.gap.above, part.gap.below),
         decoupling_error: 0.0,
     }
 }
@@ -364,9 +365,9 @@ fn normalise(residual: &mut Residual, pattern: &[bool]) {
         let both = residual.gains.iter().zip(pattern);
         both.filter(|(_, responds)| **responds).map(|(gain, _)| *gain).collect()
     };
-    let found = of_pattern(residual);
-    let largest = found.iter().map(|gain| gain.norm()).fold(0.0, f64::max);
-    let first = found[0];
+    let responses = of_pattern(residual);
+    let largest = responses.iter().map(|gain| gain.norm()).fold(0.0, f64::max);
+    let first = responses[0];
     let sign = if first.re.abs() >= first.im.abs() { first.re } else { first.im };
     let scale = 1.0_f64.copysign(sign) / largest;
     let Residual { generator, from_faults, gains, .. } = residual;

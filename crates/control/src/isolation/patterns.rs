@@ -45,9 +45,9 @@ pub fn achievable_patterns(
     requirements.check(plant.c.nrows(), plant.domain)?;
     let (plant, _) = plant.reachable_part(requirements.tolerance)?;
     let faults = plant.b_f.ncols();
-    let mut found: BTreeMap<Vec<bool>, bool> = BTreeMap::new();
+    let mut strength: BTreeMap<Vec<bool>, bool> = BTreeMap::new();
     let mut open = VecDeque::from([vec![false; faults]]);
-    let mut seen = vec![vec![false; faults]];
+    let mut queued = vec![vec![false; faults]];
     while let Some(decoupled) = open.pop_front() {
         let Some(part) = DecoupledPart::new(&plant, &decoupled, requirements.tolerance)? else {
             continue;
@@ -55,29 +55,31 @@ pub fn achievable_patterns(
         let visible = part.effects.iter().map(|effect| *effect > requirements.tolerance);
         let pattern: Vec<bool> =
             visible.zip(&decoupled).map(|(visible, off)| visible && !off).collect();
-        if !pattern.contains(&true) || found.contains_key(&pattern) {
+        if !pattern.contains(&true) || strength.contains_key(&pattern) {
             continue;
         }
         for fault in (0..faults).filter(|&fault| pattern[fault]) {
             let mut next: Vec<bool> = pattern.iter().map(|responds| !responds).collect();
             next[fault] = true;
-            if !seen.contains(&next) {
-                seen.push(next.clone());
+            if !queued.contains(&next) {
+                queued.push(next.clone());
                 open.push_back(next);
             }
         }
         let strong = is_strong(&part, &pattern, requirements, plant.domain)?;
-        found.insert(pattern, strong);
-        if found.len() > PATTERNS {
+        strength.insert(pattern, strong);
+        if strength.len() > PATTERNS {
             let rule = "at most 4096: decouple fewer faults";
             #[expect(clippy::cast_precision_loss, reason = "about 4096")]
-            let value = found.len() as f64;
+            let value = strength.len() as f64;
             return Err(Error::OutOfRange { name: "the number of patterns", value, rule });
         }
     }
-    let mut patterns: Vec<AchievablePattern> =
-        found.into_iter().map(|(pattern, strong)| AchievablePattern { pattern, strong }).collect();
-    let count = |found: &AchievablePattern| found.pattern.iter().filter(|x| **x).count();
+    let mut patterns: Vec<AchievablePattern> = strength
+        .into_iter()
+        .map(|(pattern, strong)| AchievablePattern { pattern, strong })
+        .collect();
+    let count = |one: &AchievablePattern| one.pattern.iter().filter(|x| **x).count();
     patterns.sort_by(|x, y| count(y).cmp(&count(x)).then_with(|| y.pattern.cmp(&x.pattern)));
     Ok(patterns)
 }
@@ -106,11 +108,11 @@ fn is_strong(
     let null = complement(&pencil, requirements.tolerance)?;
     let columns = stacked(&(&part.b_f / size), &(&part.d_f / outputs));
     let twice = stacked(&columns, &DMatrix::zeros(columns.nrows(), columns.ncols()));
-    let seen = null.tr_mul(&twice);
-    let lengths = seen.column_iter().zip(columns.column_iter());
+    let responses = null.tr_mul(&twice);
+    let lengths = responses.column_iter().zip(columns.column_iter());
     let mut each = pattern.iter().zip(lengths);
-    Ok(each.all(|(&responds, (seen, column))| {
-        !responds || seen.norm() > requirements.tolerance * column.norm()
+    Ok(each.all(|(&responds, (response, column))| {
+        !responds || response.norm() > requirements.tolerance * column.norm()
     }))
 }
 

@@ -131,9 +131,9 @@ impl LossyLoop {
             if factor < limit.factor {
                 limit = ConstantLimit { factor, loss };
             } else if limit.factor >= most {
-                let found = self.instability(&loss)?;
-                if found > least_stable {
-                    (least_stable, limit.loss) = (found, loss);
+                let instability = self.instability(&loss)?;
+                if instability > least_stable {
+                    (least_stable, limit.loss) = (instability, loss);
                 }
             }
         }
@@ -172,8 +172,8 @@ impl LossyLoop {
     }
 
     fn check(&self, largest: &[f64]) -> Result<(), Error> {
-        let given = DMatrix::from_column_slice(largest.len(), 1, largest);
-        check::shape("the largest losses", &given, (self.effects.len(), 1))?;
+        let losses = DMatrix::from_column_slice(largest.len(), 1, largest);
+        check::shape("the largest losses", &losses, (self.effects.len(), 1))?;
         let rule = "from zero to one, above zero for at least one input";
         let bad = largest.iter().copied().find(|loss| !(0.0..=1.0).contains(loss));
         match bad.or_else(|| largest.iter().all(|loss| *loss <= 0.0).then_some(0.0)) {

@@ -38,18 +38,18 @@ impl Staircase {
         let mut reference = link.norm();
         while !rest.is_empty() {
             let step = Svd::new(&link.transpose())?;
-            let kept = step.rank_above(tolerance * reference);
-            if kept == 0 {
+            let rank = step.rank_above(tolerance * reference);
+            if rank == 0 {
                 break;
             }
-            margin = margin.min(step.values[kept - 1] / reference);
+            margin = margin.min(step.values[rank - 1] / reference);
             let transformed = step.right.transpose() * &rest * &step.right;
-            let left = transformed.nrows() - kept;
-            link = transformed.view((kept, 0), (left, kept)).into();
-            rest = transformed.view((kept, kept), (left, left)).into();
+            let left = transformed.nrows() - rank;
+            link = transformed.view((rank, 0), (left, rank)).into();
+            rest = transformed.view((rank, rank), (left, left)).into();
             let new_basis: DMatrix<f64> = rest_basis * step.right;
-            reached.extend((0..kept).map(|column| new_basis.column(column).into_owned()));
-            rest_basis = new_basis.columns(kept, left).into();
+            reached.extend((0..rank).map(|column| new_basis.column(column).into_owned()));
+            rest_basis = new_basis.columns(rank, left).into();
             reference = size;
         }
         let rank = reached.len();

@@ -62,6 +62,6 @@ fn tolerance(a: &DMatrix<f64>) -> f64 {
 /// of A: the smallest eigenvalue of Q, less its rounding.
 fn smallest_weight(a: &DMatrix<f64>, q: &DMatrix<f64>) -> f64 {
     let (size, n) = (a.norm() / q.norm(), q.nrows());
-    let found = SymmetricEigen::try_new(q.clone(), f64::EPSILON, 100 * n);
-    found.map_or(0.0, |found| size * (found.eigenvalues.min() - tolerance(a) * q.norm()))
+    let eigen = SymmetricEigen::try_new(q.clone(), f64::EPSILON, 100 * n);
+    eigen.map_or(0.0, |eigen| size * (eigen.eigenvalues.min() - tolerance(a) * q.norm()))
 }

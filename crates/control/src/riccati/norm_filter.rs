@@ -66,7 +66,7 @@ pub struct NormFilter {
     noise: DMatrix<f64>,
     output: DMatrix<f64>,
     /// C' R^-1 C.
-    seen: DMatrix<f64>,
+    measured: DMatrix<f64>,
     /// S R^-1.
     correlated: DMatrix<f64>,
     domain: Domain,
@@ -98,14 +98,14 @@ impl NormFilter {
         let process = symmetric_part(&(&free * free.transpose()));
         let a = a - &correlated * c;
         let filter = kalman(&a, c, &process, &noise, domain)?;
-        let seen = symmetric_part(&c.tr_mul(&factor.solve(c)));
+        let measured = symmetric_part(&c.tr_mul(&factor.solve(c)));
         let mut all = Self {
             a,
             c: c.clone(),
             process,
             noise,
             output: output.clone(),
-            seen,
+            measured,
             correlated,
             domain,
             filter,
@@ -114,7 +114,7 @@ impl NormFilter {
         let covariance = &all.filter.covariance;
         all.doubles = all
             .doubled(f64::INFINITY)
-            .is_some_and(|found| (found - covariance).norm() <= SAME * covariance.norm());
+            .is_some_and(|x| (x - covariance).norm() <= SAME * covariance.norm());
         Ok(all)
     }
 
@@ -144,7 +144,7 @@ impl NormFilter {
     /// G.
     fn information(&self, gamma: f64) -> DMatrix<f64> {
         let output = &self.output / gamma;
-        symmetric_part(&(&self.seen - output.tr_mul(&output)))
+        symmetric_part(&(&self.measured - output.tr_mul(&output)))
     }
 
     /// X by doubling.
@@ -152,11 +152,11 @@ impl NormFilter {
         let (a, g) = (self.a.transpose(), self.information(gamma));
         let scale = balancing(&a, &g, &self.process);
         let (a, g, q) = scaled_equation(&a, &g, &self.process, &scale);
-        let found = match self.domain {
+        let x = match self.domain {
             Domain::Continuous => doubling::continuous(&a, &g, &q),
             Domain::Sampled { .. } => doubling::sampled(&a, &g, &q),
         };
-        Some(divide_rows(&divide_columns(&found.ok()?, &scale), &scale))
+        Some(divide_rows(&divide_columns(&x.ok()?, &scale), &scale))
     }
 
     /// The gain of X, if X is the stabilising and positive semidefinite solution.
@@ -178,13 +178,13 @@ impl NormFilter {
     /// The process noise that X adds: X E' E X / `gamma^2`, in sampled time X E' (`gamma^2` I - E X E')^-1 E X, by
     /// which the covariance then grows itself.
     fn added(&self, x: &DMatrix<f64>, gamma: f64) -> Option<DMatrix<f64>> {
-        let seen = &self.output * x / gamma;
+        let output = &self.output * x / gamma;
         let added = match self.domain {
             Domain::Continuous => return Some(DMatrix::zeros(x.nrows(), x.ncols())),
             Domain::Sampled { .. } => {
-                let rest = DMatrix::identity(seen.nrows(), seen.nrows())
-                    - &seen * self.output.transpose() / gamma;
-                seen.tr_mul(&symmetric_part(&rest).cholesky()?.solve(&seen))
+                let rest = DMatrix::identity(output.nrows(), output.nrows())
+                    - &output * self.output.transpose() / gamma;
+                output.tr_mul(&symmetric_part(&rest).cholesky()?.solve(&output))
             }
         };
         Some(symmetric_part(&added))
@@ -210,26 +210,26 @@ impl NormFilter {
         for _ in 0..ITERATIONS {
             let added = match self.domain {
                 Domain::Continuous => {
-                    let seen = &self.output * &x / gamma;
-                    symmetric_part(&seen.tr_mul(&seen))
+                    let output = &self.output * &x / gamma;
+                    symmetric_part(&output.tr_mul(&output))
                 }
                 Domain::Sampled { .. } => self.added(&x, gamma)?,
             };
             let next =
                 kalman(&self.a, &self.c, &(&self.process + &added), &self.noise, self.domain);
             let next = next.ok()?;
-            let found = match self.domain {
+            let update = match self.domain {
                 Domain::Continuous => next.covariance,
                 Domain::Sampled { .. } => next.covariance - added,
             };
-            let size = found.norm();
-            if (&found - x).norm() <= CONVERGED * size {
+            let size = update.norm();
+            if (&update - x).norm() <= CONVERGED * size {
                 return Some(next.gain + &self.correlated);
             }
             if size > GROWTH * first {
                 return None;
             }
-            x = found;
+            x = update;
         }
         None
     }

@@ -91,11 +91,12 @@ impl ScaledProblem {
         let mut p = start.clone();
         for _ in 0..NEWTON_STEPS {
             let Some(next) = self.equation.newton(&p) else { break };
-            let (moved, found) = ((&next - &p).amax(), self.equation.entrywise_residual(&next));
-            if found < residual {
-                (best, residual) = (next.clone(), found);
+            let step = (&next - &p).amax();
+            let next_residual = self.equation.entrywise_residual(&next);
+            if next_residual < residual {
+                (best, residual) = (next.clone(), next_residual);
             }
-            if moved <= 10.0 * f64::EPSILON * next.amax() || residual <= f64::EPSILON {
+            if step <= 10.0 * f64::EPSILON * next.amax() || residual <= f64::EPSILON {
                 return Ok(best);
             }
             p = next;

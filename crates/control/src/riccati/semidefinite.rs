@@ -22,9 +22,9 @@ pub(super) fn require_semidefinite(m: &DMatrix<f64>, before: &DMatrix<f64>) -> R
         return Err(refused);
     }
     let iterations = 100 * n;
-    let found = SymmetricEigen::try_new(scaled, f64::EPSILON, iterations);
+    let eigen = SymmetricEigen::try_new(scaled, f64::EPSILON, iterations);
     let what = "the eigenvalue iteration of a weight";
-    let values = found.ok_or(Error::NotConverged { what, iterations })?.eigenvalues;
+    let values = eigen.ok_or(Error::NotConverged { what, iterations })?.eigenvalues;
     #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
     let allowed = SEMIDEFINITE * n as f64;
     if values.min() < -allowed { Err(refused) } else { Ok(()) }
