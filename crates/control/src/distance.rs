@@ -140,26 +140,26 @@ impl Pencil {
     }
 
     /// Descends from s: for a fixed u the smallest value is at s = u* A u.
-    fn descend(&self, s: Complex<f64>) -> Result<(f64, Complex<f64>), Error> {
-        let mut best = (f64::INFINITY, s);
+    fn descend(&self, s: Complex<f64>) -> Result<Minimum, Error> {
+        let mut best = Minimum { value: f64::INFINITY, s };
         let mut s = s;
         for _ in 0..DESCENT_STEPS {
             let (value, next) = self.at(s)?;
-            if value >= (1.0 - WORTHWHILE) * best.0 {
+            if value >= (1.0 - WORTHWHILE) * best.value {
                 break;
             }
-            best = (value, s);
+            best = Minimum { value, s };
             s = next;
         }
         Ok(best)
     }
 
     fn search(&self) -> Result<Distance, Error> {
-        let mut best = (f64::INFINITY, Complex::new(0.0, 0.0));
+        let mut best = Minimum { value: f64::INFINITY, s: Complex::new(0.0, 0.0) };
         for start in eigenvalues(&self.a)?.into_iter().filter(|start| start.im >= 0.0) {
-            best = lower_of(best, self.descend(start)?);
+            best = best.lower_of(self.descend(start)?);
         }
-        let half = 0.5 * (1.0 + best.0);
+        let half = 0.5 * (1.0 + best.value);
         let mut squares = BinaryHeap::new();
         for centre in [Complex::new(-half, half), Complex::new(half, half)] {
             squares.push(Square { bound: 0.0, centre, half });
@@ -169,26 +169,35 @@ impl Pencil {
         for _ in 0..if searched { EVALUATIONS / 4 } else { 0 } {
             let Some(square) = squares.pop() else { break };
             lower = square.bound;
-            if lower >= CLOSE * best.0 || best.0 <= ROUNDING {
+            if lower >= CLOSE * best.value || best.value <= ROUNDING {
                 break;
             }
             for centre in square.quarters() {
                 let half = 0.5 * square.half;
                 let (value, _) = self.at(centre)?;
-                if value < best.0 {
-                    best = lower_of(best, self.descend(centre)?);
+                if value < best.value {
+                    best = best.lower_of(self.descend(centre)?);
                 }
                 let bound = (value - half * std::f64::consts::SQRT_2).max(square.bound);
                 squares.push(Square { bound, centre, half });
             }
         }
-        let at = Complex::new(best.1.re, best.1.im.abs()) * self.unit;
-        Ok(Distance { lower: lower.min(best.0), upper: best.0, at })
+        let at = Complex::new(best.s.re, best.s.im.abs()) * self.unit;
+        Ok(Distance { lower: lower.min(best.value), upper: best.value, at })
     }
 }
 
-fn lower_of(one: (f64, Complex<f64>), other: (f64, Complex<f64>)) -> (f64, Complex<f64>) {
-    if other.0 < one.0 { other } else { one }
+/// The smallest singular value of [A - s I, B] at s.
+#[derive(Clone, Copy)]
+struct Minimum {
+    value: f64,
+    s: Complex<f64>,
+}
+
+impl Minimum {
+    fn lower_of(self, other: Self) -> Self {
+        if other.value < self.value { other } else { self }
+    }
 }
 
 /// A square of the plane in which no value is below `bound`; ordered so that a heap returns the
