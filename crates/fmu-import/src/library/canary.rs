@@ -32,7 +32,10 @@ pub(super) trait Plain: Copy {}
 macro_rules! plain {
     ($($type:ty)*) => { $(impl Plain for $type {})* };
 }
-plain! { f32 f64 i8 u8 i16 u16 i32 u32 i64 u64 usize *const c_char *const u8 }
+plain! { f32 f64 i8 u8 i16 u16 i32 u32 i64 u64 usize }
+
+// `*const c_char` and `*const u8` are one type on ARM.
+impl<T> Plain for *const T {}
 
 /// The status of a call, and what it did to its arrays against the standard.
 pub(super) type Guarded = (c_int, Option<String>);
