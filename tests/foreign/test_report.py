@@ -133,12 +133,6 @@ def test_nothing_of_others_is_overwritten(aso_ftc, write, tmp_path):
     assert done.returncode == 2 and "no variable in common" in done.stderr
 
 
-def test_a_file_with_an_unknown_compression_is_refused_with_what_helps(aso_ftc, tmp_path):
-    frame().to_parquet(tmp_path / "own.parquet", compression="zstd")
-    done = aso_ftc("report", tmp_path / "own.parquet")
-    assert done.returncode == 2 and "compressed by zstd; expected Snappy" in done.stderr
-
-
 TRACE = """(0.001000) can0 100#0102
 (0.001500) can0 00000101#
 (0.002000) can0 100#0102

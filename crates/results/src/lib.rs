@@ -3,7 +3,7 @@
 //! [`create`] opens a [`Sink`] by the extension of the file: [`CsvSink`] or [`ParquetSink`].
 //! [`MemorySink`] keeps the rows in memory instead.
 //! [`Selection`] selects variables, [`Decimation`] selects communication points; [`Table`] reads a
-//! file.
+//! file, of this or another program.
 #![forbid(unsafe_code)]
 
 mod csv;
@@ -119,6 +119,16 @@ pub enum ResultsError {
         /// The file.
         path: PathBuf,
     },
+    /// The extension of a file that is read is none of `.csv`, `.parquet` and `.mat`.
+    #[error(
+        "{}: expected results as .csv, .parquet or .mat (of Dymola or OpenModelica); save them as CSV or \
+         Parquet first",
+        path.display()
+    )]
+    Extension {
+        /// The file.
+        path: PathBuf,
+    },
     /// Two columns have the same name.
     #[error("two columns of the results have the name {name:?}")]
     Duplicate {
@@ -212,6 +222,20 @@ pub enum ResultsError {
         name: String,
         /// Content of the cell.
         text: String,
+    },
+    /// A time is less than the one of the row before, or it is no number.
+    #[error("{}, {place}: {name} is {time} after {before}, expected times that do not decrease", path.display())]
+    Order {
+        /// The file.
+        path: PathBuf,
+        /// Line or row, counted from 1.
+        place: String,
+        /// The column of the time.
+        name: String,
+        /// The time.
+        time: f64,
+        /// The time of the row before, negative infinity for the first row.
+        before: f64,
     },
     /// A column contains texts; numbers are required.
     #[error("{}: {name} holds texts, expected numbers", path.display())]

@@ -2,21 +2,34 @@
 
 mod groups;
 mod lines;
+mod trajectories;
 
 use std::path::{Path, PathBuf};
 
-use super::{Column, Envelope, Format, ResultsError, Selection};
+use super::{Column, Envelope, ResultsError, Selection};
 
 /// A result file, written by a [`super::Sink`] or by another program. The time must be in the column
 /// `time` or in the first column.
+///
+/// Read are CSV with commas, semicolons or tabs between the values, decimal commas, UTF-8 or UTF-16, and
+/// optionally the units in the second line; Parquet; and MAT files of version 4 with results of Dymola or
+/// OpenModelica.
 #[derive(Debug)]
 pub struct Table {
     path: PathBuf,
-    format: Format,
+    layout: Layout,
     /// All columns, including the time.
     columns: Vec<Column>,
     /// Position of the time column.
     time: usize,
+}
+
+/// The format of a file, and what its start says about the rest.
+#[derive(Debug)]
+enum Layout {
+    Lines(lines::Layout),
+    Groups,
+    Trajectories(trajectories::Layout),
 }
 
 /// A function of the time and the values of the requested columns.
@@ -27,29 +40,36 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Format`] for an extension other than `.csv` and `.parquet`, [`ResultsError::Read`]
-    /// if the file cannot be read.
+    /// [`ResultsError::Extension`] for an extension other than `.csv`, `.parquet` and `.mat`,
+    /// [`ResultsError::Read`] if the file cannot be read.
     pub fn open(path: &Path) -> Result<Self, ResultsError> {
-        let format = Format::of(path)?;
-        let columns = match format {
-            Format::Csv => lines::columns(path)?,
-            Format::Parquet => groups::columns(path)?,
+        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let (layout, columns) = match ending.to_str() {
+            Some("csv") => {
+                let (layout, columns) = lines::columns(path)?;
+                (Layout::Lines(layout), columns)
+            }
+            Some("parquet") => (Layout::Groups, groups::columns(path)?),
+            Some("mat") => {
+                let (layout, columns) = trajectories::columns(path)?;
+                (Layout::Trajectories(layout), columns)
+            }
+            _ => return Err(ResultsError::Extension { path: path.to_owned() }),
         };
         if columns.is_empty() {
             return Err(unreadable(path, &"it has no columns"));
         }
-        let time = columns.iter().position(|column| column.name == super::TIME).unwrap_or(0);
-        Ok(Self { path: path.to_owned(), format, columns, time })
+        Ok(Self { path: path.to_owned(), layout, time: time_position(&columns), columns })
     }
 
-    /// Returns the columns in the order of the file, including the time. Columns of CSV have the type Real
-    /// and no unit.
+    /// Returns the columns in the order of the file, including the time; of MAT files, those that vary come first.
+    /// Columns of CSV and MAT files have the type Real; those of CSV have no unit, unless its second line states them.
     #[must_use]
     pub fn columns(&self) -> &[Column] {
         &self.columns
     }
 
-    /// Returns the position of the time column: the column `time` or else the first.
+    /// Returns the position of the time column: the column `time`, in this or another case, or else the first.
     #[must_use]
     pub fn time(&self) -> usize {
         self.time
@@ -73,7 +93,8 @@ impl Table {
     /// # Errors
     ///
     /// [`ResultsError::Number`] if a cell is no number, [`ResultsError::Text`] if a column contains texts,
-    /// [`ResultsError::Read`] if the file cannot be read.
+    /// [`ResultsError::Order`] if a time is less than the one before or no number, [`ResultsError::Read`] if the
+    /// file cannot be read.
     ///
     /// # Panics
     ///
@@ -85,9 +106,13 @@ impl Table {
     ) -> Result<(), ResultsError> {
         let mut columns = vec![self.time];
         columns.extend(positions);
-        match self.format {
-            Format::Csv => lines::visit(&self.path, &self.columns, &columns, visitor),
-            Format::Parquet => groups::visit(&self.path, &self.columns, &columns, visitor),
+        let (path, all) = (&self.path, &self.columns);
+        match &self.layout {
+            Layout::Lines(layout) => lines::visit(path, layout, all, &columns, visitor),
+            Layout::Groups => groups::visit(path, all, &columns, visitor),
+            Layout::Trajectories(layout) => {
+                trajectories::visit(path, layout, all, &columns, visitor)
+            }
         }
     }
 
@@ -119,15 +144,46 @@ impl Table {
     }
 }
 
+/// Returns the position of the time among the columns.
+fn time_position(columns: &[Column]) -> usize {
+    let exact = columns.iter().position(|column| column.name == super::TIME);
+    let similar =
+        || columns.iter().position(|column| column.name.eq_ignore_ascii_case(super::TIME));
+    exact.or_else(similar).unwrap_or(0)
+}
+
 fn unreadable(path: &Path, reason: &impl ToString) -> ResultsError {
-    let mut reason = reason.to_string();
-    if let Some((_, compression)) = reason.split_once("Disabled feature at compile time: ") {
-        reason = format!(
-            "it is compressed by {compression}; expected Snappy (the default of pandas) or no compression, \
-             as by `to_parquet(..., compression=\"snappy\")`"
-        );
+    ResultsError::Read { path: path.to_owned(), reason: reason.to_string() }
+}
+
+/// Checks that the times of the rows do not decrease.
+struct Clock<'a> {
+    path: &'a Path,
+    /// The column of the time.
+    name: &'a str,
+    before: f64,
+}
+
+impl<'a> Clock<'a> {
+    fn new(path: &'a Path, name: &'a str) -> Self {
+        Self { path, name, before: f64::NEG_INFINITY }
     }
-    ResultsError::Read { path: path.to_owned(), reason }
+
+    /// Checks the next time; `place` says where it is.
+    fn check(&mut self, time: f64, place: impl Fn() -> String) -> Result<(), ResultsError> {
+        // A time that is NaN is no time.
+        if time >= self.before {
+            self.before = time;
+            return Ok(());
+        }
+        Err(ResultsError::Order {
+            path: self.path.to_owned(),
+            place: place(),
+            name: self.name.to_owned(),
+            time,
+            before: self.before,
+        })
+    }
 }
 
 #[cfg(test)]

@@ -3,13 +3,13 @@
 use std::fs::File;
 use std::path::Path;
 
-use ::parquet::basic::Type as Physical;
+use ::parquet::basic::{ConvertedType, Type as Physical};
 use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use ::parquet::data_type::DataType;
 use ::parquet::errors::ParquetError;
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
 
-use super::{Column, ResultsError, Visitor, unreadable};
+use super::{Clock, Column, ResultsError, Visitor, unreadable};
 use crate::ColumnKind;
 use crate::parquet::units;
 
@@ -57,12 +57,23 @@ pub(super) fn visit(
     }
     let reader = open(path)?;
     let length = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?.len();
+    let mut clock = Clock::new(path, &columns[positions[0]].name);
+    let (mut number, mut order) = (0_u64, Ok(()));
     for group in 0..reader.num_row_groups() {
+        let mut visit = |time: f64, row: &[f64]| {
+            number += 1;
+            if order.is_ok() {
+                order = clock.check(time, || format!("row {number}"));
+            }
+            if order.is_ok() {
+                visitor(time, row);
+            }
+        };
         check_places(&reader, group, positions, length)
-            .and_then(|()| visit_group(&reader, group, positions, visitor))
+            .and_then(|()| visit_group(&reader, group, positions, &mut visit))
             .map_err(|error| unreadable(path, &error))?;
     }
-    Ok(())
+    order
 }
 
 /// Checks that the columns lie inside the file according to the footer. The crate `parquet` panics
@@ -104,11 +115,18 @@ fn visit_group(
         .iter()
         .map(|position| group.get_column_reader(*position))
         .collect::<Result<Vec<_>, _>>()?;
+    let is_unsigned: Vec<bool> = positions
+        .iter()
+        .map(|position| {
+            let kind = group.metadata().column(*position).column_descr().converted_type();
+            matches!(kind, ConvertedType::UINT_32 | ConvertedType::UINT_64)
+        })
+        .collect();
     let mut cells = vec![Vec::with_capacity(ROWS); positions.len()];
     let mut row = vec![0.0; positions.len()];
     loop {
-        for (reader, cells) in readers.iter_mut().zip(&mut cells) {
-            read(reader, cells)?;
+        for ((reader, cells), is_unsigned) in readers.iter_mut().zip(&mut cells).zip(&is_unsigned) {
+            read(reader, cells, *is_unsigned)?;
         }
         let rows = cells[0].len();
         if cells.iter().any(|cells| cells.len() != rows) {
@@ -126,12 +144,23 @@ fn visit_group(
     }
 }
 
-/// Reads the next cells of a column as numbers.
-fn read(reader: &mut ColumnReader, cells: &mut Vec<f64>) -> Result<(), ParquetError> {
+/// Reads the next cells of a column as numbers. `is_unsigned`: its integers have no sign.
+fn read(
+    reader: &mut ColumnReader,
+    cells: &mut Vec<f64>,
+    is_unsigned: bool,
+) -> Result<(), ParquetError> {
     match reader {
         ColumnReader::DoubleColumnReader(reader) => batch(reader, cells, |value| *value),
         ColumnReader::FloatColumnReader(reader) => batch(reader, cells, |value| f64::from(*value)),
+        ColumnReader::Int32ColumnReader(reader) if is_unsigned => {
+            batch(reader, cells, |value| f64::from(value.cast_unsigned()))
+        }
         ColumnReader::Int32ColumnReader(reader) => batch(reader, cells, |value| f64::from(*value)),
+        #[expect(clippy::cast_precision_loss, reason = "beyond 2^53 a drawing shows no difference")]
+        ColumnReader::Int64ColumnReader(reader) if is_unsigned => {
+            batch(reader, cells, |value| value.cast_unsigned() as f64)
+        }
         #[expect(clippy::cast_precision_loss, reason = "beyond 2^53 a drawing shows no difference")]
         ColumnReader::Int64ColumnReader(reader) => batch(reader, cells, |value| *value as f64),
         ColumnReader::BoolColumnReader(reader) => {

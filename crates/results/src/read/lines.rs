@@ -1,24 +1,79 @@
-//! Reads CSV files with names in the first line.
+//! Reads CSV files with names in the first line, of this program, FMPy, OpenModelica, pandas or a spreadsheet.
 
 use std::fs::File;
+use std::io::{BufRead as _, BufReader, Cursor, Read, Seek as _, SeekFrom};
 use std::path::Path;
 
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
 
-use super::{Column, ResultsError, Visitor, unreadable};
+use super::{Clock, Column, ResultsError, Visitor, time_position, unreadable};
 use crate::ColumnKind;
 
 /// Number of bytes read at once.
 const BUFFER: usize = 256 * 1024;
+/// Number of bytes of the start of a file that tell a text from a binary file.
+const SNIFFED: usize = 1024;
 
-fn reader(path: &Path) -> Result<Reader<File>, ResultsError> {
-    let file = File::open(path).map_err(|error| unreadable(path, &error))?;
-    // Flexible, because the last line may be incomplete.
-    Ok(ReaderBuilder::new().flexible(true).buffer_capacity(BUFFER).from_reader(file))
+/// The layout of a CSV file.
+#[derive(Debug)]
+pub(super) struct Layout {
+    delimiter: u8,
+    /// Whether the second line has the units of the columns.
+    has_units: bool,
+    /// Whether the line of the names ends with a delimiter, as OpenModelica writes it.
+    is_closed: bool,
 }
 
-pub(super) fn columns(path: &Path) -> Result<Vec<Column>, ResultsError> {
-    let mut reader = reader(path)?;
+/// Opens the file as UTF-8; UTF-16, as spreadsheets write it, is converted.
+fn open(path: &Path) -> Result<Box<dyn Read>, ResultsError> {
+    let failed = |error: &std::io::Error| unreadable(path, error);
+    let mut file = File::open(path).map_err(|error| failed(&error))?;
+    let mut start = Vec::new();
+    (&mut file).take(SNIFFED as u64).read_to_end(&mut start).map_err(|error| failed(&error))?;
+    file.seek(SeekFrom::Start(0)).map_err(|error| failed(&error))?;
+    let unit: fn([u8; 2]) -> u16 = match start.get(..2) {
+        Some([0xff, 0xfe]) => u16::from_le_bytes,
+        Some([0xfe, 0xff]) => u16::from_be_bytes,
+        _ if start.starts_with(b"PAR1") => {
+            return Err(unreadable(path, &"it is a Parquet file, expected CSV: name it .parquet"));
+        }
+        _ if start.contains(&0) => {
+            let reason = "it is a binary file, expected CSV: save it as CSV or Parquet first";
+            return Err(unreadable(path, &reason));
+        }
+        _ => return Ok(Box::new(file)),
+    };
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes).map_err(|error| failed(&error))?;
+    let units = bytes.as_chunks().0.iter().skip(1).map(|pair| unit(*pair));
+    let text: String =
+        char::decode_utf16(units).map(|sign| sign.unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
+    Ok(Box::new(Cursor::new(text.into_bytes())))
+}
+
+fn reader(path: &Path, delimiter: u8) -> Result<Reader<Box<dyn Read>>, ResultsError> {
+    let mut builder = ReaderBuilder::new();
+    // Flexible, because the last line may be incomplete.
+    builder.flexible(true).buffer_capacity(BUFFER).delimiter(delimiter);
+    Ok(builder.from_reader(open(path)?))
+}
+
+/// Returns the sign between the names: a semicolon or a tab if there is one outside of quotes, otherwise a comma.
+fn delimiter(path: &Path) -> Result<u8, ResultsError> {
+    let mut line = Vec::new();
+    let mut text = BufReader::new(open(path)?).take(BUFFER as u64);
+    text.read_until(b'\n', &mut line).map_err(|error| unreadable(path, &error))?;
+    let mut is_quoted = false;
+    line.retain(|sign| {
+        is_quoted ^= *sign == b'"';
+        !is_quoted
+    });
+    Ok([b';', b'\t'].into_iter().find(|sign| line.contains(sign)).unwrap_or(b','))
+}
+
+pub(super) fn columns(path: &Path) -> Result<(Layout, Vec<Column>), ResultsError> {
+    let delimiter = delimiter(path)?;
+    let mut reader = reader(path, delimiter)?;
     let names = reader.byte_headers().map_err(|error| unreadable(path, &error))?;
     let column = |name: &[u8]| Column {
         name: String::from_utf8_lossy(name).trim().to_owned(),
@@ -26,51 +81,117 @@ pub(super) fn columns(path: &Path) -> Result<Vec<Column>, ResultsError> {
         unit: None,
         clocked: false,
     };
-    Ok(names.iter().map(column).collect())
+    let mut columns: Vec<Column> = names.iter().map(column).collect();
+    let is_closed = columns.len() > 1 && columns.last().is_some_and(|last| last.name.is_empty());
+    if is_closed {
+        columns.pop();
+    }
+    if !columns.is_empty() && columns.iter().all(|column| column.name.parse::<f64>().is_ok()) {
+        let reason =
+            "the first line has numbers, expected the names of the columns, such as `time,x,y`";
+        return Err(unreadable(path, &reason));
+    }
+    let mut layout = Layout { delimiter, has_units: false, is_closed };
+    let mut second = ByteRecord::new();
+    if reader.read_byte_record(&mut second).is_ok_and(|is_row| is_row) {
+        let units: Vec<String> = second.iter().take(columns.len()).map(unit).collect();
+        layout.has_units = units.get(time_position(&columns)).is_some_and(|unit| unit == "s");
+        if layout.has_units {
+            for (column, unit) in columns.iter_mut().zip(units) {
+                column.unit = Some(unit).filter(|unit| !unit.is_empty());
+            }
+        }
+    }
+    Ok((layout, columns))
+}
+
+/// Returns the text of a cell in the line of the units, without brackets.
+fn unit(cell: &[u8]) -> String {
+    let text = String::from_utf8_lossy(cell);
+    text.trim().trim_start_matches(['[', '(']).trim_end_matches([']', ')']).trim().to_owned()
 }
 
 pub(super) fn visit(
     path: &Path,
+    layout: &Layout,
     columns: &[Column],
     positions: &[usize],
     visitor: &mut Visitor<'_>,
 ) -> Result<(), ResultsError> {
-    let mut reader = reader(path)?;
+    let mut reader = reader(path, layout.delimiter)?;
     let mut record = ByteRecord::new();
     let mut row = vec![0.0; positions.len()];
-    // A line that is no row counts as incomplete if it is the last one, otherwise as an error.
+    let mut clock = Clock::new(path, &columns[positions[0]].name);
+    if layout.has_units {
+        reader.read_byte_record(&mut record).map_err(|error| unreadable(path, &error))?;
+    }
+    // A line that is no row counts as incomplete if it is the last one and is not ended, otherwise as an error.
     let mut wrong: Option<ResultsError> = None;
     while reader.read_byte_record(&mut record).map_err(|error| unreadable(path, &error))? {
         if let Some(error) = wrong {
             return Err(error);
         }
         let line = record.position().map_or(0, ::csv::Position::line);
-        if record.len() != columns.len() {
-            let (expected, actual) = (columns.len(), record.len());
-            let reason = format!("line {line} has {actual} values, expected {expected}");
-            wrong = Some(unreadable(path, &reason));
+        let mut count = record.len();
+        if layout.is_closed && count == columns.len() + 1 {
+            count -= 1;
+        }
+        if count != columns.len() {
+            wrong = Some(unreadable(path, &ragged(line, count, columns.len(), layout.delimiter)));
             continue;
         }
         for (value, position) in row.iter_mut().zip(positions) {
             let cell = &record[*position];
-            *value = number(cell).ok_or_else(|| ResultsError::Number {
+            *value = number(cell, layout.delimiter).ok_or_else(|| ResultsError::Number {
                 path: path.to_owned(),
                 line,
                 name: columns[*position].name.clone(),
                 text: String::from_utf8_lossy(cell).into_owned(),
             })?;
         }
+        clock.check(row[0], || format!("line {line}"))?;
         visitor(row[0], &row[1..]);
     }
-    Ok(())
+    match wrong {
+        Some(error) if is_ended(path) => Err(error),
+        _ => Ok(()),
+    }
 }
 
-/// Parses a decimal number or a Boolean; an empty cell is NaN.
-fn number(cell: &[u8]) -> Option<f64> {
+/// Returns what is wrong with a line that has more or fewer values than names.
+fn ragged(line: u64, count: usize, expected: usize, delimiter: u8) -> String {
+    let values = if count == 1 { "1 value".to_owned() } else { format!("{count} values") };
+    let advice = if count > expected && delimiter == b',' {
+        "; if its numbers have decimal commas, separate them by semicolons"
+    } else {
+        ""
+    };
+    format!(
+        "line {line} has {values}, expected {expected}, as many as the first line has names{advice}"
+    )
+}
+
+/// Whether the last line of the file is ended.
+fn is_ended(path: &Path) -> bool {
+    let mut end = [0; 2];
+    let read = |mut file: File| {
+        file.seek(SeekFrom::End(-2))?;
+        file.read_exact(&mut end)
+    };
+    // UTF-16 has the sign in one of two bytes.
+    File::open(path).and_then(read).is_ok() && (end[1] == b'\n' || end == [b'\n', 0])
+}
+
+/// Parses a number or a Boolean; an empty cell is NaN. If the values are not separated by commas, a comma is the
+/// decimal sign.
+fn number(cell: &[u8], delimiter: u8) -> Option<f64> {
     match std::str::from_utf8(cell).ok()?.trim() {
         "" => Some(f64::NAN),
         "True" | "true" => Some(1.0),
         "False" | "false" => Some(0.0),
-        text => text.parse().ok(),
+        text => match text.parse() {
+            Err(_) if delimiter != b',' => text.replacen(',', ".", 1).parse().ok(),
+            value => value.ok(),
+        },
     }
 }

@@ -56,6 +56,80 @@ fn a_last_line_that_was_cut_is_no_row_and_one_before_is_an_error() {
 }
 
 #[test]
+fn a_last_line_that_is_ended_and_has_too_few_values_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = written(folder.path(), "a.csv", "time,x,y\n0,1,2\n1,3\n");
+    let refused = table.column(1).unwrap_err().to_string();
+    assert!(refused.contains("line 3 has 2 values, expected 3"), "{refused}");
+}
+
+#[test]
+fn layouts_of_other_programs_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [
+        ("semicolons.csv", "time;x\n0;1.5\n1;-2e3\n"),
+        ("commas.csv", "time;x\r\n0,0;1,5\r\n1,0;-2e3\r\n"),
+        ("tabs.csv", "time\tx\n0\t1,5\n1\t-2e3\n"),
+        ("bom.csv", "\u{feff}time,x\n0,1.5\n1,-2e3\n"),
+        ("closed.csv", "\"time\",\"x\",\n0,1.5,\n1,-2e3,\n"),
+        ("units.csv", "time,x\ns,[m]\n0,1.5\n1,-2e3\n"),
+        ("capital.csv", "x,Time\n1.5,0\n-2e3,1"),
+    ] {
+        let table = written(folder.path(), name, text);
+        let place = table.columns().iter().position(|column| column.name == "x").unwrap();
+        let mut rows = Vec::new();
+        table.visit(&[place], &mut |time, row| rows.push((time, row[0]))).unwrap();
+        assert_eq!(rows, [(0.0, 1.5), (1.0, -2e3)], "{name}");
+        let unit = table.columns()[place].unit.as_deref();
+        assert_eq!(unit, (name == "units.csv").then_some("m"), "{name}");
+    }
+    for (name, sign) in
+        [("little.csv", u16::to_le_bytes as fn(u16) -> [u8; 2]), ("big.csv", u16::to_be_bytes)]
+    {
+        let text = "\u{feff}time,Δx\n0,1\n1,2\n";
+        let path = folder.path().join(name);
+        fs::write(&path, text.encode_utf16().flat_map(sign).collect::<Vec<u8>>()).unwrap();
+        let table = Table::open(&path).unwrap();
+        assert_eq!(
+            (table.columns()[1].name.as_str(), table.column(1).unwrap()),
+            ("Δx", vec![1.0, 2.0])
+        );
+    }
+}
+
+#[test]
+fn times_that_decrease_are_an_error_with_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = written(folder.path(), "a.csv", "time,x\n0,1\n2,2\n2,3\n1,4\n");
+    let refused = table.column(1).unwrap_err().to_string();
+    assert!(refused.contains("a.csv, line 5: time is 1 after 2"), "{refused}");
+    let table = written(folder.path(), "b.csv", "time,x\n0,1\n,2\n");
+    let refused = table.column(1).unwrap_err().to_string();
+    assert!(refused.contains("line 3: time is NaN after 0"), "{refused}");
+}
+
+#[test]
+fn what_is_no_csv_is_refused_with_advice() {
+    let folder = tempfile::tempdir().unwrap();
+    for (text, part) in [
+        ("0,1\n1,2\n", "expected the names of the columns"),
+        ("PAR1", "name it .parquet"),
+        ("PK\0\0", "save it as CSV or Parquet"),
+    ] {
+        let path = folder.path().join("a.csv");
+        fs::write(&path, text).unwrap();
+        let refused = Table::open(&path).unwrap_err().to_string();
+        assert!(refused.contains(part), "{refused}");
+    }
+    let table = written(folder.path(), "b.csv", "time,x\n0,0,1,5\n1,0,2,5\n");
+    let refused = table.column(1).unwrap_err().to_string();
+    assert!(
+        refused.contains("line 2 has 4 values, expected 2") && refused.contains("semicolons"),
+        "{refused}"
+    );
+}
+
+#[test]
 fn words_for_truth_are_numbers_and_other_texts_are_named_with_their_place() {
     let folder = tempfile::tempdir().unwrap();
     let table = written(folder.path(), "a.csv", "time,x\n0,True\n1,False\n2,\n3,inf\n");
@@ -77,7 +151,7 @@ fn a_file_that_has_no_results_is_refused_by_name() {
         assert!(refused.starts_with("cannot read ") && refused.contains(name), "{refused}");
     }
     assert!(matches!(Table::open(&path("none.csv")), Err(ResultsError::Read { .. })));
-    assert!(matches!(Table::open(&path("a.mat")), Err(ResultsError::Format { .. })));
+    assert!(matches!(Table::open(&path("a.xlsx")), Err(ResultsError::Extension { .. })));
     let table = written(folder.path(), "d.csv", "time,speed\n0,1\n");
     let selection = Selection { include: vec!["sped".to_owned()], exclude: vec![] };
     let refused = table.choose(&selection).unwrap_err().to_string();

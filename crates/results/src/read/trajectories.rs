@@ -1,0 +1,276 @@
+//! Reads results of Dymola and OpenModelica: MAT files of version 4 with trajectories.
+//!
+//! Such a file has matrices by name. `Aclass` states the layout, `name` and `description` have a text for each
+//! variable. `dataInfo` has four integers for each variable: the matrix with its values (0: the time, 1: `data_1`
+//! with the values that are constant, 2: `data_2` with those that vary), its row there, negative for a variable with
+//! the opposite sign, and how it is interpolated. Only the layout `binTrans` is read, in which `data_2` is written
+//! time by time; both tools write it.
+
+use std::fs::File;
+use std::io::{BufReader, Read, Seek as _, SeekFrom};
+use std::path::Path;
+
+use super::{Clock, Column, ResultsError, Visitor, unreadable};
+use crate::ColumnKind;
+
+/// Largest number of bytes of the texts of a file.
+const TEXTS: u64 = 1 << 30;
+
+/// Where the values of a file are.
+#[derive(Debug)]
+pub(super) struct Layout {
+    /// The matrix of the values that vary.
+    varying: Matrix,
+    /// The values of each column.
+    places: Vec<Place>,
+}
+
+/// The values of a column.
+#[derive(Debug, Clone, Copy)]
+enum Place {
+    Constant(f64),
+    /// The row of the matrix, and the sign.
+    Varying(usize, f64),
+}
+
+/// A matrix of the file: column after column.
+#[derive(Debug, Clone, Copy)]
+struct Matrix {
+    offset: u64,
+    rows: usize,
+    columns: usize,
+    precision: Precision,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Precision {
+    Double,
+    Single,
+    Int32,
+    Int16,
+    Uint16,
+    Uint8,
+}
+
+impl Precision {
+    fn size(self) -> usize {
+        match self {
+            Self::Double => 8,
+            Self::Single | Self::Int32 => 4,
+            Self::Int16 | Self::Uint16 => 2,
+            Self::Uint8 => 1,
+        }
+    }
+
+    /// Returns the number in the bytes, as many as [`Precision::size`]; NaN for other ones.
+    fn number(self, bytes: &[u8]) -> f64 {
+        let number = match self {
+            Self::Double => bytes.try_into().ok().map(f64::from_le_bytes),
+            Self::Single => bytes.try_into().ok().map(|bytes| f64::from(f32::from_le_bytes(bytes))),
+            Self::Int32 => bytes.try_into().ok().map(|bytes| f64::from(i32::from_le_bytes(bytes))),
+            Self::Int16 => bytes.try_into().ok().map(|bytes| f64::from(i16::from_le_bytes(bytes))),
+            Self::Uint16 => bytes.try_into().ok().map(|bytes| f64::from(u16::from_le_bytes(bytes))),
+            Self::Uint8 => bytes.first().map(|byte| f64::from(*byte)),
+        };
+        number.unwrap_or(f64::NAN)
+    }
+}
+
+impl Matrix {
+    fn size(&self) -> Option<u64> {
+        let count = self.rows.checked_mul(self.columns)?.checked_mul(self.precision.size())?;
+        u64::try_from(count).ok()
+    }
+}
+
+/// An open file and its length.
+struct Source<'a> {
+    path: &'a Path,
+    file: BufReader<File>,
+    length: u64,
+}
+
+impl<'a> Source<'a> {
+    fn open(path: &'a Path) -> Result<Self, ResultsError> {
+        let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
+        let (length, file) = opened.map_err(|error| unreadable(path, &error))?;
+        Ok(Self { path, file: BufReader::new(file), length })
+    }
+
+    fn read(&mut self, bytes: &mut [u8]) -> Result<(), ResultsError> {
+        self.file.read_exact(bytes).map_err(|error| unreadable(self.path, &error))
+    }
+
+    fn seek(&mut self, offset: u64) -> Result<(), ResultsError> {
+        let moved = self.file.seek(SeekFrom::Start(offset));
+        moved.map(drop).map_err(|error| unreadable(self.path, &error))
+    }
+
+    /// Reads the header at `offset`; returns the name of the matrix, and the offset behind it.
+    fn matrix(&mut self, offset: u64) -> Result<(String, Matrix, u64), ResultsError> {
+        let foreign = |reason: &str| unreadable(self.path, &format!("{reason}, {EXPECTED}"));
+        let mut header = [0; 20];
+        self.file
+            .seek(SeekFrom::Start(offset))
+            .and_then(|_| self.file.read_exact(&mut header))
+            .map_err(|_| foreign("it is cut or damaged"))?;
+        if header.starts_with(b"MATLAB") || header.starts_with(b"\x89HDF") {
+            return Err(foreign("it is a MAT file of version 5 or later"));
+        }
+        let [kind, rows, columns, is_complex, length] =
+            std::array::from_fn(|at| header.get(4 * at..4 * at + 4).map_or(0, integer));
+        let precision = match kind / 10 {
+            0 => Precision::Double,
+            1 => Precision::Single,
+            2 => Precision::Int32,
+            3 => Precision::Int16,
+            4 => Precision::Uint16,
+            5 => Precision::Uint8,
+            _ => return Err(foreign("it is no MAT file of version 4 with little-endian numbers")),
+        };
+        if kind % 10 > 1 || is_complex != 0 || !(1..256).contains(&length) {
+            return Err(foreign("it has a matrix that is sparse or complex"));
+        }
+        let mut name = vec![0; length as usize];
+        self.file.read_exact(&mut name).map_err(|_| foreign("it is cut"))?;
+        let name = text(name.iter().copied());
+        let offset = offset + 20 + u64::from(length);
+        let matrix = Matrix { offset, rows: rows as usize, columns: columns as usize, precision };
+        let end = matrix.size().and_then(|size| offset.checked_add(size));
+        match end.filter(|end| *end <= self.length) {
+            Some(end) => Ok((name, matrix, end)),
+            None => Err(foreign("it is cut")),
+        }
+    }
+
+    /// Reads all numbers of a matrix of bounded size.
+    fn numbers(&mut self, matrix: &Matrix) -> Result<Vec<f64>, ResultsError> {
+        let size = matrix.size().filter(|size| *size <= TEXTS).unwrap_or(0);
+        let mut bytes = vec![0; usize::try_from(size).unwrap_or(0)];
+        self.seek(matrix.offset)?;
+        self.read(&mut bytes)?;
+        let numbers = bytes.chunks_exact(matrix.precision.size());
+        Ok(numbers.map(|bytes| matrix.precision.number(bytes)).collect())
+    }
+
+    /// Reads the columns of a matrix of texts.
+    fn texts(&mut self, matrix: &Matrix) -> Result<Vec<String>, ResultsError> {
+        let signs = self.numbers(matrix)?;
+        Ok(signs.chunks(matrix.rows.max(1)).map(|signs| text(signs.iter().map(sign))).collect())
+    }
+}
+
+/// The end of a sentence on a file that is not read.
+const EXPECTED: &str = "expected results of Dymola or OpenModelica (version 4, binTrans); \
+                        save others as CSV or Parquet first";
+
+fn integer(bytes: &[u8]) -> u32 {
+    bytes.try_into().map_or(0, u32::from_le_bytes)
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a sign of a text")]
+fn sign(number: &f64) -> u8 {
+    *number as u8
+}
+
+/// Returns a text without the zeros and spaces at its end.
+fn text(signs: impl Iterator<Item = u8>) -> String {
+    let signs: Vec<u8> = signs.collect();
+    String::from_utf8_lossy(&signs).trim_end_matches(['\0', ' ']).to_owned()
+}
+
+pub(super) fn columns(path: &Path) -> Result<(Layout, Vec<Column>), ResultsError> {
+    let mut source = Source::open(path)?;
+    let mut matrices = std::collections::BTreeMap::new();
+    let mut offset = 0;
+    while offset < source.length {
+        let (name, matrix, end) = source.matrix(offset)?;
+        matrices.insert(name, matrix);
+        offset = end;
+    }
+    let foreign = |reason: String| unreadable(path, &format!("{reason}, {EXPECTED}"));
+    let matrix = |name: &str| {
+        matrices.get(name).copied().ok_or_else(|| foreign(format!("it has no matrix {name}")))
+    };
+    check_class(&source.numbers(&matrix("Aclass")?)?).map_err(foreign)?;
+    let names = source.texts(&matrix("name")?)?;
+    let descriptions = match matrices.get("description").copied() {
+        Some(matrix) => source.texts(&matrix)?,
+        None => Vec::new(),
+    };
+    let information = source.numbers(&matrix("dataInfo")?)?;
+    let varying = matrix("data_2")?;
+    let (constant, constants) = match matrices.get("data_1").copied() {
+        Some(matrix) => (matrix.rows, source.numbers(&matrix)?),
+        None => (0, Vec::new()),
+    };
+    let mut read = Vec::new();
+    for (at, name) in names.into_iter().enumerate() {
+        let [group, row] = [0, 1].map(|field| information.get(4 * at + field).copied());
+        let row = row.filter(|row| row.abs() >= 1.0).unwrap_or(f64::NAN);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0")]
+        let index = (row.abs() - 1.0) as usize;
+        let place = match group {
+            Some(1.0) if index < constant => {
+                constants.get(index).map(|value| Place::Constant(value * row.signum()))
+            }
+            Some(0.0 | 2.0) if index < varying.rows => Some(Place::Varying(index, row.signum())),
+            _ => None,
+        };
+        let place = place.filter(|_| !row.is_nan());
+        let place = place.ok_or_else(|| foreign(format!("it has no values of {name}")))?;
+        let unit = descriptions.get(at).and_then(|text| unit(text));
+        let name = if group == Some(0.0) { super::super::TIME.to_owned() } else { name };
+        read.push((Column { name, kind: ColumnKind::Real, unit, clocked: false }, place));
+    }
+    // What varies comes first: large models have thousands of parameters.
+    read.sort_by_key(|(_, place)| matches!(place, Place::Constant(_)));
+    let (columns, places) = read.into_iter().unzip();
+    Ok((Layout { varying, places }, columns))
+}
+
+/// Checks the four lines of `Aclass`, which are the rows of a matrix of signs.
+fn check_class(signs: &[f64]) -> Result<(), String> {
+    let line = |row: usize| text(signs.iter().skip(row).step_by(4).map(sign));
+    match (line(0).as_str(), line(3).as_str()) {
+        ("Atrajectory", "binTrans") => Ok(()),
+        (class, layout) => Err(format!("its class is {class:?} and its layout {layout:?}")),
+    }
+}
+
+/// Returns the unit at the end of a description: `angle [rad]`, of Dymola also `angle [rad|deg]`, `on [:#(type=Boolean)]`.
+fn unit(description: &str) -> Option<String> {
+    let (_, unit) = description.strip_suffix(']')?.rsplit_once('[')?;
+    let unit = unit.split(['|', ':']).next().unwrap_or_default().trim();
+    (!unit.is_empty()).then(|| unit.to_owned())
+}
+
+pub(super) fn visit(
+    path: &Path,
+    layout: &Layout,
+    columns: &[Column],
+    positions: &[usize],
+    visitor: &mut Visitor<'_>,
+) -> Result<(), ResultsError> {
+    let Layout { varying, places } = layout;
+    let mut source = Source::open(path)?;
+    source.seek(varying.offset)?;
+    let size = varying.precision.size();
+    let mut bytes = vec![0; varying.rows * size];
+    let mut row = vec![0.0; positions.len()];
+    let mut clock = Clock::new(path, &columns[positions[0]].name);
+    for number in 1..=varying.columns {
+        source.read(&mut bytes)?;
+        for (value, position) in row.iter_mut().zip(positions) {
+            *value = match places[*position] {
+                Place::Constant(value) => value,
+                Place::Varying(index, sign) => {
+                    sign * varying.precision.number(&bytes[index * size..(index + 1) * size])
+                }
+            };
+        }
+        clock.check(row[0], || format!("row {number}"))?;
+        visitor(row[0], &row[1..]);
+    }
+    Ok(())
+}
