@@ -5,15 +5,18 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use files::check_distinct;
 use fmu_description::number::seconds;
-use report::{Request, identity};
+use report::{Comparison, Request, identity};
 
 use crate::outputs::check_own;
 
+/// Largest number of names in a line.
+const LISTED: usize = 20;
+
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The results file, .csv or .parquet
+    /// The results file: .csv, .parquet or .mat
     ///
-    /// Of this program or another one.
+    /// Of this program or another one; .mat of Dymola or OpenModelica.
     #[arg(value_name = "RESULTS")]
     results: PathBuf,
     /// Subtract a second results file
@@ -29,6 +32,12 @@ pub(crate) struct Options {
     /// By name or pattern (`plant.*`); may be repeated.
     #[arg(long, value_name = "PATTERN", value_delimiter = ',')]
     variables: Vec<String>,
+    /// Read the rows from this time on, in s
+    #[arg(long, value_name = "TIME", default_value_t = f64::NEG_INFINITY, hide_default_value = true, allow_negative_numbers = true)]
+    from: f64,
+    /// Read the rows up to this time, in s
+    #[arg(long, value_name = "TIME", default_value_t = f64::INFINITY, hide_default_value = true, allow_negative_numbers = true)]
+    to: f64,
     /// The page to write [default: RESULTS, with .html]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -57,25 +66,41 @@ pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
         results: &options.results,
         against: options.against.as_deref(),
         variables: &options.variables,
+        range: (options.from, options.to),
         units: &[],
         bus_trace: options.bus_trace.as_deref(),
         run: None,
     })?;
-    if let (Some(largest), Some(other)) = (page.differences.first(), &options.against) {
-        if largest.largest > 0.0 {
-            println!(
-                "largest difference to {}, relative to the range: {}, {:.6e} at t = {} s ({:.3e} of the range)",
-                other.display(),
-                largest.name,
-                largest.largest,
-                seconds(largest.at),
-                largest.relative
-            );
-        } else {
-            println!("no difference to {}", other.display());
-        }
+    if let (Some(comparison), Some(other)) = (&page.comparison, &options.against) {
+        compared(comparison, &options.results, other);
     }
     write(&out, &page.html)
+}
+
+/// Prints the largest difference, and what was not compared.
+fn compared(comparison: &Comparison, results: &Path, other: &Path) {
+    let (here, there) = (results.display().to_string(), other.display().to_string());
+    match comparison.differences.first().filter(|_| !comparison.is_equal()) {
+        Some(largest) => println!(
+            "largest difference to {there}, relative to the range: {}, {:.6e} at t = {} s ({:.3e} of the range)",
+            largest.name,
+            largest.largest,
+            seconds(largest.at),
+            largest.relative
+        ),
+        None => {
+            let rows = counted(comparison.rows, "row");
+            let variables = counted(comparison.differences.len() as u64, "variable");
+            println!("no difference to {there} in {rows} of {variables}");
+        }
+    }
+    for sentence in comparison.uncompared(&here, &there, LISTED) {
+        println!("not compared: {sentence}");
+    }
+}
+
+fn counted(count: u64, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Writes a page and prints its name.

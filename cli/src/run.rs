@@ -349,6 +349,7 @@ impl Started {
             against: None,
             variables: &[],
             units: &self.units,
+            range: (f64::NEG_INFINITY, f64::INFINITY),
             bus_trace: self.bus_trace.as_deref(),
             run: Some(&run),
         })?;

@@ -1,12 +1,16 @@
 """Reports of runs: statistics and differences against numpy; the page in a browser."""
 
+import base64
 import json
 import re
+import shlex
 import shutil
 import subprocess
+import zlib
 
 import numpy as np
 import pandas as pd
+import polars
 import pytest
 from lxml import html
 
@@ -25,10 +29,36 @@ def table(page, identifier):
     }
 
 
+def data(page):
+    """The data of the scripts."""
+    return json.loads(page.xpath("//script[@id='data']")[0].text)
+
+
 def curves(page):
-    """Times and values of the curves, by variable."""
-    plots = json.loads(page.xpath("//script[@id='data']")[0].text)
-    return {curve["name"]: curve for plot in plots for curve in plot["curves"]}
+    """Times and values of the curves, by variable, and how many rows the file has."""
+    content = data(page)
+
+    def column(number, rows):
+        """The numbers of a column: all first bytes, then all second bytes and so on."""
+        entry = content["columns"][number]
+        if "block" not in entry:
+            return np.full(rows, np.nan if entry["constant"] is None else entry["constant"])
+        planes = np.frombuffer(zlib.decompress(base64.b64decode(entry["block"])), dtype=np.uint8)
+        return np.frombuffer(planes.reshape(8, rows).T.tobytes())
+
+    curves = {}
+    for plot in content["plots"]:
+        grid = content["grids"][plot["grid"]]
+        for curve in plot["curves"]:
+            other = curve["other"]
+            curves[curve["name"]] = {
+                **curve,
+                "time": column(grid["time"], grid["rows"]),
+                "values": column(curve["values"], grid["rows"]),
+                "other": None if other is None else column(other, grid["rows"]),
+                "total": grid["total"],
+            }
+    return curves
 
 
 @pytest.fixture
@@ -56,7 +86,7 @@ def frame(count=2001, shift=0.0):
 def report(aso_ftc, *arguments):
     done = aso_ftc("report", *arguments)
     assert done.returncode == 0, done.stderr
-    return html.parse(done.stdout.splitlines()[-1]).getroot(), done.stdout
+    return html.parse(done.stdout.splitlines()[-1], html.HTMLParser(huge_tree=True)).getroot(), done.stdout
 
 
 @pytest.mark.parametrize("name", ["own.csv", "own.parquet"])
@@ -88,31 +118,191 @@ def test_the_difference_is_that_to_the_interpolated_other_run(aso_ftc, write):
     )
     assert "b" not in found and "Only in this run: b." in page.text_content()
     assert "largest difference to" in said
-    times, values = curves(page)["a"]["difference"]
-    assert np.allclose(values, np.interp(times, own["time"], expected), atol=1e-6)
+    curve = curves(page)["a"]
+    assert (curve["time"] == own["time"]).all() and (curve["values"] == own["a"]).all()
+    assert np.allclose(curve["other"], there, atol=1e-12)
 
 
 def test_equal_runs_have_no_difference_at_events_either(aso_ftc, write):
     own = pd.DataFrame({"time": [0.0, 1.0, 1.0, 2.0], "x": [0.0, 1.0, -1.0, 5.0]})
     page, said = report(aso_ftc, write("own.csv", own), "--against", write("other.csv", own))
     assert "no difference" in said and table(page, "differences")["x"][0] == 0
-    assert curves(page)["x"]["own"] == [[0.0, 1.0, 1.0, 2.0], [0.0, 1.0, -1.0, 5.0]]
+    curve = curves(page)["x"]
+    assert all((curve[name] == own[column]).all() for name, column in (("time", "time"), ("values", "x"), ("other", "x")))
 
 
-def test_a_peak_of_one_row_in_a_million_is_in_the_plot(aso_ftc, write):
-    values = np.zeros(1_000_000)
-    values[123_457] = 7.0
-    own = pd.DataFrame({"time": np.arange(values.size) * 1e-3, "x": values})
+def noise(count, width):
+    """Noise with a peak of one row in each column."""
+    generator = np.random.default_rng(2)
+    columns = {f"x{k}": generator.standard_normal(count) for k in range(width)}
+    for k, values in enumerate(columns.values()):
+        values[123 * (k + 1)] = 50.0 + k
+    return pd.DataFrame({"time": np.arange(count) * 1e-3, **columns})
+
+
+def test_a_page_has_all_rows_of_a_run_bit_by_bit(aso_ftc, write):
+    own = noise(10_001, 26)
+    page, _ = report(aso_ftc, write("own.csv", own))
+    found = curves(page)
+    for name in own.columns[1:]:
+        assert (found[name]["time"] == own["time"]).all() and (found[name]["values"] == own[name]).all()
+
+
+def test_a_page_of_too_many_rows_has_whole_rows_with_every_peak(aso_ftc, write, tmp_path):
+    own = noise(300_000, 12)
     page, _ = report(aso_ftc, write("own.parquet", own))
-    times, shown = curves(page)["x"]["own"]
-    assert len(times) <= 8_500 and abs(times[shown.index(7.0)] - 123.457) < 1e-9
+    assert (tmp_path / "own.html").stat().st_size < 22e6
+    for name, curve in curves(page).items():
+        rows = np.searchsorted(own["time"], curve["time"])
+        assert (own["time"].to_numpy()[rows] == curve["time"]).all()
+        assert (own[name].to_numpy()[rows] == curve["values"]).all()
+        assert curve["values"].max() == own[name].max() and curve["values"].min() == own[name].min()
+        assert (rows[0], rows[-1]) == (0, 299_999) and curve["total"] == 300_000 > rows.size
 
 
 def test_texts_and_values_that_are_not_finite_are_named(aso_ftc, write):
     own = pd.DataFrame({"time": [0.0, 1.0, 2.0], "x": [1.0, np.nan, 3.0], "mode": ["a", "b", "c"]})
     page, _ = report(aso_ftc, write("own.csv", own))
     assert "Texts are not shown: mode." in page.text_content()
-    assert curves(page)["x"]["own"][1] == [1.0, None, 3.0]
+    np.testing.assert_array_equal(curves(page)["x"]["values"], own["x"])
+
+
+def rates():
+    """A variable with a value at every row, and one with a value at every second one."""
+    slow = [10, np.nan, 20, np.nan, 30, np.nan, 40]
+    return pd.DataFrame({"time": np.arange(7.0), "fast": np.arange(7.0), "slow": slow})
+
+
+def test_statistics_with_empty_cells_are_over_the_values_and_say_so(aso_ftc, write):
+    own = rates()
+    page, _ = report(aso_ftc, write("own.csv", own))
+    values = own["slow"].dropna().to_numpy()
+    assert table(page, "statistics")["slow"][-2:] == pytest.approx([values.mean(), np.sqrt((values**2).mean())])
+    rows = page.xpath("//section[@aria-labelledby='statistics']//tbody/tr")
+    assert [row.xpath("./td")[-1].text_content() for row in rows] == ["time, 6 s", "4 values in 7 rows"]
+
+
+def test_what_is_not_compared_is_named_on_the_terminal(aso_ftc, write):
+    own = rates().assign(here=1.0, mode=["a"] * 7)
+    other = pd.DataFrame({"time": np.arange(2.0, 12.0), "fast": np.arange(2.0, 12.0), "there": 0.0})
+    page, said = report(aso_ftc, write("own.csv", own), "--against", write("other.csv", other))
+    lines = [line.removeprefix("not compared: ") for line in said.splitlines() if line.startswith("not compared: ")]
+    assert [re.sub(r"\S*/", "", line) for line in lines] == [
+        "2 rows of own.csv outside of the time of other.csv",
+        "5 rows of other.csv outside of the time of own.csv",
+        "only in own.csv: slow, here",
+        "only in other.csv: there",
+        "texts: mode",
+    ]
+    assert "no difference to" in said and "in 5 rows of 1 variable\n" in said
+    text = page.text_content()
+    assert "Only in this run: slow, here." in text and "2 rows of this run outside of the time of" in text
+    page, said = report(aso_ftc, write("own.csv", own), "--against", write("own.csv", own))
+    assert "not compared: texts: mode" in said and said.count("not compared") == 1
+
+
+def test_times_that_decrease_are_an_error_with_the_line(aso_ftc, tmp_path):
+    file = tmp_path / "own.csv"
+    file.write_text("time,a\n0,1\n2,2\n1,3\n3,4\n", encoding="utf-8")
+    done = aso_ftc("report", file)
+    assert done.returncode == 2 and "own.csv, line 4: time is 1 after 2" in done.stderr
+    polars.read_csv(file).write_parquet(tmp_path / "own.parquet")
+    done = aso_ftc("report", tmp_path / "own.parquet")
+    assert done.returncode == 2 and "own.parquet, row 3: time is 1 after 2" in done.stderr
+
+
+@pytest.mark.parametrize("compression", ["uncompressed", "snappy", "gzip", "brotli", "zstd", "lz4"])
+def test_parquet_files_of_polars_are_read(aso_ftc, tmp_path, compression):
+    own = frame()
+    polars.from_pandas(own.assign(large=np.uint32(4_000_000_000))).write_parquet(
+        tmp_path / "own.parquet", compression=compression
+    )
+    page, _ = report(aso_ftc, tmp_path / "own.parquet")
+    found = curves(page)
+    assert all((found[name]["values"] == own[name]).all() for name in ("a", "b", "on"))
+    assert (found["large"]["values"] == 4e9).all()
+
+
+def test_csv_of_other_programs_is_read(aso_ftc, tmp_path):
+    from fmpy.util import write_csv
+
+    own = frame(301)
+    expected = own["a"].to_numpy()
+
+    def check(name, values=expected):
+        page, _ = report(aso_ftc, tmp_path / name)
+        curve = curves(page)["a"]
+        assert (curve["values"] == values).all() and (curve["time"] == own["time"]).all(), name
+
+    write_csv(tmp_path / "fmpy.csv", own.to_records(index=False))
+    check("fmpy.csv")
+    own.to_csv(tmp_path / "german.csv", index=False, sep=";", decimal=",")
+    check("german.csv")
+    own.to_csv(tmp_path / "tabs.csv", index=False, sep="\t")
+    check("tabs.csv")
+    own.to_csv(tmp_path / "utf16.csv", index=False, encoding="utf-16")
+    check("utf16.csv")
+    own.to_csv(tmp_path / "bom.csv", index=False, encoding="utf-8-sig")
+    check("bom.csv")
+    # OpenModelica: names in quotation marks; some versions end each line with a comma.
+    lines = [",".join(f'"{name}"' for name in own.columns), *(",".join(map(repr, row)) for row in own.values.tolist())]
+    (tmp_path / "modelica.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    check("modelica.csv")
+    (tmp_path / "closed.csv").write_text(",\n".join(lines) + ",\n", encoding="utf-8")
+    check("closed.csv")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "parts"),
+    [
+        ("ragged.csv", b"time,a\n0,1\n1\n2,3\n", ["line 3 has 1 value, expected 2"]),
+        ("last.csv", b"time,a\n0,1\n1\n", ["line 3 has 1 value, expected 2"]),
+        ("commas.csv", b"time,a\n0,0,1,5\n", ["line 2 has 4 values, expected 2", "semicolons"]),
+        ("names.csv", b"0,1\n1,2\n", ["expected the names of the columns"]),
+        ("spaces.csv", b"time a\n0 1\n", ["no variable to show", "commas, semicolons or tabs"]),
+        ("binary.csv", b"PK\x03\x04\0\0", ["binary file", "save it as CSV"]),
+        ("book.xlsx", b"PK\x03\x04\0\0", [".csv, .parquet or .mat", "save them as CSV"]),
+        ("five.mat", b"MATLAB 5.0 MAT-file, Platform: GLNXA64", ["version 5 or later", "Dymola or OpenModelica"]),
+    ],
+)
+def test_what_is_not_read_is_one_sentence_with_advice(aso_ftc, tmp_path, name, content, parts):
+    (tmp_path / name).write_bytes(content)
+    done = aso_ftc("report", tmp_path / name)
+    assert done.returncode == 2 and len(done.stderr.strip().splitlines()) == 1
+    for part in parts:
+        assert part in done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_mat_files_of_dymola_and_openmodelica_are_read(aso_ftc, tmp_path, kind):
+    scipy = pytest.importorskip("scipy.io")
+    time = np.array([0.0, 0.5, 0.5, 1.0, 2.0])
+    values = np.sin(time)
+
+    def texts(lines):
+        """A matrix of signs with a text in each column."""
+        width = max(map(len, lines))
+        return np.array(["".join(row) for row in zip(*(line.ljust(width) for line in lines), strict=True)])
+
+    content = {
+        "Aclass": np.array(["Atrajectory", "1.1", "", "binTrans"]),
+        "name": texts(["time", "gain", "body.phi", "minus.phi"]),
+        "description": texts(["Time in [s]", "Gain", "angle [rad|deg]", "angle [rad]"]),
+        "dataInfo": np.array([[0, 1, 0, -1], [1, 2, 0, 0], [2, 2, 0, -1], [2, -2, 0, -1]], dtype=np.int32).T,
+        "data_1": np.array([[0.0, 2.0], [7.0, 7.0]], dtype=kind),
+        "data_2": np.array([time, values], dtype=kind),
+    }
+    scipy.savemat(tmp_path / "own.mat", content, format="4")
+    page, _ = report(aso_ftc, tmp_path / "own.mat")
+    found, stored = curves(page), values.astype(kind)
+    assert (found["body.phi"]["time"] == time).all()
+    assert (found["body.phi"]["values"] == stored).all() and (found["minus.phi"]["values"] == -stored).all()
+    assert (found["gain"]["values"] == 7).all()
+    assert [plot["unit"] for plot in data(page)["plots"]] == ["rad", ""]
+    whole = (tmp_path / "own.mat").read_bytes()
+    for length in (0, 10, 25, len(whole) - 1):
+        (tmp_path / "own.mat").write_bytes(whole[:length])
+        assert aso_ftc("report", tmp_path / "own.mat").returncode == 2
 
 
 def test_names_with_markup_remain_text(aso_ftc, write):
@@ -154,7 +344,8 @@ def test_the_frames_of_a_bus_trace_are_counted_and_drawn_at_their_times(aso_ftc,
     assert found["can1 100"][:3] == [1, 0.005, 0.005] and np.isnan(found["can1 100"][3:]).all()
     curve = curves(page)["can0 100"]
     assert curve["dots"] and not curves(page)["a"]["dots"]
-    assert np.allclose(curve["own"], [times[1:], gaps])
+    rows = np.isfinite(curve["values"])
+    assert np.allclose([curve["time"][rows], curve["values"][rows]], [times[1:], gaps])
 
 
 def test_a_line_of_a_trace_that_is_no_frame_is_named(aso_ftc, write, tmp_path):
@@ -184,8 +375,7 @@ def test_the_report_of_a_run_has_its_system_its_algorithm_and_units(of_a_run):
     assert "FrictionPendulum: model FrictionPendulum, FMI 2.0" in text and "algorithm: gauss-seidel" in text
     boxes = page.xpath("//*[local-name()='rect']")
     assert len(boxes) == 2 and "AsoController.u to FrictionPendulum.u" in re.sub(r"\s+", " ", text)
-    plots = json.loads(page.xpath("//script[@id='data']")[0].text)
-    assert "rad" in {plot["unit"] for plot in plots}
+    assert "rad" in {plot["unit"] for plot in data(page)["plots"]}
 
 
 def in_a_browser(page, folder, script):
@@ -204,30 +394,191 @@ def in_a_browser(page, folder, script):
 def test_a_browser_draws_every_plot_without_an_error_or_a_request(of_a_run, tmp_path):
     script = "document.title = performance.getEntriesByType('resource').length"
     page = in_a_browser(of_a_run, tmp_path, script)
-    plots = json.loads(page.xpath("//script[@id='data']")[0].text)
-    assert len(page.xpath("//figure//canvas")) == len(plots) > 2
+    assert len(page.xpath("//figure//canvas")) == len(data(page)["plots"]) > 2
     assert page.xpath("//title")[0].text == "0"
 
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_the_controls_zoom_all_plots_and_show_the_difference(aso_ftc, write, tmp_path):
     report(aso_ftc, write("own.csv", frame()), "--against", write("other.csv", frame(137, 0.25)))
-    script = """
-    const id = (name) => document.getElementById(name);
-    const range = () => [Number(id("from").value), Number(id("to").value)];
-    const curves = () => document.querySelectorAll(".u-legend .u-series").length;
-    const found = [range(), curves()];
-    id("closer").click(); found.push(range());
-    id("later").click(); found.push(range());
-    id("from").value = 1; id("to").value = 2; id("controls").requestSubmit(); found.push(range());
-    document.querySelector("input[value=difference]").click(); found.push(range(), curves());
-    id("all").click(); found.push(range());
-    document.title = JSON.stringify(found);"""
-    found = json.loads(in_a_browser(tmp_path / "own.html", tmp_path, script).xpath("//title")[0].text)
+    with browser(tmp_path / "profile") as page:
+        page.open((tmp_path / "own.html").as_uri())
+        page.evaluate("""
+            globalThis.id = (name) => document.getElementById(name);
+            globalThis.range = () => [Number(id("from").value), Number(id("to").value)];
+            globalThis.curves = () => document.querySelectorAll(".u-legend .u-series").length""")
+        page.until("document.querySelectorAll('.uplot').length === document.querySelectorAll('figure').length")
+        found = page.evaluate("""(() => {
+            const found = [range(), curves()];
+            id("closer").click(); found.push(range());
+            id("later").click(); found.push(range());
+            id("from").value = 1; id("to").value = 2; id("controls").requestSubmit(); found.push(range());
+            document.querySelector("input[value=difference]").click(); found.push(range());
+            return found;
+        })()""")
+        page.until(f"curves() === {found[1]} - 3")
+        page.evaluate("id('all').click()")
+        found += [page.evaluate("curves()"), page.evaluate("range()")]
     whole, both, closer, later, typed, kept, differences, end = found
     assert (whole, closer, later, typed, kept, end) == ([0, 4], [1, 3], [2, 4], [1, 2], [1, 2], [0, 4])
     # Each plot has a line for the time, and one for each curve.
     assert both - differences == 3
+
+
+DRAWN = "document.querySelectorAll('.uplot').length === document.querySelectorAll('figure').length"
+
+
+def show(page, low, high):
+    """Zooms all plots."""
+    page.evaluate(f"""(() => {{
+        document.getElementById("from").value = {low};
+        document.getElementById("to").value = {high};
+        document.getElementById("controls").requestSubmit();
+    }})()""")
+
+
+def read(page, figure, part):
+    """What a plot shows below the cursor: the time, and the value of each curve."""
+    element = f"document.querySelectorAll('figure')[{figure}]"
+    page.evaluate(f"{element}.scrollIntoView()")
+    box = page.evaluate(f"{element}.querySelector('.u-over').getBoundingClientRect().toJSON()")
+    place = {"x": box["left"] + part * box["width"], "y": box["top"] + box["height"] / 2}
+    page.call("Input.dispatchMouseEvent", type="mouseMoved", **place)
+    return legend(page, figure)
+
+
+def legend(page, figure):
+    """What a plot shows at the cursor: the time, and the value of each curve."""
+    cells = page.evaluate(f"""Array.from(
+        document.querySelectorAll("figure")[{figure}].querySelectorAll(".u-series"),
+        (row) => [row.querySelector(".u-label").textContent, row.querySelector(".u-value").textContent])""")
+    (_, time), *values = cells
+    return float(time), {name: np.nan if text == "–" else float(text) for name, text in values}
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_the_values_at_the_cursor_are_those_of_the_row_at_the_stated_time(aso_ftc, write, tmp_path):
+    own = noise(10_001, 26)
+    own.loc[::3, "x3"] = np.nan
+    report(aso_ftc, write("own.csv", own))
+    assert (tmp_path / "own.html").stat().st_size < 4e6  # Noise; the paper's run has 1.6 MB.
+    times, names = own["time"].to_numpy(), set()
+    with browser(tmp_path / "profile") as page:
+        page.open((tmp_path / "own.html").as_uri())
+        page.until(DRAWN)
+        for low, high in ((0, 10), (4.0, 4.03), (0, 0.3)):
+            show(page, low, high)
+            for figure in range(page.evaluate("document.querySelectorAll('figure').length")):
+                for part in (0.003, 0.21, 0.5, 0.77, 0.997):
+                    time, values = read(page, figure, part)
+                    at = np.abs(times - (low + part * (high - low))).argmin()
+                    assert abs(time - times[at]) <= 1.5e-3 * max(1, high - low)
+                    row = own.iloc[np.flatnonzero(times == time)[0]]
+                    np.testing.assert_array_equal(list(values.values()), row[list(values)])
+                    names |= set(values)
+        assert names == set(own.columns[1:]) and not page.complaints
+
+
+def inked(page, colour):
+    """The columns of the first canvas with pixels of a colour."""
+    red, green, blue = bytes.fromhex(colour)
+    return page.evaluate(f"""(() => {{
+        const canvas = document.querySelector("figure canvas");
+        const {{ data, width, height }} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+        const near = (at, value) => 40 > Math.abs(data[at] - value);
+        return Array.from({{ length: width }}, (_, x) => {{
+            let count = 0;
+            for (let y = 0; height > y; y++) {{
+                const at = 4 * (y * width + x);
+                if (data[at + 3] > 128 && near(at, {red}) && near(at + 1, {green}) && near(at + 2, {blue})) count++;
+            }}
+            return count;
+        }});
+    }})()""")
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_a_peak_of_one_row_stays_as_narrow_as_it_is_in_every_zoom(aso_ftc, write, tmp_path):
+    own = pd.DataFrame({"time": np.arange(500_001) * 1e-3, "x": 0.0})
+    own.loc[250_000, "x"] = 1.0
+    report(aso_ftc, write("own.parquet", own))
+    with browser(tmp_path / "profile") as page:
+        page.open((tmp_path / "own.html").as_uri())
+        page.until(DRAWN)
+        for length in (500.0, 5.0, 0.5):
+            show(page, 250 - length / 2, 250 + length / 2)
+            page.evaluate("new Promise((resume) => { requestAnimationFrame(() => requestAnimationFrame(resume)); })")
+            columns = np.array(inked(page, "0072b2"))
+            wide = (columns > 8).sum()
+            # The flanks have 1 ms each.
+            assert 1 <= wide <= 4 + 2.2e-3 / length * columns.size, (length, wide)
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_values_between_empty_cells_are_drawn_as_points_or_held(aso_ftc, write, tmp_path):
+    own = rates()
+    report(aso_ftc, write("own.csv", own))
+    polars.DataFrame(
+        {"time": own["time"].to_numpy(), "fast": own["fast"].to_numpy(), "slow": [10, None, 20, None, 30, None, 40]},
+        schema_overrides={"slow": polars.Int32},
+    ).write_parquet(tmp_path / "held.parquet")
+    report(aso_ftc, tmp_path / "held.parquet")
+    with browser(tmp_path / "profile") as page:
+        page.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "light"}])
+        page.open((tmp_path / "own.html").as_uri())
+        page.until(DRAWN)
+        columns = np.array(inked(page, "d55e00")) > 0
+        # The start and the end of each group of columns: four points.
+        assert (np.diff(columns.astype(int)) == 1).sum() == 4
+        assert read(page, 0, 0.49)[1] == {"fast": 3, "slow": pytest.approx(np.nan, nan_ok=True)}
+        page.open((tmp_path / "held.html").as_uri())
+        page.until(DRAWN)
+        columns = np.flatnonzero(np.array(inked(page, "d55e00")) > 0)
+        assert (np.diff(columns) == 1).all() and columns.size > 800
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_the_keyboard_reaches_each_row_of_an_event(aso_ftc, write, tmp_path):
+    own = pd.DataFrame({"time": [0.0, 1.0, 1.0, 1.0, 2.0], "x": [0.0, 1.0, -1.0, 3.0, 5.0]})
+    report(aso_ftc, write("own.csv", own))
+    with browser(tmp_path / "profile") as page:
+        page.open((tmp_path / "own.html").as_uri())
+        page.until(DRAWN)
+        read(page, 0, 0.001)
+        page.evaluate("document.querySelector('.uplot').focus()")
+        rows = []
+        for _ in range(4):
+            page.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight")
+            page.evaluate("new Promise((resume) => { requestAnimationFrame(resume); })")
+            time, values = legend(page, 0)
+            rows.append((time, values["x"]))
+        assert rows == list(own.iloc[1:].itertuples(index=False, name=None))
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_a_plot_without_all_rows_says_so_and_names_the_command_for_them(aso_ftc, write, tmp_path):
+    own = noise(300_000, 12)
+    report(aso_ftc, write("own.parquet", own))
+    with browser(tmp_path / "profile") as page:
+        page.open((tmp_path / "own.html").as_uri())
+        page.until(DRAWN)
+        rows = page.evaluate("JSON.parse(document.getElementById('data').textContent).grids[0].rows")
+        assert f"{rows:,} of 300,000 rows" in page.evaluate("document.querySelector('figcaption').textContent")
+        show(page, 40, 40.3)
+        time, values = read(page, 0, 0.4)
+        row = own.iloc[np.flatnonzero(own["time"] == time)[0]]
+        np.testing.assert_array_equal(list(values.values()), row[list(values)])
+        command = page.evaluate("document.querySelector('figcaption code').textContent")
+    words = shlex.split(command)
+    assert words[:2] == ["aso-ftc", "report"]
+    words[words.index("part.html")] = tmp_path / "part.html"
+    page, _ = report(aso_ftc, *words[2:])
+    part = own[(own["time"] >= 40) & (own["time"] <= 40.3)]
+    for name, curve in curves(page).items():
+        assert curve["total"] == len(part) and (curve["values"] == part[name]).all()
+    assert "Rows from t = 40 s to t = 40.3 s only." in page.text_content()
+    done = aso_ftc("report", tmp_path / "own.parquet", "--from", 400, "--force")
+    assert done.returncode == 2 and "no row from 400 s" in done.stderr
 
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")

@@ -5,7 +5,6 @@ use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
-use crate::trace::Trace;
 use crate::{Error, name};
 
 /// The flag of an error frame.
@@ -21,14 +20,14 @@ pub(crate) struct Message {
     /// Shortest and longest time between two frames in s; NaN for one frame.
     pub(crate) shortest: f64,
     pub(crate) longest: f64,
-    /// The time since the frame before in ms, over time.
-    pub(crate) intervals: Trace,
+    /// The time of each frame but the first in s, and the time since the frame before in ms.
+    pub(crate) intervals: Vec<(f64, f64)>,
 }
 
 impl Message {
     fn new(name: String, time: f64) -> Self {
         let (shortest, longest) = (f64::NAN, f64::NAN);
-        let intervals = Trace::default();
+        let intervals = Vec::new();
         Self { name, count: 1, first: time, last: time, shortest, longest, intervals }
     }
 
@@ -37,7 +36,7 @@ impl Message {
         // The other operand where one is NaN.
         self.shortest = self.shortest.min(interval);
         self.longest = self.longest.max(interval);
-        self.intervals.push(time, 1e3 * interval);
+        self.intervals.push((time, 1e3 * interval));
         self.count += 1;
         self.last = time;
     }

@@ -5,22 +5,24 @@
 //! only the run itself knows: the system as a graph, the algorithm and the messages.
 #![forbid(unsafe_code)]
 
+mod columns;
 mod difference;
 mod frames;
 mod graph;
 mod page;
 mod plots;
+mod samples;
 mod statistics;
-mod trace;
 
 use std::path::Path;
 
 use results::{Column, ColumnKind, ResultsError, Selection, Table};
 
-use trace::Trace;
+use plots::{Group, Plots};
+use samples::{Collector, Samples};
 
-pub use difference::Difference;
-pub use statistics::Statistics;
+pub use difference::{Comparison, Difference};
+pub use statistics::{Basis, Statistics};
 
 /// Largest number of variables in a report.
 pub const VARIABLES: usize = 300;
@@ -28,12 +30,15 @@ pub const VARIABLES: usize = 300;
 /// What a report shows.
 #[derive(Debug)]
 pub struct Request<'a> {
-    /// The results file, `.csv` or `.parquet`.
+    /// The results file, of a format that [`Table`] reads.
     pub results: &'a Path,
     /// A second results file, from which the first one is subtracted.
     pub against: Option<&'a Path>,
     /// The variables, by name or pattern; everything if it is empty.
     pub variables: &'a [String],
+    /// The first and the last time of the rows that are read, in s; negative and positive infinity are those of the
+    /// file.
+    pub range: (f64, f64),
     /// The units of variables for files without units, such as CSV: name and unit.
     pub units: &'a [(String, String)],
     /// A trace of the buses in the form of candump, whose frames are shown.
@@ -87,8 +92,8 @@ pub struct Connection {
 pub struct Page {
     /// The HTML document.
     pub html: String,
-    /// The differences to the second run, the largest relative one first.
-    pub differences: Vec<Difference>,
+    /// The comparison with the second run, if there is one.
+    pub comparison: Option<Comparison>,
 }
 
 /// An error of a report.
@@ -99,10 +104,23 @@ pub enum Error {
     #[error(transparent)]
     Results(#[from] ResultsError),
     /// A file has no variable with numbers.
-    #[error("{file}: no variable to show, expected at least one with numbers")]
+    #[error(
+        "{file}: no variable to show, expected at least one with numbers beside the time; CSV has commas, semicolons \
+         or tabs between its values"
+    )]
     Empty {
         /// The file.
         file: String,
+    },
+    /// A file has no row in the range of time.
+    #[error("{file}: no row from {from} s to {to} s")]
+    NoRows {
+        /// The file.
+        file: String,
+        /// The start of the range.
+        from: f64,
+        /// Its end.
+        to: f64,
     },
     /// A bus trace cannot be read.
     #[error("{file}: {source}")]
@@ -143,27 +161,47 @@ pub fn identity(results: &Path) -> String {
 
 /// Creates the report of a results file.
 ///
-/// At most [`VARIABLES`] variables are shown; the page says how many are left out. Files are read row by
-/// row: the memory does not depend on the length of the first file; of the second one, sixteen columns
-/// are in memory at a time.
+/// At most [`VARIABLES`] variables are shown; the page says how many are left out. It has all rows, unless these are
+/// more than two million values; then each plot says how many of the rows it has. Files are read row by row, twice: the
+/// memory does not depend on the length of the first file; of the second one, the columns of a plot are in memory.
 ///
 /// # Errors
 ///
 /// [`Error`]: a file cannot be read, has no variable with numbers, or has none in common with the other.
 pub fn page(request: &Request<'_>) -> Result<Page, Error> {
     let table = Table::open(request.results)?;
-    let Read { positions, columns, statistics, traces, texts, left_out } = read(&table, request)?;
-    let against = request.against.map(Table::open).transpose()?;
-    let compared =
-        against.map(|other| difference::compare(&table, &positions, &other)).transpose()?;
-    if let (Some(compared), Some(other)) = (&compared, request.against)
-        && compared.differences.is_empty()
-    {
-        return Err(Error::Apart { file: name(request.results), other: name(other) });
+    let view = View { table: &table, range: request.range };
+    let Read { positions, columns, statistics, rows, texts, left_out } = read(&view, request)?;
+    if rows == 0 && view.is_part() {
+        let (from, to) = request.range;
+        return Err(Error::NoRows { file: name(request.results), from, to });
     }
+    let groups = plots::groups(&columns, &statistics, rows, request.against.is_some());
+    let (mut compared, samples) = match request.against {
+        Some(path) => {
+            let other = Table::open(path)?;
+            let (mut compared, samples) = difference::compare(&view, &positions, &groups, &other)?;
+            let comparison = &mut compared.comparison;
+            if comparison.differences.is_empty() {
+                return Err(Error::Apart { file: name(request.results), other: name(path) });
+            }
+            comparison.only_here = difference::missing(&table, &positions, &other);
+            if request.variables.is_empty() {
+                let all: Vec<usize> = (0..other.columns().len()).collect();
+                comparison.only_there = difference::missing(&other, &all, &table);
+            }
+            (comparison.texts, comparison.left_out) = (texts.clone(), left_out);
+            (Some(compared), samples)
+        }
+        None => (None, collect(&view, &positions, &groups)?),
+    };
     let frames = request.bus_trace.map(frames::read).transpose()?;
-    let mut plots = plots::plots(&columns, &statistics, &traces, compared.as_ref());
-    plots.extend(plots::of_frames(frames.as_deref().unwrap_or_default()));
+    let mut plots = Plots::default();
+    let is_compared = compared.as_ref().map_or(&[][..], |compared| &compared.is_compared);
+    for (group, samples) in groups.iter().zip(&samples) {
+        plots.add(group, samples, &columns, is_compared);
+    }
+    plots.add_frames(frames.as_deref().unwrap_or_default());
     let content = page::Content {
         request,
         columns: &columns,
@@ -171,24 +209,65 @@ pub fn page(request: &Request<'_>) -> Result<Page, Error> {
         texts: &texts,
         left_out,
         frames: frames.as_deref(),
+        comparison: compared.as_ref().map(|compared| &compared.comparison),
     };
-    let html = page::render(&content, &plots, compared.as_ref());
-    Ok(Page { html, differences: compared.map_or_else(Vec::new, |compared| compared.differences) })
+    let html = page::render(&content, &plots);
+    Ok(Page { html, comparison: compared.take().map(|compared| compared.comparison) })
 }
 
-/// The results file, read once.
+/// The rows of a file in a range of time.
+struct View<'a> {
+    table: &'a Table,
+    range: (f64, f64),
+}
+
+impl View<'_> {
+    fn visit(
+        &self,
+        positions: &[usize],
+        visitor: &mut dyn FnMut(f64, &[f64]),
+    ) -> Result<(), ResultsError> {
+        let (from, to) = self.range;
+        self.table.visit(positions, &mut |time, row| {
+            if from <= time && time <= to {
+                visitor(time, row);
+            }
+        })
+    }
+
+    /// Whether rows of the file may be outside.
+    fn is_part(&self) -> bool {
+        self.range.0.is_finite() || self.range.1.is_finite()
+    }
+}
+
+/// Collects the rows of the plots.
+fn collect(view: &View<'_>, positions: &[usize], groups: &[Group]) -> Result<Vec<Samples>, Error> {
+    let collector = |group: &Group| Collector::new(group.members.len(), group.block, false);
+    let mut collectors: Vec<_> = groups.iter().map(collector).collect();
+    view.visit(positions, &mut |time, row| {
+        for (group, collector) in groups.iter().zip(&mut collectors) {
+            collector.push(time, group.members.iter().map(|at| row[*at]));
+        }
+    })?;
+    Ok(collectors.into_iter().map(Collector::finish).collect())
+}
+
+/// What the first reading of the results file finds.
 struct Read {
     positions: Vec<usize>,
     columns: Vec<Column>,
     statistics: Vec<Statistics>,
-    traces: Vec<Trace>,
+    /// The number of rows.
+    rows: usize,
     /// Variables that are texts.
     texts: Vec<String>,
     /// Number of variables beyond [`VARIABLES`].
     left_out: usize,
 }
 
-fn read(table: &Table, request: &Request<'_>) -> Result<Read, Error> {
+fn read(view: &View<'_>, request: &Request<'_>) -> Result<Read, Error> {
+    let table = view.table;
     let selection = Selection { include: request.variables.to_vec(), exclude: Vec::new() };
     let mut chosen = table.choose(&selection)?;
     chosen.retain(|at| *at != table.time());
@@ -204,12 +283,10 @@ fn read(table: &Table, request: &Request<'_>) -> Result<Read, Error> {
         let columns: Vec<_> =
             positions.iter().map(|at| with_unit(&table.columns()[*at], request)).collect();
         let mut statistics: Vec<_> = columns.iter().map(statistics::Builder::new).collect();
-        let mut traces = vec![Trace::default(); columns.len()];
-        let visited = table.visit(positions, &mut |time, row| {
-            for ((built, trace), value) in statistics.iter_mut().zip(&mut traces).zip(row) {
-                built.push(time, *value);
-                trace.push(time, *value);
-            }
+        let mut rows = 0;
+        let visited = view.visit(positions, &mut |time, row| {
+            rows += 1;
+            statistics.iter_mut().zip(row).for_each(|(built, value)| built.push(time, *value));
         });
         match visited {
             Ok(()) => {
@@ -217,7 +294,7 @@ fn read(table: &Table, request: &Request<'_>) -> Result<Read, Error> {
                     positions: positions.to_vec(),
                     statistics: statistics.into_iter().map(statistics::Builder::finish).collect(),
                     columns,
-                    traces,
+                    rows,
                     texts,
                     left_out: rest.len(),
                 });
@@ -248,4 +325,11 @@ fn name(path: &Path) -> String {
 /// Whether a variable keeps its value between two rows.
 fn holds(column: &Column) -> bool {
     !matches!(column.kind, ColumnKind::Real)
+}
+
+/// Names in a sentence, at most `limit` of them.
+fn listed(names: &[String], limit: usize) -> String {
+    let more = names.len().saturating_sub(limit);
+    let shown = names.iter().take(limit).cloned().collect::<Vec<_>>().join(", ");
+    if more > 0 { format!("{shown} and {more} more") } else { shown }
 }

@@ -6,19 +6,24 @@ use figure::interactive::{COLOURS, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, U
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use results::Column;
 
-use crate::difference::Compared;
+use serde::Serialize;
+
+use crate::difference::Comparison;
 use crate::frames::Message;
-use crate::plots::Plot;
-use crate::statistics::Statistics;
-use crate::{Request, Run, graph, identity};
+use crate::plots::Plots;
+use crate::statistics::{Basis, Statistics};
+use crate::{Request, Run, graph, identity, listed};
 
 const STYLE: &str = include_str!("page/page.css");
+const ROWS: &str = include_str!("page/rows.js");
 const SCRIPT: &str = include_str!("page/plots.js");
 /// The content security policy: the page loads nothing, even if a text contains markup.
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 /// Largest number of connections and of messages that are listed.
 const LISTED: usize = 200;
+/// The range of all times.
+const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
 pub(crate) struct Content<'a> {
     pub(crate) request: &'a Request<'a>,
@@ -30,13 +35,24 @@ pub(crate) struct Content<'a> {
     pub(crate) left_out: usize,
     /// The messages of the bus trace, if there is one.
     pub(crate) frames: Option<&'a [Message]>,
+    pub(crate) comparison: Option<&'a Comparison>,
 }
 
-pub(crate) fn render(content: &Content<'_>, plots: &[Plot], compared: Option<&Compared>) -> String {
+/// The data of the scripts.
+#[derive(Serialize)]
+struct Data<'a> {
+    #[serde(flatten)]
+    plots: &'a Plots,
+    /// The command that writes such a page.
+    command: String,
+}
+
+pub(crate) fn render(content: &Content<'_>, plots: &Plots) -> String {
     let request = content.request;
     let file = request.results.display().to_string();
     let other = request.against.map(|path| path.display().to_string());
-    let data = serde_json::to_string(plots).unwrap_or_default().replace('<', "\\u003c");
+    let data = Data { plots, command: command(request) };
+    let data = serde_json::to_string(&data).unwrap_or_default().replace('<', "\\u003c");
     let document = html! {
         (DOCTYPE)
         html lang="en" {
@@ -46,6 +62,7 @@ pub(crate) fn render(content: &Content<'_>, plots: &[Plot], compared: Option<&Co
                     p.kind { "Report of a run" }
                     h1 { (file) @if let Some(other) = &other { " against " (other) } }
                     @if let Some(run) = request.run { (outcome(run)) }
+                    @if request.range != ALL { p { "Rows from t = " (request.range.0) " s to t = " (request.range.1) " s only." } }
                 }
                 main {
                     section aria-labelledby="plots" {
@@ -56,18 +73,17 @@ pub(crate) fn render(content: &Content<'_>, plots: &[Plot], compared: Option<&Co
                         p.said {
                             "Drag over a plot to zoom, double-click to show all; all plots have the same time \
                              axis and cursor. On a touch screen two fingers zoom, a double tap shows all. In a plot, arrow keys move the cursor, + and − zoom, 0 shows all. A \
-                             click on a name hides its curve. Of long runs, a plot keeps the \
-                             lowest and highest value of each short interval, so that no peak is lost."
+                             click on a name hides its curve. The values below a plot are those of the row at the stated time, with all digits; – is an empty cell."
                             @if content.left_out > 0 {
                                 " " (content.left_out) " more variables of the file are not shown; "
                                 code { "--variables" } " chooses others."
                             }
                             @if !content.texts.is_empty() {
-                                " Texts are not shown: " (listed(content.texts)) "."
+                                " Texts are not shown: " (listed(content.texts, LISTED)) "."
                             }
                         }
                     }
-                    @if let Some(compared) = compared { (differences(compared, other.as_deref().unwrap_or_default())) }
+                    @if let Some(comparison) = content.comparison { (differences(comparison, other.as_deref().unwrap_or_default())) }
                     (statistics(content))
                     @if let (Some(messages), Some(file)) = (content.frames, request.bus_trace) { (frames(messages, file)) }
                     @if let Some(run) = request.run { (system(run)) (messages(run)) }
@@ -78,7 +94,7 @@ pub(crate) fn render(content: &Content<'_>, plots: &[Plot], compared: Option<&Co
                 }
                 script type="application/json" #data { (PreEscaped(data)) }
                 script { (PreEscaped(UPLOT)) (PreEscaped(LINKED)) }
-                script { (PreEscaped(SCRIPT)) }
+                script { (PreEscaped(ROWS)) (PreEscaped(SCRIPT)) }
             }
         }
     };
@@ -129,22 +145,47 @@ fn controls(other: Option<&str>) -> Markup {
     }
 }
 
+/// The command for a page with the same content, in the words of a shell.
+fn command(request: &Request<'_>) -> String {
+    let is_plain = |sign: char| sign.is_ascii_alphanumeric() || "_-./".contains(sign);
+    let quoted = |path: &Path| {
+        let text = path.display().to_string();
+        if text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+    };
+    let against = request.against.map(|path| format!(" --against {}", quoted(path)));
+    format!("aso-ftc report {}{}", quoted(request.results), against.unwrap_or_default())
+}
+
 /// A number with six digits, all of them in a tooltip.
 fn number(value: f64) -> Markup {
+    html! { td.number title=(value) { (short(value)) } }
+}
+
+/// A number with six digits.
+fn short(value: f64) -> String {
     let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
-    let short = if value.is_nan() {
+    if value.is_nan() {
         "–".to_owned()
     } else if rounded == 0.0 || (1e-3..1e6).contains(&rounded.abs()) {
         format!("{rounded}")
     } else {
         format!("{rounded:e}")
-    };
-    html! { td.number title=(value) { (short) } }
+    }
+}
+
+/// What mean and rms of a variable are over.
+fn basis(statistics: &Statistics) -> String {
+    match statistics.basis {
+        Basis::Time(length) => format!("time, {} s", short(length)),
+        Basis::Values(count) if statistics.not_finite == 0 => format!("{count} rows"),
+        Basis::Values(count) => {
+            format!("{count} values in {} rows", count + statistics.not_finite)
+        }
+    }
 }
 
 fn statistics(content: &Content<'_>) -> Markup {
     let rows = content.columns.iter().zip(content.statistics);
-    let gaps = content.statistics.iter().any(|statistics| statistics.not_finite > 0);
     html! {
         section aria-labelledby="statistics" {
             h2 #statistics { "Statistics" }
@@ -157,7 +198,7 @@ fn statistics(content: &Content<'_>) -> Markup {
                             @for title in ["first", "last", "smallest", "at t in s", "largest", "at t in s", "mean", "rms"] {
                                 th.number scope="col" { (title) }
                             }
-                            @if gaps { th.number scope="col" { "not finite" } }
+                            th scope="col" { "mean and rms over" }
                         }
                     }
                     tbody {
@@ -169,13 +210,16 @@ fn statistics(content: &Content<'_>) -> Markup {
                                     statistics.first, statistics.last, statistics.smallest.0, statistics.smallest.1,
                                     statistics.largest.0, statistics.largest.1, statistics.mean, statistics.rms,
                                 ] { (number(value)) }
-                                @if gaps { td.number { (statistics.not_finite) } }
+                                td { (basis(statistics)) }
                             }
                         }
                     }
                 }
             }
-            p.said { "Mean and rms are over time: integrals by the trapezoidal rule, divided by the length of the run." }
+            p.said {
+                "Over time: integrals by the trapezoidal rule (integers and Booleans are held), divided by the length of the run. Over values, if some \
+                 rows have none: each value has the same weight."
+            }
         }
     }
 }
@@ -215,35 +259,42 @@ fn frames(messages: &[Message], file: &Path) -> Markup {
     }
 }
 
-fn differences(compared: &Compared, other: &str) -> Markup {
-    let equal = compared.differences.iter().all(|difference| difference.largest <= 0.0);
+fn differences(comparison: &Comparison, other: &str) -> Markup {
+    let capitalised = |sentence: String| {
+        let mut signs = sentence.chars();
+        signs
+            .next()
+            .map_or_else(String::new, |first| format!("{}{}", first.to_uppercase(), signs.as_str()))
+    };
+    let uncompared = comparison.uncompared("this run", other, LISTED);
     html! {
         section aria-labelledby="differences" {
             h2 #differences { "Difference to " (other) }
-            @if equal {
-                p.outcome { "All " (compared.differences.len()) " common variables are equal in all rows." }
+            @if comparison.is_equal() {
+                p.outcome { "All " (comparison.differences.len()) " common variables are equal in all " (comparison.rows) " common rows." }
             }
-            @if compared.outside > 0 {
-                p.outcome.failed { (compared.outside) " rows are outside of the time of " (other) " and are not compared." }
-            }
-            @for (names, whose) in [(&compared.only_here, "this run"), (&compared.only_there, other)] {
-                @if !names.is_empty() { p { "Only in " (whose) ": " (listed(names)) "." } }
+            @if !uncompared.is_empty() {
+                div.outcome.failed {
+                    "Not compared:"
+                    ul { @for sentence in uncompared { li { (capitalised(sentence)) "." } } }
+                }
             }
             div.scroll tabindex="0" role="region" aria-labelledby="differences" {
                 table {
                     thead {
                         tr {
                             th scope="col" { "variable" }
-                            @for title in ["largest difference", "at t in s", "rms", "largest, relative to the range"] {
+                            @for title in ["largest difference", "at t in s", "rms", "largest, relative to the range", "rows"] {
                                 th.number scope="col" { (title) }
                             }
                         }
                     }
                     tbody {
-                        @for difference in &compared.differences {
+                        @for difference in &comparison.differences {
                             tr {
                                 th scope="row" { (difference.name) }
                                 @for value in [difference.largest, difference.at, difference.rms, difference.relative] { (number(value)) }
+                                td.number { (difference.rows) }
                             }
                         }
                     }
@@ -251,16 +302,10 @@ fn differences(compared: &Compared, other: &str) -> Markup {
             }
             p.said {
                 "This run minus the other one, at the rows of this run; between its rows the other one is interpolated \
-                 linearly, integers and Booleans are held."
+                 linearly, integers and Booleans are held. The rms is over the rows at which one of the runs has a value."
             }
         }
     }
-}
-
-fn listed(names: &[String]) -> String {
-    let more = names.len().saturating_sub(LISTED);
-    let shown = names.iter().take(LISTED).cloned().collect::<Vec<_>>().join(", ");
-    if more > 0 { format!("{shown} and {more} more") } else { shown }
 }
 
 fn system(run: &Run) -> Markup {

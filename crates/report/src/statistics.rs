@@ -15,13 +15,24 @@ pub struct Statistics {
     pub smallest: (f64, f64),
     /// The largest value, and its time in s.
     pub largest: (f64, f64),
-    /// The mean over time: the integral by the trapezoidal rule (held values for integers and Booleans),
-    /// divided by the length of the run.
+    /// The mean over [`Statistics::basis`].
     pub mean: f64,
-    /// The root of the mean over time of the square, by the same rule.
+    /// The root of the mean of the square over [`Statistics::basis`].
     pub rms: f64,
-    /// The number of values that are not finite.
+    /// What mean and rms are over.
+    pub basis: Basis,
+    /// The number of rows without a finite value.
     pub not_finite: u64,
+}
+
+/// What a mean is over.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Basis {
+    /// Time, of this length in s: the integral by the trapezoidal rule (held values for integers and Booleans),
+    /// divided by the length.
+    Time(f64),
+    /// This number of finite values, each with the same weight: some rows have none, or the time does not advance.
+    Values(u64),
 }
 
 /// Collects the statistics of a variable row by row.
@@ -30,8 +41,11 @@ pub(crate) struct Builder {
     holds: bool,
     before: Option<(f64, f64)>,
     length: f64,
-    integral: f64,
-    integral_of_square: f64,
+    /// Integrals of the value and of its square.
+    integrals: [f64; 2],
+    /// Number of finite values, their sum and that of their squares.
+    count: u64,
+    sums: [f64; 2],
 }
 
 impl Builder {
@@ -44,27 +58,21 @@ impl Builder {
             largest: (nan, nan),
             mean: nan,
             rms: nan,
+            basis: Basis::Values(0),
             not_finite: 0,
         };
         let holds = crate::holds(column);
-        Self {
-            statistics,
-            holds,
-            before: None,
-            length: 0.0,
-            integral: 0.0,
-            integral_of_square: 0.0,
-        }
+        let (integrals, sums) = ([0.0; 2], [0.0; 2]);
+        Self { statistics, holds, before: None, length: 0.0, integrals, count: 0, sums }
     }
 
     pub(crate) fn push(&mut self, time: f64, value: f64) {
         if !(value.is_finite() && time.is_finite()) {
             self.statistics.not_finite += 1;
-            self.before = None;
             return;
         }
         let statistics = &mut self.statistics;
-        if statistics.first.is_nan() {
+        if self.count == 0 {
             (statistics.first, statistics.smallest, statistics.largest) =
                 (value, (value, time), (value, time));
         }
@@ -75,23 +83,68 @@ impl Builder {
         if value > statistics.largest.0 {
             statistics.largest = (value, time);
         }
+        self.count += 1;
+        let powers = [value, value * value];
         if let Some((at, old)) = self.before {
-            let (step, end) = ((time - at).max(0.0), if self.holds { old } else { value });
+            let (step, olds) = ((time - at).max(0.0), [old, old * old]);
             self.length += step;
-            self.integral += step * (0.5 * old + 0.5 * end);
-            self.integral_of_square += step * (0.5 * old * old + 0.5 * end * end);
+            for power in 0..2 {
+                let end = if self.holds { olds[power] } else { powers[power] };
+                self.integrals[power] += step * (0.5 * olds[power] + 0.5 * end);
+            }
         }
+        self.sums = [0, 1].map(|power| self.sums[power] + powers[power]);
         self.before = Some((time, value));
     }
 
     pub(crate) fn finish(self) -> Statistics {
-        let Self { mut statistics, length, integral, integral_of_square, .. } = self;
-        if length > 0.0 {
-            (statistics.mean, statistics.rms) =
-                (integral / length, (integral_of_square / length).sqrt());
+        let Self { mut statistics, length, integrals, count, sums, .. } = self;
+        let (basis, [mean, square]) = if length > 0.0 && statistics.not_finite == 0 {
+            (Basis::Time(length), integrals.map(|integral| integral / length))
         } else {
-            (statistics.mean, statistics.rms) = (statistics.last, statistics.last.abs());
-        }
+            #[expect(clippy::cast_precision_loss, reason = "fewer than 2^53 values")]
+            let number = count as f64;
+            (Basis::Values(count), sums.map(|sum| sum / number))
+        };
+        (statistics.mean, statistics.rms, statistics.basis) = (mean, square.sqrt(), basis);
         statistics
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use results::ColumnKind;
+
+    use super::*;
+
+    fn statistics(kind: ColumnKind, values: &[f64]) -> Statistics {
+        let column = Column { name: "x".to_owned(), kind, unit: None, clocked: false };
+        let mut builder = Builder::new(&column);
+        for (time, value) in (0_u32..).zip(values) {
+            builder.push(f64::from(time), *value);
+        }
+        builder.finish()
+    }
+
+    #[test]
+    fn values_between_empty_cells_have_the_same_weight() {
+        let gap = f64::NAN;
+        let values = [10.0, gap, 20.0, gap, 30.0, gap, 40.0];
+        for kind in [ColumnKind::Real, ColumnKind::Integer] {
+            let found = statistics(kind, &values);
+            assert_eq!((found.mean, found.rms), (25.0, 750.0_f64.sqrt()));
+            assert_eq!((found.basis, found.not_finite), (Basis::Values(4), 3));
+        }
+        assert!(statistics(ColumnKind::Real, &[gap]).mean.is_nan());
+    }
+
+    #[test]
+    fn without_empty_cells_the_mean_is_over_time() {
+        let found = statistics(ColumnKind::Real, &[0.0, 3.0, 3.0]);
+        assert_eq!((found.mean, found.basis), (2.25, Basis::Time(2.0)));
+        let held = statistics(ColumnKind::Integer, &[0.0, 3.0, 3.0]);
+        assert_eq!((held.mean, held.basis), (1.5, Basis::Time(2.0)));
+        let single = statistics(ColumnKind::Real, &[-2.0]);
+        assert_eq!((single.mean, single.rms, single.basis), (-2.0, 2.0, Basis::Values(1)));
     }
 }

@@ -123,9 +123,11 @@ class LinkedAxis {
 
   /* Draws a plot into an element. `data`: the places, then the values of each curve; null is a gap, undefined is
      bridged. `curves`: name, colour, and optionally width, dash, `holds`, `dots`. `marks`: `x` or `y`, colour, dash.
-     `scale` enlarges lines and text, for a picture that is shown smaller. */
+     `scale` enlarges lines and text, for a picture that is shown smaller. `reader` is for data that are thinned: its
+     function `text` returns what the legend shows of a curve (0: the place), `points` the indices of points that are
+     drawn without a line, `isLine` whether lines are drawn, and `follow` is called when the cursor moves. */
   plot(element, data, { label, height, curves, marks = [], isLogarithmic = false, fromZero = false, write = String,
-    name = "", scale = 1 }) {
+    name = "", scale = 1, reader = null }) {
     const text = (size) => `${size * scale}px system-ui, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif`;
     const grid = { stroke: colour("--grid"), width: scale };
     const common = { stroke: colour("--text"), grid, ticks: { ...grid, size: 5 * scale }, font: text(12),
@@ -138,14 +140,21 @@ class LinkedAxis {
         splits: (self, index, low, high) => ticks.places(low, high, most(self), isLog),
         values: (self, places) => ticks.labels(places, ...ends(self), most(self), isLog) };
     };
-    const cell = (self, value) => (value === null || value === undefined ? "–" : write(value));
+    const cell = reader === null
+      ? (self, value) => (value === null || value === undefined ? "–" : write(value))
+      : (self, value, curve) => reader.text(self, curve);
+    const line = ({ dots, holds }) => {
+      if (dots) return () => null;
+      const paths = holds ? uPlot.paths.stepped({ align: 1 }) : uPlot.paths.linear();
+      return reader === null ? paths : (self, ...rest) => (reader.isLine(self) ? paths(self, ...rest) : null);
+    };
     const options = {
       width: (element.clientWidth || 800) * scale,
       height: height * scale,
       padding: [8 * scale, 12 * scale, 0, 0],
       scales: {
         x: { time: false, distr: this.isLogarithmic ? 3 : 1, range: (self, low, high) => [low, high] },
-        y: { distr: isLogarithmic ? 3 : 1, range: (self, low, high) => this.vertical(low, high, isLogarithmic, fromZero) },
+        y: { distr: isLogarithmic ? 3 : 1, range: (self, low, high) => this.vertical(low, high, isLogarithmic, fromZero, self) },
       },
       axes: [
         { ...axis(true, this.isLogarithmic), label: this.label, labelSize: 20 * scale, size: 30 * scale },
@@ -158,7 +167,7 @@ class LinkedAxis {
         drag: { x: true, y: false, setScale: false, dist: 3 },
         bind: { dblclick: () => () => this.show(null) },
         move: (self, left, top) => (left > self.over.clientWidth + 1 ? [-10, -10] : [left, top]),
-        dataIdx: closest,
+        ...(reader === null ? { dataIdx: closest } : { points: { show: false } }),
       },
       legend: { markers: { dash: (self, k) => (curves[k - 1].dash === undefined ? "solid" : "dashed") } },
       series: [
@@ -169,13 +178,15 @@ class LinkedAxis {
           width: (curve.width ?? 1.6) * scale,
           dash: curve.dash?.map((length) => length * scale),
           spanGaps: false,
-          points: { show: curve.dots ?? false, size: 5 * scale, fill: colour(curve.colour) },
-          paths: curve.dots ? () => null : curve.holds ? uPlot.paths.stepped({ align: 1 }) : uPlot.paths.linear(),
+          points: { show: curve.dots ?? false, size: 5 * scale, fill: colour(curve.dash === undefined ? curve.colour : "--page"),
+            filter: reader === null || curve.dots ? null : reader.points },
+          paths: line(curve),
           value: cell,
         })),
       ],
       hooks: {
         drawAxes: [(self) => drawMarks(self, marks, scale)],
+        setCursor: reader === null ? [] : [reader.follow],
         setSelect: [(self) => {
           const { left, width } = self.select;
           if (width > 2) this.show([left, left + width].map((place) => self.posToVal(place, "x")));

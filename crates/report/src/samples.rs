@@ -1,0 +1,144 @@
+//! The rows of a plot: all of a short run; of a longer one those with the extremes of the curves.
+
+/// Rows of some columns.
+#[derive(Debug, Default)]
+pub(crate) struct Samples {
+    pub(crate) time: Vec<f64>,
+    /// The values of each column, as many as there are times.
+    pub(crate) columns: Vec<Vec<f64>>,
+    /// The number of rows of which these are some.
+    pub(crate) total: usize,
+}
+
+/// Collects the rows of a plot one by one.
+///
+/// Of each block of neighbouring rows remain whole rows: those at which a column is lowest or highest, those at which
+/// the difference of a pair of columns is, and the first and the last one at which a column has no value. The first
+/// and the last row remain, too.
+pub(crate) struct Collector {
+    samples: Samples,
+    block: Samples,
+    /// Number of rows of a block; all rows remain if it is 1.
+    length: usize,
+    /// Whether the second half of the columns is subtracted from the first one.
+    is_paired: bool,
+    is_last: bool,
+}
+
+impl Collector {
+    pub(crate) fn new(columns: usize, length: usize, is_paired: bool) -> Self {
+        let empty = || Samples { columns: vec![Vec::new(); columns], ..Samples::default() };
+        Self { samples: empty(), block: empty(), length, is_paired, is_last: false }
+    }
+
+    /// The largest number of rows that remain of a block, but for the first and the last one of all.
+    pub(crate) fn remaining(columns: usize, is_paired: bool, has_gaps: bool) -> usize {
+        let curves = if is_paired { columns + columns / 2 } else { columns };
+        curves * if has_gaps { 4 } else { 2 }
+    }
+
+    pub(crate) fn push(&mut self, time: f64, values: impl Iterator<Item = f64>) {
+        let samples = if self.length > 1 { &mut self.block } else { &mut self.samples };
+        samples.time.push(time);
+        samples.columns.iter_mut().zip(values).for_each(|(column, value)| column.push(value));
+        self.samples.total += 1;
+        if self.length > 1 && self.block.time.len() == self.length {
+            self.reduce();
+        }
+    }
+
+    pub(crate) fn finish(mut self) -> Samples {
+        self.is_last = true;
+        self.reduce();
+        self.samples
+    }
+
+    /// Moves rows of the block to the samples.
+    fn reduce(&mut self) {
+        let rows = self.block.time.len();
+        let mut remains = vec![false; rows];
+        let mut mark = |row: Option<usize>| {
+            row.and_then(|row| remains.get_mut(row))
+                .into_iter()
+                .for_each(|remains| *remains = true);
+        };
+        if self.samples.time.is_empty() {
+            mark(Some(0));
+        }
+        if self.is_last {
+            mark(rows.checked_sub(1));
+        }
+        for column in &self.block.columns {
+            extremes(column.iter().copied()).into_iter().for_each(&mut mark);
+        }
+        if self.is_paired {
+            let (these, others) = self.block.columns.split_at(self.block.columns.len() / 2);
+            for (one, other) in these.iter().zip(others) {
+                let difference = one.iter().zip(other).map(|(one, other)| one - other);
+                extremes(difference).into_iter().for_each(&mut mark);
+            }
+        }
+        let move_rows = |from: &mut Vec<f64>, to: &mut Vec<f64>| {
+            to.extend(
+                from.drain(..)
+                    .zip(&remains)
+                    .filter_map(|(value, remains)| remains.then_some(value)),
+            );
+        };
+        move_rows(&mut self.block.time, &mut self.samples.time);
+        for (from, to) in self.block.columns.iter_mut().zip(&mut self.samples.columns) {
+            move_rows(from, to);
+        }
+    }
+}
+
+/// Returns the rows of the lowest and the highest value, and the first and the last row without a finite value.
+fn extremes(values: impl Iterator<Item = f64> + Clone) -> [Option<usize>; 4] {
+    let finite = || values.clone().enumerate().filter(|(_, value)| value.is_finite());
+    let mut gaps = values.clone().enumerate().filter(|(_, value)| !value.is_finite());
+    let lowest = finite().min_by(|one, other| one.1.total_cmp(&other.1));
+    let highest = finite().max_by(|one, other| one.1.total_cmp(&other.1));
+    let first = gaps.next();
+    let last = gaps.last();
+    [lowest, highest, first, last].map(|row| row.map(|(row, _)| row))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_rows_with_the_extremes_of_each_column_and_of_the_difference_remain() {
+        let mut collector = Collector::new(2, 100, true);
+        for row in 0_u32..1000 {
+            let wave = (f64::from(row) * 0.1).sin();
+            let (one, other) = match row {
+                345 => (9.0, wave),
+                678 => (wave, f64::NAN),
+                777 => (0.9, -0.9),
+                _ => (wave, wave),
+            };
+            collector.push(f64::from(row), [one, other].into_iter());
+        }
+        let samples = collector.finish();
+        assert_eq!(
+            (samples.total, samples.time[0], samples.time.last()),
+            (1000, 0.0, Some(&999.0))
+        );
+        assert!(samples.time.len() < 120, "{}", samples.time.len());
+        assert!(samples.time.is_sorted());
+        for time in [345.0, 678.0, 777.0] {
+            assert!(samples.time.contains(&time), "{time}");
+        }
+        let at = samples.time.partition_point(|time| *time < 345.0);
+        assert_eq!((samples.columns[0][at], samples.columns[1][at]), (9.0, 34.5_f64.sin()));
+    }
+
+    #[test]
+    fn a_block_of_one_row_keeps_all() {
+        let mut collector = Collector::new(1, 1, false);
+        (0..5).for_each(|row| collector.push(f64::from(row), [f64::NAN].into_iter()));
+        let samples = collector.finish();
+        assert_eq!((samples.time.len(), samples.total, samples.columns[0].len()), (5, 5, 5));
+    }
+}
