@@ -7,6 +7,7 @@
 
 * :func:`simulate` runs one FMU, :class:`System` connects several.
 * :class:`Results` holds the rows of a run for NumPy, Arrow, pandas, polars and xarray.
+* :func:`report` writes the report of a run, as a page with interactive plots.
 * :func:`design` designs a fault-tolerant controller.
 * :func:`check` and :func:`read_model_description` look at an FMU; :func:`compile` builds its library.
 """
@@ -34,6 +35,7 @@ from ._errors import (
     TimeLimitError,
 )
 from ._paper import fmus, paper, reproduce
+from ._report import report
 from ._results import Results
 from ._simulate import CheckReport, check, compile, simulate
 from ._slave import Slave
@@ -72,6 +74,7 @@ __all__ = [
     "fmus",
     "paper",
     "read_model_description",
+    "report",
     "reproduce",
     "simulate",
 ]

@@ -110,3 +110,17 @@ def test_a_picture_has_a_panel_for_each_unit(results):
     pytest.importorskip("matplotlib").use("Agg")
     figure = results.plot("plant.x_p", "plant.theta", "controller.x_p")
     assert [axes.get_ylabel() for axes in figure.axes] == ["m", "rad"]
+
+
+def test_a_report_is_a_page_of_a_file_of_any_program(results, tmp_path):
+    own, other = tmp_path / "own.parquet", tmp_path / "other.csv"
+    results.to_parquet(own)
+    other.write_text("time;plant.x_p\n0,0;1,5\n0,1;1,25\n", encoding="utf-8")
+    page = af.report(own, against=other, variables=["plant.x_p"], stop_time=0.05)
+    text = page.read_text(encoding="utf-8")
+    assert page == tmp_path / "own.html" and "plant.x_p" in text and "plant.theta" not in text
+    assert af.report(other, out=tmp_path / "page.html") == tmp_path / "page.html"
+    other.write_text("time,x\n1,0\n0,0\n", encoding="utf-8")
+    with pytest.raises(af.ResultsError, match="line 3: time is 0 after 1") as raised:
+        af.report(other)
+    assert raised.value.kind == "Report"
