@@ -229,7 +229,7 @@ impl View<'_> {
     ) -> Result<(), ResultsError> {
         let (from, to) = self.range;
         self.table.visit(positions, &mut |time, row| {
-            if from <= time && time <= to {
+            if (from..=to).contains(&time) {
                 visitor(time, row);
             }
         })

@@ -95,9 +95,9 @@ impl Collector {
 /// Returns the rows of the lowest and the highest value, and the first and the last row without a finite value.
 fn extremes(values: impl Iterator<Item = f64> + Clone) -> [Option<usize>; 4] {
     let finite = || values.clone().enumerate().filter(|(_, value)| value.is_finite());
-    let mut gaps = values.clone().enumerate().filter(|(_, value)| !value.is_finite());
     let lowest = finite().min_by(|one, other| one.1.total_cmp(&other.1));
     let highest = finite().max_by(|one, other| one.1.total_cmp(&other.1));
+    let mut gaps = values.enumerate().filter(|(_, value)| !value.is_finite());
     let first = gaps.next();
     let last = gaps.last();
     [lowest, highest, first, last].map(|row| row.map(|(row, _)| row))

@@ -88,9 +88,9 @@ impl Builder {
         if let Some((at, old)) = self.before {
             let (step, olds) = ((time - at).max(0.0), [old, old * old]);
             self.length += step;
-            for power in 0..2 {
-                let end = if self.holds { olds[power] } else { powers[power] };
-                self.integrals[power] += step * (0.5 * olds[power] + 0.5 * end);
+            let ends = if self.holds { olds } else { powers };
+            for ((integral, old), end) in self.integrals.iter_mut().zip(olds).zip(ends) {
+                *integral += step * (0.5 * old + 0.5 * end);
             }
         }
         self.sums = [0, 1].map(|power| self.sums[power] + powers[power]);

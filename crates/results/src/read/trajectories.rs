@@ -156,7 +156,10 @@ impl<'a> Source<'a> {
     /// Reads the columns of a matrix of texts.
     fn texts(&mut self, matrix: &Matrix) -> Result<Vec<String>, ResultsError> {
         let signs = self.numbers(matrix)?;
-        Ok(signs.chunks(matrix.rows.max(1)).map(|signs| text(signs.iter().map(sign))).collect())
+        Ok(signs
+            .chunks(matrix.rows.max(1))
+            .map(|signs| text(signs.iter().copied().map(sign)))
+            .collect())
     }
 }
 
@@ -169,8 +172,8 @@ fn integer(bytes: &[u8]) -> u32 {
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a sign of a text")]
-fn sign(number: &f64) -> u8 {
-    *number as u8
+fn sign(number: f64) -> u8 {
+    number as u8
 }
 
 /// Returns a text without the zeros and spaces at its end.
@@ -231,7 +234,7 @@ pub(super) fn columns(path: &Path) -> Result<(Layout, Vec<Column>), ResultsError
 
 /// Checks the four lines of `Aclass`, which are the rows of a matrix of signs.
 fn check_class(signs: &[f64]) -> Result<(), String> {
-    let line = |row: usize| text(signs.iter().skip(row).step_by(4).map(sign));
+    let line = |row: usize| text(signs.iter().skip(row).step_by(4).copied().map(sign));
     match (line(0).as_str(), line(3).as_str()) {
         ("Atrajectory", "binTrans") => Ok(()),
         (class, layout) => Err(format!("its class is {class:?} and its layout {layout:?}")),
