@@ -4,7 +4,7 @@
 //! guards a call gets copies, which are compared after it; without, it gets the arrays themselves.
 #![expect(unsafe_code, reason = "arrays as bytes")]
 
-use std::ffi::{c_char, c_int};
+use std::ffi::c_int;
 
 use slave::Failure;
 
