@@ -1,20 +1,31 @@
-//! Reads the design of the controller FMU, so that the page needs no code that reads TOML, and sets an option
-//! of the linker.
+//! Writes the design of the controller FMU as Rust, so that the module needs no code that reads a design, and
+//! sets an option of the linker.
 
 use std::error::Error;
 use std::path::Path;
 use std::{env, fs};
 
+use aso_controller::Design;
 use controller::AsoController;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let file = "../fmu-controller/resources/design.toml";
     println!("cargo:rerun-if-changed={file}");
-    let design = AsoController::bytes_of_design(&fs::read_to_string(file)?)?;
-    fs::write(Path::new(&env::var("OUT_DIR")?).join("design"), design)?;
+    let design = AsoController::parse_design(&fs::read_to_string(file)?)?;
+    fs::write(Path::new(&env::var("OUT_DIR")?).join("design.rs"), expression(&design))?;
     if env::var("CARGO_CFG_TARGET_FAMILY")? == "wasm" {
         // Indices of functions and addresses in as few bytes as each needs.
         println!("cargo:rustc-cdylib-link-arg=--compress-relocations");
     }
     Ok(())
+}
+
+/// The design as a Rust expression: its debug text, in which lists are `Vec`s and texts are `String`s. What is
+/// neither does not compile.
+fn expression(design: &Design) -> String {
+    let text = format!("{design:?}");
+    let parts = text.split('"').enumerate().map(|(k, part)| {
+        if k % 2 == 1 { format!("\"{part}\".to_owned()") } else { part.replace('[', "vec![") }
+    });
+    parts.collect()
 }

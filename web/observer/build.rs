@@ -10,8 +10,8 @@ use controller::AsoController;
 fn main() -> Result<(), Box<dyn Error>> {
     let file = "../../fmu-controller/resources/design.toml";
     println!("cargo:rerun-if-changed={file}");
-    let design = AsoController::bytes_of_design(&fs::read_to_string(file)?)?;
-    let [a, b, c, f_a] = AsoController::from_bytes(&design)?.plant();
+    let design = AsoController::parse_design(&fs::read_to_string(file)?)?;
+    let [a, b, c, f_a] = AsoController::of_design(design).plant();
     let plant = FaultyPlant::with_constant_faults(a, b, c, f_a);
     // Here, so that the module needs no code for a plant without an observer.
     plant.check_observer_exists()?;

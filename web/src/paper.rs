@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use aso_controller::Design;
 use controller::AsoController;
 use fmu::description::{Experiment, Kind};
 use master::{AlgorithmRequest, KeptState, Port, Probe, Simulation, System, Value, choose};
@@ -12,7 +13,11 @@ use crate::settings::{Settings, told};
 use crate::text;
 
 /// The design that the controller FMU contains.
-const DESIGN: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/design"));
+fn design() -> Design {
+    use aso_controller::Matrix;
+    use aso_controller::design::{Actuator, Defaults, Fault, Signal};
+    include!(concat!(env!("OUT_DIR"), "/design.rs"))
+}
 
 /// The variables of a row, after the time.
 pub const COLUMNS: [&str; 8] = [
@@ -59,10 +64,9 @@ impl Paper {
         let mut system = System::default();
         let plant = LinkedSlave::new(model::<FrictionPendulum>()?);
         let plant = plant.map_err(|failure| failure.to_string())?;
-        let controller =
-            AsoController::from_bytes(DESIGN).map_err(|failure| failure.to_string())?;
+        let controller = LinkedSlave::new(AsoController::of_design(design()));
+        let controller = controller.map_err(|failure| failure.to_string())?;
         let settings = Settings::parse(settings)?;
-        let controller = LinkedSlave::new(controller).map_err(|failure| failure.to_string())?;
         system.add("plant", Box::new(plant)).map_err(told)?;
         system.add("controller", Box::new(controller)).map_err(told)?;
         system.connect_equal_names().map_err(told)?;

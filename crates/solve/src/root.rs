@@ -44,7 +44,9 @@ impl Bracket {
         let least = 4.0 * f64::EPSILON * left.0.abs().max(right.0.abs());
         let width = if width > least { width } else { least };
         let halvings = (whole / width).log2().ceil().max(0.0);
-        let radius = 0.5 * width * (halvings + 1.0).exp2();
+        // A power of two, exactly.
+        #[expect(clippy::cast_possible_truncation, reason = "below 2100")]
+        let radius = width * 2.0_f64.powi(halvings as i32);
         Some(Self { left, right, width, truncation: 0.2 / whole, radius, gap: None })
     }
 
