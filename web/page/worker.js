@@ -1,33 +1,40 @@
 "use strict";
-// Runs the WebAssembly module. Messages in: {kind: "start" | "run" | "pause" | "step" | "back" | "set", ..}.
-// Messages out: {kind: "ready" | "started" | "rows" | "set" | "back" | "refused" | "failed" | "stopped", ..}.
+// Runs the WebAssembly module. Messages in: {kind: "start" | "run" | "pause" | "step" | "back" | "set" | "until", ..}.
+// Messages out: {kind: "ready" | "started" | "running" | "rows" | "set" | "back" | "refused" | "failed" | "stopped", ..},
+// with the number of the run.
 const EVERY = 10; // steps between two rows
+const MOST_ROWS = 1e6;
+const COLUMNS = 9; // of a row: time, x_p, ..
+const FARTHEST = 1000; // m; a lost cart is not computed farther
 const FRAME = 16; // ms between two turns
-const SAVE_EVERY = 0.5; // s of simulated time between two kept states
+const SAVE_EVERY = 0.5; // s of simulated time between two saved states
 
 let wasm = null;
 let timer = null;
-let run = null; // {step, speed, saved, due, spent, last}
+let run = null; // {number, step, every, moves, plan, speed, batch, saved, due, spent, last, ended}
 
 const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
 
-// The functions of a module. It reads numbers by the imported one.
-async function load(file) {
+// The functions of a module, a file or a compiled one. It reads numbers by the imported one.
+async function load(source) {
   let memory = null;
   const number = (place, length) => {
     const text = new TextDecoder().decode(new Uint8Array(memory.buffer, place, length)).trim();
     return NUMBER.test(text) ? Number(text) : NaN;
   };
-  const imports = { page: { number } };
-  const { instance } = await WebAssembly.instantiateStreaming(fetch(file), imports).catch(async () =>
-    // A server that does not name the type of the file.
-    WebAssembly.instantiate(await (await fetch(file)).arrayBuffer(), imports));
-  memory = instance.exports.memory;
-  return instance.exports;
+  // A server that does not name the type of the file needs the second way.
+  const module = source instanceof WebAssembly.Module ? source : await WebAssembly.compileStreaming(fetch(source))
+    .catch(async () => WebAssembly.compile(await (await fetch(source)).arrayBuffer()));
+  const { exports } = await WebAssembly.instantiate(module, { page: { number } });
+  memory = exports.memory;
+  return { exports, module };
 }
 
-const loaded = load("paper.wasm");
 let observer = null; // the module that places eigenvalues, loaded when they are set
+
+function answer(message, transfer = []) {
+  postMessage({ ...message, run: run?.number }, transfer);
+}
 
 function write(text, to = wasm) {
   const bytes = new TextEncoder().encode(text);
@@ -45,29 +52,50 @@ function pause() {
   timer = null;
 }
 
-// Sends the rows that the module keeps.
+// Sends the rows that the module keeps; whether the cart is still near.
 function send() {
   const rows = new Float64Array(wasm.memory.buffer, wasm.rows(), wasm.rows_length()).slice();
-  if (rows.length > 0) postMessage({ kind: "rows", rows }, [rows.buffer]);
+  const isNear = rows.length === 0 || Math.abs(rows.at(1 - COLUMNS)) < FARTHEST;
+  if (rows.length > 0) answer({ kind: "rows", rows }, [rows.buffer]);
+  return isNear;
 }
 
-// Makes `count` steps and sends their rows.
+function change(line) {
+  write(line);
+  if (wasm.set() !== 0) answer({ kind: "refused", text: read(), line });
+  else answer({ kind: "set", line, at: wasm.time() });
+}
+
+// Whether a time is reached, as the command compares times.
+function reached(at) {
+  const time = wasm.time();
+  return time >= at - 1e-9 * Math.max(Math.abs(time), Math.abs(at));
+}
+
+// Makes `count` steps, with the changes that are planned, and sends their rows.
 function advance(count) {
-  const status = wasm.advance(count, EVERY);
-  send();
-  if (status !== 0) {
-    pause();
-    postMessage({ kind: "failed", text: read() });
-  } else if (wasm.is_finished()) {
-    pause();
-    postMessage({ kind: "stopped", spent: run.spent });
+  let left = count;
+  while (left > 0 && !run.ended) {
+    while (run.plan.length > 0 && reached(run.plan[0].at)) change(run.plan.shift().line);
+    const next = run.plan.length > 0 ? Math.ceil((run.plan[0].at - wasm.time()) / run.step - 1e-6) : Infinity;
+    const part = Math.max(1, Math.min(left, next));
+    const status = wasm.advance(part, run.every);
+    left -= part;
+    const isNear = send();
+    if (status !== 0 || wasm.is_finished() || !isNear) {
+      pause();
+      run.ended = true;
+      if (status !== 0) answer({ kind: "failed", text: read() });
+      else if (wasm.is_finished()) answer({ kind: "stopped", spent: run.spent });
+      else answer({ kind: "failed", text: `the cart is ${FARTHEST} m away.` });
+    }
   }
 }
 
 function save() {
   if (wasm.time() >= run.saved + SAVE_EVERY) {
     run.saved = wasm.time();
-    if (wasm.save() !== 0) postMessage({ kind: "refused", text: read() });
+    wasm.save();
   }
 }
 
@@ -76,15 +104,18 @@ function turn() {
   timer = setTimeout(turn, FRAME);
   const begin = performance.now();
   const whole = run.speed === Infinity;
-  const wanted = whole ? Infinity : ((begin - run.last) / 1000) * run.speed / run.step + run.due;
+  const due = whole ? Infinity : ((begin - run.last) / 1000) * run.speed / run.step + run.due;
   run.last = begin;
-  let left = wanted;
+  let left = due;
   const budget = whole ? 40 : 12;
   while (timer !== null && left >= 1 && performance.now() - begin < budget) {
-    const count = Math.min(left, 500);
+    const count = Math.floor(Math.min(left, run.batch));
+    const started = performance.now();
     save();
-    advance(Math.floor(count));
-    left -= Math.floor(count);
+    advance(count);
+    left -= count;
+    // Steps of a lost cart are slow.
+    run.batch = performance.now() - started < 6 ? 500 : 20;
   }
   // A machine that is too slow does not save up steps.
   run.due = Number.isFinite(left) ? Math.min(left, 1) : 0;
@@ -96,83 +127,88 @@ function turn() {
 }
 
 const actions = {
-  async start({ settings, eigenvalues, step, stop }) {
+  // The second worker gets the module that the first one compiled.
+  async load({ module }) {
+    const loaded = await load(module ?? "paper.wasm");
+    wasm = loaded.exports;
+    answer({ kind: "ready", module: loaded.module });
+  },
+  async start({ number, settings, eigenvalues, gains, step, stop, plan }) {
     pause();
-    run = null;
-    let gains = "";
+    run = { number, step, every: EVERY * Math.ceil(stop / step / EVERY / MOST_ROWS), moves: plan, plan: [...plan], speed: 1, batch: 500, saved: 0, due: 0, spent: 0, last: 0, ended: true };
+    let placed = gains;
     if (eigenvalues !== null) {
-      observer ??= await load("observer.wasm");
+      observer ??= (await load("observer.wasm")).exports;
       write(eigenvalues, observer);
       const refused = observer.place() !== 0;
-      gains = read(observer);
+      placed = read(observer);
       if (refused) {
-        postMessage({ kind: "refused", text: gains });
+        answer({ kind: "refused", text: placed, setting: "eigenvalues" });
         return;
       }
     }
-    write(`${settings}\n${gains}`);
+    write(`${settings}\n${placed}`);
     if (wasm.start(step, stop) !== 0) {
-      postMessage({ kind: "refused", text: read() });
+      answer({ kind: "refused", text: read(), setting: "" });
       return;
     }
-    run = { step, speed: 1, saved: 0, due: 0, spent: 0, last: 0 };
-    postMessage({ kind: "started", gains });
+    run.ended = false;
+    answer({ kind: "started", gains: placed, every: run.every });
     send();
     wasm.save();
   },
   run({ speed }) {
-    if (!run || wasm.is_finished()) return;
+    if (!run || run.ended) return;
     pause();
     run.speed = speed;
     run.last = performance.now();
+    answer({ kind: "running" });
     turn();
   },
   pause,
   step() {
     pause();
-    if (run && !wasm.is_finished()) {
+    if (run && !run.ended) {
       save();
-      advance(EVERY);
+      advance(run.every);
     }
+  },
+  // Follows another run.
+  until({ at }) {
+    while (run && !run.ended && !reached(at)) advance(run.every);
   },
   back() {
     pause();
     if (!run) return;
     if (wasm.back() !== 0) {
-      postMessage({ kind: "refused", text: read() });
+      answer({ kind: "refused", text: read() });
       return;
     }
     run.saved = -Infinity;
-    postMessage({ kind: "back", at: wasm.time() });
+    run.ended = false;
+    run.plan = run.moves.filter(({ at }) => at >= wasm.time());
+    answer({ kind: "back", at: wasm.time() });
   },
-  set({ settings }) {
+  // A change by hand ends the plan.
+  set({ line }) {
     if (!run) return;
-    for (const line of settings) {
-      write(line);
-      if (wasm.set() !== 0) postMessage({ kind: "refused", text: read() });
-      else postMessage({ kind: "set", line, at: wasm.time() });
-    }
+    run.moves = run.plan = [];
+    change(line);
   },
 };
 
 async function act(data) {
   try {
-    wasm ??= await loaded;
     await actions[data.kind](data);
   } catch (error) {
     pause();
     run = null;
-    wasm = null;
-    observer = null;
-    postMessage({ kind: "failed", text: `The module stopped: ${error.message}. Reload the page to go on.` });
+    answer({ kind: "failed", text: wasm ? `The module stopped: ${error.message}. Reload the page to go on.` : `paper.wasm cannot be loaded: ${error.message}` });
   }
 }
 
 // One after the other: a start waits for a module.
-let acted = Promise.resolve();
+let last = Promise.resolve();
 onmessage = ({ data }) => {
-  acted = acted.then(() => act(data));
+  last = last.then(() => act(data));
 };
-
-loaded.then(() => postMessage({ kind: "ready" }), (error) =>
-  postMessage({ kind: "failed", text: `paper.wasm cannot be loaded: ${error.message}` }));

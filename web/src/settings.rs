@@ -13,11 +13,11 @@ pub(crate) struct Settings {
     pub(crate) values: Vec<(String, String)>,
     /// Inputs and the faults on their connections, in this order.
     faults: Vec<(String, FaultKind, f64)>,
-    /// Time in s from which bias and gain act.
+    /// Time in s from which the faults act.
     from: f64,
 }
 
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy)]
 enum FaultKind {
     Bias,
     Gain,
@@ -32,8 +32,8 @@ impl Settings {
     /// plant.F_c=20                     a variable
     /// bias controller.theta=0.01       on the connection to this input, from the time `from` on
     /// gain plant.u=0.5                 the same
-    /// delay controller.theta=0.001     in s, always
-    /// noise controller.theta=1e-5      standard deviation, always
+    /// delay controller.theta=0.001     the same, in s
+    /// noise controller.theta=1e-5      the same, standard deviation
     /// from=50                          in s
     /// ```
     ///
@@ -86,7 +86,6 @@ impl Settings {
     }
 
     fn fault(&self, input: &str, place: usize, kind: FaultKind, value: f64) -> (Window, Fault) {
-        let from = if matches!(kind, FaultKind::Bias | FaultKind::Gain) { self.from } else { 0.0 };
         let fault = match kind {
             FaultKind::Bias => Fault::Bias(value),
             FaultKind::Gain => Fault::Gain(value),
@@ -96,7 +95,7 @@ impl Settings {
                 draw: RandomSeries::new(0, input, place as u64, None),
             },
         };
-        (Window { from, until: None }, fault)
+        (Window { from: self.from, until: None }, fault)
     }
 }
 

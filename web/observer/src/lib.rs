@@ -4,15 +4,15 @@
 #[path = "../../src/text.rs"]
 mod text;
 
-use control::placement::{place_balanced, real_poles};
+use control::placement::place_balanced;
 use files::sentence;
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 
 // The augmented plant: A_0 and C_0, column by column, and their sizes.
 include!(concat!(env!("OUT_DIR"), "/plant.rs"));
 
-/// Replaces the eigenvalues in the text buffer, real numbers in 1/s, by the gains: lines
-/// `controller.variable=value`. Returns 1, with a sentence in the buffer, if no observer has them.
+/// Replaces the eigenvalues in the text buffer, in 1/s, by the gains: lines `controller.variable=value`. An
+/// eigenvalue is `-900`, `-900+200i` or `-900±200i`, which is a pair. Returns 1, with a sentence in the buffer, if no observer has them.
 #[allow(unsafe_code, reason = "exported name")]
 #[unsafe(no_mangle)]
 pub extern "C" fn place() -> i32 {
@@ -21,19 +21,24 @@ pub extern "C" fn place() -> i32 {
 
 /// `L_x` and `L_f` for the eigenvalues, as settings of the controller FMU.
 fn gains(eigenvalues: &str) -> Result<String, String> {
-    let parts = eigenvalues.split([' ', ',']).filter(|part| !part.is_empty());
-    let number = |part: &str| {
-        text::number(part)
-            .ok_or_else(|| format!("eigenvalues={eigenvalues}: expected a number, found {part:?}"))
-    };
-    let eigenvalues = parts.map(number).collect::<Result<Vec<_>, _>>()?;
-    if let Some(slow) = eigenvalues.iter().find(|value| **value >= 0.0) {
-        return Err(format!("eigenvalue {slow} 1/s of the observer: expected below 0"));
+    let mut poles = Vec::new();
+    for part in eigenvalues.split([' ', ',']).filter(|part| !part.is_empty()) {
+        let read = parsed(part).ok_or_else(|| {
+            format!(
+                "eigenvalues={eigenvalues}: expected a number such as -900 or -900±200i, found {part:?}"
+            )
+        })?;
+        if read[0].re >= 0.0 {
+            return Err(format!(
+                "eigenvalue {part} 1/s of the observer: expected a real part below 0"
+            ));
+        }
+        poles.extend(read);
     }
     let order = STATES + FAULTS;
     let a_0 = DMatrix::from_column_slice(order, order, &DYNAMICS);
     let c_0 = DMatrix::from_column_slice(MEASUREMENTS, order, &OUTPUT);
-    let placed = place_balanced(&a_0.transpose(), &c_0.transpose(), &real_poles(&eigenvalues));
+    let placed = place_balanced(&a_0.transpose(), &c_0.transpose(), &poles);
     // A_0 - L C_0 has the eigenvalues, L = [L_x; -L_f].
     let l = -placed.map_err(|error| sentence(&error))?.gain.transpose();
     let named = [("L_x", l.rows(0, STATES).into_owned()), ("L_f", -l.rows(STATES, FAULTS))];
@@ -46,4 +51,21 @@ fn gains(eigenvalues: &str) -> Result<String, String> {
         }
     }
     Ok(lines)
+}
+
+/// One eigenvalue, or a pair for `±`.
+fn parsed(part: &str) -> Option<Vec<Complex<f64>>> {
+    let Some(complex) = part.strip_suffix(['i', 'j']) else {
+        return Some(vec![Complex::new(text::number(part)?, 0.0)]);
+    };
+    if let Some((real, imaginary)) = complex.split_once('±') {
+        let pole = Complex::new(text::number(real)?, text::number(imaginary)?);
+        return Some(vec![pole, pole.conj()]);
+    }
+    // The last sign that is not the sign of an exponent.
+    let bytes = complex.as_bytes();
+    let is_sign =
+        |k: &usize| matches!(bytes[*k], b'+' | b'-') && !matches!(bytes[k - 1], b'e' | b'E');
+    let (real, imaginary) = complex.split_at((1..bytes.len()).rfind(is_sign)?);
+    Some(vec![Complex::new(text::number(real)?, text::number(imaginary)?)])
 }
