@@ -48,15 +48,19 @@ class Column {
 
   // The same, by whole blocks where it can be.
   extremes(from, until) {
-    const { values } = this;
-    let [least, greatest] = [from, from];
-    for (let k = from; k < until;) {
-      const end = Math.min(until, k - (k % BLOCK) + BLOCK);
-      const [low, high] = end - k === BLOCK ? [this.least[k / BLOCK], this.greatest[k / BLOCK]] : this.scan(k, end);
+    const { values, least: lows, greatest: highs } = this;
+    let least = from;
+    let greatest = from;
+    const take = (low, high) => {
       if (!(values[low] >= values[least]) && values[low] === values[low]) least = low;
       if (!(values[high] <= values[greatest]) && values[high] === values[high]) greatest = high;
-      k = end;
-    }
+    };
+    const first = Math.ceil(from / BLOCK);
+    const last = Math.floor(until / BLOCK);
+    if (first >= last) return this.scan(from, until);
+    take(...this.scan(from, first * BLOCK));
+    for (let block = first; block < last; block += 1) take(lows[block], highs[block]);
+    if (last * BLOCK < until) take(...this.scan(last * BLOCK, until));
     return [least, greatest];
   }
 
