@@ -80,19 +80,18 @@ pub(crate) fn report(options: &Options) -> anyhow::Result<()> {
 /// Prints the largest difference, and what was not compared.
 fn compared(comparison: &Comparison, results: &Path, other: &Path) {
     let (here, there) = (results.display().to_string(), other.display().to_string());
-    match comparison.differences.first().filter(|_| !comparison.is_equal()) {
-        Some(largest) => println!(
+    if let Some(largest) = comparison.differences.first().filter(|_| !comparison.is_equal()) {
+        println!(
             "largest difference to {there}, relative to the range: {}, {:.6e} at t = {} s ({:.3e} of the range)",
             largest.name,
             largest.largest,
             seconds(largest.at),
             largest.relative
-        ),
-        None => {
-            let rows = counted(comparison.rows, "row");
-            let variables = counted(comparison.differences.len() as u64, "variable");
-            println!("no difference to {there} in {rows} of {variables}");
-        }
+        );
+    } else {
+        let rows = counted(comparison.rows, "row");
+        let variables = counted(comparison.differences.len() as u64, "variable");
+        println!("no difference to {there} in {rows} of {variables}");
     }
     for sentence in comparison.uncompared(&here, &there, LISTED) {
         println!("not compared: {sentence}");

@@ -33,15 +33,12 @@ enum Column {
 impl Columns {
     /// Adds a column and returns its number.
     pub(crate) fn add(&mut self, values: &[f64]) -> usize {
-        let (key, column) = match constant(values) {
-            Some(value) => (
-                format!("{value:?}"),
-                Column::Constant { constant: Some(value).filter(|value| !value.is_nan()) },
-            ),
-            None => {
-                let block = STANDARD.encode(compress_to_vec_zlib(&planes(values), LEVEL));
-                (block.clone(), Column::Block { block })
-            }
+        let (key, column) = if let Some(value) = constant(values) {
+            let constant = Some(value).filter(|value| !value.is_nan());
+            (format!("{value:?}"), Column::Constant { constant })
+        } else {
+            let block = STANDARD.encode(compress_to_vec_zlib(&planes(values), LEVEL));
+            (block.clone(), Column::Block { block })
         };
         *self.numbers.entry(key).or_insert_with(|| {
             self.list.push(column);

@@ -71,7 +71,8 @@ pub(crate) fn groups(
 pub(crate) struct Plots {
     /// The times of the rows that plots have.
     grids: Vec<Grid>,
-    plots: Vec<Plot>,
+    #[serde(rename = "plots")]
+    all: Vec<Plot>,
     columns: Columns,
 }
 
@@ -129,7 +130,7 @@ impl Plots {
             }
         });
         let curves = curves.collect();
-        self.plots.push(Plot { unit: group.unit.clone(), grid, curves });
+        self.all.push(Plot { unit: group.unit.clone(), grid, curves });
     }
 
     /// Adds the plots of the times between the frames of each message.
@@ -146,7 +147,7 @@ impl Plots {
                 other: None,
             });
             let curves = curves.collect();
-            self.plots.push(Plot { unit: "ms since the frame before".to_owned(), grid, curves });
+            self.all.push(Plot { unit: "ms since the frame before".to_owned(), grid, curves });
         }
     }
 

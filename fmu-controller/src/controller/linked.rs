@@ -20,6 +20,7 @@ impl AsoController {
     }
 
     /// The controller of a design that [`AsoController::parse_design`] has accepted.
+    #[must_use]
     pub fn of_design(design: Design) -> Self {
         Self::with(design)
     }
