@@ -149,13 +149,17 @@ def test_clang_compiles_it_without_warnings_and_with_the_same_bits(designed):
 
 
 @pytest.mark.skipif(not shutil.which("cppcheck"), reason="cppcheck is not installed")
-@pytest.mark.parametrize("name", ["sensor-fault", "scheduled-drive", "detection-window", "detection-isolation", "fall-back", "reconfiguration-detection",
-                                  "proportional-integral-sensor", "sliding-mode-detection", "feedthrough"])
+@pytest.mark.parametrize(
+    "name",
+    ["sensor-fault", "scheduled-drive", "detection-window", "detection-isolation", "fall-back", "reconfiguration-detection",
+     "proportional-integral-sensor", "sliding-mode-detection", "feedthrough"],
+)  # fmt: skip
 def test_the_c_code_follows_all_rules_of_misra_c_that_are_not_advisory(designed, name):
-    """The rules of MISRA C:2012 that cppcheck knows; advisory ones: unused macros of a design (2.5), tables outside of functions (8.9), the place of #include (20.1)."""
+    """Those of MISRA C:2012 that cppcheck knows. Advisory ones: unused macros (2.5), tables outside of functions (8.9), #include (20.1)."""
     own = designed(name)
     command = ["cppcheck", "--std=c99", "--addon=misra", "--quiet", "--enable=warning,style,performance,portability"]
-    found = subprocess.run([*command, "--template={id}", own.folder / "c" / f"{own.name}.c"], capture_output=True, text=True, check=True).stderr
+    source = own.folder / "c" / f"{own.name}.c"
+    found = subprocess.run([*command, "--template={id}", source], capture_output=True, text=True, check=True).stderr
     advisory = {"misra-c2012-2.5", "misra-c2012-8.9", "misra-c2012-20.1"}
     # The status starts without flags.
     assert set(found.split()) <= {*advisory, "badBitmaskCheck"}, found
