@@ -204,6 +204,12 @@ impl<'a> Cursor<'a> {
     }
 }
 
+/// Letters, `%` and `_`. The letters beyond ASCII are ranges, as the table of all letters would be a part of each FMU and of
+/// the page in the browser: the micro sign, Latin to Greek and beyond, ohm, kelvin and angstrom, Chinese and Japanese.
 fn in_name(character: char) -> bool {
-    character.is_alphabetic() || character == '%' || character == '_'
+    matches!(
+        character,
+        'A'..='Z' | 'a'..='z' | '%' | '_'
+            | '\u{b5}' | '\u{c0}'..='\u{1fff}' | '\u{2126}' | '\u{212a}' | '\u{212b}' | '\u{2e80}'..
+    )
 }
