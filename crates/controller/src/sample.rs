@@ -13,9 +13,8 @@
 //! x_i'   = T (r - H y + F_i f_hat) + L_w (u - v) + x_i v is u without limits
 //! ```
 //!
-//! (R. J. Patton and S. Klinkhieo, Actuator fault estimation and compensation based on an augmented state observer
-//! approach, Proceedings of the 48th IEEE Conference on Decision and Control, 2009, equations (2), (4), (5), (18) in their
-//! general form). A current estimator adds `L_x` e and `L_f` e to `x_hat` and `f_hat_i` before it computes u, and not
+//! (R. J. Patton and S. Klinkhieo, An Adaptive Approach to Active Fault-Tolerant Control, 2009, equations (2), (4), (5),
+//! (18), in their general form). A current estimator adds `L_x` e and `L_f` e to `x_hat` and `f_hat_i` before it computes u, and not
 //! after it. Without `P_f` the estimate `f_hat` is `f_hat_i`; each other term is there where the design states its matrix.
 //!
 //! Every sum has its terms in the order of its equation, so that the results have the bits of the controller FMU. Nothing

@@ -14,8 +14,8 @@
  *     y_f'   = y_f + W (y - y_f)
  *     x_i'   = x_i + T (r - H y + F_i f_hat) + L_w (u - v) v is u without limits
  *
- * (R. J. Patton and S. Klinkhieo, Actuator fault estimation and compensation based on an augmented state observer approach,
- * Proceedings of the 48th IEEE Conference on Decision and Control, 2009, equations (2), (4), (5), (18) in their general form.)
+ * (R. J. Patton and S. Klinkhieo, An Adaptive Approach to Active Fault-Tolerant Control, 2009, equations (2), (4), (5),
+ * (18), in their general form.)
  * A current estimator adds L_x e and L_f e to x_hat and f_hat before it computes u, and not after it.
  *
  * Each sum has its terms in the order of the equation that stands above it: the results have the bits of the controller FMU
