@@ -86,9 +86,9 @@ def test_the_controller_fmu_runs(made, tmp_path):
 def test_the_source_code_of_a_sampled_controller_is_written(tmp_path):
     own, _ = matrices()
     sampled = af.design({**own, "sample_time": 0.01})
-    header, source = sampled.controller.c_code(tmp_path / "c", single=True)
-    assert header.endswith(".h") and "float" in Path(source).read_text(encoding="ascii")
-    _, library = sampled.controller.rust_crate(tmp_path / "rust")
+    header, source, runtime = sampled.controller.c_code(tmp_path / "c", single=True)
+    assert header.endswith(".h") and runtime.endswith("aso_controller.h") and "float" in Path(source).read_text(encoding="ascii")
+    _, library, *_ = sampled.controller.rust_crate(tmp_path / "rust")
     assert "#![no_std]" in Path(library).read_text(encoding="ascii")
     with pytest.raises(af.DesignError, match="sample_time"):
         af.design(own).controller.c_code(tmp_path / "none")
