@@ -254,6 +254,13 @@ impl Matrix {
         Self::ALL.into_iter().filter(|matrix| matrix.stated(controller).is_some())
     }
 
+    /// The matrices of `aso_controller::sample::Design`, without the filter of the residuals.
+    pub(super) fn of_sample() -> impl Iterator<Item = Self> {
+        let is_of_filter =
+            |matrix: &Self| matches!(matrix.kinds()[0], Kind::ResidualState | Kind::Residual);
+        Self::ALL.into_iter().filter(move |matrix| !is_of_filter(matrix))
+    }
+
     /// What its rows and columns belong to.
     pub(super) fn kinds(self) -> [Kind; 2] {
         use Kind::{

@@ -105,26 +105,6 @@ impl Matrix {
         Self::ResidualDy,
     ];
 
-    /// Those of `aso_controller::sample::Design`.
-    pub(super) const OF_SAMPLE: [Self; 16] = [
-        Self::A,
-        Self::B,
-        Self::C,
-        Self::D,
-        Self::FA,
-        Self::AF,
-        Self::KX,
-        Self::KF,
-        Self::LX,
-        Self::LF,
-        Self::PF,
-        Self::H,
-        Self::KI,
-        Self::FI,
-        Self::LW,
-        Self::NR,
-    ];
-
     /// The name in the design file.
     pub(super) fn name(self) -> &'static str {
         match self {

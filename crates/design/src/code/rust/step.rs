@@ -182,7 +182,7 @@ impl Controller {{
         );
         let is_current = controller.estimator == Estimator::Current;
         lines.push(format!("            is_current: {is_current},"));
-        for matrix in Matrix::OF_SAMPLE {
+        for matrix in Matrix::of_sample() {
             let (name, table) =
                 (matrix.name().to_ascii_lowercase(), matrix.name().to_ascii_uppercase());
             let value = if !stated.contains(&matrix) {
