@@ -36,6 +36,7 @@
 //! theorem; M. A. Dahleh and I. J. Diaz-Bobillo, Control of Uncertain Systems, 1995, section 7.3).
 
 mod analysis;
+mod rounded;
 
 use control::response::peak_gain;
 use control::{Domain, Error, StateSpace};
