@@ -15,9 +15,11 @@ pub use channel::{channel, channels};
 pub use design::{Design, DesignError};
 pub use matrix::Matrix;
 
-/// The sources of [`sample`], of `sample::detection` and of `sample::reconfiguration`: no dependency, no standard library.
-pub const SOURCES: [&str; 3] = [
-    include_str!("sample.rs"),
-    include_str!("sample/detection.rs"),
-    include_str!("sample/reconfiguration.rs"),
+/// The files of [`sample`], by their paths in `src`: no dependency, no standard library.
+pub const SOURCES: [(&str, &str); 5] = [
+    ("sample.rs", include_str!("sample.rs")),
+    ("sample/detection.rs", include_str!("sample/detection.rs")),
+    ("sample/matrix.rs", include_str!("sample/matrix.rs")),
+    ("sample/number.rs", include_str!("sample/number.rs")),
+    ("sample/reconfiguration.rs", include_str!("sample/reconfiguration.rs")),
 ];

@@ -6,7 +6,7 @@ mod step;
 mod tables;
 mod types;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::controller::Controller;
 use super::fields::Fields;
@@ -15,13 +15,6 @@ use super::summary::{Vocabulary, summary};
 use super::symbols::Kind;
 use super::text::ascii;
 use super::{Precision, Request};
-
-/// What takes the samples of each design.
-const RUNTIME: [(&str, &str); 3] = [
-    ("src/sample.rs", aso_controller::SOURCES[0]),
-    ("src/sample/detection.rs", aso_controller::SOURCES[1]),
-    ("src/sample/reconfiguration.rs", aso_controller::SOURCES[2]),
-];
 
 /// What every function of this file renders from.
 struct Source<'a> {
@@ -58,7 +51,8 @@ publish = false
         request.prefix,
     );
     let own = [("Cargo.toml".into(), manifest), ("src/lib.rs".into(), source.library(bound))];
-    let runtime = RUNTIME.map(|(path, text)| (path.into(), text.to_owned()));
+    let runtime = aso_controller::SOURCES;
+    let runtime = runtime.map(|(path, text)| (Path::new("src").join(path), text.to_owned()));
     own.into_iter().chain(runtime).collect()
 }
 
