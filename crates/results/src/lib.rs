@@ -223,7 +223,7 @@ pub enum ResultsError {
         /// Content of the cell.
         text: String,
     },
-    /// A time is less than the one of the row before, or it is no number.
+    /// A time is less than the one of the row before.
     #[error("{}, {place}: {name} is {time} after {before}, expected times that do not decrease", path.display())]
     Order {
         /// The file.
@@ -234,7 +234,7 @@ pub enum ResultsError {
         name: String,
         /// The time.
         time: f64,
-        /// The time of the row before, negative infinity for the first row.
+        /// The time of the row before.
         before: f64,
     },
     /// A column contains texts; numbers are required.

@@ -93,8 +93,8 @@ impl Table {
     /// # Errors
     ///
     /// [`ResultsError::Number`] if a cell is no number, [`ResultsError::Text`] if a column contains texts,
-    /// [`ResultsError::Order`] if a time is less than the one before or no number, [`ResultsError::Read`] if the
-    /// file cannot be read.
+    /// [`ResultsError::Order`] if a time is less than the one before, [`ResultsError::Read`] if the file cannot be
+    /// read or a time is no number.
     ///
     /// # Panics
     ///
@@ -171,7 +171,10 @@ impl<'a> Clock<'a> {
 
     /// Checks the next time; `place` says where it is.
     fn check(&mut self, time: f64, place: impl Fn() -> String) -> Result<(), ResultsError> {
-        // A time that is NaN is no time.
+        if time.is_nan() {
+            let reason = format!("{}: {} is no number, expected a time in s", place(), self.name);
+            return Err(unreadable(self.path, &reason));
+        }
         if time >= self.before {
             self.before = time;
             return Ok(());
