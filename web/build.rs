@@ -6,12 +6,11 @@ use std::path::Path;
 use std::{env, fs};
 
 use aso_controller::Design;
-use controller::AsoController;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let file = "../fmu-controller/resources/design.toml";
     println!("cargo:rerun-if-changed={file}");
-    let design = AsoController::parse_design(&fs::read_to_string(file)?)?;
+    let design = Design::parse(&fs::read_to_string(file)?, file.to_owned())?;
     fs::write(Path::new(&env::var("OUT_DIR")?).join("design.rs"), expression(&design))?;
     if env::var("CARGO_CFG_TARGET_FAMILY")? == "wasm" {
         // Indices of functions and addresses in as few bytes as each needs.

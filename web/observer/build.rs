@@ -4,13 +4,14 @@ use std::error::Error;
 use std::path::Path;
 use std::{env, fs};
 
+use aso_controller::Design;
 use control::aso::FaultyPlant;
 use controller::AsoController;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let file = "../../fmu-controller/resources/design.toml";
     println!("cargo:rerun-if-changed={file}");
-    let design = AsoController::parse_design(&fs::read_to_string(file)?)?;
+    let design = Design::parse(&fs::read_to_string(file)?, file.to_owned())?;
     let [a, b, c, f_a] = AsoController::of_design(design).plant();
     let plant = FaultyPlant::with_constant_faults(a, b, c, f_a);
     // Here, so that the module needs no code for a plant without an observer.

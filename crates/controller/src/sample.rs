@@ -137,7 +137,7 @@ pub struct Signals<'a, N> {
     pub f_value: &'a mut [N],
     /// The estimate of the states for the next sample.
     pub next_x_hat: &'a mut [N],
-    /// That of the faults.
+    /// The estimate of the faults for the next sample.
     pub next_f_hat: &'a mut [N],
     /// The next filtered measurements.
     pub next_y_f: &'a mut [N],
@@ -235,7 +235,7 @@ impl<N: Number> Signals<'_, N> {
         }
     }
 
-    /// The estimates as values. Those of a predictor are the ones that it was given.
+    /// The estimates as values. A predictor shows the estimates with which the sample starts.
     #[inline(always)]
     pub fn set_values(&mut self, design: &Design<'_, N>, state: &State<'_, N>) {
         copy(self.f_hat, self.f_value);
@@ -400,8 +400,8 @@ impl<N: Number> Signals<'_, N> {
         all_finite(self.command) && all_finite(self.x_value) && all_finite(self.f_value)
     }
 
-    /// Keeps the estimate for the next sample, if all of it is numbers; else shows the one that was kept. Returns whether
-    /// it is kept.
+    /// Stores the estimate for the next sample if all its elements are numbers; otherwise shows the stored one again.
+    /// Returns whether it stored.
     #[inline(always)]
     pub fn keep(&mut self, state: &mut State<'_, N>, is_finite: bool) -> bool {
         let next = [&*self.next_x_hat, &*self.next_f_hat, &*self.next_y_f, &*self.next_x_i];

@@ -1,6 +1,5 @@
 //! The controller in a program that links it, without files.
 
-use fmu::Failure;
 use nalgebra::DMatrix;
 
 use super::AsoController;
@@ -8,18 +7,7 @@ use crate::dense::dense;
 use aso_controller::Design;
 
 impl AsoController {
-    /// The design in `text`, the content of `design.toml`. A program can contain it as a value and needs no
-    /// code that reads TOML.
-    ///
-    /// # Errors
-    ///
-    /// [`Failure::Error`] if the design is refused.
-    pub fn parse_design(text: &str) -> Result<Design, Failure> {
-        Design::parse(text, "design.toml".to_owned())
-            .map_err(|error| Failure::Error(error.to_string()))
-    }
-
-    /// The controller of a design that [`AsoController::parse_design`] has accepted.
+    /// The controller of a design that [`Design::parse`] has accepted.
     #[must_use]
     pub fn of_design(design: Design) -> Self {
         Self::with(design)

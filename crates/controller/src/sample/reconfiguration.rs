@@ -70,9 +70,10 @@ impl Case<'_> {
 /// The sets of gains.
 #[derive(Clone, Copy)]
 pub struct Sets<'a, const ACTUATORS: usize> {
-    /// For each set the actuators without which it is; the first one is that of the intact plant. Without the fall-back.
+    /// For each set of gains, the actuators that it does without; the first set is for the intact plant. The fall-back is
+    /// not among them.
     pub gone: &'a [[bool; ACTUATORS]],
-    /// For each actuator the set without it alone, or 0; empty with a fall-back.
+    /// For each actuator, the set of gains that does without it alone, or 0 if there is none; empty with a fall-back.
     pub single: &'a [u32],
     /// The set of the fall-back.
     pub fall_back: Option<u32>,

@@ -223,13 +223,13 @@ impl Memory {
         stored += Kind::Actuator.count(controller) + controller.schedule_inputs().len();
         let mut counters = usize::from(controller.has_counter());
         let mut flags = usize::from(controller.filter.is_some());
-        if let Some(own) = &controller.detection {
-            stored += own.stored();
-            counters += own.counters();
-            flags += own.flags();
+        if let Some(detection) = &controller.detection {
+            stored += detection.stored();
+            counters += detection.counters();
+            flags += detection.flags();
         }
-        if let Some(own) = &controller.reconfiguration {
-            let cases = own.cases.len();
+        if let Some(reconfiguration) = &controller.reconfiguration {
+            let cases = reconfiguration.cases.len();
             stored += cases;
             counters += cases + 2;
             flags += Kind::Actuator.count(controller) + 2 * cases;

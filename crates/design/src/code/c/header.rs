@@ -101,11 +101,11 @@ impl Source<'_> {
                 format!("#define {capital}_FIRST_COMPENSATED {}U", controller.first_compensated),
             ]);
         }
-        if let Some(own) = &controller.detection {
+        if let Some(detection) = &controller.detection {
             lines.extend([
                 String::new(),
                 "/* The first sample whose residuals are tested. */".to_owned(),
-                format!("#define {capital}_FIRST_TESTED {}U", own.first_tested),
+                format!("#define {capital}_FIRST_TESTED {}U", detection.first_tested),
             ]);
         }
         lines.extend([
@@ -148,11 +148,11 @@ impl Source<'_> {
         ));
     }
 
-    /// The fields of an instance: those of real numbers, or the counters and flags.
+    /// The fields of an instance that are real numbers, or the counters and flags.
     pub(super) fn detection_state(&self, lines: &mut Vec<String>, of_reals: bool) {
-        let Some(own) = &self.controller.detection else { return };
+        let Some(detection) = &self.controller.detection else { return };
         let (real, tests) = (self.real, self.count(Kind::Test));
-        lines.extend(match (of_reals, own.method) {
+        lines.extend(match (of_reals, detection.method) {
             (true, Method::Cusum) => vec![
                 format!("    {real} statistic[{tests}];"),
                 format!("    {real} sums[{tests}][2];"),
@@ -188,12 +188,12 @@ impl Source<'_> {
         lines.push(format!("}} {}_Actuators;\n", self.request.prefix));
     }
 
-    /// The fields of an instance: those of real numbers, or the counters and flags.
+    /// The fields of an instance that are real numbers, or the counters and flags.
     pub(super) fn reconfiguration_state(&self, lines: &mut Vec<String>, of_reals: bool) {
-        let Some(own) = &self.controller.reconfiguration else { return };
+        let Some(reconfiguration) = &self.controller.reconfiguration else { return };
         let (real, cases, actuators) =
             (self.real, self.count(Kind::Case), self.count(Kind::Actuator));
-        let has_cases = !own.cases.is_empty();
+        let has_cases = !reconfiguration.cases.is_empty();
         if of_reals {
             lines.extend(has_cases.then(|| format!("    {real} lost[{cases}];")));
             return;

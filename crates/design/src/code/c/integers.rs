@@ -8,59 +8,63 @@ use crate::code::symbols::Kind;
 
 impl Source<'_> {
     pub(super) fn integer_tables(&self, lines: &mut Vec<String>) {
-        if let Some(own) = &self.controller.detection {
-            self.tables_of_tests(lines, own);
+        if let Some(detection) = &self.controller.detection {
+            self.tables_of_tests(lines, detection);
         }
-        if let Some(own) = &self.controller.reconfiguration {
-            self.tables_of_reconfiguration(lines, own);
+        if let Some(reconfiguration) = &self.controller.reconfiguration {
+            self.tables_of_reconfiguration(lines, reconfiguration);
         }
         self.tables_of_losses(lines);
     }
 
-    fn tables_of_tests(&self, lines: &mut Vec<String>, own: &Detection) {
+    fn tables_of_tests(&self, lines: &mut Vec<String>, detection: &Detection) {
         let (tests, suspects) = (self.count(Kind::Test), self.count(Kind::Suspect));
-        if own.method == Method::Window {
-            let of_tests = own.tests.iter();
+        if detection.method == Method::Window {
+            let of_tests = detection.tests.iter();
             let residuals = |test: &Test| test.residuals;
             numbers(lines, ["taken_residuals", &tests], of_tests.clone().map(residuals));
             let samples = |test: &Test| test.window as usize;
             numbers(lines, ["window", &tests], of_tests.map(samples));
         }
         lines.push("\n/* Which tests react to each fault. */".to_owned());
-        flags(lines, &format!("reacts[{suspects}][{tests}]"), reactions(own).into_iter());
+        flags(lines, &format!("reacts[{suspects}][{tests}]"), reactions(detection).into_iter());
     }
 
-    fn tables_of_reconfiguration(&self, lines: &mut Vec<String>, own: &Reconfiguration) {
+    fn tables_of_reconfiguration(
+        &self,
+        lines: &mut Vec<String>,
+        reconfiguration: &Reconfiguration,
+    ) {
         let (cases, actuators) = (self.count(Kind::Case), self.count(Kind::Actuator));
         let (sets, faults) = (self.count(Kind::GainSet), self.count(Kind::Fault));
         let row = |row: &[bool]| row.iter().map(bool::to_string).collect();
         lines.push("\n/* The actuators without which each set of gains is. */".to_owned());
-        let gone = own.sets.iter().map(|own| row(&own.gone));
+        let gone = reconfiguration.sets.iter().map(|set| row(&set.gone));
         flags(lines, &format!("set_gone[{sets}][{actuators}]"), gone);
-        if own.cases.is_empty() {
+        if reconfiguration.cases.is_empty() {
             return;
         }
-        if own.fallback.is_none() {
+        if reconfiguration.fallback.is_none() {
             let text = "The set of gains without one actuator; 0 if there is none.";
             lines.push(format!("\n/* {text} */"));
-            let singles = own.single_sets(self.controller.actuators.len());
+            let singles = reconfiguration.single_sets(self.controller.actuators.len());
             numbers(lines, ["single_set", &actuators], singles.into_iter());
         }
         let text = "The actuators that may be gone; the samples for which a loss must last; the loss, or the number \
                     of losses.";
         lines.push(format!("\n/* {text} */"));
-        let of_cases = own.cases.iter();
+        let of_cases = reconfiguration.cases.iter();
         let place = |case: &Case| case.actuator;
         numbers(lines, ["case_actuator", &cases], of_cases.clone().map(place));
-        let samples = |case: &Case| case.decision.map_or(0, |own| own.2 as usize);
+        let samples = |case: &Case| case.decision.map_or(0, |decision| decision.2 as usize);
         numbers(lines, ["case_samples", &cases], of_cases.clone().map(samples));
         let losses = self.controller.losses.len();
         if losses > 0 {
-            let loss = |case: &Case| case.decision.map_or(losses, |own| own.0);
+            let loss = |case: &Case| case.decision.map_or(losses, |decision| decision.0);
             numbers(lines, ["case_loss", &cases], of_cases.clone().map(loss));
         }
         lines.push("\n/* The faults whose estimates restart at 0. */".to_owned());
-        let restarts = of_cases.map(|own| row(&own.restarts));
+        let restarts = of_cases.map(|case| row(&case.restarts));
         flags(lines, &format!("case_restarts[{cases}][{faults}]"), restarts);
     }
 
@@ -102,7 +106,8 @@ fn flags(lines: &mut Vec<String>, head: &str, rows: impl Iterator<Item = Vec<Str
 }
 
 /// For each fault whether each test reacts to it, as C and Rust write it.
-pub(in crate::code) fn reactions(own: &Detection) -> Vec<Vec<String>> {
-    let row = |fault: usize| own.tests.iter().map(|test| test.reacts[fault].to_string()).collect();
-    (0..own.faults.len()).map(row).collect()
+pub(in crate::code) fn reactions(detection: &Detection) -> Vec<Vec<String>> {
+    let row =
+        |fault: usize| detection.tests.iter().map(|test| test.reacts[fault].to_string()).collect();
+    (0..detection.faults.len()).map(row).collect()
 }

@@ -90,12 +90,13 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
 
     /// The choice of the gains at the start of a sample.
     fn reconfigure(&self, lines: &mut Vec<String>) {
-        let Some(own) = &self.controller.reconfiguration else { return };
-        let fall_back = if own.fallback.is_some() { "actuators->fall_back" } else { "false" };
+        let Some(reconfiguration) = &self.controller.reconfiguration else { return };
+        let fall_back =
+            if reconfiguration.fallback.is_some() { "actuators->fall_back" } else { "false" };
         lines.push("    if (state->sample > 0U)\n    {".to_owned());
-        if !own.cases.is_empty() {
+        if !reconfiguration.cases.is_empty() {
             let fields = self.fields.switches(self.controller);
-            let fields = fields.iter().take(own.cases.len());
+            let fields = fields.iter().take(reconfiguration.cases.len());
             let reported: Vec<_> = fields.map(|field| format!("actuators->{field}")).collect();
             lines.push(format!(
                 "        const bool reported[{}] = {{{}}};\n\n        find_gone(state, reported, {fall_back});",

@@ -35,8 +35,8 @@ impl Source<'_> {
         set("LARGEST", largest.to_owned());
         let first_compensated = controller.first_compensated;
         set("FIRST_COMPENSATED", format!("{first_compensated}U"));
-        if let Some(own) = &controller.detection {
-            set("FIRST_TESTED", format!("{}U", own.first_tested));
+        if let Some(detection) = &controller.detection {
+            set("FIRST_TESTED", format!("{}U", detection.first_tested));
         }
         if controller.has_counter() {
             let last = if controller.counts_all() {
@@ -53,8 +53,8 @@ impl Source<'_> {
         if let Some(count) = regular {
             set("REGULAR_SETS", format!("{count}U"));
         }
-        if let Some(own) = &controller.schedule {
-            let measured = own.measurement.map(|k| format!("y[{k}]"));
+        if let Some(schedule) = &controller.schedule {
+            let measured = schedule.measurement.map(|k| format!("y[{k}]"));
             set("THETA", measured.unwrap_or_else(|| "theta".to_owned()));
         }
         for (name, is_on) in self.switches() {
@@ -63,31 +63,37 @@ impl Source<'_> {
     }
 
     fn switches(&self) -> [(&'static str, bool); 23] {
-        let own = self.controller;
-        let fallback = own.reconfiguration.as_ref().and_then(|own| own.fallback);
-        let windows = own.detection.as_ref().is_some_and(|own| own.method == Method::Window);
+        let controller = self.controller;
+        let fallback = controller
+            .reconfiguration
+            .as_ref()
+            .and_then(|reconfiguration| reconfiguration.fallback);
+        let windows = controller
+            .detection
+            .as_ref()
+            .is_some_and(|detection| detection.method == Method::Window);
         [
-            ("IS_CURRENT", own.estimator == Estimator::Current),
-            ("MONITORS", own.monitor),
-            ("COUNTS_SAMPLES", own.has_counter()),
-            ("HAS_CONSTANT_MATRIX", has_constant_matrix(own)),
-            ("HAS_FEEDTHROUGH", own.d.is_some()),
-            ("HAS_FILTER", own.filter.is_some()),
-            ("HAS_FAULT_MODEL", !own.constant_faults),
-            ("HAS_DIRECT_TERM", own.p_f.is_some()),
-            ("HAS_SLIDING_MODE", own.sliding_mode.is_some()),
-            ("HAS_REFERENCES", !own.references.is_empty()),
-            ("HAS_INTEGRALS", own.h.is_some()),
-            ("HAS_SENSOR_FAULTS_IN_INTEGRALS", own.f_i.is_some()),
-            ("HAS_BACK_CALCULATION", own.l_w.is_some()),
-            ("HAS_FEEDFORWARD", own.n_r.is_some()),
-            ("HAS_LIMITS", own.is_limited()),
-            ("HAS_LOSSES", !own.losses.is_empty()),
-            ("HAS_SCHEDULE", own.schedule.is_some()),
-            ("HAS_SCHEDULE_INPUT", !own.schedule_inputs().is_empty()),
-            ("HAS_DETECTION", own.detection.is_some()),
+            ("IS_CURRENT", controller.estimator == Estimator::Current),
+            ("MONITORS", controller.monitor),
+            ("COUNTS_SAMPLES", controller.has_counter()),
+            ("HAS_CONSTANT_MATRIX", has_constant_matrix(controller)),
+            ("HAS_FEEDTHROUGH", controller.d.is_some()),
+            ("HAS_FILTER", controller.filter.is_some()),
+            ("HAS_FAULT_MODEL", !controller.constant_faults),
+            ("HAS_DIRECT_TERM", controller.p_f.is_some()),
+            ("HAS_SLIDING_MODE", controller.sliding_mode.is_some()),
+            ("HAS_REFERENCES", !controller.references.is_empty()),
+            ("HAS_INTEGRALS", controller.h.is_some()),
+            ("HAS_SENSOR_FAULTS_IN_INTEGRALS", controller.f_i.is_some()),
+            ("HAS_BACK_CALCULATION", controller.l_w.is_some()),
+            ("HAS_FEEDFORWARD", controller.n_r.is_some()),
+            ("HAS_LIMITS", controller.is_limited()),
+            ("HAS_LOSSES", !controller.losses.is_empty()),
+            ("HAS_SCHEDULE", controller.schedule.is_some()),
+            ("HAS_SCHEDULE_INPUT", !controller.schedule_inputs().is_empty()),
+            ("HAS_DETECTION", controller.detection.is_some()),
             ("HAS_WINDOWS", windows),
-            ("HAS_RECONFIGURATION", own.reconfiguration.is_some()),
+            ("HAS_RECONFIGURATION", controller.reconfiguration.is_some()),
             ("HAS_FALL_BACK", fallback.is_some()),
             ("FALL_BACK_COMPENSATES", fallback == Some(true)),
         ]
