@@ -5,18 +5,28 @@ use super::*;
 /// The filter of the tests: two states, one residual, a feedthrough of command and measurement.
 const FILTER: &str = "A = [[-2.0, 0.3], [0.1, -1.0]]\nB_u = [[0.5], [0.0]]\nB_y = [[1.0], [-0.4]]\n\
     C = [[1.0, 2.0]]\nD_u = [[0.2]]\nD_y = [[0.7]]\nstart = [[1.0, 0.0], [0.5, 2.0]]\nfaults = [\"f\"]\n";
-const CUSUM: &str = "[[detection.tests]]\nname = \"f\"\nresiduals = 1\ndrift = 0.1\nthreshold = 0.8\nreacts = [true]\n";
+/// Drift and threshold of the cumulative sum: the residuals of a continuous controller are smaller.
+const CONTINUOUS: [f64; 2] = [0.005, 0.05];
+const SAMPLED: [f64; 2] = [0.1, 0.8];
 const T: f64 = 0.05;
 
+fn cusum([drift, threshold]: [f64; 2]) -> String {
+    format!(
+        "[[detection.tests]]\nname = \"f\"\nresiduals = 1\ndrift = {drift}\nthreshold = {threshold}\n\
+         reacts = [true]\n"
+    )
+}
+
 fn continuous(limits: &str) -> String {
-    format!("{}[detection]\nsample_time = {T}\nfrom = 0.2\n{FILTER}{CUSUM}", small(limits))
+    let tests = cusum(CONTINUOUS);
+    format!("{}[detection]\nsample_time = {T}\nfrom = 0.2\n{FILTER}{tests}", small(limits))
 }
 
 fn sampled() -> String {
     let text = small("").replace("step_size = 0.01", "step_size = 0.05");
     let text = format!("sample_time = {T}\nestimator = \"current\"\n{text}");
     let filter = FILTER.replace("[[-2.0, 0.3], [0.1, -1.0]]", "[[0.8, 0.1], [0.0, 0.9]]");
-    format!("{text}[detection]\nfrom = 0.2\n{filter}{CUSUM}")
+    format!("{text}[detection]\nfrom = 0.2\n{filter}{}", cusum(SAMPLED))
 }
 
 /// Residual at each sample, statistic at the end, time and onset of the first alarm.
@@ -29,16 +39,16 @@ struct Followed {
 
 impl Followed {
     /// The cumulative sums of the residuals from 0.2 s on, those after sample `first` at (k + 1) T.
-    fn test(mut self, first: usize) -> Self {
+    fn test(mut self, first: usize, [drift, threshold]: [f64; 2]) -> Self {
         let (mut up, mut down, mut since) = (0.0_f64, 0.0_f64, [0.0; 2]);
         for (k, r) in self.residuals.iter().enumerate().skip(first) {
             #[expect(clippy::cast_precision_loss, reason = "few samples")]
             let time = (k + 1) as f64 * T;
             since[0] = if up > 0.0 { since[0] } else { time };
             since[1] = if down > 0.0 { since[1] } else { time };
-            (up, down) = ((up + r - 0.1).max(0.0), (down - r - 0.1).max(0.0));
+            (up, down) = ((up + r - drift).max(0.0), (down - r - drift).max(0.0));
             self.statistic = up.max(down);
-            if self.statistic > 0.8 && self.alarm.is_none() {
+            if self.statistic > threshold && self.alarm.is_none() {
                 self.alarm = Some([time, if down > up { since[1] } else { since[0] }]);
             }
         }
@@ -79,7 +89,7 @@ fn reference(limits: [f64; 2]) -> Followed {
             s[5] = 0.0;
         }
     }
-    followed.test(3)
+    followed.test(3, CONTINUOUS)
 }
 
 fn run(mut controller: AsoController, sizes: &[f64], end: f64) -> AsoController {
@@ -100,18 +110,18 @@ fn the_residuals_of_a_continuous_controller_do_not_depend_on_the_communication_s
     for (limits, range) in
         [("", [f64::NEG_INFINITY, f64::INFINITY]), ("limits = [-1.5, 0.3]", [-1.5, 0.3])]
     {
-        let wanted = reference(range);
+        let expected = reference(range);
+        let [time, onset] = expected.alarm.unwrap();
         for sizes in [&[1.0][..], &[0.25], &[0.01], &[0.05], &[0.03, 0.011, 0.17]] {
             let mut found = run(ready(with_design(&continuous(limits)).unwrap()), sizes, 1.0);
             let detector = found.detector_mut();
-            let (residual, last) = (detector.residuals[0], wanted.residuals[19]);
+            let (residual, last) = (detector.residuals[0], expected.residuals[19]);
             assert!((residual - last).abs() < 1e-5, "{limits} {sizes:?}: {residual} {last}");
-            assert!((detector.statistics[0] - wanted.statistic).abs() < 1e-4);
+            assert!((detector.statistics[0] - expected.statistic).abs() < 1e-4);
             let decision = &detector.decision;
-            assert_eq!(decision.detected, wanted.alarm.is_some());
-            let [time, onset] = wanted.alarm.unwrap_or([-1.0; 2]);
-            assert!((decision.time - time).abs() < 1e-9, "{sizes:?} {decision:?} {wanted:?}");
-            assert!((decision.onset - onset).abs() < 1e-9, "{sizes:?} {decision:?} {wanted:?}");
+            assert!(decision.detected);
+            assert!((decision.time - time).abs() < 1e-9, "{sizes:?} {decision:?} {expected:?}");
+            assert!((decision.onset - onset).abs() < 1e-9, "{sizes:?} {decision:?} {expected:?}");
         }
     }
 }
@@ -132,24 +142,30 @@ fn a_sampled_controller_tests_in_each_sample_with_the_command_of_that_sample() {
         step(&mut controller, f64::from(k) * T, T, &[y(k)], &[0.5]);
         taken = [controller.values.u[0], y(k + 1)];
     }
-    let wanted = followed.test(3);
+    let expected = followed.test(3, SAMPLED);
     let detector = controller.detector_mut();
     // The step to the last instant takes its sample, too.
     let last = x[0] + 2.0 * x[1] + 0.2 * taken[0] + 0.7 * taken[1];
     assert!((detector.residuals[0] - last).abs() < 1e-9);
-    let [time, onset] = wanted.alarm.unwrap();
-    assert!((detector.decision.time - time).abs() < 1e-9, "{:?} {wanted:?}", detector.decision);
+    let [time, onset] = expected.alarm.unwrap();
+    assert!((detector.decision.time - time).abs() < 1e-9, "{:?} {expected:?}", detector.decision);
     assert!((detector.decision.onset - onset).abs() < 1e-9);
 }
 
 #[test]
-fn the_decision_stays_until_it_is_reset() {
+fn the_decision_stays_over_more_alarms_until_it_is_reset() {
     let mut controller = run(ready(with_design(&continuous("")).unwrap()), &[0.1], 1.0);
-    let time = controller.detector_mut().decision.time;
+    let first = controller.detector_mut().decision.clone();
+    assert!(first.detected);
+    for k in 0..4 {
+        step(&mut controller, 1.0 + 0.1 * f64::from(k), 0.1, &[0.9], &[0.5]);
+        let detector = controller.detector_mut();
+        assert!(detector.statistics[0] > CONTINUOUS[1], "the test alarms again");
+        assert_eq!(detector.decision, first);
+    }
     controller.detector_mut().reset = true;
-    assert!((controller.detector_mut().decision.time - time).abs() < 1e-15);
     controller.design.detection.as_mut().unwrap().tests[0].threshold = 1e9;
-    step(&mut controller, 1.0, 0.1, &[0.0], &[0.0]);
+    step(&mut controller, 1.4, 0.1, &[0.0], &[0.0]);
     let decision = controller.detector_mut().decision.clone();
     assert_eq!((decision.detected, decision.isolated), (false, 0));
     assert!(decision.time < 0.0 && decision.onset < 0.0);
@@ -256,8 +272,8 @@ fn a_wrong_section_is_refused_with_its_entry() {
         ("sample_time = 0.05\nfrom", "from", "detection.sample_time is missing"),
         ("residuals = 1", "residuals = 2", "the tests take 2 residuals"),
         ("reacts = [true]", "reacts = []", "reacts has 0 entries, expected 1"),
-        ("drift = 0.1", "drift = -0.1", "drift = -0.1, expected above 0"),
-        ("drift = 0.1", "drift = 0.1\nwindow = 3", "expected drift, or window"),
+        ("drift = 0.005", "drift = -0.1", "drift = -0.1, expected above 0"),
+        ("drift = 0.005", "drift = 0.005\nwindow = 3", "expected drift, or window"),
         ("from = 0.2", "from = -1.0", "detection.from = -1, expected a time in s from 0"),
     ] {
         let text = continuous("").replace(from, to);
