@@ -16,7 +16,7 @@ use crate::equations::Equations;
 use crate::loss::Loss;
 use crate::mode::Mode;
 use crate::names;
-use crate::observer::{Conditions, Observer};
+use crate::observer::{Conditions, Observer, Part};
 use crate::reconfiguration::Reconfigurator;
 use crate::sampled::Sampler;
 use crate::shared::Shared;
@@ -110,9 +110,9 @@ impl AsoController {
         let Self { design, values, deviations, reconfigurator, losses, .. } = self;
         let changed = reconfigurator.decide(design, losses, time);
         let affected = design.reconfigurations.iter();
-        let affected = affected.filter(|own| changed & (1 << own.actuator) != 0);
+        let affected = affected.filter(|case| changed & (1 << case.actuator) != 0);
         let mut restarted = false;
-        for fault in affected.flat_map(|own| &own.restarted) {
+        for fault in affected.flat_map(|case| &case.restarted) {
             let position = design.states.len() + fault;
             (values.z[position], deviations.z[position]) = (0.0, 0.0);
             if let Some(sampler) = &mut sampler {
@@ -134,19 +134,19 @@ impl AsoController {
         self.operating_point.read(&self.design);
     }
 
-    /// Advances the deviations of the estimate over the part from `offset` to `offset + size` of a step
-    /// that starts at `start`.
-    fn advance(&mut self, compensating: bool, start: f64, part: (f64, f64)) -> Result<(), Failure> {
+    /// Advances the deviations of the estimate over a part of a step that starts at `start`.
+    fn advance(&mut self, compensating: bool, start: f64, part: Part) -> Result<(), Failure> {
         let mode = self.free_mode(compensating);
         let Self { design, values, deviations, observer, detector, .. } = self;
         let Signals { z, y, r, .. } = deviations;
         let (y, r) = ([&y[..], &values.y_slopes], [&r[..], &values.r_slopes]);
         let conditions = Conditions { design, y, r, mode };
-        let follow = &mut |z: &[f64], mode, (offset, size)| {
-            let (Some(detector), Some(own)) = (&mut *detector, &design.detection) else {
+        let follow = &mut |z: &[f64], mode, Part { offset, size }| {
+            let (Some(detector), Some(detection)) = (&mut *detector, &design.detection) else {
                 return Ok(());
             };
-            detector.follow((design, own), &Stretch { z, mode, y, r, start, offset, size })
+            let stretch = Stretch { z, mode, y, r, start, offset, size };
+            detector.follow(design, detection, &stretch)
         };
         observer
             .get_or_insert_with(|| Observer::new(design))
@@ -167,16 +167,16 @@ impl AsoController {
     /// Starts the detection at `time` from the initial estimate.
     fn start_detection(&mut self, time: f64) {
         let Self { design, values, operating_point, deviations, detector, .. } = self;
-        if let (Some(detector), Some(own)) = (detector, &design.detection) {
+        if let (Some(detector), Some(detection)) = (detector, &design.detection) {
             deviations.set(values, operating_point, 0.0);
-            detector.start(own, time, &deviations.z[..design.states.len()]);
+            detector.start(detection, time, &deviations.z[..design.states.len()]);
         }
     }
 
     /// Makes a step of a continuous controller.
     fn integrate(&mut self, step: &Step) -> Result<(), Failure> {
-        if let (Some(detector), Some(own)) = (&self.detector, &self.design.detection)
-            && detector.has_too_many_samples(own, step.end())
+        if let (Some(detector), Some(detection)) = (&self.detector, &self.design.detection)
+            && detector.has_too_many_samples(detection, step.end())
         {
             let (start, end) = (step.start, step.end());
             let message = format!("too many samples are due from {start} to {end} s");
@@ -189,10 +189,12 @@ impl AsoController {
         // z has its deviations from the step before, or from the start.
         self.deviations.set_inputs(&self.values, &self.operating_point, 0.0);
         if inside {
-            self.advance(false, step.start, (0.0, until_on))?;
-            self.advance(true, step.start, (until_on, step.size - until_on))?;
+            self.advance(false, step.start, Part { offset: 0.0, size: until_on })?;
+            let rest = Part { offset: until_on, size: step.size - until_on };
+            self.advance(true, step.start, rest)?;
         } else {
-            self.advance(self.is_compensating(step.start), step.start, (0.0, step.size))?;
+            let whole = Part { offset: 0.0, size: step.size };
+            self.advance(self.is_compensating(step.start), step.start, whole)?;
         }
         self.values.set_estimate(&self.deviations.z, &self.operating_point);
         self.mode = self.free_mode(self.is_compensating(step.end()));
@@ -211,7 +213,7 @@ impl AsoController {
         }
         mode.set_limited(design, &mut deviations.u);
         Equations::<f64>::new(design, *mode).set_signals(&mut &mut *deviations);
-        values.set_commands(&deviations.u, (design, *mode), operating_point);
+        values.set_commands(&deviations.u, design, *mode, operating_point);
         self.set_losses();
         self.has_slopes = false;
     }
@@ -277,10 +279,9 @@ impl AsoController {
             let Self { design, current, values, operating_point, deviations, detector, .. } = self;
             let whole = &**design;
             let design = current.as_deref().unwrap_or(whole);
-            self.mode =
-                sampler.sample((design, mode), (values, operating_point, deviations), offset);
-            if let (Some(detector), Some(own)) = (detector, &whole.detection) {
-                detector.sample(own, (&deviations.u, &deviations.y), instant);
+            self.mode = sampler.sample(design, mode, values, operating_point, deviations, offset);
+            if let (Some(detector), Some(detection)) = (detector, &whole.detection) {
+                detector.sample(detection, &deviations.u, &deviations.y, instant);
             }
             self.set_losses();
         }
@@ -379,7 +380,7 @@ impl Model for AsoController {
             }
         }
         let detection = self.design.detection.as_ref();
-        let refused = detection.and_then(|own| own.refused_number(&self.design));
+        let refused = detection.and_then(|detection| detection.refused_number(&self.design));
         let of_laws = self.design.refused_filter().or_else(|| self.design.refused_sliding_mode());
         match of_laws.or(refused) {
             Some(Refusal { name, value, rule }) => {
@@ -457,13 +458,13 @@ impl Model for AsoController {
         self.mode.set_limited(design, &mut deviations.u);
         let equations = Equations::<Dual64>::new([self.design_in_force(), design], self.mode);
         let mut signals = (&self.deviations, &mut *deviations);
-        if let (Some(own), Some(sampler)) = (&self.sampler, &mut direction.sampler) {
-            own.differentiate_first_sample(equations, sampler, &mut signals);
+        if let (Some(sampler), Some(direction)) = (&self.sampler, &mut direction.sampler) {
+            sampler.differentiate_first_sample(equations, direction, &mut signals);
         } else {
             equations.evaluate(&mut signals, &mut (&self.z_slopes[..], z_slopes));
         }
         values.set_estimate(&deviations.z, operating_point);
-        values.set_commands(&deviations.u, (design, self.mode), operating_point);
+        values.set_commands(&deviations.u, design, self.mode, operating_point);
         for loss in &mut direction.losses {
             let (u, f_hat) = (loss.actuator, design.states.len() + loss.fault);
             let lost = loss.effectiveness_lost(
@@ -489,7 +490,7 @@ impl Model for AsoController {
             return None;
         }
         let limited = self.design.actuators.iter().filter(|actuator| actuator.limits.is_some());
-        let decisive = self.design.reconfigurations.iter().filter(|own| own.loss.is_some());
+        let decisive = self.design.reconfigurations.iter().filter(|case| case.loss.is_some());
         let event_indicators =
             if self.sampler.is_some() { 0 } else { 2 * limited.count() + decisive.count() };
         Some(ModelExchange { event_indicators })

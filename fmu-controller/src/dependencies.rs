@@ -65,7 +65,7 @@ fn of_feedback(design: &Design, [state, fault]: [DependencyKind; 2]) -> Vec<Grou
     let mut groups = vec![(estimate, x_hat(design)), (fault, f_hat(design))];
     groups.extend(direct(design, fault));
     let others = [names::integrals(design).collect(), fed_forward(design)];
-    groups.extend(others.into_iter().filter(|own| !own.is_empty()).map(|own| (state, own)));
+    groups.extend(others.into_iter().filter(|names| !names.is_empty()).map(|names| (state, names)));
     groups
 }
 
@@ -121,8 +121,8 @@ fn of_constant_slope(design: &Design, i: usize) -> Vec<Group> {
         of_integral_slope(design, i - design.integral_at(0))
     } else {
         let k = i - n - q;
-        let own = [design.measurements[k].name.clone()].into_iter();
-        let mut groups = vec![(Fixed, own.chain(names::filtered(design).nth(k)).collect())];
+        let measured = [design.measurements[k].name.clone()].into_iter();
+        let mut groups = vec![(Fixed, measured.chain(names::filtered(design).nth(k)).collect())];
         if design.d.is_some() {
             groups.extend(of_feedback(design, kinds_of_feedback(design, has_limits(design))));
         }
@@ -221,14 +221,14 @@ fn of_initial_deviation(design: &Design, j: usize) -> Vec<String> {
 
 /// The bounds of a sliding-mode law.
 fn sliding_mode(design: &Design) -> impl Iterator<Item = String> {
-    let count = design.sliding_mode.as_ref().map_or(0, |own| own.rho.len());
+    let count = design.sliding_mode.as_ref().map_or(0, |law| law.rho.len());
     channels("rho", count).chain(channels("delta", count))
 }
 
 /// The dependencies of the initial deviations of the references from the operating point.
 fn of_references(design: &Design) -> Vec<String> {
-    let own = design.references.iter().map(|signal| signal.name.clone());
-    own.chain(names::operating(design, "r_op", design.references.len())).collect()
+    let referred = design.references.iter().map(|signal| signal.name.clone());
+    referred.chain(names::operating(design, "r_op", design.references.len())).collect()
 }
 
 /// The dependencies of the initial value of command `j`.
@@ -360,7 +360,8 @@ fn of_initial_integral_slope(design: &Design, k: usize) -> Vec<String> {
         }
     }
     if let Some(l_w) = &design.l_w {
-        let limited = design.actuators.iter().enumerate().filter(|(_, own)| own.limits.is_some());
+        let limited =
+            design.actuators.iter().enumerate().filter(|(_, actuator)| actuator.limits.is_some());
         for (j, _) in limited {
             names.extend(row("L_w", l_w, k).skip(j).take(1));
             names.extend(of_initial_deviation(design, j));

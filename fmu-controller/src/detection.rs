@@ -85,14 +85,14 @@ pub(crate) struct Stretch<'a> {
 impl Detector {
     /// The detector of `design`, if it has one.
     pub(crate) fn new(design: &Design) -> Option<Self> {
-        let own = design.detection.as_ref()?;
-        let integrals = if own.sample_time.is_some() { own.c.rows } else { 0 };
-        let tests = &own.tests;
+        let detection = design.detection.as_ref()?;
+        let integrals = if detection.sample_time.is_some() { detection.c.rows } else { 0 };
+        let tests = &detection.tests;
         Some(Self {
-            state: vec![0.0; own.a.rows + integrals],
+            state: vec![0.0; detection.a.rows + integrals],
             start: 0.0,
             samples: 0.0,
-            residuals: vec![0.0; own.c.rows],
+            residuals: vec![0.0; detection.c.rows],
             statistics: vec![0.0; tests.len()],
             tests: tests.iter().map(TestState::new).collect(),
             decision: Decision::default(),
@@ -102,9 +102,9 @@ impl Detector {
     }
 
     /// Starts at `time` in s from the deviations `x_hat` of the states.
-    pub(crate) fn start(&mut self, own: &DetectionDesign, time: f64, x_hat: &[f64]) {
+    pub(crate) fn start(&mut self, detection: &DetectionDesign, time: f64, x_hat: &[f64]) {
         self.state.fill(0.0);
-        own.start.add_product::<true>(x_hat, &mut self.state);
+        detection.start.add_product::<true>(x_hat, &mut self.state);
         (self.start, self.samples) = (time, 0.0);
         self.residuals.fill(0.0);
         self.work.propagators = Propagators::default();
@@ -119,34 +119,35 @@ impl Detector {
     }
 
     /// One sample of a sampled controller at `time`, with the deviations of the commands applied from it on.
-    pub(crate) fn sample(&mut self, own: &DetectionDesign, (u, y): (&[f64], &[f64]), time: f64) {
+    pub(crate) fn sample(&mut self, detection: &DetectionDesign, u: &[f64], y: &[f64], time: f64) {
         let first = self.samples < 1.0;
         if !first {
             self.residuals.fill(0.0);
-            own.c.add_product::<true>(&self.state, &mut self.residuals);
-            own.d_u.add_product::<true>(u, &mut self.residuals);
-            own.d_y.add_product::<true>(y, &mut self.residuals);
+            detection.c.add_product::<true>(&self.state, &mut self.residuals);
+            detection.d_u.add_product::<true>(u, &mut self.residuals);
+            detection.d_y.add_product::<true>(y, &mut self.residuals);
         }
         let next = &mut self.work.after;
         next.clear();
         next.resize(self.state.len(), 0.0);
-        own.a.add_product::<true>(&self.state, next);
-        own.b_u.add_product::<true>(u, next);
-        own.b_y.add_product::<true>(y, next);
+        detection.a.add_product::<true>(&self.state, next);
+        detection.b_u.add_product::<true>(u, next);
+        detection.b_y.add_product::<true>(y, next);
         self.state.copy_from_slice(next);
         self.samples += 1.0;
         if !first {
-            self.decide(own, time);
+            self.decide(detection, time);
         }
     }
 
     /// Follows a part of a step of a continuous controller, with the samples in it.
     pub(crate) fn follow(
         &mut self,
-        (design, own): (&Design, &DetectionDesign),
+        design: &Design,
+        detection: &DetectionDesign,
         stretch: &Stretch<'_>,
     ) -> Result<(), Error> {
-        let Some(period) = own.sample_time else { return Ok(()) };
+        let Some(period) = detection.sample_time else { return Ok(()) };
         let start = stretch.start + stretch.offset;
         let (mut at, end) = (0.0, stretch.size);
         self.work.before.clear();
@@ -159,19 +160,19 @@ impl Detector {
             // A sample at the end, up to rounding, leaves the size of the part as it is.
             let to = if due < end - TOLERANCE * period { due } else { end };
             if to > at {
-                self.propagate((design, own), stretch, (at, to - at))?;
+                self.propagate(design, detection, stretch, at, to - at)?;
                 at = to;
             }
             if !sampled {
                 break;
             }
             self.samples += 1.0;
-            let integrals = &mut self.work.before[stretch.z.len() + own.a.rows..];
+            let integrals = &mut self.work.before[stretch.z.len() + detection.a.rows..];
             let root = period.sqrt();
             for (residual, integral) in self.residuals.iter_mut().zip(integrals) {
                 (*residual, *integral) = (*integral / root, 0.0);
             }
-            self.decide(own, instant);
+            self.decide(detection, instant);
         }
         self.state.copy_from_slice(&self.work.before[stretch.z.len()..]);
         Ok(())
@@ -180,9 +181,11 @@ impl Detector {
     /// Advances [z; x_r; q] by `size` s, from `at` s after the start of the part.
     fn propagate(
         &mut self,
-        (design, own): (&Design, &DetectionDesign),
+        design: &Design,
+        detection: &DetectionDesign,
         stretch: &Stretch<'_>,
-        (at, size): (f64, f64),
+        at: f64,
+        size: f64,
     ) -> Result<(), Error> {
         let Work { propagators, before, after, input, input_slope } = &mut self.work;
         input.clear();
@@ -196,7 +199,8 @@ impl Detector {
             input.push(stretch.mode.held_deviation(design, j).unwrap_or(0.0));
             input_slope.push(0.0);
         }
-        let hold = propagators.of((stretch.mode, size), || system((design, own), stretch.mode))?;
+        let hold =
+            propagators.of(stretch.mode, size, || system(design, detection, stretch.mode))?;
         after.clear();
         after.resize(before.len(), 0.0);
         hold.step_into(before, input, input_slope, after)?;
@@ -205,16 +209,16 @@ impl Detector {
     }
 
     /// Tests the residuals at `time`.
-    fn decide(&mut self, own: &DetectionDesign, time: f64) {
+    fn decide(&mut self, detection: &DetectionDesign, time: f64) {
         if self.reset {
             self.clear();
         }
         // With the rounding of a clock that an importer adds up.
-        if time < self.start + own.from - 8.0 * f64::EPSILON * time.abs() {
+        if time < self.start + detection.from - 8.0 * f64::EPSILON * time.abs() {
             return;
         }
         let mut first = 0;
-        for (at, (test, state)) in own.tests.iter().zip(&mut self.tests).enumerate() {
+        for (at, (test, state)) in detection.tests.iter().zip(&mut self.tests).enumerate() {
             let residuals = &self.residuals[first..first + test.residuals];
             first += test.residuals;
             let onset = state.take(test, residuals, time);
@@ -223,26 +227,32 @@ impl Detector {
                 self.decision.alarm(time, onset);
             }
         }
-        self.decision.isolate(own, |at| self.tests[at].has_alarmed);
+        self.decision.isolate(detection, |at| self.tests[at].has_alarmed);
     }
 
     /// Whether more samples are due until `end` than one step may take.
-    pub(crate) fn has_too_many_samples(&self, own: &DetectionDesign, end: f64) -> bool {
-        own.sample_time
+    pub(crate) fn has_too_many_samples(&self, detection: &DetectionDesign, end: f64) -> bool {
+        detection
+            .sample_time
             .is_some_and(|period| (end - self.start) / period - self.samples > MOST_SAMPLES)
     }
 }
 
 /// Matrices of [z; x_r; q]' over [z; x_r; q] and [y; r; w] in `mode`.
-fn system((design, own): (&Design, &DetectionDesign), mode: Mode) -> (DMatrix<f64>, DMatrix<f64>) {
+fn system(
+    design: &Design,
+    detection: &DetectionDesign,
+    mode: Mode,
+) -> (DMatrix<f64>, DMatrix<f64>) {
     let responses = observer::unit_responses(design, mode);
     let (order, p) = (design.order(), design.measurements.len());
-    let (k, rows) = (own.a.rows, own.c.rows);
+    let (k, rows) = (detection.a.rows, detection.c.rows);
     let whole = order + k + rows;
     let (mut state, mut input) =
         (DMatrix::zeros(whole, whole), DMatrix::zeros(whole, responses.len() - order));
     let feedthrough = design.d.as_ref().map(dense);
-    let [b_u, b_y, d_u, d_y] = [&own.b_u, &own.b_y, &own.d_u, &own.d_y].map(dense);
+    let [b_u, b_y, d_u, d_y] =
+        [&detection.b_u, &detection.b_y, &detection.d_u, &detection.d_y].map(dense);
     for (at, [slopes, u]) in responses.into_iter().enumerate() {
         let u = DVector::from_vec(u);
         let mut column = DVector::zeros(whole);
@@ -267,7 +277,7 @@ fn system((design, own): (&Design, &DetectionDesign), mode: Mode) -> (DMatrix<f6
             Some(at) => input.set_column(at, &column),
         }
     }
-    state.view_mut((order, order), (k, k)).copy_from(&dense(&own.a));
-    state.view_mut((order + k, order), (rows, k)).copy_from(&dense(&own.c));
+    state.view_mut((order, order), (k, k)).copy_from(&dense(&detection.a));
+    state.view_mut((order + k, order), (rows, k)).copy_from(&dense(&detection.c));
     (state, input)
 }

@@ -179,11 +179,12 @@ impl<'a, D: Number> Equations<'a, D> {
         z: Estimate<'_, D>,
         [y, r]: [D::In<'_, [f64]>; 2],
     ) -> D {
-        let own = |design: &'a Design| self.mode.gains(design);
-        let k_x = |design| own(design).map_or_else(|| design.k_x.row(j), |own| own.k_x(j));
+        let gains = |design: &'a Design| self.mode.gains(design);
+        let k_x = |design| gains(design).map_or_else(|| design.k_x.row(j), |gains| gains.k_x(j));
         let mut command = self.product(k_x, z.x_hat);
         if self.mode.compensating {
-            let k_f = |design| own(design).map_or_else(|| design.k_f.row(j), |own| own.k_f(j));
+            let k_f =
+                |design| gains(design).map_or_else(|| design.k_f.row(j), |gains| gains.k_f(j));
             command += self.product_with_faults(k_f, z, y);
         }
         let Design { k_i, n_r, .. } = D::values(self.design);
@@ -225,7 +226,8 @@ impl<'a, D: Number> Equations<'a, D> {
 
     /// The part of command `j` that stuck actuators cause: row j of K_s times their commands.
     fn stuck_part(self, j: usize, u: D::In<'_, [f64]>) -> D {
-        let row = |design: &'a Design| self.mode.gains(design).map_or(&[][..], |own| own.k_s(j));
+        let row =
+            |design: &'a Design| self.mode.gains(design).map_or(&[][..], |gains| gains.k_s(j));
         let k_s = D::list(D::part(self.design, row)).zip(self.mode.gone_channels());
         // -0 + x has the bits of x.
         k_s.fold(-D::zero(), |sum, (k_s, gone)| sum + k_s * D::at(u, gone))
@@ -315,13 +317,13 @@ impl<'a, D: Number> Equations<'a, D> {
     fn injection(self, i: usize, e: D::In<'_, [f64]>) -> D {
         let number = |list: fn(&SlidingMode) -> &Vec<f64>| {
             let lists = |design: &'a Design| {
-                design.sliding_mode.as_ref().map_or(&[][..], |own| list(own).as_slice())
+                design.sliding_mode.as_ref().map_or(&[][..], |law| list(law).as_slice())
             };
             D::at(D::part(self.design, lists), i)
         };
-        let seen = self.product(|design| design.l_f.row(i), e);
-        let size = if seen.re() < 0.0 { -seen } else { seen };
-        number(|own| &own.rho) * seen / (size + number(|own| &own.delta))
+        let innovation = self.product(|design| design.l_f.row(i), e);
+        let size = if innovation.re() < 0.0 { -innovation } else { innovation };
+        number(|law| &law.rho) * innovation / (size + number(|law| &law.delta))
     }
 
     /// Whether A_f f_hat is part of f_hat'.

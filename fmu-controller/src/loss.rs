@@ -33,8 +33,8 @@ impl Loss {
     /// The losses of `design`, in the order of its faults.
     pub(crate) fn all(design: &Design) -> Vec<Self> {
         let mut all = Vec::new();
-        for (fault, own) in design.faults.iter().enumerate() {
-            let (Some(name), Some(least_command)) = (&own.loss_of, own.least_command) else {
+        for (fault, signal) in design.faults.iter().enumerate() {
+            let (Some(name), Some(least_command)) = (&signal.loss_of, signal.least_command) else {
                 continue;
             };
             let actuator = design.actuators.iter().position(|actuator| actuator.name == *name);

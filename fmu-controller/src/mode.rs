@@ -58,8 +58,8 @@ impl Mode {
 
     /// The part of the free command of channel `j` that stuck actuators cause, in deviations.
     pub(crate) fn stuck_part(self, design: &Design, j: usize) -> f64 {
-        self.gains(design).map_or(0.0, |own| {
-            let stuck = own.k_s(j).iter().zip(self.gone_channels());
+        self.gains(design).map_or(0.0, |gains| {
+            let stuck = gains.k_s(j).iter().zip(self.gone_channels());
             stuck.map(|(k_s, gone)| k_s * self.held_deviation(design, gone).unwrap_or(0.0)).sum()
         })
     }
@@ -83,7 +83,7 @@ impl Mode {
     /// The command of channel `j` if it is at a limit or stuck; `None` for a free channel.
     pub(crate) fn held(self, design: &Design, j: usize) -> Option<f64> {
         if self.is_gone(j) {
-            return design.without(j).map(|own| own.stuck_at);
+            return design.without(j).map(|reconfiguration| reconfiguration.stuck_at);
         }
         let [low, high] = design.actuators[j].limits.filter(|_| self.is_limited(j))?;
         Some(if self.is_at(0, j) { low } else { high })

@@ -35,11 +35,12 @@ impl Propagators {
     /// that a restored instance, whose cache is empty, continues with the same bits.
     pub(crate) fn of(
         &mut self,
-        (mode, size): (Mode, f64),
+        mode: Mode,
+        size: f64,
         system: impl FnOnce() -> (DMatrix<f64>, DMatrix<f64>),
     ) -> Result<&FirstOrderHold, control::Error> {
-        let known = self.cache.iter().position(|(cached, own, _)| {
-            cached.has_the_matrices_of(mode) && own.to_bits() == size.to_bits()
+        let known = self.cache.iter().position(|(cached_mode, cached_size, _)| {
+            cached_mode.has_the_matrices_of(mode) && cached_size.to_bits() == size.to_bits()
         });
         if let Some(position) = known {
             return Ok(&self.cache[position].2);
@@ -69,9 +70,25 @@ pub(crate) struct Observer {
     after: Vec<f64>,
 }
 
-/// Takes z at the start of a part of a step, the mode in it, and its offset and size in s.
-pub(crate) type Follow<'a> =
-    &'a mut dyn FnMut(&[f64], Mode, (f64, f64)) -> Result<(), control::Error>;
+/// A part of a communication step.
+#[derive(Clone, Copy)]
+pub(crate) struct Part {
+    /// Its start in s after the start of the step.
+    pub(crate) offset: f64,
+    /// Its length in s.
+    pub(crate) size: f64,
+}
+
+impl Part {
+    /// The first (0) or second (1) half.
+    fn half(self, which: u32) -> Self {
+        let size = 0.5 * self.size;
+        Self { offset: self.offset + f64::from(which) * size, size }
+    }
+}
+
+/// Takes z at the start of a part of a step, the mode in it, and the part.
+pub(crate) type Follow<'a> = &'a mut dyn FnMut(&[f64], Mode, Part) -> Result<(), control::Error>;
 
 /// What does not change during a step.
 #[derive(Clone, Copy)]
@@ -92,8 +109,8 @@ impl Conditions<'_> {
     fn mode_at(&self, time: f64, z: &[f64], given: &mut [f64]) -> Mode {
         let Self { y, r, .. } = self;
         let known = y[0].iter().zip(y[1]).chain(r[0].iter().zip(r[1]));
-        for (own, (value, slope)) in given.iter_mut().zip(known) {
-            *own = value + slope * time;
+        for (given, (value, slope)) in given.iter_mut().zip(known) {
+            *given = value + slope * time;
         }
         self.mode.limited(self.design, z, given.split_at(y[0].len()).into())
     }
@@ -148,29 +165,27 @@ impl Observer {
         }
     }
 
-    /// Advances `z` by `size` s, from `offset` s after the instant of the measurements.
+    /// Advances `z` over a part of the step.
     ///
     /// Where a channel reaches or leaves a limit on the way, the step is halved until that instant
     /// is known to 2^-20 of the step. A channel that leaves its mode and returns to it before the
     /// middle or the end of a part is not detected.
     ///
-    /// `follow` gets each part of the step in which the mode stays: z at its start, the mode, offset and
-    /// size in s.
+    /// `follow` gets each part in which the mode stays, with z at its start and the mode.
     pub(crate) fn advance(
         &mut self,
         z: &mut [f64],
         conditions: Conditions<'_>,
-        (offset, size): (f64, f64),
+        part: Part,
         follow: Follow<'_>,
     ) -> Result<(), control::Error> {
-        let span = Span { offset, size, halvings: HALVINGS };
         self.before.copy_from_slice(z);
         if conditions.design.actuators.iter().any(|actuator| actuator.limits.is_some()) {
-            self.advance_part(conditions, span, follow)?;
+            self.advance_part(conditions, part, HALVINGS, follow)?;
             z.copy_from_slice(&self.before);
         } else {
-            self.propagate(conditions.mode, conditions, span)?;
-            follow(&self.before, conditions.mode, (offset, size))?;
+            self.propagate(conditions.mode, conditions, part)?;
+            follow(&self.before, conditions.mode, part)?;
             z.copy_from_slice(&self.after);
         }
         Ok(())
@@ -179,71 +194,55 @@ impl Observer {
     fn advance_part(
         &mut self,
         conditions: Conditions<'_>,
-        span: Span,
+        part: Part,
+        halvings: u32,
         follow: Follow<'_>,
     ) -> Result<(), control::Error> {
-        let mode = conditions.mode_at(span.offset, &self.before, &mut self.given);
-        if span.halvings > 0 {
-            let stays = self.keeps_mode(mode, conditions, span.half(0))?
-                && self.keeps_mode(mode, conditions, span)?;
+        let mode = conditions.mode_at(part.offset, &self.before, &mut self.given);
+        if halvings > 0 {
+            let stays = self.keeps_mode(mode, conditions, part.half(0))?
+                && self.keeps_mode(mode, conditions, part)?;
             if !stays {
-                self.advance_part(conditions, span.half(0), follow)?;
-                return self.advance_part(conditions, span.half(1), follow);
+                self.advance_part(conditions, part.half(0), halvings - 1, follow)?;
+                return self.advance_part(conditions, part.half(1), halvings - 1, follow);
             }
         } else {
-            self.propagate(mode, conditions, span)?;
+            self.propagate(mode, conditions, part)?;
         }
-        follow(&self.before, mode, (span.offset, span.size))?;
+        follow(&self.before, mode, part)?;
         std::mem::swap(&mut self.before, &mut self.after);
         Ok(())
     }
 
-    /// Propagates over `span` into `after`; true if the mode is the same at its end.
+    /// Propagates over `part` into `after`; true if the mode is the same at its end.
     fn keeps_mode(
         &mut self,
         mode: Mode,
         conditions: Conditions<'_>,
-        span: Span,
+        part: Part,
     ) -> Result<bool, control::Error> {
-        self.propagate(mode, conditions, span)?;
-        let end = span.offset + span.size;
+        self.propagate(mode, conditions, part)?;
+        let end = part.offset + part.size;
         Ok(conditions.mode_at(end, &self.after, &mut self.given) == mode)
     }
 
-    /// Computes `after` from `before` over `span` in `mode`.
+    /// Computes `after` from `before` over `part` in `mode`.
     fn propagate(
         &mut self,
         mode: Mode,
         Conditions { design, y, r, .. }: Conditions<'_>,
-        span: Span,
+        part: Part,
     ) -> Result<(), control::Error> {
         let given = y[0].iter().zip(y[1]).chain(r[0].iter().zip(r[1]));
         let (inputs, held) = self.input.split_at_mut(y[0].len() + r[0].len());
         for (k, (value, slope)) in given.enumerate() {
-            inputs[k] = value + slope * span.offset;
+            inputs[k] = value + slope * part.offset;
             self.input_slope[k] = *slope;
         }
         for (j, held) in held.iter_mut().enumerate() {
             *held = mode.held_deviation(design, j).unwrap_or(0.0);
         }
-        let hold = self.propagators.of((mode, span.size), || system(design, mode))?;
+        let hold = self.propagators.of(mode, part.size, || system(design, mode))?;
         hold.step_into(&self.before, &self.input, &self.input_slope, &mut self.after)
-    }
-}
-
-/// A part of a communication step; times in s after its start.
-#[derive(Clone, Copy)]
-struct Span {
-    offset: f64,
-    size: f64,
-    halvings: u32,
-}
-
-impl Span {
-    /// The first (0) or second (1) half.
-    fn half(self, which: u32) -> Self {
-        let size = 0.5 * self.size;
-        let offset = self.offset + f64::from(which) * size;
-        Self { offset, size, halvings: self.halvings - 1 }
     }
 }

@@ -79,17 +79,17 @@ impl Reconfigurator {
         let before = self.gone;
         self.gone = 0;
         let asked = self.fall_back && design.fallback.is_some();
-        for (own, since) in design.reconfigurations.iter().zip(&mut self.above_since) {
-            if let (Some(most), Some(least_time)) = (own.loss, own.time) {
-                let loss = losses.iter().find(|loss| loss.actuator == own.actuator);
+        for (case, since) in design.reconfigurations.iter().zip(&mut self.above_since) {
+            if let (Some(most), Some(least_time)) = (case.loss, case.time) {
+                let loss = losses.iter().find(|loss| loss.actuator == case.actuator);
                 let above = !asked && loss.is_some_and(|loss| loss.estimate > most);
                 *since = since.or(Some(time)).filter(|_| above);
                 // The importer adds up its steps with rounding.
                 let enough = since.is_some_and(|since| time - since >= least_time * (1.0 - 1e-9));
-                self.decided |= u64::from(enough) << own.actuator;
+                self.decided |= u64::from(enough) << case.actuator;
             }
-            let gone = self.reported[own.actuator] || self.decided & (1 << own.actuator) != 0;
-            self.gone |= u64::from(gone) << own.actuator;
+            let gone = self.reported[case.actuator] || self.decided & (1 << case.actuator) != 0;
+            self.gone |= u64::from(gone) << case.actuator;
         }
         let uncovered = self.gone != 0 && design.gains_without(self.gone).is_none();
         self.fallen_back = design.fallback.is_some() && (asked || uncovered);
@@ -104,9 +104,9 @@ impl Reconfigurator {
     /// The time of the next decision by an estimate that is above its fraction now, in s.
     pub(crate) fn next_decision(&self, design: &Design) -> Option<f64> {
         let ends =
-            design.reconfigurations.iter().zip(&self.above_since).filter_map(|(own, since)| {
-                let pending = self.decided & (1 << own.actuator) == 0;
-                Some((*since)? + own.time.filter(|_| pending)?)
+            design.reconfigurations.iter().zip(&self.above_since).filter_map(|(case, since)| {
+                let pending = self.decided & (1 << case.actuator) == 0;
+                Some((*since)? + case.time.filter(|_| pending)?)
             });
         ends.reduce(f64::min)
     }
@@ -118,9 +118,9 @@ impl Reconfigurator {
         losses: &'a [Loss],
     ) -> impl Iterator<Item = (f64, bool)> + 'a {
         let all = design.reconfigurations.iter().zip(&self.above_since);
-        all.filter_map(move |(own, since)| {
-            let loss = losses.iter().find(|loss| loss.actuator == own.actuator);
-            let most = own.loss?;
+        all.filter_map(move |(case, since)| {
+            let loss = losses.iter().find(|loss| loss.actuator == case.actuator);
+            let most = case.loss?;
             Some((most - loss.map_or(0.0, |loss| loss.estimate), since.is_some()))
         })
     }

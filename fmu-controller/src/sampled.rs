@@ -105,8 +105,11 @@ impl Sampler {
     /// limits, too.
     pub(crate) fn sample(
         &mut self,
-        (design, mode): (&Design, Mode),
-        (values, point, mut signals): (&mut Values, &OperatingPoint, &mut Signals),
+        design: &Design,
+        mode: Mode,
+        values: &mut Values,
+        point: &OperatingPoint,
+        mut signals: &mut Signals,
         offset: f64,
     ) -> Mode {
         values.z.copy_from_slice(&self.prediction);
@@ -122,7 +125,7 @@ impl Sampler {
         mode.set_limited(design, &mut signals.u);
         let equations = Equations::<f64>::new(design, mode);
         equations.set_free_commands(&mut signals);
-        values.set_commands(&signals.u, (design, mode), point);
+        values.set_commands(&signals.u, design, mode, point);
         self.predict(design, equations, signals);
         for (next, point) in self.prediction.iter_mut().zip(&point.z) {
             *next += point;

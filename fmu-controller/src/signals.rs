@@ -87,8 +87,8 @@ impl Signals {
     /// Sets z, y and r to the deviations of `values` from `point`, the inputs `offset` s after these were
     /// given.
     pub(crate) fn set(&mut self, values: &Values, point: &OperatingPoint, offset: f64) {
-        for ((own, value), point) in self.z.iter_mut().zip(&values.z).zip(&point.z) {
-            *own = value - point;
+        for ((z, value), point) in self.z.iter_mut().zip(&values.z).zip(&point.z) {
+            *z = value - point;
         }
         self.set_inputs(values, point, offset);
     }
@@ -103,13 +103,13 @@ impl Signals {
 
     /// Sets z, y and r to the derivatives of their deviations: those of the signals less those of the operating
     /// point, which `design` has in place of an operating point.
-    pub(crate) fn set_rates(&mut self, (z, values): (&[f64], &Values), design: &Design) {
+    pub(crate) fn set_rates(&mut self, z: &[f64], values: &Values, design: &Design) {
         self.z.copy_from_slice(z);
         self.y.copy_from_slice(&values.y_slopes);
         self.r.copy_from_slice(&values.r_slopes);
-        let less = |own: &mut [f64], signals: &[Signal]| {
-            for (own, signal) in own.iter_mut().zip(signals) {
-                *own -= signal.operating.unwrap_or_default();
+        let less = |slopes: &mut [f64], signals: &[Signal]| {
+            for (slope, signal) in slopes.iter_mut().zip(signals) {
+                *slope -= signal.operating.unwrap_or_default();
             }
         };
         let [x, _, y_f, _] = design.parts_mut(&mut self.z);
@@ -124,8 +124,8 @@ impl Signals {
         let measured = values.y.iter().zip(&values.y_slopes).zip(&point.y);
         let referred = values.r.iter().zip(&values.r_slopes).zip(&point.r);
         let inputs = self.y.iter_mut().chain(&mut self.r);
-        for (own, ((value, slope), point)) in inputs.zip(measured.chain(referred)) {
-            *own = value - point + slope * offset;
+        for (input, ((value, slope), point)) in inputs.zip(measured.chain(referred)) {
+            *input = value - point + slope * offset;
         }
     }
 }
@@ -139,8 +139,8 @@ impl Values {
 
     /// Sets z, or its first parts, to the operating point plus the deviations `z`.
     pub(crate) fn set_estimate(&mut self, z: &[f64], point: &OperatingPoint) {
-        for ((value, own), point) in self.z.iter_mut().zip(z).zip(&point.z) {
-            *value = own + point;
+        for ((value, deviation), point) in self.z.iter_mut().zip(z).zip(&point.z) {
+            *value = deviation + point;
         }
     }
 
@@ -148,10 +148,11 @@ impl Values {
     pub(crate) fn set_commands(
         &mut self,
         u: &[f64],
-        (design, mode): (&Design, Mode),
+        design: &Design,
+        mode: Mode,
         point: &OperatingPoint,
     ) {
-        let free = u.iter().zip(&point.u).map(|(own, point)| own + point);
+        let free = u.iter().zip(&point.u).map(|(u, point)| u + point);
         for (j, (value, free)) in self.u.iter_mut().zip(free).enumerate() {
             *value = mode.held(design, j).unwrap_or(free);
         }

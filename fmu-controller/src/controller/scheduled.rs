@@ -23,15 +23,15 @@ impl AsoController {
             None => self.schedule_slope,
         };
         schedule.differentiate(self.schedule_value, slope, rates);
-        moves.set_rates((z_slopes, values), rates);
+        moves.set_rates(z_slopes, values, rates);
         let equations = Equations::<Dual64>::new([current, rates], *mode);
         let (z, inputs) = (
             equations.estimate([&deviations.z, &moves.z]),
             [[&deviations.y[..], &moves.y], [&deviations.r[..], &moves.r]],
         );
         for (j, slope) in u_slopes.iter_mut().enumerate().filter(|(j, _)| !mode.is_limited(*j)) {
-            let own = rates.actuators[j].operating.unwrap_or_default();
-            *slope = own + equations.free_command(j, z, inputs).eps;
+            let point = rates.actuators[j].operating.unwrap_or_default();
+            *slope = point + equations.free_command(j, z, inputs).eps;
         }
         for (i, slope) in f_slopes.iter_mut().enumerate() {
             *slope = equations.fault(i, z, inputs[0]).eps;

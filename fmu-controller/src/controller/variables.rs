@@ -109,9 +109,9 @@ fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
         Variable::boolean("compensate", text, |model: &mut AsoController| &mut model.compensate)
             .input(),
     );
-    inputs.extend(design.reconfigurations.iter().map(|own| {
-        let j = own.actuator;
-        let text = format!("Whether this actuator is gone: {}", own.gone);
+    inputs.extend(design.reconfigurations.iter().map(|case| {
+        let j = case.actuator;
+        let text = format!("Whether this actuator is gone: {}", case.gone);
         Variable::boolean(
             channel("actuator_gone", j, design.actuators.len()),
             text,
@@ -132,7 +132,8 @@ fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
 
 /// The scheduling variable, if it is no measurement.
 fn schedule_input(design: &Design) -> Option<Variable<AsoController>> {
-    let schedule = design.schedule.as_ref().filter(|own| own.measurement(design).is_none())?;
+    let schedule =
+        design.schedule.as_ref().filter(|schedule| schedule.measurement(design).is_none())?;
     let meaning = &schedule.description;
     let meaning = if meaning.is_empty() { &schedule.variable } else { meaning };
     let text = format!("Scheduling variable: {meaning}");
@@ -301,7 +302,7 @@ mod tests {
 
     #[test]
     fn a_derivative_has_the_unit_of_its_state_per_second() {
-        for (unit, wanted) in [
+        for (unit, rate) in [
             ("m", "m/s"),
             ("rad/s", "rad/s2"),
             ("N", "N/s"),
@@ -311,7 +312,7 @@ mod tests {
             ("%", "%/s"),
         ] {
             let slope = per_second(Some(&unit.to_owned())).unwrap();
-            assert_eq!(slope, wanted);
+            assert_eq!(slope, rate);
             let [of, per] = [unit, &slope].map(|unit| Unit::parse(unit).unwrap().base.unwrap());
             assert_eq!(fmu::description::unit::BaseUnit { s: of.s - 1, ..of }, per);
         }

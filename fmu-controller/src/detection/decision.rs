@@ -34,15 +34,19 @@ impl Decision {
     }
 
     /// Finds the one fault to which exactly the tests react that have given an alarm.
-    pub(crate) fn isolate(&mut self, own: &DetectionDesign, has_alarmed: impl Fn(usize) -> bool) {
+    pub(crate) fn isolate(
+        &mut self,
+        detection: &DetectionDesign,
+        has_alarmed: impl Fn(usize) -> bool,
+    ) {
         if !self.detected {
             return;
         }
         let fits = |fault: &usize| {
-            let mut tests = own.tests.iter().enumerate();
+            let mut tests = detection.tests.iter().enumerate();
             tests.all(|(at, test)| test.reacts[*fault] == has_alarmed(at))
         };
-        let mut fitting = (0..own.faults.len()).filter(fits);
+        let mut fitting = (0..detection.faults.len()).filter(fits);
         self.isolated = match (fitting.next(), fitting.next()) {
             (Some(fault), None) => i32::try_from(fault + 1).unwrap_or(-1),
             _ => -1,

@@ -9,7 +9,7 @@ use aso_controller::design::detection::{DetectionDesign, TestDesign};
 
 /// The variables of a design with a detection.
 pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {
-    let Some(own) = &design.detection else { return Vec::new() };
+    let Some(detection) = &design.detection else { return Vec::new() };
     let mut all = vec![
         Variable::boolean(
             "detection_reset",
@@ -18,15 +18,15 @@ pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {
         )
         .input(),
     ];
-    all.extend(decision(own));
-    all.extend(residuals(own));
-    all.extend(statistics(own));
+    all.extend(decision(detection));
+    all.extend(residuals(detection));
+    all.extend(statistics(detection));
     let text = "Time after the start from which the residuals are tested";
     let from = Variable::real("detect_from", text, |model: &mut AsoController| {
         &mut model.detection_mut().from
     });
     all.push(from.unit("s").parameter().min(0.0));
-    all.extend(own.sample_time.map(|_| {
+    all.extend(detection.sample_time.map(|_| {
         let text = "Time between two samples of the residuals";
         Variable::real("detection_sample_time", text, |model: &mut AsoController| {
             model.detection_mut().sample_time.get_or_insert_default()
@@ -34,7 +34,7 @@ pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {
         .unit("s")
         .constant()
     }));
-    all.extend(thresholds(own));
+    all.extend(thresholds(detection));
     all
 }
 
@@ -43,8 +43,8 @@ fn output(variable: Variable<AsoController>) -> Variable<AsoController> {
     variable.output(&[]).discrete().initially(Vec::<String>::new())
 }
 
-fn decision(own: &DetectionDesign) -> Vec<Variable<AsoController>> {
-    let names = own.faults.iter().enumerate().map(|(at, name)| format!("{} {name}", at + 1));
+fn decision(detection: &DetectionDesign) -> Vec<Variable<AsoController>> {
+    let names = detection.faults.iter().enumerate().map(|(at, name)| format!("{} {name}", at + 1));
     let names = names.collect::<Vec<_>>().join(", ");
     let text = format!(
         "The fault that the alarms fit: {names}; 0 without an alarm, -1 if they fit none or several"
@@ -77,9 +77,9 @@ fn decision(own: &DetectionDesign) -> Vec<Variable<AsoController>> {
     ]
 }
 
-fn residuals(own: &DetectionDesign) -> Vec<Variable<AsoController>> {
-    let count = own.c.rows;
-    let tests = own.tests.iter().flat_map(|test| std::iter::repeat_n(test, test.residuals));
+fn residuals(detection: &DetectionDesign) -> Vec<Variable<AsoController>> {
+    let count = detection.c.rows;
+    let tests = detection.tests.iter().flat_map(|test| std::iter::repeat_n(test, test.residuals));
     let residual = |(k, test): (usize, &TestDesign)| {
         let text = format!("Residual of test {}, in standard deviations", test.name);
         let variable = Variable::real(
@@ -92,8 +92,8 @@ fn residuals(own: &DetectionDesign) -> Vec<Variable<AsoController>> {
     tests.enumerate().map(residual).collect()
 }
 
-fn statistics(own: &DetectionDesign) -> Vec<Variable<AsoController>> {
-    let count = own.tests.len();
+fn statistics(detection: &DetectionDesign) -> Vec<Variable<AsoController>> {
+    let count = detection.tests.len();
     let statistic = |(k, test): (usize, &TestDesign)| {
         let text = match test.drift {
             Some(_) => format!("Larger cumulative sum of test {}", test.name),
@@ -106,11 +106,11 @@ fn statistics(own: &DetectionDesign) -> Vec<Variable<AsoController>> {
         );
         output(variable.unit("1"))
     };
-    own.tests.iter().enumerate().map(statistic).collect()
+    detection.tests.iter().enumerate().map(statistic).collect()
 }
 
-fn thresholds(own: &DetectionDesign) -> Vec<Variable<AsoController>> {
-    let count = own.tests.len();
+fn thresholds(detection: &DetectionDesign) -> Vec<Variable<AsoController>> {
+    let count = detection.tests.len();
     let threshold = |(k, test): (usize, &TestDesign)| {
         let text = format!("Threshold of the statistic of test {}", test.name);
         Variable::real(channel("threshold", k, count), text, move |model: &mut AsoController| {
@@ -119,5 +119,5 @@ fn thresholds(own: &DetectionDesign) -> Vec<Variable<AsoController>> {
         .unit("1")
         .tunable()
     };
-    own.tests.iter().enumerate().map(threshold).collect()
+    detection.tests.iter().enumerate().map(threshold).collect()
 }

@@ -147,8 +147,8 @@ fn sliding_mode(design: &Design) -> Vec<Variable<AsoController>> {
             with_unit(variable, unit).parameter()
         })
     };
-    bounds("rho", "Largest estimate", rho, |own| &mut own.rho)
-        .chain(bounds("delta", "Half-width of the boundary layer", delta, |own| &mut own.delta))
+    bounds("rho", "Largest estimate", rho, |law| &mut law.rho)
+        .chain(bounds("delta", "Half-width of the boundary layer", delta, |law| &mut law.delta))
         .collect()
 }
 
@@ -193,13 +193,13 @@ fn operating(
 
 /// The commands at which actuators are stuck when they are gone.
 fn stuck(design: &Design) -> Vec<Variable<AsoController>> {
-    let one = |(at, own): (usize, &Reconfiguration)| {
-        let name = channel("u_stuck", own.actuator, design.actuators.len());
-        let text = format!("Command at which the actuator is stuck when it is gone: {}", own.gone);
+    let one = |(at, case): (usize, &Reconfiguration)| {
+        let name = channel("u_stuck", case.actuator, design.actuators.len());
+        let text = format!("Command at which the actuator is stuck when it is gone: {}", case.gone);
         let variable = Variable::real(name, text, move |model: &mut AsoController| {
             &mut model.design.reconfigurations[at].stuck_at
         });
-        with_unit(variable, design.actuators[own.actuator].unit.as_ref()).tunable()
+        with_unit(variable, design.actuators[case.actuator].unit.as_ref()).tunable()
     };
     design.reconfigurations.iter().enumerate().map(one).collect()
 }
