@@ -197,9 +197,9 @@ impl<'a> GainSet<'a> {
     #[must_use]
     pub fn k_x(self, j: usize) -> &'a [f64] {
         match self {
-            Self::Single(own) => own.k_x.as_ref().map_or(&[], |k_x| k_x.row(j)),
-            Self::Several(own) => own.k_x.row(j),
-            Self::Fallback(own) => own.k_x.row(j),
+            Self::Single(case) => case.k_x.as_ref().map_or(&[], |k_x| k_x.row(j)),
+            Self::Several(combination) => combination.k_x.row(j),
+            Self::Fallback(fallback) => fallback.k_x.row(j),
         }
     }
 
@@ -207,9 +207,9 @@ impl<'a> GainSet<'a> {
     #[must_use]
     pub fn k_f(self, j: usize) -> &'a [f64] {
         let k_f = match self {
-            Self::Single(own) => own.k_f.as_ref(),
-            Self::Several(own) => Some(&own.k_f),
-            Self::Fallback(own) => own.k_f.as_ref(),
+            Self::Single(case) => case.k_f.as_ref(),
+            Self::Several(combination) => Some(&combination.k_f),
+            Self::Fallback(fallback) => fallback.k_f.as_ref(),
         };
         k_f.map_or(&[], |k_f| k_f.row(j))
     }
@@ -218,8 +218,8 @@ impl<'a> GainSet<'a> {
     #[must_use]
     pub fn k_s(self, j: usize) -> &'a [f64] {
         match self {
-            Self::Single(own) => own.k_s.as_ref().map_or(&[], |k_s| &k_s[j..=j]),
-            Self::Several(own) => own.k_s.row(j),
+            Self::Single(case) => case.k_s.as_ref().map_or(&[], |k_s| &k_s[j..=j]),
+            Self::Several(combination) => combination.k_s.row(j),
             Self::Fallback(_) => &[],
         }
     }
@@ -432,18 +432,18 @@ impl Design {
     /// Sets the positions that reconfigurations state by names.
     fn locate_reconfigurations(&mut self) {
         let at = |name: &String, mut names: std::slice::Iter<'_, Fault>| {
-            names.position(|own| own.name == *name)
+            names.position(|fault| fault.name == *name)
         };
-        for own in &mut self.reconfigurations {
-            let actuator = self.actuators.iter().position(|actuator| actuator.name == own.gone);
-            own.actuator = actuator.unwrap_or_default();
-            own.restarted =
-                own.restart.iter().filter_map(|name| at(name, self.faults.iter())).collect();
+        for case in &mut self.reconfigurations {
+            let actuator = self.actuators.iter().position(|actuator| actuator.name == case.gone);
+            case.actuator = actuator.unwrap_or_default();
+            case.restarted =
+                case.restart.iter().filter_map(|name| at(name, self.faults.iter())).collect();
         }
-        for own in &mut self.combinations {
+        for combination in &mut self.combinations {
             let positions = self.actuators.iter().enumerate();
-            let gone = positions.filter(|(_, actuator)| own.gone.contains(&actuator.name));
-            own.mask = gone.fold(0, |mask, (j, _)| mask | 1 << j);
+            let gone = positions.filter(|(_, actuator)| combination.gone.contains(&actuator.name));
+            combination.mask = gone.fold(0, |mask, (j, _)| mask | 1 << j);
         }
     }
 
@@ -451,32 +451,36 @@ impl Design {
     /// them.
     pub fn gains_without(&self, gone: u64) -> Option<GainSet<'_>> {
         if gone.is_power_of_two() {
-            let own = self.without(gone.trailing_zeros() as usize)?;
-            return own.k_x.as_ref().map(|_| GainSet::Single(own));
+            let case = self.without(gone.trailing_zeros() as usize)?;
+            return case.k_x.as_ref().map(|_| GainSet::Single(case));
         }
-        self.combinations.iter().find(|own| own.mask == gone).map(GainSet::Several)
+        self.combinations.iter().find(|combination| combination.mask == gone).map(GainSet::Several)
     }
 
     /// The reconfiguration without actuator `j`, if there is one.
     #[must_use]
     pub fn without(&self, j: usize) -> Option<&Reconfiguration> {
-        self.reconfigurations.iter().find(|own| own.actuator == j)
+        self.reconfigurations.iter().find(|case| case.actuator == j)
     }
 
     /// Sets the matrices of reconfigurations and fall-back, which are no variables, to zero: a direction
     /// in the space of the variables.
     pub fn clear_reconfigurations(&mut self) {
-        for own in &mut self.reconfigurations {
-            let matrices = own.k_x.iter_mut().chain(&mut own.k_f).flat_map(|own| &mut own.values);
-            matrices.chain(own.k_s.iter_mut().flatten()).for_each(|value| *value = 0.0);
+        for case in &mut self.reconfigurations {
+            let matrices =
+                case.k_x.iter_mut().chain(&mut case.k_f).flat_map(|matrix| &mut matrix.values);
+            matrices.chain(case.k_s.iter_mut().flatten()).for_each(|value| *value = 0.0);
         }
-        for own in &mut self.combinations {
-            let matrices = [&mut own.k_x, &mut own.k_f, &mut own.k_s];
-            matrices.into_iter().flat_map(|own| &mut own.values).for_each(|value| *value = 0.0);
+        for combination in &mut self.combinations {
+            let matrices = [&mut combination.k_x, &mut combination.k_f, &mut combination.k_s];
+            matrices
+                .into_iter()
+                .flat_map(|matrix| &mut matrix.values)
+                .for_each(|value| *value = 0.0);
         }
-        if let Some(own) = &mut self.fallback {
-            let matrices = own.k_f.iter_mut().chain([&mut own.k_x]);
-            matrices.flat_map(|own| &mut own.values).for_each(|value| *value = 0.0);
+        if let Some(fallback) = &mut self.fallback {
+            let matrices = fallback.k_f.iter_mut().chain([&mut fallback.k_x]);
+            matrices.flat_map(|matrix| &mut matrix.values).for_each(|value| *value = 0.0);
         }
     }
 
@@ -504,16 +508,16 @@ impl Design {
     /// this variable.
     pub fn clear_constant(&mut self) {
         let matrices = [&mut self.a_f, &mut self.h, &mut self.f_i].into_iter().flatten();
-        matrices.flat_map(|own| &mut own.values).for_each(|value| *value = 0.0);
+        matrices.flat_map(|matrix| &mut matrix.values).for_each(|value| *value = 0.0);
     }
 
     /// Takes what the importer can change: the limits of the actuators and the filter.
     pub fn take_parameters(&mut self, other: &Self) {
-        for (own, other) in self.actuators.iter_mut().zip(&other.actuators) {
-            own.limits = other.limits;
+        for (actuator, other) in self.actuators.iter_mut().zip(&other.actuators) {
+            actuator.limits = other.limits;
         }
         let filters = self.filter.iter_mut().flatten().zip(other.filter.iter().flatten());
-        filters.for_each(|(own, other)| *own = *other);
+        filters.for_each(|(weight, other)| *weight = *other);
     }
 
     /// Whether the file states an operating point that does not depend on a scheduling variable.

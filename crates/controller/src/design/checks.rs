@@ -123,18 +123,18 @@ impl Design {
                     "{place}: of P_f, K_i, L_w, N_r it states [{found}], expected [{expected}] as above"
                 ));
             }
-            for (name, own) in point.matrices() {
+            for (name, matrix) in point.matrices() {
                 let Some((_, expected)) = self.matrices().find(|(other, _)| *other == name) else {
                     continue;
                 };
-                if (own.rows, own.columns) != (expected.rows, expected.columns) {
+                if (matrix.rows, matrix.columns) != (expected.rows, expected.columns) {
                     return refuse(format!(
                         "{place}: {name} is {} x {}, expected {} x {}",
-                        own.rows, own.columns, expected.rows, expected.columns
+                        matrix.rows, matrix.columns, expected.rows, expected.columns
                     ));
                 }
-                if let Some(k) = own.values.iter().position(|value| !value.is_finite()) {
-                    let name = own.element(name, k);
+                if let Some(k) = matrix.values.iter().position(|value| !value.is_finite()) {
+                    let name = matrix.element(name, k);
                     return refuse(format!("{place}: {name} is not a finite number"));
                 }
             }
@@ -232,10 +232,10 @@ impl Design {
 
     fn contradiction_of_single_reconfigurations(&self) -> Option<String> {
         let (n, m, q) = (self.states.len(), self.actuators.len(), self.faults.len());
-        self.reconfigurations.iter().enumerate().find_map(|(at, own)| {
-            let gone = &own.gone;
+        self.reconfigurations.iter().enumerate().find_map(|(at, case)| {
+            let gone = &case.gone;
             let begin = format!("reconfiguration without {gone}: ");
-            let parts = (own.k_x.as_ref(), own.k_f.as_ref(), own.k_s.as_ref());
+            let parts = (case.k_x.as_ref(), case.k_f.as_ref(), case.k_s.as_ref());
             let fits = match parts {
                 (Some(k_x), Some(k_f), Some(k_s)) => {
                     shape(k_x) == (m, n) && shape(k_f) == (m, q) && k_s.len() == m
@@ -243,10 +243,10 @@ impl Design {
                 (None, None, None) => self.fallback.is_some(),
                 _ => false,
             };
-            let decided = own.loss.zip(own.time);
+            let decided = case.loss.zip(case.time);
             let lost = self.faults.iter().any(|fault| fault.loss_of.as_ref() == Some(gone));
-            let matrices = own.k_x.iter().chain(&own.k_f).flat_map(|own| &own.values);
-            let mut numbers = matrices.chain(own.k_s.iter().flatten()).chain([&own.stuck_at]);
+            let matrices = case.k_x.iter().chain(&case.k_f).flat_map(|matrix| &matrix.values);
+            let mut numbers = matrices.chain(case.k_s.iter().flatten()).chain([&case.stuck_at]);
             let text = if !self.actuators.iter().any(|actuator| actuator.name == *gone) {
                 "there is no actuator of this name"
             } else if self.reconfigurations[..at].iter().any(|other| other.gone == *gone) {
@@ -256,9 +256,9 @@ impl Design {
                  for each actuator; or none of them together with [fallback]"
             } else if numbers.any(|value| !value.is_finite()) {
                 "a number is not finite"
-            } else if own.restart.iter().any(|name| !self.faults.iter().any(|f| f.name == *name)) {
+            } else if case.restart.iter().any(|name| !self.faults.iter().any(|f| f.name == *name)) {
                 "`restart` names a fault that does not exist"
-            } else if own.loss.is_some() != own.time.is_some() || decided.is_some() && !lost {
+            } else if case.loss.is_some() != case.time.is_some() || decided.is_some() && !lost {
                 "loss and time belong together, and to a fault with loss_of"
             } else if decided.is_some_and(|(loss, time)| !(loss > 0.0 && (0.0..1e9).contains(&time))) {
                 "expected a loss above 0 and a time of at least 0 s"
@@ -272,40 +272,41 @@ impl Design {
     fn contradiction_of_combinations(&self) -> Option<String> {
         let (n, m, q) = (self.states.len(), self.actuators.len(), self.faults.len());
         let finite = |matrix: &Matrix| matrix.values.iter().all(|value| value.is_finite());
-        if let Some(own) = &self.fallback {
-            let k_f = own.k_f.as_ref();
-            if shape(&own.k_x) != (m, n) || k_f.is_some_and(|k_f| shape(k_f) != (m, q)) {
+        if let Some(fallback) = &self.fallback {
+            let k_f = fallback.k_f.as_ref();
+            if shape(&fallback.k_x) != (m, n) || k_f.is_some_and(|k_f| shape(k_f) != (m, q)) {
                 let text =
                     "fallback: expected K_x of actuators x states, K_f of actuators x faults";
                 return Some(text.to_owned());
             }
-            if !finite(&own.k_x) || !k_f.is_none_or(finite) {
+            if !finite(&fallback.k_x) || !k_f.is_none_or(finite) {
                 return Some("fallback: a number is not finite".to_owned());
             }
         }
         let position = |name: &String| self.reconfigurations.iter().position(|r| r.gone == *name);
-        let order = |name: &String| self.actuators.iter().position(|own| own.name == *name);
-        self.combinations.iter().enumerate().find_map(|(at, own)| {
-            let ordered = own.gone.windows(2).all(|pair| order(&pair[0]) < order(&pair[1]));
-            let count = own.gone.len();
-            let text = if count < 2 || !own.gone.iter().all(|name| position(name).is_some()) {
+        let order =
+            |name: &String| self.actuators.iter().position(|actuator| actuator.name == *name);
+        self.combinations.iter().enumerate().find_map(|(at, combination)| {
+            let ordered = combination.gone.windows(2).all(|pair| order(&pair[0]) < order(&pair[1]));
+            let count = combination.gone.len();
+            let text = if count < 2 || !combination.gone.iter().all(|name| position(name).is_some()) {
                 "expected at least two actuators, each with an entry in reconfigurations"
             } else if !ordered {
                 "expected each actuator once, in the order of the actuators"
-            } else if self.combinations[..at].iter().any(|other| other.gone == own.gone) {
+            } else if self.combinations[..at].iter().any(|other| other.gone == combination.gone) {
                 "it is there twice"
-            } else if shape(&own.k_x) != (m, n)
-                || shape(&own.k_f) != (m, q)
-                || shape(&own.k_s) != (m, count)
+            } else if shape(&combination.k_x) != (m, n)
+                || shape(&combination.k_f) != (m, q)
+                || shape(&combination.k_s) != (m, count)
             {
                 "expected K_x of actuators x states, K_f of actuators x faults, K_s with one number \
                  for each actuator and each that is gone"
-            } else if ![&own.k_x, &own.k_f, &own.k_s].into_iter().all(finite) {
+            } else if ![&combination.k_x, &combination.k_f, &combination.k_s].into_iter().all(finite) {
                 "a number is not finite"
             } else {
                 return None;
             };
-            Some(format!("combination without {}: {text}", own.gone.join(", ")))
+            Some(format!("combination without {}: {text}", combination.gone.join(", ")))
         })
     }
 
@@ -332,8 +333,8 @@ impl Design {
         if fault.least_command.is_none() {
             return Some(format!("fault {name}: loss_of is stated and least_command is not"));
         }
-        let names: Vec<_> = self.actuators.iter().map(|own| own.name.as_str()).collect();
-        match names.iter().filter(|own| *own == actuator).count() {
+        let names: Vec<_> = self.actuators.iter().map(|actuator| actuator.name.as_str()).collect();
+        match names.iter().filter(|name| *name == actuator).count() {
             1 => None,
             count => Some(format!(
                 "fault {name}: loss_of = {actuator:?} is the name of {count} actuators, expected \
