@@ -238,15 +238,36 @@ fn bound(entry: &Entry<'_>, region: Region, limited: bool) -> Result<Option<f64>
     }
 }
 
-/// Reads a symmetric matrix, or a list of numbers as a diagonal matrix.
+/// The part of the largest entry by which rounding may make a weight unsymmetric: that of a product of three matrices.
+const UNSYMMETRIC: f64 = 1e-12;
+
+/// Reads a symmetric matrix, or a list of numbers as a diagonal matrix. Rounding is taken off a matrix that is
+/// symmetric but for it.
 fn weight(entry: &Entry<'_>) -> Result<DMatrix<f64>, PlaceError> {
     let members = entry.list()?;
     if members.iter().any(Entry::is_list) {
         let matrix = entry.matrix()?;
-        if matrix.is_square() && matrix == matrix.transpose() {
-            return Ok(matrix);
+        if !matrix.is_square() {
+            let (rows, columns) = matrix.shape();
+            return Err(
+                entry.error(format!("expected a symmetric matrix, found {rows} x {columns}"))
+            );
         }
-        return Err(entry.error("expected a symmetric matrix"));
+        let transposed = matrix.transpose();
+        let differences = (&matrix - &transposed).abs();
+        let (row, column) = differences.iamax_full();
+        if differences[(row, column)] > UNSYMMETRIC * matrix.amax() {
+            let (row, column) = (row.min(column), row.max(column));
+            let [one, other] = [matrix[(row, column)], matrix[(column, row)]];
+            return Err(entry.error(format!(
+                "expected a symmetric matrix, found [{}, {}] = {one} and [{}, {}] = {other}",
+                row + 1,
+                column + 1,
+                column + 1,
+                row + 1
+            )));
+        }
+        return Ok((matrix + transposed) / 2.0);
     }
     let mut diagonal = Vec::with_capacity(members.len());
     for member in &members {
