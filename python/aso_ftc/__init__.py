@@ -8,7 +8,7 @@
 * :func:`simulate` runs one FMU, :class:`System` connects several.
 * :class:`Results` holds the rows of a run for NumPy, Arrow, pandas, polars and xarray.
 * :func:`report` writes the report of a run, as a page with interactive plots.
-* :func:`design` designs a fault-tolerant controller.
+* :func:`design` designs a fault-tolerant controller, :func:`trade_off` one for each of several requirements.
 * :func:`check` and :func:`read_model_description` look at an FMU; :func:`compile` builds its library.
 """
 
@@ -40,6 +40,7 @@ from ._results import Results
 from ._simulate import CheckReport, check, compile, simulate
 from ._slave import Slave
 from ._system import Cancel, Simulation, System, fault
+from ._trade_off import TradeOff, trade_off
 
 __version__ = _core.__version__
 
@@ -63,6 +64,7 @@ __all__ = [
     "Slave",
     "System",
     "TimeLimitError",
+    "TradeOff",
     "Variable",
     "__version__",
     "check",
@@ -77,6 +79,7 @@ __all__ = [
     "report",
     "reproduce",
     "simulate",
+    "trade_off",
 ]
 
 

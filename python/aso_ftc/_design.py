@@ -9,9 +9,10 @@ import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from . import _core
+from . import _core, _plant
 from ._errors import DesignError
 from ._paper import fmus
+from ._results import _package
 from ._system import PathLike
 
 if TYPE_CHECKING:
@@ -24,12 +25,13 @@ def design(plant: object, **entries: Any) -> Design:
     """Design observer and feedback with fault compensation for a linear plant.
 
     Args:
-        plant: the path of a plant file; its content as nested dicts; a linear system with the attributes
-            ``A``, ``B``, ``C`` (and ``D``, which must be zero), such as ``control.StateSpace``; a tuple
-            of matrices ``(A, B, C)`` with the shapes (n, n), (n, m), (p, n); or the path of a ``.npz`` or
-            ``.mat`` file with them.
+        plant: the path of a plant file; its content as nested dicts; a system of python-control or scipy.signal in
+            continuous time (state space, transfer function, zeros and poles); a tuple of matrices ``(A, B, C)`` or
+            ``(A, B, C, D)`` with the shapes (n, n), (n, m), (p, n), (p, m); or the path of a ``.npz`` or ``.mat``
+            file with them.
         entries: entries of the plant file, which replace those of the plant: ``feedback``,
-            ``observer``, ``F_a`` (n, q), ``faults``, ``measurements``, ...; see the page "Plant file".
+            ``observer``, ``F_a`` (n, q), ``faults``, ``measurements``, ...; see the page "Plant file". ``None``
+            removes an entry. Eigenvalues are numbers as NumPy gives them, complex ones in pairs.
 
     Returns:
         gains, checks and report: the same numbers as ``aso-ftc design``.
@@ -40,100 +42,52 @@ def design(plant: object, **entries: Any) -> Design:
     >>> made = design((A, B, C), feedback={"eigenvalues": [-2, -3]},
     ...               observer={"eigenvalues": [-8, -9, -10]}, actuator_faults=True)  # doctest: +SKIP
     """
+    folder = os.getcwd()
     if isinstance(plant, (str, os.PathLike)):
-        path = os.fspath(plant)
+        path = os.path.abspath(os.fspath(plant))
         if path.lower().endswith((".npz", ".mat")):
-            return _of_entries({**_of_file(path), **entries})
-        if not entries:
-            return Design(_core.design_file(path))
-        with open(path, encoding="utf-8") as file:
-            own = _core.parse_toml(file.read())
-        return _of_entries({**own, **entries}, os.path.dirname(os.path.abspath(path)))
-    if isinstance(plant, Mapping):
-        return _of_entries({**plant, **entries})
-    return _of_entries({**_matrices(plant), **entries})
-
-
-def _of_entries(entries: Mapping[str, Any], folder: str | None = None) -> Design:
-    own = {name: _plain(value) for name, value in entries.items() if value is not None}
-    own = _with_signals(own)
-    return Design(_core.design_plant(own, os.path.join(folder or os.getcwd(), "plant.toml")))
-
-
-def _plain(value: Any) -> Any:
-    """Return matrices as lists of rows of floats."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    return value
-
-
-def _matrices(plant: Any) -> dict[str, Any]:
-    import numpy
-
-    if all(hasattr(plant, name) for name in "ABC"):
-        if getattr(plant, "dt", None) not in (None, 0, False):
-            raise DesignError("the plant is sampled, expected a continuous-time system", "Sampled")
-        feedthrough = numpy.asarray(getattr(plant, "D", 0.0), dtype=float)
-        if feedthrough.any():
-            raise DesignError("the matrix D of the plant is not zero, expected no feedthrough", "D")
-        named = {"A": plant.A, "B": plant.B, "C": plant.C}
-        labels = {
-            "states": getattr(plant, "state_labels", None),
-            "actuators": getattr(plant, "input_labels", None),
-            "measurements": getattr(plant, "output_labels", None),
-        }
-    elif isinstance(plant, (tuple, list)) and len(plant) == 3:
-        named, labels = dict(zip("ABC", plant)), {}
+            own = _plant.of_file(path)
+        elif not entries:
+            return Design(_core.design_file(os.fspath(plant)), path)
+        else:
+            with open(path, encoding="utf-8") as file:
+                own = _core.parse_toml(file.read())
+            folder = os.path.dirname(path)
+    elif isinstance(plant, Mapping):
+        own = dict(plant)
     else:
-        kind = type(plant).__name__
-        raise TypeError(f"expected a path, a dict, a linear system or matrices (A, B, C), found {kind}")
-    own: dict[str, Any] = {
-        name: numpy.atleast_2d(numpy.asarray(matrix, dtype=float)).tolist() for name, matrix in named.items()
-    }
-    for entry, names in labels.items():
-        if names and all(str(name).isidentifier() for name in names):
-            own[entry] = [{"name": str(name)} for name in names]
-    return own
+        own = _plant.of_system(plant)
+    return _of_entries({**own, **entries}, os.path.join(folder, "plant.toml"))
 
 
-def _with_signals(own: dict[str, Any]) -> dict[str, Any]:
-    """Add names of states, commands and measurements where there are none."""
-    for entry, matrix, axis, letter in (
-        ("states", "A", 0, "x"),
-        ("actuators", "B", 1, "u"),
-        ("measurements", "C", 0, "y"),
-    ):
-        if entry not in own and matrix in own:
-            rows = own[matrix]
-            count = len(rows) if axis == 0 else len(rows[0])
-            own[entry] = [{"name": f"{letter}{k + 1}"} for k in range(count)]
-    return own
-
-
-def _of_file(path: str) -> dict[str, Any]:
-    """Read the matrices of a ``.npz`` or ``.mat`` file."""
-    import numpy
-
-    content: Mapping[str, Any]
-    if path.lower().endswith(".npz"):
-        content = numpy.load(path)
-    else:
-        from ._results import _package
-
-        content = _package("scipy.io", "a .mat file").loadmat(path)
-    missing = [name for name in "ABC" if name not in content]
-    if missing:
-        raise DesignError(f"{path} has no matrix {missing[0]}, expected A, B, C", "Matrix")
-    names = [name for name in ("A", "B", "C", "F_a") if name in content]
-    return {name: numpy.atleast_2d(numpy.asarray(content[name], dtype=float)).tolist() for name in names}
+def _of_entries(entries: Mapping[str, Any], path: str) -> Design:
+    stated = {name: _plant.plain(value, name) for name, value in entries.items() if value is not None}
+    stated = _plant.with_names(stated)
+    return Design(_core.design_plant(stated, path), path, stated)
 
 
 class Design:
     """A designed controller: gains, checks, report; :func:`design` returns it."""
 
-    def __init__(self, designed: _core.Designed) -> None:
+    def __init__(self, designed: _core.Designed, path: str, entries: dict[str, Any] | None = None) -> None:
         self._designed = designed
+        self._path = path
+        self._entries = entries
         self._report: dict[str, Any] | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _of_entries, (self.entries, self._path)
+
+    @property
+    def entries(self) -> dict[str, Any]:
+        """The plant and the requirements: the entries of the plant file."""
+        if self._entries is None:
+            self._entries = _core.parse_toml(self._designed.plant)
+        return dict(self._entries)
+
+    def with_(self, **entries: Any) -> Design:
+        """Design again with other entries: ``design.with_(observer={"eigenvalues": [-4, -5, -6]})``."""
+        return _of_entries({**self.entries, **entries}, self._path)
 
     @property
     def report(self) -> dict[str, Any]:
@@ -148,6 +102,132 @@ class Design:
         import numpy
 
         return {own["name"]: numpy.array(own["values"], dtype=float) for own in self.report["gains"]}
+
+    @property
+    def K_x(self) -> NDArray[Any]:
+        """The gain of the state feedback (m, n)."""
+        return self.gains["K_x"]
+
+    @property
+    def K_f(self) -> NDArray[Any]:
+        """The gain of the fault compensation (m, q)."""
+        return self.gains["K_f"]
+
+    @property
+    def L(self) -> NDArray[Any]:
+        """The gain of the observer: ``L_x`` (n, p) above ``L_f`` (q, p)."""
+        import numpy
+
+        return numpy.vstack([self.gains["L_x"], self.gains["L_f"]])
+
+    @property
+    def eigenvalues(self) -> dict[str, NDArray[Any]]:
+        """The eigenvalues of ``feedback`` (A + B K_x) and ``observer`` (A_0 - L C_0), complex; of a sample if sampled."""
+        import numpy
+
+        found = {part: self.report[part]["eigenvalues"] for part in ("feedback", "observer")}
+        return {part: numpy.array([complex(*value) for value in values]) for part, values in found.items()}
+
+    @property
+    def margins(self) -> list[dict[str, Any]]:
+        """The margins of each command (``at`` is ``input``) and measurement (``output``).
+
+        ``gain`` has the factors up to which the loop is stable, ``phase`` is in degrees, ``delay`` in s.
+        """
+        points = (self.report["robustness"] or {"points": []})["points"]
+        names = ("name", "gain", "phase", "delay")
+        return [
+            {"at": point["point"], **{name: channel[name] for name in names}}
+            for point in points
+            for channel in point["channels"]
+        ]
+
+    @property
+    def plant(self) -> Any:
+        """The plant from commands to measurements as a ``control.StateSpace``; of a sampled design held and sampled."""
+        return self._system("plant", self._commands, self._measurements)
+
+    @property
+    def closed_loop(self) -> Any:
+        """The loop as a ``control.StateSpace``.
+
+        From signals that are added to commands and measurements, to commands and measurements without these.
+        """
+        signals = [*self._commands, *self._measurements]
+        return self._system("closed loop", [f"d_{name}" for name in signals], signals)
+
+    @property
+    def S(self) -> Any:
+        """The sensitivity at the measurements as ``control.FrequencyResponseData``."""
+        return self._response("S at the measurements")
+
+    @property
+    def T(self) -> Any:
+        """The complementary sensitivity at the measurements as ``control.FrequencyResponseData``."""
+        return self._response("T at the measurements")
+
+    @property
+    def S_input(self) -> Any:
+        """The sensitivity at the commands as ``control.FrequencyResponseData``."""
+        return self._response("S at the commands")
+
+    @property
+    def T_input(self) -> Any:
+        """The complementary sensitivity at the commands as ``control.FrequencyResponseData``."""
+        return self._response("T at the commands")
+
+    @property
+    def _commands(self) -> list[str]:
+        return [signal["name"] for signal in self.report["plant"]["actuators"]]
+
+    @property
+    def _measurements(self) -> list[str]:
+        return [signal["name"] for signal in self.report["plant"]["measurements"]]
+
+    def _system(self, name: str, inputs: list[str], outputs: list[str]) -> Any:
+        import numpy
+
+        control = _package("control", "a system of python-control")
+        matrices, period = self._designed.system(name)
+        sizes = ((-1, len(matrices[0])), (len(matrices[0]), -1), (-1, len(matrices[0])), (len(outputs), -1))
+        arrays = [numpy.array(rows, dtype=float).reshape(size) for rows, size in zip(matrices, sizes)]
+        return control.StateSpace(*arrays, period or 0, inputs=inputs, outputs=outputs)
+
+    def _response(self, name: str) -> Any:
+        import numpy
+
+        signals = self._commands if name.endswith("commands") else self._measurements
+        system = self._system(name, signals, signals)
+        curves = (self.report["robustness"] or {"curves": []})["curves"]
+        if not curves:
+            raise DesignError(f"{name} does not exist: the loop is not stable", "Unstable")
+        return _package("control", name).frequency_response(system, numpy.array(curves[0]["frequencies"]))
+
+    def plot_bode(self, ax: Any = None) -> Any:
+        """Plot the largest singular values of S and T at commands and measurements over the frequency; return the axes."""
+        ax = _axes(ax)
+        for curve in (self.report["robustness"] or {"curves": []})["curves"]:
+            ax.loglog(curve["frequencies"], curve["singular_values"][0], label=curve["name"])
+        ax.set_xlabel("frequency in rad/s")
+        ax.set_ylabel("largest singular value")
+        ax.legend()
+        return ax
+
+    def plot_step(self, ax: Any = None, *, fault: str | None = None) -> Any:
+        """Plot the responses to a step of a fault, the first one by default; return the axes."""
+        steps = self.report["steps"]
+        names = [step["fault"] for step in steps]
+        if fault is not None and fault not in names:
+            raise DesignError(f"there is no fault {fault!r}, expected one of {', '.join(names)}", "Fault")
+        step = steps[names.index(fault) if fault else 0]
+        ax = _axes(ax)
+        for curve in step["curves"]:
+            unit = f" in {curve['unit']}" if curve["unit"] else ""
+            ax.plot(curve["times"], curve["values"], label=f"{curve['name']}{unit}")
+        ax.set_xlabel("time in s")
+        ax.set_title(f"step of {step['fault']} by {step['size']:g} {step['unit'] or ''}".rstrip())
+        ax.legend()
+        return ax
 
     @property
     def checks(self) -> list[dict[str, Any]]:
@@ -165,6 +245,11 @@ class Design:
         return str(self.report["verdict"]["level"])
 
     @property
+    def reasons(self) -> list[str]:
+        """The sentences for a verdict that is not green."""
+        return list(self.report["verdict"]["reasons"])
+
+    @property
     def ok(self) -> bool:
         """Whether all checks hold and the verdict is not red: where ``aso-ftc design`` ends with status 0."""
         return self._designed.holds and self.verdict != "red"
@@ -177,7 +262,7 @@ class Design:
     @property
     def controller(self) -> Controller:
         """The controller, to make its FMU."""
-        return Controller(self._designed)
+        return Controller(self)
 
     def page(self) -> str:
         """Return the report as an HTML page that needs no other file."""
@@ -191,16 +276,42 @@ class Design:
         title = _escaped(self.report["description"])
         return f"<p>{title}: {self.verdict}</p><table><tr><th>holds</th><th>condition</th></tr>{rows}</table>"
 
+    def __str__(self) -> str:
+        import numpy
+
+        lines = [self.report["description"], f"verdict: {self.verdict}", *(f"    {reason}" for reason in self.reasons)]
+        with numpy.printoptions(precision=5, suppress=True):
+            lines.extend(f"{name} =\n{gain}" for name, gain in self.gains.items())
+            lines.extend(f"eigenvalues, {part}: {values}" for part, values in self.eigenvalues.items())
+        robustness = self.report["robustness"]
+        if robustness:
+            peaks = ", ".join(f"{point['s_peak']:.3f} at the {point['point']}" for point in robustness["points"])
+            lines.append(f"peak of S: {peaks}; delay margin: {robustness['delay_margin']:.4g} s")
+        return "\n".join(lines)
+
     def __repr__(self) -> str:
         held = sum(own["holds"] for own in self.checks)
         return f"<Design: {', '.join(self.gains)}; {held} of {len(self.checks)} checks hold; {self.verdict}>"
 
 
+def _axes(ax: Any) -> Any:
+    if ax is not None:
+        return ax
+    return _package("matplotlib.pyplot", "a plot").subplots()[1]
+
+
 class Controller:
     """The controller of a design."""
 
-    def __init__(self, designed: _core.Designed) -> None:
-        self._designed = designed
+    def __init__(self, design: Design) -> None:
+        self._design = design
+        self._designed = design._designed
+
+    @property
+    def system(self) -> Any:
+        """The controller from measurements to commands, limits aside, as a ``control.StateSpace``."""
+        design = self._design
+        return design._system("controller", design._measurements, design._commands)
 
     def fmu(self, path: PathLike, *, base: PathLike | None = None) -> str:
         """Write the controller as an FMU; return its path.

@@ -3,6 +3,9 @@
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
+use control::Domain;
+use control::robustness::Point;
+use nalgebra::DMatrix;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -55,6 +58,12 @@ impl Designed {
         self.with(|design| design.file.clone())
     }
 
+    /// The text of the plant file.
+    #[getter]
+    fn plant(&self) -> String {
+        self.with(|design| design.plant.clone())
+    }
+
     /// Whether all checks hold.
     #[getter]
     fn holds(&self) -> bool {
@@ -65,6 +74,33 @@ impl Designed {
     fn report(&self) -> PyResult<String> {
         let text = self.with(|design| serde_json::to_string(&design.report));
         text.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// A, B, C, D of a system of the loop, and the sample time of a sampled one.
+    fn system(&self, name: &str) -> PyResult<(Vec<Vec<Vec<f64>>>, Option<f64>)> {
+        let system = self.with(|design| {
+            let whole = &design.closed_loop;
+            Some(match name {
+                "plant" => whole.plant().clone(),
+                "controller" => whole.controller().clone(),
+                "closed loop" => whole.system(),
+                "S at the commands" => whole.sensitivity(Point::Input),
+                "S at the measurements" => whole.sensitivity(Point::Output),
+                "T at the commands" => whole.complementary(Point::Input),
+                "T at the measurements" => whole.complementary(Point::Output),
+                _ => return None,
+            })
+        });
+        let system = system.ok_or_else(|| PyValueError::new_err(name.to_owned()))?;
+        let matrices = [&system.a, &system.b, &system.c, &system.d];
+        let rows = |matrix: &DMatrix<f64>| {
+            matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+        };
+        let period = match system.domain {
+            Domain::Continuous => None,
+            Domain::Sampled { period } => Some(period),
+        };
+        Ok((matrices.map(rows).into(), period))
     }
 
     /// The report as an HTML page.

@@ -1,6 +1,7 @@
 """Designs: the command is the reference."""
 
 import json
+import pickle
 import subprocess
 from pathlib import Path
 
@@ -106,3 +107,121 @@ def test_a_wrong_plant_is_a_design_error(tmp_path):
     assert (caught.value.path, caught.value.line) == (str(file), 1)
     with pytest.raises(TypeError, match="found int"):
         af.design(3)
+
+
+SERVO = (np.array([[0.0, 1.0], [0.0, -0.5]]), np.array([0.0, 0.5]), np.array([1.0, 0.0]))
+REQUIREMENTS = {
+    "actuator_faults": "all",
+    "feedback": {"eigenvalues": np.array([-1 + 1j, -1 - 1j])},
+    "observer": {"eigenvalues": [-4.0, complex(-3, 2), complex(-3, -2)]},
+}
+
+
+@pytest.fixture(scope="module")
+def servo():
+    return af.design(SERVO, **REQUIREMENTS)
+
+
+@pytest.mark.parametrize("kind", ["matrices with D", "scipy", "scipy transfer function", "control", "control transfer function"])
+def test_a_plant_of_any_package_gives_the_same_loop(servo, kind):
+    signal, control = pytest.importorskip("scipy.signal"), pytest.importorskip("control")
+    a, b, c = SERVO[0], SERVO[1].reshape(2, 1), SERVO[2].reshape(1, 2)
+    plant = {
+        "matrices with D": (a, b, c, [[0.0]]),
+        "scipy": signal.StateSpace(a, b, c, [[0.0]]),
+        "scipy transfer function": signal.TransferFunction([0.5], [1, 0.5, 0]),
+        "control": control.ss(a, b, c, 0),
+        "control transfer function": control.tf([0.5], [1, 0.5, 0]),
+    }[kind]
+    made = af.design(plant, **REQUIREMENTS)
+    ours, theirs = servo.controller.system, made.controller.system
+    at = 1j * np.logspace(-1, 2, 20)
+    assert np.allclose(ours(at), theirs(at), rtol=1e-9)
+
+
+def test_a_transfer_function_of_several_inputs_has_its_poles_once_and_its_response():
+    control = pytest.importorskip("control")
+    plant = control.tf([[[1], [2]], [[1, 1], [3]]], [[[1, 1], [1, 3, 2]], [[1, 5, 6], [1, 1]]])
+    made = af.design(
+        plant, actuator_faults="all", feedback={"region": {"decay": 1.5}}, observer={"region": {"decay": 3.0}}
+    )
+    # McMillan degree: -1 twice, -2 twice, -3 once (minors: 3 / (s + 1)^2 - 2 / ((s + 2)^2 (s + 3))).
+    assert sorted(made.plant.poles().real.round(6)) == [-3.0, -2.0, -2.0, -1.0, -1.0]
+    for s in 1j * np.logspace(-1, 1, 5):
+        assert np.allclose(made.plant(s), plant(s), rtol=1e-8)
+
+
+def test_the_loop_is_that_of_python_control(servo):
+    control = pytest.importorskip("control")
+    plant, law = servo.plant, servo.controller.system
+    ours = np.sort_complex(servo.closed_loop.poles())
+    # u = K y: the loop of python-control has negative feedback.
+    theirs = control.feedback(plant, law, sign=1)
+    assert np.allclose(ours, np.sort_complex(theirs.poles()), rtol=1e-6)
+    required = np.concatenate([servo.eigenvalues["feedback"], servo.eigenvalues["observer"]])
+    assert np.allclose(ours, np.sort_complex(required), rtol=1e-6)
+    s = 1j * servo.S.frequency
+    expected = 1 / (1 - plant(s) * law(s))
+    assert np.allclose(servo.S.complex, expected, rtol=1e-8) and np.allclose(servo.S_input.complex, expected, rtol=1e-8)
+    assert np.allclose(servo.T.complex, 1 - expected, rtol=1e-8, atol=1e-10)
+    peaks = [point["s_peak"] for point in servo.report["robustness"]["points"]]
+    assert np.abs(expected).max() == pytest.approx(max(peaks), rel=1e-2)
+    [at_command, at_measurement] = servo.margins
+    assert (at_command["at"], at_measurement["at"]) == ("input", "output")
+    _, phase, *_ = control.margin(-plant * law)
+    assert phase == pytest.approx(at_command["phase"], rel=1e-3)
+
+
+def test_the_plots_show_the_peaks_of_s_and_the_responses_to_a_fault(servo):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    lines = {line.get_label(): line.get_ydata() for line in servo.plot_bode().get_lines()}
+    assert np.allclose(lines["S at the input"], np.abs(servo.S_input.complex).ravel(), rtol=1e-8)
+    steps = {line.get_label(): line.get_ydata() for line in servo.plot_step(fault="f_u1").get_lines()}
+    # The compensation takes the fault off: the position returns.
+    assert abs(steps["x1"][-1]) < 0.01 * np.abs(steps["x1"]).max() > 0
+    with pytest.raises(af.DesignError, match="expected one of f_u1"):
+        servo.plot_step(fault="f")
+
+
+def test_a_design_travels_and_is_changed(servo):
+    copy = pickle.loads(pickle.dumps(servo))
+    assert copy.report == servo.report and copy.design_file == servo.design_file
+    faster = servo.with_(observer={"eigenvalues": [-8, -9, -10]})
+    assert np.allclose(np.sort(faster.eigenvalues["observer"].real), [-10, -9, -8])
+    assert np.array_equal(faster.K_x, servo.K_x) and faster.L.shape == (3, 1)
+    assert str(faster).startswith(faster.report["description"]) and "peak of S" in str(faster)
+    of_file = af.design(PLANT)
+    assert pickle.loads(pickle.dumps(of_file)).design_file == of_file.design_file
+
+
+def test_a_trade_off_shows_what_speed_costs(tmp_path):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    speeds = [[-4, -5, -6], [-8, -10, -12], [-16, -20, -24], [1, 2, 3]]
+    compared = af.trade_off(SERVO, {"observer.eigenvalues": speeds}, **REQUIREMENTS)
+    assert [row["verdict"] == "refused" for row in compared] == [False, False, False, True]
+    assert [row["observer_speed"] for row in compared][:3] == pytest.approx([4, 8, 16])
+    noise = [row["noise"] for row in compared][:3]
+    assert noise == sorted(noise) and noise[2] > 2 * noise[0]
+    assert compared.pareto("observer_speed", "noise") == [0, 1, 2]
+    assert compared.plot("observer_speed", "noise").get_xlabel() == "observer_speed"
+    assert len(compared.to_pandas()) == 4
+    with pytest.raises(KeyError, match="expected one of speed"):
+        compared.plot("speeds")
+
+
+def test_a_wrong_system_says_what_is_expected():
+    signal = pytest.importorskip("scipy.signal")
+    with pytest.raises(af.DesignError, match=r"dt = 0\.1; expected a plant in continuous time"):
+        af.design(signal.dlti([1.0], [1.0, -0.5], dt=0.1), **REQUIREMENTS)
+    with pytest.raises(af.DesignError, match="C has 3 elements and A 2 rows"):
+        af.design((SERVO[0], SERVO[1], [1.0, 0.0, 0.0]), **REQUIREMENTS)
+    with pytest.raises(af.DesignError, match="stands without its conjugate"):
+        af.design(SERVO, **{**REQUIREMENTS, "feedback": {"eigenvalues": [-1 + 1j, -2]}})
+    with pytest.raises(af.DesignError, match=r"\[1, 2\] = 0\.5 and \[2, 1\] = 0\.1"):
+        af.design(SERVO, **{**REQUIREMENTS, "feedback": {"Q": [[1, 0.5], [0.1, 1]], "R": [1]}})
+    q = np.array([[1, 0.1], [0.1 + 1e-16, 1]])
+    rounded = af.design(SERVO, **{**REQUIREMENTS, "feedback": {"Q": q, "R": [1]}})
+    exact = af.design(SERVO, **{**REQUIREMENTS, "feedback": {"Q": (q + q.T) / 2, "R": [1]}})
+    assert np.array_equal(rounded.K_x, exact.K_x)

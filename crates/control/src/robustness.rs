@@ -166,6 +166,24 @@ impl Loop {
         ]
     }
 
+    /// The loop as a system: from signals that are added to commands and measurements to commands and
+    /// measurements, these without what is added to them.
+    #[must_use]
+    pub fn system(&self) -> StateSpace {
+        let (plant, controller) = (&self.plant, &self.controller);
+        let ([to_commands, to_measurements], [commands, measurements]) =
+            (self.entries(), self.signals());
+        let zeros = |size| DMatrix::zeros(size, size);
+        let (p, m) = plant.d.shape();
+        StateSpace {
+            a: self.dynamics(),
+            b: stacked(&to_commands.transpose(), &to_measurements.transpose()).transpose(),
+            c: stacked(&commands, &measurements),
+            d: block_2x2([&zeros(m), &controller.d], [&plant.d, &zeros(p)]),
+            domain: plant.domain,
+        }
+    }
+
     /// S as a system: from a signal that is added at `at` to the sum.
     #[must_use]
     pub fn sensitivity(&self, at: Point) -> StateSpace {

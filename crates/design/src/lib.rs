@@ -29,6 +29,7 @@ mod threads;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use control::robustness::Loop;
 use files::{Source, Table};
 
 pub use code::{Code, Language, Precision};
@@ -65,10 +66,13 @@ pub struct Design {
     /// A plant file with the worst plant that was found within the tolerances; none if the loop is
     /// not stable, or if a plant file cannot state the faults of the plant's FMU.
     pub worst_case: Option<String>,
+    /// The loop of the plant and the controller within its limits, in deviations from the operating point; that of
+    /// the plant of the file in a design for several. Sampled, if the controller is.
+    pub closed_loop: Loop,
     /// The FMU of the plant, if the plant file names one.
     pub model: Option<PathBuf>,
-    /// The plant file.
-    plant: String,
+    /// The text of the plant file.
+    pub plant: String,
 }
 
 /// Designs the controller that the plant file at `path` asks for.
@@ -142,6 +146,7 @@ fn design_source(
         report,
         identity,
         worst_case,
+        closed_loop: assess::robustness::loop_of(&designed.nominal)?,
         plant: source.text().to_owned(),
         model: file.fmu().map(Path::to_owned),
     })

@@ -34,6 +34,12 @@ const WIDTH: f64 = 1e-4;
 const POINTS_PER_DECADE: u32 = 20;
 const POINTS: [(Point, &str); 2] = [(Point::Input, "input"), (Point::Output, "output")];
 
+/// The loop of a design: the plant, and the controller with its filter and its integrals.
+pub(crate) fn loop_of(designed: &Solution) -> Result<Loop, Error> {
+    let physical = Physical::of(designed)?;
+    physical.closed(&physical.controller)
+}
+
 /// Returns the robustness of a design; None if the loop is not stable. `family`: the plants whose
 /// parameters vary; without it the entries of the matrices vary.
 pub(crate) fn robustness(
@@ -179,6 +185,7 @@ impl Physical {
         Ok(Self { plant, controller: commands, estimates })
     }
 
+    /// The loop of the plant and `controller`, in the time domain of the controller.
     pub(crate) fn closed(&self, controller: &StateSpace) -> Result<Loop, Error> {
         closed(&self.plant, controller)
     }

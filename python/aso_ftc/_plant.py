@@ -1,0 +1,168 @@
+"""Linear plants as Python people have them, as entries of a plant file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from ._errors import DesignError
+from ._results import _package
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["of_file", "of_system", "plain", "with_names"]
+
+# The part of the largest element below which an element of a realisation counts as rounding.
+_ROUNDING = 1e-10
+_NAMES = (("states", "A", 0, "x"), ("actuators", "B", 1, "u"), ("measurements", "C", 0, "y"))
+_LABELS = {"states": "state_labels", "actuators": "input_labels", "measurements": "output_labels"}
+
+
+def plain(value: Any, entry: str = "") -> Any:
+    """Return a value as a plant file has it: lists for arrays, one of each pair of complex numbers."""
+    if isinstance(value, Mapping):
+        return {name: plain(inner, str(name)) for name, inner in value.items()}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        if any(isinstance(element, complex) for element in value):
+            return _pairs(value, entry)
+        return [plain(element, entry) for element in value]
+    return value
+
+
+def _pairs(values: Any, entry: str) -> list[Any]:
+    """Return real numbers, and one ``{"re": ..., "im": ...}`` for each pair of complex ones."""
+    rest = [complex(value) for value in values]
+    found: list[Any] = []
+    while rest:
+        value = rest.pop(0)
+        if value.imag == 0.0:
+            found.append(value.real)
+            continue
+        nearest = min(rest, key=lambda other: abs(other - value.conjugate()), default=None)
+        if nearest is None or abs(nearest - value.conjugate()) > _ROUNDING * abs(value):
+            raise DesignError(f"{entry}: {value} stands without its conjugate {value.conjugate()}", "Eigenvalues")
+        rest.remove(nearest)
+        found.append({"re": value.real, "im": abs(value.imag)})
+    return found
+
+
+def with_names(entries: Mapping[str, Any]) -> dict[str, Any]:
+    """Add names of states, commands and measurements where there are none."""
+    named = dict(entries)
+    for entry, matrix, axis, letter in _NAMES:
+        rows = named.get(matrix)
+        if entry not in named and rows:
+            count = len(rows) if axis == 0 else len(rows[0])
+            named[entry] = [{"name": f"{letter}{k + 1}"} for k in range(count)]
+    return named
+
+
+def of_system(plant: Any) -> dict[str, Any]:
+    """Return the entries of a linear system, or of a tuple of matrices (A, B, C) or (A, B, C, D)."""
+    if isinstance(plant, (tuple, list)) and len(plant) in (3, 4):
+        return _entries(*plant)
+    if getattr(plant, "dt", None) not in (None, 0, False):
+        raise DesignError(
+            f"the plant is sampled, dt = {plant.dt}; expected a plant in continuous time: the entry sample_time "
+            "makes a sampled controller for it",
+            "Sampled",
+        )
+    if all(hasattr(plant, name) for name in "ABC"):
+        entries = _entries(plant.A, plant.B, plant.C, getattr(plant, "D", 0.0))
+        for entry, attribute in _LABELS.items():
+            labels = getattr(plant, attribute, None)
+            if labels and all(str(label).isidentifier() for label in labels):
+                entries[entry] = [{"name": str(label)} for label in labels]
+        return entries
+    if hasattr(plant, "num") and hasattr(plant, "ninputs"):
+        # Its own realisation of several inputs needs Slycot.
+        return _entries(*_realisation(plant.num, plant.den))
+    if hasattr(plant, "to_ss"):
+        return of_system(plant.to_ss())
+    kind = type(plant).__name__
+    raise TypeError(
+        "expected a path, a dict, a linear system of python-control or scipy, or matrices (A, B, C) or "
+        f"(A, B, C, D), found {kind}"
+    )
+
+
+def _entries(a: Any, b: Any, c: Any, d: Any = 0.0) -> dict[str, Any]:
+    """Return the matrices as lists of rows; a vector is a column of B, a row of C."""
+    import numpy
+
+    matrices = {name: numpy.asarray(matrix, dtype=float) for name, matrix in zip("ABC", (a, b, c))}
+    matrices["A"] = numpy.atleast_2d(matrices["A"])
+    states = len(matrices["A"])
+    for name, shape in (("B", (states, 1)), ("C", (1, states))):
+        if matrices[name].ndim < 2:
+            if matrices[name].size != states:
+                raise DesignError(
+                    f"{name} has {matrices[name].size} elements and A {states} rows: expected a matrix of "
+                    f"{'n x m' if name == 'B' else 'p x n'}, or a vector of {states} elements",
+                    "Shape",
+                )
+            matrices[name] = matrices[name].reshape(shape)
+    feedthrough = numpy.asarray(d, dtype=float)
+    if feedthrough.any():
+        size = (len(matrices["C"]), matrices["B"].shape[1])
+        if feedthrough.ndim < 2 and feedthrough.size == size[0] * size[1] and 1 in size:
+            feedthrough = feedthrough.reshape(size)
+        matrices["D"] = feedthrough
+    return {name: matrix.tolist() for name, matrix in matrices.items()}
+
+
+def _realisation(numerators: Any, denominators: Any) -> tuple[NDArray[Any], ...]:
+    """Return A, B, C, D of a transfer function: realisations of its elements without what they share."""
+    import numpy
+
+    signal = _package("scipy.signal", "a transfer function")
+    linalg = _package("scipy.linalg", "a transfer function")
+    outputs, inputs = len(numerators), len(numerators[0])
+    feedthrough = numpy.zeros((outputs, inputs))
+    blocks = []
+    for i in range(outputs):
+        for j in range(inputs):
+            a, b, c, d = signal.tf2ss(numerators[i][j], denominators[i][j])
+            feedthrough[i, j] = d.item()
+            blocks.append((a, b @ numpy.eye(1, inputs, j), numpy.eye(outputs, 1, -i) @ c))
+    a = linalg.block_diag(*(block[0] for block in blocks))
+    b, c = numpy.vstack([block[1] for block in blocks]), numpy.hstack([block[2] for block in blocks])
+    if len(blocks) > 1:
+        a, b, c = _observable(a, b, c)
+        a, c, b = (matrix.T for matrix in _observable(a.T, c.T, b.T))
+    return a, b, c, feedthrough
+
+
+def _observable(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+    """Return the part that the outputs see: its states are the row space of the observability matrix."""
+    import numpy
+
+    scaled = a / max(numpy.linalg.norm(a, 2), numpy.finfo(float).tiny)
+    rows = [c / numpy.linalg.norm(c, 2)]
+    for _ in range(len(a) - 1):
+        rows.append(rows[-1] @ scaled)
+    _, sizes, basis = numpy.linalg.svd(numpy.vstack(rows))
+    part = basis[: int((sizes > _ROUNDING * sizes[0]).sum())]
+    return part @ a @ part.T, part @ b, c @ part.T
+
+
+def of_file(path: str) -> dict[str, Any]:
+    """Read the matrices of a ``.npz`` or ``.mat`` file."""
+    import numpy
+
+    content: Mapping[str, Any]
+    if path.lower().endswith(".npz"):
+        content = numpy.load(path)
+    else:
+        content = _package("scipy.io", "a .mat file").loadmat(path)
+    missing = [name for name in "ABC" if name not in content]
+    if missing:
+        raise DesignError(f"{path} has no matrix {missing[0]}, expected A, B, C", "Matrix")
+    a, b, c = (content[name] for name in "ABC")
+    entries = _entries(a, b, c, content["D"] if "D" in content else 0.0)
+    if "F_a" in content:
+        entries["F_a"] = numpy.atleast_2d(numpy.asarray(content["F_a"], dtype=float)).tolist()
+    return entries
