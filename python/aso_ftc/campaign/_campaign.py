@@ -25,6 +25,7 @@ from ._parameters import Parameter, Sampled, columns_of_table, sample, text
 
 if TYPE_CHECKING:
     from ._analysis import Outcome
+    from ._search import RareEvent, WorstCase
 
 __all__ = ["Campaign", "Plan"]
 
@@ -405,6 +406,56 @@ class Campaign:
         return execute(
             self, Path(folder), workers=workers, scheduler=scheduler, progress=progress, live=live
         )
+
+    def worst_case(
+        self,
+        folder: PathLike,
+        measure: str,
+        *,
+        smallest: bool = False,
+        workers: int | None = None,
+        scheduler: str | None = None,
+    ) -> WorstCase:
+        """Search the parameters for the run with the largest value of a measure, over all faults.
+
+        Needs a design ``{"method": "random", "runs": number}``, whose runs are those of the whole search. The same
+        seed gives the same search, and an interrupted one goes on. A run that does not finish is the worst.
+
+        Args:
+            folder: a new folder, or that of this search.
+            measure: the name of a measure.
+            smallest: search for the smallest value.
+            workers, scheduler: as for :meth:`run`.
+
+        Raises:
+            ConfigurationError, Error: as for :meth:`run`.
+        """
+        from ._search import worst_case
+
+        if measure not in (*self.expressions, *self.functions):
+            raise fail("measure", f"{measure!r}: expected one of {', '.join((*self.expressions, *self.functions))}")
+        return worst_case(self, Path(folder), measure, smallest=smallest, workers=workers, scheduler=scheduler)
+
+    def rare_event(
+        self, folder: PathLike, limit: str, *, workers: int | None = None, scheduler: str | None = None
+    ) -> RareEvent:
+        """Estimate the probability that a limit is violated, down to 1e-6 and less, by subset simulation.
+
+        Needs the package openturns and a design ``{"method": "random", "runs": number}``, whose runs are those of
+        one level, such as 500; each level divides the probability by about 10. The same seed gives the same runs, and
+        an interrupted estimate goes on. With faults, a row of parameters fails if one of its faults does.
+
+        Args:
+            folder: a new folder, or that of this estimate.
+            limit: the name of a measure with a limit.
+            workers, scheduler: as for :meth:`run`.
+
+        Raises:
+            ConfigurationError, Error: as for :meth:`run`.
+        """
+        from ._search import rare_event
+
+        return rare_event(self, Path(folder), limit, workers=workers, scheduler=scheduler)
 
     def __repr__(self) -> str:
         return f"Campaign({self.name!r}, {len(self)} runs of {self.system!r})"

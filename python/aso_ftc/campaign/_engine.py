@@ -25,7 +25,7 @@ from ._folder import Folder, column
 from ._packages import package
 from ._worker import Job, Row, holds
 
-__all__ = ["execute"]
+__all__ = ["Session", "execute"]
 
 # Seconds within which a cluster must have a worker.
 _PATIENCE = 60.0
@@ -63,6 +63,41 @@ def execute(
                 work.perform(client, scheduler)
         work.close()
     return load(folder.path)
+
+
+class Session:
+    """Does several campaigns of one system one after the other, on the same workers.
+
+    They have the job of the first one: they differ in the values of their runs only. The workers start with the
+    first run that a folder lacks.
+    """
+
+    def __init__(self, campaign: Campaign, workers: int | None, scheduler: str | None) -> None:
+        self.campaign, self.workers, self.scheduler = campaign, workers, scheduler
+        self._open = contextlib.ExitStack()
+        self._client: Any = None
+        self._name = f"aso-ftc-session-{os.getpid()}-{time.monotonic_ns()}"
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._open.close()
+
+    def outcome(self, campaign: Campaign, path: Path) -> Outcome:
+        """Do the runs of a campaign that its folder lacks."""
+        folder = Folder(path, campaign)
+        folder.begin(campaign)
+        if not folder.manifest["complete"]:
+            work = _Work(campaign, folder, False)
+            if work.open_parts:
+                if self._client is None:
+                    self._open.enter_context(_quiet())
+                    self._client = self._open.enter_context(_client(self.workers, self.scheduler))
+                    work.prepare(self._client, self._name)
+                work.perform(self._client, self.scheduler, self._name)
+            work.close()
+        return load(folder.path)
 
 
 class _View:
@@ -284,17 +319,18 @@ class _Work:
     def _numbers(self, first: int) -> list[int]:
         return list(range(first, min(first + self.size, self.total)))
 
-    def perform(self, client: Any, scheduler: str | None) -> None:
-        """Do the runs on a cluster and write each part when it is whole."""
+    def perform(self, client: Any, scheduler: str | None, prepared: str | None = None) -> None:
+        """Do the runs on a cluster, prepared under a name or now, and write each part when it is whole."""
         distributed = package("distributed")
-        name = f"aso-ftc-{self.folder.manifest['identity'][:16]}"
+        name = prepared or f"aso-ftc-{self.folder.manifest['identity'][:16]}"
         gone = Error(
             f"the scheduler {scheduler or 'of the local workers'} was lost; finished runs are in "
             f"{self.folder.path}, and the same command goes on",
             "Scheduler",
         )
         try:
-            self._prepare(client, name)
+            if prepared is None:
+                self.prepare(client, name)
             tasks = _Tasks(client, name, self._task)
             left, suspects = iter(self.open_parts), deque[int]()
             while True:
@@ -333,10 +369,10 @@ class _Work:
         finally:
             self.progress.close()
             with contextlib.suppress(Exception):
-                if client.status == "running":
+                if prepared is None and client.status == "running":
                     client.unregister_worker_plugin(name)
 
-    def _prepare(self, client: Any, name: str) -> None:
+    def prepare(self, client: Any, name: str) -> None:
         """Give the job to all workers, and ask each whether it can run it."""
         try:
             client.wait_for_workers(1, timeout=_PATIENCE)

@@ -1,0 +1,241 @@
+"""Campaigns whose runs follow from the runs before them: the worst case, and small probabilities."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._changes import arguments
+from ._engine import Session
+from ._entries import fail
+from ._packages import package
+from ._parameters import Sampled
+
+if TYPE_CHECKING:
+    from ._campaign import Campaign
+
+__all__ = ["RareEvent", "WorstCase", "rare_event", "worst_case"]
+
+Numbers = NDArray[np.float64]
+
+# Members of a generation for each parameter, and the fewest in all.
+_MEMBERS, _FEWEST = 10, 20
+# The part of the runs that each level of subset simulation keeps.
+_KEPT = 0.1
+# Positions stay this far from the ends of a distribution, which may have none.
+_END = 1e-16
+_NORMAL_QUANTILE_95 = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class WorstCase:
+    """The worst run that a search found.
+
+    Attributes:
+        measure: the measure that was searched, and its ``value``; NaN if a run did not finish.
+        values: the parameters of the run, and the label of its ``fault`` if the campaign has faults.
+        arguments: the run again: ``campaign.system.run(**worst.arguments)``.
+        history: the worst value after each generation.
+        runs, unfinished: number of runs in all, and of those that did not finish.
+    """
+
+    measure: str
+    value: float
+    values: dict[str, Any]
+    fault: str | None
+    arguments: dict[str, Any]
+    history: tuple[float, ...]
+    runs: int
+    unfinished: int
+
+
+@dataclass(frozen=True)
+class RareEvent:
+    """A small probability, by subset simulation.
+
+    Attributes:
+        limit: the measure whose limit is violated with this ``probability``.
+        lower, upper: bounds of 95 %, log-normal with the coefficient of ``variation``. They hold for many runs in
+            a level and count no error of a search that misses a region of failures.
+        levels: the thresholds of the levels, as distances beyond the limit; the last one is 0.
+        runs: number of runs in all.
+    """
+
+    limit: str
+    probability: float
+    lower: float
+    upper: float
+    variation: float
+    levels: tuple[float, ...]
+    runs: int
+
+
+class _Batches:
+    """Runs of a campaign at positions of its parameters, one campaign in a folder of its own for each batch."""
+
+    def __init__(self, campaign: Campaign, path: Path, session: Session, measure: str) -> None:
+        self.campaign, self.path, self.session, self.measure = campaign, path, session, measure
+        self.count = self.runs = self.unfinished = 0
+
+    def part(self, unit: Numbers) -> Campaign:
+        """Return the campaign with one run for each row of positions in [0, 1], and each fault."""
+        unit = np.clip(unit, _END, 1 - _END)
+        values = {own.name: own.quantile(unit[:, k]) for k, own in enumerate(self.campaign.parameters)}
+        part = copy.copy(self.campaign)
+        part.name = f"{self.campaign.name} {self.count}"
+        design = {"method": "search", "batch": self.count}
+        part.plan = type(part.plan)(design, Sampled(values, unit, len(unit)), part.plan.faults)
+        part.runs_per_task = min(50, max(1, len(part.plan) // 16))
+        return part
+
+    def __call__(self, unit: Numbers, sign: float) -> tuple[Numbers, NDArray[np.int64]]:
+        """Return the worst value of each row, of all faults, and its fault; a run that did not finish is the worst."""
+        part = self.part(unit)
+        outcome = self.session.outcome(part, self.path / f"batch-{self.count:05}")
+        self.count += 1
+        values = sign * outcome.read([self.measure])[self.measure].to_numpy(dtype=float)
+        self.runs += len(values)
+        self.unfinished += int(np.isnan(values).sum())
+        table = np.where(np.isnan(values), np.inf, values).reshape(len(unit), -1)
+        worst = table.argmax(axis=1)
+        return table[np.arange(len(unit)), worst], worst
+
+
+def _check(campaign: Campaign) -> None:
+    if not campaign.parameters:
+        raise fail("parameters", "a search needs at least one parameter")
+    if campaign.plan.design["method"] != "random":
+        raise fail("design", 'a search needs { method = "random", runs = number }')
+    campaign.check()
+
+
+@contextlib.contextmanager
+def _batches(
+    campaign: Campaign, path: Path, measure: str, workers: int | None, scheduler: str | None
+) -> Iterator[_Batches]:
+    # Neither the end of a random campaign nor kept signals belong to a search.
+    own = copy.copy(campaign)
+    own.stop, own.keep = {}, {}
+    with Session(own, workers, scheduler) as session:
+        yield _Batches(own, path, session, measure)
+
+
+def worst_case(
+    campaign: Campaign, path: Path, measure: str, *, smallest: bool, workers: int | None, scheduler: str | None
+) -> WorstCase:
+    """Search the parameters and faults for the largest or smallest value of a measure; see Campaign.worst_case.
+
+    Differential evolution (R. Storn and K. Price, Journal of Global Optimization 11, 1997) of scipy.optimize on the
+    positions in [0, 1] of the parameters.
+    """
+    optimize = package("scipy.optimize")
+    _check(campaign)
+    dimensions = len(campaign.parameters)
+    members = max(_FEWEST, _MEMBERS * dimensions)
+    runs = campaign.plan.sampled.rows
+    generations = runs // members - 1
+    if generations < 1:
+        raise fail("design.runs", f"{runs}: a search of {dimensions} parameters needs at least {2 * members}")
+    sign = -1.0 if smallest else 1.0
+    worst: dict[str, Any] = {"value": -np.inf}
+    history: list[float] = []
+
+    with _batches(campaign, path, measure, workers, scheduler) as batches:
+
+        def negative(columns: Numbers) -> Numbers:
+            unit = columns.T
+            values, faults = batches(unit, sign)
+            best = int(values.argmax())
+            if values[best] > worst["value"]:
+                worst.update(value=values[best], unit=unit[best : best + 1].copy(), fault=int(faults[best]))
+            history.append(sign * worst["value"])
+            # The optimiser compares finite numbers.
+            return -np.clip(values, -1e300, 1e300)
+
+        optimize.differential_evolution(
+            negative,
+            [(0.0, 1.0)] * dimensions,
+            maxiter=generations,
+            popsize=max(1, members // dimensions),
+            tol=0.0,
+            rng=np.random.default_rng(campaign.seed),
+            polish=False,
+            updating="deferred",
+            vectorized=True,
+        )
+        if "unit" not in worst:
+            raise fail(f"measures.{measure}", "no run of the search has a value")
+        part = batches.part(worst["unit"])
+        run = worst["fault"]
+        values, case = part.plan.row(run)
+        value = worst["value"]
+        return WorstCase(
+            measure=measure,
+            value=float(sign * value) if np.isfinite(value) else float("nan"),
+            values=values,
+            fault=part.plan.faults[case].label if campaign.cases else None,
+            arguments=arguments(part.changes(run)),
+            history=tuple(float(own) for own in history),
+            runs=batches.runs,
+            unfinished=batches.unfinished,
+        )
+
+
+def rare_event(
+    campaign: Campaign, path: Path, limit: str, *, workers: int | None, scheduler: str | None
+) -> RareEvent:
+    """Estimate the probability that a limit is violated; see Campaign.rare_event.
+
+    Subset simulation (S.-K. Au and J. L. Beck, Probabilistic Engineering Mechanics 16, 2001) of OpenTURNS on standard
+    normal variables, of which each parameter is a function.
+    """
+    if limit not in campaign.limits:
+        raise fail("limits", f"{limit!r} has no limit, expected one of {', '.join(campaign.limits) or 'those stated'}")
+    _check(campaign)
+    turns, normal = package("openturns"), package("scipy.stats").norm
+    ((kind, bound),) = campaign.limits[limit].items()
+    sign = 1.0 if kind == "below" else -1.0
+    runs = campaign.plan.sampled.rows
+    block = max(1, int(_KEPT * runs))
+
+    with _batches(campaign, path, limit, workers, scheduler) as batches:
+
+        def distance(sample: Any) -> Numbers:
+            values, _ = batches(normal.cdf(np.asarray(sample)), sign)
+            # A run that did not finish violates the limit by more than any other.
+            distances: Numbers = np.clip(values - sign * bound, -1e300, 1e300)
+            return distances[:, None]
+
+        dimensions = len(campaign.parameters)
+        turns.RandomGenerator.SetSeed(campaign.seed)
+        function = turns.PythonFunction(dimensions, 1, func_sample=distance)
+        variables = turns.RandomVector(turns.Normal(dimensions))
+        event = turns.ThresholdEvent(turns.CompositeRandomVector(function, variables), turns.GreaterOrEqual(), 0.0)
+        simulation = turns.SubsetSampling(event, 2.0, _KEPT)
+        simulation.setBlockSize(block)
+        simulation.setMaximumOuterSampling(max(1, runs // block))
+        simulation.run()
+        result = simulation.getResult()
+        probability = float(result.getProbabilityEstimate())
+        variation = float(result.getCoefficientOfVariation())
+        if variation < 0.0 < probability:
+            # Of a probability that the first level finds by counting, OpenTURNS states none.
+            variation = math.sqrt((1.0 - probability) / (probability * batches.runs))
+        factor = float(np.exp(_NORMAL_QUANTILE_95 * np.sqrt(np.log1p(variation**2)))) if probability else float("nan")
+        return RareEvent(
+            limit=limit,
+            probability=probability,
+            lower=probability / factor,
+            upper=min(1.0, probability * factor),
+            variation=variation,
+            levels=tuple(float(level) for level in simulation.getThresholdPerStep()),
+            runs=batches.runs,
+        )

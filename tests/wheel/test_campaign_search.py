@@ -1,0 +1,77 @@
+"""Searches against closed forms: the largest value of a function, the probability of a half space."""
+
+import math
+
+import aso_ftc as af
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+
+def campaign(design, measure, **entries):
+    """The paper's loop for one step; the measure is a function of two parameters that the signals do not change."""
+    return af.campaign.Campaign(
+        "paper",
+        experiment={"stop-time": 0.001},
+        design=design,
+        measures={"y": f"{measure} + 0 * last(plant.x_p)"},
+        **entries,
+    )
+
+
+PLACES = {"a": "plant.F_c", "b": "plant.x_p_0"}
+
+
+def test_the_worst_case_is_the_largest_value_of_the_function(tmp_path):
+    # Two hills, of which the lower one is wider: 3 at (27, 0.12), 2 at (21, 0.18).
+    a, b = 'parameter("a")', '(100 * parameter("b"))'
+    hills = f"3 * exp(-(({a} - 27) ** 2 + ({b} - 12) ** 2) / 4) + 2 * exp(-(({a} - 21) ** 2 + ({b} - 18) ** 2) / 9)"
+    ranges = {
+        "a": {"from": 20.0, "to": 30.0, "set": PLACES["a"]},
+        "b": {"from": 0.1, "to": 0.2, "set": PLACES["b"]},
+    }
+    own = campaign({"method": "random", "runs": 600}, hills, parameters=ranges, seed=1)
+    found = own.worst_case(tmp_path / "search", "y", workers=2)
+    assert found.value == pytest.approx(3.0, abs=1e-2) and found.runs <= 600 and found.unfinished == 0
+    assert [found.values["a"], 100 * found.values["b"]] == pytest.approx([27.0, 12.0], abs=0.1)
+    assert list(found.history) == sorted(found.history) and found.history[-1] == found.value
+    assert found.arguments["start_values"]["plant.F_c"] == found.values["a"]
+    # All runs are in the folder: the same call does none of them again, also without workers.
+    again = own.worst_case(tmp_path / "search", "y", scheduler="tcp://127.0.0.1:9")
+    assert again == found
+
+
+def test_the_probability_of_a_half_space_is_that_of_the_normal_distribution(tmp_path):
+    # The sum of two independent standard normal variables has the deviation sqrt(2): P(z > 3.5) = 2.33e-4.
+    own = campaign(
+        {"method": "random", "runs": 500},
+        '(parameter("a") - 25) / 0.5 + (parameter("b") - 0.1) / 0.005',
+        parameters={
+            "a": {"distribution": "norm", "loc": 25.0, "scale": 0.5, "set": PLACES["a"]},
+            "b": {"distribution": "norm", "loc": 0.1, "scale": 0.005, "set": PLACES["b"]},
+        },
+        limits={"y": {"below": 3.5 * math.sqrt(2)}},
+        seed=1,
+    )
+    found = own.rare_event(tmp_path / "rare", "y", workers=2)
+    exact = norm.sf(3.5)
+    assert found.lower < exact < found.upper and 0.5 * exact < found.probability < 2 * exact
+    assert 0 < found.variation < 0.5 and found.upper / found.lower < 10
+    # Counting needs 1 / exact runs for one failure.
+    assert found.runs < 0.6 / exact and found.levels[-1] == pytest.approx(0.0)
+    assert list(found.levels) == sorted(found.levels)
+
+
+def test_a_search_that_cannot_be_done_says_what_it_needs(tmp_path):
+    parameters = {"a": {"from": 20.0, "to": 30.0, "set": PLACES["a"]}}
+    few = campaign({"method": "random", "runs": 10}, 'parameter("a")', parameters=parameters)
+    with pytest.raises(af.ConfigurationError, match="needs at least 40"):
+        few.worst_case(tmp_path / "few", "y")
+    with pytest.raises(af.ConfigurationError, match="expected one of y"):
+        few.worst_case(tmp_path / "few", "x")
+    with pytest.raises(af.ConfigurationError, match="'y' has no limit"):
+        few.rare_event(tmp_path / "few", "y")
+    grid = campaign({"method": "grid"}, "1", parameters={"a": {"values": [20.0, 25.0], "set": PLACES["a"]}})
+    with pytest.raises(af.ConfigurationError, match='method = "random"'):
+        grid.worst_case(tmp_path / "grid", "y")
+    assert not (tmp_path / "few").exists() and np.isfinite(len(grid))
