@@ -1,10 +1,12 @@
 """The page of a campaign: one file, no requests, escaped names, the numbers of the analysis."""
 
+import base64
 import html.parser
 import json
 import shutil
 import subprocess
 import time
+import zlib
 
 import numpy as np
 import pytest
@@ -21,10 +23,14 @@ class Page(html.parser.HTMLParser):
 
     def __init__(self, path):
         super().__init__()
-        self.tags, self.text, self.embedded, self.inside = [], "", "", None
+        self.tags, self.text, self.packed, self.inside = [], "", {"data": "", "plotly": ""}, None
         self.source = path.read_text(encoding="utf-8")
         self.feed(self.source)
-        self.data = json.loads(self.embedded)
+        self.data, self.library = json.loads(self.unpacked("data")), self.unpacked("plotly")
+
+    def unpacked(self, name):
+        """The text of a compressed script element."""
+        return zlib.decompress(base64.b85decode(self.packed[name].replace("'", "<")), -15).decode()
 
     def handle_starttag(self, tag, attrs):
         self.tags.append((tag, dict(attrs)))
@@ -36,8 +42,8 @@ class Page(html.parser.HTMLParser):
     def handle_data(self, data):
         if self.inside is None:
             self.text += data
-        elif self.inside == ("script", "data"):
-            self.embedded += data
+        elif self.inside in (("script", "data"), ("script", "plotly")):
+            self.packed[self.inside[1]] += data
 
     def column(self, name, kind):
         (found,) = [own for own in self.data["columns"] if (own["name"], own["kind"]) == (name, kind)]
@@ -61,7 +67,7 @@ def test_the_page_is_one_file_that_makes_no_request(tmp_path):
     assert "default-src 'none'" in policy and "http" not in policy and "connect-src" not in policy
     style = found.source[found.source.index("<style>") : found.source.index("</style>")]
     assert "url(" not in style and "@import" not in style
-    assert "plotly.js v" in found.source and sorted(path.name for path in tmp_path.iterdir()) == [
+    assert "plotly.js v" in found.library and sorted(path.name for path in tmp_path.iterdir()) == [
         "c",
         "p.html",
     ]
@@ -102,9 +108,9 @@ def test_the_pictures_have_the_values_of_the_runs(tmp_path):
     found = page(outcome, tmp_path / "p.html")
     assert found.data["runs"] == list(range(700)) and found.column("status", "status") == status
     assert found.column("k", "input") == list(columns["k"])
-    assert np.allclose(found.column("p", "input"), columns["p"], rtol=1e-6)
+    assert np.allclose(found.column("p", "input"), columns["p"], rtol=5e-6)
     drawn = [np.nan if value is None else value for value in found.column("y", "measure")]
-    assert np.allclose(drawn, np.where(np.isfinite(values), values, np.nan), rtol=1e-6, equal_nan=True)
+    assert np.allclose(drawn, np.where(np.isfinite(values), values, np.nan), rtol=5e-6, equal_nan=True)
     (own,) = found.data["measures"]
     finite = values[np.isfinite(values)]
     counts, _ = np.histogram(finite, own["histogram"]["edges"])
@@ -143,7 +149,7 @@ def test_of_many_runs_all_that_failed_are_drawn(tmp_path):
     drawn = np.array(found.data["runs"])
     assert len(drawn) == 10_000 == len(set(drawn)) and np.all(np.diff(drawn) > 0)
     assert set(lost) | set(outside) <= set(drawn)
-    assert np.allclose(found.column("y", "measure")[1], values[drawn[1]], rtol=1e-6)
+    assert np.allclose(found.column("y", "measure")[1], values[drawn[1]], rtol=5e-6)
     assert (
         f"50 of the 50 runs that did not finish, {len(outside)} of the {len(outside)} runs outside"
         in found.text
@@ -162,6 +168,42 @@ def test_frequent_failures_leave_half_of_the_points_to_the_other_runs(tmp_path):
     assert (
         np.count_nonzero(np.array(found.column("y", "measure")) == 2) == 5000 == len(found.data["runs"]) / 2
     )
+
+
+def test_the_page_opens_on_the_answer(tmp_path):
+    generator = np.random.default_rng(8)
+    a, b, c = generator.random((3, 5000))
+    # A straight border: a fails above 0.5 + b / 4, whatever c is.
+    outcome = write(
+        tmp_path / "c", {"method": "random"}, {"c": c, "b": b, "a": a}, {"other": c, "y": a - b / 4},
+        limits={"y": {"below": 0.5}},
+    )  # fmt: skip
+    found = page(outcome, tmp_path / "p.html")
+    failed = int((a - b / 4 >= 0.5).sum())
+    assert f"{failed:,} of 5,000 runs ({100 * failed / 5000:.3g} %) fail: y is not below 0.5." in found.text
+    assert "a decides most: rank correlation with y 0.9" in found.text and "; next b, -0.2" in found.text
+    assert ("option", {"value": "1", "selected": None}) in found.tags
+    assert found.text.index("fail: y is not below") < found.text.index("What was run")
+    border = found.data["border"]
+    assert border["names"] == ["a", "b"] and border["measure"] == "y"
+    surface = border["surface"]
+    for along, row in zip(surface["y"], surface["z"]):
+        crossing = np.interp(0.5, row, surface["x"])
+        assert crossing == pytest.approx(0.5 + along / 4, abs=0.02)
+    assert surface["wrong"] < 0.01 and len(found.source) < 2e6
+
+
+def test_of_few_failures_no_surface_is_fitted(tmp_path):
+    values = np.r_[np.zeros(95), np.full(5, 2.0)]
+    outcome = write(
+        tmp_path / "c", {"method": "random"}, {"p": values + np.arange(100), "q": np.arange(100.0)}, {"y": values},
+        limits={"y": {"below": 1.0}},
+    )  # fmt: skip
+    found = page(outcome, tmp_path / "p.html")
+    assert found.data["border"]["surface"] is None and "Too few runs fail" in found.text
+    none = page(random_campaign(tmp_path / "n", np.zeros(100), {"below": 1.0}), tmp_path / "n.html")
+    upper = 1 - 0.025 ** (1 / 100)
+    assert f"None of the 100 runs fails: y is below 1. The probability of a failure is below {upper:.2g} (95 %)" in none.text
 
 
 def test_runs_that_did_not_finish_are_a_table_with_their_commands(tmp_path):
@@ -194,8 +236,8 @@ def test_the_page_has_the_indices_of_the_design(tmp_path):
     table = outcome.sobol("y")
     assert indices["names"] == list(table.index) and [bar["name"] for bar in indices["bars"]] == ["S1", "ST"]
     for bar in indices["bars"]:
-        assert np.allclose(bar["values"], table[bar["name"]], rtol=1e-6)
-        assert np.allclose(bar["confidence"], table[bar["name"] + "_conf"], rtol=1e-6)
+        assert np.allclose(bar["values"], table[bar["name"]], rtol=5e-6)
+        assert np.allclose(bar["confidence"], table[bar["name"] + "_conf"], rtol=5e-6)
     status = ["failed", *["ok"] * (len(unit) - 1)]
     lost = campaign(
         tmp_path / "d", {"method": "saltelli", "second-order": False}, unit, ishigami, status=status
@@ -266,13 +308,18 @@ def test_a_browser_draws_the_page_and_a_click_shows_the_command(tmp_path):
     outcome = fault_campaign(tmp_path / "c", {"below": 4.5})
     outcome.page(tmp_path / "p.html")
     probe = """<script>
+    const byId = id => document.getElementById(id);
+    const waiting = setInterval(() => {
+    if (!document.documentElement.dataset.drawn) return;
+    clearInterval(waiting);
     byId('scatter').emit('plotly_click', {points: [{customdata: 2}]});
     byId('input').selectedIndex = 2;
     byId('input').dispatchEvent(new Event('change'));
     document.title = JSON.stringify([byId('point').querySelector('code').textContent,
       byId('scatter').data.map(own => own.x.length), byId('heat').data.length, byId('histogram-0').data.length,
-      [...document.querySelectorAll('.modebar-btn')].map(own => own.dataset.title),
+      [...byId('scatter').querySelectorAll('.modebar-btn')].map(own => own.dataset.title),
       performance.getEntriesByType('resource').length]);
+    }, 50);
     </script></body>"""
     text = (tmp_path / "p.html").read_text(encoding="utf-8").replace("</body>", probe)
     (tmp_path / "probe.html").write_text(text, encoding="utf-8")

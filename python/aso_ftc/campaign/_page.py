@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import math
 import os
+import zlib
 from collections.abc import Iterable, Mapping
 from html import escape
 from pathlib import Path
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 
 from .._errors import ConfigurationError, ResultsError
 from ._analysis import batches, describe
+from ._border import border
 from ._packages import package
 
 if TYPE_CHECKING:
@@ -25,6 +28,8 @@ __all__ = ["write"]
 _MARK = '<meta name="generator" content="aso-ftc campaign">'
 _POINTS = 10_000
 _ROWS = 50
+# The rank correlation from which on a parameter decides.
+_DECISIVE = 0.3
 _BINS = 60
 # An axis of positive values is logarithmic if the largest is above the median by this factor, or the median
 # above the lowest hundredth by twice this factor.
@@ -63,8 +68,12 @@ def _head(path: Path) -> str:
 
 def _page(outcome: Outcome, script: str) -> str:
     measures = list(outcome.manifest["measures"])
+    # The page opens on a measure that can fail.
+    opened = next((name for name in measures if name in outcome.limits), measures[0] if measures else "")
     rows, drawn = _choose(outcome)
+    fitted = _border(outcome, opened)
     data = {
+        "border": fitted,
         "command": outcome.command_parts,
         "measures": [_measure(outcome, name) for name in measures],
         "columns": _columns(outcome, measures, rows),
@@ -74,7 +83,10 @@ def _page(outcome: Outcome, script: str) -> str:
         f'<div class="of-measure">{_indices_note(outcome, own)}</div>' for own in data["measures"]
     )
     influence = "".join(f'<div class="of-measure">{_influence(outcome, name)}</div>' for name in measures)
-    options = "".join(f'<option value="{at}">{escape(name)}</option>' for at, name in enumerate(measures))
+    options = "".join(
+        f'<option value="{at}"{" selected" if name == opened else ""}>{escape(name)}</option>'
+        for at, name in enumerate(measures)
+    )
     inputs = "".join(
         f'<option value="{at}">{escape(name)}</option>' for at, name in enumerate([*outcome.inputs, "run"])
     )
@@ -89,8 +101,10 @@ def _page(outcome: Outcome, script: str) -> str:
     )
     heat = '<p id="heat-note"></p><div class="wide"><div id="heat"></div></div>'
     sections = [
-        ("What was run", _summary(outcome) + _parameters(outcome)),
+        ("", _answer(outcome, opened)),
+        ("Where the border runs", _border_text(outcome, fitted)),
         ("Limits", _limits(outcome)),
+        ("What was run", _summary(outcome) + _parameters(outcome)),
         ("", f'<p class="choice"><label>Measure: <select id="measure">{options}</select></label></p>'),
         ("Influence of each parameter", influence if outcome.inputs else ""),
         (
@@ -104,23 +118,30 @@ def _page(outcome: Outcome, script: str) -> str:
         ("Runs that did not finish", _unfinished(outcome)),
     ]
     if not measures:
-        sections = [sections[0], sections[-1]]
+        sections = [sections[3], sections[-1]]
     body = "".join(
         (f"<section><h2>{escape(title)}</h2>{text}</section>" if title else text)
         for title, text in sections
         if text
     )
-    # "<" cannot occur in the data of a script element; the texts come from files of the user.
-    embedded = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
-    name = escape(str(outcome.manifest["name"]))
+    embedded = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    name = str(outcome.manifest["name"])
+    name = escape(outcome.folder.name if name == "campaign" else name)
     style, drawing = (Path(__file__).with_name(file).read_text(encoding="utf-8") for file in ("page.css", "page.js"))
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">{_MARK}{_POLICY}'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>Campaign {name}</title><style>\n{style}</style></head>\n<body><h1>Campaign {name}</h1>{body}\n"
-        f"<script>{script}</script>\n"
-        f'<script type="application/json" id="data">{embedded}</script>\n<script>\n{drawing}</script></body></html>\n'
+        f'<script type="text/plain" id="plotly">{_packed(script)}</script>\n'
+        f'<script type="text/plain" id="data">{_packed(embedded)}</script>\n'
+        f"<script>\n'use strict';\n(async () => {{\n{drawing}}})();\n</script></body></html>\n"
     )
+
+
+def _packed(text: str) -> str:
+    """Return a text compressed, in characters that a script element takes as they are: "<" cannot occur."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15, 9)
+    return base64.b85encode(packer.compress(text.encode()) + packer.flush()).decode().replace("<", "'")
 
 
 def _faults(outcome: Outcome) -> bool:
@@ -142,12 +163,92 @@ def _text(value: object) -> str:
 
 
 def _number(value: float) -> float | None:
-    """A number of JSON with seven digits, ``None`` if it is not finite."""
-    return float(f"{value:.7g}") if math.isfinite(value) else None
+    """A number of JSON with six digits, ``None`` if it is not finite."""
+    return float(f"{value:.6g}") if math.isfinite(value) else None
 
 
 def _numbers(values: Iterable[float]) -> list[float | None]:
     return [_number(float(value)) for value in values]
+
+
+# The answer.
+
+
+def _answer(outcome: Outcome, opened: str) -> str:
+    """How many runs fail, and which parameter decides."""
+    total = len(outcome)
+    lines = []
+    for name in outcome.limits:
+        failures = int(outcome.failed(name).sum())
+        text = f"{_share(failures, total)} fail: {name} is not {describe(outcome.limits[name])}."
+        if not failures:
+            text = f"None of the {total:,} runs fails: {name} is {describe(outcome.limits[name])}."
+        try:
+            upper = outcome.failure_probability(name).upper
+            text += "" if failures else f" The probability of a failure is below {upper:.2g} (95 %)."
+        except ConfigurationError:
+            pass
+        lines.append(text)
+    if not outcome.limits:
+        lost = int(outcome.unfinished.sum())
+        lines.append(f"{_share(lost, total)} did not finish. The campaign has no limits, so that nothing else fails.")
+    if outcome.inputs and opened:
+        found = outcome.influence(opened)
+        numeric = found[found["correlation"].notna()]["correlation"]
+        if len(numeric):
+            strongest = f"rank correlation with {opened} {numeric.iloc[0]:.2f}"
+            decides = abs(numeric.iloc[0]) >= _DECISIVE
+            text = f"{numeric.index[0]} decides most: {strongest}" if decides else "No parameter decides alone"
+            text += "" if decides else f": the strongest is {numeric.index[0]}, {strongest}"
+            text += f"; next {numeric.index[1]}, {numeric.iloc[1]:.2f}." if len(numeric) > 1 else "."
+            lines.append(text)
+    return '<div class="answer">' + "".join(f"<p>{escape(line)}</p>" for line in lines) + "</div>"
+
+
+def _share(count: int, total: int) -> str:
+    return f"{count:,} of {total:,} runs ({100 * count / max(total, 1):.3g} %)"
+
+
+def _border(outcome: Outcome, measure: str) -> dict[str, Any] | None:
+    """The two strongest parameters, and the probability of failure over both."""
+    if measure not in outcome.limits:
+        return None
+    found = outcome.influence(measure)
+    names = list(found[found["correlation"].notna()].index[:2])
+    if len(names) < 2:
+        return None
+    frame = outcome.read(names)
+    x, y = (frame[name].to_numpy(dtype=np.float64) for name in names)
+    fitted = border(x, y, outcome.failed(measure))
+    return {
+        "names": names,
+        "measure": measure,
+        "surface": None
+        if fitted is None
+        else {
+            "x": _numbers(fitted.x),
+            "y": _numbers(fitted.y),
+            "z": [[round(float(value), 4) for value in row] for row in fitted.probability],
+            "wrong": fitted.wrong,
+        },
+    }
+
+
+def _border_text(outcome: Outcome, fitted: Mapping[str, Any] | None) -> str:
+    if fitted is None:
+        return ""
+    a, b = fitted["names"]
+    text = f"The runs over the two parameters with the strongest influence on {fitted['measure']}, {a} and {b}."
+    if fitted["surface"] is None:
+        text += " Too few runs fail, or too few pass, to fit a surface."
+    else:
+        share = float(outcome.failed(fitted["measure"]).mean())
+        text += (
+            " Colours: the probability of a failure, by a logistic regression with squares of both; the line is one half. "
+            f"In cross-validation it puts {100 * fitted['surface']['wrong']:.2g} % of the runs on the wrong side; without "
+            f"these parameters it would be {100 * min(share, 1 - share):.2g} %."
+        )
+    return f'<p>{escape(text)}</p><div class="wide"><div id="border"></div></div>'
 
 
 # What was run.

@@ -1,5 +1,23 @@
-'use strict';
-const data = JSON.parse(document.getElementById('data').textContent);
+// The text of a script element that the page has compressed: five characters for four bytes, then deflate.
+async function unpacked(id) {
+  const text = document.getElementById(id).textContent;
+  const alphabet = '0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;\'=>?@^_`{|}~';
+  const digit = new Uint8Array(128);
+  for (let k = 0; k < 85; k += 1) digit[alphabet.charCodeAt(k)] = k;
+  const whole = Math.ceil(text.length / 5), bytes = new DataView(new ArrayBuffer(4 * whole));
+  for (let k = 0; k < whole; k += 1) {
+    let value = 0;
+    for (let at = 5 * k; at < 5 * k + 5; at += 1) value = 85 * value + (at < text.length ? digit[text.charCodeAt(at)] : 84);
+    bytes.setUint32(4 * k, value);
+  }
+  const length = 4 * whole - (5 * whole - text.length);
+  const packed = new Blob([new Uint8Array(bytes.buffer, 0, length)]).stream();
+  return new Response(packed.pipeThrough(new DecompressionStream('deflate-raw'))).text();
+}
+const library = document.createElement('script');
+library.textContent = await unpacked('plotly');
+document.head.append(library);
+const data = JSON.parse(await unpacked('data'));
 const byId = id => document.getElementById(id);
 const color = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
 // plotly reads a small HTML in its texts.
@@ -31,6 +49,29 @@ function layout(more) {
     font: {color: color('text'), family: 'system-ui, sans-serif', size: 12},
     hoverlabel: {align: 'left'}, margin: {l: 10, r: 10, t: 30, b: 10}, legend: {orientation: 'h', y: 1.02, yanchor: 'bottom'},
     ...more};
+}
+
+function drawBorder() {
+  const place = byId('border');
+  if (!place) return;
+  const {names, surface, measure: of} = data.border, [x, y] = names.map(name => column(name, 'input'));
+  const all = column(of, 'measure').values, {below, above} = data.measures.find(own => own.name === of).limit;
+  const passed = value => value !== null && (below === undefined || value < below) && (above === undefined || value > above);
+  const traces = [];
+  if (surface) {
+    const shades = [[0, color('page')], [1, color('bad')]];
+    traces.push({type: 'contour', ...surface, colorscale: shades, zmin: 0, zmax: 1, opacity: 0.45, hoverinfo: 'skip',
+      contours: {start: 0.1, end: 0.9, size: 0.1, showlines: false}, colorbar: {title: {text: 'probability', side: 'right'}, thickness: 12}});
+    traces.push({type: 'contour', ...surface, showscale: false, hoverinfo: 'skip', line: {color: color('text'), width: 2},
+      contours: {type: 'constraint', operation: '=', value: 0.5}, showlegend: false});
+  }
+  for (const [name, ok, shade, symbol] of [['pass', true, 'good', 'circle'], ['fail', false, 'bad', 'x']]) {
+    const rows = data.runs.map((_, at) => at).filter(at => passed(all[at]) === ok);
+    traces.push({type: 'scatter', mode: 'markers', name, x: rows.map(at => x.values[at]), y: rows.map(at => y.values[at]),
+      text: rows.map(at => 'run ' + data.runs[at] + '<br>' + plain(of) + ' = ' + all[at]), hoverinfo: 'text',
+      marker: {color: color(shade), size: 5, symbol, opacity: 0.7}});
+  }
+  Plotly.react(place, traces, layout({hovermode: 'closest', showlegend: true, xaxis: axis(titled(x)), yaxis: axis(titled(y))}), options);
 }
 
 function drawIndices() {
@@ -192,6 +233,7 @@ function drawMeasure() {
   drawIndices(); drawParallel(); drawScatter(); drawHeat();
 }
 function drawAll() {
+  drawBorder();
   data.measures.forEach(drawHistogram);
   if (data.measures.length) drawMeasure();
 }
@@ -216,3 +258,4 @@ addEventListener('resize', () => {
   pending = setTimeout(() => { if (data.measures.length) { drawParallel(); drawHeat(); } }, 200);
 });
 drawAll();
+document.documentElement.dataset.drawn = 'true';
