@@ -2,7 +2,7 @@
 
 >>> import aso_ftc as af
 >>> results = af.reproduce(stop_time=1.0)
->>> len(results)
+>>> len(results.time)
 101
 
 * :func:`simulate` runs one FMU, :class:`System` connects several.
@@ -86,6 +86,10 @@ __all__ = [
 def clear() -> None:
     """Close the FMUs that no run uses and remove their unpacked files; done at the end of Python."""
     _core.clear()
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "campaign"])
 
 
 def __getattr__(name: str) -> _Any:

@@ -1,8 +1,7 @@
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, final
 
-from ._errors import RunError
 from ._slave import Slave
 
 __all__ = [
@@ -131,7 +130,7 @@ class Study:
     def __new__(
         cls, description: str | Mapping[str, Any], folder: str, slaves: list[tuple[str, Slave]]
     ) -> Study: ...
-    def check(self, changes: Mapping[str, Any]) -> list[dict[str, Any]]: ...
+    def check(self, changes: Mapping[str, Any], *, quiet: bool = False) -> list[dict[str, Any]]: ...
     def run(
         self,
         changes: Mapping[str, Any],
@@ -140,8 +139,9 @@ class Study:
         cancel: Cancel | None = None,
         progress: bool | Callable[[float], object] | None = None,
         input: Callable[[float], Mapping[str, Any]] | None = None,
+        tables: Sequence[tuple[str, bytes, bytes]] | None = None,
         prefix: str | None = None,
-    ) -> tuple[Outcome, RunError | None]: ...
+    ) -> tuple[Outcome, BaseException | None]: ...
     def simulation(self, changes: Mapping[str, Any]) -> Stepper: ...
 
 @final

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _core, _plant
 from ._errors import DesignError
+from ._html import page
 from ._paper import fmus
 from ._results import _package
 from ._system import PathLike
@@ -50,8 +51,11 @@ def design(plant: object, **entries: Any) -> Design:
         elif not entries:
             return Design(_core.design_file(os.fspath(plant)), path)
         else:
-            with open(path, encoding="utf-8") as file:
-                own = _core.parse_toml(file.read())
+            try:
+                with open(path, encoding="utf-8") as file:
+                    own = _core.parse_toml(file.read())
+            except OSError as error:
+                raise DesignError(f"cannot read {path}: {error.strerror}", "File", {"path": path}) from None
             folder = os.path.dirname(path)
     elif isinstance(plant, Mapping):
         own = dict(plant)
@@ -63,7 +67,13 @@ def design(plant: object, **entries: Any) -> Design:
 def _of_entries(entries: Mapping[str, Any], path: str) -> Design:
     stated = {name: _plant.plain(value, name) for name, value in entries.items() if value is not None}
     stated = _plant.with_names(stated)
-    return Design(_core.design_plant(stated, path), path, stated)
+    try:
+        return Design(_core.design_plant(stated, path), path, stated)
+    except DesignError as error:
+        if "message" not in error.fields:
+            raise
+        # Nobody wrote a file: the message names the entry.
+        raise DesignError(error.fields["message"], error.kind) from None
 
 
 class Design:
@@ -269,12 +279,8 @@ class Design:
         return self._designed.page()
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><td>{'yes' if own['holds'] else '<b>no</b>'}</td><td>{_escaped(own['condition'])}</td></tr>"
-            for own in self.checks
-        )
-        title = _escaped(self.report["description"])
-        return f"<p>{title}: {self.verdict}</p><table><tr><th>holds</th><th>condition</th></tr>{rows}</table>"
+        rows = [("yes" if own["holds"] else "no", own["condition"]) for own in self.checks]
+        return page(f"{self.report['description']}: {self.verdict}", ("holds", "condition"), rows)
 
     def __str__(self) -> str:
         import numpy
@@ -359,9 +365,3 @@ class Controller:
         for note in notes:
             warnings.warn(note, stacklevel=3)
         return paths
-
-
-def _escaped(text: str) -> str:
-    import html
-
-    return html.escape(text)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ._words import in_python
+
 if TYPE_CHECKING:
     from ._results import Results
 
@@ -32,7 +34,7 @@ class Error(Exception):
     fields: dict[str, Any]
 
     def __init__(self, message: str, kind: str = "Other", fields: dict[str, Any] | None = None) -> None:
-        super().__init__(message)
+        super().__init__(in_python(message))
         self.kind = kind
         self.fields = dict(fields or {})
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import html
 import importlib
 import os
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, cast
 
 from . import _core
+from ._arrays import Array, arrays
 from ._errors import MissingPackageError
+from ._html import MOST_ROWS, page
+from ._words import similar
 
 if TYPE_CHECKING:
+    import matplotlib.axes
     import matplotlib.figure
     import numpy
     import pandas
@@ -21,9 +25,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["Results"]
-
-# Most variables that a picture or a table shows by itself.
-_SHOWN = 20
 
 
 def _package(name: str, purpose: str) -> Any:
@@ -36,12 +37,15 @@ def _package(name: str, purpose: str) -> Any:
         raise MissingPackageError(sentence, "MissingPackage", {"package": package}) from error
 
 
-class Results:
-    """The recorded variables of a run, one row for each recorded time.
+class Results(Mapping[str, "NDArray[Any]"]):
+    """The recorded variables of a run: a mapping of names to columns, with one row for each recorded time.
 
     ``results["fmu.variable"]`` is a NumPy array with the memory of the results, which is read-only. The
-    object has the Arrow interface ``__arrow_c_stream__``, so that ``pyarrow.table(results)``,
+    name of an array of FMI 3.0 gives its elements in its dimensions: ``(rows, ...)``. The object has the
+    Arrow interface ``__arrow_c_stream__``, so that ``pyarrow.table(results)``,
     ``polars.DataFrame(results)`` and others read it without copies.
+
+    Two results are equal if they have the same names, units and values; NaN equals NaN.
     """
 
     def __init__(self, outcome: _core.Outcome) -> None:
@@ -77,7 +81,7 @@ class Results:
     def end(self) -> str:
         """Why the run ended: ``"stop time"``, or the name of the FMU that requested the end.
 
-        Of an exception's results: ``"failed"``, ``"time limit"`` or ``"cancelled"``.
+        Of an exception's results: ``"failed"``, ``"time limit"``, ``"cancelled"`` or ``"interrupted"``.
         """
         return self._outcome.end
 
@@ -107,17 +111,23 @@ class Results:
         return list(self._outcome.reasons)
 
     def __len__(self) -> int:
-        return len(self._table)
+        return len(self.names)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
 
-    def keys(self) -> list[str]:
-        """Return the names of the columns."""
-        return self.names
-
     def __contains__(self, name: object) -> bool:
-        return name in self.names
+        return name in self.names or name in self._arrays
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Results):
+            return NotImplemented
+        if self.units != other.units or self.names != other.names:
+            return False
+        return all(_equal(self[name], other[name]) for name in self)
+
+    # Columns are compared by their values, as those of frames.
+    __hash__ = None  # type: ignore[assignment]
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         known = self._columns.get(name)
@@ -128,26 +138,29 @@ class Results:
         numbers = self._table.numbers(name)
         if numbers is not None:
             column = numpy.asarray(numbers)
+        elif (values := self._table.values(name)) is not None:
+            is_bool = all(isinstance(value, bool) for value in values)
+            column = numpy.array(values, dtype=bool if is_bool else object)
+        elif name in self._arrays:
+            array = self._arrays[name]
+            columns = [self[element] for element in array.elements]
+            column = numpy.stack(columns, axis=-1).reshape(len(columns[0]), *array.shape)
         else:
-            values = self._table.values(name)
-            if values is None:
-                raise KeyError(self._unknown(name))
-            is_text = any(isinstance(value, str) for value in values[:1])
-            column = numpy.array(values, dtype=object if is_text else bool)
-            column.flags.writeable = False
+            raise KeyError(self._unknown(name))
+        column.flags.writeable = False
         self._columns[name] = column
         return column
 
-    def _unknown(self, name: str) -> str:
-        import difflib
+    @cached_property
+    def _arrays(self) -> dict[str, Array]:
+        return arrays(self.names)
 
-        near = difflib.get_close_matches(name, self.names, 3)
-        hint = f"; similar: {', '.join(near)}" if near else ""
-        return f"the results have no column {name!r}{hint}"
+    def _unknown(self, name: str) -> str:
+        return f"the results have no column {name!r}{similar(name, self.names)}"
 
     def last(self) -> dict[str, Any]:
         """Return the values of the last row by name; empty without rows."""
-        rows = len(self)
+        rows = len(self._table)
         return {name: self._table.value(name, rows - 1) for name in self.names} if rows else {}
 
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
@@ -165,22 +178,24 @@ class Results:
         import numpy
 
         columns = {name: self[name] for name in self.names}
-        array = numpy.empty(len(self), dtype=[(name, own.dtype) for name, own in columns.items()])
+        array = numpy.empty(len(self._table), dtype=[(name, own.dtype) for name, own in columns.items()])
         for name, column in columns.items():
             array[name] = column
         return array
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return a ``pandas.DataFrame`` whose index is the time in s."""
+        """Return a ``pandas.DataFrame`` whose index is the time in s; ``attrs["units"]`` has the units by name."""
         package = _package("pandas", "to_pandas()")
         columns = {name: self[name] for name in self.names[1:]}
         index = package.Index(self.time, name="time")
         frame: pandas.DataFrame = package.DataFrame(columns, index=index, copy=False)
+        frame.attrs["units"] = {name: unit for name, unit in self.units.items() if unit}
         return frame
 
     def to_polars(self) -> polars.DataFrame:
         """Return a ``polars.DataFrame`` without copies."""
-        return _package("polars", "to_polars()").DataFrame(self)
+        # A mapping of columns would lose the types of columns with gaps.
+        return _package("polars", "to_polars()").DataFrame(self._table)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return an ``xarray.Dataset`` over ``time``; units are attributes of the variables."""
@@ -209,58 +224,82 @@ class Results:
             raise ValueError(f"{text}: expected a name that ends in {ending}")
         self._table.write(text)
 
-    def plot(self, *names: str, **options: Any) -> matplotlib.figure.Figure:
+    def plot(
+        self,
+        *names: str,
+        signals: Iterable[str] = (),
+        ax: matplotlib.axes.Axes | None = None,
+        **options: Any,
+    ) -> matplotlib.figure.Figure:
         """Draw variables over time, one panel for each unit.
 
         Args:
             names: the variables; default: those of the experiment, or the first numbers.
+            signals: further variables, as a list.
+            ax: draw all variables into these axes of an existing picture.
             options: passed to ``matplotlib.pyplot.subplots``.
         """
-        pyplot = _package("matplotlib.pyplot", "plot()")
+        if isinstance(signals, str):
+            raise TypeError("signals is a list of names, found a str")
         panels: dict[str, list[str]] = {}
-        for name in names or self._default_plot():
+        for name in [*names, *signals] or self._default_plot():
             if name not in self:
                 raise KeyError(self._unknown(name))
-            panels.setdefault(self.units[name] or "", []).append(name)
+            unit = self.units[self._arrays[name].elements[0] if name in self._arrays else name]
+            panels.setdefault(unit or "", []).append(name)
+        if ax is not None:
+            if options:
+                raise TypeError(f"{next(iter(options))} is an option of a new picture, found ax, too")
+            shown = [name for members in panels.values() for name in members]
+            self._draw(ax, shown, ", ".join(filter(None, panels)))
+            ax.set_xlabel("time in s")
+            return cast("matplotlib.figure.Figure", ax.figure)
+        pyplot = _package("matplotlib.pyplot", "plot()")
         count = max(len(panels), 1)
         options = {"sharex": True, "squeeze": False, "figsize": (8, 1.5 + 2 * count), **options}
-        figure: matplotlib.figure.Figure
         figure, axes = pyplot.subplots(count, 1, **options)
         for own, (unit, members) in zip(axes[:, 0], panels.items()):
-            for name in members:
-                own.plot(self.time, self[name], label=name)
-            own.set_ylabel(unit)
-            own.legend(loc="best")
-            own.grid(True, alpha=0.3)
+            self._draw(own, members, unit)
         axes[-1, 0].set_xlabel("time in s")
         figure.tight_layout()
         return figure
 
+    def _draw(self, axes: matplotlib.axes.Axes, names: list[str], unit: str) -> None:
+        for name in names:
+            values = self[name].reshape(len(self.time), -1)
+            labels = self._arrays[name].elements if name in self._arrays else name
+            axes.plot(self.time, values, label=labels)
+        axes.set_ylabel(unit)
+        axes.legend(loc="best")
+        axes.grid(True, alpha=0.3)
+
     def _default_plot(self) -> list[str]:
         known = [name for name in self._plot if name in self]
         numbers = [name for name in self.names[1:] if self[name].dtype.kind in "fib"]
-        return known or numbers[:_SHOWN]
+        return known or numbers[:MOST_ROWS]
 
     def __repr__(self) -> str:
-        count = len(self.names) - 1
-        return f"<Results: {count} variables, {len(self)} rows, end at t = {self.end_time:.12g} s ({self.end})>"
+        count, rows = len(self.names) - 1, len(self._table)
+        return f"<Results: {count} variables, {rows} rows, end at t = {self.end_time:.12g} s ({self.end})>"
 
     def _repr_html_(self) -> str:
         units, names = self.units, self.names[1:]
-
-        def cell(value: object) -> str:
-            return f"<td>{html.escape(str(value))}</td>"
-
-        lines = []
-        for name in names[:_SHOWN]:
+        rows = []
+        for name in names[:MOST_ROWS]:
             column = self[name]
             is_number = column.dtype.kind in "fi" and len(column) > 0
             numbers = [column.min(), column.max()] if is_number else ["", ""]
             last = column[-1] if len(column) else ""
             shown = [f"{value:.6g}" if isinstance(value, float) else value for value in [*numbers, last]]
-            lines.append("<tr>" + "".join(map(cell, [name, units[name] or "", *shown])) + "</tr>")
-        head = "".join(f"<th>{word}</th>" for word in ("variable", "unit", "min", "max", "last"))
-        more = len(names) - _SHOWN
-        rest = f"<p>and {more} more variables</p>" if more > 0 else ""
-        summary = html.escape(repr(self).strip("<>"))
-        return f"<p>{summary}</p><table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>{rest}"
+            rows.append([name, units[name] or "", *shown])
+        head = ("variable", "unit", "min", "max", "last")
+        return page(f"{self!r}"[1:-1], head, rows, len(names) - MOST_ROWS)
+
+
+def _equal(one: NDArray[Any], other: NDArray[Any]) -> bool:
+    """Whether two columns have the same type and values; NaN equals NaN."""
+    import numpy
+
+    if one.dtype != other.dtype:
+        return False
+    return numpy.array_equal(one, other, equal_nan=one.dtype.kind == "f")

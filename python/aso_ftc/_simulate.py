@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
-import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Union
+from typing import Any, Literal
 
 from . import _core
+from ._arrays import arrays
 from ._command import command
+from ._description import Variable
 from ._errors import ConfigurationError, FmuError
+from ._html import page
+from ._input import Input, options
+from ._keywords import keywords
 from ._results import Results
-from ._system import Cancel, PathLike, System, _changes
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+from ._system import _FMPY, Cancel, PathLike, System, _changes
 
 __all__ = ["CheckReport", "check", "simulate"]
 
-Input = Union["ArrayLike", Mapping[str, Sequence[float]], Callable[[float], Mapping[str, Any]]]
-
-
+@keywords(_FMPY)
 def simulate(
     fmu: PathLike,
     *,
@@ -50,10 +50,12 @@ def simulate(
         start_time, stop_time: simulated time in s; default: the ``DefaultExperiment``, else 0 and 1.
         step: communication step in s; default: the ``DefaultExperiment``, else 1 ms.
         start_values: values of variables before the run.
-        input: inputs over time: a structured array or a mapping of columns with ``"time"`` in s, with the
-            interpolation of FMPy; or a function that gets the time in s at each communication point and
-            returns values by name.
-        output: variables to record, by name or pattern; default: the outputs.
+        input: inputs over time. Either a table with the column ``"time"`` in s, with the interpolation of
+            FMPy: a mapping of columns, a structured array, :class:`Results`, a frame of pandas (whose index
+            may be the time) or polars, a dataset of xarray, a table of Arrow; units that it states are
+            converted, and columns that are outputs are not used. Or a function that gets the time in s at
+            each communication point and returns values by name.
+        output: variables to record, by name or pattern, or by the name of an array; default: the outputs.
         record_every: interval between rows in s; default: every step, with more than 10,000 steps
             10,000 intervals.
         tolerance: relative tolerance of solvers.
@@ -70,26 +72,27 @@ def simulate(
     if isolate is not None:
         # Of the system, so that no function loads the FMU into this process.
         system.isolation["isolate"] = isolate
+    values = None if start_values is None else _prefixed(name, start_values)
+    variables = _variables(system, name, values)
     changes: dict[str, Any] = {
-        "start_values": None if start_values is None else _prefixed(name, start_values),
+        "start_values": values,
         "start_time": start_time,
         "stop_time": stop_time,
         "step": step,
         "tolerance": tolerance,
         "record_every": record_every,
-        "record": _outputs(system, name) if output is None else [f"{name}.{own}" for own in _names(output)],
+        "record": _recorded(name, variables, output),
     }
-    options: dict[str, Any] = {"time_limit": time_limit, "cancel": cancel, "progress": progress}
-    options["prefix"] = f"{name}."
-    if input is None or callable(input):
-        if input is not None:
-            options["input"] = _from_function(name, input)
-        return system._run(_changes(**changes), **options)
-    with tempfile.TemporaryDirectory(prefix="aso-ftc-") as folder:
-        path = os.path.join(folder, "input.csv")
-        _write_input(path, input, {own.name for own in system.variables()}, name)
-        tables = [{"csv": path, "element": name}]
-        return system._run(_changes(**changes, tables=tables), **options)
+    run_options: dict[str, Any] = {"time_limit": time_limit, "cancel": cancel, "progress": progress}
+    if input is not None:
+        changes["signals"], inputs = options(input, name, variables)
+        run_options |= inputs
+    try:
+        return system._run(_changes(**changes), **run_options, prefix=f"{name}.")
+    except ConfigurationError as error:
+        # The signals of the scenario are the columns of the input.
+        sentence = re.sub(r"^scenario\.signal\[\d+\]", "input", str(error))
+        raise ConfigurationError(sentence, error.kind, error.fields) from error.__cause__
 
 
 def _element(fmu: PathLike) -> str:
@@ -98,76 +101,52 @@ def _element(fmu: PathLike) -> str:
     return "".join(letter if letter.isalnum() or letter in "_-" else "_" for letter in stem) or "fmu"
 
 
-def _names(names: Iterable[str]) -> list[str]:
-    if isinstance(names, str):
-        raise TypeError("output is a list of names, found a str")
-    return list(names)
-
-
 def _prefixed(name: str, values: Mapping[str, Any]) -> dict[str, Any]:
     return {f"{name}.{variable}": value for variable, value in values.items()}
 
 
-def _outputs(system: System, name: str) -> list[str] | None:
-    """Return the outputs; ``None``, which records more, without outputs."""
-    return [own.name for own in system.variables() if own.causality == "output"] or None
+def _variables(system: System, name: str, values: Mapping[str, Any] | None) -> list[Variable]:
+    """Return the variables of the FMU with its own names, in the sizes that the start values give to arrays."""
+    known = system._study().check(_changes(start_values=values), quiet=True)
+    return [Variable(**{**own, "name": own["name"].removeprefix(f"{name}.")}) for own in known]
 
 
-def _from_function(
-    name: str, function: Callable[[float], Mapping[str, Any]]
-) -> Callable[[float], Mapping[str, Any]]:
-    return lambda time: _prefixed(name, function(time))
-
-
-def _write_input(path: str, given: Any, known: set[str], element: str) -> None:
-    """Write inputs as a CSV file with a column ``time``."""
-    import numpy
-
-    if isinstance(given, Mapping) or hasattr(given, "columns"):
-        columns = {str(name): numpy.asarray(given[name]) for name in given}
-    else:
-        array = numpy.asarray(given)
-        if array.dtype.names is None:
-            sentence = "input: expected a structured array, a mapping of columns or a function"
-            raise ConfigurationError(sentence, "Input")
-        columns = {name: array[name] for name in array.dtype.names}
-    if "time" not in columns:
-        found = ", ".join(columns)
-        raise ConfigurationError(f'input: expected a column "time", found {found}', "Input")
-    unknown = [name for name in columns if name != "time" and f"{element}.{name}" not in known]
-    if unknown:
-        raise ConfigurationError(f"input: the FMU has no variable {unknown[0]!r}", "Input")
-    lengths = {column.shape for column in columns.values()}
-    if len(lengths) != 1 or len(next(iter(lengths))) != 1:
-        raise ConfigurationError("input: expected columns of one length", "Input")
-    names = ["time", *(name for name in columns if name != "time")]
-    # repr of a float reads back as the same number.
-    values = [[_number(value) for value in columns[name].tolist()] for name in names]
-    quoted = [f'"{name.replace(chr(34), chr(34) * 2)}"' for name in names]
-    lines = [",".join(quoted), *map(",".join, zip(*values))]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _number(value: Any) -> str:
-    return str(int(value)) if isinstance(value, bool) else repr(value)
+def _recorded(name: str, variables: list[Variable], output: Iterable[str] | None) -> list[str] | None:
+    """Return what is recorded: outputs by default; ``None``, which records more, without outputs."""
+    if output is None:
+        return [f"{name}.{own.name}" for own in variables if own.causality == "output"] or None
+    if isinstance(output, str):
+        raise TypeError(f"output is a list of names, found the text {output!r}")
+    known = arrays(own.name for own in variables)
+    return [f"{name}.{element}" for own in output for element in (known[own].elements if own in known else [own])]
 
 
 @dataclass(frozen=True)
 class CheckReport:
-    """What ``aso-ftc check`` finds in an FMU."""
+    """What ``aso-ftc check`` finds in an FMU; true if no finding is an error."""
 
     ok: bool
     """Whether no finding is an error."""
     errors: int
     warnings: int
     notes: int
-    findings: list[dict[str, Any]]
-    data: dict[str, Any]
+    findings: tuple[dict[str, Any], ...] = field(hash=False, repr=False)
+    data: dict[str, Any] = field(hash=False, repr=False)
     """The whole answer of the command."""
+
+    def __bool__(self) -> bool:
+        return self.ok
 
     def __str__(self) -> str:
         lines = [f"{own.get('severity', 'note')}: {own.get('what', own)}" for own in self.findings]
-        return "\n".join([*lines, f"errors {self.errors}, warnings {self.warnings}, notes {self.notes}"])
+        return "\n".join([*lines, self._counts()])
+
+    def _counts(self) -> str:
+        return f"errors {self.errors}, warnings {self.warnings}, notes {self.notes}"
+
+    def _repr_html_(self) -> str:
+        rows = [(own.get("severity", "note"), own.get("what", own)) for own in self.findings]
+        return page(self._counts(), ("severity", "finding"), rows)
 
 
 def check(fmu: PathLike, *, run: bool = True, time_limit: float = 30.0) -> CheckReport:
@@ -189,7 +168,7 @@ def check(fmu: PathLike, *, run: bool = True, time_limit: float = 30.0) -> Check
         raise FmuError(done.stderr.strip().removeprefix("error: ") or "the check failed", "Check")
     data = json.loads(done.stdout)
     counts = {name: data[name] for name in ("errors", "warnings", "notes")}
-    return CheckReport(ok=done.returncode == 0, findings=data["findings"], data=data, **counts)
+    return CheckReport(ok=done.returncode == 0, findings=tuple(data["findings"]), data=data, **counts)
 
 
 def compile(fmu: PathLike) -> Path:

@@ -6,11 +6,15 @@ import copy
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from . import _core
+from ._arrays import Array, arrays, spread
 from ._description import Variable
-from ._errors import Error
+from ._errors import ConfigurationError, Error
+from ._html import page
+from ._keywords import keywords
 from ._results import Results
 
 if TYPE_CHECKING:
@@ -24,6 +28,22 @@ PathLike = str | os.PathLike[str]
 Value = bool | int | float | str
 Cancel = _core.Cancel
 
+# Keywords of FMPy's functions that run one FMU, and what does the same here.
+_FMPY = {
+    "step_size": "step, the communication step",
+    "output_interval": "step, the communication step, or record_every, the interval between rows",
+    "relative_tolerance": "tolerance",
+    "fmi_type": 'interface, "co-simulation" or "model-exchange"',
+    "timeout": "time_limit, in s of wall-clock time",
+    "step_finished": "cancel and progress, or System.simulation() to step from Python",
+    "debug_logging": 'logging.getLogger("aso_ftc.fmu").setLevel("DEBUG")',
+    "logger": 'a handler of logging.getLogger("aso_ftc.fmu")',
+    "fmi_call_logger": "the command `aso-ftc run --log-calls`",
+    "validate": "aso_ftc.check(fmu)",
+    "record_events": "record_every",
+    "fmu_instance": "System.simulation()",
+    "fmu_state": "Simulation.save() and restore()",
+}
 # Tables of a system.toml that a System shows as attributes.
 _TABLES = ("algorithm", "experiment", "results", "isolation", "scenario")
 
@@ -135,6 +155,7 @@ class System:
         interface: Literal["co-simulation", "model-exchange"] | None = None,
         solver: Literal["automatic", "explicit", "stiff"] | None = None,
         every: int | None = None,
+        replace: bool = False,
     ) -> System:
         """Add an FMU, or a Python object with a function ``step`` (see :class:`Slave`).
 
@@ -144,10 +165,17 @@ class System:
             interface: the interface of an FMU that offers both; default: co-simulation.
             solver: the integration method of a model-exchange FMU.
             every: the FMU makes one step for this many communication steps.
+            replace: take the place of the FMU that has this name.
 
         Returns:
             the system itself.
+
+        Raises:
+            ConfigurationError: the system has an FMU of this name.
         """
+        if not replace and (name in self._slaves or name in self._rest.get("fmus", {})):
+            sentence = f"the system has an FMU {name} already; replace=True puts this one in its place"
+            raise ConfigurationError(sentence, "SameName", {"name": name})
         if isinstance(fmu, (str, os.PathLike)):
             self._slaves.pop(name, None)
             self._rest.setdefault("fmus", {})[name] = self._path(fmu)
@@ -269,6 +297,15 @@ class System:
         based = [repr(os.path.basename(self._rest["system"]))] if "system" in self._rest else []
         return f"System({', '.join([*based, *names])})"
 
+    def _repr_html_(self) -> str:
+        fmus = [(name, os.path.basename(path)) for name, path in self._rest.get("fmus", {}).items()]
+        slaves = [(name, type(slave).__name__) for name, slave in self._slaves.items()]
+        sources: dict[str, list[str]] = {}
+        for entry in self._rest.get("connections", []):
+            sources.setdefault(entry["to"].partition(".")[0], []).append(f"{entry['from']} to {entry['to']}")
+        rows = [(name, file, "; ".join(sources.get(name, ()))) for name, file in [*fmus, *slaves]]
+        return page(repr(self), ("name", "FMU or object", "connections to it"), rows)
+
     def _named_files(self) -> Iterator[str]:
         config = self.to_dict()
         if "system" in config:
@@ -333,8 +370,9 @@ class System:
 
     def variables(self) -> list[Variable]:
         """Return the variables of all FMUs, with names ``"fmu.variable"``."""
-        return [Variable(**own) for own in self._study().check({})]
+        return [Variable(**own) for own in self._study().check({}, quiet=True)]
 
+    @keywords(_FMPY)
     def run(
         self,
         *,
@@ -361,7 +399,8 @@ class System:
         """Run the system to its stop time and return the results.
 
         The arguments take precedence over the system, which they do not change. The interpreter is
-        released while the FMUs step. Ctrl-C raises ``KeyboardInterrupt`` after the present step.
+        released while the FMUs step. Ctrl-C raises ``KeyboardInterrupt`` after the present step; the
+        exception has the attribute ``results`` with the rows up to then.
 
         Args:
             start_values: values of variables before the run, by ``"fmu.variable"``.
@@ -410,8 +449,8 @@ class System:
         return self._run(changes, time_limit=time_limit, cancel=cancel, progress=progress)
 
     def _run(self, changes: dict[str, Any], **options: Any) -> Results:
-        outcome, error = self._study().run(changes, **options)
-        results = Results(outcome)
+        outcome, stop = self._study().run(changes, **options)
+        results, error = Results(outcome), cast("Any", stop)
         if error is None:
             return results
         try:
@@ -419,8 +458,9 @@ class System:
             raise error
         finally:
             # The traceback would otherwise keep this frame, and with it the results, in a cycle.
-            del error, results
+            del error, stop, results
 
+    @keywords(_FMPY)
     def simulation(
         self,
         *,
@@ -462,11 +502,29 @@ class System:
 class Simulation:
     """A simulation that Python advances; :meth:`System.simulation` creates it.
 
-    ``simulation["fmu.variable"]`` is the value of a variable at the time reached.
+    ``simulation["fmu.variable"]`` is the value of a variable at the time reached, of an array of FMI 3.0
+    an array; the names of all variables are what a loop over the simulation gives.
     """
 
     def __init__(self, stepper: _core.Stepper) -> None:
         self._stepper = stepper
+
+    @cached_property
+    def _names(self) -> dict[str, None]:
+        return dict.fromkeys(self._stepper.names())
+
+    @cached_property
+    def _arrays(self) -> dict[str, Array]:
+        return arrays(self._names)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names or name in self._arrays
 
     def __enter__(self) -> Simulation:
         return self
@@ -496,7 +554,7 @@ class Simulation:
 
     def names(self) -> list[str]:
         """Return the names of all variables, ``"fmu.variable"``."""
-        return self._stepper.names()
+        return list(self._names)
 
     def step(self, count: int = 1) -> int:
         """Make up to ``count`` communication steps; return how many were made before the end."""
@@ -507,15 +565,24 @@ class Simulation:
         return self._stepper.run_until(time)
 
     def __getitem__(self, name: str) -> Any:
-        return self._stepper[name]
+        if name in self._names or name not in self._arrays:
+            return self._stepper[name]
+        import numpy
+
+        array = self._arrays[name]
+        return numpy.array(self._stepper.get(list(array.elements))).reshape(array.shape)
 
     def get(self, names: Iterable[str]) -> list[Any]:
         """Return the values of several variables."""
+        if isinstance(names, str):
+            raise TypeError(f"expected a list of names, found the text {names!r}")
         return self._stepper.get(list(names))
 
     def set(self, name: str, value: object) -> None:
         """Set an input without a connection or a tunable parameter, from the next step on."""
-        self._stepper.set(name, value)
+        known = {} if name in self._names else self._arrays
+        for own, element in spread({name: value}, known):
+            self._stepper.set(own, element)
 
     def save(self) -> bytes:
         """Return the state of all FMUs and connections.
@@ -535,33 +602,36 @@ class Simulation:
 
 
 def _flat(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of variables, those of arrays as text."""
-    return {name: _setting(value) for name, value in values.items()}
+    """Return values of variables: of arrays of numbers as one text, of arrays of texts for each element."""
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        elements = dict(_elements(value.tolist() if hasattr(value, "tolist") else value))
+        if () in elements:
+            flat[name] = _plain(elements[()])
+        elif any(isinstance(element, (str, bytes)) for element in elements.values()):
+            for indices, element in elements.items():
+                flat[f"{name}[{','.join(map(str, indices))}]"] = _plain(element)
+        else:
+            flat[name] = ", ".join(_text(element) for element in elements.values())
+    return flat
 
 
-def _setting(value: Any) -> Any:
-    if isinstance(value, (bool, int, float, str)):
-        return value
+def _elements(value: Any, indices: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Any]]:
+    """Return the elements of nested lists with their indices, which start at 1."""
     if hasattr(value, "tolist"):
         value = value.tolist()
-    if isinstance(value, (bytes, bytearray)):
-        return value.hex()
-    if isinstance(value, (list, tuple)):
-        return ", ".join(_element(item) for item in _leaves(value))
-    return value
+    if not isinstance(value, (list, tuple)):
+        yield indices, value
+        return
+    for index, item in enumerate(value, 1):
+        yield from _elements(item, (*indices, index))
 
 
-def _leaves(values: Iterable[Any]) -> Iterator[Any]:
-    for value in values:
-        if isinstance(value, (list, tuple)):
-            yield from _leaves(value)
-        elif hasattr(value, "tolist"):
-            yield from _leaves([value.tolist()])
-        else:
-            yield value
+def _plain(value: Any) -> Any:
+    return value.hex() if isinstance(value, (bytes, bytearray)) else value
 
 
-def _element(value: Any) -> str:
+def _text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 

@@ -53,7 +53,12 @@ pub(crate) fn read(description: &Bound<'_, PyAny>, folder: &Path) -> PyResult<Co
     };
     parse(&text, &folder.join(NAME)).map_err(|place| {
         let shown = place.shown().trim();
-        let shown = if shown.is_empty() { String::new() } else { format!(", in: {shown}") };
+        let before = text.lines().take(place.line().saturating_sub(1));
+        let table = match before.filter(|line| line.starts_with('[')).last() {
+            Some(table) if !shown.starts_with('[') => format!(" {table}"),
+            _ => String::new(),
+        };
+        let shown = if shown.is_empty() { String::new() } else { format!(", in{table}: {shown}") };
         invalid(&format!("{}{shown}", place.message())).raise(py)
     })
 }

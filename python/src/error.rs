@@ -161,6 +161,7 @@ pub(crate) fn system(error: &SystemError) -> Exception {
         E::Setting { name, value, source } => {
             called(named("Setting", name).text("value", value), source)
         }
+        E::NotSettable { name, value, .. } => named("NotSettable", name).text("value", value),
         E::LostSetting { name, value, found: actual } => {
             named("LostSetting", name).text("value", value).text("found", actual)
         }

@@ -1,19 +1,22 @@
 //! Messages of the libraries and of FMUs for Python's `logging`.
 //!
-//! A message may arise in any thread, without the interpreter. So messages wait in a list until a thread
+//! The module `aso_ftc._logging` states the loggers. A message may arise in any thread, without the interpreter. So messages wait in a list until a thread
 //! that is attached to the interpreter passes them on: at the end of each call, and during a run each
 //! time that it looks for signals.
 
+use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use fmu_description::number::seconds;
 use pyo3::prelude::*;
 use study::LogFields;
 use tracing::span::{Attributes, Id, Record};
 use tracing::subscriber::Interest;
 use tracing::{Event, Level, Metadata, Subscriber};
 
+/// The module that states the loggers.
+const MODULE: &str = "aso_ftc._logging";
 /// `target` of the messages of FMUs.
 const FMU: &str = "fmu";
 /// Most messages that wait at the same time; further ones are counted only.
@@ -24,11 +27,26 @@ static LOST: AtomicU64 = AtomicU64::new(0);
 /// The lowest level of `logging` that is passed on.
 static LEAST: AtomicU8 = AtomicU8::new(30);
 
-/// A message: level of `logging`, whether it is from an FMU, text.
+/// A message: level of `logging`, the FMU that it is from, simulated time in s, category, text.
 struct Message {
     level: u8,
-    from_fmu: bool,
+    fmu: Option<String>,
+    time: Option<f64>,
+    category: String,
     text: String,
+}
+
+thread_local! {
+    /// Whether the messages of this thread are left out.
+    static QUIET: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Calls `work`, without the messages of this thread if `quiet`.
+pub(crate) fn quietly<T>(quiet: bool, work: impl FnOnce() -> T) -> T {
+    let before = QUIET.replace(quiet);
+    let done = catch_unwind(AssertUnwindSafe(work));
+    QUIET.set(before);
+    done.unwrap_or_else(|panic| resume_unwind(panic))
 }
 
 /// Starts to collect messages.
@@ -39,13 +57,15 @@ pub(crate) fn start() {
 
 /// Reads from Python's `logging` which levels are passed on.
 pub(crate) fn adopt_level(py: Python<'_>) {
-    let level = || -> PyResult<u8> {
-        let logger = py.import("logging")?.call_method1("getLogger", ("aso_ftc",))?;
-        Ok(logger.call_method0("getEffectiveLevel")?.extract::<u32>()?.min(255) as u8)
-    };
+    let level = || py.import(MODULE)?.call_method0("level")?.extract::<u32>();
     if let Ok(level) = level() {
-        LEAST.store(level, Ordering::Relaxed);
+        LEAST.store(level.min(255) as u8, Ordering::Relaxed);
     }
+}
+
+/// Whether a logger passes on the debugging messages of FMUs.
+pub(crate) fn is_debugging() -> bool {
+    LEAST.load(Ordering::Relaxed) <= level(Level::DEBUG)
 }
 
 /// Passes the messages so far to Python's `logging`.
@@ -62,15 +82,12 @@ pub(crate) fn pass_on(py: Python<'_>) -> PyResult<()> {
     if messages.is_empty() {
         return Ok(());
     }
-    let logging = py.import("logging")?;
-    let package = logging.call_method1("getLogger", ("aso_ftc",))?;
-    let fmu = logging.call_method1("getLogger", ("aso_ftc.fmu",))?;
-    for message in messages {
-        let logger = if message.from_fmu { &fmu } else { &package };
-        logger.call_method1("log", (message.level, "%s", message.text))?;
+    let emit = py.import(MODULE)?.getattr("emit")?;
+    for Message { level, fmu, time, category, text } in messages {
+        emit.call1((level, text, fmu, time, category))?;
     }
     if lost > 0 {
-        package.call_method1("warning", ("%s further messages were dropped", lost))?;
+        emit.call1((level(Level::WARN), format!("{lost} further messages were dropped")))?;
     }
     Ok(())
 }
@@ -85,7 +102,7 @@ impl Subscriber for Collector {
     }
 
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
-        level(*metadata.level()) >= LEAST.load(Ordering::Relaxed)
+        !QUIET.get() && level(*metadata.level()) >= LEAST.load(Ordering::Relaxed)
     }
 
     fn new_span(&self, _: &Attributes<'_>) -> Id {
@@ -100,11 +117,13 @@ impl Subscriber for Collector {
         let metadata = event.metadata();
         let mut fields = LogFields::default();
         event.record(&mut fields);
-        let from_fmu = metadata.target() == FMU;
-        let text = if from_fmu { of_fmu(fields) } else { fields.message + &fields.others };
+        let LogFields { message, instance, category, time, others } = fields;
+        let fmu = (metadata.target() == FMU).then_some(instance);
+        let text = message.trim_end().to_owned() + &others;
+        let level = level(*metadata.level());
         let mut messages = MESSAGES.lock().unwrap_or_else(PoisonError::into_inner);
         if messages.len() < WAITING {
-            messages.push(Message { level: level(*metadata.level()), from_fmu, text });
+            messages.push(Message { level, fmu, time, category, text });
         } else {
             LOST.fetch_add(1, Ordering::Relaxed);
         }
@@ -124,12 +143,4 @@ fn level(level: Level) -> u8 {
         Level::DEBUG => 10,
         Level::TRACE => 5,
     }
-}
-
-/// Returns the message of an FMU with its name, time and category.
-fn of_fmu(fields: LogFields) -> String {
-    let LogFields { message, instance, category, time, others } = fields;
-    let time = time.map(|time| format!(", t = {} s", seconds(time))).unwrap_or_default();
-    let category = if category.is_empty() { category } else { format!(", {category}") };
-    format!("{instance}{time}{category}: {}{others}", message.trim_end())
 }

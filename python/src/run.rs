@@ -1,16 +1,18 @@
 //! Runs: a configuration, its changes, Python slaves.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::{LazyLock, OnceLock};
+use std::sync::{Arc, LazyLock, OnceLock};
 
+use fmu_description::Kind;
 use master::{Port, Simulation, Slave};
-use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyDict, PyMapping};
 use results::{MemorySink, Recorded, Sink};
 use study::config::CheckpointSettings;
+use study::table::Table as Signals;
 use study::{AssemblyOptions, Config, LoadedConfig, PreparedRun, Run, RunEnd, Store};
 
 use crate::configuration::{merge, read};
@@ -58,6 +60,9 @@ pub(crate) struct Study {
     slaves: Vec<(String, Py<PyAny>)>,
 }
 
+/// A column of an input: its name, and times and values as bytes.
+type TableInMemory = (String, PyBackedBytes, PyBackedBytes);
+
 /// Slaves with the exceptions that they raise.
 type Slaves = (Vec<(String, Box<dyn Slave>)>, Raised);
 
@@ -75,11 +80,18 @@ impl Study {
         Ok(Self { config, folder, slaves })
     }
 
-    /// Loads and connects the FMUs, and resolves all names; starts nothing. Returns the variables.
-    fn check(&self, py: Python<'_>, changes: &Bound<'_, PyAny>) -> PyResult<Vec<Py<PyDict>>> {
+    /// Loads and connects the FMUs, and resolves all names; starts nothing. Returns the variables. `quiet`: without
+    /// messages, which the run of the same configuration repeats.
+    #[pyo3(signature = (changes, *, quiet = false))]
+    fn check(
+        &self,
+        py: Python<'_>,
+        changes: &Bound<'_, PyAny>,
+        quiet: bool,
+    ) -> PyResult<Vec<Py<PyDict>>> {
         logging::adopt_level(py);
         let (loaded, (slaves, _)) = (self.loaded(changes)?, self.slaves(py)?);
-        let prepared = guarded(py, || prepare(loaded, slaves));
+        let prepared = guarded(py, || logging::quietly(quiet, || prepare(loaded, slaves, &[])));
         logging::pass_on(py)?;
         let prepared = prepared?.map_err(|error| error::study(&error).raise(py))?;
         let mut variables = Vec::new();
@@ -95,7 +107,7 @@ impl Study {
 
     /// Runs to the end. Returns the outcome, and the exception of a run that failed after its start.
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
-    #[pyo3(signature = (changes, *, time_limit = None, cancel = None, progress = None, input = None, prefix = None))]
+    #[pyo3(signature = (changes, *, time_limit = None, cancel = None, progress = None, input = None, tables = None, prefix = None))]
     fn run(
         &self,
         py: Python<'_>,
@@ -104,6 +116,7 @@ impl Study {
         cancel: Option<&Bound<'_, Cancel>>,
         progress: Option<&Bound<'_, PyAny>>,
         input: Option<Py<PyAny>>,
+        tables: Option<Vec<TableInMemory>>,
         prefix: Option<&str>,
     ) -> PyResult<(Outcome, Option<Py<PyAny>>)> {
         logging::adopt_level(py);
@@ -111,16 +124,18 @@ impl Study {
         let cancel = cancel.map(|cancel| cancel.get().flag.clone());
         let watch = Watch::new(py, time_limit, cancel, Progress::new(progress)?)?;
         let input = input.map(Input::new);
-        let ran = guarded(py, || run(loaded, slaves, watch, input));
+        let tables = tables.unwrap_or_default().iter().map(|table| self.table(table)).collect();
+        let ran = guarded(py, || run(loaded, slaves, watch, input, tables));
         logging::pass_on(py)?;
         let ran = ran?.map_err(|error| caused(py, error::study(&error), &raised))?;
         let Ran { ended, time, steps, seconds, recorded, settings, reasons, mut watch } = ran;
+        let (recorded, binaries) = recorded;
         if let (None, RunEnd::AtStop | RunEnd::ByFmu(_)) = (&watch.stop, &ended) {
-            watch.finish(py)?;
+            watch.finish(py);
         }
         let shown = fmu_description::number::seconds(time);
         let (end, exception) = match (watch.stop.take(), ended) {
-            (Some(Stop::Raised(error)), _) => return Err(error),
+            (Some(Stop::Raised(error)), _) => ("interrupted".to_owned(), Some(error)),
             (Some(Stop::TimeLimit(limit)), _) => {
                 let sentence =
                     format!("the run reached its time limit of {limit} s at t = {shown} s");
@@ -135,14 +150,11 @@ impl Study {
             (None, RunEnd::ByFmu(name)) => (name, None),
             (None, RunEnd::Failed(error)) => {
                 let error = caused(py, error::study(&error).reached(time), &raised);
-                if !error.is_instance_of::<PyException>(py) {
-                    return Err(error);
-                }
                 ("failed".to_owned(), Some(error))
             }
             (None, RunEnd::AtStop | RunEnd::Interrupted) => ("stop time".to_owned(), None),
         };
-        let table = Py::new(py, Table::new(recorded, prefix)?)?;
+        let table = Py::new(py, Table::new(recorded, &binaries, prefix)?)?;
         let outcome = Outcome { table, end, time, steps, seconds, settings, reasons };
         Ok((outcome, exception.map(|error| error.into_value(py).into_any())))
     }
@@ -153,7 +165,7 @@ impl Study {
         let (mut loaded, (slaves, raised)) = (self.loaded(changes)?, self.slaves(py)?);
         (loaded.config.results.file, loaded.config.checkpoint) =
             (None, CheckpointSettings::default());
-        let started = guarded(py, || prepare(loaded, slaves)?.start(None));
+        let started = guarded(py, || prepare(loaded, slaves, &[])?.start(None));
         logging::pass_on(py)?;
         let run = started?.map_err(|error| caused(py, error::study(&error), &raised))?;
         Ok(Stepper::new(run, raised))
@@ -170,6 +182,15 @@ impl Study {
         Ok(LoadedConfig { config, source: None })
     }
 
+    /// Returns a table in memory with the path that its name has in the configuration.
+    fn table(&self, (name, times, values): &TableInMemory) -> (PathBuf, Signals) {
+        let numbers = |bytes: &[u8]| -> Arc<[f64]> {
+            bytes.as_chunks().0.iter().map(|bytes| f64::from_ne_bytes(*bytes)).collect()
+        };
+        let (times, columns) = (numbers(times), vec![numbers(values)]);
+        (self.folder.join(name), Signals { names: vec![name.clone()], times, columns })
+    }
+
     fn slaves(&self, py: Python<'_>) -> PyResult<Slaves> {
         let raised = Raised::default();
         let mut slaves: Vec<(String, Box<dyn Slave>)> = Vec::new();
@@ -184,6 +205,7 @@ impl Study {
 fn prepare(
     loaded: LoadedConfig,
     slaves: Vec<(String, Box<dyn Slave>)>,
+    tables: &[(PathBuf, Signals)],
 ) -> Result<PreparedRun, study::Error> {
     #[cfg(unix)]
     if loaded.config.isolation.isolate != Some(true)
@@ -193,7 +215,8 @@ fn prepare(
         let _ = fmu_import::crash::leave_file(&here);
     }
     let worker = WORKER.get().map(PathBuf::as_path);
-    let options = AssemblyOptions { store: Some(&STORE.0), worker, ..AssemblyOptions::default() };
+    let (store, logging) = (Some(&STORE.0), logging::is_debugging());
+    let options = AssemblyOptions { store, worker, logging, tables, ..AssemblyOptions::default() };
     PreparedRun::with_slaves(loaded, &options, slaves)
 }
 
@@ -203,7 +226,8 @@ struct Ran {
     time: f64,
     steps: u64,
     seconds: f64,
-    recorded: results::Columns,
+    /// The rows, and the names of the columns that are the bytes of binaries.
+    recorded: (results::Columns, HashSet<String>),
     settings: String,
     reasons: Vec<String>,
     watch: Watch,
@@ -215,8 +239,12 @@ fn run(
     slaves: Vec<(String, Box<dyn Slave>)>,
     mut watch: Watch,
     mut input: Option<Input>,
+    tables: Vec<(PathBuf, Signals)>,
 ) -> Result<Ran, study::Error> {
-    let prepared = prepare(loaded, slaves)?;
+    let prepared = prepare(loaded, slaves, &tables)?;
+    let is_binary = |port: &&Port| matches!(prepared.system.variable(**port).kind, Kind::Binary(_));
+    let binaries = prepared.ports.iter().filter(is_binary);
+    let binaries = binaries.map(|port| prepared.system.name(*port)).collect();
     let file = prepared.config.results.file.clone();
     let recorded = Recorded::default();
     let mut run = prepared.start_into(None, |columns| {
@@ -240,7 +268,7 @@ fn run(
     let reasons = std::mem::take(&mut run.plan.reasons);
     drop(run);
     finished?;
-    let recorded = recorded.take();
+    let recorded = (recorded.take(), binaries);
     let (steps, seconds) = (tally.steps, tally.seconds);
     Ok(Ran { ended, time, steps, seconds, recorded, settings, reasons, watch })
 }

@@ -1,13 +1,13 @@
 //! Results in memory, shared with Python without copies.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{
-    Array as _, ArrayRef, BooleanArray, Float64Array, Int32Array, Int64Array, LargeStringArray,
-    RecordBatch, RecordBatchIterator, cast::AsArray as _,
+    Array as _, ArrayRef, BooleanArray, Float64Array, Int32Array, Int64Array, LargeBinaryArray,
+    LargeStringArray, RecordBatch, RecordBatchIterator, cast::AsArray as _,
 };
 use arrow_buffer::{Buffer, NullBuffer, OffsetBuffer, ScalarBuffer};
 use arrow_schema::ffi::FFI_ArrowSchema;
@@ -17,6 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList, PyTuple};
 use pyo3::{IntoPyObjectExt as _, pyclass};
 use results::{Column, ColumnKind, Columns, TIME, Values};
+use slave::{from_hex, to_hex};
 
 use crate::error;
 
@@ -28,8 +29,13 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Takes over the memory of the columns. Their names lose `prefix`.
-    pub(crate) fn new(recorded: Columns, prefix: Option<&str>) -> PyResult<Self> {
+    /// Takes over the memory of the columns. Those in `binaries`, recorded as hexadecimal digits, become
+    /// bytes. Names lose `prefix`.
+    pub(crate) fn new(
+        recorded: Columns,
+        binaries: &HashSet<String>,
+        prefix: Option<&str>,
+    ) -> PyResult<Self> {
         let rows = recorded.time.len();
         let time = Column {
             name: TIME.to_owned(),
@@ -37,30 +43,43 @@ impl Table {
             unit: Some("s".to_owned()),
             clocked: false,
         };
-        let (mut fields, mut arrays) = (vec![field(&time)], vec![reals(recorded.time, None)]);
+        let mut arrays = vec![reals(recorded.time, None)];
         let mut columns = vec![time];
         let mut present = recorded.present.into_iter();
         for (mut column, values) in recorded.columns {
+            let is_binary = binaries.contains(&column.name);
             let short = prefix.and_then(|prefix| column.name.strip_prefix(prefix));
             let short = short.filter(|name| *name != TIME).map(str::to_owned);
             if let Some(name) = short {
                 column.name = name;
             }
-            fields.push(field(&column));
             let nulls = if column.clocked { present.next().map(NullBuffer::from) } else { None };
-            arrays.push(array(values, nulls).map_err(failed)?);
+            let array = match values {
+                Values::String(texts) if is_binary => bytes(&texts, nulls.as_ref()),
+                values => array(values, nulls).map_err(failed)?,
+            };
+            arrays.push(array);
             columns.push(column);
         }
         debug_assert!(
             arrays.iter().all(|array| array.len() == rows),
             "columns of different lengths"
         );
+        let fields: Vec<_> = columns.iter().zip(&arrays).map(field).collect();
         let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).map_err(failed)?;
         Ok(Self { batch, columns })
     }
 
     fn position(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column.name == name)
+    }
+
+    /// Returns the names of the columns of bytes.
+    fn binaries(&self) -> HashSet<String> {
+        let schema = self.batch.schema();
+        let bytes =
+            schema.fields().iter().filter(|field| *field.data_type() == DataType::LargeBinary);
+        bytes.map(|field| field.name().clone()).collect()
     }
 
     /// Returns the columns as they were recorded.
@@ -87,16 +106,9 @@ fn failed(error: ArrowError) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-fn field(column: &Column) -> Field {
-    let kind = match column.kind {
-        ColumnKind::Real => DataType::Float64,
-        ColumnKind::Integer => DataType::Int32,
-        ColumnKind::Long => DataType::Int64,
-        ColumnKind::Boolean => DataType::Boolean,
-        ColumnKind::String => DataType::LargeUtf8,
-    };
+fn field((column, array): (&Column, &ArrayRef)) -> Field {
     let unit = column.unit.clone().map(|unit| ("unit".to_owned(), unit));
-    Field::new(&column.name, kind, column.clocked)
+    Field::new(&column.name, array.data_type().clone(), column.clocked)
         .with_metadata(unit.into_iter().collect::<HashMap<_, _>>())
 }
 
@@ -122,7 +134,17 @@ fn array(values: Values, nulls: Option<NullBuffer>) -> Result<ArrayRef, ArrowErr
     })
 }
 
-/// Returns the values of an array that [`array`] has made.
+/// Returns the bytes that texts write as hexadecimal digits.
+fn bytes(texts: &results::Texts, nulls: Option<&NullBuffer>) -> ArrayRef {
+    let rows = texts.offsets.len().saturating_sub(1);
+    let value = |row| match nulls {
+        Some(nulls) if nulls.is_null(row) => None,
+        _ => texts.get(row).and_then(from_hex),
+    };
+    Arc::new((0..rows).map(value).collect::<LargeBinaryArray>())
+}
+
+/// Returns the values of an array that [`array`] or [`bytes`] has made.
 fn values(array: &ArrayRef) -> Values {
     use arrow_array::types::{Float64Type, Int32Type, Int64Type};
     match array.data_type() {
@@ -133,6 +155,14 @@ fn values(array: &ArrayRef) -> Values {
             let texts = array.as_string::<i64>();
             let (offsets, bytes) = (texts.offsets().to_vec(), texts.values().to_vec());
             Values::String(results::Texts { offsets, bytes })
+        }
+        DataType::LargeBinary => {
+            let mut texts = results::Texts::default();
+            for bytes in array.as_binary::<i64>() {
+                texts.bytes.extend(to_hex(bytes.unwrap_or(&[])).into_bytes());
+                texts.offsets.push(i64::try_from(texts.bytes.len()).unwrap_or(i64::MAX));
+            }
+            Values::String(texts)
         }
         _ => Values::Real(array.as_primitive::<Float64Type>().values().to_vec()),
     }
@@ -183,11 +213,12 @@ impl Table {
     /// The values of a column as a list.
     fn values<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Option<Bound<'py, PyList>>> {
         let Some(position) = self.position(name) else { return Ok(None) };
-        if self.batch.column(position).null_count() > 0 {
+        let column = self.batch.column(position);
+        if column.null_count() > 0 || *column.data_type() == DataType::LargeBinary {
             let all = (0..self.batch.num_rows()).map(|row| self.value(py, name, row));
             return Ok(Some(PyList::new(py, all.collect::<PyResult<Vec<_>>>()?)?));
         }
-        Ok(Some(match values(self.batch.column(position)) {
+        Ok(Some(match values(column) {
             Values::Real(list) => PyList::new(py, list)?,
             Values::Integer(list) => PyList::new(py, list)?,
             Values::Long(list) => PyList::new(py, list)?,
@@ -209,6 +240,9 @@ impl Table {
         if one.is_null(0) {
             return Ok(py.None().into_bound(py));
         }
+        if let Some(bytes) = one.as_binary_opt::<i64>() {
+            return Ok(PyBytes::new(py, bytes.value(0)).into_any());
+        }
         match values(&one) {
             Values::Real(list) => list[0].into_bound_py_any(py),
             Values::Integer(list) => list[0].into_bound_py_any(py),
@@ -227,7 +261,7 @@ impl Table {
 
     /// The columns as bytes, for pickle.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let bytes = py.detach(|| postcard::to_stdvec(&self.recorded()));
+        let bytes = py.detach(|| postcard::to_stdvec(&(self.recorded(), self.binaries())));
         let bytes = bytes.map_err(|error| PyValueError::new_err(error.to_string()))?;
         Ok(PyBytes::new(py, &bytes))
     }
@@ -265,8 +299,9 @@ impl Table {
 #[pyfunction]
 pub(crate) fn table_from_bytes(bytes: &[u8]) -> PyResult<Table> {
     let recorded = postcard::from_bytes(bytes);
-    let recorded = recorded.map_err(|error| PyValueError::new_err(error.to_string()))?;
-    Table::new(recorded, None)
+    let (recorded, binaries) =
+        recorded.map_err(|error| PyValueError::new_err(error.to_string()))?;
+    Table::new(recorded, &binaries, None)
 }
 
 /// The numbers of a column, in the memory of the results.

@@ -180,10 +180,10 @@ impl Watch {
         if self.stop.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    /// Reports the end of the run, and raises the exception of a signal that has arrived meanwhile.
-    pub(crate) fn finish(&self, py: Python<'_>) -> PyResult<()> {
-        py.check_signals()?;
-        self.progress.show(py, 1.0)
+    /// Reports the end of the run, and takes the exception of a signal that has arrived meanwhile.
+    pub(crate) fn finish(&mut self, py: Python<'_>) {
+        let finished = py.check_signals().and_then(|()| self.progress.show(py, 1.0));
+        self.stop = finished.err().map(Stop::Raised);
     }
 
     fn look(&mut self, time: f64) {

@@ -49,3 +49,17 @@ def python():
         )
 
     return run
+
+
+@pytest.fixture(scope="session")
+def packed(tmp_path_factory):
+    """Packs a model of this repository as an FMU of FMI 3.0; returns its path."""
+
+    def pack(model):
+        folder = tmp_path_factory.mktemp("packed")
+        words = [af.command(), "pack", ROOT / model, "--fmi", "3", "--out", folder]
+        subprocess.run([str(word) for word in words], check=True, capture_output=True, cwd=ROOT)
+        (fmu,) = folder.glob("*.fmu")
+        return fmu
+
+    return pack

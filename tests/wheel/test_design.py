@@ -79,7 +79,7 @@ def test_the_controller_fmu_runs(made, tmp_path):
     path = made.controller.fmu(tmp_path / "Own.fmu")
     names = {own.name for own in af.read_model_description(path).variables}
     assert "f_hat" in names
-    system = af.paper().add("controller", path)
+    system = af.paper().add("controller", path, replace=True)
     own, packed = system.run(stop_time=0.1), af.paper().run(stop_time=0.1)
     assert np.array_equal(own["plant.x_p"], packed["plant.x_p"])
 

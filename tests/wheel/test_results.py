@@ -43,7 +43,7 @@ def test_results_survive_pickle(results):
 def test_arrow_shares_the_memory_of_the_columns(results):
     pyarrow = pytest.importorskip("pyarrow")
     table = results.to_arrow()
-    assert table.column_names == results.names and table.num_rows == len(results)
+    assert table.column_names == results.names and table.num_rows == len(results.time)
     for name in ("time", "plant.x_p", "plant.regime"):
         address = table.column(name).chunk(0).buffers()[1].address
         assert address == results[name].ctypes.data, name
@@ -72,7 +72,7 @@ def test_pandas_polars_and_xarray_have_the_same_values(results):
 def test_xarray_has_units(results):
     pytest.importorskip("xarray")
     dataset = results.to_xarray()
-    assert dataset["plant.x_p"].attrs == {"units": "m"} and dataset.sizes == {"time": len(results)}
+    assert dataset["plant.x_p"].attrs == {"units": "m"} and dataset.sizes == {"time": len(results.time)}
 
 
 def test_files_read_back_as_the_same_numbers(results, tmp_path):
@@ -91,7 +91,7 @@ def test_files_read_back_as_the_same_numbers(results, tmp_path):
 
 def test_a_notebook_shows_a_table_and_names_are_escaped(results):
     page = results._repr_html_()
-    assert page.count("<tr>") == 21 and "plant.x_p" in page and "and 6 more variables" in page
+    assert page.count("<tr>") == 21 and "plant.x_p" in page and "and 6 more<" in page
 
 
 def test_the_settings_of_the_results_repeat_the_run(results, tmp_path):
@@ -102,7 +102,7 @@ def test_the_settings_of_the_results_repeat_the_run(results, tmp_path):
 
 
 def test_nothing_is_recorded_where_nothing_is_asked_for(paper):
-    assert len(paper.run(record=[])) == 0 == len(paper.run(record_every="never"))
+    assert len(paper.run(record=[]).time) == 0 == len(paper.run(record_every="never").time)
     assert paper.run(record=["plant.M"]).names == ["time", "plant.M"]
 
 

@@ -56,7 +56,7 @@ def test_the_arguments_of_a_run_do_what_the_options_of_the_command_do(paper, com
     results.to_csv(tmp_path / "own.csv")
     assert (tmp_path / "own.csv").read_bytes() == (tmp_path / "command" / "results.csv").read_bytes()
     # The system itself keeps its settings.
-    assert "plant.M" not in paper.start_values and len(paper.run()) == 21
+    assert "plant.M" not in paper.start_values and len(paper.run().time) == 21
 
 
 def test_the_paper_is_the_experiment_of_the_command(command, tmp_path):
@@ -296,7 +296,7 @@ def test_an_exception_of_a_python_object_is_the_cause_of_the_error():
     with pytest.raises(af.RunError, match="law at t = 0.05.* raised ArithmeticError: no solution") as caught:
         loop(Broken(1.0)).run()
     assert isinstance(caught.value.__cause__, ArithmeticError)
-    assert caught.value.fmu == "law" and len(caught.value.results) > 50
+    assert caught.value.fmu == "law" and len(caught.value.results.time) > 50
 
     class Unknown(Proportional):
         def step(self, t, dt, inputs):

@@ -1,10 +1,11 @@
 //! Options of an assembly that are not part of the configuration.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use fmu_import::CallLog;
 
 use crate::store::Store;
+use crate::table::Table;
 
 /// Options of [`crate::assemble()`] that are not part of the configuration.
 #[derive(Clone, Copy, Debug, Default)]
@@ -19,4 +20,6 @@ pub struct AssemblyOptions<'a> {
     pub store: Option<&'a Store>,
     /// The program that becomes the separate process of an FMU; default: this program.
     pub worker: Option<&'a Path>,
+    /// Tables in memory that the scenario reads, each with the path of the file whose place it takes.
+    pub tables: &'a [(PathBuf, Table)],
 }

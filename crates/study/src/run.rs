@@ -25,6 +25,7 @@ use crate::record::{Recorder, select};
 use crate::resume::resume;
 use crate::saved::SavedRun;
 use crate::scenario::Setup;
+use crate::table::Table;
 pub use intervention::Intervention;
 
 /// A run with all settings chosen, before initialisation.
@@ -75,7 +76,7 @@ impl PreparedRun {
         let plan = plan(&mut loaded.config, &assembled)?;
         let AssembledSystem { system, opened, .. } = &mut assembled;
         let (system, opened) = (std::mem::take(system), opened.take());
-        let scenario = scenario(&loaded, &system, &plan)?;
+        let scenario = scenario(&loaded, &system, &plan, options.tables)?;
         let config = loaded.config;
         let ports = select(&system, &config.results.record, &config.results.exclude)?;
         check_saving(&config, &system)?;
@@ -155,10 +156,16 @@ impl PreparedRun {
 }
 
 /// Resolves the signals and faults of the run.
-fn scenario(loaded: &LoadedConfig, system: &System, plan: &Plan) -> Result<Scenario, Error> {
+fn scenario(
+    loaded: &LoadedConfig,
+    system: &System,
+    plan: &Plan,
+    tables: &[(PathBuf, Table)],
+) -> Result<Scenario, Error> {
     // The paths are absolute already.
     let folder = Path::new("");
-    let setup = Setup { folder, start: plan.experiment.start_time, step: plan.algorithm.step };
+    let (start, step) = (plan.experiment.start_time, plan.algorithm.step);
+    let setup = Setup { folder, start, step, tables };
     let resolved = loaded.config.scenario.resolve(system, &setup);
     let prepared = resolved.map_err(|error| {
         let place = error.place.clone();

@@ -19,3 +19,7 @@ from ._analysis import Outcome, Probability, load
 from ._campaign import Campaign
 
 __all__ = ["Campaign", "Outcome", "Probability", "load"]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

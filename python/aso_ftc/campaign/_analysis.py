@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 import math
 import os
@@ -20,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _html
 from .._errors import ConfigurationError, ResultsError
 from ._packages import package
 
@@ -201,18 +201,13 @@ class Outcome:
         return f"<Outcome: {name}, {len(self)} of {planned} runs, {lost} not finished>"
 
     def _repr_html_(self) -> str:
-        def row(cells: Iterable[object], tag: str = "td") -> str:
-            return "<tr>" + "".join(f"<{tag}>{html.escape(str(cell))}</{tag}>" for cell in cells) + "</tr>"
-
-        lines = []
+        rows = []
         for name, entry in self.manifest["measures"].items():
             values = self.read([name])[name].to_numpy()
             finite = values[np.isfinite(values)]
             shown = [f"{f(finite):.6g}" for f in (np.min, np.median, np.max)] if len(finite) else [""] * 3
-            lines.append(row([name, entry.get("unit") or "", describe(self.limits.get(name)), *shown]))
-        head = row(("measure", "unit", "limit", "min", "median", "max"), "th")
-        summary = html.escape(repr(self).strip("<>"))
-        return f"<p>{summary}</p><table><thead>{head}</thead><tbody>{''.join(lines)}</tbody></table>"
+            rows.append([name, entry.get("unit") or "", describe(self.limits.get(name)), *shown])
+        return _html.page(repr(self).strip("<>"), ("measure", "unit", "limit", "min", "median", "max"), rows)
 
     @property
     def limits(self) -> dict[str, dict[str, float]]:

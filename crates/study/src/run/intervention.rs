@@ -65,7 +65,8 @@ impl Run {
         scenario.fault.extend(added.fault);
         let start = self.plan.experiment.start_time;
         // The paths are absolute already.
-        let setup = Setup { folder: Path::new(""), start, step: self.plan.algorithm.step };
+        let setup =
+            Setup { folder: Path::new(""), start, step: self.plan.algorithm.step, tables: &[] };
         let resolved = scenario.resolve(&*self.simulation.system(), &setup)?;
         self.simulation.change_scenario(resolved.scenario)?;
         if let Some(recorder) = &mut self.recorder {

@@ -62,6 +62,8 @@ pub struct Setup<'a> {
     pub start: f64,
     /// Communication step in s; the first one if it varies.
     pub step: f64,
+    /// Tables in memory, each with the path of the file whose place it takes.
+    pub tables: &'a [(PathBuf, Table)],
 }
 
 /// A scenario resolved for a system.
@@ -211,9 +213,14 @@ impl<'a> Resolver<'a> {
         if let Some(known) = self.files.get(&path) {
             return Ok((path, known.clone()));
         }
-        let table = table::read(&path)
-            .map_err(|error| Reason::File { path: path.clone(), error })
-            .map(Rc::new)?;
+        let in_memory = self.setup.tables.iter().find(|(known, _)| *known == path);
+        let table = match in_memory {
+            Some((_, table)) => table.clone(),
+            None => {
+                table::read(&path).map_err(|error| Reason::File { path: path.clone(), error })?
+            }
+        };
+        let table = Rc::new(table);
         self.files.insert(path.clone(), table.clone());
         Ok((path, table))
     }

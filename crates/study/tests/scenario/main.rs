@@ -156,7 +156,7 @@ fn scenario(text: &str) -> Scenario {
 
 /// The run starts at 0 s with steps of 0.5 s.
 fn setup(folder: &Path) -> Setup<'_> {
-    Setup { folder, start: 0.0, step: 0.5 }
+    Setup { folder, start: 0.0, step: 0.5, tables: &[] }
 }
 
 fn resolve(text: &str) -> Result<ResolvedScenario, ScenarioError> {

@@ -30,7 +30,7 @@ fn chosen_steps_end_at_the_start_and_the_end_of_a_fault() {
         let system = network.system(ABLE, &Arc::default());
         let algorithm = Algorithm { control, relative_tolerance: 1e-2, ..Algorithm::new(0.01) };
         let file: File = toml::from_str(FAULT).unwrap();
-        let setup = Setup { folder: Path::new("."), start: 0.0, step: 0.01 };
+        let setup = Setup { folder: Path::new("."), start: 0.0, step: 0.01, tables: &[] };
         let scenario = file.scenario.resolve(&system, &setup).unwrap().scenario;
         let mut simulation =
             Simulation::with_scenario(system, &algorithm, &until(1.0), scenario).unwrap();

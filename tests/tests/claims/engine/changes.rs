@@ -24,7 +24,7 @@ bias = { value = 0.01, from = 0.11 }
 
 fn resolve(text: &str, system: &System, step: f64) -> master::Scenario {
     let file: File = toml::from_str(text).unwrap();
-    let setup = Setup { folder: Path::new("."), start: 0.0, step };
+    let setup = Setup { folder: Path::new("."), start: 0.0, step, tables: &[] };
     file.scenario.resolve(system, &setup).unwrap().scenario
 }
 

@@ -1,0 +1,65 @@
+"""Arrays of FMI 3.0, whose elements are variables with indices in their names."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ._errors import ConfigurationError
+
+__all__ = ["Array", "arrays", "spread"]
+
+# The indices at the end of the name of an element: [2] or [1,2].
+_INDICES = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
+
+
+@dataclass(frozen=True)
+class Array:
+    """An array: the names of its elements in row-major order, and its extents."""
+
+    elements: tuple[str, ...]
+    shape: tuple[int, ...]
+
+
+def arrays(names: Iterable[str]) -> dict[str, Array]:
+    """Return the complete arrays among the elements with these names, by name."""
+    found: dict[str, dict[tuple[int, ...], str]] = {}
+    known = list(names)
+    for name in known:
+        if match := _INDICES.fullmatch(name):
+            indices = tuple(map(int, match[2].split(",")))
+            found.setdefault(match[1], {})[indices] = name
+    complete = {}
+    for name, elements in found.items():
+        if len({len(indices) for indices in elements}) > 1 or name in known:
+            continue
+        axes = [sorted(set(axis)) for axis in zip(*elements)]
+        shape = tuple(len(axis) for axis in axes)
+        if math.prod(shape) == len(elements):
+            ordered = tuple(elements[place] for place in itertools.product(*axes))
+            complete[name] = Array(ordered, shape)
+    return complete
+
+
+def spread(values: Mapping[str, Any], known: Mapping[str, Array]) -> Iterator[tuple[str, Any]]:
+    """Return names and values, those of an array with one value for each element.
+
+    Raises:
+        ConfigurationError: an array has another shape.
+    """
+    for name, value in values.items():
+        array = known.get(name)
+        if array is None:
+            yield name, value
+            continue
+        import numpy
+
+        found = numpy.asarray(value)
+        if found.shape not in (array.shape, ()):
+            sentence = f"{name} has the shape {array.shape}, found an array of the shape {found.shape}"
+            raise ConfigurationError(sentence, "Shape", {"name": name})
+        yield from zip(array.elements, numpy.broadcast_to(found, array.shape).ravel().tolist())
