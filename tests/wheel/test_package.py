@@ -79,3 +79,10 @@ def test_the_licences_of_the_package_and_of_the_crates_in_it_are_there():
     assert "Apache License" in information.read_text("licenses/LICENSE-APACHE")
     others = (PACKAGE / "THIRD-PARTY.txt").read_text(encoding="utf-8")
     assert {"clarabel", "clap", "pyo3", "parquet"} <= {line.partition(" ")[0] for line in others.splitlines()}
+
+
+def test_the_metadata_name_the_authors_and_the_python_that_runs():
+    about = importlib.metadata.metadata("aso-ftc")
+    version = ".".join(map(str, sys.version_info[:2]))
+    assert about["Author"] and f"Programming Language :: Python :: {version}" in about.get_all("Classifier")
+    assert about["License-Expression"] == "MIT OR Apache-2.0" and "pip install aso-ftc" not in about.get_payload()
