@@ -55,8 +55,9 @@ def with_names(entries: Mapping[str, Any]) -> dict[str, Any]:
     for entry, matrix, axis, letter in _NAMES:
         rows = named.get(matrix)
         # Of a matrix that is none the design says what is wrong.
-        is_matrix = isinstance(rows, list) and rows and all(isinstance(row, list) for row in rows)
-        if entry not in named and is_matrix:
+        if entry in named or not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
+            continue
+        if rows:
             count = len(rows) if axis == 0 else len(rows[0])
             named[entry] = [{"name": f"{letter}{k + 1}"} for k in range(count)]
     return named

@@ -33,7 +33,7 @@ fn prepared(text: &str, system: &System) -> master::Scenario {
         return master::Scenario::default();
     }
     let file: File = toml::from_str(text).unwrap();
-    let setup = Setup { folder: Path::new("."), start: 0.0, step: 0.01 };
+    let setup = Setup { folder: Path::new("."), start: 0.0, step: 0.01, tables: &[] };
     file.scenario.resolve(system, &setup).unwrap().scenario
 }
 

@@ -26,7 +26,7 @@ fn network() -> Network {
 fn simulate(text: &str, algorithm: &Algorithm) -> Simulation {
     let system: System = network().system(ABLE, &Arc::default());
     let file: File = toml::from_str(text).unwrap();
-    let setup = Setup { folder: Path::new("."), start: 0.0, step: algorithm.step };
+    let setup = Setup { folder: Path::new("."), start: 0.0, step: algorithm.step, tables: &[] };
     let prepared = file.scenario.resolve(&system, &setup).unwrap().scenario;
     Simulation::with_scenario(system, algorithm, &until(2.0), prepared).unwrap()
 }
