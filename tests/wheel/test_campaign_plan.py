@@ -41,7 +41,7 @@ def test_a_grid_has_every_combination_once():
 
 
 def test_whole_levels_between_whole_ends_stay_whole():
-    own = {"from": 1, "to": 7, "steps": 4, "set": "algorithm.jobs"}
+    own = {"from": 1, "to": 7, "steps": 4, "set": "plant.F_c"}
     for change, expected in (({}, [1, 3, 5, 7]), ({"to": 7.0}, [1.0, 3.0, 5.0, 7.0]), ({"steps": 5}, [1.0, 2.5, 4.0, 5.5, 7.0])):
         levels = columns(paper(parameters={"n": own | change}))["n"]
         assert levels == expected and {type(level) for level in levels[1:-1]} == {type(expected[1])}
@@ -211,12 +211,20 @@ def test_a_measure_has_the_value_of_its_definition(text, expected, tolerance):
         ({"stop": {"limit": "peak", "width": 0.1}}, "limit"),
         ({"keep": {"runs": [17]}}, "0 to 0"),
         ({"seed": -1}, "seed"),
-        ({"sistem": "paper"}, "sistem"),
+        ({"sistem": "paper"}, "similar: system"),
+        ({"parameters": {"plant.f_c": [1.0]}}, "similar: plant.F_c"),
+        ({"parameters": {"plant.theta": [1.0]}}, "cannot be set"),
+        ({"parameters": {"plant.F_c": {"relative": 0.1}}, "design": {"method": "random", "runs": 10**9}}, "design.runs"),
+        ({"parameters": {"plant.F_c": {"relative": 0.1}}, "design": {"method": "random", "runs": 5.5}}, "5.5"),
+        ({"parameters": {name: {"relative": 0.1, "steps": 1000} for name in ("plant.F_c", "plant.F_s", "plant.M")}}, "1000000000 runs"),
+        ({"parameters": {"plant.F_c": stats.norm(1.0, -1.0)}}, "out of range"),
+        ({"measures": {"m": "max(plant.xp)"}}, "similar: plant.x_p"),
+        ({"measures": {"m": "maxi(plant.x_p)"}}, "similar: max"),
     ],
 )
 def test_what_is_wrong_is_named_before_the_first_run(entries, words):
     with pytest.raises(af.ConfigurationError) as caught:
-        paper(**entries).check()
+        paper(**entries)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -231,3 +239,36 @@ def test_an_error_in_a_campaign_file_has_its_line(tmp_path):
         Campaign.from_toml(file)
     assert str(caught.value).startswith(f"{file}:7: parameters.plant.F_q")
     assert caught.value.line == 7
+
+
+def test_numbers_of_numpy_and_distributions_of_scipy_are_entries():
+    grid = paper(parameters={"plant.F_c": np.linspace(20.0, 30.0, 5), "controller.compensate": np.array([True])})
+    assert columns(grid) == {"plant.F_c": [20.0, 22.5, 25.0, 27.5, 30.0], "controller.compensate": [True] * 5}
+    frozen = {"plant.F_c": stats.norm(25.0, scale=2.0), "plant.F_s": {"distribution": stats.uniform(28.0, 4.0)}}
+    named = {
+        "plant.F_c": {"distribution": "norm", "loc": 25.0, "scale": 2.0},
+        "plant.F_s": {"distribution": "uniform", "loc": 28.0, "scale": 4.0},
+    }
+    design = {"method": "latin-hypercube", "runs": np.int64(8)}
+    one, other = (paper(parameters=own, design=design, seed=np.uint8(3)) for own in (frozen, named))
+    assert columns(one) == columns(other) and one.describe() == other.describe()
+    whole = paper(
+        parameters={"n": {"distribution": stats.randint(1, 5), "set": "algorithm.jobs"}},
+        design={"method": "random", "runs": 50},
+    )
+    assert set(columns(whole)["n"]) == {1, 2, 3, 4}
+
+
+def test_tables_have_names_of_python_or_of_the_file():
+    own = [
+        Campaign("paper", experiment={name: 0.1}, measures=MEASURES).system.experiment["stop-time"]
+        for name in ("stop_time", "stop-time")
+    ]
+    assert own == [0.1, 0.1]
+
+
+@pytest.mark.parametrize("workers", [0, -1, 1.5, True, "2"])
+def test_a_wrong_number_of_workers_is_refused_before_anything_is_written(workers, tmp_path):
+    with pytest.raises(af.ConfigurationError, match="workers: .*expected a whole number of at least 1"):
+        paper().run(tmp_path / "out", workers=workers)
+    assert not list(tmp_path.iterdir())

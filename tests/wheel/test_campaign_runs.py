@@ -470,3 +470,25 @@ def test_the_claims_of_the_paper_have_the_values_of_the_command(campaign, tmp_pa
     shown |= {"pendulum residual": 1.75e-3, "rms of f_fric - f_hat": 0.28}
     for name, value in shown.items():
         assert row[name] == pytest.approx(value, rel=2e-2), name
+
+
+def test_functions_are_measures_and_a_changed_one_is_another_campaign(tmp_path):
+    scale = 1e3
+
+    def peak(results, values):
+        return scale * np.max(np.abs(results["plant.x_p"])) + 0.0 * values["plant.F_c"]
+
+    def campaign(function):
+        return af.campaign.Campaign(
+            af.paper(),
+            experiment={"stop_time": 0.1},
+            parameters={"plant.F_c": np.linspace(20.0, 30.0, 3)},
+            measures={"peak": function, "last": {"python": lambda results, values: results["plant.x_p"][-1]}},
+        )
+
+    table = campaign(peak).run(tmp_path / "out", workers=np.int64(1), progress=False).table
+    for row, friction in zip(table.itertuples(), np.linspace(20.0, 30.0, 3), strict=True):
+        results = af.paper().run(stop_time=0.1, start_values={"plant.F_c": friction}, record_every="step")
+        assert (row.peak, row.last) == (1e3 * np.abs(results["plant.x_p"]).max(), results["plant.x_p"][-1])
+    with pytest.raises(af.ConfigurationError, match="another campaign .*measures"):
+        campaign(lambda results, values: 1.0).run(tmp_path / "out", workers=1, progress=False)

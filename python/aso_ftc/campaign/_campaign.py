@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import _core
 from .._errors import ConfigurationError, Error
+from .._html import page
 from .._paper import paper
-from .._system import System, fault, hash_of_file
+from .._system import PathLike, System, fault, hash_of_file
+from .._words import similar
 from ._changes import arguments, changes
-from ._entries import TABLES, fail, finite, only, positive, table
+from ._entries import TABLES, fail, finite, only, plain, positive, table, whole
 from ._faults import NO_FAULT, FaultCase, cases, disturbances
 from ._measures import PAPER_CLAIMS, Expression
 from ._parameters import Parameter, Sampled, columns_of_table, sample, text
@@ -27,9 +30,10 @@ if TYPE_CHECKING:
     from ._analysis import Outcome
     from ._search import RareEvent, WorstCase
 
-__all__ = ["Campaign", "Plan"]
+__all__ = ["Campaign", "Function", "Plan"]
 
-PathLike = Union[str, "os.PathLike[str]"]
+# A function of the user: file and name, or the function itself.
+Function = tuple[str, str] | Callable[..., Any]
 
 _ENTRIES = {
     "name", "system", "seed", "design", "parameters", "disturbances", "faults", "measures", "claims",
@@ -66,13 +70,14 @@ class Campaign:
     Args:
         system: a :class:`System`, the path of a ``system.toml`` or of a system structure, or ``"paper"``
             for the loop of :func:`aso_ftc.paper`.
-        parameters: what varies, by name: a list of values, or a table with ``values``; ``from`` and
+        parameters: what varies, by name: a list of values, a distribution of scipy.stats, or a table with ``values``; ``from`` and
             ``to`` (with ``steps``, ``logarithmic``); ``relative``; or ``distribution`` with the entries of
             that distribution in scipy.stats. ``set`` names what it sets if that is not its own name.
         design: ``method`` (``"grid"``, ``"table"``, ``"random"``, ``"latin-hypercube"``, ``"sobol"``,
             ``"halton"``, ``"saltelli"``, ``"morris"``, ``"fast"``) and its entries; default: a grid.
-        measures: expressions by name, or tables with ``expression`` or ``python`` (``"file.py:function"``)
-            and ``unfinished``, the value for a run that does not finish (NaN).
+        measures: by name an expression, a function ``function(results, values)`` that returns a number, or
+            a table with ``expression`` or ``python`` (the function, or ``"file.py:function"``) and
+            ``unfinished``, the value for a run that does not finish (NaN).
         limits: by measure: ``{"below": number}`` or ``{"above": number}``.
         disturbances: faults that all runs have, by name; parameters can set their entries.
         faults: faults of which each run has one; lists in an entry mean every combination.
@@ -110,6 +115,9 @@ class Campaign:
             "disturbances": disturbances, "faults": faults, "keep": keep, "stop": stop,
         }  # fmt: skip
         own |= {name: value for name, value in stated.items() if value is not None}
+        for name in TABLES:
+            if isinstance(own.get(name), Mapping):
+                own[name] = {str(entry).replace("_", "-"): value for entry, value in own[name].items()}
         self._read(own, Path(folder) if folder is not None else Path.cwd())
 
     @classmethod
@@ -132,13 +140,12 @@ class Campaign:
         return own
 
     def _read(self, entries: dict[str, Any], folder: Path) -> None:
+        entries = plain(entries)
         only("", entries, sorted(_ENTRIES))
         self.name = str(entries.get("name", "campaign"))
         if not _NAME.fullmatch(self.name):
             raise fail("name", f"{self.name!r}: expected letters, digits, spaces, dots, - and _")
-        self.seed = entries.get("seed", 0)
-        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
-            raise fail("seed", f"{self.seed!r}: expected a whole number of at least 0")
+        self.seed = whole("seed", entries.get("seed", 0), 0)
         self.system = _system(entries, folder)
         self.isolate = bool(entries.get("isolate", False))
         limit = entries.get("time-limit")
@@ -159,10 +166,8 @@ class Campaign:
         self.stop = self._stop(entries.get("stop"))
         # Independent of the number of workers, so that the parts are.
         share = min(50, max(10, len(self.plan) // 64))
-        per_task = entries.get("runs-per-task", share)
-        if isinstance(per_task, bool) or not isinstance(per_task, int) or not 1 <= per_task <= 10_000:
-            raise fail("runs-per-task", f"{per_task!r}: expected a whole number from 1 to 10000")
-        self.runs_per_task = per_task
+        self.runs_per_task = whole("runs-per-task", entries.get("runs-per-task", share), 1, 10_000)
+        self.check()
 
     # The parts of a campaign.toml, in the order in which they are read.
 
@@ -218,10 +223,7 @@ class Campaign:
         first, _, entry = place.partition(".")
         if (first in self.disturbances and entry) or first in TABLES or place in self._variables:
             return
-        near = [
-            name for name in self._variables if name.lower() == place.lower() or name.endswith(f".{place}")
-        ]
-        hint = f", did you mean {near[0]}" if near else ""
+        hint = similar(place, self._variables)
         raise fail(where, f"{place} is neither a variable of the system nor an entry of a disturbance{hint}")
 
     def _measures(self, entries: Mapping[str, Any], folder: Path) -> None:
@@ -233,13 +235,15 @@ class Campaign:
                 "measures", 'a campaign needs at least one measure, such as peak = "max(abs(plant.x))"'
             )
         self.expressions: dict[str, Expression] = {}
-        self.functions: dict[str, tuple[str, str]] = {}
+        self.functions: dict[str, Function] = {}
         self.unfinished: dict[str, float] = {}
         columns = {"run", "status", "reason", "seconds", "fault", *(own.name for own in self.parameters)}
         for name, entry in own.items():
             if name in columns or name.startswith(("fault.", "unit:")):
                 raise fail(f"measures.{name}", "a column of the results has this name, choose another one")
-            stated = {"expression": entry} if isinstance(entry, str) else table(f"measures.{name}", entry)
+            short = {"expression": entry} if isinstance(entry, str) else {"python": entry}
+            is_short = isinstance(entry, str) or callable(entry)
+            stated = short if is_short else table(f"measures.{name}", entry)
             if "unfinished" in stated:
                 self.unfinished[name] = finite(f"measures.{name}.unfinished", stated.pop("unfinished"))
             if set(stated) == {"expression"}:
@@ -247,11 +251,14 @@ class Campaign:
             elif set(stated) == {"python"}:
                 self.functions[name] = _function(f"measures.{name}", stated["python"], folder)
             else:
-                raise fail(f"measures.{name}", 'expected an expression, or { python = "file.py:function" }')
+                raise fail(
+                    f"measures.{name}", 'expected an expression, a function, or { python = "file.py:function" }'
+                )
         self.limits = table("limits", entries.get("limits", {}))
         for name, limit in self.limits.items():
             if name not in own:
-                raise fail(f"limits.{name}", f"no measure has this name, there are {', '.join(own)}")
+                hint = similar(name, own)
+                raise fail(f"limits.{name}", f"no measure has this name, there are {', '.join(own)}{hint}")
             limit = table(f"limits.{name}", limit)
             if len(limit) != 1 or not set(limit) <= {"below", "above"}:
                 raise fail(f"limits.{name}", "expected { below = number } or { above = number }")
@@ -297,6 +304,10 @@ class Campaign:
         """The signals that the expressions read."""
         return sorted(set().union(*(own.signals for own in self.expressions.values())))
 
+    def sources(self) -> list[str]:
+        """Return the paths of the files with functions of the user."""
+        return [own[0] for own in self.functions.values() if isinstance(own, tuple)]
+
     def changes(self, run: int) -> dict[str, Any]:
         """Return the arguments of :meth:`System.run` with the values and the fault of a run."""
         values, case = self.plan.row(run)
@@ -313,7 +324,7 @@ class Campaign:
         """Return everything that the results depend on, for the manifest of the folder."""
         return {
             "system": self.system.to_dict(),
-            "files": {**self.system.files(), **{path: hash_of_file(path) for path, _ in self.functions.values()}},
+            "files": {**self.system.files(), **{path: hash_of_file(path) for path in self.sources()}},
             "seed": self.seed,
             "design": self.plan.design,
             "runs": len(self.plan),
@@ -345,7 +356,7 @@ class Campaign:
     def _described(self) -> dict[str, dict[str, Any]]:
         found: dict[str, dict[str, Any]] = {
             **{name: {"expression": own.text} for name, own in self.expressions.items()},
-            **{name: {"python": f"{path}:{own}"} for name, (path, own) in self.functions.items()},
+            **{name: _describe_function(own) for name, own in self.functions.items()},
         }
         for name, value in self.unfinished.items():
             found[name]["unfinished"] = value
@@ -361,7 +372,8 @@ class Campaign:
         for name in recorded:
             if name not in self._variables:
                 reader = next(key for key, own in self.expressions.items() if name in own.signals)
-                raise fail(f"measures.{reader}", f"the system has no variable {name}")
+                hint = similar(name, self._variables)
+                raise fail(f"measures.{reader}", f"the system has no variable {name}{hint}")
         for run in sorted({0, len(self.plan) - 1}):
             try:
                 self.system.check(**arguments(self.changes(run)), record=recorded or None)
@@ -373,7 +385,8 @@ class Campaign:
         for key, expression in self.expressions.items():
             for name in expression.parameters:
                 if name not in known:
-                    raise fail(f"measures.{key}", f"the campaign has no parameter {name}")
+                    hint = similar(name, known)
+                    raise fail(f"measures.{key}", f"the campaign has no parameter {name}{hint}")
             expression.value(zeros, np.array([0.0, 1.0]), known)
 
     def run(
@@ -403,8 +416,9 @@ class Campaign:
         """
         from ._engine import execute
 
+        count = None if workers is None else whole("workers", plain(workers), 1)
         return execute(
-            self, Path(folder), workers=workers, scheduler=scheduler, progress=progress, live=live
+            self, Path(folder), workers=count, scheduler=scheduler, progress=progress, live=live
         )
 
     def worst_case(
@@ -460,6 +474,14 @@ class Campaign:
     def __repr__(self) -> str:
         return f"Campaign({self.name!r}, {len(self)} runs of {self.system!r})"
 
+    def _repr_html_(self) -> str:
+        rows = []
+        for own in self.parameters:
+            values = self.plan.sampled.values[own.name]
+            ends = [f"{min(values):.6g}", f"{max(values):.6g}"] if own.numeric else ["", ""]
+            rows.append([own.name, own.unit or "", *ends, ", ".join(own.places)])
+        return page(repr(self), ("parameter", "unit", "min", "max", "sets"), rows)
+
 
 def _system(entries: dict[str, Any], folder: Path) -> System:
     if "system" not in entries:
@@ -484,7 +506,10 @@ def _system(entries: dict[str, Any], folder: Path) -> System:
     return system
 
 
-def _function(place: str, text: Any, folder: Path) -> tuple[str, str]:
+def _function(place: str, text: Any, folder: Path) -> Function:
+    if callable(text):
+        function: Function = text
+        return function
     path, _, name = str(text).rpartition(":")
     if not path or not name.isidentifier():
         raise fail(place, f'{text!r}: expected "file.py:function"')
@@ -492,6 +517,19 @@ def _function(place: str, text: Any, folder: Path) -> tuple[str, str]:
     if not file.is_file():
         raise fail(place, f"there is no file {file}")
     return str(file), name
+
+
+def _describe_function(function: Function) -> dict[str, str]:
+    """Return a function of the user for the manifest; one without a file with a hash of its code."""
+    if isinstance(function, tuple):
+        return {"python": ":".join(function)}
+    try:
+        text = inspect.getsource(function)
+    except (OSError, TypeError):
+        code = getattr(function, "__code__", None)
+        text = repr((code.co_code, code.co_consts)) if code is not None else repr(function)
+    name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', repr(function))}"
+    return {"python": name, "code": hashlib.sha256(text.encode()).hexdigest()}
 
 
 def _digest_of_plan(plan: Plan) -> str:

@@ -171,8 +171,6 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
                 client.close(timeout=5)
         return
     count = os.cpu_count() or 1 if workers is None else workers
-    if count < 1:
-        raise ConfigurationError(f"workers = {count}: expected at least 1")
     with tempfile.TemporaryDirectory(prefix="aso-ftc-") as place:
         cluster = distributed.LocalCluster(
             n_workers=count,
@@ -380,7 +378,7 @@ class _Work:
             raise Error(
                 f"the scheduler has no workers within {_PATIENCE:g} s: start some", "Scheduler"
             ) from None
-        plugin = _plugin(name, pickle.dumps(Job.of(self.campaign)))
+        plugin = _plugin(name, package("cloudpickle").dumps(Job.of(self.campaign)))
         client.register_plugin(plugin, name=name)
         for worker, wrong in client.run(_state, name).items():
             if wrong:

@@ -7,15 +7,27 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from .._errors import ConfigurationError
+from .._words import similar
 
-__all__ = ["TABLES", "fail", "finite", "only", "positive", "table"]
+__all__ = ["MOST_RUNS", "TABLES", "fail", "finite", "only", "plain", "positive", "table", "whole"]
 
 # Tables of a system.toml whose entries a parameter can set.
 TABLES = ("algorithm", "experiment")
+# Most runs of a campaign: the values of all of them are in memory.
+MOST_RUNS = 20_000_000
 
 
 def fail(place: str, text: str) -> ConfigurationError:
     return ConfigurationError(f"{place}: {text}", "Campaign", {"name": place})
+
+
+def plain(value: Any) -> Any:
+    """Return an entry with the numbers, lists and dicts of Python instead of those of NumPy and others."""
+    if isinstance(value, Mapping):
+        return {name: plain(own) for name, own in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(own) for own in value]
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def table(place: str, value: Any) -> dict[str, Any]:
@@ -25,9 +37,18 @@ def table(place: str, value: Any) -> dict[str, Any]:
 
 
 def only(place: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
+    names = list(known)
     for entry in table:
-        if entry not in known:
-            raise fail(f"{place}.{entry}" if place else entry, f"unknown entry, expected {', '.join(known)}")
+        if entry not in names:
+            hint = similar(entry, names) or f", expected {', '.join(names)}"
+            raise fail(f"{place}.{entry}" if place else entry, f"unknown entry{hint}")
+
+
+def whole(place: str, value: Any, least: int, most: int | None = None) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < least or (most and value > most):
+        limits = f"of at least {least}" if most is None else f"from {least} to {most}"
+        raise fail(place, f"{value!r}: expected a whole number {limits}")
+    return value
 
 
 def finite(place: str, value: Any) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._errors import ConfigurationError
+from .._words import similar
 
 __all__ = ["Expression", "PAPER_CLAIMS"]
 
@@ -290,8 +291,9 @@ class Expression:
             self.parameters.add(own)
             return lambda run: run.parameters[own]
         if name not in _REDUCTIONS and name not in _FUNCTIONS:
-            known = ", ".join([*_REDUCTIONS, *_FUNCTIONS])
-            raise self._wrong(f"unknown function {name}: expected one of {known}")
+            known = [*_REDUCTIONS, *_FUNCTIONS]
+            hint = similar(name, known) or f": expected one of {', '.join(known)}"
+            raise self._wrong(f"unknown function {name}{hint}")
         arguments = [self._compile(argument) for argument in node.args]
         if name in _FUNCTIONS:
             if node.keywords:

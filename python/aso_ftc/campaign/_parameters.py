@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -12,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import ConfigurationError
+from .._words import similar
+from ._entries import MOST_RUNS, fail, whole
 from ._packages import package
 
 __all__ = ["METHODS", "Parameter", "Place", "Sampled", "columns_of_table", "sample", "text"]
@@ -39,13 +41,9 @@ _OPTIONAL: dict[str, dict[str, Any]] = {
 }
 
 
-def _fail(place: str, text: str) -> ConfigurationError:
-    return ConfigurationError(f"{place}: {text}", "Campaign", {"name": place})
-
-
 def _number(place: str, entry: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
-        raise _fail(place, f"{entry} = {value!r}: expected a finite number")
+        raise fail(place, f"{entry} = {value!r}: expected a finite number")
     return float(value)
 
 
@@ -94,17 +92,19 @@ class Parameter:
         place = f"parameters.{name}"
         if isinstance(entry, (list, tuple)):
             entry = {"values": list(entry)}
+        elif _is_distribution(entry):
+            entry = {"distribution": entry}
         if not isinstance(entry, Mapping):
-            raise _fail(place, f"expected a table such as {{ from = 1.0, to = 2.0 }}, found {entry!r}")
+            raise fail(place, f"expected a table such as {{ from = 1.0, to = 2.0 }}, found {entry!r}")
         own = dict(entry)
         places = own.pop("set", [name])
         places = [places] if isinstance(places, str) else places
         if not places or not all(isinstance(text, str) for text in places):
-            raise _fail(place, f"set = {places!r}: expected names of variables")
+            raise fail(place, f"set = {places!r}: expected names of variables")
         unit = own.pop("unit", None)
         kinds = [kind for kind in ("values", "from", "relative", "distribution") if kind in own]
         if len(kinds) != 1:
-            raise _fail(place, "expected one of values, from and to, relative, distribution")
+            raise fail(place, "expected one of values, from and to, relative, distribution")
         value, found = (None, unit) if unit is not None and kinds[0] != "relative" else nominal(places[0])
         unit = found if unit is None else unit
         make = {"values": _listed, "from": _range, "relative": _relative, "distribution": _distribution}
@@ -127,16 +127,21 @@ def _kind(values: Iterable[Any]) -> str:
 def _unknown(place: str, own: Mapping[str, Any], known: Sequence[str]) -> None:
     for entry in own:
         if entry not in known:
-            raise _fail(place, f"unknown entry {entry}: expected {', '.join(known)}")
+            hint = similar(entry, known) or f": expected {', '.join(known)}"
+            raise fail(place, f"unknown entry {entry}{hint}")
+
+
+def _is_distribution(value: Any) -> bool:
+    return hasattr(value, "ppf") or hasattr(value, "icdf")
 
 
 def _listed(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
     _unknown(place, own, ["values", "set", "unit"])
     values = own["values"]
     if not isinstance(values, (list, tuple)) or not values:
-        raise _fail(place, f"values = {values!r}: expected a list of at least one value")
+        raise fail(place, f"values = {values!r}: expected a list of at least one value")
     if not all(isinstance(value, (bool, int, float, str)) for value in values):
-        raise _fail(place, "values: expected numbers, true, false or texts")
+        raise fail(place, "values: expected numbers, true, false or texts")
     levels = tuple(values)
     return levels, lambda unit: [levels[int(i)] for i in np.minimum(unit * len(levels), len(levels) - 1)]
 
@@ -144,11 +149,11 @@ def _listed(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
 def _between(place: str, own: Mapping[str, Any], low: float, high: float) -> tuple[Any, Any]:
     logarithmic = own.get("logarithmic", False)
     if not isinstance(logarithmic, bool):
-        raise _fail(place, f"logarithmic = {logarithmic!r}: expected true or false")
+        raise fail(place, f"logarithmic = {logarithmic!r}: expected true or false")
     if not low < high:
-        raise _fail(place, f"from = {low}, to = {high}: expected from below to")
+        raise fail(place, f"from = {low}, to = {high}: expected from below to")
     if logarithmic and low <= 0:
-        raise _fail(place, f"from = {low}: a logarithmic range starts above 0")
+        raise fail(place, f"from = {low}: a logarithmic range starts above 0")
 
     def quantile(unit: Numbers) -> Any:
         if logarithmic:
@@ -157,9 +162,7 @@ def _between(place: str, own: Mapping[str, Any], low: float, high: float) -> tup
 
     levels = None
     if "steps" in own:
-        steps = own["steps"]
-        if isinstance(steps, bool) or not isinstance(steps, int) or steps < 2:
-            raise _fail(place, f"steps = {steps!r}: expected a whole number of at least 2")
+        steps = whole(f"{place}.steps", own["steps"], 2, MOST_RUNS)
         inner = quantile(np.linspace(0.0, 1.0, steps))[1:-1]
         levels = (low, *(float(value) for value in inner), high)
     return levels, quantile
@@ -168,7 +171,7 @@ def _between(place: str, own: Mapping[str, Any], low: float, high: float) -> tup
 def _range(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
     _unknown(place, own, [*_RANGES, "set", "unit"])
     if "to" not in own:
-        raise _fail(place, "from without to")
+        raise fail(place, "from without to")
     levels, quantile = _between(place, own, _number(place, "from", own["from"]), _number(place, "to", own["to"]))
     ends = (own["from"], own["to"])
     if levels is not None and all(isinstance(end, int) for end in ends) and "logarithmic" not in own:
@@ -182,9 +185,9 @@ def _relative(place: str, own: dict[str, Any], value: Any) -> tuple[Any, Any]:
     _unknown(place, own, ["relative", "steps", "set", "unit"])
     part = _number(place, "relative", own["relative"])
     if part <= 0:
-        raise _fail(place, f"relative = {part}: expected a number above 0")
+        raise fail(place, f"relative = {part}: expected a number above 0")
     if isinstance(value, (bool, str)) or value is None or value == 0:
-        raise _fail(place, f"relative needs a start value other than 0, found {value!r}")
+        raise fail(place, f"relative needs a start value other than 0, found {value!r}")
     ends = sorted((value * (1 - part), value * (1 + part)))
     return _between(place, own, *ends)
 
@@ -192,21 +195,30 @@ def _relative(place: str, own: dict[str, Any], value: Any) -> tuple[Any, Any]:
 def _distribution(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
     stats = package("scipy.stats")
     name = own["distribution"]
+    if _is_distribution(name):
+        _unknown(place, own, ["distribution", "set", "unit"])
+        # A frozen distribution, or one of the classes of scipy.stats.
+        quantile = name.ppf if hasattr(name, "ppf") else name.icdf
+        if not np.isfinite(quantile(np.array([0.25, 0.5, 0.75]))).all():
+            raise fail(place, "the distribution has no quantiles: its arguments are out of range")
+        if isinstance(getattr(name, "dist", None), stats.rv_discrete):
+            return None, lambda unit: [int(value) for value in quantile(unit)]
+        return None, quantile
     family: Any = getattr(stats, name, None) if isinstance(name, str) else None
     discrete = isinstance(family, stats.rv_discrete)
     if not isinstance(family, stats.rv_continuous) and not discrete:
-        raise _fail(
-            place, f"distribution = {name!r}: expected a name of scipy.stats, such as norm or uniform"
-        )
+        kinds = (stats.rv_continuous, stats.rv_discrete)
+        hint = similar(name, [own for own in dir(stats) if isinstance(getattr(stats, own), kinds)])
+        raise fail(place, f"distribution = {name!r}: expected a name of scipy.stats, such as norm{hint}")
     shapes = [] if family.shapes is None else [text.strip() for text in family.shapes.split(",")]
     allowed = [*shapes, "loc"] if discrete else [*shapes, "loc", "scale"]
     _unknown(place, own, ["distribution", *allowed, "set", "unit"])
     missing = [shape for shape in shapes if shape not in own]
     if missing:
-        raise _fail(place, f"distribution {name} needs {', '.join(missing)}")
+        raise fail(place, f"distribution {name} needs {', '.join(missing)}")
     frozen = family(**{key: _number(place, key, own[key]) for key in allowed if key in own})
     if not np.isfinite(frozen.ppf([0.25, 0.5, 0.75])).all():
-        raise _fail(place, f"distribution {name} has no quantiles for these entries: they are out of range")
+        raise fail(place, f"distribution {name} has no quantiles for these entries: they are out of range")
     if discrete:
         return None, lambda unit: [int(value) for value in frozen.ppf(unit)]
     return None, frozen.ppf
@@ -230,15 +242,15 @@ class Sampled:
 def _options(design: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     method = design.get("method")
     if method not in METHODS:
-        raise _fail("design", f"method = {method!r}: expected one of {', '.join(METHODS)}")
+        hint = similar(method, METHODS)
+        raise fail("design", f"method = {method!r}: expected one of {', '.join(METHODS)}{hint}")
     own = {**_OPTIONAL.get(method, {}), **{key: value for key, value in design.items() if key != "method"}}
     _unknown("design", own, list(METHODS[method]))
     for entry, least in METHODS[method].items():
         if entry not in own:
-            raise _fail("design", f"method {method} needs {entry}")
-        value = own[entry]
-        if least is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
-            raise _fail("design", f"{entry} = {value!r}: expected a whole number of at least {least}")
+            raise fail("design", f"method {method} needs {entry}")
+        if least is not None:
+            whole(f"design.{entry}", own[entry], least, MOST_RUNS)
     return method, own
 
 
@@ -257,7 +269,7 @@ def sample(
         return {**complete, "file": str(own["file"])}, Sampled(values, None, len(next(iter(values.values()))))
     if not parameters:
         if method != "grid":
-            raise _fail("parameters", f"a design {method} needs at least one parameter")
+            raise fail("parameters", f"a design {method} needs at least one parameter")
         return complete, Sampled({}, None, 1)
     if method == "grid":
         return complete, _grid(parameters)
@@ -266,7 +278,7 @@ def sample(
     for column, parameter in enumerate(parameters):
         found = parameter.quantile(unit[:, column])
         if parameter.numeric and not np.isfinite(np.asarray(found, dtype=float)).all():
-            raise _fail(
+            raise fail(
                 f"parameters.{parameter.name}",
                 f"the design {method} reaches the ends of a distribution that has none: "
                 "use a bounded one, such as truncnorm, or from and to",
@@ -278,8 +290,11 @@ def sample(
 def _grid(parameters: Sequence[Parameter]) -> Sampled:
     for parameter in parameters:
         if parameter.levels is None:
-            raise _fail(f"parameters.{parameter.name}", "a grid needs values, or from and to with steps")
+            raise fail(f"parameters.{parameter.name}", "a grid needs values, or from and to with steps")
     levels = [parameter.levels or () for parameter in parameters]
+    count = math.prod(map(len, levels))
+    if count > MOST_RUNS:
+        raise fail("design", f"the grid has {count} runs, expected at most {MOST_RUNS}")
     places = np.unravel_index(np.arange(np.prod([len(own) for own in levels])), [len(own) for own in levels])
     values = {
         parameter.name: [own[i] for i in column]
@@ -291,21 +306,21 @@ def _grid(parameters: Sequence[Parameter]) -> Sampled:
 def columns_of_table(file: Any, folder: Path) -> dict[str, list[Any]]:
     """Return the columns of a user's .csv or .parquet file, without a column ``run``."""
     if not isinstance(file, (str, os.PathLike)):
-        raise _fail("design.file", f"{file!r}: expected the path of a .csv or .parquet file")
+        raise fail("design.file", f"{file!r}: expected the path of a .csv or .parquet file")
     path = folder / file
     kind = "parquet" if path.suffix == ".parquet" else "csv"
     reader = package(f"pyarrow.{kind}")
     try:
         table = reader.read_table(path) if kind == "parquet" else reader.read_csv(path)
     except (OSError, ValueError) as error:
-        raise _fail("design.file", f"{path} cannot be read as a table: {error}") from None
+        raise fail("design.file", f"{path} cannot be read as a table: {error}") from None
     columns = {name: table[name].to_pylist() for name in table.column_names if name != "run"}
     if not table.num_rows or not columns:
-        raise _fail("design.file", f"{path} has no values")
+        raise fail("design.file", f"{path} has no values")
     for name, column in columns.items():
         for row, value in enumerate(column, 1):
             if value is None or (isinstance(value, float) and not np.isfinite(value)):
-                raise _fail("design.file", f"{path}, row {row}: {name} has no value")
+                raise fail("design.file", f"{path}, row {row}: {name} has no value")
     return columns
 
 
@@ -328,7 +343,7 @@ def _unit(method: str, own: Mapping[str, Any], count: int, seed: int) -> Numbers
     problem = {"num_vars": count, "names": [f"x{i}" for i in range(count)], "bounds": [[0.0, 1.0]] * count}
     if method == "saltelli":
         if own["base"] & (own["base"] - 1):
-            raise _fail("design", f"base = {own['base']}: expected a power of two")
+            raise fail("design", f"base = {own['base']}: expected a power of two")
         sampler = package("SALib.sample.sobol")
         return np.asarray(
             sampler.sample(problem, own["base"], calc_second_order=own["second-order"], seed=seed)
@@ -339,6 +354,6 @@ def _unit(method: str, own: Mapping[str, Any], count: int, seed: int) -> Numbers
         return np.asarray(unit)
     least = 4 * own["harmonics"] ** 2 + 1
     if own["base"] < least:
-        raise _fail("design", f"base = {own['base']}: {own['harmonics']} harmonics need at least {least}")
+        raise fail("design", f"base = {own['base']}: {own['harmonics']} harmonics need at least {least}")
     sampler = package("SALib.sample.fast_sampler")
     return np.asarray(sampler.sample(problem, own["base"], M=own["harmonics"], seed=seed))

@@ -17,7 +17,7 @@ import numpy as np
 from .. import _core
 from .._errors import Error, RunError, TimeLimitError
 from .._system import System
-from ._campaign import Campaign
+from ._campaign import Campaign, Function
 from ._changes import arguments, changes
 from ._faults import FaultCase
 from ._folder import parquet_bytes
@@ -50,7 +50,7 @@ class Job:
     disturbances: dict[str, Any]
     cases: tuple[FaultCase, ...]
     expressions: dict[str, str]
-    functions: dict[str, tuple[str, str]]
+    functions: dict[str, Function]
     unfinished: dict[str, float]
     limits: dict[str, Any]
     keep: dict[str, Any]
@@ -98,15 +98,15 @@ class Job:
         for path, digest in self.paths.items():
             name, content = self.files[digest]
             placed[path] = str(_place(folder / digest, name, content))
+        sources = {own[0] for own in self.functions.values() if isinstance(own, tuple)}
         system = self.system.with_files(
-            {path: place for path, place in placed.items() if path not in self._sources}
+            {path: place for path, place in placed.items() if path not in sources}
         )
-        functions = {name: (placed[path], own) for name, (path, own) in self.functions.items()}
+        functions = {
+            name: (placed[own[0]], own[1]) if isinstance(own, tuple) else own
+            for name, own in self.functions.items()
+        }
         return Runner(self, system, functions)
-
-    @property
-    def _sources(self) -> set[str]:
-        return {path for path, _ in self.functions.values()}
 
 
 def pack(path: str) -> tuple[str, bytes]:
@@ -147,11 +147,15 @@ def _place(folder: Path, name: str, content: bytes) -> Path:
 class Runner:
     """Does the runs of one campaign in this process."""
 
-    def __init__(self, job: Job, system: System, functions: Mapping[str, tuple[str, str]]) -> None:
+    def __init__(self, job: Job, system: System, functions: Mapping[str, Function]) -> None:
         self.job, self.system = job, system
         self.expressions = {name: Expression(name, text) for name, text in job.expressions.items()}
         self.functions: dict[str, Callable[..., Any]] = {}
-        for name, (path, own) in functions.items():
+        for name, function in functions.items():
+            if not isinstance(function, tuple):
+                self.functions[name] = function
+                continue
+            path, own = function
             found = runpy.run_path(path).get(own)
             if not callable(found):
                 raise Error(f"measures.{name}: {Path(path).name} has no function {own}")
@@ -184,9 +188,8 @@ class Runner:
             own = changes(job.parameters, job.disturbances, fault, values, job.seed, run)
             results = self._simulate(own, self.record, job.record_every)
             start = np.nan if fault.start is None else fault.start
-            signals = _Signals(results)
             for name, expression in self.expressions.items():
-                row.measures[name] = expression.value(signals, results.time, values, start)
+                row.measures[name] = expression.value(results, results.time, values, start)
             for name, function in self.functions.items():
                 row.measures[name] = float(function(results, {**values, "fault": fault.label}))
         except TimeLimitError as error:
@@ -227,22 +230,6 @@ class Runner:
 def holds(limit: Mapping[str, float], value: float) -> bool:
     """Whether a value is within its limit; NaN is not."""
     return value < limit["below"] if "below" in limit else value > limit["above"]
-
-
-class _Signals(Mapping[str, Any]):
-    """The recorded signals of a run by name."""
-
-    def __init__(self, results: Any) -> None:
-        self._results = results
-
-    def __getitem__(self, name: str) -> Any:
-        return self._results[name]
-
-    def __iter__(self) -> Any:
-        return iter(self._results.names)
-
-    def __len__(self) -> int:
-        return len(self._results.names)
 
 
 def _status(error: RunError) -> str:
