@@ -112,6 +112,21 @@ def test_a_picture_has_a_panel_for_each_unit(results):
     assert [axes.get_ylabel() for axes in figure.axes] == ["m", "rad"]
 
 
+def test_a_picture_is_drawn_into_axes_that_are_given(results):
+    pytest.importorskip("matplotlib").use("Agg")
+    from matplotlib import pyplot
+
+    figure, (upper, lower) = pyplot.subplots(2, 1)
+    assert results.plot(signals=["plant.x_p", "controller.x_p"], ax=lower) is figure and not upper.lines
+    for line, name in zip(lower.lines, ("plant.x_p", "controller.x_p"), strict=True):
+        assert line.get_label() == name and np.array_equal(line.get_ydata(), results[name])
+    assert lower.get_ylabel() == "m" and lower.get_xlabel() == "time in s"
+    with pytest.raises(KeyError, match="similar: plant.x_p"):
+        results.plot(signals=["plant.xp"], ax=lower)
+    with pytest.raises(TypeError, match="found ax, too"):
+        results.plot("plant.x_p", ax=lower, figsize=(3, 3))
+
+
 def test_a_report_is_a_page_of_a_file_of_any_program(results, tmp_path):
     own, other = tmp_path / "own.parquet", tmp_path / "other.csv"
     results.to_parquet(own)
