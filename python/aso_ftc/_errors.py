@@ -67,7 +67,17 @@ class ConfigurationError(Error, ValueError):
 
 
 class FmuError(Error):
-    """An FMU cannot be read, loaded or instantiated."""
+    """An FMU cannot be read, loaded or instantiated.
+
+    Attributes:
+        fmu: its name in the system, ``None`` outside of a system.
+    """
+
+    fmu: str | None = None
+
+    def __init__(self, message: str, kind: str = "Other", fields: dict[str, Any] | None = None) -> None:
+        super().__init__(message, kind, fields)
+        self.fmu = self.fields.get("within")
 
 
 class RunError(Error, RuntimeError):

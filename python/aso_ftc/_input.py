@@ -181,7 +181,10 @@ def _present(variable: Variable, times: NDArray[Any], column: Any) -> tuple[NDAr
     if variable.type == "Binary":
         sentence = f"input: {name} is a Binary, to which a function of the time gives values, not a table"
         raise ConfigurationError(sentence, "Input", {"name": name})
-    gaps = numpy.array([value is None or value != value for value in values.tolist()], dtype=bool)
+    if values.dtype.kind == "O":
+        gaps = numpy.array([value is None or value != value for value in values.tolist()], dtype=bool)
+    else:
+        gaps = values != values
     if gaps.any() and variable.type in _REALS and variable.variability == "continuous":
         row = int(numpy.argmax(gaps))
         sentence = f"input: {name} is {values[row]} in row {row}, t = {times[row]:.12g} s, expected a number"

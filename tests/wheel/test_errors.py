@@ -66,8 +66,12 @@ def test_a_missing_fmu_is_an_fmu_error(tmp_path):
             call(tmp_path / "missing.fmu")
     broken = tmp_path / "broken.fmu"
     broken.write_bytes(b"no archive")
-    with pytest.raises(af.FmuError, match="broken.fmu"):
-        af.simulate(broken)
+    with pytest.raises(af.FmuError, match="broken.fmu") as caught:
+        af.System().add("wheel", broken).run()
+    assert caught.value.fmu == "wheel"
+    with pytest.raises(af.FmuError) as caught:
+        af.read_model_description(broken)
+    assert caught.value.fmu is None
 
 
 def test_errors_survive_pickle_with_their_fields(paper):

@@ -85,4 +85,4 @@ def test_the_metadata_name_the_authors_and_the_python_that_runs():
     about = importlib.metadata.metadata("aso-ftc")
     version = ".".join(map(str, sys.version_info[:2]))
     assert about["Author"] and f"Programming Language :: Python :: {version}" in about.get_all("Classifier")
-    assert about["License-Expression"] == "MIT OR Apache-2.0" and "pip install aso-ftc" not in about.get_payload()
+    assert about["License-Expression"] == "MIT OR Apache-2.0" and "pip install aso-ftc" not in about["Description"]
