@@ -27,14 +27,14 @@ class Array:
 
 def arrays(names: Iterable[str]) -> dict[str, Array]:
     """Return the complete arrays among the elements with these names, by name."""
-    found: dict[str, dict[tuple[int, ...], str]] = {}
+    parts: dict[str, dict[tuple[int, ...], str]] = {}
     known = list(names)
     for name in known:
         if match := _INDICES.fullmatch(name):
             indices = tuple(map(int, match[2].split(",")))
-            found.setdefault(match[1], {})[indices] = name
+            parts.setdefault(match[1], {})[indices] = name
     complete = {}
-    for name, elements in found.items():
+    for name, elements in parts.items():
         if len({len(indices) for indices in elements}) > 1 or name in known:
             continue
         axes = [sorted(set(axis)) for axis in zip(*elements)]
@@ -58,8 +58,8 @@ def spread(values: Mapping[str, Any], known: Mapping[str, Array]) -> Iterator[tu
             continue
         import numpy
 
-        found = numpy.asarray(value)
-        if found.shape not in (array.shape, ()):
-            sentence = f"{name} has the shape {array.shape}, found an array of the shape {found.shape}"
+        numbers = numpy.asarray(value)
+        if numbers.shape not in (array.shape, ()):
+            sentence = f"{name} has the shape {array.shape}, found an array of the shape {numbers.shape}"
             raise ConfigurationError(sentence, "Shape", {"name": name})
-        yield from zip(array.elements, numpy.broadcast_to(found, array.shape).ravel().tolist())
+        yield from zip(array.elements, numpy.broadcast_to(numbers, array.shape).ravel().tolist())

@@ -22,24 +22,24 @@ Input = Union["ArrayLike", Mapping[str, Sequence[Any]], Callable[[float], Mappin
 _REALS = ("Real", "Float64", "Float32")
 
 
-def options(given: Input, element: str, variables: Iterable[Variable]) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+def options(data: Input, element: str, variables: Iterable[Variable]) -> tuple[list[dict[str, Any]], dict[str, Any]]:
     """Return the signals of a scenario and the options of a run for an input of an FMU.
 
     Args:
-        given: as the argument ``input`` of :func:`aso_ftc.simulate`.
+        data: as the argument ``input`` of :func:`aso_ftc.simulate`.
         element: the name of the FMU in its system.
         variables: the variables of the FMU, without the name of the FMU.
     """
     known = {variable.name: variable for variable in variables}
     shapes = arrays(known)
-    if callable(given):
-        function: Callable[[float], Mapping[str, Any]] = given
+    if callable(data):
+        function: Callable[[float], Mapping[str, Any]] = data
 
         def values(time: float) -> dict[str, Any]:
             return {f"{element}.{name}": value for name, value in spread(function(time), shapes)}
 
         return [], {"input": values}
-    columns, units = _columns(given)
+    columns, units = _columns(data)
     times = _times(columns)
     signals: list[dict[str, Any]] = []
     tables: list[tuple[str, bytes, bytes]] = []
@@ -65,7 +65,7 @@ def options(given: Input, element: str, variables: Iterable[Variable]) -> tuple[
         file = f"input-{len(tables)}"
         tables.append((file, moments.tobytes(), numbers.tobytes()))
         signals.append({**signal, "csv": {"file": file, "column": file}})
-    if ignored and (not signals or isinstance(given, dict)):
+    if ignored and (not signals or isinstance(data, dict)):
         sentence = f"input: expected inputs and tunable parameters, found {', '.join(ignored)}"
         raise ConfigurationError(sentence, "Input")
     if ignored:
@@ -74,47 +74,47 @@ def options(given: Input, element: str, variables: Iterable[Variable]) -> tuple[
     return signals, {"tables": tables}
 
 
-def _columns(given: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+def _columns(data: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the columns of a table by name, and the units that it states."""
     import numpy
 
-    if isinstance(given, Results):
-        return dict(given), given.units
-    if isinstance(given, Mapping) and not hasattr(given, "data_vars"):
-        return {str(name): numpy.asarray(column) for name, column in given.items()}, {}
-    if hasattr(given, "data_vars"):
+    if isinstance(data, Results):
+        return dict(data), data.units
+    if isinstance(data, Mapping) and not hasattr(data, "data_vars"):
+        return {str(name): numpy.asarray(column) for name, column in data.items()}, {}
+    if hasattr(data, "data_vars"):
         # Of xarray.
-        parts = {str(name): given[name] for name in [*given.coords, *given.data_vars]}
+        parts = {str(name): data[name] for name in [*data.coords, *data.data_vars]}
         units = {name: part.attrs.get("units") for name, part in parts.items()}
         return {name: numpy.asarray(part) for name, part in parts.items()}, units
-    if hasattr(given, "columns") and hasattr(given, "index"):
+    if hasattr(data, "columns") and hasattr(data, "index"):
         # Of pandas.
-        columns = {str(name): given[name].to_numpy() for name in given.columns}
-        if "time" not in columns and given.index.name == "time":
-            columns["time"] = given.index.to_numpy()
-        return columns, dict(given.attrs.get("units", {}))
-    if hasattr(given, "get_columns"):
+        columns = {str(name): data[name].to_numpy() for name in data.columns}
+        if "time" not in columns and data.index.name == "time":
+            columns["time"] = data.index.to_numpy()
+        return columns, dict(data.attrs.get("units", {}))
+    if hasattr(data, "get_columns"):
         # Of polars.
-        return {column.name: column.to_numpy() for column in given.get_columns()}, {}
-    if hasattr(given, "__arrow_c_stream__"):
-        table = _package("pyarrow", "a table of Arrow as input").table(given)
+        return {column.name: column.to_numpy() for column in data.get_columns()}, {}
+    if hasattr(data, "__arrow_c_stream__"):
+        table = _package("pyarrow", "a table of Arrow as input").table(data)
         units = {
             field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema
         }
         return {name: table[name].to_numpy() for name in table.column_names}, units
-    array = numpy.asarray(given)
+    array = numpy.asarray(data)
     if array.dtype.names is None:
         sentence = (
             "input: expected a table with the column time (results, mapping, structured array, frame, dataset) "
-            f"or a function of the time, found {_described(given)}"
+            f"or a function of the time, found {_described(data)}"
         )
         raise ConfigurationError(sentence, "Input")
     return {name: array[name] for name in array.dtype.names}, {}
 
 
-def _described(given: Any) -> str:
-    shape = getattr(given, "shape", None)
-    return f"{type(given).__name__}" + (f" of the shape {tuple(shape)}" if shape is not None else "")
+def _described(data: Any) -> str:
+    shape = getattr(data, "shape", None)
+    return f"{type(data).__name__}" + (f" of the shape {tuple(shape)}" if shape is not None else "")
 
 
 def _times(columns: dict[str, Any]) -> NDArray[Any]:
@@ -122,8 +122,8 @@ def _times(columns: dict[str, Any]) -> NDArray[Any]:
     import numpy
 
     if "time" not in columns:
-        found = ", ".join(columns)
-        raise ConfigurationError(f'input: expected a column "time", found {found}', "Input")
+        names = ", ".join(columns)
+        raise ConfigurationError(f'input: expected a column "time", found {names}', "Input")
     try:
         times = numpy.array(columns.pop("time"), dtype=float)
     except (TypeError, ValueError) as error:

@@ -46,11 +46,11 @@ def similar(name: object, names: Any) -> str:
     import difflib
 
     text = str(name).casefold()
-    folded = {str(own).casefold(): str(own) for own in names}
+    folded = {str(word).casefold(): str(word) for word in names}
     near = difflib.get_close_matches(text, folded, 3)
     # Also the variable that the name is a part of.
-    near += [own for own in folded if own.endswith(f".{text}") and own not in near][:1]
-    return f"; similar: {', '.join(folded[own] for own in near)}" if near else ""
+    near += [word for word in folded if word.endswith(f".{text}") and word not in near][:1]
+    return f"; similar: {', '.join(folded[word] for word in near)}" if near else ""
 
 
 def in_python(sentence: str) -> str:
@@ -61,35 +61,35 @@ def in_python(sentence: str) -> str:
     return sentence
 
 
-def _names(found: re.Match[str]) -> list[str]:
-    return re.findall(r"`([^`]*)`", found["known"])
+def _names(match: re.Match[str]) -> list[str]:
+    return re.findall(r"`([^`]*)`", match["known"])
 
 
-def _table(found: re.Match[str]) -> str:
+def _table(match: re.Match[str]) -> str:
     """The table in which an entry is, as the start of a sentence."""
-    name = (found["table"] or "").strip(" []")
+    name = (match["table"] or "").strip(" []")
     return f"{name}: " if name else ""
 
 
-def _shown(found: re.Match[str]) -> str:
-    return f"{_table(found)}{found['shown']}" if found["shown"] else "the entry"
+def _shown(match: re.Match[str]) -> str:
+    return f"{_table(match)}{match['shown']}" if match["shown"] else "the entry"
 
 
-def _field(found: re.Match[str]) -> str:
-    known = _names(found)
-    hint = similar(found["name"], known) or f", expected {', '.join(known)}"
-    return f"{_table(found)}unknown entry {found['name']}{hint}"
+def _field(match: re.Match[str]) -> str:
+    known = _names(match)
+    hint = similar(match["name"], known) or f", expected {', '.join(known)}"
+    return f"{_table(match)}unknown entry {match['name']}{hint}"
 
 
-def _variant(found: re.Match[str]) -> str:
-    known = _names(found)
-    return f"{_shown(found)}: expected {', '.join(known)}{similar(found['name'], known)}"
+def _variant(match: re.Match[str]) -> str:
+    known = _names(match)
+    return f"{_shown(match)}: expected {', '.join(known)}{similar(match['name'], known)}"
 
 
-def _type(found: re.Match[str]) -> str:
-    kind = _KINDS.get(found["kind"], "a table" if found["kind"].startswith("struct ") else found["kind"])
-    return f"{_shown(found)}: expected {kind}"
+def _type(match: re.Match[str]) -> str:
+    kind = _KINDS.get(match["kind"], "a table" if match["kind"].startswith("struct ") else match["kind"])
+    return f"{_shown(match)}: expected {kind}"
 
 
-def _missing(found: re.Match[str]) -> str:
-    return f"{_table(found)}expected the entry {found['name']}"
+def _missing(match: re.Match[str]) -> str:
+    return f"{_table(match)}expected the entry {match['name']}"
