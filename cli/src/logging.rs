@@ -6,6 +6,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use fmu_description::number::seconds;
 use indicatif::MultiProgress;
+use report::Message;
 use study::LogFields;
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::filter::LevelFilter;
@@ -47,7 +48,7 @@ pub(crate) fn use_memory_of_thread() {
 const KEPT: usize = 1000;
 
 /// The warnings and errors so far, and the number of all of them, if they are kept.
-static COLLECTED: Mutex<Option<(Vec<String>, usize)>> = Mutex::new(None);
+static COLLECTED: Mutex<Option<(Vec<Message>, usize)>> = Mutex::new(None);
 
 /// Keeps warnings and errors from now on.
 pub(crate) fn collect() {
@@ -55,11 +56,12 @@ pub(crate) fn collect() {
 }
 
 /// Returns the warnings and errors since [`collect`].
-pub(crate) fn collected() -> Vec<String> {
+pub(crate) fn collected() -> Vec<Message> {
     let collected = COLLECTED.lock().unwrap_or_else(PoisonError::into_inner);
     let (mut messages, count) = collected.clone().unwrap_or_default();
     if count > messages.len() {
-        messages.push(format!("and {} more", count - messages.len()));
+        let text = format!("and {} more", count - messages.len());
+        messages.push(Message { time: None, text });
     }
     messages
 }
@@ -92,7 +94,9 @@ impl<S: Subscriber> Layer<S> for Collector {
         if let Some((messages, count)) = collected.as_mut() {
             *count += 1;
             if messages.len() < KEPT {
-                messages.push(sentence(event));
+                let mut parts = LogFields::default();
+                event.record(&mut parts);
+                messages.push(Message { time: parts.time, text: sentence(event) });
             }
         }
     }

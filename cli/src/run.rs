@@ -71,6 +71,8 @@ struct Started {
     units: Vec<(String, String)>,
     /// What the report says about the run, if one is requested.
     report: Option<report::Run>,
+    /// The numbers of settings and faults of the scenario at the start; further ones are interventions.
+    planned: (usize, usize),
     /// The trace of the buses that the report can show.
     bus_trace: Option<PathBuf>,
     /// The pacing by the clock, if one is requested.
@@ -107,7 +109,8 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     }
     describe(options, system, plan, by_name);
     let units = units(system, ports);
-    let report = options.results.report.then(|| facts::facts(system, plan));
+    let report = options.results.report.then(|| facts::facts(system, plan, &config.results.plot));
+    let planned = (config.scenario.set.len(), config.scenario.fault.len());
     let is_shown = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "log");
     let bus_trace = config.results.bus_trace.clone().filter(is_shown);
     let ports = prepared.ports.clone();
@@ -117,7 +120,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     let open = |start| Live::open(&mut run, &ports, factor, start, &here);
     let live = options.watching.live.map(open).transpose()?;
     let log_calls = log_calls.zip(options.watching.log_calls.clone());
-    Ok(Some(Started { run, here, units, report, bus_trace, pace, live, log_calls }))
+    Ok(Some(Started { run, here, units, report, planned, bus_trace, pace, live, log_calls }))
 }
 
 /// Checks that no output is an input, and reserves standard output for the results if they go there.
@@ -343,7 +346,12 @@ impl Started {
     /// Writes the report, if one is requested.
     fn report(&mut self, file: &Path, outcome: String, failed: bool) -> anyhow::Result<()> {
         let Some(run) = self.report.take() else { return Ok(()) };
-        let run = report::Run { outcome, failed, messages: logging::collected(), ..run };
+        let scenario = &self.run.config.scenario;
+        let start = self.run.plan.experiment.start_time;
+        let marks = facts::marks(scenario, self.planned, start);
+        let disturbed = facts::disturbed(scenario);
+        let messages = logging::collected();
+        let run = report::Run { outcome, failed, disturbed, marks, messages, ..run };
         let page = report::page(&report::Request {
             results: file,
             against: None,

@@ -61,6 +61,12 @@ def curves(page):
     return curves
 
 
+def unchanged(page):
+    """The variables that do not change, and their values."""
+    rows = page.xpath("//details[@id='unchanged']//tbody/tr")
+    return {row.xpath("./th")[0].text_content(): float(row.xpath("./td[@title]")[0].get("title")) for row in rows}
+
+
 @pytest.fixture
 def write(tmp_path):
     """Writes a results file of another program."""
@@ -103,8 +109,9 @@ def test_statistics_are_those_of_numpy_for_files_of_pandas(aso_ftc, write, name)
         assert np.allclose(found[variable], expected, rtol=1e-12, atol=1e-12)
 
 
-def test_the_difference_is_that_to_the_interpolated_other_run(aso_ftc, write):
-    own, other = frame(), frame(137, 0.25)
+@pytest.mark.parametrize("rows", [137, 5003])
+def test_the_difference_is_that_to_the_interpolated_other_run(aso_ftc, write, rows):
+    own, other = frame(), frame(rows, 0.25)
     page, said = report(aso_ftc, write("own.csv", own), "--against", write("other.csv", other.drop(columns="b")))
     there = np.interp(own["time"], other["time"], other["a"])
     expected = own["a"] - there
@@ -220,7 +227,7 @@ def test_parquet_files_of_polars_are_read(aso_ftc, tmp_path, compression):
     page, _ = report(aso_ftc, tmp_path / "own.parquet")
     found = curves(page)
     assert all((found[name]["values"] == own[name]).all() for name in ("a", "b", "on"))
-    assert (found["large"]["values"] == 4e9).all()
+    assert "large" not in found and unchanged(page) == {"large": 4e9}
 
 
 def test_csv_of_other_programs_is_read(aso_ftc, tmp_path):
@@ -297,8 +304,8 @@ def test_mat_files_of_dymola_and_openmodelica_are_read(aso_ftc, tmp_path, kind):
     found, stored = curves(page), values.astype(kind)
     assert (found["body.phi"]["time"] == time).all()
     assert (found["body.phi"]["values"] == stored).all() and (found["minus.phi"]["values"] == -stored).all()
-    assert (found["gain"]["values"] == 7).all()
-    assert [plot["unit"] for plot in data(page)["plots"]] == ["rad", ""]
+    assert unchanged(page) == {"gain": 7}
+    assert [plot["unit"] for plot in data(page)["plots"]] == ["rad"]
     whole = (tmp_path / "own.mat").read_bytes()
     for length in (0, 10, 25, len(whole) - 1):
         (tmp_path / "own.mat").write_bytes(whole[:length])
@@ -373,7 +380,7 @@ def test_the_report_of_a_run_has_its_system_its_algorithm_and_units(of_a_run):
     page = html.parse(of_a_run).getroot()
     text = page.text_content()
     assert "FrictionPendulum: model FrictionPendulum, FMI 2.0" in text and "algorithm: gauss-seidel" in text
-    boxes = page.xpath("//*[local-name()='rect']")
+    boxes = page.xpath("//*[@class='graph']//*[local-name()='rect']")
     assert len(boxes) == 2 and "AsoController.u to FrictionPendulum.u" in re.sub(r"\s+", " ", text)
     assert "rad" in {plot["unit"] for plot in data(page)["plots"]}
 
@@ -392,7 +399,8 @@ def in_a_browser(page, folder, script):
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
 def test_a_browser_draws_every_plot_without_an_error_or_a_request(of_a_run, tmp_path):
-    script = "document.title = performance.getEntriesByType('resource').length"
+    script = "document.title = performance.getEntriesByType('resource').length;"
+    script += "setInterval(() => document.querySelectorAll('#more details').forEach((fold) => { fold.open = true; }), 100)"
     page = in_a_browser(of_a_run, tmp_path, script)
     assert len(page.xpath("//figure//canvas")) == len(data(page)["plots"]) > 2
     assert page.xpath("//title")[0].text == "0"
@@ -472,7 +480,7 @@ def test_the_values_at_the_cursor_are_those_of_the_row_at_the_stated_time(aso_ft
                 for part in (0.003, 0.21, 0.5, 0.77, 0.997):
                     time, values = read(page, figure, part)
                     at = np.abs(times - (low + part * (high - low))).argmin()
-                    assert abs(time - times[at]) <= 1.5e-3 * max(1, high - low)
+                    assert abs(time - times[at]) <= 4e-3 * max(1, high - low)
                     row = own.iloc[np.flatnonzero(times == time)[0]]
                     np.testing.assert_array_equal(list(values.values()), row[list(values)])
                     names |= set(values)
@@ -579,6 +587,146 @@ def test_a_plot_without_all_rows_says_so_and_names_the_command_for_them(aso_ftc,
     assert "Rows from t = 40 s to t = 40.3 s only." in page.text_content()
     done = aso_ftc("report", tmp_path / "own.parquet", "--from", 400, "--force")
     assert done.returncode == 2 and "no row from 400 s" in done.stderr
+
+
+@pytest.fixture(scope="module")
+def of_many_signals(aso_ftc, tmp_path_factory):
+    """The page of 200 signals, 11 of which do not change."""
+    time = np.linspace(0.0, 10.0, 501)
+    signals = {f"{'plant' if k < 100 else 'controller'}.x{k}": np.sin(time + k) for k in range(189)}
+    signals |= {f"plant.p{k}": np.full(time.size, k + 0.25) for k in range(11)}
+    file = tmp_path_factory.mktemp("many") / "own.csv"
+    pd.DataFrame({"time": time, **signals}).to_csv(file, index=False)
+    page, _ = report(aso_ftc, file)
+    return file.with_suffix(".html"), page
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_a_page_of_200_signals_is_short_and_its_filter_finds_each(of_many_signals, tmp_path):
+    path, page = of_many_signals
+    assert unchanged(page) == {f"plant.p{k}": k + 0.25 for k in range(11)}
+    assert "11 signals do not change" in page.xpath("//details[@id='unchanged']/summary")[0].text_content()
+    with browser(tmp_path / "profile", 1280, 900) as page:
+        page.open(path.as_uri())
+        page.until(DRAWN)
+        assert page.evaluate("document.documentElement.scrollHeight") < 3000
+        page.evaluate("""(() => {
+            const filter = document.getElementById("filter");
+            filter.value = "controller X17";
+            filter.dispatchEvent(new Event("input"));
+        })()""")
+        page.until("document.querySelectorAll('figure:not([hidden]) .uplot').length === 2")
+        shown = "[...document.querySelectorAll('figure:not([hidden]) .u-series:not(.u-off) .u-label')].map((label) => label.textContent)"
+        expected = {"t in s", *(f"controller.x{k}" for k in range(170, 180))}
+        page.until(f"new Set({shown}).size === {len(expected)}")
+        assert set(page.evaluate(shown)) == expected
+        assert page.evaluate("document.getElementById('found').textContent") == "10 of 200 signals"
+        assert not page.complaints
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_the_second_cursor_and_the_vertical_zoom_work_by_mouse_and_keyboard(aso_ftc, write, tmp_path):
+    own = frame()
+    report(aso_ftc, write("own.csv", own))
+    frames = "new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(done)); })"
+
+    def cells(page):
+        return page.evaluate(f"{frames}.then(() => [...document.querySelectorAll('figure .u-value')].map((cell) => cell.textContent))")
+
+    def assert_differences(page, at, other):
+        """The legend has the values of a row, and the differences to another row."""
+        for name, cell in zip(["time", "a", "b", "on"], cells(page), strict=True):
+            value, difference = re.fullmatch(r"(\S+) \(Δ (\S+)\)", cell).groups()
+            assert float(value) == own[name][at]
+            assert float(difference) == pytest.approx(own[name][at] - own[name][other], rel=1e-5, abs=1e-12)
+
+    def row(page):
+        return int(np.flatnonzero(own["time"] == float(cells(page)[0].split(" ")[0]))[0])
+
+    def key(page, name):
+        page.call("Input.dispatchKeyEvent", type="keyDown", key=name)
+
+    def spread(page):
+        """The length of the vertical axis, from the heights at which two values are marked."""
+        one, other = (float(cell.split(" ")[0]) for cell in cells(page)[1:3])
+        marks = "[...document.querySelectorAll('.at-cursor')].map((mark) => Number(mark.style.translate.split(' ')[1].slice(0, -2)))"
+        high, low = page.evaluate(marks)[:2]
+        return page.evaluate("document.querySelector('.u-over').clientHeight") * (one - other) / (low - high)
+
+    with browser(tmp_path / "profile") as page:
+        page.open((tmp_path / "own.html").as_uri())
+        page.until(DRAWN)
+        read(page, 0, 0.25)
+        first = row(page)
+        ((x, y),) = page.places("figure .u-over", [0.25])
+        for kind in ("mousePressed", "mouseReleased"):
+            page.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+        ((x, y),) = page.places("figure .u-over", [0.75])
+        page.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+        second = row(page)
+        assert second > first
+        assert_differences(page, second, first)
+        page.evaluate("document.querySelector('.uplot').focus()")
+        key(page, "ArrowRight")
+        assert_differences(page, row(page), first)
+        key(page, "Escape")
+        assert "Δ" not in "".join(cells(page))
+        third = row(page)
+        key(page, " ")
+        key(page, "ArrowLeft")
+        assert_differences(page, row(page), third)
+        # A drag down selects a part of the vertical axis, and leaves the axis of time.
+        labels = "document.querySelector('#from').value + ' ' + document.querySelector('#to').value"
+        whole = page.evaluate(labels)
+        before = spread(page)
+        page.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y - 30, button="left", clickCount=1)
+        for move in (0, 30):
+            page.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y + move, button="left", buttons=1)
+        page.call("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y + 30, button="left", clickCount=1)
+        height = page.evaluate("document.querySelector('.u-over').clientHeight")
+        assert spread(page) == pytest.approx(before * 60 / height, rel=0.05) and page.evaluate(labels) == whole
+        key(page, "0")
+        assert spread(page) == pytest.approx(before, rel=1e-3)
+        key(page, "ArrowUp")
+        assert spread(page) == pytest.approx(0.8 * before, rel=1e-3)
+        page.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=100, modifiers=8)
+        assert spread(page) == pytest.approx(before, rel=1e-3)
+        assert not page.complaints
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")
+def test_changes_faults_and_messages_of_a_run_are_marked_at_their_times(aso_ftc, tmp_path):
+    fmus = {name: ROOT / "dist" / f"{fmu}.fmu" for name, fmu in (("plant", "FrictionPendulum"), ("controller", "AsoController"))}
+    (tmp_path / "system.toml").write_text(
+        "[experiment]\nstop-time = 3\n[fmus]\n"
+        + "".join(f'{name} = "{path}"\n' for name, path in fmus.items())
+        + '[[scenario.set]]\nvariable = "plant.F_c"\nat = 1\nvalue = 9\n'
+        + '[[scenario.fault]]\nconnection = "controller.x_p"\nbias = { value = 0.001, from = 1.5, until = 2 }\n',
+        encoding="utf-8",
+    )
+    done = aso_ftc("run", tmp_path / "system.toml", "--out", tmp_path, "--report")
+    assert done.returncode == 0, done.stderr
+    page = html.parse(tmp_path / "results.html").getroot()
+    marks = {mark["kind"]: mark for mark in data(page)["marks"]}
+    assert (marks["change"]["time"], marks["change"]["text"]) == (1, "plant.F_c = 9.0")
+    assert (marks["fault"]["time"], marks["fault"]["end"]) == (1.5, 2) and "bias" in marks["fault"]["text"]
+    shown = [curve["name"] for plot in data(page)["plots"] if plot["shown"] for curve in plot["curves"]]
+    # Outputs, connected or not, and the input with the fault; other inputs follow their sources.
+    assert {"plant.x_p", "plant.theta", "controller.u", "controller.x_p"} <= set(shown)
+    assert not {"controller.theta", "plant.u"} & set(shown)
+    with browser(tmp_path / "profile") as page:
+        page.open((tmp_path / "results.html").as_uri())
+        page.until(DRAWN)
+        page.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "light"}])
+        read(page, 0, 1.75 / 3)
+        said = page.evaluate("document.querySelector('.happening').textContent")
+        assert said.startswith("t = 1.5 s, fault: controller.x_p: bias")
+        page.until(DRAWN)
+        # The bar of the fault, in its colour.
+        box, width = (page.evaluate(f"document.querySelector('{name}').clientWidth") for name in (".u-over", "figure canvas"))
+        left = page.evaluate("document.querySelector('.u-over').offsetLeft")
+        bar = np.flatnonzero(np.array(inked(page, "a83200")) > 2)
+        assert np.median(bar) == pytest.approx(left + 1.75 / 3 * box, abs=0.02 * width) and bar.size > 0.1 * box
 
 
 @pytest.mark.skipif(not BROWSER, reason="no Chromium is installed")

@@ -1,11 +1,14 @@
 //! What the report of a run says about the run itself.
 
+use fmu_description::Causality;
 use master::{Port, System};
-use report::{Connection, Fmu, Run};
+use report::{Connection, Fmu, Mark, MarkKind, Run};
+use serde::Serialize;
 use study::Plan;
+use study::scenario::Scenario;
 
-/// The system and the algorithm; outcome and messages follow at the end of the run.
-pub(super) fn facts(system: &System, plan: &Plan) -> Run {
+/// The system, the algorithm and the variables to plot; outcome, marks and messages follow at the end of the run.
+pub(super) fn facts(system: &System, plan: &Plan, plotted: &[String]) -> Run {
     let variable = |port: Port| {
         system.slaves[port.slave].1.description().variables[port.variable].name.clone()
     };
@@ -25,9 +28,58 @@ pub(super) fn facts(system: &System, plan: &Plan) -> Run {
     Run {
         fmus: fmus.collect(),
         connections: connections.collect(),
+        outputs: system
+            .ports(Causality::Output)
+            .into_iter()
+            .map(|port| system.name(port))
+            .collect(),
+        plotted: plotted.to_vec(),
         algorithm: plan.explanation(system).lines().map(without_dash).collect(),
         ..Run::default()
     }
+}
+
+/// Returns what a scenario changes and when; entries after the first `planned` settings and faults are interventions.
+pub(super) fn marks(scenario: &Scenario, planned: (usize, usize), start: f64) -> Vec<Mark> {
+    let kind = |at: usize, planned: usize, kind| {
+        if at < planned { kind } else { MarkKind::Intervention }
+    };
+    let set = scenario.set.iter().enumerate().map(|(at, entry)| {
+        let entry = entry.get_ref();
+        let text = format!("{} = {}", entry.variable.get_ref(), written(entry.value.get_ref()));
+        Mark { kind: kind(at, planned.0, MarkKind::Change), time: entry.at, end: None, text }
+    });
+    let steps = scenario.signal.iter().flat_map(|entry| {
+        let entry = entry.get_ref();
+        let steps = entry.steps.iter().flat_map(toml::Spanned::get_ref);
+        steps.map(|(time, value)| {
+            let text = format!("{} = {}", entry.variable.get_ref(), written(value.get_ref()));
+            Mark { kind: MarkKind::Change, time: *time, end: None, text }
+        })
+    });
+    let faults = scenario.fault.iter().enumerate().map(|(at, entry)| {
+        let entry = entry.get_ref();
+        // The connection, and one table with the name of the kind.
+        let table = toml::Table::try_from(entry).unwrap_or_default();
+        let body = table.iter().find_map(|(name, body)| Some((name, body.as_table()?)));
+        let time = |name: &str| body?.1.get(name)?.as_float();
+        let what = body.map(|(name, body)| format!("{name} {}", written(body))).unwrap_or_default();
+        let text = format!("{}: {what}", entry.connection.get_ref());
+        let (time, end) = (time("from").unwrap_or(start), time("until"));
+        Mark { kind: kind(at, planned.1, MarkKind::Fault), time, end, text }
+    });
+    set.chain(steps).chain(faults).collect()
+}
+
+/// Returns the inputs on which a fault of the scenario acts.
+pub(super) fn disturbed(scenario: &Scenario) -> Vec<String> {
+    let input = |connection: &str| connection.rsplit('=').next().unwrap_or_default().to_owned();
+    scenario.fault.iter().map(|fault| input(fault.get_ref().connection.get_ref())).collect()
+}
+
+/// A value as in a TOML file, in one line.
+fn written(value: impl Serialize) -> String {
+    toml::Value::try_from(value).map(|value| value.to_string()).unwrap_or_default()
 }
 
 fn without_dash(line: &str) -> String {

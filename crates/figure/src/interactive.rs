@@ -1,14 +1,18 @@
 //! Scripts and style sheets of interactive plots, for HTML pages that are one file.
 //!
-//! A page includes [`UPLOT_STYLE`], [`COLOURS`] and [`LINKED_STYLE`], then [`UPLOT`] and [`LINKED`]. Its own script
-//! makes a `LinkedAxis` for each quantity on a horizontal axis and calls its method `plot` for each plot: a drag
-//! zooms all plots of the axis, their cursors move together, and the legends show the values there. Arrow keys move
-//! the cursor, plus and minus zoom. On a touch screen two fingers zoom and a double tap shows everything.
+//! A page includes [`UPLOT_STYLE`], [`COLOURS`], [`BASE_STYLE`] and [`LINKED_STYLE`], then [`UPLOT`] and [`LINKED`].
+//! Its own script makes a `LinkedAxis` for each quantity on a horizontal axis and calls its method `plot` for each
+//! plot: a drag along the axis zooms all plots of it, a drag across zooms the vertical axis of one; their cursors move
+//! together, and the legends show the values there, and their differences to those at a second cursor. Everything
+//! works from the keyboard. On a touch screen two fingers zoom and a double tap shows everything. [`USAGE`] says this
+//! to the reader.
 //!
-//! A page whose data grow includes [`ZOOM`] instead of [`LINKED`], and makes a `GrowingAxis`.
+//! A page whose parts are folded includes [`FOLD`].
 
 /// The style sheet of the colours, light and dark.
 pub const COLOURS: &str = include_str!("interactive/colours.css");
+/// The style sheet of texts, tables, controls and paper, after [`COLOURS`].
+pub const BASE_STYLE: &str = include_str!("interactive/base.css");
 /// The script of the plots: uPlot 1.6.32, Leon Sorokin, MIT licence ([`UPLOT_LICENCE`]).
 pub const UPLOT: &str = include_str!("interactive/uPlot.iife.min.js");
 /// The style sheet of uPlot.
@@ -17,8 +21,20 @@ pub const UPLOT_STYLE: &str = include_str!("interactive/uPlot.min.css");
 pub const UPLOT_LICENCE: &str = include_str!("interactive/uPlot-LICENSE");
 /// The script that zooms plots: the function `zoomByTouch` and the class `GrowingAxis`.
 pub const ZOOM: &str = include_str!("interactive/zoom.js");
-/// The script of linked plots, after [`ZOOM`]: the class `LinkedAxis` and the function `redrawOn`.
+/// The script of linked plots, with [`ZOOM`]: the class `LinkedAxis` and the function `redrawOn`.
 pub const LINKED: &str =
     concat!(include_str!("interactive/zoom.js"), include_str!("interactive/linked.js"));
+/// The script that opens the elements `details` for paper and for links into them.
+pub const FOLD: &str = include_str!("interactive/fold.js");
+/// How a reader uses linked plots.
+pub const USAGE: [&str; 3] = [
+    "Mouse: drag along the axis to zoom all plots, up or down to zoom the vertical axis of one, or turn the wheel with \
+     Shift; double-click to show all. A click puts a second cursor: the values at the cursor are then followed by \
+     their differences (Δ) to those there; a click on it removes it. A click on a name hides its curve.",
+    "Keyboard, in a plot (Tab goes there): ← and → move the cursor, with Shift ten times as far; + and − zoom; ↑ and ↓ \
+     zoom the vertical axis, with Shift they move it; 0 shows all; the space bar puts the second cursor, Escape \
+     removes it.",
+    "Touch screen: two fingers zoom, a double tap shows all.",
+];
 /// The style sheet of linked plots.
 pub const LINKED_STYLE: &str = include_str!("interactive/linked.css");

@@ -1,6 +1,9 @@
 //! The difference of two runs.
 
-use results::{Column, Table};
+use std::collections::VecDeque;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use results::{Column, ResultsError, Table};
 
 use crate::plots::Group;
 use crate::samples::{Collector, Samples};
@@ -89,7 +92,9 @@ impl Comparison {
 pub(crate) struct Compared {
     pub(crate) comparison: Comparison,
     /// Whether the other run has each of the columns.
-    pub(crate) is_compared: Vec<bool>,
+    pub(crate) common: Vec<bool>,
+    /// The largest difference of each of the columns, relative to its range; 0 if the other run does not have it.
+    pub(crate) relative: Vec<f64>,
 }
 
 /// Compares the columns at `positions` with those of the same names in `other`, at the times of the rows
@@ -108,52 +113,56 @@ pub(crate) fn compare(
     let there =
         |at: usize| named(other, &table.columns()[at].name).filter(|there| *there != other.time());
     let partners: Vec<Option<usize>> = positions.iter().map(|at| there(*at)).collect();
-    let mut comparison = Comparison::default();
-    let mut samples = Vec::new();
-    for group in groups {
-        let members = group.members.iter().map(|at| (positions[*at], partners[*at]));
-        let (here, there): (Vec<usize>, Vec<Option<usize>>) = members.unzip();
-        let mut series = Series::read(other, &there.iter().flatten().copied().collect::<Vec<_>>())?;
-        let mut sums: Vec<_> = here.iter().map(|at| Sum::new(&table.columns()[*at])).collect();
-        let mut collector = Collector::new(2 * here.len(), group.block, true);
-        let mut others = vec![f64::NAN; here.len()];
-        let mut times: Option<(f64, f64)> = None;
-        (comparison.rows, comparison.outside) = (0, 0);
-        view.visit(&here, &mut |time, row| {
-            let place = series.at(time);
+    let positions_there: Vec<usize> = partners.iter().flatten().copied().collect();
+    std::thread::scope(|scope| {
+        let (sender, receiver) = sync_channel(BATCHES);
+        let reader = scope.spawn(move || Batches::read(other, &positions_there, sender));
+        let mut series = Series::new(receiver);
+        let mut sums: Vec<_> = positions.iter().map(|at| Sum::new(&table.columns()[*at])).collect();
+        let collector = |group: &Group| Collector::new(2 * group.members.len(), group.block, true);
+        let mut collectors: Vec<_> = groups.iter().map(collector).collect();
+        let mut others = vec![f64::NAN; positions.len()];
+        let mut comparison = Comparison::default();
+        view.visit(positions, &mut |time, row| {
+            let part = series.advance_to(time);
+            let count = if part.is_some() { &mut comparison.rows } else { &mut comparison.outside };
+            *count += 1;
             let mut column = 0;
             for ((sum, value), (there, other)) in
-                sums.iter_mut().zip(row).zip(there.iter().zip(&mut others))
+                sums.iter_mut().zip(row).zip(partners.iter().zip(&mut others))
             {
                 *other = f64::NAN;
                 if there.is_none() {
                     continue;
                 }
-                if let Some(place) = place {
-                    *other = series.value(column, place, sum.holds);
+                if let Some(part) = part {
+                    *other = series.value(column, part, sum.holds);
                     sum.push(time, *value, *other);
                 }
                 column += 1;
             }
-            let count =
-                if place.is_some() { &mut comparison.rows } else { &mut comparison.outside };
-            *count += 1;
-            times = Some((times.map_or(time, |(first, _)| first), time));
-            collector.push(time, row.iter().chain(&others).copied());
+            for (group, collector) in groups.iter().zip(&mut collectors) {
+                let members = || group.members.iter();
+                collector.push(
+                    time,
+                    members().map(|at| row[*at]).chain(members().map(|at| others[*at])),
+                );
+            }
         })?;
-        if let Some((first, last)) = times.filter(|_| !view.is_part()) {
-            let beyond = series.time.iter().filter(|time| !(first..=last).contains(*time));
-            comparison.outside_there = beyond.count() as u64;
+        let outside = series.outside();
+        reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        if !view.is_part() {
+            comparison.outside_there = outside;
         }
-        let compared = sums.into_iter().zip(&there).filter(|(_, there)| there.is_some());
-        comparison.differences.extend(compared.map(|(sum, _)| sum.finish()));
-        samples.push(collector.finish());
-    }
-    comparison.differences.sort_by(|one, other| other.relative.total_cmp(&one.relative));
-    Ok((
-        Compared { comparison, is_compared: partners.iter().map(Option::is_some).collect() },
-        samples,
-    ))
+        let common: Vec<bool> = partners.iter().map(Option::is_some).collect();
+        let differences: Vec<_> = sums.into_iter().map(Sum::finish).collect();
+        let relative = differences.iter().map(|difference| difference.relative).collect();
+        let compared = differences.into_iter().zip(&common).filter(|(_, is)| **is);
+        comparison.differences = compared.map(|(difference, _)| difference).collect();
+        comparison.differences.sort_by(|one, other| other.relative.total_cmp(&one.relative));
+        let samples = collectors.into_iter().map(Collector::finish).collect();
+        Ok((Compared { comparison, common, relative }, samples))
+    })
 }
 
 /// Returns the names of the columns of `all` but the time that `rest` does not have.
@@ -164,56 +173,109 @@ pub(crate) fn missing<'a>(all: &'a Table, positions: &[usize], rest: &Table) -> 
     columns.filter(is_missing).map(|column| column.name.clone()).collect()
 }
 
-/// Columns of the other run.
-struct Series {
-    time: Vec<f64>,
-    columns: Vec<Vec<f64>>,
-    /// The first row that was not used yet.
-    next: usize,
+/// Rows of a file that a thread passes on at once, and the number of such batches that wait.
+const BATCH: usize = 1024;
+const BATCHES: usize = 8;
+
+/// A row: its time and its values.
+type Row = (f64, Vec<f64>);
+
+/// Passes on the rows of a file.
+struct Batches {
+    rows: VecDeque<Row>,
+    sender: SyncSender<VecDeque<Row>>,
 }
 
-/// A row, and the part of the way to the next one.
-#[derive(Clone, Copy)]
-struct Place {
-    row: usize,
-    part: f64,
+impl Batches {
+    fn read(
+        table: &Table,
+        positions: &[usize],
+        sender: SyncSender<VecDeque<Row>>,
+    ) -> Result<(), ResultsError> {
+        let mut batches = Self { rows: VecDeque::new(), sender };
+        table.visit(positions, &mut |time, row| {
+            batches.rows.push_back((time, row.to_vec()));
+            if batches.rows.len() == BATCH {
+                batches.send();
+            }
+        })?;
+        batches.send();
+        Ok(())
+    }
+
+    /// Without a receiver, the comparison has ended by an error.
+    fn send(&mut self) {
+        let _ = self.sender.send(std::mem::take(&mut self.rows));
+    }
+}
+
+/// The rows of the other run: the last one up to a time, and the next one.
+struct Series {
+    receiver: Receiver<VecDeque<Row>>,
+    rows: VecDeque<Row>,
+    before: Option<Row>,
+    next: Option<Row>,
+    /// The first and the last time asked for.
+    asked: Option<(f64, f64)>,
+    /// Number of rows before the first time asked for.
+    early: u64,
 }
 
 impl Series {
-    fn read(table: &Table, positions: &[usize]) -> Result<Self, Error> {
-        let (mut time, mut columns) = (Vec::new(), vec![Vec::new(); positions.len()]);
-        table.visit(positions, &mut |at, row| {
-            time.push(at);
-            columns.iter_mut().zip(row).for_each(|(column, value)| column.push(*value));
-        })?;
-        Ok(Self { time, columns, next: 0 })
+    fn new(receiver: Receiver<VecDeque<Row>>) -> Self {
+        let rows = VecDeque::new();
+        let mut series = Self { receiver, rows, before: None, next: None, asked: None, early: 0 };
+        series.advance();
+        series
     }
 
-    /// The place of `time`, which does not decrease from call to call; None outside of the run.
+    fn advance(&mut self) {
+        if self.rows.is_empty() {
+            self.rows = self.receiver.recv().unwrap_or_default();
+        }
+        self.before =
+            std::mem::replace(&mut self.next, self.rows.pop_front()).or(self.before.take());
+    }
+
+    /// Advances to `time`, which does not decrease from call to call; returns the part of the way to the next row, None
+    /// outside of the run.
     #[expect(clippy::float_cmp, reason = "rows of the same time")]
-    fn at(&mut self, time: f64) -> Option<Place> {
-        while self.time.get(self.next).is_some_and(|next| *next < time) {
-            self.next += 1;
+    fn advance_to(&mut self, time: f64) -> Option<f64> {
+        let is_first = self.asked.is_none();
+        self.asked = Some((self.asked.map_or(time, |(first, _)| first), time));
+        while self.next.as_ref().is_some_and(|next| next.0 < time) {
+            self.early += u64::from(is_first);
+            self.advance();
         }
-        if self.time.get(self.next).is_some_and(|next| *next == time) {
-            self.next += 1;
-            return Some(Place { row: self.next - 1, part: 0.0 });
+        if self.next.as_ref().is_some_and(|next| next.0 == time) {
+            self.advance();
+            return Some(0.0);
         }
-        let row = self.next.checked_sub(1)?;
-        let start = self.time[row];
+        let start = self.before.as_ref()?.0;
         if start == time {
-            return Some(Place { row, part: 0.0 });
+            return Some(0.0);
         }
-        let end = self.time.get(self.next)?;
-        Some(Place { row, part: (time - start) / (end - start) })
+        let end = self.next.as_ref()?.0;
+        Some((time - start) / (end - start))
     }
 
-    fn value(&self, column: usize, Place { row, part }: Place, holds: bool) -> f64 {
-        let values = &self.columns[column];
+    fn value(&self, column: usize, part: f64, holds: bool) -> f64 {
+        let value = |row: &Option<Row>| row.as_ref().map_or(f64::NAN, |row| row.1[column]);
         if holds || part == 0.0 {
-            return values[row];
+            return value(&self.before);
         }
-        values[row] * (1.0 - part) + values[row + 1] * part
+        value(&self.before) * (1.0 - part) + value(&self.next) * part
+    }
+
+    /// Reads the rest, and returns the number of rows before the first and after the last time asked for.
+    fn outside(&mut self) -> u64 {
+        let Some((_, last)) = self.asked else { return 0 };
+        let mut outside = self.early;
+        while let Some(next) = &self.next {
+            outside += u64::from(next.0 > last);
+            self.advance();
+        }
+        outside
     }
 }
 

@@ -10,8 +10,10 @@ mod difference;
 mod frames;
 mod graph;
 mod page;
+mod pictures;
 mod plots;
 mod samples;
+mod signals;
 mod statistics;
 
 use std::path::Path;
@@ -20,12 +22,17 @@ use results::{Column, ColumnKind, ResultsError, Selection, Table};
 
 use plots::{Group, Plots};
 use samples::{Collector, Samples};
+use serde::Serialize;
+use signals::Signals;
 
 pub use difference::{Comparison, Difference};
 pub use statistics::{Basis, Statistics};
 
 /// Largest number of variables in a report.
 pub const VARIABLES: usize = 300;
+
+/// Largest number of marks of a kind on the axis of time.
+const MARKS: usize = 1000;
 
 /// What a report shows.
 #[derive(Debug)]
@@ -58,10 +65,65 @@ pub struct Run {
     pub fmus: Vec<Fmu>,
     /// The connections.
     pub connections: Vec<Connection>,
+    /// The names of the outputs, such as `plant.x_p`.
+    pub outputs: Vec<String>,
+    /// The names of connected inputs on which a fault acts: they differ from their sources.
+    pub disturbed: Vec<String>,
+    /// The variables whose plot the configuration asks for, by name or pattern.
+    pub plotted: Vec<String>,
     /// The algorithm, and the reason of each setting.
     pub algorithm: Vec<String>,
+    /// Changes and faults of the scenario.
+    pub marks: Vec<Mark>,
     /// Warnings and errors of the run, in their order.
-    pub messages: Vec<String>,
+    pub messages: Vec<Message>,
+}
+
+/// A warning or an error of a run.
+#[derive(Clone, Debug)]
+pub struct Message {
+    /// Its time in s, if it has one.
+    pub time: Option<f64>,
+    /// The sentence.
+    pub text: String,
+}
+
+/// Something that happened at a time of the run.
+#[derive(Clone, Debug, Serialize)]
+pub struct Mark {
+    /// What kind of thing it is.
+    pub kind: MarkKind,
+    /// Its time in s, or its start.
+    pub time: f64,
+    /// Its end in s, if it has one.
+    pub end: Option<f64>,
+    /// What happened.
+    pub text: String,
+}
+
+/// The kind of a [`Mark`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MarkKind {
+    /// The scenario sets a variable.
+    Change,
+    /// The scenario disturbs a connection.
+    Fault,
+    /// Somebody changed the run while it was running.
+    Intervention,
+    /// A warning or an error.
+    Message,
+}
+
+impl MarkKind {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Change => "change",
+            Self::Fault => "fault",
+            Self::Intervention => "intervention",
+            Self::Message => "message",
+        }
+    }
 }
 
 /// An FMU of a run.
@@ -162,8 +224,9 @@ pub fn identity(results: &Path) -> String {
 /// Creates the report of a results file.
 ///
 /// At most [`VARIABLES`] variables are shown; the page says how many are left out. It has all rows, unless these are
-/// more than two million values; then each plot says how many of the rows it has. Files are read row by row, twice: the
-/// memory does not depend on the length of the first file; of the second one, the columns of a plot are in memory.
+/// more than two million values; then each plot says how many of the rows it has. Files are read row by row, the first
+/// one once for the statistics and once for the plots, together with the second one: the memory does not depend on
+/// their length.
 ///
 /// # Errors
 ///
@@ -171,21 +234,24 @@ pub fn identity(results: &Path) -> String {
 pub fn page(request: &Request<'_>) -> Result<Page, Error> {
     let table = Table::open(request.results)?;
     let view = View { table: &table, range: request.range };
-    let Read { positions, columns, statistics, rows, texts, left_out } = read(&view, request)?;
+    let read = read(&view, request)?;
+    let Read { positions, columns, statistics, texts, .. } = &read;
+    let (rows, left_out) = (read.rows, read.left_out);
     if rows == 0 && view.is_part() {
         let (from, to) = request.range;
         return Err(Error::NoRows { file: name(request.results), from, to });
     }
-    let groups = plots::groups(&columns, &statistics, rows, request.against.is_some());
+    let signals = Signals::new(columns, request.run);
+    let groups = plots::groups(columns, statistics, &signals, rows, request.against.is_some());
     let (mut compared, samples) = match request.against {
         Some(path) => {
             let other = Table::open(path)?;
-            let (mut compared, samples) = difference::compare(&view, &positions, &groups, &other)?;
+            let (mut compared, samples) = difference::compare(&view, positions, &groups, &other)?;
             let comparison = &mut compared.comparison;
             if comparison.differences.is_empty() {
                 return Err(Error::Apart { file: name(request.results), other: name(path) });
             }
-            comparison.only_here = difference::missing(&table, &positions, &other);
+            comparison.only_here = difference::missing(&table, positions, &other);
             if request.variables.is_empty() {
                 let all: Vec<usize> = (0..other.columns().len()).collect();
                 comparison.only_there = difference::missing(&other, &all, &table);
@@ -193,23 +259,33 @@ pub fn page(request: &Request<'_>) -> Result<Page, Error> {
             (comparison.texts, comparison.left_out) = (texts.clone(), left_out);
             (Some(compared), samples)
         }
-        None => (None, collect(&view, &positions, &groups)?),
+        None => (None, collect(&view, positions, &groups)?),
     };
     let frames = request.bus_trace.map(frames::read).transpose()?;
     let mut plots = Plots::default();
-    let is_compared = compared.as_ref().map_or(&[][..], |compared| &compared.is_compared);
-    for (group, samples) in groups.iter().zip(&samples) {
-        plots.add(group, samples, &columns, is_compared);
-    }
+    let is_compared = compared.as_ref().map_or(&[][..], |compared| &compared.common);
+    let difference = |group: &Group| {
+        let relative = compared.as_ref().map(|compared| &compared.relative);
+        let relative = relative.map(|all| group.members.iter().map(|at| all[*at]));
+        relative.into_iter().flatten().fold(0.0, f64::max)
+    };
+    let all = groups.iter().zip(&samples);
+    let (mut drawn, flat): (Vec<_>, Vec<_>) =
+        all.partition(|(group, _)| !group.is_flat || difference(group) > 0.0);
+    drawn.sort_by(|one, other| difference(other.0).total_cmp(&difference(one.0)));
+    plots.add_all(&drawn, columns, &signals.fmus, is_compared);
     plots.add_frames(frames.as_deref().unwrap_or_default());
     let content = page::Content {
         request,
-        columns: &columns,
-        statistics: &statistics,
-        texts: &texts,
+        columns,
+        statistics,
+        flat: flat.iter().flat_map(|(group, _)| &group.members).copied().collect(),
+        events: &read.events,
+        texts,
         left_out,
         frames: frames.as_deref(),
         comparison: compared.as_ref().map(|compared| &compared.comparison),
+        picture: pictures::svg(&name(request.results), &drawn, columns),
     };
     let html = page::render(&content, &plots);
     Ok(Page { html, comparison: compared.take().map(|compared| compared.comparison) })
@@ -260,6 +336,7 @@ struct Read {
     statistics: Vec<Statistics>,
     /// The number of rows.
     rows: usize,
+    events: Events,
     /// Variables that are texts.
     texts: Vec<String>,
     /// Number of variables beyond [`VARIABLES`].
@@ -283,9 +360,10 @@ fn read(view: &View<'_>, request: &Request<'_>) -> Result<Read, Error> {
         let columns: Vec<_> =
             positions.iter().map(|at| with_unit(&table.columns()[*at], request)).collect();
         let mut statistics: Vec<_> = columns.iter().map(statistics::Builder::new).collect();
-        let mut rows = 0;
+        let (mut rows, mut events) = (0, Events::default());
         let visited = view.visit(positions, &mut |time, row| {
             rows += 1;
+            events.push(time);
             statistics.iter_mut().zip(row).for_each(|(built, value)| built.push(time, *value));
         });
         match visited {
@@ -295,6 +373,7 @@ fn read(view: &View<'_>, request: &Request<'_>) -> Result<Read, Error> {
                     statistics: statistics.into_iter().map(statistics::Builder::finish).collect(),
                     columns,
                     rows,
+                    events,
                     texts,
                     left_out: rest.len(),
                 });
@@ -308,6 +387,30 @@ fn read(view: &View<'_>, request: &Request<'_>) -> Result<Read, Error> {
             }
             Err(error) => return Err(error.into()),
         }
+    }
+}
+
+/// The times at which several rows follow each other, as at events.
+#[derive(Default)]
+struct Events {
+    /// The first ones, at most [`MARKS`].
+    times: Vec<f64>,
+    /// The number of all.
+    count: usize,
+    before: Option<f64>,
+    last: Option<f64>,
+}
+
+impl Events {
+    fn push(&mut self, time: f64) {
+        if self.before == Some(time) && self.last != Some(time) {
+            self.last = Some(time);
+            self.count += 1;
+            if self.times.len() < MARKS {
+                self.times.push(time);
+            }
+        }
+        self.before = Some(time);
     }
 }
 

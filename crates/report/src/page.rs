@@ -2,17 +2,18 @@
 
 use std::path::Path;
 
-use figure::interactive::{COLOURS, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, UPLOT_STYLE};
+use figure::interactive::{
+    BASE_STYLE, COLOURS, FOLD, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, UPLOT_STYLE, USAGE,
+};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use results::Column;
 
 use serde::Serialize;
 
-use crate::difference::Comparison;
-use crate::frames::Message;
+use crate::difference::{Comparison, Difference};
 use crate::plots::Plots;
 use crate::statistics::{Basis, Statistics};
-use crate::{Request, Run, graph, identity, listed};
+use crate::{Events, MARKS, Mark, MarkKind, Request, Run, frames, graph, identity, listed};
 
 const STYLE: &str = include_str!("page/page.css");
 const ROWS: &str = include_str!("page/rows.js");
@@ -22,6 +23,8 @@ const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 /// Largest number of connections and of messages that are listed.
 const LISTED: usize = 200;
+/// Largest number of rows of a table that is not folded.
+const OPEN: usize = 10;
 /// The range of all times.
 const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
@@ -29,13 +32,18 @@ pub(crate) struct Content<'a> {
     pub(crate) request: &'a Request<'a>,
     pub(crate) columns: &'a [Column],
     pub(crate) statistics: &'a [Statistics],
+    /// The positions of variables that do not change and have no plot.
+    pub(crate) flat: Vec<usize>,
+    pub(crate) events: &'a Events,
     /// Variables that are texts.
     pub(crate) texts: &'a [String],
     /// Number of variables that are not shown.
     pub(crate) left_out: usize,
     /// The messages of the bus trace, if there is one.
-    pub(crate) frames: Option<&'a [Message]>,
+    pub(crate) frames: Option<&'a [frames::Message]>,
     pub(crate) comparison: Option<&'a Comparison>,
+    /// The first plots, for a reader without JavaScript.
+    pub(crate) picture: String,
 }
 
 /// The data of the scripts.
@@ -43,6 +51,9 @@ pub(crate) struct Content<'a> {
 struct Data<'a> {
     #[serde(flatten)]
     plots: &'a Plots,
+    marks: &'a [Mark],
+    /// The times of events.
+    events: &'a [f64],
     /// The command that writes such a page.
     command: String,
 }
@@ -51,7 +62,9 @@ pub(crate) fn render(content: &Content<'_>, plots: &Plots) -> String {
     let request = content.request;
     let file = request.results.display().to_string();
     let other = request.against.map(|path| path.display().to_string());
-    let data = Data { plots, command: command(request) };
+    let marks = marks(request.run);
+    let events = &content.events.times;
+    let data = Data { plots, marks: &marks, events, command: command(request) };
     let data = serde_json::to_string(&data).unwrap_or_default().replace('<', "\\u003c");
     let document = html! {
         (DOCTYPE)
@@ -62,39 +75,47 @@ pub(crate) fn render(content: &Content<'_>, plots: &Plots) -> String {
                     p.kind { "Report of a run" }
                     h1 { (file) @if let Some(other) = &other { " against " (other) } }
                     @if let Some(run) = request.run { (outcome(run)) }
+                    @if let (Some(comparison), Some(other)) = (content.comparison, &other) { (largest(comparison, other)) }
                     @if request.range != ALL { p { "Rows from t = " (request.range.0) " s to t = " (request.range.1) " s only." } }
                 }
                 main {
                     section aria-labelledby="plots" {
                         h2 #plots { "Plots" }
                         (controls(other.as_deref()))
-                        noscript { p.warned { "The plots need JavaScript; the tables do not." } }
-                        div #figures {}
-                        p.said {
-                            "Drag over a plot to zoom, double-click to show all; all plots have the same time \
-                             axis and cursor. On a touch screen two fingers zoom, a double tap shows all. In a plot, arrow keys move the cursor, + and − zoom, 0 shows all. A \
-                             click on a name hides its curve. The values below a plot are those of the row at the stated time, with all digits; – is an empty cell."
-                            @if content.left_out > 0 {
-                                " " (content.left_out) " more variables of the file are not shown; "
-                                code { "--variables" } " chooses others."
-                            }
-                            @if !content.texts.is_empty() {
-                                " Texts are not shown: " (listed(content.texts, LISTED)) "."
+                        noscript {
+                            p { "Interactive plots need JavaScript; this picture and the tables do not." }
+                            (PreEscaped(&content.picture))
+                        }
+                        div.figures #figures {}
+                        div #more {}
+                        (unchanged(content))
+                        @if content.left_out > 0 {
+                            p { (content.left_out) " more variables of the file are not shown; " code { "--variables" } " chooses others." }
+                        }
+                        @if !content.texts.is_empty() { p { "Texts are not shown: " (listed(content.texts, LISTED)) "." } }
+                        details.said.stays {
+                            summary { "How to zoom, read values and differences, by mouse, keyboard and touch" }
+                            @for sentence in USAGE { p { (sentence) } }
+                            p {
+                                "The values below a plot are those of the row at the stated time, with all digits; – is an empty cell. \
+                                 All plots have the same axis of time. Marks: triangles are changes, faults and messages, the bar at the \
+                                 top is the time of a fault, short lines at the axis are events. Below a plot stands what happened at the cursor."
                             }
                         }
                     }
                     @if let Some(comparison) = content.comparison { (differences(comparison, other.as_deref().unwrap_or_default())) }
+                    (happened(&marks, content.events))
                     (statistics(content))
-                    @if let (Some(messages), Some(file)) = (content.frames, request.bus_trace) { (frames(messages, file)) }
+                    @if let (Some(messages), Some(file)) = (content.frames, request.bus_trace) { (bus_frames(messages, file)) }
                     @if let Some(run) = request.run { (system(run)) (messages(run)) }
                 }
                 footer {
                     p { "Written by aso-ftc " (env!("CARGO_PKG_VERSION")) ". Plots by uPlot." }
-                    details { summary { "Licence of uPlot" } pre { (UPLOT_LICENCE) } }
+                    details.stays { summary { "Licence of uPlot" } pre { (UPLOT_LICENCE) } }
                 }
                 script type="application/json" #data { (PreEscaped(data)) }
                 script { (PreEscaped(UPLOT)) (PreEscaped(LINKED)) }
-                script { (PreEscaped(ROWS)) (PreEscaped(SCRIPT)) }
+                script { (PreEscaped(FOLD)) (PreEscaped(ROWS)) (PreEscaped(SCRIPT)) }
             }
         }
     };
@@ -111,7 +132,7 @@ fn head(file: &str, request: &Request<'_>) -> Markup {
             meta name="generator" content=(identity(request.results));
             title { (file) ", report" }
             style {
-                @for text in [UPLOT_STYLE, COLOURS, STYLE, LINKED_STYLE] { (PreEscaped(text)) }
+                @for text in [UPLOT_STYLE, COLOURS, BASE_STYLE, LINKED_STYLE, STYLE] { (PreEscaped(text)) }
             }
         }
     }
@@ -120,12 +141,111 @@ fn head(file: &str, request: &Request<'_>) -> Markup {
 fn outcome(run: &Run) -> Markup {
     html! {
         p.outcome.failed[run.failed] role="status" { (run.outcome) }
+        @if !run.messages.is_empty() {
+            p { a href="#messages" { (run.messages.len()) " warnings and errors" } }
+        }
+    }
+}
+
+/// The answer to the question how much two runs differ.
+fn largest(comparison: &Comparison, other: &str) -> Markup {
+    html! {
+        @if comparison.is_equal() {
+            p.outcome { "All " (comparison.differences.len()) " common variables are equal in all " (comparison.rows) " common rows." }
+        } @else if let Some(largest) = comparison.differences.first() {
+            p.outcome.warned {
+                "The largest difference to " (other) ", relative to the range, is that of " strong { (largest.name) } ": " (short(largest.largest))
+                " at t = " (short(largest.at)) " s, " (short(100.0 * largest.relative)) " % of its range. The plots start with the largest difference."
+            }
+        }
+    }
+}
+
+/// All marks in the order of their times: of the scenario, and messages with a time.
+fn marks(run: Option<&Run>) -> Vec<Mark> {
+    let Some(run) = run else { return Vec::new() };
+    let messages = run.messages.iter().filter_map(|message| {
+        let (kind, text) = (MarkKind::Message, message.text.clone());
+        Some(Mark { kind, time: message.time?, end: None, text })
+    });
+    let mut marks: Vec<Mark> =
+        run.marks.iter().take(MARKS).cloned().chain(messages.take(MARKS)).collect();
+    marks.sort_by(|one, other| one.time.total_cmp(&other.time));
+    marks
+}
+
+/// A table that is folded if it has many rows.
+fn folded(count: usize, summary: &str, table: &Markup) -> Markup {
+    html! { details open[count <= OPEN] { summary { (summary) } (table) } }
+}
+
+fn happened(marks: &[Mark], events: &Events) -> Markup {
+    let table = html! {
+        div.scroll tabindex="0" role="region" aria-labelledby="happened" {
+            table {
+                thead { tr { th.number scope="col" { "t in s" } th scope="col" { "kind" } th scope="col" { "what" } } }
+                tbody {
+                    @for mark in marks.iter().take(LISTED) {
+                        tr {
+                            td.number title=(mark.time) { (short(mark.time)) }
+                            td { (mark.kind.name()) }
+                            th scope="row" { (mark.text) }
+                        }
+                    }
+                }
+            }
+        }
+    };
+    html! {
+        @if !marks.is_empty() || events.count > 0 {
+            section aria-labelledby="happened" {
+                h2 #happened { "What happened when" }
+                @if !marks.is_empty() {
+                    (folded(marks.len(), &format!("{} marks on the axis of time", marks.len()), &table))
+                    @if marks.len() > LISTED { p { "and " (marks.len() - LISTED) " more, in the plots." } }
+                }
+                @if events.count > 0 {
+                    p {
+                        "At " (events.count) @if events.count == 1 { " instant" } @else { " instants" } " the file has several rows, as at events."
+                        @if events.count > events.times.len() { " The plots mark the first " (events.times.len()) "." }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The variables that keep one value.
+fn unchanged(content: &Content<'_>) -> Markup {
+    let count = content.flat.len();
+    html! {
+        @if count > 0 {
+            details #unchanged {
+                summary { (count) @if count == 1 { " signal does" } @else { " signals do" } " not change" }
+                div.scroll tabindex="0" role="region" aria-label="Signals that do not change" {
+                    table {
+                        thead { tr { th scope="col" { "variable" } th.number scope="col" { "value" } th scope="col" { "unit" } } }
+                        tbody {
+                            @for at in &content.flat {
+                                tr {
+                                    th scope="row" { (content.columns[*at].name) }
+                                    (number(content.statistics[*at].first))
+                                    td { (content.columns[*at].unit.as_deref().unwrap_or_default()) }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
     }
 }
 
 fn controls(other: Option<&str>) -> Markup {
     html! {
         form #controls {
+            label { "signals " input #filter type="search" placeholder="filter by name" autocomplete="off"; }
+            span.said #found role="status" {}
             label { "from " input #from type="number" step="any"; " s" }
             label { "to " input #to type="number" step="any"; " s" }
             button type="submit" { "Show" }
@@ -186,9 +306,7 @@ fn basis(statistics: &Statistics) -> String {
 
 fn statistics(content: &Content<'_>) -> Markup {
     let rows = content.columns.iter().zip(content.statistics);
-    html! {
-        section aria-labelledby="statistics" {
-            h2 #statistics { "Statistics" }
+    let table = html! {
             div.scroll tabindex="0" role="region" aria-labelledby="statistics" {
                 table {
                     thead {
@@ -216,6 +334,11 @@ fn statistics(content: &Content<'_>) -> Markup {
                     }
                 }
             }
+    };
+    html! {
+        section aria-labelledby="statistics" {
+            h2 #statistics { "Statistics" }
+            (folded(content.columns.len(), &format!("First, last, smallest and largest values, mean and rms of {} variables", content.columns.len()), &table))
             p.said {
                 "Over time: integrals by the trapezoidal rule (integers and Booleans are held), divided by the length of the run. Over values, if some \
                  rows have none: each value has the same weight."
@@ -224,7 +347,7 @@ fn statistics(content: &Content<'_>) -> Markup {
     }
 }
 
-fn frames(messages: &[Message], file: &Path) -> Markup {
+fn bus_frames(messages: &[frames::Message], file: &Path) -> Markup {
     html! {
         section aria-labelledby="frames" {
             h2 #frames { "Frames on the bus" }
@@ -267,19 +390,35 @@ fn differences(comparison: &Comparison, other: &str) -> Markup {
             .map_or_else(String::new, |first| format!("{}{}", first.to_uppercase(), signs.as_str()))
     };
     let uncompared = comparison.uncompared("this run", other, LISTED);
+    let count = comparison.differences.len();
+    let (largest, rest) = comparison.differences.split_at(count.min(OPEN));
     html! {
         section aria-labelledby="differences" {
             h2 #differences { "Difference to " (other) }
-            @if comparison.is_equal() {
-                p.outcome { "All " (comparison.differences.len()) " common variables are equal in all " (comparison.rows) " common rows." }
-            }
             @if !uncompared.is_empty() {
                 div.outcome.failed {
                     "Not compared:"
                     ul { @for sentence in uncompared { li { (capitalised(sentence)) "." } } }
                 }
             }
-            div.scroll tabindex="0" role="region" aria-labelledby="differences" {
+            (difference_table("The largest differences", largest))
+            @if !rest.is_empty() {
+                details {
+                    summary { (rest.len()) " smaller differences" }
+                    (difference_table("Smaller differences", rest))
+                }
+            }
+            p.said {
+                "This run minus the other one, at the rows of this run; between its rows the other one is interpolated \
+                 linearly, integers and Booleans are held. The rms is over the rows at which one of the runs has a value."
+            }
+        }
+    }
+}
+
+fn difference_table(name: &str, differences: &[Difference]) -> Markup {
+    html! {
+            div.scroll tabindex="0" role="region" aria-label=(name) {
                 table {
                     thead {
                         tr {
@@ -290,7 +429,7 @@ fn differences(comparison: &Comparison, other: &str) -> Markup {
                         }
                     }
                     tbody {
-                        @for difference in &comparison.differences {
+                        @for difference in differences {
                             tr {
                                 th scope="row" { (difference.name) }
                                 @for value in [difference.largest, difference.at, difference.rms, difference.relative] { (number(value)) }
@@ -300,11 +439,6 @@ fn differences(comparison: &Comparison, other: &str) -> Markup {
                     }
                 }
             }
-            p.said {
-                "This run minus the other one, at the rows of this run; between its rows the other one is interpolated \
-                 linearly, integers and Booleans are held. The rms is over the rows at which one of the runs has a value."
-            }
-        }
     }
 }
 
@@ -335,7 +469,7 @@ fn messages(run: &Run) -> Markup {
         section aria-labelledby="messages" {
             h2 #messages { "Warnings and errors" }
             @if run.messages.is_empty() { p { "None." } }
-            ul { @for message in run.messages.iter().take(LISTED) { li { (message) } } }
+            ul { @for message in run.messages.iter().take(LISTED) { li { (message.text) } } }
             @if run.messages.len() > LISTED { p { "and " (run.messages.len() - LISTED) " more." } }
         }
     }

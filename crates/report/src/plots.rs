@@ -1,4 +1,4 @@
-//! The plots of a page: variables grouped by unit and size, and the rows that each plot has.
+//! The plots of a page: variables grouped by FMU, unit and size, and the rows that each plot has.
 
 use results::Column;
 use serde::Serialize;
@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::columns::Columns;
 use crate::frames::Message;
 use crate::samples::{Collector, Samples};
+use crate::signals::{Rank, Signals};
 use crate::statistics::Statistics;
 
 /// Largest number of curves in a plot: the number of colours.
@@ -16,9 +17,15 @@ const VALUES: usize = 2_000_000;
 const BLOCKS: usize = 300;
 /// Largest ratio of the sizes of two curves in a plot: more, and the smaller one is a line.
 const RATIO: f64 = 30.0;
+/// Largest number of plots that are not folded.
+const SHOWN: usize = 6;
 
-/// Variables with the same unit and similar size, which share a plot.
+/// Variables of an FMU with the same unit and similar size, which share a plot.
 pub(crate) struct Group {
+    /// How soon the first of its variables is shown, and the position of its FMU.
+    key: (Rank, usize),
+    /// Whether no variable changes.
+    pub(crate) is_flat: bool,
     unit: String,
     /// Their positions among the columns.
     pub(crate) members: Vec<usize>,
@@ -29,9 +36,23 @@ pub(crate) struct Group {
 }
 
 impl Group {
-    fn takes(&self, unit: &str, size: f64) -> bool {
-        let ratio = size.max(self.size) / size.min(self.size);
-        self.unit == unit && self.members.len() < CURVES && (ratio <= RATIO || ratio.is_nan())
+    pub(crate) fn unit(&self) -> &str {
+        &self.unit
+    }
+
+    /// Whether it is one of those that are shown first.
+    fn is_first(&self) -> bool {
+        self.key.0 < Rank::Other
+    }
+
+    /// Whether this group has room for a variable of the group `other`.
+    fn takes(&self, other: &Self) -> bool {
+        let ratio = other.size.max(self.size) / other.size.min(self.size);
+        (self.is_first(), self.key.1) == (other.is_first(), other.key.1)
+            && self.is_flat == other.is_flat
+            && self.unit == other.unit
+            && self.members.len() < CURVES
+            && (ratio <= RATIO || ratio.is_nan())
     }
 }
 
@@ -39,20 +60,31 @@ impl Group {
 pub(crate) fn groups(
     columns: &[Column],
     statistics: &[Statistics],
+    signals: &Signals,
     rows: usize,
     is_paired: bool,
 ) -> Vec<Group> {
+    let is_flat = |one: &Statistics| one.smallest.0 >= one.largest.0 && one.not_finite == 0;
     let mut groups: Vec<Group> = Vec::new();
     for (at, (column, statistics)) in columns.iter().zip(statistics).enumerate() {
-        let unit = column.unit.clone().unwrap_or_default();
-        let size = statistics.smallest.0.abs().max(statistics.largest.0.abs());
-        match groups.iter_mut().find(|group| group.takes(&unit, size)) {
-            Some(group) => group.members.push(at),
-            None => groups.push(Group { unit, members: vec![at], size, block: 1 }),
+        let alone = Group {
+            key: (signals.ranks[at], signals.fmu[at]),
+            is_flat: is_flat(statistics),
+            unit: column.unit.clone().unwrap_or_default(),
+            members: vec![at],
+            size: statistics.smallest.0.abs().max(statistics.largest.0.abs()),
+            block: 1,
+        };
+        match groups.iter_mut().find(|group| group.takes(&alone)) {
+            Some(group) => {
+                group.key = group.key.min(alone.key);
+                group.members.push(at);
+            }
+            None => groups.push(alone),
         }
     }
+    groups.sort_by_key(|group| group.key);
     let runs = if is_paired { 2 } else { 1 };
-    let is_flat = |one: &Statistics| one.smallest.0 >= one.largest.0 && one.not_finite == 0;
     let flat = statistics.iter().filter(|one| is_flat(one)).count();
     // Columns that do not vary need memory in the browser only.
     let share = VALUES / (runs * (statistics.len() - flat) + flat / 32).max(1);
@@ -88,7 +120,11 @@ struct Grid {
 
 #[derive(Serialize)]
 struct Plot {
+    /// The FMU of the variables; empty if there is none.
+    fmu: String,
     unit: String,
+    /// Whether it is not folded.
+    shown: bool,
     grid: usize,
     curves: Vec<Curve>,
 }
@@ -107,16 +143,33 @@ struct Curve {
 }
 
 impl Plots {
-    /// Adds the plot of a group. `samples` has the columns of this run, then those of the other one;
-    /// `is_compared` says which variables the other one has.
-    pub(crate) fn add(
+    /// Adds the plots of the groups. The samples of each have the columns of this run, then those of the other one;
+    /// `is_compared` says which variables the other one has. The first plots are not folded: of the variables that
+    /// are shown first, or of any if there are none of these.
+    pub(crate) fn add_all(
+        &mut self,
+        groups: &[(&Group, &Samples)],
+        columns: &[Column],
+        fmus: &[String],
+        is_compared: &[bool],
+    ) {
+        let has_first = groups.iter().any(|(group, _)| group.is_first());
+        for (group, samples) in groups {
+            let curves = self.curves(group, samples, columns, is_compared);
+            let grid = self.grid(samples);
+            let shown = self.all.len() < SHOWN && (group.is_first() || !has_first);
+            let (fmu, unit) = (fmus[group.key.1].clone(), group.unit.clone());
+            self.all.push(Plot { fmu, unit, shown, grid, curves });
+        }
+    }
+
+    fn curves(
         &mut self,
         group: &Group,
         samples: &Samples,
         columns: &[Column],
         is_compared: &[bool],
-    ) {
-        let grid = self.grid(samples);
+    ) -> Vec<Curve> {
         let count = group.members.len();
         let curves = group.members.iter().enumerate().map(|(place, at)| {
             let other = is_compared.get(*at).is_some_and(|is_compared| *is_compared);
@@ -129,8 +182,7 @@ impl Plots {
                 other: other.map(|values| self.columns.add(values)),
             }
         });
-        let curves = curves.collect();
-        self.all.push(Plot { unit: group.unit.clone(), grid, curves });
+        curves.collect()
     }
 
     /// Adds the plots of the times between the frames of each message.
@@ -147,7 +199,9 @@ impl Plots {
                 other: None,
             });
             let curves = curves.collect();
-            self.all.push(Plot { unit: "ms since the frame before".to_owned(), grid, curves });
+            let unit = "ms since the frame before".to_owned();
+            let shown = self.all.len() < SHOWN + 1;
+            self.all.push(Plot { fmu: "Frames on the bus".to_owned(), unit, shown, grid, curves });
         }
     }
 

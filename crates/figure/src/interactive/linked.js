@@ -79,10 +79,13 @@ class LinkedAxis {
     Object.assign(this, { name, label, short, isLogarithmic, common: whole, changed });
     this.range = null;
     this.plots = new Set();
+    this.heights = new Map(); /* by plot: the range of its vertical axis, if it is zoomed */
+    this.second = null; /* the place of the second cursor */
   }
 
-  /* Shows a range in all plots; null: everything. */
+  /* Shows a range in all plots; null: everything, and the whole vertical axes. */
   show(range) {
+    if (range === null) this.heights.clear();
     if (range !== null && !(range[1] - range[0] > 1e-12 * Math.max(...range.map(Math.abs)))) return;
     this.range = range;
     for (const plot of this.plots) this.apply(plot);
@@ -116,13 +119,61 @@ class LinkedAxis {
     return [low, high].map((end) => from(middle + (end - middle) * size + by * (high - low)));
   }
 
+  /* Zooms the vertical axis of a plot; null: all values. */
+  showVertical(plot, range) {
+    if (range === null) this.heights.delete(plot);
+    else if (range[1] - range[0] > 1e-12 * Math.max(...range.map(Math.abs))) this.heights.set(plot, range);
+    this.apply(plot);
+  }
+
+  /* Moves the vertical range of a plot by a part of its length, and scales it about `at`, by default its middle. */
+  moveVertical(plot, by, size, at = null) {
+    const { min, max, distr } = plot.scales.y;
+    const [to, from] = distr === 3 ? [Math.log10, (value) => 10 ** value] : [Number, Number];
+    const [low, high] = [min, max].map(to);
+    const middle = at === null ? (low + high) / 2 : to(at);
+    this.showVertical(plot, [low, high].map((end) => from(middle + (end - middle) * size + by * (high - low))));
+  }
+
+  /* Puts the second cursor of all plots at a place, from where the legends state differences; null: removes it. */
+  setSecond(at) {
+    this.second = at;
+    for (const plot of this.plots) {
+      plot.root.classList.toggle("has-second", at !== null);
+      plot.redraw(false);
+      this.write(plot);
+    }
+  }
+
+  /* Puts the second cursor at the cursor of a plot, or removes it from there. */
+  toggleSecond(plot) {
+    const at = this.readingPlace(plot);
+    if (at === null) return;
+    const isThere = this.second !== null && 3 > Math.abs(plot.valToPos(at, "x") - plot.valToPos(this.second, "x"));
+    this.setSecond(isThere ? null : at);
+  }
+
+  /* The place whose values the legend of a plot shows; null without a cursor. */
+  readingPlace(plot) {
+    const { idx } = plot.cursor;
+    return idx === null || idx === undefined ? null : plot.data[0][idx];
+  }
+
+  /* Writes the legend of a plot again. */
+  write(plot) {
+    plot.setLegend({ idxs: plot.cursor.idxs }, false);
+  }
+
   remove(plot) {
     this.plots.delete(plot);
+    this.heights.delete(plot);
     plot.destroy();
   }
 
   /* Draws a plot into an element. `data`: the places, then the values of each curve; null is a gap, undefined is
-     bridged. `curves`: name, colour, and optionally width, dash, `holds`, `dots`. `marks`: `x` or `y`, colour, dash.
+     bridged. `curves`: name, colour, and optionally width, dash, `holds`, `dots`. `marks`: `x` or `y`, colour, dash;
+     with `flag` a mark at `x` has a triangle at the top, with `end` it has a bar up to there, and with `tick` it is a
+     short line at the axis.
      `scale` enlarges lines and text, for a picture that is shown smaller. `reader` is for data that are thinned: its
      function `text` returns what the legend shows of a curve (0: the place), `points` the indices of points that are
      drawn without a line, `isLine` whether lines are drawn, and `follow` is called when the cursor moves. */
@@ -140,8 +191,13 @@ class LinkedAxis {
         splits: (self, index, low, high) => ticks.places(low, high, most(self), isLog),
         values: (self, places) => ticks.labels(places, ...ends(self), most(self), isLog) };
     };
+    const second = (self, curve) => {
+      const index = self.valToIdx(this.second);
+      return self.data[curve][curve === 0 ? index : closest(self, curve, index)];
+    };
     const cell = reader === null
-      ? (self, value) => (value === null || value === undefined ? "–" : write(value))
+      ? (self, value, curve) => (value === null || value === undefined
+        ? "–" : write(value) + (this.second === null ? "" : difference(value, second(self, curve))))
       : (self, value, curve) => reader.text(self, curve);
     const line = ({ dots, holds }) => {
       if (dots) return () => null;
@@ -154,7 +210,7 @@ class LinkedAxis {
       padding: [8 * scale, 12 * scale, 0, 0],
       scales: {
         x: { time: false, distr: this.isLogarithmic ? 3 : 1, range: (self, low, high) => [low, high] },
-        y: { distr: isLogarithmic ? 3 : 1, range: (self, low, high) => this.vertical(low, high, isLogarithmic, fromZero, self) },
+        y: { distr: isLogarithmic ? 3 : 1, range: (self, low, high) => this.heights.get(self) ?? this.vertical(low, high, isLogarithmic, fromZero, self) },
       },
       axes: [
         { ...axis(true, this.isLogarithmic), label: this.label, labelSize: 20 * scale, size: 30 * scale },
@@ -164,7 +220,7 @@ class LinkedAxis {
       cursor: {
         y: false,
         sync: { key: this.name, setSeries: false, filters: { pub: (kind) => ["mousemove", "mouseleave"].includes(kind) } },
-        drag: { x: true, y: false, setScale: false, dist: 3 },
+        drag: { x: true, y: true, uni: 40, setScale: false, dist: 3 },
         bind: { dblclick: () => () => this.show(null) },
         move: (self, left, top) => (left > self.over.clientWidth + 1 ? [-10, -10] : [left, top]),
         ...(reader === null ? { dataIdx: closest } : { points: { show: false } }),
@@ -185,19 +241,28 @@ class LinkedAxis {
         })),
       ],
       hooks: {
-        drawAxes: [(self) => drawMarks(self, marks, scale)],
+        drawAxes: [(self) => {
+          drawMarks(self, marks, scale);
+          if (this.second !== null) drawMarks(self, [{ x: this.second, colour: "--text", dash: [6, 3] }], scale);
+        }],
         setCursor: reader === null ? [] : [reader.follow],
         setSelect: [(self) => {
-          const { left, width } = self.select;
-          if (width > 2) this.show([left, left + width].map((place) => self.posToVal(place, "x")));
-          self.setSelect({ left: 0, width: 0 }, false);
+          const { left, top, width, height } = self.select;
+          /* A drag along one axis selects all of the other one. */
+          const isWide = width > 2 && self.over.clientWidth > width + 1;
+          const isHigh = height > 2 && self.over.clientHeight > height + 1;
+          if (isHigh) this.showVertical(self, [top + height, top].map((place) => self.posToVal(place, "y")));
+          if (isWide) this.show([left, left + width].map((place) => self.posToVal(place, "x")));
+          self.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
         }],
       },
     };
     const plot = new uPlot(options, data, element);
     this.plots.add(plot);
     this.apply(plot);
+    plot.root.classList.toggle("has-second", this.second !== null);
     this.keys(plot, name);
+    this.mouse(plot);
     const [to, from] = this.scale();
     zoomByTouch(plot.over, {
       ends: () => [plot.scales.x.min, plot.scales.x.max].map(to),
@@ -232,13 +297,31 @@ class LinkedAxis {
     return Math.ceil(widest / devicePixelRatio) + axis.ticks.size + axis.gap;
   }
 
-  /* Arrow keys move the cursor, plus and minus zoom, 0 shows everything. */
+  /* A click puts the second cursor; the wheel zooms the vertical axis while Shift is held. */
+  mouse(plot) {
+    const { over } = plot;
+    let pressed = null;
+    over.addEventListener("mousedown", (event) => { pressed = event; });
+    over.addEventListener("click", (event) => {
+      const isDrag = pressed === null || Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY) > 3;
+      if (event.pointerType !== "touch" && !isDrag) this.toggleSecond(plot);
+    });
+    over.addEventListener("wheel", (event) => {
+      if (!event.shiftKey) return;
+      event.preventDefault();
+      const at = plot.posToVal(event.clientY - over.getBoundingClientRect().top, "y");
+      this.moveVertical(plot, 0, (event.deltaY || event.deltaX) > 0 ? 1.25 : 0.8, at);
+    }, { passive: false });
+  }
+
+  /* Left and right move the cursor, plus and minus zoom, up and down zoom the vertical axis and with Shift move it, 0
+     shows everything, the space bar puts the second cursor, Escape removes it. */
   keys(plot, name) {
     const { root } = plot;
     root.tabIndex = 0;
     root.setAttribute("role", "group");
     root.setAttribute("aria-label", name);
-    root.setAttribute("aria-keyshortcuts", "ArrowLeft ArrowRight Shift+ArrowLeft Shift+ArrowRight Plus - 0");
+    root.setAttribute("aria-keyshortcuts", "ArrowLeft ArrowRight Shift+ArrowLeft Shift+ArrowRight Plus - ArrowUp ArrowDown Shift+ArrowUp Shift+ArrowDown 0 Space Escape");
     const legend = root.querySelector(".u-legend");
     root.addEventListener("blur", () => {
       legend.removeAttribute("aria-live");
@@ -248,8 +331,13 @@ class LinkedAxis {
       if (event.target !== root || event.ctrlKey || event.altKey || event.metaKey) return;
       const way = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
       const size = { "+": 0.5, "=": 0.5, "-": 2 }[event.key];
+      const up = { ArrowUp: 1, ArrowDown: -1 }[event.key];
       if (way !== undefined) this.step(plot, way * (event.shiftKey ? 0.05 : 0.005));
       else if (size !== undefined) this.zoomAbout(plot, size);
+      else if (up !== undefined && event.shiftKey) this.moveVertical(plot, 0.1 * up, 1);
+      else if (up !== undefined) this.moveVertical(plot, 0, up > 0 ? 0.8 : 1.25);
+      else if (event.key === " ") this.toggleSecond(plot);
+      else if (event.key === "Escape") this.setSecond(null);
       else if (event.key === "0") this.show(null);
       else return;
       event.preventDefault();
@@ -307,7 +395,13 @@ function closest(self, curve, index) {
   return index;
 }
 
-/* Draws vertical lines at `x` and horizontal ones at `y`. */
+/* The difference of a value to that at the second cursor, for a legend. */
+function difference(value, other) {
+  const text = Number.isFinite(value - other) ? String(Number((value - other).toPrecision(6))) : "–";
+  return ` (Δ ${text})`;
+}
+
+/* Draws vertical marks at `x` and horizontal lines at `y`. */
 function drawMarks({ ctx, bbox, valToPos }, marks, scale) {
   const ratio = devicePixelRatio * scale;
   ctx.save();
@@ -316,12 +410,20 @@ function drawMarks({ ctx, bbox, valToPos }, marks, scale) {
   ctx.clip();
   ctx.lineWidth = 1.4 * ratio;
   for (const mark of marks) {
-    ctx.strokeStyle = colour(mark.colour);
+    ctx.strokeStyle = ctx.fillStyle = colour(mark.colour);
     ctx.setLineDash((mark.dash ?? []).map((length) => length * ratio));
     ctx.beginPath();
     if (mark.x !== undefined) {
       const x = valToPos(mark.x, "x", true);
-      ctx.moveTo(x, bbox.top);
+      if (mark.end !== undefined) ctx.fillRect(x, bbox.top, valToPos(mark.end, "x", true) - x, 4 * ratio);
+      if (mark.flag) {
+        ctx.moveTo(x - 5 * ratio, bbox.top);
+        ctx.lineTo(x + 5 * ratio, bbox.top);
+        ctx.lineTo(x, bbox.top + 8 * ratio);
+        ctx.fill();
+        ctx.beginPath();
+      }
+      ctx.moveTo(x, mark.tick ? bbox.top + bbox.height - 7 * ratio : bbox.top);
       ctx.lineTo(x, bbox.top + bbox.height);
     } else {
       const y = valToPos(mark.y, "y", true);

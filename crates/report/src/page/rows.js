@@ -107,12 +107,16 @@ class RowAxis extends LinkedAxis {
       mark.style.background = colour(options.curves[k].colour);
       return mark;
     });
-    const state = { rows, marks, drawn: [], isNear: true, isStale: false };
-    const text = (value) => (value === undefined || Number.isNaN(value) ? "–" : String(value));
+    const state = { rows, marks, drawn: [], isNear: true, isStale: false, followed: options.followed };
+    const text = (list, row) => {
+      const value = list[row];
+      if (value === undefined || Number.isNaN(value)) return "–";
+      return String(value) + (this.second === null ? "" : difference(value, list[this.secondRow(rows)]));
+    };
     const isAlone = (values, row) => !Number.isFinite(values[row - 1]) && !Number.isFinite(values[row + 1]);
     const isLine = (self) => isComplete || !this.isSparse(self, state);
     const plot = this.plot(element, [[], ...curves.map(() => [])], { ...options, reader: {
-      text: (self, k) => text((k === 0 ? rows.time : curves[k - 1])[this.row(self, state)]),
+      text: (self, k) => text(k === 0 ? rows.time : curves[k - 1], this.row(self, state)),
       /* Values without neighbours have no line. Where rows are missing, lines would invent shapes. */
       points: (self, k) => {
         const values = curves[k - 1];
@@ -171,6 +175,25 @@ class RowAxis extends LinkedAxis {
     return isThere ? target.row : rows.closest(plot.posToVal(left, "x"));
   }
 
+  /* The time of the row at the cursor; of rows with the same time, as at an event, the second cursor keeps the row. */
+  readingPlace(plot) {
+    const state = this.states.get(plot);
+    const row = this.row(plot, state);
+    if (row < 0) return null;
+    this.secondTarget = { time: state.rows.time, row };
+    return state.rows.time[row];
+  }
+
+  /* The row at the second cursor. */
+  secondRow(rows) {
+    const { time, row } = this.secondTarget;
+    return time === rows.time && time[row] === this.second ? row : rows.closest(this.second);
+  }
+
+  write(plot) {
+    this.follow(plot, this.states.get(plot));
+  }
+
   /* The range of the vertical axis; if no row is in the range of time, that of the rows beside it. */
   vertical(low, high, isLogarithmic, fromZero, plot) {
     if (low !== null && low !== undefined) return super.vertical(low, high, isLogarithmic, fromZero);
@@ -192,6 +215,7 @@ class RowAxis extends LinkedAxis {
       if (isShown) mark.style.translate = `${plot.valToPos(time[row], "x")}px ${plot.valToPos(value, "y")}px`;
     });
     plot.setLegend({ idx: row >= 0 ? plot.cursor.idx ?? 0 : null }, false);
+    state.followed?.(plot, row >= 0 ? time[row] : null);
   }
 
   /* Moves the cursor by a part of the range, but at least to the next row. */
