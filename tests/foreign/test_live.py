@@ -107,7 +107,7 @@ def test_a_watched_run_keeps_its_bits(aso_ftc, tmp_path):
     assert aso_ftc("run", *FMUS, "--out", tmp_path / "free", *options).returncode == 0
     with live(tmp_path / "seen", *options) as run:
         assert run.state()["phase"] == "paused"
-        for name in ["", "colours.css", "page.css", "page.js", "uPlot.css", "uPlot.js", "zoom.js", "facts"]:
+        for name in ["", "page.css", "page.js", "plots.js", "facts"]:
             assert run.ask(name)[0] == 200
         run.do("continue")
         seen = []
@@ -563,9 +563,11 @@ def test_the_page_shows_the_run_and_all_controls_work(aso_ftc, tmp_path):
         page.evaluate(click.format("step"))
         page.until("document.body.dataset.time === '0.001'")
         page.evaluate(
-            "document.getElementById('set-variable').value = 'plant.F_c'; document.getElementById('set-value').value = '12.5';"
-            "document.querySelector('#set button').click()"
+            "document.getElementById('set-variable').value = 'plant.F_c';"
+            "document.getElementById('set-variable').dispatchEvent(new Event('input'));"
         )
+        page.until("document.getElementById('set-now').textContent === 'Present value: 25 N'")
+        page.evaluate("document.getElementById('set-value').value = '12.5'; document.querySelector('#set button').click()")
         page.until("document.getElementById('interventions').childElementCount === 1")
         assert "takes effect at t = 0.002 s" in page.evaluate(text.format("answer"))
         page.evaluate(click.format("hold"))
@@ -574,17 +576,21 @@ def test_the_page_shows_the_run_and_all_controls_work(aso_ftc, tmp_path):
             "document.getElementById('fault-input').value = 'controller.theta';"
             "document.getElementById('fault-kind').value = 'noise';"
             "document.getElementById('fault-kind').dispatchEvent(new Event('change'));"
-            "document.getElementById('fault-members').value = 'deviation = 1e-5'; document.querySelector('#fault button').click()"
+            "document.getElementById('fault-deviation').value = '1e-5'; document.getElementById('fault-until').value = '59';"
+            "document.querySelector('#fault button').click()"
         )
         page.until("document.getElementById('interventions').childElementCount === 2")
-        page.evaluate("document.getElementById('fault-members').value = 'nonsense'; document.querySelector('#fault button').click()")
+        page.evaluate("document.getElementById('fault-deviation').value = 'nonsense'; document.querySelector('#fault button').click()")
         page.until("document.getElementById('answer').classList.contains('failed')")
         page.evaluate(
             "document.getElementById('text').value = '[[set]]\\nvariable = \"controller.compensate\"\\nvalue = true';"
             "document.querySelector('#entries button').click()"
         )
         page.until("document.getElementById('interventions').childElementCount === 3")
-        page.evaluate("document.querySelectorAll('#signals input')[6].click()")
+        page.until("document.getElementById('set-now').textContent === 'Present value: 12.5 N'")
+        names = "[...document.querySelectorAll('#signals input:checked')].map((box) => box.parentElement.dataset.name)"
+        assert set(page.evaluate(names)) == {"plant.x_p", "plant.theta", "controller.u"}, "the outputs that are connected"
+        page.evaluate("document.querySelector('[data-name=\"plant.f_fric\"] input').click()")
         page.until("document.querySelectorAll('#figures .uplot').length >= 2")
         page.until("document.getElementById('values').textContent.includes('plant.f_fric = ')")
         assert page.evaluate("document.querySelector('canvas').width") > 100
@@ -604,3 +610,56 @@ def test_the_page_shows_the_run_and_all_controls_work(aso_ftc, tmp_path):
     assert done.returncode == 0, done.stderr
     own, again = ((tmp_path / "run" / f"{name}.csv").read_bytes() for name in ("results", "repeat"))
     assert again.startswith(own) and own.count(b"\n") > 500
+
+
+class Tunnel:
+    """A way to the page that can be broken and mended."""
+
+    def __init__(self, target):
+        self.target, self.listener = target, socket.create_server(("127.0.0.1", 0))
+        self.port = self.listener.getsockname()[1]
+        self.is_broken = False
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    def accept(self):
+        """Passes on one connection after the other, or closes it."""
+        while True:
+            try:
+                here, _ = self.listener.accept()
+            except OSError:
+                return
+            if self.is_broken:
+                here.close()
+                continue
+            there = socket.create_connection(("127.0.0.1", self.target))
+            for source, sink in ((here, there), (there, here)):
+                threading.Thread(target=self.copy, args=(source, sink), daemon=True).start()
+
+    def copy(self, source, sink):
+        """Passes on bytes; `Host` and `Origin` get the port of the server."""
+        try:
+            while data := source.recv(65536):
+                sink.sendall(data.replace(b":%d" % self.port, b":%d" % self.target))
+            sink.shutdown(socket.SHUT_WR)
+        except OSError:
+            pass
+
+
+@pytest.mark.skipif(not CHROMIUM, reason="no Chromium is installed")
+def test_a_broken_tunnel_is_stated_and_the_page_goes_on_when_it_is_mended(tmp_path):
+    with live(tmp_path / "run", "--stop-time", 1000, "--real-time=1", start="--live") as run, browser(tmp_path / "profile") as page:
+        tunnel = Tunnel(run.port)
+        page.open(f"http://127.0.0.1:{tunnel.port}{run.root}")
+        page.until("Number(document.body.dataset.time) > 0.5")
+        tunnel.is_broken = True
+        page.until("!document.getElementById('lost').hidden")
+        assert re.search(r"No answer since \d+:\d\d:\d\d", page.evaluate("document.getElementById('lost').textContent"))
+        assert page.evaluate("document.getElementById('hold').disabled")
+        before = page.evaluate("Number(document.body.dataset.time)")
+        time.sleep(5)  # more than eleven questions, each 200 ms after the one before, took
+        assert page.evaluate("Number(document.body.dataset.time)") == before
+        tunnel.is_broken = False
+        page.until(f"Number(document.body.dataset.time) > {before + 4}")
+        assert page.evaluate("document.getElementById('lost').hidden && !document.getElementById('hold').disabled")
+        page.evaluate("document.getElementById('hold').click()")
+        page.until("document.body.dataset.phase === 'paused'")

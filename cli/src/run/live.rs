@@ -77,7 +77,9 @@ impl Live {
         let file = results.with_file_name(file);
         let shown = shown(&file, here);
         let repeat = repeat_command(&shown);
-        let probe = probe(run, ports)?;
+        let settable = settable(run.simulation.system());
+        let unrecorded = settable.iter().filter(|port| !ports.contains(port));
+        let probe = probe(run, &ports.iter().chain(unrecorded).copied().collect::<Vec<_>>())?;
         let system = run.simulation.system();
         let facts = Facts {
             subject: Subject::Run,
@@ -91,7 +93,7 @@ impl Live {
             stop,
             pace,
             signals: probe.names().iter().filter_map(|name| named(system, name)).collect(),
-            settings: settings(system),
+            settings: settable.iter().map(|port| variable(system, *port)).collect(),
             inputs: inputs(system),
             file: shown,
             repeat,
@@ -288,7 +290,7 @@ fn repeat_command(file: &str) -> String {
     format!("{} run {}", quoted(&command), quoted(file))
 }
 
-/// Returns a probe of the recorded variables that can be read.
+/// Returns a probe of the variables that can be read: those that are recorded, then those that can be set.
 fn probe(run: &mut Run, ports: &[Port]) -> anyhow::Result<Probe> {
     let time = run.simulation.time();
     let system = run.simulation.system();
@@ -315,15 +317,12 @@ fn variable(system: &System, port: Port) -> Variable {
 }
 
 /// Returns the inputs without a connection and the tunable parameters.
-fn settings(system: &System) -> Vec<Variable> {
+fn settable(system: &System) -> Vec<Port> {
     let inputs = system.ports(Causality::Input).into_iter();
     let free = inputs.filter(|port| system.source(*port).is_none());
     let parameters = system.ports(Causality::Parameter).into_iter();
     let is_tunable = |port: &Port| system.variable(*port).variability == Variability::Tunable;
-    free.chain(parameters.filter(is_tunable))
-        .take(SETTINGS)
-        .map(|port| variable(system, port))
-        .collect()
+    free.chain(parameters.filter(is_tunable)).take(SETTINGS).collect()
 }
 
 /// Returns the connected inputs on which a fault can act.

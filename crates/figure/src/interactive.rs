@@ -19,9 +19,7 @@ pub const UPLOT: &str = include_str!("interactive/uPlot.iife.min.js");
 pub const UPLOT_STYLE: &str = include_str!("interactive/uPlot.min.css");
 /// The licence of uPlot.
 pub const UPLOT_LICENCE: &str = include_str!("interactive/uPlot-LICENSE");
-/// The script that zooms plots: the function `zoomByTouch` and the class `GrowingAxis`.
-pub const ZOOM: &str = include_str!("interactive/zoom.js");
-/// The script of linked plots, with [`ZOOM`]: the class `LinkedAxis` and the function `redrawOn`.
+/// The script of linked plots: the class `LinkedAxis` and the function `redrawOn`.
 pub const LINKED: &str =
     concat!(include_str!("interactive/zoom.js"), include_str!("interactive/linked.js"));
 /// The script that opens the elements `details` for paper and for links into them.

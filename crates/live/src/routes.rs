@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::time::Duration;
 
+use figure::interactive::{BASE_STYLE, COLOURS, LINKED, LINKED_STYLE, UPLOT, UPLOT_STYLE, USAGE};
 use serde_json::json;
 
 use crate::action::{Action, Request};
@@ -49,18 +50,7 @@ impl Site {
             "scenario" => Some(Action::Intervene(request.body.clone())),
             _ => None,
         };
-        let is_read = [
-            "",
-            "colours.css",
-            "page.css",
-            "page.js",
-            "uPlot.css",
-            "uPlot.js",
-            "zoom.js",
-            "facts",
-            "state",
-        ]
-        .contains(&path);
+        let is_read = ["", "page.css", "page.js", "plots.js", "facts", "state"].contains(&path);
         match (action, request.method.as_str()) {
             (Some(action), "POST") => self.perform(action, request),
             (Some(_), _) => Answer { allow: Some("POST"), ..Answer::refusal(405, "expected POST") },
@@ -75,12 +65,17 @@ impl Site {
     fn read(&self, path: &str, request: &Parsed) -> Answer {
         match path {
             "" => Answer::file("text/html", HTML),
-            "colours.css" => Answer::file("text/css", figure::interactive::COLOURS),
-            "page.css" => Answer::file("text/css", STYLE),
+            "page.css" => Answer {
+                body: [UPLOT_STYLE, COLOURS, BASE_STYLE, LINKED_STYLE, STYLE].concat().into(),
+                ..Answer::file("text/css", "")
+            },
             "page.js" => Answer::file("text/javascript", SCRIPT),
-            "uPlot.css" => Answer::file("text/css", figure::interactive::UPLOT_STYLE),
-            "uPlot.js" => Answer::file("text/javascript", figure::interactive::UPLOT),
-            "zoom.js" => Answer::file("text/javascript", figure::interactive::ZOOM),
+            "plots.js" => Answer {
+                body: [UPLOT, LINKED, "const USAGE = ", &json!(USAGE).to_string(), ";\n"]
+                    .concat()
+                    .into(),
+                ..Answer::file("text/javascript", "")
+            },
             "facts" => Answer::text_of_json(200, self.facts.clone()),
             _ => match query(&request.query) {
                 Some(query) => self.state(&query),

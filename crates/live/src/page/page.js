@@ -3,14 +3,24 @@
 (async () => {
   const PERIOD = 200; // ms between two questions
   const HIDDEN_PERIOD = 1000;
+  const LOST_PERIOD = 2000;
+  const LIMIT = 5000; // ms for an answer
   const MOST = 20000; // rows kept
   const CURVES = 7; // colours
   const MESSAGES = 300;
   const SHOWN = 32;
-  // Kinds of faults: members that they usually have, and whether these are needed.
+  // Kinds of faults and their values: name in the scenario, label, proposed value, whether it has the unit of the input.
   const KINDS = {
-    bias: "value = 0.1", gain: "factor = 0.5", drift: "rate = 0.01", delay: "seconds = 0.01", stuck: "", dropout: "",
-    noise: "deviation = 0.01", quantisation: "step = 0.1", saturation: "min = -1, max = 1", inversion: "",
+    bias: [["value", "Value", "0.1", true]],
+    gain: [["factor", "Factor", "0.5"]],
+    drift: [["rate", "Rate per s", "0.01", true]],
+    delay: [["seconds", "Delay, in s", "0.01"]],
+    stuck: [["value", "Value (empty: the present one)", "", true]],
+    dropout: [["value", "Value (empty: the last one)", "", true]],
+    noise: [["deviation", "Standard deviation", "0.01", true]],
+    quantisation: [["step", "Distance of the levels", "0.1", true]],
+    saturation: [["min", "Lowest value", "-1", true], ["max", "Highest value", "1", true]],
+    inversion: [],
   };
   const field = (id) => document.getElementById(id);
   const say = (id, text) => {
@@ -18,35 +28,92 @@
   };
   const element = (name, text) => Object.assign(document.createElement(name), { textContent: text });
   const digits = (value) => (value === null || value === undefined ? "–" : String(Number(value.toPrecision(6))));
-  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-  const facts = await (await fetch("facts")).json();
+  // Numbers in a sentence, without the rounding errors of sums.
+  const rounded = (text) => text.replace(/\d+\.\d{9,}/gu, (number) => String(Number(Number(number).toPrecision(9))));
+
+  async function asked(path, options) {
+    return fetch(path, { ...options, signal: AbortSignal.timeout(LIMIT) });
+  }
+  const pause = (length) => new Promise((resume) => { setTimeout(resume, length); });
+
+  let since = null; // when the last question without an answer was put
+  /* Says since when there is no answer, and holds the controls until there is one. */
+  function lost() {
+    since ??= new Date();
+    const length = Math.round((Date.now() - since) / 1000);
+    field("lost").hidden = false;
+    say("lost", `No answer since ${since.toLocaleTimeString()} (${length} s). The command has ended, or the connection is broken, such as a tunnel; `
+      + "then the run goes on. The page asks again every 2 s.");
+    for (const control of controls()) control.disabled = true;
+  }
+
+  function reached() {
+    if (since === null) return;
+    since = null;
+    field("lost").hidden = true;
+    for (const control of controls()) control.disabled = false;
+  }
+  const controls = () => document.querySelectorAll("main .bar button, main form button, main form input, main form select, main textarea");
+
+  let facts = null;
+  while (facts === null) {
+    try {
+      facts = await (await asked("facts")).json();
+    } catch {
+      lost();
+      await pause(LOST_PERIOD);
+    }
+  }
+  reached();
   let shown = [];
-  let data = []; // times, then the values of each shown signal
+  let watched = []; // the signals shown, and the one that is being set
+  let data = []; // times, then the values of each watched signal
   let rows = 0; // number of the last row
   let messages = 0;
-  const horizontal = new GrowingAxis("run");
+  const interventions = []; // marks in all plots
+
+  // An axis whose data grow: it shows everything or the last seconds, unless it is zoomed.
+  class RunAxis extends LinkedAxis {
+    whole({ data: [times] }) {
+      const [low, high] = [times[0] ?? 0, times.at(-1) ?? 1];
+      const start = Math.max(low, high - (Number(field("length").value) || Infinity));
+      return high > start ? [start, high] : [start, start + 1];
+    }
+
+    // Gives a plot new data; it keeps a range that is zoomed.
+    update(plot, rows) {
+      plot.setData(rows, false);
+      this.apply(plot);
+    }
+  }
+
   let plots = [];
   let phase = "";
-  let asked = []; // times of the last questions: wall-clock seconds and simulated time
+  let speeds = []; // times of the last questions: wall-clock seconds and simulated time
 
   const campaign = facts.subject === "campaign";
-  const AXIS = campaign ? "finished runs" : "time in s";
+  const horizontal = campaign
+    ? new RunAxis({ name: "runs", label: "finished runs", short: "runs" })
+    : new RunAxis({ name: "run", label: "time in s", short: "t in s" });
   if (campaign) {
     const names = {
       kind: "Live view of a campaign", "run-title": "Campaign", "time-name": "finished runs", "factor-name": "runs per second, now",
       "mean-name": "runs per second, mean", "signals-title": "Measures", "messages-title": "Runs",
-      "signals-note": "One point for each run, in the order in which they end. Drag over a plot to zoom, double-click to show all.",
+      "signals-note": "One point for each run, in the order in which they end.",
     };
     for (const [id, text] of Object.entries(names)) say(id, text);
     field("progress").setAttribute("aria-label", "Finished runs");
     for (const id of ["steps-part", "fallbacks-part", "step", "change"]) field(id).hidden = true;
+    for (const option of field("length").options) option.textContent = option.textContent.replace("run", "campaign").replace(" s", " runs");
   }
   document.title = `${facts.system}: live view`;
   say("system", facts.system);
   say("file", facts.file);
   say("repeat", facts.repeat);
   field("late-part").hidden = facts.pace === null;
+  field("usage").append(...USAGE.map((sentence) => element("p", sentence)));
+  field("length").addEventListener("change", () => horizontal.show(null));
 
   // --- signals and plots
 
@@ -56,7 +123,10 @@
     for (const box of boxes) box.disabled = !box.checked && shown.length >= SHOWN;
     // The server repeats the rows that it still has.
     rows = 0;
-    data = [[], ...shown.map(() => [])];
+    watched = [...shown];
+    const setting = facts.signals.findIndex(({ name }) => name === field("set-variable").value);
+    if (setting >= 0 && !shown.includes(setting) && shown.length < SHOWN) watched.push(setting);
+    data = [[], ...watched.map(() => [])];
     draw();
   }
 
@@ -79,36 +149,25 @@
   function onePlot(unit, members) {
     const figure = element("div", "");
     figure.className = "figure";
-    figure.setAttribute("role", "img");
-    figure.setAttribute("aria-label", `${members.map(({ signal }) => facts.signals[signal].name).join(", ")} over time; the values are below`);
     field("figures").append(figure);
-    const axis = { stroke: colour("--text"), grid: { stroke: colour("--grid") }, ticks: { stroke: colour("--grid") } };
-    const width = () => Math.max(figure.clientWidth, 200);
-    const options = {
-      width: width(),
+    const names = members.map(({ signal }) => facts.signals[signal].name);
+    const plot = horizontal.plot(figure, [[], ...members.map(() => [])], {
+      label: unit,
       height: 220,
-      scales: { x: { time: false } },
-      axes: [{ ...axis, label: AXIS, labelSize: 22 }, { ...axis, size: 75, label: unit || undefined }],
-      series: [
-        { label: campaign ? "runs" : "t in s", value: (self, value) => digits(value) },
-        ...members.map(({ signal }, k) => ({
-          label: facts.signals[signal].name,
-          stroke: colour(`--ink-${k + 1}`),
-          width: 1.5,
-          points: { show: campaign, size: 4, fill: colour(`--ink-${k + 1}`) },
-          paths: campaign ? () => null : facts.signals[signal].kind === "Real" ? uPlot.paths.linear() : uPlot.paths.stepped({ align: 1 }),
-          value: (self, value) => digits(value),
-        })),
-      ],
-    };
-    const plot = horizontal.plot(options, [[], ...members.map(() => [])], figure);
-    const observer = new ResizeObserver(() => plot.setSize({ width: width(), height: 220 }));
+      curves: members.map(({ signal }, k) =>
+        ({ name: names[k], colour: `--ink-${k + 1}`, dots: campaign, holds: facts.signals[signal].kind !== "Real" })),
+      marks: interventions,
+      write: digits,
+      name: `${names.join(", ")} over ${campaign ? "the runs" : "time"}`,
+    });
+    const observer = new ResizeObserver(() => plot.setSize({ width: Math.max(figure.clientWidth, 200), height: 220 }));
     observer.observe(figure);
     return { plot, members, observer };
   }
 
   function refresh() {
     for (const { plot, members } of plots) horizontal.update(plot, [data[0], ...members.map(({ place }) => data[place + 1])]);
+    present();
     const last = shown.map((signal, place) => {
       const { name, unit } = facts.signals[signal];
       return `${name} = ${digits(data[place + 1].at(-1))}${unit ? ` ${unit}` : ""}`;
@@ -133,14 +192,16 @@
     field("signals").append(label);
   });
   const boxes = [...field("signals").querySelectorAll("input")];
-  for (const box of boxes.slice(0, 4)) box.checked = true;
+  // First the outputs that are connected.
+  const sources = new Set(facts.inputs.map(({ output }) => output));
+  const connected = boxes.filter((box) => sources.has(facts.signals[box.value].name));
+  for (const box of connected.length > 0 ? connected.slice(0, 8) : boxes.slice(0, 4)) box.checked = true;
   field("signals").addEventListener("change", choose);
-  field("choice").open = facts.signals.length > 4;
   field("filter").addEventListener("input", () => {
     const sought = field("filter").value.toLowerCase();
     for (const label of field("signals").querySelectorAll("label")) label.hidden = !label.dataset.name.includes(sought);
   });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  redrawOn(draw);
 
   // --- the state
 
@@ -151,18 +212,21 @@
     say("time", campaign ? `${time} of ${facts.stop}` : `${digits(time)} of ${digits(facts.stop)} s`);
     say("steps", String(steps));
     say("mean", seconds > 0 ? ((time - facts.start) / seconds).toPrecision(3) : "–");
-    asked.push([seconds, time]);
-    asked = asked.slice(-10);
-    const [[before, from], [after, to]] = [asked[0], asked.at(-1)];
+    speeds.push([seconds, time]);
+    speeds = speeds.slice(-10);
+    const [[before, from], [after, to]] = [speeds[0], speeds.at(-1)];
     say("factor", after > before ? ((to - from) / (after - before)).toPrecision(3) : "–");
     field("fallbacks-part").hidden = campaign || state.fallbacks === null;
     say("fallbacks", String(state.fallbacks));
     say("late", String(state.late ?? "–"));
     change(state.outcome === null ? state.phase : "ended", state.outcome);
     report(state);
-    const entries = state.interventions.map(({ text }) => text);
-    const list = field("interventions");
-    for (const text of entries.slice(list.childElementCount)) list.append(element("li", text));
+    for (const { time: accepted, text } of state.interventions.slice(interventions.length)) {
+      const x = Number(/\b(?:at|from) = ([\d.eE+-]+)/u.exec(text)?.[1] ?? accepted);
+      interventions.push({ x, colour: "--good", dash: [3, 3], flag: true });
+      field("interventions").append(element("li", rounded(text)));
+      for (const { plot } of plots) plot.redraw(false);
+    }
     document.body.dataset.time = time;
   }
 
@@ -175,7 +239,7 @@
     say("status", running[now]);
     say("hold", now === "paused" ? "Go on" : "Pause");
     if (now === "ended") {
-      for (const control of document.querySelectorAll("main button, main form input, main form select, main textarea")) control.disabled = true;
+      for (const control of controls()) control.disabled = true;
     }
   }
 
@@ -192,31 +256,25 @@
     while (list.childElementCount > MESSAGES) list.lastChild.remove();
   }
 
-  function lost() {
-    if (phase === "ended") return;
-    change("ended", "The command has ended, or does not answer any more.");
-    field("status").classList.add("failed");
-  }
-
-  let failures = 0;
   async function ask() {
-    const asking = shown;
-    try {
-      const answer = await fetch(`state?rows=${rows}&messages=${messages}&show=${asking.join(",")}`);
-      const state = await answer.json();
-      failures = 0;
-      messages = state.message;
-      if (asking === shown) {
-        rows = state.row;
-        keep(state);
+    for (;;) {
+      const asking = watched;
+      try {
+        const answer = await asked(`state?rows=${rows}&messages=${messages}&show=${asking.join(",")}`);
+        const state = await answer.json();
+        reached();
+        messages = state.message;
+        if (asking === watched) {
+          rows = state.row;
+          keep(state);
+        }
+        show(state);
+        if (state.outcome !== null) return;
+      } catch {
+        lost();
       }
-      show(state);
-      if (state.outcome !== null) return;
-    } catch {
-      failures += 1;
-      if (failures > 10) return lost();
+      await pause(since !== null ? LOST_PERIOD : document.hidden ? HIDDEN_PERIOD : PERIOD);
     }
-    setTimeout(ask, document.hidden ? HIDDEN_PERIOD : PERIOD);
   }
 
   // --- requests
@@ -225,12 +283,12 @@
     const place = field("answer");
     place.hidden = false;
     place.classList.toggle("failed", failed);
-    place.textContent = text;
+    place.textContent = rounded(text);
   }
 
   async function send(path, body) {
     try {
-      const answer = await fetch(path, { method: "POST", headers: { "Content-Type": "application/toml" }, body: body ?? "" });
+      const answer = await asked(path, { method: "POST", headers: { "Content-Type": "application/toml" }, body: body ?? "" });
       const { answer: sentence, error } = await answer.json();
       answered(error ?? sentence, !answer.ok);
       return answer.ok;
@@ -274,7 +332,19 @@
   }
   field("set-none").hidden = facts.settings.length > 0;
   const setting = () => facts.settings.find(({ name }) => name === field("set-variable").value);
-  field("set-variable").addEventListener("input", () => say("set-unit", setting()?.unit ? `in ${setting().unit}` : ""));
+  field("set-variable").addEventListener("input", () => {
+    say("set-unit", setting()?.unit ? `in ${setting().unit}` : "");
+    if (setting() !== undefined) choose();
+    present();
+  });
+
+  // Says the present value of the variable that is being set.
+  function present() {
+    const place = watched.findIndex((signal) => facts.signals[signal].name === field("set-variable").value);
+    const value = place < 0 ? undefined : data[place + 1].at(-1);
+    const unit = setting()?.unit ? ` ${setting().unit}` : "";
+    say("set-now", value === undefined || value === null ? "The present value appears here." : `Present value: ${digits(value)}${unit}`);
+  }
   field("set").addEventListener("submit", (event) => {
     event.preventDefault();
     const value = literal(field("set-value").value, setting()?.kind);
@@ -285,19 +355,26 @@
     field("fault-input").append(Object.assign(document.createElement("option"), { value: input.name, textContent: `${output} → ${input.name}` }));
   }
   for (const kind of Object.keys(KINDS)) field("fault-kind").append(element("option", kind));
-  const proposed = () => {
-    field("fault-members").value = KINDS[field("fault-kind").value];
+  const members = () => KINDS[field("fault-kind").value];
+  function proposed() {
     const { input } = facts.inputs.find(({ input: { name } }) => name === field("fault-input").value) ?? {};
-    say("fault-unit", input?.unit ? `in ${input.unit}` : "");
-  };
+    field("fault-values").replaceChildren(...members().map(([name, text, value, hasUnit]) => {
+      const label = element("label", hasUnit && input?.unit ? `${text}, in ${input.unit} ` : `${text} `);
+      label.append(Object.assign(document.createElement("input"), { id: `fault-${name}`, value, inputMode: "decimal", autocomplete: "off" }));
+      return label;
+    }));
+  }
   field("fault-kind").addEventListener("change", proposed);
   field("fault-input").addEventListener("change", proposed);
   proposed();
   field("fault").addEventListener("submit", (event) => {
     event.preventDefault();
-    const until = field("fault-until").value.trim();
-    const members = [field("fault-members").value.trim(), until ? `until = ${until}` : ""].filter((part) => part !== "");
-    send("scenario", `[[fault]]\nconnection = ${quoted(field("fault-input").value)}\n${field("fault-kind").value} = { ${members.join(", ")} }\n`);
+    const kind = facts.inputs.find(({ input: { name } }) => name === field("fault-input").value)?.input.kind;
+    const values = [...members().map(([name]) => name), "from", "until"].flatMap((name) => {
+      const value = field(`fault-${name}`).value.trim();
+      return value === "" ? [] : [`${name} = ${literal(value, kind)}`];
+    });
+    send("scenario", `[[fault]]\nconnection = ${quoted(field("fault-input").value)}\n${field("fault-kind").value} = { ${values.join(", ")} }\n`);
   });
   field("entries").addEventListener("submit", (event) => {
     event.preventDefault();
