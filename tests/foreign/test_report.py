@@ -739,6 +739,7 @@ def test_axe_finds_nothing_serious_in_the_reports_of_runs_and_designs(aso_ftc, o
     with browser(tmp_path / "profile") as page:
         for file in (of_a_run, tmp_path / "own.html", tmp_path / "design.html"):
             page.open(file.as_uri())
+            page.evaluate("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
             page.evaluate("document.querySelector('#figures, #step-1-1').scrollIntoView()")
             page.until("document.querySelector('.uplot') !== null")
             assert page.violations() == [], file

@@ -1,5 +1,6 @@
 //! `report.html`: the design report as one self-contained page.
 
+mod advice;
 mod certificate;
 mod chart;
 mod comparison;
@@ -24,7 +25,9 @@ mod table;
 mod verdict;
 
 pub(crate) use comparison::comparison;
-use figure::interactive::{COLOURS, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, UPLOT_STYLE};
+use figure::interactive::{
+    BASE_STYLE, COLOURS, FOLD, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, UPLOT_STYLE, USAGE,
+};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use plots::Plots;
 
@@ -55,7 +58,6 @@ pub(crate) fn page(report: &Report, identity: &str) -> String {
                     h1 { (title) }
                     p.file { "Plant file " code { (report.plant_file) } }
                     (verdict::verdict(report))
-                    (contents(&sections))
                     @if !plots.is_empty() {
                         (about_plots())
                         noscript {
@@ -69,8 +71,10 @@ pub(crate) fn page(report: &Report, identity: &str) -> String {
                 main {
                     @for (index, section) in sections.iter().enumerate() {
                         section aria-labelledby=(section.id) {
-                            h2 id=(section.id) { (index + 1) ". " (section.title) }
-                            (section.content)
+                            details {
+                                summary { h2 id=(section.id) { (index + 1) ". " (section.title) } }
+                                (section.content)
+                            }
                         }
                     }
                 }
@@ -83,10 +87,11 @@ pub(crate) fn page(report: &Report, identity: &str) -> String {
                     }
                     @if !plots.is_empty() {
                         p { "Plots by uPlot." }
-                        details { summary { "Licence of uPlot" } pre { (UPLOT_LICENCE) } }
+                        details.stays { summary { "Licence of uPlot" } pre tabindex="0" { (UPLOT_LICENCE) } }
                     }
                     p role="status" #copied {}
                 }
+                (script(FOLD))
                 @if !plots.is_empty() {
                     script type="application/json" #curves { (PreEscaped(plots.json())) }
                     @for text in [UPLOT, LINKED, FIGURES] { (script(text)) }
@@ -101,10 +106,9 @@ pub(crate) fn page(report: &Report, identity: &str) -> String {
 /// How to use the plots.
 fn about_plots() -> Markup {
     html! {
-        p.said {
-            "Curves over time or frequency: drag to zoom, double-click to show all. All plots with the same axis \
-             follow, and show their values at the cursor. On a touch screen: two fingers zoom, a double tap shows all. From the keyboard: arrow keys move the cursor, + and − \
-             zoom, 0 shows all. A click on a name hides its curve."
+        details.said.stays {
+            summary { "How to zoom, read values and differences in the plots, by mouse, keyboard and touch" }
+            @for sentence in USAGE { p { (sentence) } }
         }
     }
 }
@@ -124,7 +128,7 @@ fn head(title: &str, identity: &str) -> Markup {
             meta name="generator" content=(identity);
             title { (title) ", design report" }
             style {
-                @for text in [UPLOT_STYLE, COLOURS, STYLE, LINKED_STYLE] { (PreEscaped(text)) }
+                @for text in [UPLOT_STYLE, COLOURS, BASE_STYLE, LINKED_STYLE, STYLE] { (PreEscaped(text)) }
             }
         }
     }
@@ -204,18 +208,6 @@ fn sections<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Vec<Section> {
         .filter(|(shown, ..)| *shown)
         .map(|(_, id, title, content)| Section { id, title, content })
         .collect()
-}
-
-fn contents(sections: &[Section]) -> Markup {
-    html! {
-        nav aria-label="Contents" {
-            ul {
-                @for (index, section) in sections.iter().enumerate() {
-                    li { (index + 1) ". " a href={ "#" (section.id) } { (section.title) } }
-                }
-            }
-        }
-    }
 }
 
 #[cfg(test)]

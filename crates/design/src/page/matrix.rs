@@ -60,7 +60,7 @@ pub(super) fn literals(id: &str, name: &str, matrices: &[&Matrix]) -> Markup {
     };
     let forms = [("TOML", text(toml)), ("numpy", text(numpy)), ("MATLAB", text(matlab))];
     html! {
-        details {
+        details.stays {
             summary { (name) " in full precision: TOML, numpy, MATLAB" }
             @for (form, text) in forms {
                 @let target = format!("{id}-{}", form.to_lowercase());

@@ -1,7 +1,8 @@
-//! The summary: which checks hold, which fail, and the most important numbers.
+//! The first screen: the verdict, its reasons, what to change, and the most important numbers.
 
 use maud::{Markup, html};
 
+use super::advice::advice;
 use super::number::number;
 use super::plane::Plane;
 use crate::report::robustness::Level;
@@ -10,27 +11,19 @@ use crate::report::{Loop, Report};
 pub(super) fn verdict(report: &Report) -> Markup {
     let failures = failures(report);
     let count = report.checks.len();
-    let limits = &report.verdict.limits;
-    let parameters =
-        report.robustness.as_ref().is_some_and(|found| !found.tolerance.parameters.is_empty());
     let level = if failures.is_empty() { report.verdict.level } else { Level::Red };
-    // The checks are shown above with their explanations.
+    // The checks have their explanations.
     let checked = |reason: &&String| !reason.starts_with("does not hold: ");
-    let warnings: Vec<_> = report.verdict.reasons.iter().filter(checked).collect();
+    let reasons: Vec<_> = report.verdict.reasons.iter().filter(checked).collect();
+    let advice = if level == Level::Green { Vec::new() } else { advice(report) };
     html! {
         div.verdict .passed[level == Level::Green] .warned[level == Level::Amber]
             .failed[level == Level::Red] {
-            @if failures.is_empty() {
-                p.outcome {
-                    (sign(level)) " "
-                    @match count {
-                        0 => "Both loops are stable; nothing else was checked.",
-                        1 => "The check holds; both loops are stable.",
-                        _ => { "All " (count) " checks hold; both loops are stable." }
-                    }
-                }
-            } @else {
-                p.outcome { "✗ This design fails:" }
+            p.outcome {
+                (sign(level)) " Verdict: " (level.word())
+                @if failures.is_empty() && reasons.is_empty() { "; " (holding(count)) }
+            }
+            @if !failures.is_empty() || !reasons.is_empty() {
                 ul {
                     @for (what, why) in &failures {
                         li {
@@ -38,40 +31,101 @@ pub(super) fn verdict(report: &Report) -> Markup {
                             @if !why.is_empty() { ": " (why) }
                         }
                     }
+                    @for reason in &reasons { li { (reason) } }
                 }
+                @if failures.is_empty() { p { (capitalised(&holding(count))) } }
+            }
+            @if !advice.is_empty() {
+                p.outcome { "To make it green" }
+                ul { @for entry in &advice { li { (entry) } } }
             }
             @if !report.warnings.is_empty() {
                 p.outcome { "Warnings" }
                 ul { @for warning in &report.warnings { li { (warning) } } }
             }
-            @if !warnings.is_empty() {
-                p.outcome { "Robustness: " (level.word()) }
-                ul { @for warning in &warnings { li { (warning) } } }
-            }
-            p {
-                "Verdict: " (report.verdict.level.word()) ". A peak of S above " (number(limits.amber))
-                " is amber, above " (number(limits.red)) " red, as are parameters within their \
-                 tolerances that make the loop unstable"
-                @if !parameters {
-                    ": "
-                    @for (index, (name, tolerance)) in limits.of_matrices(&report.plant.matrices).enumerate() {
-                        @if index > 0 { ", " }
-                        (number(tolerance)) " of each entry of " (name)
-                    }
-                } @else {
-                    ": those of the FMU that the section on robustness lists"
-                }
-                "."
-            }
-            @if let Err(reason) = &report.certificate.printed {
-                p { "Theorem 1 as printed does not apply: " (reason) }
-            }
-            @if let Err(reason) = &report.certificate.free {
-                p { "No certificate with free P: " (reason) }
-            }
         }
-        (key_numbers(report))
+        dl.key.first { (figures(report)) }
+        details {
+            summary { "More figures, and the limits of the verdict" }
+            (limits(report))
+            (key_numbers(report))
+        }
     }
+}
+
+/// The limits that the verdict follows from, and what is not certified.
+fn limits(report: &Report) -> Markup {
+    let limits = &report.verdict.limits;
+    let parameters =
+        report.robustness.as_ref().is_some_and(|found| !found.tolerance.parameters.is_empty());
+    html! {
+        p {
+            "A peak of S above " (number(limits.amber))
+            " is amber, above " (number(limits.red)) " red, as are parameters within their \
+             tolerances that make the loop unstable"
+            @if !parameters {
+                ": "
+                @for (index, (name, tolerance)) in limits.of_matrices(&report.plant.matrices).enumerate() {
+                    @if index > 0 { ", " }
+                    (number(tolerance)) " of each entry of " (name)
+                }
+            } @else {
+                ": those of the FMU that the section on robustness lists"
+            }
+            "."
+        }
+        @if let Err(reason) = &report.certificate.printed {
+            p { "Theorem 1 as printed does not apply: " (reason) }
+        }
+        @if let Err(reason) = &report.certificate.free {
+            p { "No certificate with free P: " (reason) }
+        }
+    }
+}
+
+/// The three figures that matter: those of the robustness, or the speeds of a loop without it.
+fn figures(report: &Report) -> Markup {
+    let plane = Plane::of(report);
+    let Some(robustness) = &report.robustness else {
+        return html! {
+            (slowest("Slowest of the feedback loop", &report.feedback, plane))
+            (slowest("Slowest of the observer", &report.observer, plane))
+            (settling(report))
+        };
+    };
+    let tolerance = &robustness.tolerance;
+    html! {
+        (key("Peak of S", &html! {
+            @for (index, point) in robustness.points.iter().enumerate() {
+                @if index > 0 { ", " }
+                (number(point.judged)) " at the " (point.point)
+            }
+            " (limit " (number(report.verdict.limits.amber)) ")"
+        }))
+        (key("Delay margin", &html! { (number(robustness.delay_margin)) " s" }))
+        (key("Parameters within their tolerances", &html! {
+            (number(100.0 * tolerance.stable)) " % of " (tolerance.cases) " random cases stable, "
+            @if tolerance.first_unstable.is_infinite() {
+                "no unstable case found"
+            } @else {
+                "unstable from " (number(tolerance.first_unstable)) " of the tolerances on"
+            }
+        }))
+    }
+}
+
+/// Says that all checks hold.
+fn holding(checks: usize) -> String {
+    match checks {
+        0 => "both loops are stable; nothing else was checked.".to_owned(),
+        1 => "the check holds; both loops are stable.".to_owned(),
+        _ => format!("all {checks} checks hold; both loops are stable."),
+    }
+}
+
+fn capitalised(sentence: &str) -> String {
+    let mut signs = sentence.chars();
+    signs.next().map_or_else(String::new, |first| first.to_uppercase().chain(signs).collect())
 }
 
 fn sign(level: Level) -> &'static str {
@@ -124,14 +178,6 @@ fn key_numbers(report: &Report) -> Markup {
                 @if let Some(condition) = condition {
                     (key(name, &number(condition)))
                 }
-            }
-            @if let Some(robustness) = &report.robustness {
-                @for point in &robustness.points {
-                    (key(&format!("Peak of S at the {}", point.point), &number(point.judged)))
-                }
-                (key("Random cases that stay stable", &html! {
-                    (number(100.0 * robustness.tolerance.stable)) " %"
-                }))
             }
             (settling(report))
             @if let Ok(theorem) = &report.certificate.printed {
