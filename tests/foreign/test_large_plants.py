@@ -160,3 +160,13 @@ def test_placement_with_50_states_reaches_the_required_eigenvalues_to_the_error_
         for curve in step["curves"]:
             assert len(curve["times"]) == len(curve["values"]) <= 1000
             assert max(map(abs, curve["values"])) == pytest.approx(abs(curve["peak"]), rel=0.1, abs=1e-12)
+
+
+@pytest.mark.parametrize("states", [8, 10, 20, 40, 50, 200])
+def test_a_chain_of_any_size_has_a_force_on_and_a_position_of_distinct_masses(states):
+    _, b, c = large_plants.chain(states)
+    masses = states // 2
+    assert c.shape == (min(10, masses), states) and b.shape == (states, 4)
+    assert not b[:masses].any() and not c[:, masses:].any(), "forces change velocities, positions are measured"
+    for placed in (b.T, c):
+        assert (placed.sum(axis=1) == 1).all() and len(set(placed.argmax(axis=1))) == len(placed)
