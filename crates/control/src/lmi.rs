@@ -20,6 +20,7 @@
 //! * [`certify_schedule`]: proves that a loop that depends on a scheduling variable is stable while
 //!   this variable changes at a bounded rate, with a P that depends on it, too.
 //! * [`constant_gain`]: the static gain whose worst error over a family of systems is least.
+//! * [`until`]: ends the searches of a thread early.
 //!
 //! Problems are solved by an interior point method (Clarabel) in coordinates in which the data are
 //! about one. Its result is never trusted: a certificate is returned only if the eigenvalues of its
@@ -32,6 +33,7 @@ pub(crate) mod definite;
 mod descent;
 mod disc_bound;
 mod gain;
+mod limit;
 mod lower_bound;
 mod noiseless;
 mod observer;
@@ -50,6 +52,7 @@ pub use affine::Affine;
 pub use constant_gain::{ConstantGain, constant_gain};
 pub use disc_bound::disc_norm_lower_bound;
 pub use gain::{GainBound, Norm, certify_gain};
+pub use limit::{Ending, ending, until};
 pub use lower_bound::{feedback_norm_lower_bound, observer_norm_lower_bound};
 pub use noiseless::noiseless_norm_lower_bound;
 pub use problem::Problem;

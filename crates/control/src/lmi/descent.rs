@@ -1,5 +1,6 @@
 //! Local descent of the H-infinity norm over the entries of a gain.
 
+use super::limit;
 use super::region::Region;
 use crate::eigen::eigenvalues;
 use crate::response::h_infinity;
@@ -106,6 +107,9 @@ impl GainNorm<'_> {
             let (mut low, mut high, mut step) = (0.0, f64::INFINITY, 1.0);
             let mut accepted = None;
             for _ in 0..SEARCHES {
+                if limit::is_over() {
+                    break;
+                }
                 let next = &x + &direction * step;
                 match evaluate(&next) {
                     Some((other, gradient)) if other <= value + DECREASE * step * rate => {
@@ -121,7 +125,7 @@ impl GainNorm<'_> {
                 step = if high.is_finite() { 0.5 * (low + high) } else { 2.0 * step };
             }
             let Some((next, other, gradient)) = accepted else {
-                if fresh {
+                if fresh || limit::is_over() {
                     break;
                 }
                 (inverse, fresh) = (&identity * first(&slope, &x), true);

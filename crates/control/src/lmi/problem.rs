@@ -2,6 +2,7 @@
 
 use super::affine::Affine;
 use super::definite::smallest_eigenvalue;
+use super::limit;
 use super::solver::{End, minimise};
 use super::{Outcome, Solution};
 use crate::Error;
@@ -162,7 +163,11 @@ impl Problem {
         }
         let all: Vec<_> = self.requirements.iter().collect();
         let Some((slack, unknowns)) = self.largest_slack(&all) else {
-            return Ok(Outcome::Inconclusive("the interior point method did not end"));
+            return Ok(Outcome::Inconclusive(if limit::is_over() {
+                "its time was over"
+            } else {
+                "the interior point method did not end"
+            }));
         };
         if slack < -UNDECIDED {
             return Ok(Outcome::Infeasible { conflict: self.conflict() });

@@ -1,6 +1,7 @@
 //! The interface to the solver Clarabel.
 
 use super::affine::Affine;
+use super::limit::{self, Ending};
 use aso_lapack as _;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
@@ -8,6 +9,9 @@ use clarabel::solver::{
 };
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::SQRT_2;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
 
 /// How the solver ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -26,6 +30,9 @@ pub(super) fn minimise(
     objective: &DVector<f64>,
     matrices: &[Affine],
 ) -> Option<(DVector<f64>, End)> {
+    if limit::is_over() {
+        return None;
+    }
     let unknowns = objective.len();
     let mut cones = Vec::with_capacity(matrices.len());
     let mut right = Vec::new();
@@ -51,20 +58,65 @@ pub(super) fn minimise(
         }
         starts.push(rows.len());
     }
-    let left = CscMatrix::new(right.len(), unknowns, starts, rows, values);
-    let quadratic = CscMatrix::zeros((unknowns, unknowns));
-    let costs = objective.as_slice();
-    let mut solver =
-        DefaultSolver::new(&quadratic, costs, &left, &right, &cones, settings()).ok()?;
-    solver.solve();
-    let solution = &solver.solution;
-    let end = match solution.status {
-        SolverStatus::Solved | SolverStatus::AlmostSolved => End::Solved,
-        SolverStatus::InsufficientProgress | SolverStatus::MaxIterations => End::Stalled,
-        _ => return None,
+    let program = Program {
+        left: CscMatrix::new(right.len(), unknowns, starts, rows, values),
+        right,
+        costs: objective.as_slice().to_vec(),
+        cones,
     };
-    let finite = solution.x.iter().all(|value| value.is_finite());
-    finite.then(|| (DVector::from_column_slice(&solution.x), end))
+    match limit::ending() {
+        None => program.solve(None),
+        Some(ending) => program.solve_until(&ending),
+    }
+}
+
+/// A program in the form of the solver.
+struct Program {
+    left: CscMatrix<f64>,
+    right: Vec<f64>,
+    costs: Vec<f64>,
+    cones: Vec<Cone<f64>>,
+}
+
+/// Interval at which a caller looks whether to go on waiting.
+const LOOK: Duration = Duration::from_millis(20);
+
+impl Program {
+    /// Solves in a thread of its own and waits for it until `ending`: one iteration of a large program takes
+    /// minutes. The thread ends after that iteration.
+    fn solve_until(self, ending: &Ending) -> Option<(DVector<f64>, End)> {
+        let (sender, receiver) = channel();
+        let of_solver = Ending::clone(ending);
+        let solve = move || drop(sender.send(self.solve(Some(of_solver))));
+        // Without a thread there is no answer, as for a program that the solver refuses.
+        thread::Builder::new().name("inequalities".to_owned()).spawn(solve).ok()?;
+        loop {
+            match receiver.recv_timeout(LOOK) {
+                Ok(found) => return found,
+                Err(RecvTimeoutError::Timeout) if !ending() => {}
+                Err(_) => return None,
+            }
+        }
+    }
+
+    fn solve(&self, ending: Option<Ending>) -> Option<(DVector<f64>, End)> {
+        let Self { left, right, costs, cones } = self;
+        let quadratic = CscMatrix::zeros((costs.len(), costs.len()));
+        let solver = DefaultSolver::new(&quadratic, costs, left, right, cones, settings());
+        let mut solver = solver.ok()?;
+        if let Some(ending) = ending {
+            solver.set_termination_callback(move |_: &_| ending());
+        }
+        solver.solve();
+        let solution = &solver.solution;
+        let end = match solution.status {
+            SolverStatus::Solved | SolverStatus::AlmostSolved => End::Solved,
+            SolverStatus::InsufficientProgress | SolverStatus::MaxIterations => End::Stalled,
+            _ => return None,
+        };
+        let finite = solution.x.iter().all(|value| value.is_finite());
+        finite.then(|| (DVector::from_column_slice(&solution.x), end))
+    }
 }
 
 fn settings() -> DefaultSettings<f64> {
