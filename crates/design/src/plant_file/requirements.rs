@@ -97,9 +97,14 @@ pub(crate) fn request(
     if one.name.ends_with(".h_infinity") {
         let region = region.as_ref().map(self::region).transpose()?.unwrap_or_default();
         let channel = Channel::read(table, signals, domain)?;
-        // A sampled observer cannot lower the norm without end: it knows no disturbance of the last sample.
-        let limited = !channel.noise.is_empty() || (sampled && weights[0] == "W");
-        let bound = bound(&one, region, limited)?;
+        let remedy = match weights[0] {
+            // In sampled time the gain of the least norm is finite: no gain knows the disturbance of the last
+            // sample.
+            _ if sampled || !channel.noise.is_empty() || region.disc.is_some() => None,
+            "W" => Some("`noise`, or a `region` with a disc"),
+            _ => Some("a `region` with a disc"),
+        };
+        let bound = bound(&one, remedy)?;
         let requirement = Requirement::HInfinity { bound, region, channel };
         return Ok(Request { requirement, place: one.place, other: None });
     }
@@ -223,18 +228,17 @@ fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
     }
 }
 
-/// Reads a bound of the norm, or the text "least" (`None`).
-fn bound(entry: &Entry<'_>, region: Region, limited: bool) -> Result<Option<f64>, PlaceError> {
+/// Reads a bound of the norm, or the text "least" (`None`), which may need a `remedy`.
+fn bound(entry: &Entry<'_>, remedy: Option<&str>) -> Result<Option<f64>, PlaceError> {
     if !entry.is_text() {
         return entry.positive().map(Some);
     }
-    match entry.text()? {
-        "least" if region.disc.is_some() || limited => Ok(None),
-        "least" => Err(entry.error(
-            "\"least\" needs a `region` with a disc, or for the observer `noise`: without either, ever \
-             larger gains lower the norm without end",
-        )),
-        other => Err(entry.error(format!("expected a number or \"least\", found {other:?}"))),
+    match (entry.text()?, remedy) {
+        ("least", None) => Ok(None),
+        ("least", Some(remedy)) => Err(entry.error(format!(
+            "\"least\" needs {remedy}: without, ever larger gains lower the norm without end"
+        ))),
+        (other, _) => Err(entry.error(format!("expected a number or \"least\", found {other:?}"))),
     }
 }
 
