@@ -1,5 +1,6 @@
 //! `aso-ftc design`: designs a controller from a plant file; writes its report and its FMU.
 
+mod interrupt;
 mod progress;
 mod terminal;
 
@@ -12,9 +13,9 @@ use std::time::Duration;
 use crate::models;
 use crate::outputs::{Outputs, check_own};
 use anyhow::Context;
-use design::{Design, Language, Precision};
+use design::{Design, Language, Precision, TimeLimits};
 use files::check_distinct;
-use progress::Bar;
+use progress::Reporter;
 
 #[derive(clap::Args)]
 #[command(group(clap::ArgGroup::new("code").multiple(true)))]
@@ -81,6 +82,12 @@ pub(crate) struct Options {
     #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = seconds)]
     #[arg(help_heading = "Computation")]
     certificate_time: Duration,
+    /// Time for gains in s
+    ///
+    /// The time that the search for gains by linear matrix inequalities may take before the design is refused.
+    #[arg(long, value_name = "SECONDS", default_value = "300", value_parser = seconds)]
+    #[arg(help_heading = "Computation")]
+    gain_time: Duration,
     /// Load a shared library first
     ///
     /// Its symbols are visible to the plant's FMU. May be repeated.
@@ -104,8 +111,13 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         fmu_import::preload(library)?;
     }
     let mut design = {
-        let bar = Bar::new();
-        design::design_within(&options.plant, options.certificate_time, &|step| bar.show(step))?
+        let progress = Reporter::new();
+        let limits = TimeLimits {
+            gains: options.gain_time,
+            certificates: options.certificate_time,
+            interrupted: interrupt::listen()?,
+        };
+        design::design_within(&options.plant, &limits, &|step| progress.show(step))?
     };
     let code = code(options, &design)?;
     for (option, path, _) in &code.files {

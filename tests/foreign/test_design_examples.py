@@ -103,7 +103,7 @@ def test_losses_of_effectiveness_of_both_pumps_are_estimated(aso_ftc, python, ta
     begin = {"plant.t_fault_1": 300, "plant.t_fault_2": 300}
     settings = {f"plant.{name}": value for name, value in losses.items()} | begin
     table, _ = coupled(python, designed, tanks, settings)
-    slowest = -max(re for re, _ in plane(designed.report["feedback"]["wanted"]))
+    slowest = -max(re for re, _ in plane(designed.report["feedback"]["required"]))
     for (name, loss), fault, pump in zip(losses.items(), ("f_1", "f_2"), ("Q_1", "Q_2")):
         found = table[designed.loss(fault)]
         assert found[after(table, 300 + 5 / slowest)] == pytest.approx(loss, rel=0.02), name
@@ -209,7 +209,7 @@ def test_the_servo_returns_despite_fault_and_friction(aso_ftc, python, servo, tm
     table, _ = coupled(python, designed, servo, settings, "--stop-time", 1, "--step", 1e-4)
     turned = abs(table["plant.theta"])
     assert turned[~after(table, 0.1)].max() == 0 and turned.max() > 0.1
-    slowest = -max(re for re, _ in designed.report["feedback"]["wanted"])
+    slowest = -max(re for re, _ in designed.report["feedback"]["required"])
     assert turned[after(table, 0.1 + 10 / slowest)].max() < 0.02 * turned.max()
     assert turned[-1] < 1e-3
     # To the observer friction is a fault: the voltage that gives the same torque.

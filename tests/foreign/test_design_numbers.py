@@ -95,7 +95,7 @@ def test_the_eigenvalues_of_both_loops_are_those_of_the_plant_file(case):
         if "eigenvalues" in wish:
             wanted = np.sort(wish["eigenvalues"])
             wanted = wanted if own.period is None else np.exp(wanted * own.period)
-            assert complex_numbers(loop["wanted"]) == pytest.approx(wanted, rel=1e-14)
+            assert complex_numbers(loop["required"]) == pytest.approx(wanted, rel=1e-14)
             assert found == pytest.approx(wanted, rel=1e-8) and loop["pole_error"] < 1e-9
     a = np.array(designed.report["plant"]["matrices"][0]["values"])
     stated = complex_numbers(designed.report["plant"]["eigenvalues"])

@@ -48,7 +48,7 @@ def test_weights_give_the_linear_quadratic_regulator_of_scipy(wanting, file, sta
         wanted = -np.linalg.solve(r + own.B.T @ p @ own.B, own.B.T @ p @ own.A)
     assert own.K_x == pytest.approx(wanted, rel=1e-7)
     assert designed.report["feedback"]["method"].startswith("Linear-quadratic regulator")
-    assert designed.report["feedback"]["wanted"] == []
+    assert designed.report["feedback"]["required"] == []
 
 
 FILTERS = [

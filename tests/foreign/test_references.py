@@ -80,7 +80,7 @@ def test_the_loop_is_stable_and_has_the_requested_eigenvalues(case):
     found = np.linalg.eigvals(loop.matrices()[0])
     period = design.get("sample_time")
     assert (abs(found) < 1 if period else found.real < 0).all()
-    for wanted in report["feedback"]["wanted"]:
+    for wanted in report["feedback"]["required"]:
         assert np.abs(found - complex(*wanted)).min() < 1e-6
     assert all(check["holds"] for check in report["checks"])
 

@@ -1,7 +1,10 @@
-//! The progress bar of a design.
+//! The progress of a design on standard error.
 
 use std::io::IsTerminal;
-use std::time::Duration;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use design::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -12,39 +15,72 @@ use crate::logging;
 const PARTS: f64 = 1000.0;
 /// Interval at which the elapsed time is drawn again.
 const REDRAWN: Duration = Duration::from_millis(200);
+/// Interval between two lines where standard error is no terminal.
+const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
-/// A progress bar of the steps of a design; hidden if standard error is not a terminal. It is removed
-/// when it is dropped.
-pub(super) struct Bar {
-    bar: Option<ProgressBar>,
+/// Shows the steps of a design: a bar on a terminal, which is removed when the reporter is dropped, and a line every
+/// 10 s elsewhere.
+pub(super) enum Reporter {
+    Bar(ProgressBar),
+    Lines(Lines),
 }
 
-impl Bar {
+/// The step that the next line names. Dropping the sender ends the thread that prints.
+pub(super) struct Lines {
+    latest: Arc<Mutex<Option<Progress>>>,
+    _end: Sender<()>,
+}
+
+impl Reporter {
     pub(super) fn new() -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template(
-                "{bar:24} {percent:>3} %, {elapsed}, {eta} left: {msg}",
-            )
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
-            let bar = logging::bars().add(ProgressBar::new(parts(1.0)).with_style(style));
-            bar.enable_steady_tick(REDRAWN);
-            bar
-        });
-        Self { bar }
+        if !std::io::stderr().is_terminal() {
+            return Self::Lines(Lines::new());
+        }
+        let style =
+            ProgressStyle::with_template("{bar:24} {percent:>3} %, {elapsed}, {eta} left: {msg}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar());
+        let bar = logging::bars().add(ProgressBar::new(parts(1.0)).with_style(style));
+        bar.enable_steady_tick(REDRAWN);
+        Self::Bar(bar)
     }
 
     /// Shows the step that begins.
     pub(super) fn show(&self, progress: Progress) {
-        if let Some(bar) = &self.bar {
-            bar.set_position(parts(progress.done));
-            bar.set_message(progress.step);
+        match self {
+            Self::Bar(bar) => {
+                bar.set_position(parts(progress.done));
+                bar.set_message(progress.step);
+            }
+            Self::Lines(lines) => {
+                *lines.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(progress);
+            }
         }
     }
 }
 
-impl Drop for Bar {
+impl Lines {
+    fn new() -> Self {
+        let latest = Arc::new(Mutex::new(None::<Progress>));
+        let (sender, receiver) = channel::<()>();
+        let (start, shown) = (Instant::now(), Arc::clone(&latest));
+        let print = move || {
+            while receiver.recv_timeout(BETWEEN_LINES) == Err(RecvTimeoutError::Timeout) {
+                let latest = *shown.lock().unwrap_or_else(PoisonError::into_inner);
+                if let Some(Progress { step, done, .. }) = latest {
+                    let seconds = start.elapsed().as_secs();
+                    eprintln!("{seconds} s, {:.0} %: {step}", 100.0 * done);
+                }
+            }
+        };
+        // Without a thread there are no lines; the design does not depend on them.
+        let _ = thread::Builder::new().name("progress".to_owned()).spawn(print);
+        Self { latest, _end: sender }
+    }
+}
+
+impl Drop for Reporter {
     fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
+        if let Self::Bar(bar) = self {
             bar.finish_and_clear();
         }
     }

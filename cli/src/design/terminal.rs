@@ -5,7 +5,7 @@ use design::report::fallback::FallbackReport;
 use design::report::family::MemberReport;
 use design::report::losses::LossLoop;
 use design::report::reconfiguration::ReconfigurationReport;
-use design::report::robustness::Number;
+use design::report::robustness::{Number, ToleranceResult};
 use design::report::schedule::ScheduleReport;
 use design::report::{CommandPeak, Loop, Matrix, ReferenceStep};
 use design::{Comparison, Report};
@@ -41,16 +41,7 @@ pub(crate) fn summarise(report: &Report) {
             number(robustness.delay_margin),
             number(robustness.longest_hold)
         );
-        let tolerance = &robustness.tolerance;
-        let worst = match tolerance.first_unstable {
-            limit if limit.is_infinite() => "no unstable case found".to_owned(),
-            limit => format!("an unstable case from {} of them on", number(limit)),
-        };
-        println!(
-            "parameter tolerances: {} % of {} random cases are stable, {worst}",
-            number(100.0 * tolerance.stable),
-            tolerance.cases,
-        );
+        print_tolerance(&robustness.tolerance);
     }
     if let Some(family) = &report.family {
         let members: Vec<_> = family.members.iter().collect();
@@ -92,7 +83,39 @@ pub(crate) fn summarise(report: &Report) {
     let checked = |reason: &&String| !reason.starts_with("does not hold: ");
     for reason in report.verdict.reasons.iter().filter(checked) {
         println!("    {reason}");
+        let remedies = report.verdict.remedies.iter();
+        for remedy in remedies.filter(|remedy| remedy.reason == *reason) {
+            println!("        {}", remedy.change);
+            for line in &remedy.lines {
+                println!("        {line}");
+            }
+        }
     }
+}
+
+/// Prints what varies within its tolerance, and whether the loop stays stable.
+fn print_tolerance(tolerance: &ToleranceResult) {
+    if !tolerance.is_examined() {
+        println!("parameter tolerances: not examined, no entry of the plant varies");
+        return;
+    }
+    let (count, kind) = match tolerance.parameters.len() {
+        0 => (tolerance.entries as usize, "entries"),
+        count => (count, "parameters"),
+    };
+    println!("parameter tolerances: {count} {kind} vary, {}", tolerance.range());
+    let worst = match tolerance.first_unstable {
+        limit if limit.is_infinite() => "no unstable case found".to_owned(),
+        limit => format!("an unstable case from {} of the tolerances on", number(limit)),
+    };
+    println!("    {}, {worst}", stable_cases(tolerance));
+}
+
+/// The percentage of random cases that are stable.
+fn stable_cases(tolerance: &ToleranceResult) -> String {
+    tolerance.stable.map_or("no random cases".to_owned(), |part| {
+        format!("{} % of {} random cases are stable", number(100.0 * part), tolerance.cases)
+    })
 }
 
 /// Prints what the controller does without actuators.
@@ -149,11 +172,8 @@ fn print_members(kind: &str, members: &[&MemberReport]) {
             .map(|point| format!("{} at the {}", number(point.judged), point.point))
             .collect();
         let tolerance = margins.tolerance.as_ref().map_or(String::new(), |tolerance| {
-            format!(
-                "; {} % of {} random cases are stable",
-                number(100.0 * tolerance.stable),
-                tolerance.cases
-            )
+            let cases = stable_cases(tolerance);
+            format!("; {} entries vary: {cases}", tolerance.entries)
         });
         println!("{kind} {}: peak of S {}{tolerance}", member.name, peaks.join(", "));
     }

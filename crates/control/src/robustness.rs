@@ -49,7 +49,8 @@ pub use opened::OpenedLoop;
 pub use scaling::ScaledPeak;
 pub use speed::regulator_of_same_speed;
 pub use tolerance::{
-    EntryFamily, ToleranceSearch, ToleranceTest, Tolerances, random_deviations, tolerance_test,
+    EntryFamily, PlantEntry, ToleranceSearch, ToleranceTest, Tolerances, random_deviations,
+    tolerance_test,
 };
 
 use crate::blocks::{block_2x2, stacked};

@@ -11,6 +11,7 @@ pub(crate) mod losses;
 pub(crate) mod matrices;
 pub(crate) mod reconfiguration;
 pub(crate) mod references;
+pub(crate) mod remedies;
 pub(crate) mod reporting;
 pub(crate) mod responses;
 pub(crate) mod robustness;

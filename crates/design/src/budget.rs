@@ -1,29 +1,87 @@
-//! The time that certificates and bounds may take.
+//! The time that the phases of a design may take.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Time that certificates (the linear matrix inequalities of Theorem 1) and bounds (peak gains) of one
-/// design may take before the rest of them is left out. A part that has begun is completed.
+use control::lmi::{Ending, until};
+
+/// The time that a design may take, and how to end it.
+#[derive(Debug, Clone)]
+pub struct TimeLimits {
+    /// Of the search for gains. A design whose gains are not found by then is refused.
+    pub gains: Duration,
+    /// Of certificates and bounds together. The rest of them is left out, and the report says so. Zero
+    /// leaves all of them out.
+    pub certificates: Duration,
+    /// True ends the search for gains, certificates and bounds; the report has what was done by then.
+    pub interrupted: Arc<AtomicBool>,
+}
+
+impl Default for TimeLimits {
+    /// Five minutes for the gains, 30 s for certificates and bounds.
+    fn default() -> Self {
+        Self {
+            gains: Duration::from_secs(300),
+            certificates: Duration::from_secs(30),
+            interrupted: Arc::default(),
+        }
+    }
+}
+
+impl TimeLimits {
+    /// Starts the clock of the gains.
+    pub(crate) fn of_gains(&self) -> Budget {
+        Budget::start(self.gains, "the search for gains", "--gain-time", &self.interrupted)
+    }
+
+    /// Starts the clock of certificates and bounds.
+    pub(crate) fn of_certificates(&self) -> Budget {
+        let (option, flag) = ("--certificate-time", &self.interrupted);
+        Budget::start(self.certificates, "certificates and bounds", option, flag)
+    }
+}
+
+/// Time that a phase of one design may take before the rest of it is left out.
+#[derive(Clone)]
 pub(crate) struct Budget {
     start: Instant,
     limit: Duration,
+    phase: &'static str,
+    /// The option that allows more.
+    option: &'static str,
+    interrupted: Arc<AtomicBool>,
 }
 
 impl Budget {
-    /// Starts the clock.
-    pub(crate) fn start(limit: Duration) -> Self {
-        Self { start: Instant::now(), limit }
+    fn start(
+        limit: Duration,
+        phase: &'static str,
+        option: &'static str,
+        interrupted: &Arc<AtomicBool>,
+    ) -> Self {
+        let interrupted = Arc::clone(interrupted);
+        Self { start: Instant::now(), limit, phase, option, interrupted }
     }
 
     pub(crate) fn is_over(&self) -> bool {
-        self.start.elapsed() >= self.limit
+        self.start.elapsed() >= self.limit || self.interrupted.load(Ordering::Relaxed)
+    }
+
+    /// Runs `compute`, whose linear matrix inequalities end with the budget.
+    pub(crate) fn run<T>(&self, compute: impl FnOnce() -> T) -> T {
+        let budget = self.clone();
+        let ending: Ending = Arc::new(move || budget.is_over());
+        until(Some(ending), compute)
     }
 
     /// The reason for leaving something out.
     pub(crate) fn reason(&self) -> String {
-        format!(
-            "left out after {} s, the time for certificates and bounds; --certificate-time allows more",
-            self.limit.as_secs_f64()
-        )
+        let Self { limit, phase, option, .. } = self;
+        if self.interrupted.load(Ordering::Relaxed) {
+            return "left out: the design was interrupted".to_owned();
+        }
+        let seconds = limit.as_secs_f64();
+        format!("left out after {seconds} s, the time for {phase}; {option} allows more")
     }
 }

@@ -27,11 +27,11 @@ mod tests;
 mod threads;
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use control::robustness::Loop;
 use files::{Source, Table};
 
+pub use budget::TimeLimits;
 pub use code::{Code, Language, Precision};
 pub use compare::compare;
 pub use controller_fmu::ControllerFmu;
@@ -50,9 +50,6 @@ use progress::{Step, Steps};
 use report::identity;
 use solve::solution::Solution;
 use solve::{designed, fallback, reconfiguration};
-
-/// The time that certificates and bounds may take unless something else is asked for.
-pub const CERTIFICATE_TIME: Duration = Duration::from_secs(30);
 
 /// A designed controller.
 pub struct Design {
@@ -82,22 +79,21 @@ pub struct Design {
 /// [`Error`]: an entry of the file is wrong, with its line; the plant cannot be controlled, its faults
 /// cannot be told apart, or no gain meets the requirements.
 pub fn design(path: &Path) -> Result<Design, Error> {
-    design_within(path, CERTIFICATE_TIME, &|_| {})
+    design_within(path, &TimeLimits::default(), &|_| {})
 }
 
-/// [`design()`] in which certificates and bounds may take `certificate_time`; the rest of them is left
-/// out, and the report says so. Zero leaves all of them out. `observer` is called when a step begins.
+/// [`design()`] within `limits`. `observer` is called when a step begins.
 ///
 /// # Errors
 ///
-/// Same as [`design()`].
+/// Same as [`design()`]; [`Error::Within`] if the gains were not found in time.
 pub fn design_within(
     path: &Path,
-    certificate_time: Duration,
+    limits: &TimeLimits,
     observer: &Observer<'_>,
 ) -> Result<Design, Error> {
     let source = Source::read(path).map_err(Error::file("read", path))?;
-    design_source(&source, certificate_time, &Steps::new(observer))
+    design_source(&source, limits, &Steps::new(observer))
 }
 
 /// Designs the controller that `text`, the content of a plant file, asks for. `path` appears in errors;
@@ -107,24 +103,41 @@ pub fn design_within(
 ///
 /// Same as [`design()`].
 pub fn design_text(path: &Path, text: String) -> Result<Design, Error> {
-    design_source(&Source::new(path, text), CERTIFICATE_TIME, &Steps::new(&|_| {}))
+    let source = Source::new(path, text);
+    design_source(&source, &TimeLimits::default(), &Steps::new(&|_| {}))
 }
 
-fn design_source(
-    source: &Source,
-    certificate_time: Duration,
-    steps: &Steps<'_>,
-) -> Result<Design, Error> {
+fn design_source(source: &Source, limits: &TimeLimits, steps: &Steps<'_>) -> Result<Design, Error> {
     let parsed = source.parse()?;
     let file = PlantFile::read(source, &Table::whole(source, &parsed))?;
     let family = ParameterFamily::of(&file)?;
-    let designed = steps.run(Step::Gains, || designed::design(&file))?;
+    let budget = limits.of_gains();
+    let in_time = |error: Error| {
+        if !budget.is_over() {
+            return error;
+        }
+        error.within(format!("{}: no gains: the rest was {}", file.name(), budget.reason()))
+    };
+    let gains = || budget.run(|| designed::design(&file));
+    let mut designed = steps.run(Step::Gains, gains).map_err(in_time)?;
+    if budget.is_over() {
+        let text = format!(
+            "more time may give better gains: a part of the search was {}",
+            budget.reason()
+        );
+        designed.warnings.push(file.error(&["feedback"], text));
+    }
     let description = description(&file, &designed.nominal);
-    let detection = detection::detection(&file, &designed, family.as_ref())?;
+    let detection =
+        steps.run(Step::Detection, || detection::detection(&file, &designed, family.as_ref()))?;
     let section = detection.as_ref().map(|detection| &detection.section);
-    let fallback = fallback::fallback(&file, &designed.nominal, &assess::fallback::slowest)?;
-    let (reconfigurations, without) =
-        reconfiguration::reconfigurations(&file, &designed.nominal, fallback)?;
+    let without = || {
+        let solution = &designed.nominal;
+        let fallback = fallback::fallback(&file, solution, &assess::fallback::slowest)?;
+        Ok::<_, Error>(reconfiguration::reconfigurations(&file, solution, fallback)?)
+    };
+    let without = || budget.run(without);
+    let (reconfigurations, without) = steps.run(Step::Reconfiguration, without).map_err(in_time)?;
     let controller = designed.file(&file, &description, section, &reconfigurations)?;
     let text = controller.to_toml().map_err(|error| Error::Invalid(error.to_string()))?;
     let assessment = Assessment {
@@ -132,7 +145,7 @@ fn design_source(
         detection,
         reconfiguration: without,
         fallback: reconfigurations.fallback.as_ref(),
-        certificate_time,
+        limits: limits.clone(),
         ..Assessment::new(&file, family.as_ref(), &designed, steps)
     };
     let report = reporting::report(assessment).map_err(|error| {

@@ -223,7 +223,7 @@ impl<'a> PlantFile<'a> {
             estimation: EstimationRequest::read(file, faults.len())?,
             stop_time: time("stop_time")?,
             step_size: time("step_size")?,
-            robustness: RobustnessLimits::read(file, measurements.len())?,
+            robustness: RobustnessLimits::read(file, &model, measurements.len())?,
             family: variants::family(file, &model)?,
             schedule: variants::schedule(file, &model, &measurements)?,
             is_point: false,

@@ -19,34 +19,43 @@ pub type Observer<'a> = dyn Fn(Progress) + Sync + 'a;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Step {
     Gains,
+    Detection,
+    Reconfiguration,
     Margins,
     Comparison,
     Tolerances,
     Certificates,
     Bounds,
     Responses,
+    Remedies,
 }
 
 impl Step {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 10] = [
         Self::Gains,
+        Self::Detection,
+        Self::Reconfiguration,
         Self::Margins,
         Self::Comparison,
         Self::Tolerances,
         Self::Certificates,
         Self::Bounds,
         Self::Responses,
+        Self::Remedies,
     ];
 
     fn name(self) -> &'static str {
         match self {
             Self::Gains => "gains",
+            Self::Detection => "detection",
+            Self::Reconfiguration => "reconfiguration",
             Self::Margins => "margins",
             Self::Comparison => "comparison",
             Self::Tolerances => "parameter tolerances",
             Self::Certificates => "certificates",
             Self::Bounds => "bounds",
             Self::Responses => "responses",
+            Self::Remedies => "remedies",
         }
     }
 
@@ -58,7 +67,8 @@ impl Step {
             Self::Comparison => 10,
             Self::Responses => 13,
             Self::Tolerances | Self::Bounds => 20,
-            Self::Certificates => 2,
+            Self::Remedies => 5,
+            Self::Certificates | Self::Detection | Self::Reconfiguration => 2,
         }
     }
 }

@@ -154,6 +154,8 @@ pub struct Loop {
     /// The method that found the gain, in a sentence.
     pub method: String,
     /// Required eigenvalues [re, im]; empty if the requirement is of another kind.
+    pub required: Vec<[f64; 2]>,
+    /// The same as `required`, under its name up to version 0.1; the next version leaves it out.
     pub wanted: Vec<[f64; 2]>,
     /// Eigenvalues [re, im] of the closed loop.
     pub eigenvalues: Vec<[f64; 2]>,

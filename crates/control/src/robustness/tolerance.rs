@@ -5,38 +5,89 @@ use super::worst_case::climb;
 use crate::{Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-/// Entries this near to 0 (relative to the largest of the matrix) or to +-1 are structural.
-const STRUCTURAL: f64 = 1e-9;
+/// A factor this near to 1 is the 1 of a structural row: a linearisation rounds it.
+const ROUNDING: f64 = 1e-9;
+
+/// An entry of A, B, C or D.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PlantEntry {
+    /// 0 to 3: A, B, C, D.
+    pub matrix: usize,
+    /// The row, from 0.
+    pub row: usize,
+    /// The column, from 0.
+    pub column: usize,
+}
 
 /// The relative tolerances of the entries of A, B, C and D of a plant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tolerances {
     /// Of A, B, C, D, in this order: each matrix as large as the plant's; zero for an exact entry.
     pub of: [DMatrix<f64>; 4],
+    /// Entries that change by the same factor. An entry in none of these groups changes independently.
+    pub common: Vec<Vec<PlantEntry>>,
 }
 
 impl Tolerances {
-    /// The tolerances `relative` of A, B, C and D for all entries that are not structural: 0, 1 and -1
-    /// are exact.
+    /// The tolerances `relative` of A, B, C and D for all entries but zeros and those of structural rows.
+    ///
+    /// A row is structural if its single entry other than 0 is 1 and says what a state or a measurement is:
+    ///
+    /// ```text
+    /// x_i' = x_j (j other than i): a state is the derivative of another; row i of B is zero
+    /// y_i = x_j: a measurement is a state; row i of D is zero
+    /// ```
+    ///
+    /// Every other entry may be a parameter of the plant, 1 and -1, too.
     #[must_use]
-    pub fn of_values(plant: &StateSpace, relative: [f64; 4]) -> Self {
-        let of = |(m, relative): (&DMatrix<f64>, f64)| {
-            let negligible = STRUCTURAL * m.amax();
-            m.map(|entry| {
-                let fixed = entry.abs() <= negligible || (entry.abs() - 1.0).abs() <= STRUCTURAL;
-                if fixed { 0.0 } else { relative }
+    pub fn unless_structural(plant: &StateSpace, relative: [f64; 4]) -> Self {
+        let [in_a, in_b, in_c, in_d] = relative;
+        let varying = |m: &DMatrix<f64>, relative: f64, structural: &dyn Fn(usize) -> bool| {
+            DMatrix::from_fn(m.nrows(), m.ncols(), |row, column| {
+                if m[(row, column)] == 0.0 || structural(row) { 0.0 } else { relative }
             })
         };
-        let [a, b, c, d] = relative;
-        let matrices = [(&plant.a, a), (&plant.b, b), (&plant.c, c), (&plant.d, d)];
-        Self { of: matrices.map(of) }
+        let kinematic = |row: usize| is_signal(&plant.a, &plant.b, row, Some(row));
+        let selector = |row: usize| is_signal(&plant.c, &plant.d, row, None);
+        let of = [
+            varying(&plant.a, in_a, &kinematic),
+            varying(&plant.b, in_b, &|_| false),
+            varying(&plant.c, in_c, &selector),
+            varying(&plant.d, in_d, &|_| false),
+        ];
+        Self { of, common: Vec::new() }
     }
 
-    /// The number of entries that are not exact.
-    #[must_use]
-    pub fn count(&self) -> usize {
-        self.of.iter().flat_map(DMatrix::iter).filter(|entry| **entry > 0.0).count()
+    /// The entries that are not exact, matrix by matrix and row by row.
+    pub fn entries(&self) -> impl Iterator<Item = PlantEntry> + '_ {
+        self.of.iter().enumerate().flat_map(|(matrix, of)| {
+            let all = (0..of.nrows()).flat_map(|row| (0..of.ncols()).map(move |col| (row, col)));
+            all.filter(|place| of[*place] > 0.0).map(move |(row, column)| PlantEntry {
+                matrix,
+                row,
+                column,
+            })
+        })
     }
+}
+
+/// Whether a row says that its left side is a state other than `excluded`: a 1 for it in `states`, zeros
+/// everywhere else and in `commands`.
+fn is_signal(
+    states: &DMatrix<f64>,
+    commands: &DMatrix<f64>,
+    row: usize,
+    excluded: Option<usize>,
+) -> bool {
+    let entries = states.row(row);
+    let mut entries = entries.iter().enumerate().filter(|(_, entry)| **entry != 0.0);
+    let is_one = match (entries.next(), entries.next()) {
+        (Some((column, entry)), None) => {
+            Some(column) != excluded && (entry - 1.0).abs() <= ROUNDING
+        }
+        _ => false,
+    };
+    is_one && commands.row(row).iter().all(|entry| *entry == 0.0)
 }
 
 /// What a loop does while the parameters of its plant are within their tolerances.
@@ -185,19 +236,18 @@ fn uniform(state: &mut u64) -> f64 {
     fraction / 9_007_199_254_740_992.0
 }
 
-/// A plant entry that varies: matrix (A, B, C, D), row, column, and the product of value and tolerance.
+/// A plant entry that varies, and the product of its value and its tolerance.
 struct Entry {
-    matrix: usize,
-    row: usize,
-    column: usize,
+    place: PlantEntry,
     size: f64,
 }
 
 /// All plants within the tolerances of single entries: each is multiplied by 1 + t d, t its tolerance,
-/// d its deviation.
+/// d its deviation. Entries that change together have one deviation.
 pub struct EntryFamily<'a> {
     plant: &'a StateSpace,
-    entries: Vec<Entry>,
+    /// The entries of each deviation.
+    deviations: Vec<Vec<Entry>>,
 }
 
 impl<'a> EntryFamily<'a> {
@@ -207,25 +257,28 @@ impl<'a> EntryFamily<'a> {
     ///
     /// [`Error::Shape`] for tolerances that do not fit; [`Error::OutOfRange`] for a negative one.
     pub fn new(plant: &'a StateSpace, tolerances: &Tolerances) -> Result<Self, Error> {
-        let mut entries = Vec::new();
         let named = [("A", &plant.a), ("B", &plant.b), ("C", &plant.c), ("D", &plant.d)];
-        for (matrix, ((name, values), of)) in named.into_iter().zip(&tolerances.of).enumerate() {
+        for ((name, values), of) in named.into_iter().zip(&tolerances.of) {
             check::shape(name, of, values.shape())?;
-            for (row, column) in
-                (0..of.ncols()).flat_map(|column| (0..of.nrows()).map(move |row| (row, column)))
-            {
-                let relative = of[(row, column)];
-                if relative < 0.0 {
-                    let rule = "not negative";
-                    return Err(Error::OutOfRange { name: "the tolerance", value: relative, rule });
-                }
-                let size = relative * values[(row, column)];
-                if size.abs() > 0.0 {
-                    entries.push(Entry { matrix, row, column, size });
-                }
+            if let Some(&value) = of.iter().find(|relative| **relative < 0.0) {
+                let rule = "not negative";
+                return Err(Error::OutOfRange { name: "the tolerance", value, rule });
             }
         }
-        Ok(Self { plant, entries })
+        let mut groups: Vec<Vec<Entry>> = tolerances.common.iter().map(|_| Vec::new()).collect();
+        for place in tolerances.entries() {
+            let PlantEntry { matrix, row, column } = place;
+            let size = tolerances.of[matrix][(row, column)] * named[matrix].1[(row, column)];
+            if size == 0.0 {
+                continue;
+            }
+            match tolerances.common.iter().position(|group| group.contains(&place)) {
+                Some(at) => groups[at].push(Entry { place, size }),
+                None => groups.push(vec![Entry { place, size }]),
+            }
+        }
+        groups.retain(|group| !group.is_empty());
+        Ok(Self { plant, deviations: groups })
     }
 }
 
@@ -233,25 +286,28 @@ impl PlantFamily for EntryFamily<'_> {
     type Error = Error;
 
     fn count(&self) -> usize {
-        self.entries.len()
+        self.deviations.len()
     }
 
     fn plant(&self, deviations: &[f64]) -> Result<StateSpace, Error> {
         let mut plant = self.plant.clone();
-        for (entry, deviation) in self.entries.iter().zip(deviations) {
-            let matrix = match entry.matrix {
-                0 => &mut plant.a,
-                1 => &mut plant.b,
-                2 => &mut plant.c,
-                _ => &mut plant.d,
-            };
-            matrix[(entry.row, entry.column)] += entry.size * deviation;
+        for (entries, deviation) in self.deviations.iter().zip(deviations) {
+            for Entry { place: PlantEntry { matrix, row, column }, size } in entries {
+                let matrix = match matrix {
+                    0 => &mut plant.a,
+                    1 => &mut plant.b,
+                    2 => &mut plant.c,
+                    _ => &mut plant.d,
+                };
+                matrix[(*row, *column)] += size * deviation;
+            }
         }
         Ok(plant)
     }
 
     fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64> {
-        let of = |entry: &Entry| entries[entry.matrix][(entry.row, entry.column)] * entry.size;
-        self.entries.iter().map(of).collect()
+        let slope =
+            |Entry { place, size }: &Entry| entries[place.matrix][(place.row, place.column)] * size;
+        self.deviations.iter().map(|entries| entries.iter().map(slope).sum()).collect()
     }
 }

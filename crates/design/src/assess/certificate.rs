@@ -28,7 +28,11 @@ pub(crate) fn certificate(designed: &Solution, norms: Vec<Norm>, budget: &Budget
 }
 
 fn in_time<T>(budget: &Budget, solve: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    if budget.is_over() { Err(budget.reason()) } else { solve() }
+    if budget.is_over() {
+        return Err(budget.reason());
+    }
+    let found = budget.run(solve);
+    if found.is_err() && budget.is_over() { Err(budget.reason()) } else { found }
 }
 
 /// Returns the largest norm of the fault vector, from the bounds of the plant file.

@@ -81,7 +81,11 @@ pub(crate) fn common(
     if budget.is_over() {
         return Ok(Err(format!("it was {}", budget.reason())));
     }
-    Ok(match certify_common(loops, &lmi::Region::default(), domain)? {
+    let found = budget.run(|| certify_common(loops, &lmi::Region::default(), domain))?;
+    if !matches!(found, Outcome::Optimal(_)) && budget.is_over() {
+        return Ok(Err(format!("it was {}", budget.reason())));
+    }
+    Ok(match found {
         Outcome::Optimal(found) => Ok(reported(&found)),
         Outcome::Infeasible { conflict } => {
             let mut names: Vec<_> = conflict.into_iter().map(name).collect();
@@ -139,13 +143,14 @@ pub(crate) fn judge(
     }
     let tolerances = stable().filter_map(|(name, own)| Some((name, own.tolerance.as_ref()?)));
     let worst = tolerances
-        .filter(|(_, found)| found.stable < 1.0 || found.worst_instability >= 0.0)
+        .filter(|(_, found)| found.is_unstable())
         .min_by(|x, y| x.1.first_unstable.total_cmp(&y.1.first_unstable));
     if let Some((name, found)) = worst {
         let text = format!(
-            "parameters within their tolerances make the loop with the {kind} {name} unstable: {:.1} % \
+            "parameters within their tolerances ({}) make the loop with the {kind} {name} unstable: {:.1} % \
              of {} random cases, the worst case found from {:.3} of the tolerances on",
-            100.0 * (1.0 - found.stable),
+            found.range(),
+            100.0 * (1.0 - found.stable.unwrap_or(1.0)),
             found.cases,
             found.first_unstable
         );

@@ -255,7 +255,8 @@ impl Examination<'_> {
             Outcome::Inconclusive(reason) => return Ok(Err(reason.to_owned())),
         };
         let searched = bounded && !self.budget.is_over();
-        let decay = if searched { self.lossy.decay(&largest)? } else { None };
+        let decay = || self.lossy.decay(&largest);
+        let decay = if searched { self.budget.run(decay)? } else { None };
         Ok(Ok(LossProof {
             margin: certificate.margin,
             p: rows(&certificate.p),
@@ -270,7 +271,10 @@ impl Examination<'_> {
             if self.budget.is_over() {
                 break;
             }
-            let found = self.lossy.certified(largest, limit.factor)?;
+            let found = self.budget.run(|| self.lossy.certified(largest, limit.factor))?;
+            if self.budget.is_over() {
+                break;
+            }
             let losses = numbers(self.stated, |_| 0.0).into_iter().zip(largest);
             all.push(CertifiedLoss {
                 losses: losses
@@ -297,13 +301,9 @@ impl Examination<'_> {
                 if self.budget.is_over() {
                     break;
                 }
-                let set = common_reachable_set(
-                    &corners,
-                    &column,
-                    &outputs,
-                    2.0 * decay * rate,
-                    self.lossy.domain,
-                )?;
+                let (rate, domain) = (2.0 * decay * rate, self.lossy.domain);
+                let set = || common_reachable_set(&corners, &column, &outputs, rate, domain);
+                let set = self.budget.run(set)?;
                 let Outcome::Optimal(set) = set else { continue };
                 for (state, smallest) in smallest.iter_mut().enumerate() {
                     let peak = set.peak(&outputs.row(state).transpose());

@@ -22,11 +22,12 @@ use crate::assess::losses::{self, losses};
 use crate::assess::matrices::Names;
 use crate::assess::reconfiguration::reasons as reconfiguration_reasons;
 use crate::assess::references::{beyond_limits, reached, reference_steps};
+use crate::assess::remedies::remedies;
 use crate::assess::responses::responses;
 use crate::assess::robustness::robustness;
 use crate::assess::schedule::{self as schedule_report, judge_schedule};
 use crate::assess::verdict::verdict;
-use crate::budget::Budget;
+use crate::budget::TimeLimits;
 use crate::matrix::pairs;
 use crate::plant::fixed_mode::shown;
 use crate::plant::parameters::ParameterFamily;
@@ -56,8 +57,7 @@ pub(crate) struct Assessment<'a> {
     pub(crate) detection: Option<Detection>,
     pub(crate) reconfiguration: Option<ReconfigurationReport>,
     pub(crate) fallback: Option<&'a Fallback>,
-    /// The time that certificates and bounds may take.
-    pub(crate) certificate_time: Duration,
+    pub(crate) limits: TimeLimits,
     pub(crate) steps: &'a Steps<'a>,
 }
 
@@ -77,7 +77,7 @@ impl<'a> Assessment<'a> {
             detection: None,
             reconfiguration: None,
             fallback: None,
-            certificate_time: Duration::ZERO,
+            limits: TimeLimits { certificates: Duration::ZERO, ..TimeLimits::default() },
             steps,
         }
     }
@@ -93,7 +93,7 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
         detection,
         reconfiguration,
         fallback,
-        certificate_time,
+        limits,
         steps,
     } = assessment;
     let nominal = &designed.nominal;
@@ -111,7 +111,7 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
     let mut missing = Vec::new();
     let errors = unless_numerical("the errors of the estimates", errors, &mut missing)?;
     let norms = unless_numerical("the norms of the estimation errors", norms, &mut missing)?;
-    let budget = Budget::start(certificate_time);
+    let budget = limits.of_certificates();
     let certificate = steps.run(Step::Certificates, || certificate(nominal, norms, &budget));
     let (bounds, without_bounds) = steps.run(Step::Bounds, || loops.bounds(&budget))?;
     let losses = losses(nominal, &budget)?;
@@ -129,7 +129,8 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
     further.extend(fallback.iter().flat_map(|own| fallback::reasons(own, file.robustness.red)));
     let family_report = family_report::family(designed, &file.robustness, &budget)?;
     let schedule = schedule_report::schedule(designed, &file.robustness, &budget)?;
-    let mut verdict = verdict(&checks, robustness.as_ref(), &file.robustness, further);
+    let remedies = steps.run(Step::Remedies, || remedies(file, robustness.as_ref(), &budget));
+    let mut verdict = verdict(&checks, robustness.as_ref(), &file.robustness, further, remedies);
     if let Some(found) = &family_report {
         let members: Vec<_> = found.members.iter().skip(1).collect();
         judge(&mut verdict, "member", &members, &file.robustness);
@@ -274,10 +275,12 @@ fn closed(
         _ => None,
     };
     let number = |number: fn(&Quality) -> f64| quality.as_ref().map(number);
+    let required = pairs(&sorted(&found.required));
     Ok(Loop {
         matrix: name.to_owned(),
         method: found.method.clone(),
-        wanted: pairs(&sorted(&found.required)),
+        wanted: required.clone(),
+        required,
         eigenvalues: pairs(&eigenvalues(dynamics)?),
         condition: number(|quality| quality.condition),
         balanced_condition: number(|quality| quality.balanced_condition),

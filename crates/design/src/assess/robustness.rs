@@ -152,7 +152,7 @@ pub(crate) struct Physical {
 }
 
 impl Physical {
-    fn of(designed: &Solution) -> Result<Self, Error> {
+    pub(crate) fn of(designed: &Solution) -> Result<Self, Error> {
         Self::with(designed, &designed.linear)
     }
 
@@ -167,13 +167,7 @@ impl Physical {
         linear: &LinearPlant,
         gains: &Gains,
     ) -> Result<Self, Error> {
-        let plant = StateSpace {
-            a: linear.a.clone(),
-            b: linear.b.clone(),
-            c: linear.c.clone(),
-            d: linear.d.clone(),
-            domain: Domain::Continuous,
-        };
+        let plant = linear.state_space();
         let CompleteController { commands, estimates } = complete(designed, gains)?;
         let channels: Vec<_> =
             designed.extended.channels.iter().map(|channel| channel.estimate).collect();
@@ -281,8 +275,8 @@ fn sensitivity(
 ) -> Vec<PeakSensitivity> {
     let linear = &designed.linear;
     let one = |((_, name), [to_a, to_b, to_c, to_d]): ((Point, &str), &[DMatrix<f64>; 4])| {
-        // One for the entries that tolerances vary, zero for structural ones.
-        let [in_a, in_b, in_c, in_d] = Tolerances::of_values(plant, [1.0; 4]).of;
+        // One for the entries that are not structural.
+        let [in_a, in_b, in_c, in_d] = Tolerances::unless_structural(plant, [1.0; 4]).of;
         let matrix = |name: &str, of: (&[Signal], &[Signal]), effects: &DMatrix<f64>| Matrix {
             name: name.to_owned(),
             meaning: "entry times derivative of the peak of S".to_owned(),

@@ -102,9 +102,12 @@ fn bounded(
                  than a sample"
             )));
         }
-        Some(rate) => certify_schedule(intervals, rate * time, domain)?,
-        None => largest_change(intervals, domain)?,
+        Some(rate) => budget.run(|| certify_schedule(intervals, rate * time, domain))?,
+        None => budget.run(|| largest_change(intervals, domain))?,
     };
+    if found.is_none() && budget.is_over() {
+        return Ok(Err(format!("it was {}", budget.reason())));
+    }
     Ok(match found {
         Some(ScheduleCertificate { change, p, margin, .. }) => {
             let p = p.iter().map(rows).collect();

@@ -2,8 +2,9 @@
 
 use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::Check;
-use crate::report::number::rounded;
-use crate::report::robustness::{Level, Limits, Parameter, Robustness, ToleranceResult, Verdict};
+use crate::report::robustness::{
+    Level, Limits, LoopPoint, Remedy, Robustness, ToleranceResult, Verdict,
+};
 
 /// Judges a design.
 pub(crate) fn verdict(
@@ -11,6 +12,7 @@ pub(crate) fn verdict(
     robustness: Option<&Robustness>,
     limits: &RobustnessLimits,
     further: Vec<(Level, String)>,
+    remedies: Vec<Remedy>,
 ) -> Verdict {
     let RobustnessLimits { amber, red, tolerance, .. } = *limits;
     let stated = Limits { amber, red, tolerance };
@@ -21,57 +23,46 @@ pub(crate) fn verdict(
         reasons.push(format!("does not hold: {}", check.condition));
     }
     for point in robustness.iter().flat_map(|found| &found.points) {
-        let peak = point.judged;
-        let (limit, reached) = match peak {
-            peak if peak > limits.red => (limits.red, Level::Red),
-            peak if peak > limits.amber => (limits.amber, Level::Amber),
-            _ => continue,
-        };
-        if level != Level::Red {
-            level = reached;
-        }
-        reasons.push(format!(
-            "the peak of S at the {} is {peak:.3}, above {limit} ({})",
-            point.point,
-            reached.word()
-        ));
+        let Some((reached, reason)) = peak_reason(point, limits) else { continue };
+        level = level.max(reached);
+        reasons.push(reason);
     }
     if let Some(found) = robustness.map(|found| &found.tolerance) {
-        let unstable = found.stable < 1.0 || found.worst_instability >= 0.0;
-        if unstable {
+        if found.is_unstable() {
             level = Level::Red;
-            reasons.push(instability(found, &stated));
+            reasons.push(instability(found));
         }
     }
     for (reached, reason) in further {
         level = level.max(reached);
         reasons.push(reason);
     }
-    Verdict { level, reasons, limits: stated }
+    Verdict { level, reasons, remedies, limits: stated }
+}
+
+/// The sentence about a peak of S above a limit, and the level of the verdict.
+pub(crate) fn peak_reason(point: &LoopPoint, limits: &RobustnessLimits) -> Option<(Level, String)> {
+    let peak = point.judged;
+    let (limit, level) = match peak {
+        peak if peak > limits.red => (limits.red, Level::Red),
+        peak if peak > limits.amber => (limits.amber, Level::Amber),
+        _ => return None,
+    };
+    let (at, word) = (&point.point, level.word());
+    Some((level, format!("the peak of S at the {at} is {peak:.3}, above {limit} ({word})")))
 }
 
 /// The sentence about a loop that parameters within their tolerances make unstable.
-fn instability(found: &ToleranceResult, limits: &Limits) -> String {
-    let range = if found.parameters.is_empty() {
-        format!("parameters within {}", limits.stated_tolerances(&found.worst))
-    } else {
-        let limits = |own: &Parameter| {
-            let [low, high] = own.limits.map(rounded);
-            format!("{} from {low} to {high}", own.name)
-        };
-        found.parameters.iter().map(limits).collect::<Vec<_>>().join(", ")
+pub(crate) fn instability(found: &ToleranceResult) -> String {
+    let range = found.range();
+    let (cases, first) = (found.cases, found.first_unstable);
+    let worst = format!("the worst case found, from {first:.3} of the tolerances on");
+    let unstable = match found.stable {
+        Some(part) if part < 1.0 => {
+            format!("{:.1} % of {cases} random cases, and {worst}", 100.0 * (1.0 - part))
+        }
+        Some(_) => format!("none of {cases} random cases, but {worst}"),
+        None => worst,
     };
-    let worst =
-        format!("the worst case found, from {:.3} of the tolerances on", found.first_unstable);
-    let cases = found.cases;
-    if found.stable < 1.0 {
-        let unstable = 100.0 * (1.0 - found.stable);
-        format!(
-            "{range} make the loop unstable: {unstable:.1} % of {cases} random cases, and {worst}"
-        )
-    } else if cases > 0 {
-        format!("{range} make the loop unstable: none of {cases} random cases, but {worst}")
-    } else {
-        format!("{range} make the loop unstable: {worst}")
-    }
+    format!("parameters within their tolerances ({range}) make the loop unstable: {unstable}")
 }

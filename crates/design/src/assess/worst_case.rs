@@ -32,7 +32,7 @@ pub(crate) fn plant_file(
     let text = toml::to_string(&table).map_err(|error| unwritable(&error))?;
     let parameters = &robustness.tolerance.parameters;
     let within = if parameters.is_empty() {
-        format!("within {}", report.verdict.limits.stated_tolerances(&robustness.tolerance.worst))
+        format!("within {}", robustness.tolerance.range())
     } else {
         let worst = |own: &Parameter| format!("{} = {}", own.name, own.worst);
         format!("with {}", parameters.iter().map(worst).collect::<Vec<_>>().join(", "))

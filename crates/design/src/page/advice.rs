@@ -18,10 +18,19 @@ pub(super) fn advice(report: &Report) -> Vec<Markup> {
              faults; its explanation is under " (link("checks", "Checks")) "."
         });
     }
-    if let Some(robustness) = &report.robustness {
+    for remedy in &report.verdict.remedies {
+        advice.push(html! {
+            (remedy.change)
+            @for line in &remedy.lines { br; code { (line) } }
+        });
+    }
+    // Without other designs that were computed.
+    if let Some(robustness) = &report.robustness
+        && report.verdict.remedies.is_empty()
+    {
         advice.extend(lower_peaks(robustness, report.verdict.limits.amber));
         let tolerance = &robustness.tolerance;
-        if tolerance.stable < 1.0 || tolerance.worst_instability >= 0.0 {
+        if tolerance.is_unstable() {
             advice.push(html! {
                 "The worst plant found is unstable from " (number(tolerance.first_unstable)) " of the tolerances on. Lower the peak of \
                  S, or measure the parameters more exactly and state smaller tolerances in " code { "[robustness]" } "."

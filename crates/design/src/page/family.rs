@@ -131,7 +131,7 @@ fn margins(caption: &str, kind: &str, members: &[&MemberReport]) -> Markup {
             point(0).map(|point| point.together.alpha).into(),
             point(1).map(|point| point.together.alpha).into(),
             own.map(|own| own.delay_margin).into(),
-            tolerance.map(|found| 100.0 * found.stable).into(),
+            tolerance.and_then(|found| found.stable).map(|part| 100.0 * part).into(),
             tolerance.map(|found| found.first_unstable).into(),
         ]
     };

@@ -11,7 +11,7 @@ use crate::report::{Loop, LowerBoundFor, Region, Report};
 
 /// Returns the required and the actual eigenvalues of a loop, mapped by `place`.
 fn groups(system: &Loop, place: impl Fn(Pole) -> Pole) -> Vec<Group> {
-    [("required", Sign::Ring, &system.wanted), ("reached", Sign::Cross, &system.eigenvalues)]
+    [("required", Sign::Ring, &system.required), ("reached", Sign::Cross, &system.eigenvalues)]
         .into_iter()
         .map(|(name, sign, poles)| group(name, sign, poles, &place))
         .filter(|group| !group.poles.is_empty())

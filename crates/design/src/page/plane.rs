@@ -72,7 +72,7 @@ impl Loop {
     pub(super) fn pairs(&self) -> Vec<Pair> {
         let mut left = self.eigenvalues.clone();
         let mut pairs = Vec::new();
-        for required in &self.wanted {
+        for required in &self.required {
             let distance = |pole: &Pole| (pole[0] - required[0]).hypot(pole[1] - required[1]);
             let nearest =
                 (0..left.len()).min_by(|a, b| distance(&left[*a]).total_cmp(&distance(&left[*b])));
@@ -102,7 +102,8 @@ mod tests {
         let system = Loop {
             matrix: String::new(),
             method: String::new(),
-            wanted: vec![[-1.0, 2.0], [-1.0, -2.0], [-5.0, 0.0]],
+            required: vec![[-1.0, 2.0], [-1.0, -2.0], [-5.0, 0.0]],
+            wanted: Vec::new(),
             eigenvalues: vec![[-5.1, 0.0], [-1.1, -2.0], [-9.0, 0.0], [-1.1, 2.0]],
             condition: Some(1.0),
             balanced_condition: Some(1.0),

@@ -215,21 +215,29 @@ fn parameters(report: &Report, found: &Robustness) -> Markup {
 }
 
 fn tolerances(report: &Report, found: &ToleranceResult) -> Markup {
-    let varied = report.verdict.limits.stated_tolerances(&found.worst);
+    if !found.is_examined() {
+        return html! { p { "Not examined: no entry and no parameter of the plant varies." } };
+    }
     let tried = if found.parameters.is_empty() { 16.0 } else { 1.0 };
     html! {
         p {
             @if found.parameters.is_empty() {
-                "Each of " (number(f64::from(found.entries))) " entries that is not 0, 1 or −1 varies by \
-                 itself (" (varied) "); "
+                (found.entries) " entries vary: " (found.range()) ". Each varies by itself, unless \
+                 stated together; zeros and structural rows do not vary; "
             } @else {
                 "The parameters of the table vary between their limits, and the FMU is linearised \
                  with each set of them at the same operating point; "
             }
-            "the controller does not. Of " (number(f64::from(found.cases))) " random cases (seed "
-            (number(f64::from(found.seed))) ") the \
-             fraction " (number(found.stable)) " is stable. The worst plant found has the stability \
-             figure " (number(found.worst_instability)) " (negative: stable; "
+            "the controller does not. "
+            @match found.stable {
+                Some(part) => {
+                    "Of " (found.cases) " random cases (seed " (found.seed) ") the fraction "
+                    (number(part)) " is stable. "
+                }
+                None => "There are no random cases. "
+            }
+            "The worst plant found has the stability figure "
+            (number(found.worst_instability)) " (negative: stable; "
             @if report.sampling.is_some() { "largest modulus less 1" } @else { "largest real part, 1/s" }
             "). In its direction the loop is stable up to " (number(found.first_unstable.min(tried)))
             " of the tolerances" @if found.first_unstable > tried { ", the most that was tried" }

@@ -56,21 +56,14 @@ pub(super) fn verdict(report: &Report) -> Markup {
 /// The limits that the verdict follows from, and what is not certified.
 fn limits(report: &Report) -> Markup {
     let limits = &report.verdict.limits;
-    let parameters =
-        report.robustness.as_ref().is_some_and(|found| !found.tolerance.parameters.is_empty());
     html! {
         p {
             "A peak of S above " (number(limits.amber))
             " is amber, above " (number(limits.red)) " red, as are parameters within their \
              tolerances that make the loop unstable"
-            @if !parameters {
-                ": "
-                @for (index, (name, tolerance)) in limits.of_matrices(&report.plant.matrices).enumerate() {
-                    @if index > 0 { ", " }
-                    (number(tolerance)) " of each entry of " (name)
-                }
-            } @else {
-                ": those of the FMU that the section on robustness lists"
+            @if let Some(robustness) = &report.robustness {
+                @if robustness.tolerance.is_examined() { ": " (robustness.tolerance.range()) }
+                @else { ", which were not examined, because nothing varies" }
             }
             "."
         }
@@ -104,8 +97,12 @@ fn figures(report: &Report) -> Markup {
         }))
         (key("Delay margin", &html! { (number(robustness.delay_margin)) " s" }))
         (key("Parameters within their tolerances", &html! {
-            (number(100.0 * tolerance.stable)) " % of " (tolerance.cases) " random cases stable, "
-            @if tolerance.first_unstable.is_infinite() {
+            @if let Some(part) = tolerance.stable {
+                (number(100.0 * part)) " % of " (tolerance.cases) " random cases stable, "
+            }
+            @if !tolerance.is_examined() {
+                "not examined: nothing varies"
+            } @else if tolerance.first_unstable.is_infinite() {
                 "no unstable case found"
             } @else {
                 "unstable from " (number(tolerance.first_unstable)) " of the tolerances on"

@@ -2,6 +2,7 @@
 
 use control::detection::UnknownInput;
 use control::faults::{Fault as Model, FaultEntry, FaultKind};
+use control::{Domain, StateSpace};
 use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
@@ -42,6 +43,17 @@ impl LinearPlant {
     /// Whether a measurement depends on a command directly.
     pub(crate) fn has_feedthrough(&self) -> bool {
         self.d.amax() > 0.0
+    }
+
+    /// The plant from the commands to the measurements.
+    pub(crate) fn state_space(&self) -> StateSpace {
+        StateSpace {
+            a: self.a.clone(),
+            b: self.b.clone(),
+            c: self.c.clone(),
+            d: self.d.clone(),
+            domain: Domain::Continuous,
+        }
     }
 
     /// Takes the matrices of `file`, or linearises its FMU.

@@ -1,7 +1,9 @@
 //! Reads the table `[robustness]` of a plant file: tolerances, measurement noise, limits.
 
+use control::robustness::PlantEntry;
 use files::{Entry, PlaceError, Table};
 
+use crate::plant_file::Model;
 use crate::plant_file::parameters::{self, ParameterTolerance, fraction};
 
 /// What the robustness of a design is tested with, and the limits of its verdict.
@@ -9,6 +11,8 @@ use crate::plant_file::parameters::{self, ParameterTolerance, fraction};
 pub(crate) struct RobustnessLimits {
     /// Relative tolerances of the entries of A, B, C and D.
     pub(crate) tolerance: [f64; 4],
+    /// Tolerances of single entries, in place of those of their matrices.
+    pub(crate) entries: Vec<EntryTolerance>,
     /// Tolerances of parameters of the plant's FMU; if there are any, the entries are exact.
     pub(crate) parameters: Vec<ParameterTolerance>,
     /// Number of random cases.
@@ -24,6 +28,17 @@ pub(crate) struct RobustnessLimits {
     pub(crate) red: f64,
 }
 
+/// A tolerance of entries that change by the same factor.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct EntryTolerance {
+    pub(crate) entries: Vec<PlantEntry>,
+    /// Fraction of their values; 0 for exact entries.
+    pub(crate) relative: f64,
+}
+
+/// The names of the matrices that vary.
+pub(crate) const MATRICES: [&str; 4] = ["A", "B", "C", "D"];
+
 const KEYS: [&str; 7] = ["tolerance", "parameters", "cases", "seed", "noise", "amber", "red"];
 const TOLERANCE: f64 = 0.1;
 const CASES: u32 = 200;
@@ -32,9 +47,14 @@ const RED: f64 = 4.0;
 
 impl RobustnessLimits {
     /// Reads the table, or returns the defaults for a plant with that many measurements.
-    pub(crate) fn read(file: &Table<'_>, measurements: usize) -> Result<Self, PlaceError> {
+    pub(crate) fn read(
+        file: &Table<'_>,
+        model: &Model,
+        measurements: usize,
+    ) -> Result<Self, PlaceError> {
         let mut found = Self {
             tolerance: [TOLERANCE; 4],
+            entries: Vec::new(),
             parameters: Vec::new(),
             cases: CASES,
             seed: 1,
@@ -49,6 +69,11 @@ impl RobustnessLimits {
         table.allow(&KEYS)?;
         if let Some(entry) = table.get("tolerance") {
             found.tolerance = tolerances(&entry)?;
+            if entry.is_table()
+                && let Some(entry) = entry.table()?.get("entries")
+            {
+                found.entries = entries(&entry, model)?;
+            }
         }
         if let Some(entry) = table.get("parameters") {
             if file.get("plant").is_none() {
@@ -87,15 +112,61 @@ impl RobustnessLimits {
     }
 }
 
+/// Reads tolerances of single entries: `"A[2][1]" = 0.5`, `"A[2][1], B[2][1]" = 0.5` for entries that change by
+/// the same factor.
+fn entries(entry: &Entry<'_>, model: &Model) -> Result<Vec<EntryTolerance>, PlaceError> {
+    let Model::Matrices { a, b, c, d, .. } = model else {
+        return Err(
+            entry.error("an FMU is the plant: expected `parameters`, its parameters that vary")
+        );
+    };
+    let mut found: Vec<EntryTolerance> = Vec::new();
+    for (text, entry) in entry.table()?.entries() {
+        let mut places = Vec::new();
+        for name in text.split(',').map(str::trim) {
+            let place = plant_entry(name).ok_or_else(|| {
+                entry.error(format!(
+                    "expected an entry of A, B, C or D such as \"A[2][1]\", or several with commas, which \
+                     change by the same factor; found {name:?}"
+                ))
+            })?;
+            let matrix = [a, b, c, d][place.matrix];
+            let value = matrix.get((place.row, place.column)).ok_or_else(|| {
+                let (rows, columns) = matrix.shape();
+                entry.error(format!("{name}: the matrix has {rows} rows and {columns} columns"))
+            })?;
+            if *value == 0.0 {
+                return Err(entry.error(format!("{name} is 0, of which a fraction is nothing")));
+            }
+            let mut stated = found.iter().flat_map(|own| &own.entries).chain(&places);
+            if stated.any(|other| *other == place) {
+                return Err(entry.error(format!("{name} is stated twice")));
+            }
+            places.push(place);
+        }
+        found.push(EntryTolerance { entries: places, relative: fraction(&entry)? });
+    }
+    Ok(found)
+}
+
+/// Reads `A[2][1]`; rows and columns count from 1.
+fn plant_entry(text: &str) -> Option<PlantEntry> {
+    let (name, rest) = text.split_once('[')?;
+    let matrix = MATRICES.iter().position(|own| *own == name)?;
+    let (row, column) = rest.strip_suffix(']')?.split_once("][")?;
+    let index = |text: &str| text.parse::<usize>().ok()?.checked_sub(1);
+    Some(PlantEntry { matrix, row: index(row)?, column: index(column)? })
+}
+
 /// Reads one number for A, B, C and D, or a table with a number for some of them.
 fn tolerances(entry: &Entry<'_>) -> Result<[f64; 4], PlaceError> {
     if !entry.is_table() {
         return Ok([fraction(entry)?; 4]);
     }
     let table = entry.table()?;
-    table.allow(&["A", "B", "C", "D"])?;
+    table.allow(&["A", "B", "C", "D", "entries"])?;
     let mut found = [0.0; 4];
-    for (key, tolerance) in ["A", "B", "C", "D"].into_iter().zip(&mut found) {
+    for (key, tolerance) in MATRICES.into_iter().zip(&mut found) {
         if let Some(entry) = table.get(key) {
             *tolerance = fraction(&entry)?;
         }

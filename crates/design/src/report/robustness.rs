@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::report::number::rounded;
 use crate::report::{Frequency, Matrix};
 
 /// How a design is judged.
@@ -37,8 +38,21 @@ pub struct Verdict {
     pub level: Level,
     /// The reasons for a level other than green, in sentences.
     pub reasons: Vec<String>,
+    /// What changes peaks of S and instability within tolerances: computed for slower and faster gains.
+    pub remedies: Vec<Remedy>,
     /// The limits that the levels follow from.
     pub limits: Limits,
+}
+
+/// A change of the plant file that removes a reason of the verdict, or the one that comes nearest.
+#[derive(Serialize, JsonSchema)]
+pub struct Remedy {
+    /// The reason, as in `reasons`.
+    pub reason: String,
+    /// What the change gives, in a sentence.
+    pub change: String,
+    /// The lines of the plant file that replace those of the same name; empty if no change helps.
+    pub lines: Vec<String>,
 }
 
 impl Verdict {
@@ -58,25 +72,8 @@ pub struct Limits {
     pub amber: f64,
     /// Peak of S above which it is red.
     pub red: f64,
-    /// Relative tolerances of the entries of A, B, C and D that are not 0, 1 or -1.
+    /// Relative tolerances of the entries of A, B, C and D that are neither 0 nor structural.
     pub tolerance: [f64; 4],
-}
-
-impl Limits {
-    /// The tolerances of A, B, C and D, as far as they are among `matrices`.
-    pub(crate) fn of_matrices<'a>(
-        &self,
-        matrices: &'a [Matrix],
-    ) -> impl Iterator<Item = (&'static str, f64)> + use<'a> {
-        let all = ["A", "B", "C", "D"].into_iter().zip(self.tolerance);
-        all.filter(|(name, _)| matrices.iter().any(|own| own.name == *name))
-    }
-
-    /// The same in words.
-    pub(crate) fn stated_tolerances(&self, matrices: &[Matrix]) -> String {
-        let one = |(name, part): (&str, f64)| format!("±{} % of {name}", 100.0 * part);
-        self.of_matrices(matrices).map(one).collect::<Vec<_>>().join(", ")
-    }
 }
 
 /// The robustness of the loop of plant and controller. A number without a limit is infinite, in
@@ -143,7 +140,7 @@ pub struct LoopPoint {
 pub struct PeakSensitivity {
     /// `input` (commands) or `output` (measurements).
     pub point: String,
-    /// A, B and C: each entry that is not 0, 1 or -1, times the derivative with respect to it. A
+    /// A, B and C: each entry that is not structural, times the derivative with respect to it. A
     /// change of the entry by 1 % changes the peak by 0.01 times this number.
     pub matrices: Vec<Matrix>,
 }
@@ -225,19 +222,30 @@ pub struct Parameter {
     pub effects: Vec<f64>,
 }
 
+/// Entries of the plant that vary by the same factor.
+#[derive(Serialize, JsonSchema)]
+pub struct VaryingEntries {
+    /// The entries, such as `A[2][1]`: matrix, row and column, counted from 1.
+    pub entries: Vec<String>,
+    /// Their relative tolerance.
+    pub tolerance: f64,
+}
+
 /// Stability while the parameters of the plant vary within their tolerances.
 #[derive(Serialize, JsonSchema)]
 pub struct ToleranceResult {
     /// Number of entries that vary; 0 if `parameters` vary.
     pub entries: u32,
+    /// These entries; those of one item vary together.
+    pub varying: Vec<VaryingEntries>,
     /// The parameters of the FMU that vary; empty if the entries vary.
     pub parameters: Vec<Parameter>,
     /// Number of random cases.
     pub cases: u32,
     /// Seed of the random cases.
     pub seed: u32,
-    /// The fraction of the random cases that is stable.
-    pub stable: f64,
+    /// The fraction of the random cases that is stable; none if nothing varies or there are no cases.
+    pub stable: Option<f64>,
     /// Largest real part of the eigenvalues, 1/s, or largest modulus less 1, with the worst plant
     /// found.
     pub worst_instability: f64,
@@ -247,4 +255,61 @@ pub struct ToleranceResult {
     pub first_unstable: f64,
     /// A, B and C of the worst plant.
     pub worst: Vec<Matrix>,
+}
+
+/// The most entries that are named one by one.
+const NAMED: usize = 12;
+
+impl ToleranceResult {
+    /// Whether something varies.
+    #[must_use]
+    pub fn is_examined(&self) -> bool {
+        self.entries > 0 || !self.parameters.is_empty()
+    }
+
+    /// Whether a case within the tolerances is unstable.
+    #[must_use]
+    pub fn is_unstable(&self) -> bool {
+        self.is_examined()
+            && (self.worst_instability >= 0.0 || self.stable.is_some_and(|part| part < 1.0))
+    }
+
+    /// What varies, and how far: `±10 % of A[2][1], B[2][1]`, many entries by their number.
+    #[must_use]
+    pub fn range(&self) -> String {
+        let limits = |own: &Parameter| {
+            let [low, high] = own.limits.map(rounded);
+            format!("{} from {low} to {high}", own.name)
+        };
+        let mut parts: Vec<_> = self.parameters.iter().map(limits).collect();
+        let (single, common): (Vec<_>, Vec<_>) =
+            self.varying.iter().partition(|item| item.entries.len() == 1);
+        let mut sizes: Vec<f64> = single.iter().map(|item| item.tolerance).collect();
+        sizes.sort_by(f64::total_cmp);
+        sizes.dedup();
+        for size in sizes {
+            let names = single.iter().filter(|item| item.tolerance.total_cmp(&size).is_eq());
+            let names: Vec<_> = names.flat_map(|item| &item.entries).map(String::as_str).collect();
+            parts.push(format!("±{} % of {}", rounded(100.0 * size), listed(&names)));
+        }
+        for item in common {
+            let names: Vec<_> = item.entries.iter().map(String::as_str).collect();
+            let size = rounded(100.0 * item.tolerance);
+            parts.push(format!("±{size} % of {} together", listed(&names)));
+        }
+        parts.join("; ")
+    }
+}
+
+/// The entries, or the number of them in each matrix.
+fn listed(names: &[&str]) -> String {
+    if names.len() <= NAMED {
+        return names.join(", ");
+    }
+    let of = |matrix: &&str| names.iter().filter(|name| name.starts_with(*matrix)).count();
+    let counts = ["A", "B", "C", "D"].into_iter().filter(|matrix| of(matrix) > 0);
+    counts
+        .map(|matrix| format!("{} entries of {matrix}", of(&matrix)))
+        .collect::<Vec<_>>()
+        .join(", ")
 }

@@ -21,7 +21,7 @@ use control::controller::closed_loop;
 use control::detectability::{Detectability, detectability};
 use control::distance::{Distance, from_uncontrollable};
 use control::faults::ExtendedPlant;
-use control::lmi::RegionCertificate;
+use control::lmi::{self, RegionCertificate};
 use control::rank::{Mode, Rank, controllability, uncontrollable_modes};
 use control::sampled;
 use control::stability::{instability, is_clearly_stable};
@@ -292,9 +292,12 @@ impl GainProblem<'_> {
             filter: filter.as_deref(),
             estimator: estimator(file),
         };
-        let (feedback, observer) = rayon::join(feedback, || {
-            observer(&file.observer.requirement, &observer_problem, domain)
-        });
+        // Both run in other threads, which have the same time.
+        let ending = lmi::ending();
+        let feedback = || lmi::until(ending.clone(), feedback);
+        let observer = || observer(&file.observer.requirement, &observer_problem, domain);
+        let observer = || lmi::until(ending.clone(), observer);
+        let (feedback, observer) = rayon::join(feedback, observer);
         let feedback =
             feedback.map_err(|refusal| feedback_refused(file, linear, domain, refusal))?;
         let observer = observer.map_err(|refusal| {

@@ -6,17 +6,19 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::rc::Rc;
 
+use control::Domain;
 use control::detection::UncertainPlant;
 use control::robustness::{PlantFamily, Tolerances, random_deviations};
-use control::{Domain, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
 use crate::assess::detection::decoupling::Decoupling;
 use crate::assess::detection::problem::Problem;
+use crate::plant::entries::tolerances;
 use crate::plant::linear::LinearPlant;
 use crate::plant::parameters::ParameterFamily;
 use crate::plant_file::PlantFile;
 use crate::plant_file::detection::ModelError;
+use crate::plant_file::robustness::RobustnessLimits;
 use crate::plant_file::signals::Signal;
 use crate::solve::designed::Designed;
 
@@ -80,7 +82,7 @@ impl<'a> ModelErrors<'a> {
         Ok(Self {
             file,
             request,
-            plants: plants.map(|plant| uncertain(plant, file.robustness.tolerance)).collect(),
+            plants: plants.map(|plant| uncertain(plant, &file.robustness)).collect(),
             parameters,
             random: parameters.map_or_else(Vec::new, |family| {
                 let limits = &file.robustness;
@@ -190,15 +192,10 @@ impl<'a> ModelErrors<'a> {
 }
 
 /// The linear plant with errors of its entries within the tolerances.
-fn uncertain(linear: &LinearPlant, tolerance: [f64; 4]) -> UncertainPlant {
-    let nominal = StateSpace {
-        a: linear.a.clone(),
-        b: linear.b.clone(),
-        c: linear.c.clone(),
-        d: DMatrix::zeros(linear.c.nrows(), linear.b.ncols()),
-        domain: Domain::Continuous,
-    };
-    let Tolerances { of: [a, b, c, _] } = Tolerances::of_values(&nominal, tolerance);
+fn uncertain(linear: &LinearPlant, limits: &RobustnessLimits) -> UncertainPlant {
+    let mut nominal = linear.state_space();
+    let Tolerances { of: [a, b, c, _], .. } = tolerances(&nominal, limits);
+    nominal.d.fill(0.0);
     let sizes = [
         a.component_mul(&nominal.a.abs()),
         b.component_mul(&nominal.b.abs()),

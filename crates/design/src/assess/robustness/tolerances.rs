@@ -1,17 +1,18 @@
 //! Whether a loop stays stable while the plant varies within its tolerances.
 
 use control::robustness::{
-    EntryFamily, ToleranceSearch, ToleranceTest, Tolerances, tolerance_test,
+    EntryFamily, PlantEntry, ToleranceSearch, ToleranceTest, Tolerances, tolerance_test,
 };
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::assess::robustness::{Physical, names};
 use crate::matrix::rows;
+use crate::plant::entries::tolerances;
 use crate::plant::parameters::ParameterFamily;
-use crate::plant_file::robustness::RobustnessLimits;
+use crate::plant_file::robustness::{MATRICES, RobustnessLimits};
 use crate::report::Matrix;
-use crate::report::robustness::ToleranceResult;
+use crate::report::robustness::{ToleranceResult, VaryingEntries};
 use crate::solve::solution::Solution;
 
 /// Examines the loop for plants whose matrices have other entries, within the tolerances: the part of the
@@ -21,7 +22,7 @@ pub(crate) fn by_entries(
     physical: &Physical,
     limits: &RobustnessLimits,
 ) -> Result<ToleranceResult, crate::Error> {
-    let tolerances = Tolerances::of_values(&physical.plant, limits.tolerance);
+    let tolerances = tolerances(&physical.plant, limits);
     let family = EntryFamily::new(&physical.plant, &tolerances)?;
     let search = ToleranceSearch { family: &family, controller: &physical.controller };
     let cases = search.cases(limits.cases, u64::from(limits.seed)).into_par_iter();
@@ -29,8 +30,10 @@ pub(crate) fn by_entries(
     let cases = cases.collect::<Result<Vec<_>, _>>()?;
     let climbs = search.starts(&cases)?.into_par_iter().map(|start| search.climb(start));
     let found = search.result(&cases, climbs.collect::<Result<Vec<_>, _>>()?)?;
-    let entries = u32::try_from(tolerances.count()).unwrap_or(u32::MAX);
-    Ok(ToleranceResult { entries, ..tested(designed, limits, &found) })
+    let entries = u32::try_from(tolerances.entries().count()).unwrap_or(u32::MAX);
+    let stable = stable(&found).filter(|_| entries > 0);
+    let varying = varying(&tolerances);
+    Ok(ToleranceResult { entries, varying, stable, ..tested(designed, limits, &found) })
 }
 
 /// Examines the loop for other parameters of the plant's FMU, as [`by_entries`] does for entries.
@@ -45,6 +48,31 @@ pub(super) fn by_parameters(
     let found = tolerance_test(family, &physical.controller, limits.cases, seed)?;
     let parameters = family.report(&found.deviations, slopes);
     Ok(ToleranceResult { parameters, ..tested(designed, limits, &found) })
+}
+
+/// The entries that vary: one item for each factor.
+fn varying(tolerances: &Tolerances) -> Vec<VaryingEntries> {
+    let name = |place: &PlantEntry| {
+        format!("{}[{}][{}]", MATRICES[place.matrix], place.row + 1, place.column + 1)
+    };
+    let item = |entries: &[PlantEntry]| {
+        let PlantEntry { matrix, row, column } = entries[0];
+        let tolerance = tolerances.of[matrix][(row, column)];
+        VaryingEntries { entries: entries.iter().map(name).collect(), tolerance }
+    };
+    let common = |place: &PlantEntry| tolerances.common.iter().any(|group| group.contains(place));
+    let single = tolerances.entries().filter(|place| !common(place)).map(|place| item(&[place]));
+    let varies = |group: &&Vec<PlantEntry>| {
+        group
+            .first()
+            .is_some_and(|place| tolerances.of[place.matrix][(place.row, place.column)] > 0.0)
+    };
+    single.chain(tolerances.common.iter().filter(varies).map(|group| item(group))).collect()
+}
+
+/// The part of the random cases that is stable; none without cases.
+fn stable(found: &ToleranceTest) -> Option<f64> {
+    (found.cases > 0).then(|| f64::from(found.stable) / f64::from(found.cases))
 }
 
 fn tested(
@@ -72,14 +100,11 @@ fn tested(
     }
     ToleranceResult {
         entries: 0,
+        varying: Vec::new(),
         parameters: Vec::new(),
         cases: found.cases,
         seed: limits.seed,
-        stable: if found.cases == 0 {
-            1.0
-        } else {
-            f64::from(found.stable) / f64::from(found.cases)
-        },
+        stable: stable(found),
         worst_instability: found.worst_instability,
         first_unstable: found.first_unstable.unwrap_or(f64::INFINITY),
         worst,

@@ -18,7 +18,7 @@ use crate::report::{
 };
 
 use crate::report::robustness::{
-    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Parameter, PeakSensitivity,
+    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Parameter, PeakSensitivity, Remedy,
     Robustness, ToleranceResult, Verdict,
 };
 
@@ -70,7 +70,8 @@ fn sampled_loop(matrix: &str, rates: &[[f64; 2]], region: Option<Region>) -> Loo
     Loop {
         matrix: matrix.to_owned(),
         method: format!("weights {QUOTES}"),
-        wanted: if region.is_some() { Vec::new() } else { eigenvalues.clone() },
+        wanted: Vec::new(),
+        required: if region.is_some() { Vec::new() } else { eigenvalues.clone() },
         eigenvalues,
         condition: Some(1.234_567_89e3),
         balanced_condition: Some(f64::INFINITY),
@@ -323,6 +324,7 @@ fn robustness(numbers: &mut Numbers) -> Robustness {
         }],
         tolerance: ToleranceResult {
             entries: 0,
+            varying: Vec::new(),
             parameters: vec![Parameter {
                 name: QUOTES.to_owned(),
                 unit: Some(QUOTES.to_owned()),
@@ -333,7 +335,7 @@ fn robustness(numbers: &mut Numbers) -> Robustness {
             }],
             cases: 200,
             seed: 1,
-            stable: 0.125,
+            stable: Some(0.125),
             worst_instability: 0.5,
             first_unstable: 0.75,
             worst: vec![numbers.matrix("A", 10, 10)],
@@ -406,6 +408,11 @@ pub(super) fn hostile() -> Report {
         verdict: Verdict {
             level: Level::Red,
             reasons: vec![format!("the peak of S {MARKUP}")],
+            remedies: vec![Remedy {
+                reason: format!("the peak of S {MARKUP}"),
+                change: format!("with {MARKUP}"),
+                lines: vec![MARKUP.to_owned()],
+            }],
             limits: Limits { amber: 2.0, red: 4.0, tolerance: [0.0; 4] },
         },
         robustness: Some(robustness(&mut numbers)),
@@ -502,6 +509,7 @@ pub(super) fn bare() -> Report {
         matrix: "a".to_owned(),
         method: "given".to_owned(),
         wanted: Vec::new(),
+        required: Vec::new(),
         eigenvalues: vec![[pole, 0.0]],
         condition: None,
         balanced_condition: None,
@@ -517,6 +525,7 @@ pub(super) fn bare() -> Report {
         verdict: Verdict {
             level: Level::Green,
             reasons: Vec::new(),
+            remedies: Vec::new(),
             limits: Limits { amber: 2.0, red: 4.0, tolerance: [0.0; 4] },
         },
         checks: Vec::new(),

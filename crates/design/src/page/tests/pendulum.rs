@@ -225,12 +225,13 @@ fn bound(error: &str, unit: &str, gain_of_fault: f64, gain_of_rate: f64) -> Boun
     }
 }
 
-fn system(matrix: &str, wanted: &[f64], reached: &DMatrix<f64>, conditions: [f64; 3]) -> Loop {
+fn system(matrix: &str, required: &[f64], reached: &DMatrix<f64>, conditions: [f64; 3]) -> Loop {
     Loop {
         matrix: matrix.to_owned(),
         method: "eigenvalues placed for a small condition number (Kautsky, Nichols and Van Dooren)"
             .to_owned(),
-        wanted: wanted.iter().map(|pole| [*pole, 0.0]).collect(),
+        wanted: Vec::new(),
+        required: required.iter().map(|pole| [*pole, 0.0]).collect(),
         eigenvalues: pairs(&control::eigen::eigenvalues(reached).unwrap()),
         condition: Some(conditions[0]),
         balanced_condition: Some(conditions[1]),
@@ -267,6 +268,7 @@ pub(super) fn pendulum() -> Report {
         verdict: Verdict {
             level: Level::Green,
             reasons: Vec::new(),
+            remedies: Vec::new(),
             limits: Limits { amber: 2.0, red: 4.0, tolerance: [0.1; 4] },
         },
         checks: checks(),

@@ -1,0 +1,259 @@
+//! What changes the verdict: the same plant with slower or faster gains, designed and examined.
+
+use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
+
+use crate::assess::robustness::{Physical, by_entries, loop_points};
+use crate::assess::verdict::{instability, peak_reason};
+use crate::budget::Budget;
+use crate::plant_file::PlantFile;
+use crate::plant_file::requirements::Requirement;
+use crate::plant_file::robustness::RobustnessLimits;
+use crate::report::number::rounded;
+use crate::report::robustness::{LoopPoint, Remedy, Robustness};
+use crate::solve::designed::design;
+
+/// Factors on the speed of a loop.
+const FACTORS: [f64; 8] = [0.8, 1.25, 0.6, 1.7, 0.4, 2.5, 0.25, 4.0];
+/// A weight of commands or measurements changes by this power of the factor on the speed: that of a double
+/// integrator.
+const WEIGHT_POWER: i32 = -4;
+/// Largest number of states for which other designs are tried.
+const LARGEST_ORDER: usize = 24;
+/// A peak that is lower by less than this part is not worth a change.
+const LOWER: f64 = 0.95;
+
+/// Returns what changes the peaks of S above their limit and instability within the tolerances, one item for
+/// each of these reasons. For gains by linear matrix inequalities, several or large plants, and without time,
+/// there is none.
+pub(crate) fn remedies(
+    file: &PlantFile<'_>,
+    robustness: Option<&Robustness>,
+    budget: &Budget,
+) -> Vec<Remedy> {
+    let limits = &file.robustness;
+    let Some(robustness) = robustness else { return Vec::new() };
+    let of_peaks = robustness.points.iter().enumerate();
+    let mut reasons: Vec<_> = of_peaks
+        .filter_map(|(at, point)| {
+            let (_, text) = peak_reason(point, limits)?;
+            Some(Reason { text, aim: Aim::Peak { at, present: point.judged } })
+        })
+        .collect();
+    // Other parameters of an FMU are not tried.
+    if robustness.tolerance.is_unstable() && limits.parameters.is_empty() {
+        reasons.push(Reason { text: instability(&robustness.tolerance), aim: Aim::Stable });
+    }
+    // The search for other gains takes long.
+    let quick = [&file.feedback, &file.observer].iter().all(|request| {
+        let searched =
+            matches!(request.requirement, Requirement::Region(_) | Requirement::HInfinity { .. });
+        !searched
+    });
+    let single = quick && file.family.is_empty() && file.schedule.is_none();
+    let order = robustness.tolerance.worst.first().map_or(0, |a| a.values.len());
+    if reasons.is_empty() || !single || order > LARGEST_ORDER || budget.is_over() {
+        return Vec::new();
+    }
+    let varies = reasons.iter().any(|reason| matches!(reason.aim, Aim::Stable));
+    let mut trials: Vec<_> = variants(file)
+        .into_par_iter()
+        .filter(|_| !budget.is_over())
+        .filter_map(|variant| variant.trial(file, varies))
+        .collect();
+    trials.sort_by(|one, other| one.distance.total_cmp(&other.distance));
+    let remedy = |reason: Reason| reason.remedy(&trials, limits);
+    reasons.into_iter().map(remedy).collect()
+}
+
+/// A reason of the verdict, and what a change has to reach.
+struct Reason {
+    text: String,
+    aim: Aim,
+}
+
+enum Aim {
+    /// The peak at a point of the loop below its limit.
+    Peak { at: usize, present: f64 },
+    /// Stability within the tolerances.
+    Stable,
+}
+
+/// Other requirements in the plant file.
+struct Variant {
+    observer: Option<Scaled>,
+    feedback: Option<Scaled>,
+    factor: f64,
+}
+
+/// A requirement for a faster or slower loop, as a line of the plant file and in words.
+#[derive(Clone)]
+struct Scaled {
+    requirement: Requirement,
+    line: String,
+    words: String,
+}
+
+/// A variant that was designed.
+struct Trial {
+    lines: Vec<String>,
+    words: String,
+    points: Vec<LoopPoint>,
+    is_unstable: bool,
+    /// How far the speeds are from those of the plant file.
+    distance: f64,
+}
+
+/// One loop, or both, slower or faster.
+fn variants(file: &PlantFile<'_>) -> Vec<Variant> {
+    let one = |factor: f64| {
+        let observer = scaled("observer", "V", &file.observer.requirement, factor);
+        let feedback = scaled("feedback", "R", &file.feedback.requirement, factor);
+        let both = observer.is_some() && feedback.is_some();
+        let mut all = vec![
+            Variant { observer: observer.clone(), feedback: None, factor },
+            Variant { observer: None, feedback: feedback.clone(), factor },
+        ];
+        all.extend(both.then_some(Variant { observer, feedback, factor }));
+        all.retain(|variant| variant.observer.is_some() || variant.feedback.is_some());
+        all
+    };
+    FACTORS.into_iter().flat_map(one).collect()
+}
+
+/// The requirement of the loop `name` with eigenvalues times `factor`, or with another `weight`.
+fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> Option<Scaled> {
+    // The line of the plant file has these digits.
+    let short = |value: f64| rounded(value).parse::<f64>().unwrap_or(value);
+    match requirement {
+        Requirement::Eigenvalues(all) => {
+            let all: Vec<_> = all
+                .iter()
+                .map(|value| Complex::new(short(factor * value.re), short(factor * value.im)))
+                .collect();
+            let shown = all.iter().filter(|value| value.im >= 0.0).map(|value| {
+                let (re, im) = (rounded(value.re), rounded(value.im));
+                if value.im == 0.0 { re } else { format!("{{ re = {re}, im = {im} }}") }
+            });
+            let shown = shown.collect::<Vec<_>>().join(", ");
+            Some(Scaled {
+                requirement: Requirement::Eigenvalues(all),
+                line: format!("{name}.eigenvalues = [{shown}]"),
+                words: format!("{name} eigenvalues {factor} times as fast"),
+            })
+        }
+        Requirement::Weights { states, channels } => {
+            let size = short(factor.powi(WEIGHT_POWER));
+            let channels: DMatrix<f64> = channels.map(|entry| short(size * entry));
+            let rows = channels.row_iter().map(|row| {
+                let entries: Vec<_> = row.iter().map(|entry| rounded(*entry)).collect();
+                format!("[{}]", entries.join(", "))
+            });
+            let rows = rows.collect::<Vec<_>>().join(", ");
+            let larger = rounded(size);
+            Some(Scaled {
+                requirement: Requirement::Weights { states: states.clone(), channels },
+                line: format!("{name}.{weight} = [{rows}]"),
+                words: format!("{name}.{weight} {larger} times as large"),
+            })
+        }
+        _ => None,
+    }
+}
+
+impl Variant {
+    /// Designs the variant and examines its loop; None if there is no stable one.
+    fn trial(self, file: &PlantFile<'_>, varies: bool) -> Option<Trial> {
+        let Self { observer, feedback, factor } = self;
+        let mut other = file.clone();
+        if let Some(observer) = &observer {
+            other.observer.requirement = observer.requirement.clone();
+        }
+        if let Some(feedback) = &feedback {
+            other.feedback.requirement = feedback.requirement.clone();
+        }
+        let nominal = design(&other).ok()?.nominal;
+        if nominal.instability >= 0.0 {
+            return None;
+        }
+        let physical = Physical::of(&nominal).ok()?;
+        let closed = physical.closed(&physical.controller).ok()?;
+        let linear = &nominal.linear;
+        let points = loop_points(&closed, &linear.actuators, &linear.measurements).ok()?;
+        let is_unstable =
+            varies && by_entries(&nominal, &physical, &file.robustness).ok()?.is_unstable();
+        let parts: Vec<_> = observer.iter().chain(&feedback).collect();
+        #[expect(clippy::cast_precision_loss, reason = "one or two loops")]
+        let distance = factor.ln().abs() * parts.len() as f64;
+        let words: Vec<_> = parts.iter().map(|part| part.words.as_str()).collect();
+        Some(Trial {
+            lines: parts.iter().map(|part| part.line.clone()).collect(),
+            words: words.join(" and "),
+            points,
+            is_unstable,
+            distance,
+        })
+    }
+}
+
+impl Trial {
+    fn peaks(&self) -> String {
+        let one = |point: &LoopPoint| format!("{} at the {}", rounded(point.judged), point.point);
+        self.points.iter().map(one).collect::<Vec<_>>().join(" and ")
+    }
+
+    /// Whether nothing is left of the reasons.
+    fn is_green(&self, limits: &RobustnessLimits) -> bool {
+        !self.is_unstable && self.points.iter().all(|point| point.judged <= limits.amber)
+    }
+}
+
+impl Reason {
+    /// The smallest change that removes all reasons, else this one; else the one with the lowest peak.
+    fn remedy(self, trials: &[Trial], limits: &RobustnessLimits) -> Remedy {
+        let reached = |trial: &&Trial| match self.aim {
+            Aim::Peak { at, .. } => trial.points[at].judged <= limits.amber,
+            Aim::Stable => !trial.is_unstable,
+        };
+        let green = trials.iter().find(|trial| trial.is_green(limits));
+        let least = match self.aim {
+            Aim::Stable => None,
+            Aim::Peak { at, present } => trials
+                .iter()
+                .min_by(|x, y| x.points[at].judged.total_cmp(&y.points[at].judged))
+                .filter(|trial| trial.points[at].judged < LOWER * present),
+        };
+        let chosen = green.or_else(|| trials.iter().find(reached));
+        let (trial, change) = match (chosen, least) {
+            (Some(trial), _) => {
+                let peaks = trial.peaks();
+                let stable =
+                    if trial.is_unstable { ", still unstable within the tolerances" } else { "" };
+                (trial, format!("with {}, the peak of S is {peaks}{stable}", trial.words))
+            }
+            (None, Some(trial)) => {
+                let peaks = trial.peaks();
+                let change = format!(
+                    "none of {} other designs, from {} to {} times as fast, meets the limit; with {}, the \
+                     peak of S is {peaks}",
+                    trials.len(),
+                    FACTORS[6],
+                    FACTORS[7],
+                    trial.words
+                );
+                (trial, change)
+            }
+            (None, None) => {
+                let change = format!(
+                    "none of {} other designs, from {} to {} times as fast, is better: other \
+                     measurements, actuators or requirements are needed",
+                    trials.len(),
+                    FACTORS[6],
+                    FACTORS[7]
+                );
+                return Remedy { reason: self.text, change, lines: Vec::new() };
+            }
+        };
+        Remedy { reason: self.text, change, lines: trial.lines.clone() }
+    }
+}

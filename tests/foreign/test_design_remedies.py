@@ -1,0 +1,109 @@
+"""Each remedy that a message of `aso-ftc design` names is tried: the refused plant file, with the remedy, is designed."""
+
+import pytest
+
+from design_oracle import made
+
+TROLLEY = """A = [[0, 1], [0, -1]]
+B = [[0], [1]]
+C = [[1, 0]]
+actuator_faults = "all"
+feedback.eigenvalues = [-1, -2]
+observer.eigenvalues = [-5, -6, -7]
+"""
+FEEDBACK, OBSERVER = "feedback.eigenvalues = [-1, -2]\n", "observer.eigenvalues = [-5, -6, -7]\n"
+SAMPLED = f"sample_time = 0.05\n{TROLLEY}"
+LEAST = {name: f'{name}.h_infinity = "least"\n' for name in ("feedback", "observer")}
+DISC = "region = { disc = { center = -5, radius = 4 } }\n"
+
+# What is replaced in the plant file; the message; what the remedy replaces.
+CASES = {
+    "least norm of a feedback": (
+        (TROLLEY, FEEDBACK, LEAST["feedback"]),
+        '"least" needs a `region` with a disc',
+        (LEAST["feedback"], LEAST["feedback"] + f"feedback.{DISC}"),
+    ),
+    "least norm of an observer, noise": (
+        (TROLLEY, OBSERVER, LEAST["observer"]),
+        '"least" needs `noise`, or a `region` with a disc',
+        (LEAST["observer"], LEAST["observer"] + "observer.noise = 0.01\n"),
+    ),
+    "least norm of an observer, disc": (
+        (TROLLEY, OBSERVER, LEAST["observer"]),
+        '"least" needs `noise`, or a `region` with a disc',
+        (LEAST["observer"], LEAST["observer"] + f"observer.{DISC}"),
+    ),
+    "disc of a sampled design": (
+        (SAMPLED, FEEDBACK, f"{LEAST['feedback']}feedback.{DISC}"),
+        "a sampled design has a region by `decay` only",
+        (DISC, "region = { decay = 1.0 }\n"),
+    ),
+    "sensor fault": (
+        (TROLLEY, 'actuator_faults = "all"\n', 'faults = [{ name = "bias", sensor = "y1" }]\n'),
+        "needs `filter`",
+        ("C = [[1, 0]]", "C = [[1, 0], [1, 0]]\nfilter = 50"),
+        ("[-5, -6, -7]", "[-5, -6, -7, -8, -9]"),
+    ),
+    "law that does not exist": (
+        (TROLLEY, OBSERVER, f'{OBSERVER}estimation.law = "sliding-mode"\n'),
+        "possible are augmented, proportional-integral",
+        ('"sliding-mode"', '"proportional-integral"'),
+    ),
+    "entry of an FMU's matrices": (
+        (TROLLEY, "C = ", 'robustness.tolerance = { entries = { k = 0.5 } }\nC = '),
+        'expected an entry of A, B, C or D such as "A[2][1]"',
+        ("{ k = 0.5 }", '{ "A[2][2]" = 0.5 }'),
+    ),
+    "entry that is zero": (
+        (TROLLEY, "C = ", 'robustness.tolerance = { entries = { "A[1][1]" = 0.5 } }\nC = '),
+        "A[1][1] is 0, of which a fraction is nothing",
+        ('"A[1][1]"', '"A[2][2]"'),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_a_refused_plant_file_with_the_remedy_of_its_message_is_designed(aso_ftc, tmp_path, case):
+    (text, old, new), message, *remedies = case
+    assert old in text
+    refused = text.replace(old, new)
+    own, error = made(aso_ftc, tmp_path, refused)
+    assert own is None and message in error, error
+    for old, new in remedies:
+        assert old in refused
+        refused = refused.replace(old, new)
+    own, report = made(aso_ftc, tmp_path, refused)
+    assert own is not None, report
+
+
+def test_a_sampled_feedback_of_the_least_norm_needs_no_region(aso_ftc, tmp_path):
+    for region in ("", "feedback.region = { decay = 1.0 }\n"):
+        own, report = made(aso_ftc, tmp_path, SAMPLED.replace(FEEDBACK, LEAST["feedback"] + region))
+        assert own is not None, report
+        norm = report["feedback"]["norm"]
+        assert norm["norm"] >= 0.999 * norm["lower_bound"]
+
+
+REMEDIED = """A = [[0, 0, 1, 0], [0, 0, 0, 1], [-1, 1, 0, 0], [1, -1, 0, 0]]
+B = [[0], [0], [1], [0]]
+C = [[0, 1, 0, 0]]
+actuator_faults = "all"
+feedback.eigenvalues = [-1, -1.1, -1.2, -1.3]
+observer.eigenvalues = [-4, -5, -6, -7, -8]
+robustness.tolerance = 0.0
+"""
+
+
+def test_the_lines_that_follow_a_reason_of_the_verdict_give_the_stated_peaks(aso_ftc, tmp_path):
+    _, report = made(aso_ftc, tmp_path, REMEDIED)
+    verdict = report["verdict"]
+    assert verdict["level"] == "amber" and [one["reason"] for one in verdict["remedies"]] == verdict["reasons"]
+    for remedy in verdict["remedies"]:
+        changed = [line for line in REMEDIED.splitlines() if line.split(" = ")[0] not in {line.split(" = ")[0] for line in remedy["lines"]}]
+        _, other = made(aso_ftc, tmp_path, "\n".join([*remedy["lines"], *changed]))
+        peaks = [point["judged"] for point in other["robustness"]["points"]]
+        for peak in peaks:
+            assert f"{peak:.3f}"[:4] in remedy["change"], (peak, remedy)
+        assert max(peaks) < max(point["judged"] for point in report["robustness"]["points"])
+    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml", "--force")
+    assert done.returncode in (0, 1)
