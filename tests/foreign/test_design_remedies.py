@@ -99,7 +99,8 @@ def test_the_lines_that_follow_a_reason_of_the_verdict_give_the_stated_peaks(aso
     verdict = report["verdict"]
     assert verdict["level"] == "amber" and [one["reason"] for one in verdict["remedies"]] == verdict["reasons"]
     for remedy in verdict["remedies"]:
-        changed = [line for line in REMEDIED.splitlines() if line.split(" = ")[0] not in {line.split(" = ")[0] for line in remedy["lines"]}]
+        names = {line.split(" = ")[0] for line in remedy["lines"]}
+        changed = [line for line in REMEDIED.splitlines() if line.split(" = ")[0] not in names]
         _, other = made(aso_ftc, tmp_path, "\n".join([*remedy["lines"], *changed]))
         peaks = [point["judged"] for point in other["robustness"]["points"]]
         for peak in peaks:

@@ -1,7 +1,7 @@
 """Which entries vary within their tolerances, and what becomes of the loop, by numpy: two masses and a spring.
 
-The benchmark of B. Wie and D. S. Bernstein (American Control Conference 1990): m1 = m2 = k = 1, the spring is uncertain from 0.5 to 2. All its
-numbers are 0, 1 and -1; those of the spring and of the masses are parameters all the same."""
+The benchmark of B. Wie and D. S. Bernstein (American Control Conference 1990): m1 = m2 = k = 1, the spring is uncertain from
+0.5 to 2. All its numbers are 0, 1 and -1; those of the spring and of the masses are parameters all the same."""
 
 import numpy as np
 import pytest
