@@ -54,7 +54,7 @@ const REFUSALS: [(&str, &str, &str); 54] = [
     (
         "feedback.eigenvalues = [-1, -2]",
         "feedback.h_infinity = \"least\"",
-        "5:23: feedback.h_infinity: \"least\" needs a `region` with a disc, or",
+        "5:23: feedback.h_infinity: \"least\" needs a `region` with a disc: without",
     ),
     (
         "feedback.eigenvalues = [-1, -2]",

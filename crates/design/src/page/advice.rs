@@ -21,7 +21,7 @@ pub(super) fn advice(report: &Report) -> Vec<Markup> {
     for remedy in &report.verdict.remedies {
         advice.push(html! {
             (remedy.change)
-            @for line in &remedy.lines { br; code { (line) } }
+            @for line in &remedy.lines { div { code { (line) } } }
         });
     }
     // Without other designs that were computed.

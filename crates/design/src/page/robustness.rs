@@ -222,7 +222,7 @@ fn tolerances(report: &Report, found: &ToleranceResult) -> Markup {
     html! {
         p {
             @if found.parameters.is_empty() {
-                (found.entries) " entries vary: " (found.range()) ". Each varies by itself, unless \
+                (number(f64::from(found.entries))) " entries vary: " (found.range()) ". Each varies by itself, unless \
                  stated together; zeros and structural rows do not vary; "
             } @else {
                 "The parameters of the table vary between their limits, and the FMU is linearised \
@@ -231,7 +231,7 @@ fn tolerances(report: &Report, found: &ToleranceResult) -> Markup {
             "the controller does not. "
             @match found.stable {
                 Some(part) => {
-                    "Of " (found.cases) " random cases (seed " (found.seed) ") the fraction "
+                    "Of " (number(f64::from(found.cases))) " random cases (seed " (number(f64::from(found.seed))) ") the fraction "
                     (number(part)) " is stable. "
                 }
                 None => "There are no random cases. "

@@ -65,6 +65,11 @@ fn limits(report: &Report) -> Markup {
                 @if robustness.tolerance.is_examined() { ": " (robustness.tolerance.range()) }
                 @else { ", which were not examined, because nothing varies" }
             }
+            ". The tolerances of the entries of A, B, C and D are "
+            @for (index, tolerance) in limits.tolerance.iter().enumerate() {
+                @if index > 0 { ", " }
+                (number(*tolerance))
+            }
             "."
         }
         @if let Err(reason) = &report.certificate.printed {
