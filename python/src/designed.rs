@@ -41,6 +41,9 @@ pub(crate) fn design_plant(plant: &Bound<'_, PyAny>, path: PathBuf) -> PyResult<
     Ok(Designed { design: Mutex::new(design) })
 }
 
+/// The rows of a matrix.
+type Rows = Vec<Vec<f64>>;
+
 /// Paths and contents of files, and warnings.
 type SourceFiles = (Vec<(PathBuf, String)>, Vec<String>);
 
@@ -77,7 +80,7 @@ impl Designed {
     }
 
     /// A, B, C, D of a system of the loop, and the sample time of a sampled one.
-    fn system(&self, name: &str) -> PyResult<(Vec<Vec<Vec<f64>>>, Option<f64>)> {
+    fn system(&self, name: &str) -> PyResult<([Rows; 4], Option<f64>)> {
         let system = self.with(|design| {
             let whole = &design.closed_loop;
             Some(match name {
@@ -100,7 +103,7 @@ impl Designed {
             Domain::Continuous => None,
             Domain::Sampled { period } => Some(period),
         };
-        Ok((matrices.map(rows).into(), period))
+        Ok((matrices.map(rows), period))
     }
 
     /// The report as an HTML page.

@@ -3,7 +3,8 @@
     python scripts/study/large_plants.py STATES [--placement] [--sample-time H] [--seed N] > chain.toml
 
 Masses 1, springs 1, the damping matrix 0.01 times the stiffness matrix; 4 commands (forces) and 10 measurements (positions), with fewer
-masses one of each, spread over the masses; faults of 2 actuators. With --seed the springs are random, between 0.8 and 1.2. The gains are those of weights
+masses one of each, spread over the masses; faults of 2 actuators. With --seed the springs are random,
+between 0.8 and 1.2. The gains are those of weights
 of ones (V of 0.01), with --placement those of eigenvalues that lie 0.2 (feedback) and 0.5 (observer) to the left of the plant's.
 Needs Python 3.11 with numpy. `aso-ftc design chain.toml --certificate-time 0` then shows the time for such a plant.
 """

@@ -62,12 +62,11 @@ impl Step {
     /// The part of the time of a design with 100 states, relative to the other steps.
     fn weight(self) -> u32 {
         match self {
-            Self::Gains => 5,
+            Self::Gains | Self::Remedies => 5,
             Self::Margins => 45,
             Self::Comparison => 10,
             Self::Responses => 13,
             Self::Tolerances | Self::Bounds => 20,
-            Self::Remedies => 5,
             Self::Certificates | Self::Detection | Self::Reconfiguration => 2,
         }
     }

@@ -27,11 +27,10 @@ pub(crate) fn verdict(
         level = level.max(reached);
         reasons.push(reason);
     }
-    if let Some(found) = robustness.map(|found| &found.tolerance) {
-        if found.is_unstable() {
-            level = Level::Red;
-            reasons.push(instability(found));
-        }
+    let tolerance = robustness.map(|found| &found.tolerance);
+    if let Some(found) = tolerance.filter(|found| found.is_unstable()) {
+        level = Level::Red;
+        reasons.push(instability(found));
     }
     for (reached, reason) in further {
         level = level.max(reached);
