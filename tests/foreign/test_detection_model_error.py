@@ -33,8 +33,11 @@ def matrices(plant=PLANT):
 
 
 def sizes(plant=PLANT):
-    """The largest errors of the entries; 0, 1 and -1 are exact."""
-    return [np.where(np.isin(np.abs(m), [0.0, 1.0]), 0.0, TOLERANCE * np.abs(m)) for m in matrices(plant)]
+    """The largest errors of the entries; those of x_i' = x_j and of y_i = x_j are exact."""
+    a, b, c = matrices(plant)
+    unit = lambda row: np.count_nonzero(row) == 1 and row.max() == 1.0
+    exact = [[unit(row) and not b[i].any() for i, row in enumerate(a)], [False] * len(b), [unit(row) for row in c]]
+    return [TOLERANCE * np.abs(m) * ~np.array(rows)[:, None] for m, rows in zip((a, b, c), exact, strict=True)]
 
 
 def perturbed(generator, plant=PLANT):
@@ -77,7 +80,7 @@ def test_no_plant_within_the_tolerances_has_a_larger_mean_and_the_bound_is_near(
     own = Filter(file["detection"])
     generator = np.random.default_rng(3)
     largest = np.zeros(len(own.tests))
-    for _ in range(25):
+    for _ in range(100):
         effects = means(own, perturbed(generator, plant), None if sampled else report["sample_time"], 250)
         # The worst commands have the signs of the effects: each residual by itself.
         each = np.abs(effects).sum(axis=0) @ SIZE

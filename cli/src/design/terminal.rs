@@ -81,11 +81,18 @@ pub(crate) fn summarise(report: &Report) {
     }
     println!("verdict: {}", report.verdict.level.word());
     let checked = |reason: &&String| !reason.starts_with("does not hold: ");
+    // One change may remove several reasons.
+    let mut stated = "";
     for reason in report.verdict.reasons.iter().filter(checked) {
         println!("    {reason}");
         let remedies = report.verdict.remedies.iter();
         for remedy in remedies.filter(|remedy| remedy.reason == *reason) {
-            println!("        {}", remedy.change);
+            if remedy.change == stated {
+                println!("        the same change");
+                continue;
+            }
+            stated = &remedy.change;
+            println!("        {stated}");
             for line in &remedy.lines {
                 println!("        {line}");
             }

@@ -18,7 +18,12 @@ pub(super) fn advice(report: &Report) -> Vec<Markup> {
              faults; its explanation is under " (link("checks", "Checks")) "."
         });
     }
-    for remedy in &report.verdict.remedies {
+    let remedies = &report.verdict.remedies;
+    for (index, remedy) in remedies.iter().enumerate() {
+        // One change may remove several reasons.
+        if remedies[..index].iter().any(|earlier| earlier.change == remedy.change) {
+            continue;
+        }
         advice.push(html! {
             (remedy.change)
             @for line in &remedy.lines { div { code { (line) } } }
@@ -26,7 +31,7 @@ pub(super) fn advice(report: &Report) -> Vec<Markup> {
     }
     // Without other designs that were computed.
     if let Some(robustness) = &report.robustness
-        && report.verdict.remedies.is_empty()
+        && remedies.is_empty()
     {
         advice.extend(lower_peaks(robustness, report.verdict.limits.amber));
         let tolerance = &robustness.tolerance;
