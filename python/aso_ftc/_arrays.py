@@ -1,4 +1,4 @@
-"""Arrays of FMI 3.0, whose elements are variables with indices in their names."""
+"""Arrays: those of FMI 3.0, whose elements are variables with indices in their names, and those of NumPy as lists."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 from ._errors import ConfigurationError
 
-__all__ = ["Array", "arrays", "spread"]
+__all__ = ["Array", "arrays", "plain", "spread"]
 
 # The indices at the end of the name of an element: [2] or [1,2].
 _INDICES = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
@@ -43,6 +43,15 @@ def arrays(names: Iterable[str]) -> dict[str, Array]:
             ordered = tuple(elements[place] for place in itertools.product(*axes))
             complete[name] = Array(ordered, shape)
     return complete
+
+
+def plain(value: Any) -> Any:
+    """Return a value with the numbers, lists and dicts of Python instead of those of NumPy and others."""
+    if isinstance(value, Mapping):
+        return {name: plain(inner) for name, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(inner) for inner in value]
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def spread(values: Mapping[str, Any], known: Mapping[str, Array]) -> Iterator[tuple[str, Any]]:

@@ -65,7 +65,7 @@ def design(plant: object, **entries: Any) -> Design:
 
 
 def _of_entries(entries: Mapping[str, Any], path: str) -> Design:
-    stated = {name: _plant.plain(value, name) for name, value in entries.items() if value is not None}
+    stated = {name: _plant.stated(value, name) for name, value in entries.items() if value is not None}
     stated = _plant.with_names(stated)
     try:
         return Design(_core.design_plant(stated, path), path, stated)

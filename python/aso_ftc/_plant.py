@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from ._arrays import plain
 from ._errors import DesignError
 from ._results import _package
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["of_file", "of_system", "plain", "with_names"]
+__all__ = ["of_file", "of_system", "stated", "with_names"]
 
 # The part of the largest element below which an element of a realisation counts as rounding.
 _ROUNDING = 1e-10
@@ -19,16 +20,13 @@ _NAMES = (("states", "A", 0, "x"), ("actuators", "B", 1, "u"), ("measurements", 
 _LABELS = {"states": "state_labels", "actuators": "input_labels", "measurements": "output_labels"}
 
 
-def plain(value: Any, entry: str = "") -> Any:
-    """Return a value as a plant file has it: lists for arrays, one of each pair of complex numbers."""
-    if isinstance(value, Mapping):
-        return {name: plain(inner, str(name)) for name, inner in value.items()}
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, (list, tuple)):
-        if any(isinstance(element, complex) for element in value):
-            return _pairs(value, entry)
-        return [plain(element, entry) for element in value]
+def stated(value: Any, entry: str) -> Any:
+    """Return a value as a plant file states it: lists for arrays, one of each pair of complex numbers."""
+    value = plain(value)
+    if isinstance(value, dict):
+        return {name: stated(inner, str(name)) for name, inner in value.items()}
+    if isinstance(value, list) and any(isinstance(element, complex) for element in value):
+        return _pairs(value, entry)
     return value
 
 

@@ -73,8 +73,8 @@ def measures(made: Design) -> dict[str, float]:
 
     ``speed`` and ``observer_speed``: the decay rates of the slowest eigenvalues in 1/s; ``peak_of_S``: the larger of
     the peaks at commands and measurements; ``delay_margin`` in s; ``noise``: the largest root-mean-square value of a
-    command under the noise of all measurements; ``ramp_error``: the largest error of an estimate while its fault
-    rises by 1 in a second.
+    command under white noise of all measurements, that of the entry ``robustness.noise``, 1 without it;
+    ``ramp_error``: the largest error of an estimate while its fault rises by 1 in a second.
     """
     import numpy
 

@@ -10,7 +10,9 @@ __all__ = ["in_python", "similar"]
 # What Python has instead of options of the command. Options that are not here are no part of a sentence.
 _OPTIONS = {
     "compile": "aso_ftc.compile",
+    "certificate-time": "`aso-ftc design --certificate-time`",
     "connect": "connect",
+    "gain-time": "`aso-ftc design --gain-time`",
     "isolate": "isolate=True",
     "log-calls": "a log of calls",
     "memory-limit": "memory_limit",

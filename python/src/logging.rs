@@ -1,8 +1,8 @@
 //! Messages of the libraries and of FMUs for Python's `logging`.
 //!
-//! The module `aso_ftc._logging` states the loggers. A message may arise in any thread, without the interpreter. So messages wait in a list until a thread
-//! that is attached to the interpreter passes them on: at the end of each call, and during a run each
-//! time that it looks for signals.
+//! The module `aso_ftc._logging` states the loggers. A message may arise in any thread, without the interpreter. So
+//! messages wait in a list until a thread that is attached to the interpreter passes them on: at the end of each call,
+//! and during a run each time that it looks for signals.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

@@ -226,7 +226,7 @@ struct Ran {
     time: f64,
     steps: u64,
     seconds: f64,
-    /// The rows, and the names of the columns that are the bytes of binaries.
+    /// The rows, and the names of the columns that hold values of the type Binary.
     recorded: (results::Columns, HashSet<String>),
     settings: String,
     reasons: Vec<String>,

@@ -29,8 +29,8 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Takes over the memory of the columns. Those in `binaries`, recorded as hexadecimal digits, become
-    /// bytes. Names lose `prefix`.
+    /// Takes over the memory of the columns, without `prefix` in their names. Those in `binaries` were recorded as
+    /// hexadecimal digits and become bytes.
     pub(crate) fn new(
         recorded: Columns,
         binaries: &HashSet<String>,
@@ -134,7 +134,7 @@ fn array(values: Values, nulls: Option<NullBuffer>) -> Result<ArrayRef, ArrowErr
     })
 }
 
-/// Returns the bytes that texts write as hexadecimal digits.
+/// Decodes texts of hexadecimal digits.
 fn bytes(texts: &results::Texts, nulls: Option<&NullBuffer>) -> ArrayRef {
     let rows = texts.offsets.len().saturating_sub(1);
     let value = |row| match nulls {

@@ -101,8 +101,9 @@ def assert_reads_the_numbers(page, numbers, identifier, share, ends=None):
     assert at == nine(places[index]) and values == [nine(own[index]) for own in lists], identifier
     low, high = ends or (places[0], places[-1])
     expected = nearest(places, low * (high / low) ** share)
-    # The pointer is on a whole pixel.
-    assert abs(index - expected) <= 1 or abs(math.log(places[index] / places[expected])) < 0.012 * math.log(high / low)
+    # The pointer is on a whole pixel, and the point the nearest one.
+    width = page.evaluate(f"document.querySelector('#{identifier} .u-over').clientWidth")
+    assert abs(index - expected) <= 1 or abs(math.log(places[index] / places[expected])) < 2 * math.log(high / low) / width
     return places[index]
 
 

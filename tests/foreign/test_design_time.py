@@ -4,8 +4,6 @@ import signal
 import subprocess
 import time
 
-import pytest
-
 import large_plants
 from conftest import ROOT
 
@@ -33,7 +31,6 @@ def test_gains_that_are_not_found_in_time_are_refused(aso_ftc, tmp_path):
     assert not (tmp_path / "design.toml").exists()
 
 
-@pytest.mark.skipif(not hasattr(signal, "SIGINT"), reason="needs signals")
 def test_a_search_says_where_it_is_every_ten_seconds_and_ends_at_an_interrupt(tmp_path):
     file = chain(tmp_path, 40)
     command = [COMMAND, "design", file, "--out", tmp_path / "design.toml"]
@@ -41,10 +38,9 @@ def test_a_search_says_where_it_is_every_ten_seconds_and_ends_at_an_interrupt(tm
         lines = [process.stderr.readline()]
         assert lines[0].startswith("10 s, ") and lines[0].endswith(": gains\n"), lines
         process.send_signal(signal.SIGINT)
-        start = time.monotonic()
         rest = process.communicate(timeout=PATIENCE)[1]
     assert "interrupted: the design ends with what there is" in rest and "the design was interrupted" in rest
-    assert process.returncode == 2 and time.monotonic() - start < PATIENCE
+    assert process.returncode == 2
 
 
 def test_certificates_keep_their_time_and_the_design_is_written(aso_ftc, tmp_path):

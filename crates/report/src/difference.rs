@@ -93,7 +93,7 @@ pub(crate) struct Compared {
     pub(crate) comparison: Comparison,
     /// Whether the other run has each of the columns.
     pub(crate) common: Vec<bool>,
-    /// The largest difference of each of the columns, relative to its range; 0 if the other run does not have it.
+    /// By column: the largest difference divided by the range of the column, or 0 for a column that the other run lacks.
     pub(crate) relative: Vec<f64>,
 }
 

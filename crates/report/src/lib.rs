@@ -88,7 +88,7 @@ pub struct Message {
     pub text: String,
 }
 
-/// Something that happened at a time of the run.
+/// A mark on the axis of time: what happened there.
 #[derive(Clone, Debug, Serialize)]
 pub struct Mark {
     /// What kind of thing it is.

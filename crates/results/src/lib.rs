@@ -223,7 +223,7 @@ pub enum ResultsError {
         /// Content of the cell.
         text: String,
     },
-    /// A time is less than the one of the row before.
+    /// A time is earlier than that of the row before.
     #[error("{}, {place}: {name} is {time} after {before}, expected times that do not decrease", path.display())]
     Order {
         /// The file.

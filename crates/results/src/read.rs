@@ -93,7 +93,7 @@ impl Table {
     /// # Errors
     ///
     /// [`ResultsError::Number`] if a cell is no number, [`ResultsError::Text`] if a column contains texts,
-    /// [`ResultsError::Order`] if a time is less than the one before, [`ResultsError::Read`] if the file cannot be
+    /// [`ResultsError::Order`] if a time is earlier than the one before, [`ResultsError::Read`] if the file cannot be
     /// read or a time is no number.
     ///
     /// # Panics

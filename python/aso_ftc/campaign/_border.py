@@ -13,7 +13,7 @@ Numbers = NDArray[np.float64]
 
 _CELLS = 40
 _FOLDS = 5
-# Fewer runs of a kind than there are coefficients say nothing about the surface.
+# The fewest runs that must fail, and that must pass: twice as many as there are coefficients.
 _FEWEST = 12
 _ITERATIONS = 50
 _RIDGE = 1e-3
@@ -36,9 +36,9 @@ class Border:
 
 
 def border(x: Numbers, y: Numbers, failed: NDArray[np.bool_]) -> Border | None:
-    """Fit a logistic regression with all terms up to the second degree; None for too few runs of a kind.
+    """Fit a logistic regression with all terms up to the second degree; None if too few runs fail or pass.
 
-    The error is that of cross-validation in five parts.
+    ``wrong`` comes from cross-validation: each fifth of the runs is judged by a fit to the others.
     """
     known = np.isfinite(x) & np.isfinite(y)
     x, y, failed = x[known], y[known], failed[known]

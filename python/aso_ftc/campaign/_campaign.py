@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from .._arrays import plain
 from .._errors import ConfigurationError, Error
 from .._html import page
 from .._paper import paper
 from .._system import PathLike, System, fault, hash_of_file
 from .._words import similar
 from ._changes import arguments, changes
-from ._entries import TABLES, fail, finite, only, plain, positive, table, whole
+from ._entries import TABLES, fail, finite, only, positive, table, whole
 from ._faults import NO_FAULT, FaultCase, cases, disturbances
 from ._measures import PAPER_CLAIMS, Expression
 from ._parameters import Parameter, Sampled, columns_of_table, sample, text

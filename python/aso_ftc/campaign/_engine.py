@@ -53,7 +53,6 @@ def execute(
     live: Callable[[str], None] | None = None,
 ) -> Outcome:
     """Do the runs of a campaign that its folder lacks; see :meth:`Campaign.run`."""
-    campaign.check()
     folder = Folder(path, campaign)
     folder.begin(campaign)
     if not folder.manifest["complete"]:

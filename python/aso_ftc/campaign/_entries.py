@@ -9,7 +9,7 @@ from typing import Any
 from .._errors import ConfigurationError
 from .._words import similar
 
-__all__ = ["MOST_RUNS", "TABLES", "fail", "finite", "only", "plain", "positive", "table", "whole"]
+__all__ = ["MOST_RUNS", "TABLES", "fail", "finite", "only", "positive", "table", "whole"]
 
 # Tables of a system.toml whose entries a parameter can set.
 TABLES = ("algorithm", "experiment")
@@ -19,15 +19,6 @@ MOST_RUNS = 20_000_000
 
 def fail(place: str, text: str) -> ConfigurationError:
     return ConfigurationError(f"{place}: {text}", "Campaign", {"name": place})
-
-
-def plain(value: Any) -> Any:
-    """Return an entry with the numbers, lists and dicts of Python instead of those of NumPy and others."""
-    if isinstance(value, Mapping):
-        return {name: plain(own) for name, own in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(own) for own in value]
-    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def table(place: str, value: Any) -> dict[str, Any]:

@@ -176,11 +176,13 @@ def _numbers(values: Iterable[float]) -> list[float | None]:
 
 def _answer(outcome: Outcome, opened: str) -> str:
     """How many runs fail, and which parameter decides."""
-    total = len(outcome)
+    total, lost = len(outcome), int(outcome.unfinished.sum())
     lines = []
     for name in outcome.limits:
         failures = int(outcome.failed(name).sum())
         text = f"{_share(failures, total)} fail: {name} is not {describe(outcome.limits[name])}."
+        if lost:
+            text = text.removesuffix(".") + f", or the run did not finish ({lost:,} runs)."
         if not failures:
             text = f"None of the {total:,} runs fails: {name} is {describe(outcome.limits[name])}."
         try:
@@ -190,7 +192,6 @@ def _answer(outcome: Outcome, opened: str) -> str:
             pass
         lines.append(text)
     if not outcome.limits:
-        lost = int(outcome.unfinished.sum())
         lines.append(f"{_share(lost, total)} did not finish. The campaign has no limits, so that nothing else fails.")
     if outcome.inputs and opened:
         found = outcome.influence(opened)

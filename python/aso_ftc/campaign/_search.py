@@ -40,7 +40,8 @@ class WorstCase:
     """The worst run that a search found.
 
     Attributes:
-        measure: the measure that was searched, and its ``value``; NaN if a run did not finish.
+        measure: the measure that was searched.
+        value: its value in the worst run; NaN if that one did not finish.
         values: the parameters of the run, and the label of its ``fault`` if the campaign has faults.
         arguments: the run again: ``campaign.system.run(**worst.arguments)``.
         history: the worst value after each generation.
@@ -63,9 +64,9 @@ class RareEvent:
 
     Attributes:
         limit: the measure whose limit is violated with this ``probability``.
-        lower, upper: bounds of 95 %, log-normal with the coefficient of ``variation``. They hold for many runs in
-            a level and count no error of a search that misses a region of failures.
-        levels: the thresholds of the levels, as distances beyond the limit; the last one is 0.
+        lower, upper: bounds of 95 %, log-normal with the coefficient of ``variation``; NaN if no run failed. They
+            hold for many runs in a level and do not know of failures in a region that no run came near.
+        levels: how far the runs of each level are beyond the limit at least; the last one is 0.
         runs: number of runs in all.
     """
 
@@ -97,14 +98,18 @@ class _Batches:
         return part
 
     def __call__(self, unit: Numbers, sign: float) -> tuple[Numbers, NDArray[np.int64]]:
-        """Return the worst value of each row, of all faults, and its fault; a run that did not finish is the worst."""
+        """Return the worst value of each row, of all faults, and its fault.
+
+        A run that did not finish or has no value is worse than any other.
+        """
         part = self.part(unit)
         outcome = self.session.outcome(part, self.path / f"batch-{self.count:05}")
         self.count += 1
         values = sign * outcome.read([self.measure])[self.measure].to_numpy(dtype=float)
         self.runs += len(values)
-        self.unfinished += int(np.isnan(values).sum())
-        table = np.where(np.isnan(values), np.inf, values).reshape(len(unit), -1)
+        self.unfinished += int(outcome.unfinished.sum())
+        lost = outcome.unfinished | np.isnan(values)
+        table = np.where(lost, np.inf, values).reshape(len(unit), -1)
         worst = table.argmax(axis=1)
         return table[np.arange(len(unit)), worst], worst
 
@@ -114,7 +119,6 @@ def _check(campaign: Campaign) -> None:
         raise fail("parameters", "a search needs at least one parameter")
     if campaign.plan.design["method"] != "random":
         raise fail("design", 'a search needs { method = "random", runs = number }')
-    campaign.check()
 
 
 @contextlib.contextmanager

@@ -33,8 +33,7 @@ const status = column('status', 'status'), fault = column('fault', 'fault');
 const shown = (own, at) => own.labels ? own.labels[own.values[at]] : own.values[at];
 const measure = () => data.measures[byId('measure').value];
 const values = () => column(measure().name, 'measure').values;
-const inside = value => {
-  const {below, above} = measure().limit;
+const inside = (value, {below, above} = measure().limit) => {
   return (below === undefined || value < below) && (above === undefined || value > above);
 };
 // By default plotly.js has a button that uploads the data of a picture.
@@ -55,8 +54,7 @@ function drawBorder() {
   const place = byId('border');
   if (!place) return;
   const {names, surface, measure: of} = data.border, [x, y] = names.map(name => column(name, 'input'));
-  const all = column(of, 'measure').values, {below, above} = data.measures.find(own => own.name === of).limit;
-  const passed = value => value !== null && (below === undefined || value < below) && (above === undefined || value > above);
+  const all = column(of, 'measure').values, {limit} = data.measures.find(own => own.name === of);
   const traces = [];
   if (surface) {
     const shades = [[0, color('page')], [1, color('bad')]];
@@ -66,7 +64,7 @@ function drawBorder() {
       contours: {type: 'constraint', operation: '=', value: 0.5}, showlegend: false});
   }
   for (const [name, ok, shade, symbol] of [['pass', true, 'good', 'circle'], ['fail', false, 'bad', 'x']]) {
-    const rows = data.runs.map((_, at) => at).filter(at => passed(all[at]) === ok);
+    const rows = data.runs.map((_, at) => at).filter(at => (all[at] !== null && inside(all[at], limit)) === ok);
     traces.push({type: 'scatter', mode: 'markers', name, x: rows.map(at => x.values[at]), y: rows.map(at => y.values[at]),
       text: rows.map(at => 'run ' + data.runs[at] + '<br>' + plain(of) + ' = ' + all[at]), hoverinfo: 'text',
       marker: {color: color(shade), size: 5, symbol, opacity: 0.7}});

@@ -13,8 +13,10 @@ use crate::report::number::rounded;
 use crate::report::robustness::{LoopPoint, Remedy, Robustness};
 use crate::solve::designed::design;
 
-/// Factors on the speed of a loop.
-const FACTORS: [f64; 8] = [0.8, 1.25, 0.6, 1.7, 0.4, 2.5, 0.25, 4.0];
+/// Factors on the speed of a loop, between the slowest and the fastest one.
+const FACTORS: [f64; 8] = [SLOWEST, 0.4, 0.6, 0.8, 1.25, 1.7, 2.5, FASTEST];
+const SLOWEST: f64 = 0.25;
+const FASTEST: f64 = 4.0;
 /// A weight of commands or measurements changes by this power of the factor on the speed: that of a double
 /// integrator.
 const WEIGHT_POWER: i32 = -4;
@@ -100,13 +102,13 @@ struct Trial {
     words: String,
     points: Vec<LoopPoint>,
     is_unstable: bool,
-    /// How far the speeds are from those of the plant file.
+    /// The size of the change: the logarithm of the factor, for each loop that it changes.
     distance: f64,
 }
 
 /// One loop, or both, slower or faster.
 fn variants(file: &PlantFile<'_>) -> Vec<Variant> {
-    let one = |factor: f64| {
+    let with_factor = |factor: f64| {
         let observer = scaled("observer", "V", &file.observer.requirement, factor);
         let feedback = scaled("feedback", "R", &file.feedback.requirement, factor);
         let both = observer.is_some() && feedback.is_some();
@@ -118,7 +120,7 @@ fn variants(file: &PlantFile<'_>) -> Vec<Variant> {
         all.retain(|variant| variant.observer.is_some() || variant.feedback.is_some());
         all
     };
-    FACTORS.into_iter().flat_map(one).collect()
+    FACTORS.into_iter().flat_map(with_factor).collect()
 }
 
 /// The requirement of the loop `name` with eigenvalues times `factor`, or with another `weight`.
@@ -234,22 +236,18 @@ impl Reason {
             (None, Some(trial)) => {
                 let peaks = trial.peaks();
                 let change = format!(
-                    "none of {} other designs, from {} to {} times as fast, meets the limit; with {}, the \
-                     peak of S is {peaks}",
+                    "none of {} other stable designs, from {SLOWEST} to {FASTEST} times as fast, meets the limit; \
+                     with {}, the peak of S is {peaks}",
                     trials.len(),
-                    FACTORS[6],
-                    FACTORS[7],
                     trial.words
                 );
                 (trial, change)
             }
             (None, None) => {
                 let change = format!(
-                    "none of {} other designs, from {} to {} times as fast, is better: other \
+                    "none of {} other stable designs, from {SLOWEST} to {FASTEST} times as fast, is better: other \
                      measurements, actuators or requirements are needed",
-                    trials.len(),
-                    FACTORS[6],
-                    FACTORS[7]
+                    trials.len()
                 );
                 return Remedy { reason: self.text, change, lines: Vec::new() };
             }

@@ -228,7 +228,7 @@ fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
     }
 }
 
-/// Reads a bound of the norm, or the text "least" (`None`), which may need a `remedy`.
+/// Reads a bound of the norm, or the text "least" (`None`). If that is not possible, `remedy` says what it needs.
 fn bound(entry: &Entry<'_>, remedy: Option<&str>) -> Result<Option<f64>, PlaceError> {
     if !entry.is_text() {
         return entry.positive().map(Some);
