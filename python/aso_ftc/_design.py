@@ -291,7 +291,7 @@ class Design:
             lines.extend(f"eigenvalues, {part}: {values}" for part, values in self.eigenvalues.items())
         robustness = self.report["robustness"]
         if robustness:
-            peaks = ", ".join(f"{point['s_peak']:.3f} at the {point['point']}" for point in robustness["points"])
+            peaks = ", ".join(f"{point['judged']:.3f} at the {point['point']}" for point in robustness["points"])
             lines.append(f"peak of S: {peaks}; delay margin: {robustness['delay_margin']:.4g} s")
         return "\n".join(lines)
 

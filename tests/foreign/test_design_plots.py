@@ -101,9 +101,10 @@ def assert_reads_the_numbers(page, numbers, identifier, share, ends=None):
     assert at == nine(places[index]) and values == [nine(own[index]) for own in lists], identifier
     low, high = ends or (places[0], places[-1])
     expected = nearest(places, low * (high / low) ** share)
-    # The pointer is on a whole pixel, and the point the nearest one.
+    # The pointer is on a whole pixel of the axis, and the ends of what was dragged are on whole pixels of the whole axis.
     width = page.evaluate(f"document.querySelector('#{identifier} .u-over').clientWidth")
-    assert abs(index - expected) <= 1 or abs(math.log(places[index] / places[expected])) < 2 * math.log(high / low) / width
+    pixels = [math.log(end / start) / width for start, end in ((low, high), (places[0], places[-1]))]
+    assert abs(index - expected) <= 1 or abs(math.log(places[index] / places[expected])) < sum(pixels)
     return places[index]
 
 

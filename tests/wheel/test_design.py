@@ -202,6 +202,8 @@ def test_a_trade_off_shows_what_speed_costs(tmp_path):
     compared = af.trade_off(SERVO, {"observer.eigenvalues": speeds}, **REQUIREMENTS)
     assert [row["verdict"] == "refused" for row in compared] == [False, False, False, True]
     assert [row["observer_speed"] for row in compared][:3] == pytest.approx([4, 8, 16])
+    for row, made in list(zip(compared, compared.designs))[:3]:
+        assert row["peak_of_S"] == max(point["judged"] for point in made.report["robustness"]["points"])
     noise = [row["noise"] for row in compared][:3]
     assert noise == sorted(noise) and noise[2] > 2 * noise[0]
     assert compared.pareto("observer_speed", "noise") == [0, 1, 2]
