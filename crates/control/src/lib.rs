@@ -5,7 +5,7 @@
 //! | task | module |
 //! |---|---|
 //! | assign the poles of a state feedback or an observer | [`placement`] |
-//! | linear-quadratic regulator, Kalman filter | [`riccati`] |
+//! | linear-quadratic regulator, Kalman filter | [`riccati`], by their bandwidth [`bandwidth`] |
 //! | augmented state observer (ASO): estimate and compensate faults | [`aso`], [`faults`], [`sampled`] |
 //! | other laws that estimate faults: proportional-integral, fast adaptive, sliding mode, learning | [`estimation`] |
 //! | commands without an actuator: control allocation, equilibrium | [`allocation`] |
@@ -42,6 +42,8 @@ pub mod allocation;
 #[cfg(feature = "design")]
 pub mod aso;
 mod balance;
+#[cfg(feature = "design")]
+pub mod bandwidth;
 #[cfg(feature = "design")]
 mod blocks;
 mod check;

@@ -3,6 +3,7 @@
 
 mod allocation;
 mod aso;
+mod bandwidth;
 mod data;
 mod detectability;
 mod distance;
