@@ -32,7 +32,8 @@ def design(plant: object, **entries: Any) -> Design:
             file with them.
         entries: entries of the plant file, which replace those of the plant: ``feedback``,
             ``observer``, ``F_a`` (n, q), ``faults``, ``measurements``, ...; see the page "Plant file". ``None``
-            removes an entry. Eigenvalues are numbers as NumPy gives them, complex ones in pairs.
+            removes an entry. Eigenvalues are numbers as NumPy gives them, complex ones in pairs. Without ``feedback``
+            or ``observer`` a bandwidth is chosen by the verdict.
 
     Returns:
         gains, checks and report: the same numbers as ``aso-ftc design``.
@@ -40,8 +41,7 @@ def design(plant: object, **entries: Any) -> Design:
     Raises:
         DesignError: an entry is wrong, or no gain meets the requirements.
 
-    >>> made = design((A, B, C), feedback={"eigenvalues": [-2, -3]},
-    ...               observer={"eigenvalues": [-8, -9, -10]}, actuator_faults=True)  # doctest: +SKIP
+    >>> made = design((A, B, C), actuator_faults="all")  # doctest: +SKIP
     """
     folder = os.getcwd()
     if isinstance(plant, (str, os.PathLike)):

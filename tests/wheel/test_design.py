@@ -195,6 +195,12 @@ def test_a_design_travels_and_is_changed(servo):
     assert pickle.loads(pickle.dumps(of_file)).design_file == of_file.design_file
 
 
+def test_matrices_alone_get_bandwidths_and_a_green_verdict():
+    made = af.design(([[0, 1], [0, -0.5]], [0, 0.5], [1, 0]), actuator_faults="all")
+    assert made.ok and made.verdict == "green"
+    assert all("bandwidth" in made.report[part]["method"] for part in ("feedback", "observer"))
+
+
 def test_a_trade_off_shows_what_speed_costs(tmp_path):
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")

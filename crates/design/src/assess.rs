@@ -1,12 +1,14 @@
 //! Examines a design: margins, certificates, bounds, responses, detection, and the verdict.
 
 pub(crate) mod analysis;
+pub(crate) mod bandwidths;
 pub(crate) mod certificate;
 pub(crate) mod checks;
 pub(crate) mod detection;
 pub(crate) mod estimation;
 pub(crate) mod fallback;
 pub(crate) mod family;
+pub(crate) mod judged;
 pub(crate) mod losses;
 pub(crate) mod matrices;
 pub(crate) mod reconfiguration;

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use crate::assess::bandwidths;
 use crate::assess::reporting::Assessment;
+use crate::budget::TimeLimits;
 use crate::error::Error;
 use crate::plant::parameters::ParameterFamily;
 use crate::plant_file::PlantFile;
@@ -29,6 +31,7 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
     let parsed = source.parse()?;
     let file = PlantFile::read(&source, &Table::whole(&source, &parsed))?;
     let family = ParameterFamily::of(&file)?;
+    let file = bandwidths::chosen(&file, &TimeLimits::default().of_gains())?;
     let base = design_by(&file, &Law::Augmented)?;
     let Solution { linear, extended, plant, gains, domain, .. } = &base.nominal;
     let problem = LawProblem { linear, extended, plant, gains, domain: *domain };

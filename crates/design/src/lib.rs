@@ -42,7 +42,7 @@ pub use report::comparison::{Comparison, LawFigures, LawResult};
 pub use report::robustness::Level;
 
 use assess::reporting::Assessment;
-use assess::{detection, reporting, worst_case};
+use assess::{bandwidths, detection, reporting, worst_case};
 use controller_fmu::Content;
 use plant::parameters::ParameterFamily;
 use plant_file::PlantFile;
@@ -112,6 +112,7 @@ fn design_source(source: &Source, limits: &TimeLimits, steps: &Steps<'_>) -> Res
     let file = PlantFile::read(source, &Table::whole(source, &parsed))?;
     let family = ParameterFamily::of(&file)?;
     let budget = limits.of_gains();
+    let file = bandwidths::chosen(&file, &budget)?;
     let in_time = |error: Error| {
         if !budget.is_over() {
             return error;

@@ -193,7 +193,8 @@ impl<'a> PlantFile<'a> {
         let domain = sampling
             .as_ref()
             .map_or(Domain::Continuous, |sampling| Domain::Sampled { period: sampling.period });
-        let read = |key: &str, weights, meaning: &str| {
+        let read = |key: &str, weights| {
+            let Some(entry) = file.get(key) else { return Ok(Request::open(file.place.clone())) };
             let outputs: Vec<&str> = match key {
                 "observer" => faults.iter().map(|fault| fault.name.as_str()).collect(),
                 _ => measurements.iter().chain(&actuators).map(|one| one.name.as_str()).collect(),
@@ -201,7 +202,7 @@ impl<'a> PlantFile<'a> {
             let names = || measurements.iter().map(|one| one.name.as_str()).collect();
             let noises = (key == "observer").then(names);
             let signals = ChannelSignals { outputs, noises };
-            request(&file.require(key, meaning)?.table()?, weights, &signals, domain)
+            request(&entry.table()?, weights, &signals, domain)
         };
         let experiment = file.get("experiment").map(|entry| entry.table()).transpose()?;
         if let Some(table) = &experiment {
@@ -218,8 +219,8 @@ impl<'a> PlantFile<'a> {
             t_on: file.get("t_on").map_or(Ok(0.0), |entry| entry.number())?,
             monitor: file.get("monitor").map_or(Ok(false), |entry| entry.flag())?,
             filter: filter(file, &measurements, &faults)?,
-            feedback: read("feedback", ["Q", "R"], "the requirement on A + B K_x")?,
-            observer: read("observer", ["W", "V"], "the requirement on A_0 - L C_0")?,
+            feedback: read("feedback", ["Q", "R"])?,
+            observer: read("observer", ["W", "V"])?,
             estimation: EstimationRequest::read(file, faults.len())?,
             stop_time: time("stop_time")?,
             step_size: time("step_size")?,

@@ -1,5 +1,6 @@
 //! Solves for the controller: the gains of one plant, of a family, of a schedule, and without actuators.
 
+pub(crate) mod bandwidth;
 pub(crate) mod designed;
 pub(crate) mod fallback;
 pub(crate) mod family;

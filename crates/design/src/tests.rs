@@ -11,7 +11,7 @@ use crate::assess::robustness::robustness;
 use crate::assess::verdict::verdict;
 use crate::budget::TimeLimits;
 use crate::plant_file::channel::Channel;
-use crate::plant_file::requirements::{Region, Requirement};
+use crate::plant_file::requirements::{Bandwidth, Region, Requirement};
 use crate::plant_file::signals::{EntryPoint, FaultDynamics};
 use crate::plant_file::{Model, PlantFile};
 use crate::report::Report;
@@ -43,8 +43,8 @@ const REFUSALS: [(&str, &str, &str); 54] = [
     ("feedback", "something", "5:1: unknown entry `something`; expected one of description, "),
     (
         "feedback.eigenvalues = [-1, -2]",
-        "",
-        "1:1: `feedback` is missing: the requirement on A + B K_x",
+        "feedback.bandwidth = -1",
+        "5:22: feedback.bandwidth: expected a number above 0, found -1",
     ),
     (
         "feedback.eigenvalues = [-1, -2]",
@@ -71,7 +71,7 @@ const REFUSALS: [(&str, &str, &str); 54] = [
         "feedback.region = { sector = 95 }",
         "expected less than 90 degrees, found 95",
     ),
-    ("feedback.", "feedback.Q = [1, 1]\nfeedback.", "5:14: feedback.Q: only one of eigenvalues, "),
+    ("feedback.", "feedback.Q = [1, 1]\nfeedback.", "5:14: feedback.Q: only one of bandwidth, "),
     (
         "feedback.",
         "feedback.sampled_",
@@ -243,6 +243,16 @@ fn a_pair_of_complex_eigenvalues_counts_twice() {
     let expected = read(MASS, |file| file.observer.requirement.clone()).unwrap();
     let pair = [Complex::new(-6.0, 2.5), Complex::new(-6.0, -2.5)];
     assert_eq!(expected, Requirement::Eigenvalues(vec![Complex::new(-5.0, 0.0), pair[0], pair[1]]));
+}
+
+#[test]
+fn requirements_that_are_not_stated_are_open() {
+    let bandwidth = Requirement::Bandwidth(Bandwidth { rate: None, is_stated: false });
+    let open = MASS.replace("feedback.eigenvalues = [-1, -2]", "");
+    assert_eq!(read(&open, |file| file.feedback.requirement.clone()).unwrap(), bandwidth);
+    let stated = MASS.replace("feedback.eigenvalues = [-1, -2]", "feedback.bandwidth = 3");
+    let bandwidth = Requirement::Bandwidth(Bandwidth { rate: Some(3.0), is_stated: true });
+    assert_eq!(read(&stated, |file| file.feedback.requirement.clone()).unwrap(), bandwidth);
 }
 
 #[test]

@@ -3,11 +3,11 @@
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
-use crate::assess::robustness::{Physical, by_entries, loop_points};
+use crate::assess::judged::Judged;
 use crate::assess::verdict::{instability, peak_reason};
 use crate::budget::Budget;
 use crate::plant_file::PlantFile;
-use crate::plant_file::requirements::Requirement;
+use crate::plant_file::requirements::{Bandwidth, Requirement};
 use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::number::rounded;
 use crate::report::robustness::{LoopPoint, Remedy, Robustness};
@@ -100,8 +100,7 @@ struct Scaled {
 struct Trial {
     lines: Vec<String>,
     words: String,
-    points: Vec<LoopPoint>,
-    is_unstable: bool,
+    judged: Judged,
     /// The size of the change: the logarithm of the factor, for each loop that it changes.
     distance: f64,
 }
@@ -159,6 +158,17 @@ fn scaled(name: &str, weight: &str, requirement: &Requirement, factor: f64) -> O
                 words: format!("{name}.{weight} {larger} times as large"),
             })
         }
+        Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }) => {
+            let rate = short(factor * rate);
+            Some(Scaled {
+                requirement: Requirement::Bandwidth(Bandwidth {
+                    rate: Some(rate),
+                    is_stated: true,
+                }),
+                line: format!("{name}.bandwidth = {}", rounded(rate)),
+                words: format!("{name}.bandwidth {factor} times as large"),
+            })
+        }
         _ => None,
     }
 }
@@ -175,15 +185,7 @@ impl Variant {
             other.feedback.requirement = feedback.requirement.clone();
         }
         let nominal = design(&other).ok()?.nominal;
-        if nominal.instability >= 0.0 {
-            return None;
-        }
-        let physical = Physical::of(&nominal).ok()?;
-        let closed = physical.closed(&physical.controller).ok()?;
-        let linear = &nominal.linear;
-        let points = loop_points(&closed, &linear.actuators, &linear.measurements).ok()?;
-        let is_unstable =
-            varies && by_entries(&nominal, &physical, &file.robustness).ok()?.is_unstable();
+        let judged = Judged::of(&nominal, varies.then_some(&file.robustness)).ok().flatten()?;
         let parts: Vec<_> = observer.iter().chain(&feedback).collect();
         #[expect(clippy::cast_precision_loss, reason = "one or two loops")]
         let distance = factor.ln().abs() * parts.len() as f64;
@@ -191,8 +193,7 @@ impl Variant {
         Some(Trial {
             lines: parts.iter().map(|part| part.line.clone()).collect(),
             words: words.join(" and "),
-            points,
-            is_unstable,
+            judged,
             distance,
         })
     }
@@ -201,12 +202,7 @@ impl Variant {
 impl Trial {
     fn peaks(&self) -> String {
         let one = |point: &LoopPoint| format!("{} at the {}", rounded(point.judged), point.point);
-        self.points.iter().map(one).collect::<Vec<_>>().join(" and ")
-    }
-
-    /// Whether nothing is left of the reasons.
-    fn is_green(&self, limits: &RobustnessLimits) -> bool {
-        !self.is_unstable && self.points.iter().all(|point| point.judged <= limits.amber)
+        self.judged.points.iter().map(one).collect::<Vec<_>>().join(" and ")
     }
 }
 
@@ -214,23 +210,26 @@ impl Reason {
     /// The smallest change that removes all reasons, else this one; else the one with the lowest peak.
     fn remedy(self, trials: &[Trial], limits: &RobustnessLimits) -> Remedy {
         let reached = |trial: &&Trial| match self.aim {
-            Aim::Peak { at, .. } => trial.points[at].judged <= limits.amber,
-            Aim::Stable => !trial.is_unstable,
+            Aim::Peak { at, .. } => trial.judged.points[at].judged <= limits.amber,
+            Aim::Stable => !trial.judged.is_unstable,
         };
-        let green = trials.iter().find(|trial| trial.is_green(limits));
+        let green = trials.iter().find(|trial| trial.judged.is_green(limits));
         let least = match self.aim {
             Aim::Stable => None,
             Aim::Peak { at, present } => trials
                 .iter()
-                .min_by(|x, y| x.points[at].judged.total_cmp(&y.points[at].judged))
-                .filter(|trial| trial.points[at].judged < LOWER * present),
+                .min_by(|x, y| x.judged.points[at].judged.total_cmp(&y.judged.points[at].judged))
+                .filter(|trial| trial.judged.points[at].judged < LOWER * present),
         };
         let chosen = green.or_else(|| trials.iter().find(reached));
         let (trial, change) = match (chosen, least) {
             (Some(trial), _) => {
                 let peaks = trial.peaks();
-                let stable =
-                    if trial.is_unstable { ", still unstable within the tolerances" } else { "" };
+                let stable = if trial.judged.is_unstable {
+                    ", still unstable within the tolerances"
+                } else {
+                    ""
+                };
                 (trial, format!("with {}, the peak of S is {peaks}{stable}", trial.words))
             }
             (None, Some(trial)) => {

@@ -1,5 +1,7 @@
 //! The requirements of a plant file on state feedback and observer.
 
+use std::f64::consts::PI;
+
 use crate::matrix::MatrixEntry as _;
 use nalgebra::{Complex, DMatrix};
 
@@ -19,8 +21,19 @@ pub(crate) enum Requirement {
     /// The least integral of x'Q x + u'R u (LQR), or the least variance for noise of intensity W
     /// and V (Kalman).
     Weights { states: DMatrix<f64>, channels: DMatrix<f64> },
+    /// A linear-quadratic regulator, or a Kalman filter, of a bandwidth.
+    Bandwidth(Bandwidth),
     /// The least H-infinity norm, or a norm below a bound; the eigenvalues also lie in a region.
     HInfinity { bound: Option<f64>, region: Region, channel: Channel },
+}
+
+/// The bandwidth of a loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bandwidth {
+    /// In rad/s; None until it is chosen.
+    pub(crate) rate: Option<f64>,
+    /// Whether the file states it.
+    pub(crate) is_stated: bool,
 }
 
 /// A region of the left half plane: the intersection of the given parts.
@@ -43,6 +56,19 @@ pub(crate) struct Request {
     pub(crate) other: Option<(String, Place)>,
 }
 
+impl Request {
+    /// The request of a file without one, at its place.
+    pub(crate) fn open(place: Place) -> Self {
+        let requirement = Requirement::Bandwidth(Bandwidth { rate: None, is_stated: false });
+        Self { requirement, place, other: None }
+    }
+
+    /// Whether the bandwidth is to be chosen.
+    pub(crate) fn is_open(&self) -> bool {
+        matches!(self.requirement, Requirement::Bandwidth(Bandwidth { rate: None, .. }))
+    }
+}
+
 impl Requirement {
     /// The eigenvalues that are stated.
     pub(crate) fn eigenvalues(&self) -> &[Complex<f64>] {
@@ -63,7 +89,7 @@ impl Requirement {
     }
 }
 
-const KEYS: [&str; 4] = ["eigenvalues", "sampled_eigenvalues", "region", "h_infinity"];
+const KEYS: [&str; 5] = ["bandwidth", "eigenvalues", "sampled_eigenvalues", "region", "h_infinity"];
 
 /// Reads `[feedback]` (weights Q, R) or `[observer]` (weights W, V).
 pub(crate) fn request(
@@ -111,6 +137,10 @@ pub(crate) fn request(
     if let Some(entry) = region {
         return Err(entry.error("a region can be combined with `h_infinity` only"));
     }
+    if one.name.ends_with(".bandwidth") {
+        let requirement = Requirement::Bandwidth(bandwidth(&one, domain)?);
+        return Ok(Request { requirement, place: one.place, other: None });
+    }
     if one.name.ends_with(".eigenvalues") {
         let requirement = Requirement::Eigenvalues(stable(&one, false)?);
         return Ok(Request { requirement, place: one.place, other: None });
@@ -140,7 +170,7 @@ fn refuse_unsampled(region: &Entry<'_>) -> Result<(), PlaceError> {
 
 /// Returns the only method of the table besides a region; several methods are an error.
 fn only_one<'a>(table: &Table<'a>, weight: &str) -> Result<Option<Entry<'a>>, PlaceError> {
-    let keys = ["eigenvalues", "sampled_eigenvalues", "h_infinity", weight];
+    let keys = ["bandwidth", "eigenvalues", "sampled_eigenvalues", "h_infinity", weight];
     let mut stated = keys.iter().filter_map(|key| table.get(key));
     let first = stated.next();
     match stated.next() {
@@ -149,6 +179,18 @@ fn only_one<'a>(table: &Table<'a>, weight: &str) -> Result<Option<Entry<'a>>, Pl
             Err(second.error(format!("only one of {keys} is possible")))
         }
         None => Ok(first),
+    }
+}
+
+/// Reads a bandwidth, which a sampled loop has below its Nyquist frequency.
+fn bandwidth(entry: &Entry<'_>, domain: Domain) -> Result<Bandwidth, PlaceError> {
+    let found = entry.positive()?;
+    match domain {
+        Domain::Sampled { period } if found * period >= PI => Err(entry.error(format!(
+            "expected less than pi / sample_time = {:.6} rad/s, found {found}",
+            PI / period
+        ))),
+        _ => Ok(Bandwidth { rate: Some(found), is_stated: true }),
     }
 }
 

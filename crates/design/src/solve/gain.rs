@@ -55,6 +55,8 @@ pub(crate) struct FeedbackProblem<'a> {
     pub(crate) a: &'a DMatrix<f64>,
     pub(crate) b: &'a DMatrix<f64>,
     pub(crate) c: &'a DMatrix<f64>,
+    /// Number of states of the plant; those after it are integrals of references.
+    pub(crate) states: usize,
     pub(crate) f_a: &'a DMatrix<f64>,
 }
 

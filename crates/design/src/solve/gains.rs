@@ -45,6 +45,7 @@ pub(crate) fn feedback(
             let found = lqr(a, b, &weights, domain)?;
             Ok(weighted(found.gain, "Linear-quadratic regulator", found.residual))
         }
+        Requirement::Bandwidth(bandwidth) => problem.by_bandwidth(bandwidth, domain),
         Requirement::Region(region) => {
             let part = controllable_part(a, b)?;
             region.require(&part.fixed, domain)?;
@@ -105,6 +106,7 @@ pub(crate) fn observer(
                 .unwrap_or(found.gain);
             Ok(weighted(gain, "Kalman filter", found.residual))
         }
+        Requirement::Bandwidth(bandwidth) => problem.by_bandwidth(bandwidth, domain),
         Requirement::Region(region) => {
             let part = controllable_part(&a_dual, &b_dual)?;
             region.require(&part.fixed, domain)?;

@@ -36,6 +36,8 @@ pub(crate) struct ObserverProblem<'a> {
     pub(crate) a_0: &'a DMatrix<f64>,
     /// `C_0`.
     pub(crate) c_0: &'a DMatrix<f64>,
+    /// B of the plant with its filter.
+    pub(crate) b: &'a DMatrix<f64>,
     /// The estimates of each fault among the last states.
     pub(crate) channels: &'a [FaultChannel],
     /// Number of states of the fault models, the last states.
@@ -231,6 +233,7 @@ impl ObserverProblem<'_> {
         let unfiltered = ObserverProblem {
             a_0: &kept_columns.select_rows(&kept),
             c_0: &(DMatrix::from_diagonal(&rates) * kept_columns.rows(first, filter.len())),
+            b: &self.b.rows(0, first).into_owned(),
             channels: self.channels,
             faults: self.faults,
             filter: None,

@@ -301,6 +301,7 @@ impl Without<'_> {
             a: &plant.a.view((0, 0), (n, n)).into(),
             b: &plant.b.rows(0, n).into_owned().remove_columns_at(gone),
             c: &linear.c,
+            states: n,
             f_a: &plant.f_a.rows(0, n).into(),
         };
         match feedback(&requirement, &problem, *domain) {

@@ -276,6 +276,7 @@ impl GainProblem<'_> {
             a,
             b,
             c: &linear.c.clone().resize_horizontally(order, 0.0),
+            states: n,
             f_a: &plant.f_a.rows(0, n).into_owned().resize_vertically(order, 0.0),
         };
         let feedback = || match common {
@@ -287,6 +288,7 @@ impl GainProblem<'_> {
         let observer_problem = ObserverProblem {
             a_0: &a_0,
             c_0: &c_0,
+            b: &plant.b,
             channels: &extended.channels,
             faults: plant.f_a.ncols(),
             filter: filter.as_deref(),

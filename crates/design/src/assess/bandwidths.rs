@@ -1,0 +1,149 @@
+//! Chooses the bandwidths that a plant file leaves open.
+
+use control::Domain;
+use control::eigen::eigenvalues;
+use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
+
+use crate::Error;
+use crate::assess::judged::Judged;
+use crate::budget::Budget;
+use crate::plant::linear::LinearPlant;
+use crate::plant_file::PlantFile;
+use crate::plant_file::requirements::{Bandwidth, Request, Requirement};
+use crate::solve::designed::design;
+
+/// Bandwidths of the feedback relative to the speed of the plant, with those of the observer relative to the feedback:
+/// the first that makes the verdict green is taken.
+const CANDIDATES: [(f64, f64); 18] = [
+    (1.0, 4.0),
+    (0.5, 4.0),
+    (0.25, 4.0),
+    (1.0, 8.0),
+    (2.0, 8.0),
+    (2.0, 4.0),
+    (0.5, 8.0),
+    (4.0, 8.0),
+    (0.25, 8.0),
+    (4.0, 4.0),
+    (0.1, 4.0),
+    (1.0, 16.0),
+    (2.0, 16.0),
+    (4.0, 16.0),
+    (8.0, 8.0),
+    (0.1, 1.0),
+    (0.05, 4.0),
+    (0.02, 4.0),
+];
+/// From this number of states on, only the first candidates are examined, without the tolerances.
+const LARGE: usize = 24;
+const OF_LARGE: usize = 3;
+/// Eigenvalues smaller than this part of the largest one have no speed.
+const NO_SPEED: f64 = 1e-9;
+/// Largest bandwidth of the feedback in rad per sample.
+const PER_SAMPLE: f64 = 0.2;
+/// Largest bandwidth of the observer in rad per sample.
+const OBSERVER_PER_SAMPLE: f64 = 1.5;
+/// The bandwidth for a plant without a speed of its own, rad/s.
+const WITHOUT_SPEED: f64 = 1.0;
+
+/// Returns `file` with the bandwidths that it leaves open.
+///
+/// The speed of the plant is the median of the moduli of its eigenvalues, at least twice the largest real part; of a
+/// loop whose feedback is stated by eigenvalues, the median of these. Of the candidates the first with a green verdict is
+/// taken, otherwise that with the lowest peak of S.
+pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantFile<'a>, Error> {
+    if !file.feedback.is_open() && !file.observer.is_open() {
+        return Ok(file.clone());
+    }
+    let plant = LinearPlant::of(file)?;
+    let speed = speed(file, &plant.a)?;
+    let large = plant.a.nrows() >= LARGE;
+    let candidates = &CANDIDATES[..if large { OF_LARGE } else { CANDIDATES.len() }];
+    let examine = |&(of_feedback, of_observer): &(f64, f64)| {
+        let feedback = of_feedback * speed;
+        let other = with(file, feedback, of_observer * feedback);
+        let judged = judged(&other, !large);
+        (other, judged)
+    };
+    let mut best: Option<(PlantFile<'a>, Judged)> = None;
+    let mut refusal: Option<Error> = None;
+    for candidates in candidates.chunks(rayon::current_num_threads().max(2)) {
+        let examined: Vec<_> = candidates.par_iter().map(examine).collect();
+        for (other, judged) in examined {
+            match judged {
+                Ok(Some(judged)) if judged.is_green(&file.robustness) => return Ok(other),
+                Ok(Some(judged)) => {
+                    let better =
+                        |(_, earlier): &(_, Judged)| judged.is_better(earlier, &file.robustness);
+                    if best.as_ref().is_none_or(better) {
+                        best = Some((other, judged));
+                    }
+                }
+                Ok(None) => {}
+                Err(error) => refusal = refusal.or(Some(error)),
+            }
+        }
+        // What refuses the first candidates is the plant, not the bandwidth.
+        if budget.is_over() || (best.is_none() && refusal.is_some()) {
+            break;
+        }
+    }
+    match (best, refusal) {
+        (Some((other, _)), _) => Ok(other),
+        (None, Some(error)) => Err(error),
+        (None, None) => {
+            let message = "no bandwidth was found whose loop is stable; expected a requirement, \
+                           `feedback.eigenvalues` and `observer.eigenvalues` for example";
+            Err(file.error(&["feedback", "observer"], message).into())
+        }
+    }
+}
+
+/// Examines the loop of a file, with its tolerances if `varies` and the nominal loop is green; None if it is not stable.
+fn judged(file: &PlantFile<'_>, varies: bool) -> Result<Option<Judged>, Error> {
+    let nominal = design(file)?.nominal;
+    let judged = Judged::of(&nominal, None)?;
+    let varies = varies && judged.as_ref().is_some_and(|judged| judged.is_green(&file.robustness));
+    if varies { Judged::of(&nominal, Some(&file.robustness)) } else { Ok(judged) }
+}
+
+/// The file with bandwidths where it leaves them open, with the digits that a plant file has.
+fn with<'a>(file: &PlantFile<'a>, feedback: f64, observer: f64) -> PlantFile<'a> {
+    let most =
+        file.sampling.map_or(f64::INFINITY, |sampling| OBSERVER_PER_SAMPLE / sampling.period);
+    let set = |request: &mut Request, rate: f64| {
+        if request.is_open() {
+            // Two digits are enough, and what a plant file would state.
+            let rate = format!("{:.1e}", rate.min(most)).parse().ok();
+            request.requirement = Requirement::Bandwidth(Bandwidth { rate, is_stated: false });
+        }
+    };
+    let mut other = file.clone();
+    set(&mut other.feedback, feedback);
+    set(&mut other.observer, observer);
+    other
+}
+
+/// The speed of the plant, or of the stated feedback, rad/s.
+fn speed(file: &PlantFile<'_>, a: &DMatrix<f64>) -> Result<f64, Error> {
+    let domain = file.sampling.map(|sampling| Domain::Sampled { period: sampling.period });
+    let stated: Vec<Complex<f64>> = match (&file.feedback.requirement, domain) {
+        (Requirement::Eigenvalues(all), _) => all.clone(),
+        (Requirement::SampledEigenvalues(all), Some(Domain::Sampled { period })) => {
+            all.iter().map(|value| value.ln() / period).collect()
+        }
+        (Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }), _) => return Ok(*rate),
+        _ => Vec::new(),
+    };
+    let all = if stated.is_empty() { eigenvalues(a)? } else { stated };
+    let mut sizes: Vec<_> =
+        all.iter().map(|value| value.norm()).filter(|size| size.is_finite()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let largest = sizes.last().copied().unwrap_or_default();
+    sizes.retain(|&size| size > NO_SPEED * largest);
+    let median = sizes.get(sizes.len() / 2).copied().unwrap_or(WITHOUT_SPEED);
+    let unstable = all.iter().map(|value| value.re).fold(0.0, f64::max);
+    let most = file.sampling.map_or(f64::INFINITY, |sampling| PER_SAMPLE / sampling.period);
+    Ok(median.max(2.0 * unstable).min(most))
+}

@@ -1,0 +1,125 @@
+//! Gains of a stated bandwidth: a linear-quadratic regulator and a Kalman filter in natural units.
+
+use control::aso::Estimator;
+use control::bandwidth::{ByBandwidth, NaturalUnits, filter, regulator};
+use control::{Domain, StateSpace};
+use nalgebra::DMatrix;
+
+use crate::plant_file::requirements::Bandwidth;
+use crate::report::number::rounded;
+use crate::solve::gain::{FeedbackProblem, GainResult, Refusal, unique};
+use crate::solve::norm_gains::ObserverProblem;
+
+/// Integral action and the estimates of faults are slower than the loop by this factor.
+const SLOWER: f64 = 8.0;
+
+impl FeedbackProblem<'_> {
+    /// The regulator with the cost of the measurements, and of the integrals of references as far as they are slower.
+    pub(crate) fn by_bandwidth(
+        &self,
+        bandwidth: &Bandwidth,
+        domain: Domain,
+    ) -> Result<GainResult, Refusal> {
+        let Self { a, b, c, states, .. } = *self;
+        let rate = bandwidth.rate()?;
+        // The rows of the integrals are outputs of the plant, too.
+        let integrals = a.view((states, 0), (a.nrows() - states, states)).into_owned();
+        let outputs = stacked(&c.columns(0, states).into_owned(), &integrals);
+        let plant = plant(a, &b.rows(0, states).into_owned(), &outputs, domain);
+        let units = NaturalUnits::new(&plant, rate)?;
+        let p = c.nrows();
+        let weighted = DMatrix::from_diagonal(&units.outputs.rows(0, p).into_owned()) * c;
+        let mut q = weighted.tr_mul(&weighted);
+        for (at, unit) in units.outputs.iter().skip(p).enumerate() {
+            q[(states + at, states + at)] += (rate * step(domain) / SLOWER * unit).powi(2);
+        }
+        let ByBandwidth { result, loop_gain, .. } =
+            regulator(a, b, &q, &units.inputs, rate, domain)?;
+        let method = bandwidth.method("Linear-quadratic regulator", loop_gain, result.residual);
+        Ok(unique(result.gain, method))
+    }
+}
+
+impl ObserverProblem<'_> {
+    /// The filter for noise where commands and faults enter, and for the walks of the faults.
+    pub(crate) fn by_bandwidth(
+        &self,
+        bandwidth: &Bandwidth,
+        domain: Domain,
+    ) -> Result<GainResult, Refusal> {
+        let Self { a_0, c_0, b, channels, faults, estimator, .. } = *self;
+        let rate = bandwidth.rate()?;
+        let (order, m) = (a_0.nrows(), b.ncols());
+        let n = order - faults;
+        let mut inputs = b.clone().resize(order, m + channels.len(), 0.0);
+        let walk = rate * step(domain) / SLOWER;
+        for (at, channel) in channels.iter().enumerate() {
+            let mut column = inputs.column_mut(m + at);
+            column.rows_mut(0, n).copy_from(&a_0.view((0, n + channel.estimate), (n, 1)));
+            column[n + channel.estimate] = walk;
+            if let Some(of_ramp) = channel.rate {
+                column[n + of_ramp] = walk * rate / SLOWER;
+            }
+        }
+        let plant =
+            plant(a_0, &inputs.rows(0, n).into_owned(), &c_0.columns(0, n).into_owned(), domain);
+        let units = NaturalUnits::new(&plant, rate)?;
+        let noise = inputs * DMatrix::from_diagonal(&units.inputs);
+        let w = &noise * noise.transpose();
+        let ByBandwidth { result, loop_gain, .. } =
+            filter(a_0, c_0, &((&w + w.transpose()) / 2.0), &units.outputs, rate, domain)?;
+        let current = result.current_gain.filter(|_| estimator == Estimator::Current);
+        let method = bandwidth.method("Kalman filter", loop_gain, result.residual);
+        Ok(unique(current.unwrap_or(result.gain), method))
+    }
+}
+
+impl Bandwidth {
+    fn rate(&self) -> Result<f64, Refusal> {
+        let open = || Refusal::Conflict("expected a bandwidth or another requirement".to_owned());
+        self.rate.ok_or_else(open)
+    }
+
+    fn method(&self, name: &str, loop_gain: f64, residual: f64) -> String {
+        let rate = rounded(self.rate.unwrap_or_default());
+        let chosen = if self.is_stated {
+            ""
+        } else {
+            ", chosen by the peaks of S as the file states no requirement"
+        };
+        let reached = match loop_gain {
+            gain if gain > 1.1 => {
+                format!("; the unstable modes need more: the loop gain there is {gain:.3}")
+            }
+            gain if gain < 0.9 => {
+                format!("; no weight reaches it: the loop gain there is {gain:.3}")
+            }
+            _ => String::new(),
+        };
+        format!(
+            "{name} with a bandwidth of {rate} rad/s{chosen}{reached}; relative residual of the Riccati equation \
+             {residual:.1e}."
+        )
+    }
+}
+
+/// The plant from inputs to outputs, the first states of `a`.
+fn plant(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>, domain: Domain) -> StateSpace {
+    let n = b.nrows();
+    let (d, a) = (DMatrix::zeros(c.nrows(), b.ncols()), a.view((0, 0), (n, n)).into_owned());
+    StateSpace { a, b: b.clone(), c: c.clone(), d, domain }
+}
+
+/// The time of one step of an integral.
+fn step(domain: Domain) -> f64 {
+    match domain {
+        Domain::Continuous => 1.0,
+        Domain::Sampled { period } => period,
+    }
+}
+
+fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut all = above.clone().resize_vertically(above.nrows() + below.nrows(), 0.0);
+    all.rows_mut(above.nrows(), below.nrows()).copy_from(below);
+    all
+}
