@@ -25,6 +25,13 @@ pub(crate) struct Options {
     ///
     /// It states plant, faults and requirements on the controller.
     plant: PathBuf,
+    /// Write a plant file, no design
+    ///
+    /// PLANT is then an FMU, a MAT file with the variables A, B, C and D, or a CSV table of them with the names of
+    /// rows and columns. The plant file is --out [default: NAME.toml]; it has the bandwidths that were found for the plant.
+    #[arg(long)]
+    #[arg(conflicts_with_all = ["report", "fmu", "worst_case", "json", "code", "compare"])]
+    init: bool,
     /// The design file [default: NAME-design.toml]
     ///
     /// NAME is that of the plant file, NAME.toml. The report goes into the same folder.
@@ -98,6 +105,9 @@ pub(crate) struct Options {
 /// Designs the controller and writes the requested files, all or none; returns whether all checks
 /// hold and the verdict is not red.
 pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
+    if options.init {
+        return init(options).map(|()| true);
+    }
     if options.compare {
         return compare(options).map(|()| true);
     }
@@ -202,6 +212,35 @@ fn code(options: &Options, design: &Design) -> anyhow::Result<CodeFiles> {
         all.warnings = code.warnings;
     }
     Ok(all)
+}
+
+/// Writes a plant file for an FMU or for matrices.
+fn init(options: &Options) -> anyhow::Result<()> {
+    let stem = options.plant.file_stem().unwrap_or_default().to_string_lossy();
+    let out = options.out.clone().unwrap_or_else(|| format!("{stem}.toml").into());
+    check_distinct(&[("the plant", &options.plant)], &[("--out", &out)])?;
+    anyhow::ensure!(
+        options.force || !out.exists(),
+        "{} exists; --out names another file, --force overwrites it",
+        out.display()
+    );
+    for library in &options.preload {
+        fmu_import::preload(library)?;
+    }
+    let limits = TimeLimits {
+        gains: options.gain_time,
+        interrupted: interrupt::listen()?,
+        ..TimeLimits::default()
+    };
+    let made = design::new_plant_file(&options.plant, &out, &limits)?;
+    let mut staged = Outputs::default();
+    staged.stage(&out, |path| fs::write(path, &made.text))?;
+    staged.commit()?;
+    if let Some(refusal) = made.refusal {
+        eprintln!("warning: no controller was found for this plant yet: {refusal}");
+    }
+    println!("{}", out.display());
+    Ok(())
 }
 
 /// Compares the estimation laws; writes one page.

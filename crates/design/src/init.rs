@@ -1,0 +1,101 @@
+//! Writes a plant file for matrices or an FMU, with the bandwidths of a controller.
+
+mod draft;
+mod fmu;
+mod labelled;
+mod mat;
+
+use std::path::Path;
+
+use files::{Source, Table};
+
+use crate::Error;
+use crate::assess::bandwidths;
+use crate::budget::TimeLimits;
+use crate::plant_file::PlantFile;
+use crate::plant_file::requirements::{Bandwidth, Requirement};
+use draft::{Draft, Settings};
+
+/// Rates of a measurement filter, in 1/s, that are tried for a plant with direct feedthrough.
+const FILTERS: [f64; 4] = [10.0, 100.0, 1000.0, 1.0];
+
+/// A new plant file.
+pub struct NewPlantFile {
+    /// Its content.
+    pub text: String,
+    /// Why no controller was found for the plant, if there is none.
+    pub refusal: Option<String>,
+}
+
+/// Writes a plant file for the plant at `source`: an FMU (`.fmu`), MATLAB variables A, B, C and D (`.mat`), or a table of
+/// them with names (`.csv`, see the book's page on plant files). `out` is where the file will be: its folder is where
+/// the path of an FMU starts.
+///
+/// The faults are those of all actuators, or of as many as the measurements can tell apart. Feedback and observer have the
+/// bandwidths that a design without requirements would have.
+///
+/// # Errors
+///
+/// [`Error`]: the source cannot be read, or is no plant.
+pub fn new_plant_file(
+    source: &Path,
+    out: &Path,
+    limits: &TimeLimits,
+) -> Result<NewPlantFile, Error> {
+    let ending = source.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    let draft = match ending.as_deref() {
+        Some("fmu") => fmu::draft(source, out),
+        Some("mat") => mat::draft(source),
+        Some("csv" | "tsv" | "txt") => labelled::draft(source),
+        _ => Err(Error::Invalid(format!(
+            "{}: expected an FMU (.fmu), a file of MATLAB (.mat), or a table (.csv)",
+            source.display()
+        ))),
+    }?;
+    let budget = limits.of_gains();
+    let mut refusal = None;
+    for settings in attempts(&draft) {
+        let text = draft.text(&settings, &[]);
+        match bandwidths(out, &text, &budget) {
+            Ok([feedback, observer]) => {
+                let settings = Settings { bandwidths: Some([feedback, observer]), ..settings };
+                return Ok(NewPlantFile { text: draft.text(&settings, &[]), refusal: None });
+            }
+            Err(error) => refusal = refusal.or_else(|| Some(files::sentence(&error))),
+        }
+        if budget.is_over() {
+            break;
+        }
+    }
+    let refusal = refusal.unwrap_or_default();
+    let text = draft.text(&Settings::of_all(&draft), &refusal.lines().collect::<Vec<_>>());
+    Ok(NewPlantFile { text, refusal: Some(refusal) })
+}
+
+/// Faults and filters to try: those of all actuators first, then of fewer.
+fn attempts(draft: &Draft) -> Vec<Settings> {
+    let all = draft.actuators.len();
+    let one = |faulty: Vec<usize>, filter| Settings { faulty, filter, bandwidths: None };
+    let sets = (1..=all).rev().flat_map(|count| {
+        // The first actuators; one alone may be any.
+        let starts = if count == 1 { 0..all } else { 0..1 };
+        starts.map(move |start| (start..start + count).collect::<Vec<_>>())
+    });
+    let filters = |set: Vec<usize>| {
+        let filters = if draft.has_feedthrough { FILTERS.map(Some).to_vec() } else { vec![None] };
+        filters.into_iter().map(move |filter| one(set.clone(), filter))
+    };
+    sets.flat_map(filters).collect()
+}
+
+/// The bandwidths that the design of a plant file without requirements has.
+fn bandwidths(path: &Path, text: &str, budget: &crate::budget::Budget) -> Result<[f64; 2], Error> {
+    let source = Source::new(path, text.to_owned());
+    let parsed = source.parse()?;
+    let file = PlantFile::read(&source, &Table::whole(&source, &parsed))?;
+    let file = bandwidths::chosen(&file, budget)?;
+    Ok([&file.feedback, &file.observer].map(|request| match request.requirement {
+        Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }) => rate,
+        _ => f64::NAN,
+    }))
+}

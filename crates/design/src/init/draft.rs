@@ -1,0 +1,173 @@
+//! The text of a new plant file.
+
+use std::fmt::Write as _;
+
+use nalgebra::DMatrix;
+
+/// A plant of which a file is written.
+pub(super) struct Draft {
+    /// What the plant is from, one line.
+    pub(super) origin: String,
+    pub(super) model: Model,
+    pub(super) actuators: Vec<Named>,
+    pub(super) measurements: Vec<Named>,
+    /// Outputs that are no measurements, as they contain a command.
+    pub(super) left_out: Vec<String>,
+    pub(super) has_feedthrough: bool,
+}
+
+/// A signal with what is known of it.
+pub(super) struct Named {
+    pub(super) name: String,
+    pub(super) unit: Option<String>,
+    pub(super) description: Option<String>,
+}
+
+pub(super) enum Model {
+    Matrices {
+        a: DMatrix<f64>,
+        b: DMatrix<f64>,
+        c: DMatrix<f64>,
+        d: DMatrix<f64>,
+        states: Vec<Named>,
+    },
+    Fmu {
+        path: String,
+        inputs: Vec<(String, f64)>,
+    },
+}
+
+/// What is chosen for the plant.
+#[derive(Clone)]
+pub(super) struct Settings {
+    /// The actuators that may be faulty.
+    pub(super) faulty: Vec<usize>,
+    /// Rate of the measurement filter, 1/s.
+    pub(super) filter: Option<f64>,
+    /// Of feedback and observer, rad/s.
+    pub(super) bandwidths: Option<[f64; 2]>,
+}
+
+impl Settings {
+    pub(super) fn of_all(draft: &Draft) -> Self {
+        Self { faulty: (0..draft.actuators.len()).collect(), filter: None, bandwidths: None }
+    }
+}
+
+impl Draft {
+    /// The plant file. `refusal`: why there is no controller for it.
+    pub(super) fn text(&self, settings: &Settings, refusal: &[&str]) -> String {
+        let mut text = format!(
+            "# Plant: {}. Each entry is described in the reference of plant files.\n\n",
+            self.origin
+        );
+        self.plant(&mut text);
+        list(&mut text, "actuators", &self.actuators);
+        list(&mut text, "measurements", &self.measurements);
+        if !self.left_out.is_empty() {
+            let _ = writeln!(
+                text,
+                "# Left out, as they contain a command: {}",
+                self.left_out.join(", ")
+            );
+        }
+        self.faults(&mut text, settings);
+        if let Some(rate) = settings.filter {
+            text += "\n# 1/s, rate of the low-pass filters of the measurements, as these contain a command.\n";
+            line(&mut text, "filter", rate);
+        }
+        if !refusal.is_empty() {
+            text += "\n# No controller was found for this plant yet:\n";
+            for line in refusal {
+                let _ = writeln!(text, "#   {}", line.trim_end());
+            }
+        }
+        if let Some([feedback, observer]) = settings.bandwidths {
+            text += "\n# rad/s. A larger bandwidth is faster, and asks for larger commands and better sensors.\n";
+            line(&mut text, "feedback.bandwidth", feedback);
+            line(&mut text, "observer.bandwidth", observer);
+        }
+        text += "\n# Often needed as well:\n\
+                 # sample_time = 0.01                  # s, of a controller that acts at regular times\n\
+                 # robustness.tolerance = 0.1          # each entry of A, B and C may differ by 10 %\n\
+                 # In a table of `actuators`, limits = [-10, 10] states what the actuator can do.\n";
+        text
+    }
+
+    fn plant(&self, text: &mut String) {
+        match &self.model {
+            Model::Matrices { a, b, c, d, states } => {
+                *text +=
+                    "# x' = A x + B u, y = C x + D u, in deviations from the operating point.\n";
+                for (name, matrix) in [("A", a), ("B", b), ("C", c)] {
+                    self::matrix(text, name, matrix);
+                }
+                if self.has_feedthrough {
+                    self::matrix(text, "D", d);
+                }
+                list(text, "states", states);
+            }
+            Model::Fmu { path, inputs } => {
+                let _ = writeln!(text, "plant = {}", quoted(path));
+                *text += "\n# The operating point: inputs, parameters and states; others have their start values.\n\
+                          # Commands must move the plant there: a friction that holds it is a parameter to state, as 0.\n";
+                for (name, value) in inputs {
+                    let _ = writeln!(text, "operating_point.{} = {value}", key(name));
+                }
+                *text += "\n";
+            }
+        }
+    }
+
+    fn faults(&self, text: &mut String, settings: &Settings) {
+        if settings.faulty.len() == self.actuators.len() {
+            *text += "\n# What adds to each command, a friction or an offset, is estimated and cancelled.\n\
+                      actuator_faults = \"all\"\n";
+            return;
+        }
+        *text += "\n# What adds to these commands is estimated and cancelled. The measurements cannot tell apart that of \
+                  all actuators.\nfaults = [\n";
+        for &at in &settings.faulty {
+            let name = &self.actuators[at].name;
+            let fault = quoted(&format!("f_{name}"));
+            let _ = writeln!(text, "    {{ name = {fault}, actuator = {} }},", quoted(name));
+        }
+        *text += "]\n";
+    }
+}
+
+fn line(text: &mut String, key: &str, value: f64) {
+    let _ = writeln!(text, "{key} = {value}");
+}
+
+fn matrix(text: &mut String, name: &str, matrix: &DMatrix<f64>) {
+    let _ = writeln!(text, "{name} = [");
+    for row in matrix.row_iter() {
+        let row: Vec<_> = row.iter().map(ToString::to_string).collect();
+        let _ = writeln!(text, "    [{}],", row.join(", "));
+    }
+    *text += "]\n";
+}
+
+fn list(text: &mut String, key: &str, signals: &[Named]) {
+    let _ = writeln!(text, "{key} = [");
+    for Named { name, unit, description } in signals {
+        let mut parts = vec![format!("name = {}", quoted(name))];
+        for (key, value) in [("unit", unit), ("description", description)] {
+            parts.extend(value.as_ref().map(|value| format!("{key} = {}", quoted(value))));
+        }
+        let _ = writeln!(text, "    {{ {} }},", parts.join(", "));
+    }
+    *text += "]\n";
+}
+
+/// A key of TOML.
+fn key(name: &str) -> String {
+    let is_bare = |sign: char| sign.is_ascii_alphanumeric() || "_-".contains(sign);
+    if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { quoted(name) }
+}
+
+/// A text of TOML.
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}

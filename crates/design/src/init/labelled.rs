@@ -1,0 +1,124 @@
+//! A table of the matrices with the names of rows and columns.
+//!
+//! ```text
+//!             , position [m] , speed [m/s] , force [N]
+//! position    , 0            , 1           , 0
+//! speed       , 0            , -0.5        , 0.5
+//! y [m]       , 1            , 0           , 0
+//! ```
+//!
+//! A column that has the name of a row is a state, and this row its derivative; other columns are commands, other
+//! rows measurements.
+
+use std::fs;
+use std::path::Path;
+
+use nalgebra::DMatrix;
+
+use crate::Error;
+use crate::init::draft::{Draft, Model, Named};
+
+/// Reads the table.
+pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
+    let text = fs::read_to_string(path).map_err(Error::file("read", path))?;
+    table(&text, &path.file_name().unwrap_or_default().to_string_lossy())
+        .map_err(|reason| Error::Invalid(format!("{}: {reason}", path.display())))
+}
+
+fn table(text: &str, file: &str) -> Result<Draft, String> {
+    let header = text.lines().next().unwrap_or_default();
+    let count = |sign: &char| header.matches(*sign).count();
+    let separator = [',', ';', '\t'].into_iter().max_by_key(count).unwrap_or(',');
+    let cells = |line: &str| -> Vec<String> {
+        line.split(separator).map(|cell| cell.trim().trim_matches('"').trim().to_owned()).collect()
+    };
+    let columns: Vec<Named> = cells(header).iter().skip(1).map(|cell| named(cell)).collect();
+    if columns.is_empty() {
+        return Err(EXPECTED.to_owned());
+    }
+    let mut rows = Vec::new();
+    for (at, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty()) {
+        let cells = cells(line);
+        if cells.len() != columns.len() + 1 {
+            let (expected, found) = (columns.len() + 1, cells.len());
+            return Err(format!("line {}: expected {expected} cells, found {found}", at + 1));
+        }
+        let number = |(cell, column): (&String, &Named)| {
+            let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
+            value.ok_or_else(|| {
+                format!("line {}, {}: expected a number, found {cell:?}", at + 1, column.name)
+            })
+        };
+        let values = cells[1..].iter().zip(&columns).map(number).collect::<Result<Vec<_>, _>>()?;
+        rows.push((named(derivative(&cells[0])), values));
+    }
+    split(&rows, &columns, file)
+}
+
+/// What the table has to be.
+const EXPECTED: &str = "expected a table of the matrices: the first line names states and commands, the first cell of \
+                        each further line the state whose derivative it is, or the measurement";
+
+fn split(rows: &[(Named, Vec<f64>)], columns: &[Named], file: &str) -> Result<Draft, String> {
+    let named_by = |name: &str| rows.iter().position(|(row, _)| row.name == name);
+    let of_states: Vec<_> = columns.iter().filter_map(|column| named_by(&column.name)).collect();
+    let of_outputs: Vec<_> = (0..rows.len()).filter(|row| !of_states.contains(row)).collect();
+    let (n, m, p) = (of_states.len(), columns.len() - of_states.len(), of_outputs.len());
+    if n == 0 || m == 0 || p == 0 {
+        let recorded = columns.len() > 1 && n == 0;
+        let advice = if recorded { "; a recording of signals is no plant" } else { "" };
+        return Err(format!(
+            "found {n} states, {m} commands and {p} measurements; {EXPECTED}{advice}"
+        ));
+    }
+    let is_state = |at: &usize| named_by(&columns[*at].name).is_some();
+    let (states, commands): (Vec<_>, Vec<_>) = (0..columns.len()).partition(is_state);
+    let block = |of_rows: &[usize], of_columns: &[usize]| {
+        DMatrix::from_fn(of_rows.len(), of_columns.len(), |i, j| rows[of_rows[i]].1[of_columns[j]])
+    };
+    let d = block(&of_outputs, &commands);
+    let has_feedthrough = d.amax() > 0.0;
+    let model = Model::Matrices {
+        a: block(&of_states, &states),
+        b: block(&of_states, &commands),
+        c: block(&of_outputs, &states),
+        d,
+        states: states.iter().map(|&at| columns[at].copied()).collect(),
+    };
+    Ok(Draft {
+        origin: format!("the matrices of {file}"),
+        model,
+        actuators: commands.iter().map(|&at| columns[at].copied()).collect(),
+        measurements: of_outputs.iter().map(|&at| rows[at].0.copied()).collect(),
+        left_out: Vec::new(),
+        has_feedthrough,
+    })
+}
+
+/// The state of `der(x)` or `x'`.
+fn derivative(cell: &str) -> &str {
+    let inner = cell.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
+    inner.or_else(|| cell.strip_suffix('\'')).unwrap_or(cell)
+}
+
+/// `name [unit]`.
+fn named(cell: &str) -> Named {
+    let parts = cell.strip_suffix(']').and_then(|rest| rest.rsplit_once('['));
+    let (name, unit) =
+        parts.map_or((cell, None), |(name, unit)| (name, Some(unit.trim().to_owned())));
+    Named {
+        name: name.trim().to_owned(),
+        unit: unit.filter(|unit| !unit.is_empty()),
+        description: None,
+    }
+}
+
+impl Named {
+    fn copied(&self) -> Self {
+        Self {
+            name: self.name.clone(),
+            unit: self.unit.clone(),
+            description: self.description.clone(),
+        }
+    }
+}

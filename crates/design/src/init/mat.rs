@@ -1,0 +1,89 @@
+//! The matrices A, B, C and D of a file of MATLAB.
+
+use std::fs::File;
+use std::path::Path;
+
+use matfile::{Array, MatFile, NumericData};
+use nalgebra::DMatrix;
+
+use crate::Error;
+use crate::init::draft::{Draft, Model, Named};
+
+/// Reads the matrices.
+pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
+    let file = File::open(path).map_err(Error::file("read", path))?;
+    let invalid = |reason: String| Error::Invalid(format!("{}: {reason}", path.display()));
+    let content = MatFile::parse(file).map_err(|_| {
+        invalid(
+            "expected a MAT file of version 5 or 7 (in MATLAB save -v7, in scipy savemat); version 7.3 is \
+             HDF5, version 4 is not read"
+                .to_owned(),
+        )
+    })?;
+    let matrix = |name: &str| matrix(&content, name).map_err(&invalid);
+    let required = |name: &str| {
+        let names: Vec<_> = content.arrays().iter().map(Array::name).collect();
+        let missing =
+            || invalid(format!("expected the variables A, B and C, found {}", names.join(", ")));
+        matrix(name)?.ok_or_else(missing)
+    };
+    let (a, b, c) = (required("A")?, required("B")?, required("C")?);
+    let d = matrix("D")?.unwrap_or_else(|| DMatrix::zeros(c.nrows(), b.ncols()));
+    let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
+    for (name, matrix, expected) in
+        [("A", &a, (n, n)), ("B", &b, (n, m)), ("C", &c, (p, n)), ("D", &d, (p, m))]
+    {
+        if matrix.shape() != expected {
+            let ((rows, columns), (i, j)) = (expected, matrix.shape());
+            return Err(invalid(format!("{name}: expected {rows} x {columns}, found {i} x {j}")));
+        }
+    }
+    if let Some(period) =
+        matrix("Ts")?.and_then(|period| period.iter().copied().find(|&h| h != 0.0))
+    {
+        return Err(invalid(format!(
+            "Ts = {period}: the matrices are of sampled time; expected those of continuous time (in MATLAB d2c)"
+        )));
+    }
+    let numbered = |letter: &str, count: usize| {
+        let one = |k| Named { name: format!("{letter}{k}"), unit: None, description: None };
+        (1..=count).map(one).collect()
+    };
+    Ok(Draft {
+        origin: format!(
+            "the matrices of {}",
+            path.file_name().unwrap_or_default().to_string_lossy()
+        ),
+        actuators: numbered("u", m),
+        measurements: numbered("y", p),
+        left_out: Vec::new(),
+        has_feedthrough: d.amax() > 0.0,
+        model: Model::Matrices { a, b, c, d, states: numbered("x", n) },
+    })
+}
+
+/// The matrix of this name; None if the file has none.
+fn matrix(content: &MatFile, name: &str) -> Result<Option<DMatrix<f64>>, String> {
+    let Some(array) = content.find_by_name(name) else { return Ok(None) };
+    macro_rules! numbers {
+        ($($kind:ident),*) => {
+            match array.data() {
+                NumericData::Double { real, imag } => (real.clone(), imag.is_some()),
+                $(NumericData::$kind { real, imag } => {
+                    (real.iter().map(|&entry| entry as f64).collect(), imag.is_some())
+                })*
+            }
+        };
+    }
+    #[expect(clippy::cast_precision_loss, clippy::cast_lossless, reason = "as MATLAB's double()")]
+    let (real, imaginary) =
+        numbers!(Single, Int8, UInt8, Int16, UInt16, Int32, UInt32, Int64, UInt64);
+    let size = array.size();
+    let &[rows, columns] = size.as_slice() else {
+        return Err(format!("{name}: expected a matrix, found {} dimensions", size.len()));
+    };
+    if imaginary || real.len() != rows * columns || real.iter().any(|entry| !entry.is_finite()) {
+        return Err(format!("{name}: expected finite real numbers"));
+    }
+    Ok(Some(DMatrix::from_vec(rows, columns, real)))
+}

@@ -1,0 +1,241 @@
+"""Designs without requirements, and new plant files: `aso-ftc design --init`. The peaks of S are computed again in numpy."""
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+# Published plants: the source, A, B, C, and the number of actuators whose faults the measurements can tell apart.
+PLANTS = {
+    "double integrator": ([[0, 1], [0, 0]], [[0], [1]], [[1, 0]]),
+    # B. Wie, D. S. Bernstein, Benchmark problems for robust control design (1992), problem 1.
+    "two masses": ([[0, 0, 1, 0], [0, 0, 0, 1], [-1, 1, 0, 0], [1, -1, 0, 0]], [[0], [0], [1], [0]], [[0, 1, 0, 0]]),
+    "unstable": ([[0, 1], [900, 0]], [[0], [100]], [[1, 0]]),
+    "zero in the right half plane": ([[-1, 0], [1, -2]], [[1], [0]], [[1, -3]]),
+    "resonance": ([[0, 1], [-100, -0.1]], [[0], [1]], [[1, 0]]),
+    # K. H. Johansson, IEEE Trans. Control Syst. Technol. 8 (2000), minimum phase.
+    "quadruple tank": (
+        [[-1 / 62, 0, 1 / 23, 0], [0, -1 / 90, 0, 1 / 30], [0, 0, -1 / 23, 0], [0, 0, 0, -1 / 30]],
+        [[0.08325, 0], [0, 0.0628125], [0, 0.047857], [0.03121875, 0]],
+        [[0.5, 0, 0, 0], [0, 0.5, 0, 0]],
+    ),
+    # K. S. Narendra, S. S. Tripathi, J. Aircraft 10 (1973): a helicopter, with a slow zero.
+    "helicopter": (
+        [[-0.0366, 0.0271, 0.0188, -0.4555], [0.0482, -1.01, 0.0024, -4.0208], [0.1002, 0.3681, -0.707, 1.42], [0, 0, 1, 0]],
+        [[0.4422, 0.1761], [3.5446, -7.5922], [-5.52, 4.49], [0, 0]],
+        [[0, 1, 0, 0], [0, 0, 0, 1]],
+    ),
+}
+
+
+def peaks(plant, gains):
+    """The peaks of S at the commands and at the measurements, with the observer's own equations."""
+    a, b, c = (np.array(matrix, float) for matrix in plant)
+    (n, m), p = b.shape, c.shape[0]
+    k = np.hstack([gains["K_x"], gains["K_f"]])
+    gain = np.vstack([gains["L_x"], gains["L_f"]])
+    a_0 = np.block([[a, b], [np.zeros((m, n + m))]])
+    observer = a_0 + np.vstack([b, np.zeros((m, m))]) @ k - gain @ np.hstack([c, np.zeros((p, m))])
+    found = np.zeros(2)
+    speeds = np.abs(np.concatenate([np.linalg.eigvals(a), np.linalg.eigvals(observer)]))
+    for w in np.geomspace(1e-3 * speeds[speeds > 1e-9].min(), 1e2 * speeds.max(), 3000):
+        response = c @ np.linalg.solve(1j * w * np.eye(n) - a, b)
+        controller = k @ np.linalg.solve(1j * w * np.eye(n + m) - observer, gain)
+        for at, opened in enumerate((controller @ response, response @ controller)):
+            found[at] = max(found[at], np.linalg.norm(np.linalg.inv(np.eye(len(opened)) - opened), 2))
+    return found
+
+
+# The measurements with different units, so that the peak of S is judged in the units that make it least.
+MIXED = 'measurements = [{ name = "w", unit = "ft/s" }, { name = "theta", unit = "rad" }]\n'
+
+
+def written(plant):
+    a, b, c = plant
+    return f"A = {a}\nB = {b}\nC = {c}\n{MIXED if plant is PLANTS['helicopter'] else ''}"
+
+
+@pytest.fixture
+def designed(aso_ftc, tmp_path):
+    """The report of a plant file."""
+
+    def run(text, name="plant"):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text, encoding="utf-8")
+        done = aso_ftc("design", path, "--out", tmp_path / f"{name}-design.toml", "--json", "--force")
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    return run
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_a_published_plant_without_requirements_has_a_green_design(designed, name):
+    report = designed(written(PLANTS[name]) + 'actuator_faults = "all"\nrobustness.tolerance = 0.02\n')
+    gains = {gain["name"]: np.array(gain["values"]) for gain in report["gains"]}
+    found = peaks(PLANTS[name], gains)
+    stated = [point["s_peak"] for point in report["robustness"]["points"]]
+    np.testing.assert_allclose(found, stated, rtol=0.01)
+    judged = [point["judged"] for point in report["robustness"]["points"]]
+    assert max(judged) <= 2.0 and report["verdict"]["level"] == "green"
+    assert found.max() <= 2.0 or name == "helicopter"
+    assert all("bandwidth" in report[part]["method"] for part in ("feedback", "observer"))
+
+
+def test_the_chosen_bandwidths_are_lines_of_a_plant_file_that_gives_the_same_gains(designed):
+    plant = written(PLANTS["quadruple tank"]) + 'actuator_faults = "all"\n'
+    open_ = designed(plant)
+    rates = [open_[part]["method"].split("bandwidth of ")[1].split()[0] for part in ("feedback", "observer")]
+    stated = designed(f"{plant}feedback.bandwidth = {rates[0]}\nobserver.bandwidth = {rates[1]}\n")
+    assert stated["gains"] == open_["gains"]
+    assert "chosen" in open_["feedback"]["method"] and "chosen" not in stated["feedback"]["method"]
+
+
+def test_a_requirement_that_is_stated_stays(designed):
+    plant = written(PLANTS["double integrator"]) + 'actuator_faults = "all"\nfeedback.eigenvalues = [-3, -4]\n'
+    report = designed(plant)
+    assert sorted(value[0] for value in report["feedback"]["eigenvalues"]) == pytest.approx([-4, -3])
+    assert "bandwidth" in report["observer"]["method"]
+
+
+def test_units_of_states_and_measurements_do_not_change_the_loop(designed):
+    a, b, c = (np.array(matrix, float) for matrix in PLANTS["two masses"])
+    state, output = np.diag([1e3, 0.01, 50, 1]), np.diag([1e4])
+    scaled = [(state @ a @ np.linalg.inv(state)).tolist(), (state @ b).tolist(), (output @ c @ np.linalg.inv(state)).tolist()]
+    one, other = (designed(written(plant) + 'actuator_faults = "all"\n') for plant in (PLANTS["two masses"], scaled))
+    for part in ("feedback", "observer"):
+        values = [np.sort_complex([complex(*value) for value in report[part]["eigenvalues"]]) for report in (one, other)]
+        np.testing.assert_allclose(*values, rtol=1e-6)
+
+
+def test_a_sampled_design_without_requirements_is_slower_than_its_samples(designed):
+    report = designed(written(PLANTS["unstable"]) + 'actuator_faults = "all"\nsample_time = 0.002\n')
+    assert report["verdict"]["level"] == "green"
+    rate = float(report["observer"]["method"].split("bandwidth of ")[1].split()[0])
+    assert rate * 0.002 < np.pi / 2
+
+
+TABLE = """,position [m],speed [m/s],force [N]
+der(position),0,1,0
+speed,0,-0.5,0.5
+y [m],1,0,0
+"""
+
+
+def test_a_table_with_names_becomes_a_plant_file_that_is_designed(aso_ftc, tmp_path):
+    (tmp_path / "trolley.csv").write_text(TABLE, encoding="utf-8")
+    done = aso_ftc("design", "--init", tmp_path / "trolley.csv", "--out", tmp_path / "trolley.toml")
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    made = tomllib.loads((tmp_path / "trolley.toml").read_text(encoding="utf-8"))
+    assert (made["A"], made["B"], made["C"]) == ([[0, 1], [0, -0.5]], [[0], [0.5]], [[1, 0]])
+    assert made["states"] == [{"name": "position", "unit": "m"}, {"name": "speed", "unit": "m/s"}]
+    assert (made["actuators"], made["measurements"]) == ([{"name": "force", "unit": "N"}], [{"name": "y", "unit": "m"}])
+    designed = aso_ftc("design", tmp_path / "trolley.toml", "--out", tmp_path / "design.toml")
+    assert designed.returncode == 0 and "verdict: green" in designed.stdout, designed.stderr
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_matlab_variables_become_a_plant_file_with_the_same_matrices(aso_ftc, tmp_path, compressed):
+    a, b, c = PLANTS["helicopter"]
+    savemat(tmp_path / "plant.mat", {"A": a, "B": b, "C": c, "title": "text"}, do_compression=compressed)
+    done = aso_ftc("design", "--init", tmp_path / "plant.mat", "--out", tmp_path / "plant.toml")
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    made = tomllib.loads((tmp_path / "plant.toml").read_text(encoding="utf-8"))
+    for name, matrix in (("A", a), ("B", b), ("C", c)):
+        np.testing.assert_array_equal(made[name], matrix)
+    assert made["actuator_faults"] == "all" and made["observer"]["bandwidth"] > made["feedback"]["bandwidth"] > 0
+
+
+def test_measurements_that_cannot_tell_all_faults_apart_get_fewer(aso_ftc, tmp_path):
+    a, b, c = PLANTS["helicopter"]
+    savemat(tmp_path / "plant.mat", {"A": a, "B": b, "C": c[:1]})
+    done = aso_ftc("design", "--init", tmp_path / "plant.mat", "--out", tmp_path / "plant.toml")
+    assert done.returncode == 0, done.stderr
+    made = tomllib.loads((tmp_path / "plant.toml").read_text(encoding="utf-8"))
+    assert made["faults"] == [{"name": "f_u1", "actuator": "u1"}]
+
+
+def test_a_plant_with_feedthrough_gets_a_filter(aso_ftc, tmp_path):
+    savemat(tmp_path / "plant.mat", {"A": [[-0.5]], "B": [[0.5]], "C": [[1.0], [-0.5]], "D": [[0.0], [0.5]]})
+    done = aso_ftc("design", "--init", tmp_path / "plant.mat", "--out", tmp_path / "plant.toml")
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    assert tomllib.loads((tmp_path / "plant.toml").read_text(encoding="utf-8"))["filter"] > 0
+
+
+def test_an_fmu_becomes_a_plant_file_with_its_inputs_and_outputs(aso_ftc, tmp_path, examples):
+    done = aso_ftc("design", "--init", examples["ThreeTank"], "--out", tmp_path / "tank.toml")
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    made = tomllib.loads((tmp_path / "tank.toml").read_text(encoding="utf-8"))
+    assert [signal["name"] for signal in made["actuators"]] == ["Q_1", "Q_2"]
+    designed = aso_ftc("design", tmp_path / "tank.toml", "--out", tmp_path / "design.toml")
+    assert designed.returncode == 0 and "verdict: green" in designed.stdout, designed.stderr
+
+
+def test_an_fmu_that_its_friction_holds_gets_a_plant_file_with_the_reason(aso_ftc, tmp_path, examples):
+    done = aso_ftc("design", "--init", examples["DcServo"], "--out", tmp_path / "servo.toml")
+    assert done.returncode == 0 and "no controller was found for this plant yet" in done.stderr
+    text = (tmp_path / "servo.toml").read_text(encoding="utf-8")
+    assert "#   " in text and "no feedback moves the eigenvalue" in text
+    # The remedy that the file names.
+    mended = text.replace("operating_point.u = 0\n", "operating_point.u = 0\noperating_point.friction = 0\n")
+    assert mended != text
+    (tmp_path / "servo.toml").write_text(mended, encoding="utf-8")
+    designed = aso_ftc("design", tmp_path / "servo.toml", "--out", tmp_path / "design.toml")
+    assert designed.returncode == 0 and "verdict: green" in designed.stdout, designed.stderr
+
+
+def test_a_file_that_exists_is_not_overwritten(aso_ftc, tmp_path):
+    (tmp_path / "trolley.csv").write_text(TABLE, encoding="utf-8")
+    (tmp_path / "trolley.toml").write_text("mine", encoding="utf-8")
+    done = aso_ftc("design", "--init", tmp_path / "trolley.csv", "--out", tmp_path / "trolley.toml")
+    assert done.returncode == 2 and "--force overwrites it" in done.stderr
+    assert (tmp_path / "trolley.toml").read_text(encoding="utf-8") == "mine"
+
+
+REFUSED = {
+    "recording.csv": (b"time,x,u\n0,1,2\n1,2,3\n", "a recording of signals is no plant"),
+    "short.csv": (b",x,u\nx,0\n", "line 2: expected 3 cells, found 2"),
+    "word.csv": (b",x,u\nx,0,fast\ny,1,0\n", 'line 2, u: expected a number, found "fast"'),
+    "no-output.csv": (b",x,u\nx,0,1\n", "found 1 states, 1 commands and 0 measurements"),
+    "empty.csv": (b"", "expected a table of the matrices"),
+    "damaged.mat": (b"MATLAB 5.0 MAT-file" + bytes(300), "expected"),
+    "empty.mat": (b"", "expected a MAT file of version 5 or 7"),
+    "damaged.fmu": (b"PK\x03\x04", "damaged.fmu"),
+    "plant.toml": (b"A = 1", "expected an FMU (.fmu), a file of MATLAB (.mat), or a table (.csv)"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_source_that_is_no_plant_is_named_with_what_was_expected(aso_ftc, tmp_path, name):
+    content, message = REFUSED[name]
+    (tmp_path / name).write_bytes(content)
+    done = aso_ftc("design", "--init", tmp_path / name, "--out", tmp_path / "new.toml")
+    assert done.returncode == 2 and message in done.stderr and name in done.stderr, done.stderr
+    assert "panicked" not in done.stderr and not (tmp_path / "new.toml").exists()
+
+
+def test_every_cut_of_a_mat_file_is_refused_or_read(aso_ftc, tmp_path):
+    a, b, c = PLANTS["double integrator"]
+    savemat(tmp_path / "whole.mat", {"A": a, "B": b, "C": c}, do_compression=True)
+    whole = (tmp_path / "whole.mat").read_bytes()
+    for cut in range(1, len(whole), 37):
+        (tmp_path / "cut.mat").write_bytes(whole[:cut])
+        done = aso_ftc("design", "--init", tmp_path / "cut.mat", "--out", tmp_path / "new.toml", "--force")
+        assert done.returncode == 2 and "panicked" not in done.stderr, (cut, done.stderr)
+
+
+@pytest.mark.parametrize(
+    "variables, message",
+    [
+        ({"A": [[1.0]], "B": [[1.0]]}, "expected the variables A, B and C, found A, B"),
+        ({"A": [[1.0, 2.0]], "B": [[1.0]], "C": [[1.0]]}, "A: expected 1 x 1, found 1 x 2"),
+        ({"A": [[1j]], "B": [[1.0]], "C": [[1.0]]}, "A: expected finite real numbers"),
+        ({"A": [[0.5]], "B": [[1.0]], "C": [[1.0]], "Ts": 0.1}, "the matrices are of sampled time"),
+    ],
+)
+def test_matlab_variables_that_are_no_plant_are_refused(aso_ftc, tmp_path, variables, message):
+    savemat(tmp_path / "plant.mat", variables)
+    done = aso_ftc("design", "--init", tmp_path / "plant.mat", "--out", tmp_path / "plant.toml")
+    assert done.returncode == 2 and message in done.stderr, done.stderr
