@@ -26,8 +26,8 @@ def design(plant: object, **entries: Any) -> Design:
     """Design observer and feedback with fault compensation for a linear plant.
 
     Args:
-        plant: the path of a plant file; its content as nested dicts; a system of python-control or scipy.signal in
-            continuous time (state space, transfer function, zeros and poles); a tuple of matrices ``(A, B, C)`` or
+        plant: the path of a plant file; its content as nested dicts; a system of python-control or scipy.signal
+            (state space, transfer function, zeros and poles), sampled with its ``dt``; a tuple of matrices ``(A, B, C)`` or
             ``(A, B, C, D)`` with the shapes (n, n), (n, m), (p, n), (p, m); or the path of a ``.npz`` or ``.mat``
             file with them.
         entries: entries of the plant file, which replace those of the plant: ``feedback``,

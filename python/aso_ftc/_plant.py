@@ -65,12 +65,20 @@ def of_system(plant: Any) -> dict[str, Any]:
     """Return the entries of a linear system, or of a tuple of matrices (A, B, C) or (A, B, C, D)."""
     if isinstance(plant, (tuple, list)) and len(plant) in (3, 4):
         return _entries(*plant)
-    if getattr(plant, "dt", None) not in (None, 0, False):
-        raise DesignError(
-            f"the plant is sampled, dt = {plant.dt}; expected a plant in continuous time: the entry sample_time "
-            "makes a sampled controller for it",
-            "Sampled",
-        )
+    return {**_of_model(plant), **_sampling(getattr(plant, "dt", None))}
+
+
+def _sampling(period: Any) -> dict[str, Any]:
+    """Return the entries of matrices in sampled time; none for a plant in continuous time."""
+    if period in (None, 0, False):
+        return {}
+    if period is True:
+        raise DesignError("the plant is sampled with dt = True; expected the time of a sample in s", "Sampled")
+    return {"matrices": "sampled", "sample_time": float(period)}
+
+
+def _of_model(plant: Any) -> dict[str, Any]:
+    """Return the matrices of a system of python-control or scipy.signal."""
     if all(hasattr(plant, name) for name in "ABC"):
         entries = _entries(plant.A, plant.B, plant.C, getattr(plant, "D", 0.0))
         for entry, attribute in _LABELS.items():
@@ -82,7 +90,7 @@ def of_system(plant: Any) -> dict[str, Any]:
         # Its own realisation of several inputs needs Slycot.
         return _entries(*_realisation(plant.num, plant.den))
     if hasattr(plant, "to_ss"):
-        return of_system(plant.to_ss())
+        return _of_model(plant.to_ss())
     kind = type(plant).__name__
     raise TypeError(
         "expected a path, a dict, a linear system of python-control or scipy, or matrices (A, B, C) or "
@@ -166,4 +174,4 @@ def of_file(path: str) -> dict[str, Any]:
     entries = _entries(a, b, c, content["D"] if "D" in content else 0.0)
     if "F_a" in content:
         entries["F_a"] = numpy.atleast_2d(numpy.asarray(content["F_a"], dtype=float)).tolist()
-    return entries
+    return {**entries, **_sampling(numpy.ravel(content.get("Ts", 0))[0])}

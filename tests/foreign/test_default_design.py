@@ -232,7 +232,6 @@ def test_every_cut_of_a_mat_file_is_refused_or_read(aso_ftc, tmp_path):
         ({"A": [[1.0]], "B": [[1.0]]}, "expected the variables A, B and C, found A, B"),
         ({"A": [[1.0, 2.0]], "B": [[1.0]], "C": [[1.0]]}, "A: expected 1 x 1, found 1 x 2"),
         ({"A": [[1j]], "B": [[1.0]], "C": [[1.0]]}, "A: expected finite real numbers"),
-        ({"A": [[0.5]], "B": [[1.0]], "C": [[1.0]], "Ts": 0.1}, "the matrices are of sampled time"),
     ],
 )
 def test_matlab_variables_that_are_no_plant_are_refused(aso_ftc, tmp_path, variables, message):

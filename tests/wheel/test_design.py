@@ -201,6 +201,15 @@ def test_matrices_alone_get_bandwidths_and_a_green_verdict():
     assert all("bandwidth" in made.report[part]["method"] for part in ("feedback", "observer"))
 
 
+def test_a_sampled_system_gives_the_design_of_the_plant_that_was_sampled():
+    signal = pytest.importorskip("scipy.signal")
+    plant = signal.StateSpace([[0, 1], [0, -0.5]], [[0], [0.5]], [[1, 0]], [[0]])
+    of_samples = af.design(plant.to_discrete(0.05), actuator_faults="all")
+    of_plant = af.design(plant, actuator_faults="all", sample_time=0.05)
+    for name, gain in of_plant.gains.items():
+        assert np.allclose(of_samples.gains[name], gain, rtol=1e-8)
+
+
 def test_a_trade_off_shows_what_speed_costs(tmp_path):
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")
@@ -221,8 +230,8 @@ def test_a_trade_off_shows_what_speed_costs(tmp_path):
 
 def test_a_wrong_system_says_what_is_expected():
     signal = pytest.importorskip("scipy.signal")
-    with pytest.raises(af.DesignError, match=r"dt = 0\.1; expected a plant in continuous time"):
-        af.design(signal.dlti([1.0], [1.0, -0.5], dt=0.1), **REQUIREMENTS)
+    with pytest.raises(af.DesignError, match="dt = True; expected the time of a sample"):
+        af.design(signal.dlti([1.0], [1.0, -0.5]), **REQUIREMENTS)
     with pytest.raises(af.DesignError, match="C has 3 elements and A 2 rows"):
         af.design((SERVO[0], SERVO[1], [1.0, 0.0, 0.0]), **REQUIREMENTS)
     with pytest.raises(af.DesignError, match="stands without its conjugate"):

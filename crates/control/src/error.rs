@@ -64,6 +64,12 @@ pub enum Error {
         /// Number of states.
         n: usize,
     },
+    /// No continuous plant has these samples.
+    #[error(
+        "no continuous plant has these samples: its A would be the logarithm of the sampled A, which needs \
+         eigenvalues that are neither zero nor negative"
+    )]
+    NoContinuousPlant,
     /// The pair (A, C) is not observable.
     #[error("the pair (A, C) is not observable: {rank} of {n} states can be seen")]
     NotObservable {

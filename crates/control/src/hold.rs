@@ -2,6 +2,7 @@
 
 use crate::balance::{Balance, divide_rows, power_of_two};
 use crate::exponential::scaling_and_squaring;
+use crate::logarithm::logarithm_of_one_plus;
 use crate::{Error, check};
 use nalgebra::{DMatrix, DVector};
 
@@ -114,6 +115,43 @@ pub fn zero_order_hold(
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
     let [phi, gamma, _] = integrals(a, b, h, Degree::Constant)?;
     Ok((phi, gamma))
+}
+
+/// The continuous plant x' = A x + B u with the given samples: the inverse of [`zero_order_hold`].
+///
+/// `phi`: n x n; `gamma`: n x m; `h`: the time of a sample, above 0. Of all such plants it is the one whose eigenvalues
+/// have imaginary parts between -pi/h and pi/h. It exists if no eigenvalue of `phi` is zero or negative. Method: the
+/// logarithm of [phi, gamma; 0, I], see [`logarithm_of_one_plus`].
+///
+/// # Example
+///
+/// ```
+/// use control::hold::{continuous, zero_order_hold};
+/// use nalgebra::DMatrix;
+/// let (phi, gamma) = (DMatrix::from_element(1, 1, 0.5), DMatrix::from_element(1, 1, 1.0));
+/// let (a, b) = continuous(&phi, &gamma, 0.1)?;
+/// assert!((a[(0, 0)] - 0.5_f64.ln() / 0.1).abs() < 1e-13);
+/// assert!((zero_order_hold(&a, &b, 0.1)?.1 - gamma).amax() < 1e-14);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], [`Error::OutOfRange`] for a bad argument;
+/// [`Error::NoContinuousPlant`].
+pub fn continuous(
+    phi: &DMatrix<f64>,
+    gamma: &DMatrix<f64>,
+    h: f64,
+) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
+    let (n, m) = (check::square("A", phi)?, gamma.ncols());
+    check::shape("B", gamma, (n, m))?;
+    check::positive("h", h)?;
+    let mut less_one = DMatrix::zeros(n + m, n + m);
+    less_one.view_mut((0, 0), (n, n)).copy_from(&(phi - DMatrix::identity(n, n)));
+    less_one.view_mut((0, n), (n, m)).copy_from(gamma);
+    let all = logarithm_of_one_plus(&less_one).ok_or(Error::NoContinuousPlant)? / h;
+    Ok((all.view((0, 0), (n, n)).into(), all.view((0, n), (n, m)).into()))
 }
 
 /// The polynomial degree of the input over a step.

@@ -22,7 +22,7 @@
 //! | loss of effectiveness: its estimate, which losses the loop bears | [`losses`] |
 //! | linear matrix inequalities (feature `lmi`) | `lmi` |
 //! | the controller as one system, the closed loop, its stability | [`controller`], [`stability`] |
-//! | discretisation, matrix exponential | [`hold`], [`exponential`] |
+//! | discretisation and back, matrix exponential and logarithm | [`hold`], [`exponential`], [`logarithm`] |
 //! | eigenvalues, Lyapunov equations, reproducible products | [`eigen`], [`lyapunov`], [`product`] |
 //!
 //! # Conventions
@@ -74,6 +74,7 @@ pub mod hold;
 pub mod isolation;
 #[cfg(feature = "lmi")]
 pub mod lmi;
+pub mod logarithm;
 #[cfg(feature = "design")]
 pub mod losses;
 #[cfg(feature = "design")]

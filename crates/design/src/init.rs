@@ -27,7 +27,7 @@ pub struct NewPlantFile {
     pub refusal: Option<String>,
 }
 
-/// Writes a plant file for the plant at `source`: an FMU (`.fmu`), MATLAB variables A, B, C and D (`.mat`), or a table of
+/// Writes a plant file for the plant at `source`: an FMU (`.fmu`), MATLAB variables A, B, C, D and Ts (`.mat`), or a table of
 /// them with names (`.csv`, see the book's page on plant files). `out` is where the file will be: its folder is where
 /// the path of an FMU starts.
 ///

@@ -11,6 +11,7 @@ pub(crate) mod reconfiguration;
 pub(crate) mod references;
 pub(crate) mod requirements;
 pub(crate) mod robustness;
+mod sampled_matrices;
 pub(crate) mod signals;
 pub(crate) mod variants;
 
@@ -28,6 +29,7 @@ use crate::plant_file::reconfiguration::ReconfigurationRequest;
 use crate::plant_file::references::References;
 use crate::plant_file::requirements::{Request, request};
 use crate::plant_file::robustness::RobustnessLimits;
+use crate::plant_file::sampled_matrices::SampledMatrices;
 use crate::plant_file::signals::{
     EntryPoint, Fault, Signal, all_actuator_faults, description, faults, signals,
 };
@@ -86,6 +88,8 @@ pub(crate) enum Model {
         d: DMatrix<f64>,
         f_a: Option<DMatrix<f64>>,
         states: Vec<Signal>,
+        /// The sampled matrices of the file, of which `a`, `b` and `f_a` are the continuous plant.
+        sampled: Option<Box<SampledMatrices>>,
     },
     /// The matrices are linearised from an FMU.
     Fmu(PlantFmu),
@@ -114,7 +118,7 @@ pub(crate) struct Sampling {
     pub(crate) current: bool,
 }
 
-const KEYS: [&str; 32] = [
+const KEYS: [&str; 33] = [
     "description",
     "t_on",
     "monitor",
@@ -122,6 +126,7 @@ const KEYS: [&str; 32] = [
     "operating_point",
     "preload",
     "linearisation_step",
+    "matrices",
     "A",
     "B",
     "C",
@@ -183,13 +188,13 @@ impl<'a> PlantFile<'a> {
     pub(crate) fn read(source: &'a Source, file: &Table<'a>) -> Result<Self, PlaceError> {
         file.allow(&KEYS)?;
         let place = |key: &&'static str| Some((*key, file.get(key)?.place));
+        let sampling = sampling(file)?;
         let (model, [actuators, measurements]) = match file.get("plant") {
             Some(plant) => linearised(source, file, &plant)?,
-            None => stated(file)?,
+            None => stated(file, sampling)?,
         };
         let faults = all_faults(file, &actuators, &measurements)?;
         let references = References::read(file, &measurements)?;
-        let sampling = sampling(file)?;
         let domain = sampling
             .as_ref()
             .map_or(Domain::Continuous, |sampling| Domain::Sampled { period: sampling.period });
@@ -228,7 +233,7 @@ impl<'a> PlantFile<'a> {
             family: variants::family(file, &model)?,
             schedule: variants::schedule(file, &model, &measurements)?,
             is_point: false,
-            disturbances: disturbances(file, &actuators, &measurements)?,
+            disturbances: disturbances(file, &actuators, &measurements, &model)?,
             detection: DetectionRequest::read(file, &actuators, measurements.len(), &faults)?,
             reconfiguration: ReconfigurationRequest::read(
                 file,
@@ -330,7 +335,7 @@ fn linearised(
     file: &Table<'_>,
     plant: &Entry<'_>,
 ) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
-    for key in ["A", "B", "C", "D", "F_a"] {
+    for key in ["A", "B", "C", "D", "F_a", "matrices"] {
         if let Some(entry) = file.get(key) {
             return Err(entry.error("an FMU is the plant; its matrices are not stated"));
         }
@@ -365,7 +370,10 @@ fn texts(entry: &Entry<'_>) -> Result<Vec<String>, PlaceError> {
 }
 
 /// Reads a plant whose matrices the file states.
-fn stated(file: &Table<'_>) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
+fn stated(
+    file: &Table<'_>,
+    sampling: Option<Sampling>,
+) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
     for key in ["preload", "linearisation_step"] {
         if let Some(entry) = file.get(key) {
             return Err(entry.error("it belongs to `plant`, an FMU"));
@@ -395,7 +403,13 @@ fn stated(file: &Table<'_>) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
     let actuators = counted(file, "actuators", "u", b.ncols(), "actuators, the columns of B")?;
     let measurements =
         counted(file, "measurements", "y", c.nrows(), "measurements, the rows of C")?;
-    let model = Model::Matrices { a, b, c, d, f_a: f_a.transpose()?, states };
+    let f_a = f_a.transpose()?;
+    let sampled = SampledMatrices::read(file, sampling, (&a, &b))?;
+    let (a, b, f_a) = match &sampled {
+        None => (a, b, f_a),
+        Some(sampled) => (sampled.a.clone(), sampled.b.clone(), f_a.map(|f_a| sampled.held(&f_a))),
+    };
+    let model = Model::Matrices { a, b, c, d, f_a, states, sampled };
     Ok((model, [actuators, measurements]))
 }
 

@@ -17,7 +17,6 @@ mod differences;
 mod directional;
 mod error;
 mod fit;
-mod logarithm;
 mod parts;
 mod point;
 mod result;

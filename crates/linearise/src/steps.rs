@@ -1,12 +1,12 @@
 //! The Jacobian from communication steps: short runs with pulses of the inputs from a saved FMU
 //! state, a step map fitted to the responses, and its logarithm.
 
+use control::logarithm::logarithm_of_one_plus;
 use nalgebra::DMatrix;
 
 use super::bench::{Bench, Record, index};
 use super::differences::{Side, extrapolate};
 use super::fit::{Directions, least_squares};
-use super::logarithm::logarithm_of_one_plus;
 use super::parts::{Part, Parts};
 use super::result::relative_error;
 use super::{Linearise, LineariseError};

@@ -5,7 +5,7 @@ use crate::reference::{
 };
 use crate::{integers, matrix};
 use control::Error;
-use control::hold::{FirstOrderHold, zero_order_hold};
+use control::hold::{FirstOrderHold, continuous, zero_order_hold};
 use nalgebra::DMatrix;
 
 /// Natural units of the controller's states; its entries are proportional to powers of 1800 / s.
@@ -150,5 +150,26 @@ fn the_zero_order_hold_is_the_first_order_hold_without_slope() {
         let first = controller(h);
         assert!(error_in_units(&phi, &first.phi, true) < 1e-14);
         assert!(error_in_units(&gamma, &first.gamma_0, false) < 1e-14);
+    }
+}
+
+#[test]
+fn the_continuous_plant_of_samples_is_the_one_that_was_sampled() {
+    let a = matrix(3, 3, &[-1e-3, 1.0, 0.0, -40.0, -0.4, 2.0, 0.0, 0.0, 0.0]);
+    let b = matrix(3, 2, &[0.0, 1e4, 5.0, 0.0, 0.0, 1e-4]);
+    for h in [1e-4, 0.05, 0.4] {
+        let (phi, gamma) = zero_order_hold(&a, &b, h).unwrap();
+        let (found, input) = continuous(&phi, &gamma, h).unwrap();
+        assert!((&found - &a).amax() < 1e-10 * a.amax() / h, "{h}: {found}");
+        assert!((&input - &b).amax() < 1e-10 * b.amax() / h, "{h}: {input}");
+    }
+}
+
+#[test]
+fn samples_with_an_eigenvalue_that_is_negative_or_zero_have_no_continuous_plant() {
+    for eigenvalue in [-0.3, 0.0] {
+        let one = matrix(1, 1, &[1.0]);
+        let found = continuous(&matrix(1, 1, &[eigenvalue]), &one, 0.1);
+        assert_eq!(found, Err(Error::NoContinuousPlant));
     }
 }

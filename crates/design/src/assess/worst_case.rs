@@ -1,9 +1,11 @@
 //! A plant file with the worst plant within the tolerances.
 
 use control::faults::FaultEntry;
+use nalgebra::DMatrix;
 use toml::{Table, Value};
 
-use crate::plant_file::PlantFile;
+use crate::plant_file::detection::DisturbanceEntry;
+use crate::plant_file::{Model, PlantFile};
 use crate::report::Report;
 use crate::report::identity::identity;
 use crate::report::robustness::Parameter;
@@ -26,6 +28,9 @@ pub(crate) fn plant_file(
         let rows = matrix.values.iter().map(row).collect();
         table.insert(matrix.name.clone(), Value::Array(rows));
     }
+    if let Model::Matrices { f_a, sampled: Some(_), .. } = &file.model {
+        without_samples(&mut table, file, f_a.as_ref());
+    }
     if file.fmu().is_some() && !without_fmu(&mut table, designed) {
         return Ok(None);
     }
@@ -41,6 +46,24 @@ pub(crate) fn plant_file(
         "# Written by {}: the worst plant found {within}.\n\n{text}",
         identity(report)
     )))
+}
+
+/// Replaces what is of sampled time; the worst matrices are of continuous time.
+fn without_samples(table: &mut Table, file: &PlantFile<'_>, f_a: Option<&DMatrix<f64>>) {
+    table.remove("matrices");
+    let floats = |numbers: Vec<f64>| Value::Array(numbers.into_iter().map(Value::Float).collect());
+    if let Some(f_a) = f_a {
+        let rows = f_a.row_iter().map(|row| floats(row.iter().copied().collect()));
+        table.insert("F_a".to_owned(), Value::Array(rows.collect()));
+    }
+    let Some(Value::Array(disturbances)) = table.get_mut("disturbances") else { return };
+    for (disturbance, read) in disturbances.iter_mut().zip(&file.disturbances) {
+        if let (Value::Table(disturbance), DisturbanceEntry::Column(e)) =
+            (disturbance, &read.entry_point)
+        {
+            disturbance.insert("E".to_owned(), floats(e.iter().copied().collect()));
+        }
+    }
 }
 
 /// Replaces what refers to the plant's FMU; false if a fault cannot be stated without it.

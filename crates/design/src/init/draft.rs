@@ -30,6 +30,8 @@ pub(super) enum Model {
         c: DMatrix<f64>,
         d: DMatrix<f64>,
         states: Vec<Named>,
+        /// Time of a sample, s, of sampled matrices.
+        sampled: Option<f64>,
     },
     Fmu {
         path: String,
@@ -87,18 +89,25 @@ impl Draft {
             line(&mut text, "feedback.bandwidth", feedback);
             line(&mut text, "observer.bandwidth", observer);
         }
-        text += "\n# Often needed as well:\n\
-                 # sample_time = 0.01                  # s, of a controller that acts at regular times\n\
-                 # robustness.tolerance = 0.1          # each entry of A, B and C may differ by 10 %\n\
+        text += "\n# Often needed as well:\n";
+        if !matches!(self.model, Model::Matrices { sampled: Some(_), .. }) {
+            text += "# sample_time = 0.01                  # s, of a controller that acts at regular times\n";
+        }
+        text += "# robustness.tolerance = 0.1          # each entry of A, B and C may differ by 10 %\n\
                  # In a table of `actuators`, limits = [-10, 10] states what the actuator can do.\n";
         text
     }
 
     fn plant(&self, text: &mut String) {
         match &self.model {
-            Model::Matrices { a, b, c, d, states } => {
-                *text +=
-                    "# x' = A x + B u, y = C x + D u, in deviations from the operating point.\n";
+            Model::Matrices { a, b, c, d, states, sampled } => {
+                if let Some(period) = sampled {
+                    *text += "# x[k+1] = A x[k] + B u[k], y[k] = C x[k], in deviations from the operating point.\n\
+                              matrices = \"sampled\"\n";
+                    line(text, "sample_time", *period);
+                } else {
+                    *text += "# x' = A x + B u, y = C x + D u, in deviations from the operating point.\n";
+                }
                 for (name, matrix) in [("A", a), ("B", b), ("C", c)] {
                     self::matrix(text, name, matrix);
                 }

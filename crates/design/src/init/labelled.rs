@@ -84,6 +84,7 @@ fn split(rows: &[(Named, Vec<f64>)], columns: &[Named], file: &str) -> Result<Dr
         c: block(&of_outputs, &states),
         d,
         states: states.iter().map(|&at| columns[at].copied()).collect(),
+        sampled: None,
     };
     Ok(Draft {
         origin: format!("the matrices of {file}"),

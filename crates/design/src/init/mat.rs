@@ -38,12 +38,9 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
             return Err(invalid(format!("{name}: expected {rows} x {columns}, found {i} x {j}")));
         }
     }
-    if let Some(period) =
-        matrix("Ts")?.and_then(|period| period.iter().copied().find(|&h| h != 0.0))
-    {
-        return Err(invalid(format!(
-            "Ts = {period}: the matrices are of sampled time; expected those of continuous time (in MATLAB d2c)"
-        )));
+    let sampled = matrix("Ts")?.and_then(|period| period.iter().copied().find(|&h| h != 0.0));
+    if let Some(period) = sampled.filter(|&period| period < 0.0) {
+        return Err(invalid(format!("Ts: expected the time of a sample in s, found {period}")));
     }
     let numbered = |letter: &str, count: usize| {
         let one = |k| Named { name: format!("{letter}{k}"), unit: None, description: None };
@@ -58,7 +55,7 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
         measurements: numbered("y", p),
         left_out: Vec::new(),
         has_feedthrough: d.amax() > 0.0,
-        model: Model::Matrices { a, b, c, d, states: numbered("x", n) },
+        model: Model::Matrices { a, b, c, d, states: numbered("x", n), sampled },
     })
 }
 

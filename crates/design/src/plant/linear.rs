@@ -59,7 +59,7 @@ impl LinearPlant {
     /// Takes the matrices of `file`, or linearises its FMU.
     pub(crate) fn of(file: &PlantFile<'_>) -> Result<Self, crate::Error> {
         match &file.model {
-            plant_file::Model::Matrices { a, b, c, d, f_a, states } => {
+            plant_file::Model::Matrices { a, b, c, d, f_a, states, sampled } => {
                 let columns = f_a.clone().unwrap_or_else(|| DMatrix::zeros(a.nrows(), 0));
                 let model = |fault: &Fault| match fault.entry_point {
                     EntryPoint::Column(at) => {
@@ -78,7 +78,14 @@ impl LinearPlant {
                     faults: file.faults.clone(),
                     models: file.faults.iter().map(model).collect(),
                     disturbances: disturbances(file, b, d, None)?,
-                    origin: "The plant file states the matrices.".to_owned(),
+                    origin: match sampled {
+                        None => "The plant file states the matrices.",
+                        Some(_) => {
+                            "The plant file states sampled matrices; these are of the continuous plant with the \
+                             same samples."
+                        }
+                    }
+                    .to_owned(),
                     residual: None,
                 })
             }

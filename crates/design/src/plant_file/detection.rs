@@ -1,8 +1,9 @@
 //! Reads the table `[detection]` and the list `[[disturbances]]` of a plant file.
 
 use files::{Entry, Place, PlaceError, Table};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
+use crate::plant_file::Model;
 use crate::plant_file::signals::{Fault, Signal, name, position};
 
 /// What the detection of faults shall do.
@@ -264,6 +265,7 @@ pub(crate) fn disturbances(
     file: &Table<'_>,
     actuators: &[Signal],
     measurements: &[Signal],
+    model: &Model,
 ) -> Result<Vec<Disturbance>, PlaceError> {
     let Some(entry) = file.get("disturbances") else {
         return Ok(Vec::new());
@@ -273,7 +275,13 @@ pub(crate) fn disturbances(
     }
     let mut found: Vec<Disturbance> = Vec::new();
     for member in entry.list()? {
-        let own = disturbance(file, &member, actuators, measurements)?;
+        let mut own = disturbance(file, &member, actuators, measurements)?;
+        if let (DisturbanceEntry::Column(e), Model::Matrices { sampled: Some(sampled), .. }) =
+            (&mut own.entry_point, model)
+        {
+            let held = sampled.held(&DMatrix::from_column_slice(e.len(), 1, e.as_slice()));
+            e.copy_from(&held.column(0));
+        }
         if found.iter().any(|other| other.name == own.name) {
             return Err(member.error(format!("the name `{}` is there twice", own.name)));
         }

@@ -220,7 +220,7 @@ fn variant(
                 own.operating_point.push((name.to_owned(), value));
             }
         }
-        Model::Matrices { a, b, c, d: _, f_a, states } => {
+        Model::Matrices { a, b, c, d: _, f_a, states, sampled: _ } => {
             let matrices = [
                 ("A", Some(&mut *a)),
                 ("B", Some(&mut *b)),

@@ -34,7 +34,8 @@ const NODES: [(f64, f64); 4] = [
 /// matrix to specified accuracy, SIAM J. Matrix Anal. Appl. 22 (2001), (2.2) and section 4; L. Dieci,
 /// B. Morini, A. Papini, Computational techniques for real logarithms of matrices, SIAM J. Matrix
 /// Anal. Appl. 17 (1996).
-pub(super) fn logarithm_of_one_plus(e: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+#[must_use]
+pub fn logarithm_of_one_plus(e: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = e.nrows();
     let identity = DMatrix::<f64>::identity(n, n);
     let (mut x, mut factor) = (e.clone(), 1.0);

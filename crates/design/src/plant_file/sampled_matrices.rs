@@ -1,0 +1,72 @@
+//! Matrices of a plant in sampled time.
+
+use control::hold::{continuous, zero_order_hold};
+use files::{PlaceError, Table};
+use nalgebra::DMatrix;
+
+use crate::plant_file::Sampling;
+
+/// Part of the largest entries of row and column below which an entry of the logarithm is rounding.
+const ROUNDING: f64 = 1e-13;
+
+/// The continuous plant x' = A x + B u whose samples are those of the matrices in the file.
+#[derive(Clone)]
+pub(crate) struct SampledMatrices {
+    /// A, n x n.
+    pub(crate) a: DMatrix<f64>,
+    /// B, n x m.
+    pub(crate) b: DMatrix<f64>,
+    /// The integral of e^(A s) over a sample, n x n.
+    held: DMatrix<f64>,
+}
+
+impl SampledMatrices {
+    /// Reads `matrices`; `pair`: A and B of the file. None if the matrices are continuous.
+    pub(crate) fn read(
+        file: &Table<'_>,
+        sampling: Option<Sampling>,
+        pair: (&DMatrix<f64>, &DMatrix<f64>),
+    ) -> Result<Option<Box<Self>>, PlaceError> {
+        let Some(entry) = file.get("matrices") else { return Ok(None) };
+        match entry.text()? {
+            "continuous" => return Ok(None),
+            "sampled" => {}
+            other => {
+                let expected = "expected \"continuous\" or \"sampled\"";
+                return Err(entry.error(format!("{expected}, found {other:?}")));
+            }
+        }
+        let Some(Sampling { period, .. }) = sampling else {
+            let message =
+                "expected `sample_time`, too: the time, in s, between the samples of A and B";
+            return Err(entry.error(message));
+        };
+        if let Some(other) = ["family", "schedule"].iter().find_map(|key| file.get(key)) {
+            return Err(
+                other.error("expected continuous matrices, without `matrices = \"sampled\"`")
+            );
+        }
+        let refuse =
+            |error: control::Error| entry.error(format!("sampled every {period} s: {error}"));
+        let (a, b) = continuous(pair.0, pair.1, period).map_err(refuse)?;
+        let a = without_rounding(&a);
+        let identity = DMatrix::identity(a.nrows(), a.nrows());
+        let (_, held) = zero_order_hold(&a, &identity, period).map_err(refuse)?;
+        Ok(Some(Box::new(Self { a, b, held })))
+    }
+
+    /// The columns of continuous time that are `columns` in the samples.
+    pub(crate) fn held(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        // It has no zero eigenvalue where the logarithm exists.
+        let solved = self.held.clone().lu().solve(columns);
+        solved.unwrap_or_else(|| columns.map(|_| f64::NAN))
+    }
+}
+
+/// A without the entries that are rounding of the logarithm: beside the largest ones of their row and column.
+fn without_rounding(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let size = |i: usize, j: usize| (a.row(i).amax() * a.column(j).amax()).sqrt();
+    DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| {
+        if a[(i, j)].abs() <= ROUNDING * size(i, j) { 0.0 } else { a[(i, j)] }
+    })
+}
