@@ -1,9 +1,9 @@
 //! Computes the gains for the plant of a plant file.
 
-use crate::plant::feedthrough;
 use crate::plant::fixed_mode::{described, described_in};
 use crate::plant::linear::LinearPlant;
 use crate::plant::plausibility::{check_faults, check_limits};
+use crate::plant::{attainable, feedthrough};
 use crate::plant_file::estimation::Law;
 use crate::plant_file::requirements::{Request, Requirement};
 use crate::plant_file::{FAULTS, PlantFile};
@@ -81,6 +81,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let linear = LinearPlant::of(file)?;
     feedthrough::check(file, &linear)?;
     let mut warnings = check_limits(file, &linear)?;
+    warnings.extend(attainable::warnings(file, &linear)?);
     let filter = file.filter.as_deref().unwrap_or_default();
     let LinearPlant { a, b, c, models, .. } = &linear;
     let extended = ExtendedPlant::new(a, b, c, models, filter)

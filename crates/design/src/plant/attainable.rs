@@ -1,0 +1,131 @@
+//! What no controller of a plant can reach: the peak of S that unstable modes, zeros and samples force.
+
+use control::Error;
+use control::eigen::eigenvalues;
+use control::zeros::zeros;
+use files::PlaceError;
+use nalgebra::Complex;
+
+use crate::plant::linear::LinearPlant;
+use crate::plant_file::PlantFile;
+use crate::plant_file::requirements::{Bandwidth, Requirement};
+use crate::report::number::rounded;
+
+/// Real parts above this part of the modulus count as positive.
+const RIGHT: f64 = 1e-9;
+/// |S| is at most this up to the bandwidth.
+const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// Returns warnings of a peak of S above the limit that no controller avoids, and of a feedback that is too fast for a
+/// zero in the right half plane.
+///
+/// ```text
+/// continuous, one command and one measurement, for a zero z:  max |S| >= M = product over unstable p of |z + p*| / |z - p|
+///     and, if |S| <= e up to w:                               max |S| >= M^t e^(1 - t),  t = pi / (pi - 2 atan(w / z))
+/// sampled every h, m commands:                                max |S| >= e^(h sum of p / m)
+/// ```
+///
+/// Sources: J. S. Freudenberg, D. P. Looze, Right half plane poles and zeros and design tradeoffs in feedback systems, IEEE
+/// Trans. Autom. Control 30 (1985), theorem 2; for samples the sum of log |S| over the unit circle: H.-K. Sung, S. Hara, Int. J.
+/// Control 48 (1988).
+pub(crate) fn warnings(
+    file: &PlantFile<'_>,
+    linear: &LinearPlant,
+) -> Result<Vec<PlaceError>, Error> {
+    let poles: Vec<_> =
+        eigenvalues(&linear.a)?.into_iter().filter(|&value| is_right(value)).collect();
+    let limit = file.robustness.amber;
+    let mut warnings = Vec::new();
+    if let Some(sampling) = file.sampling {
+        let sum: f64 = poles.iter().map(|pole| pole.re).sum();
+        #[expect(clippy::cast_precision_loss, reason = "a number of commands")]
+        let rate = sum / linear.b.ncols() as f64;
+        let least = (rate * sampling.period).exp();
+        if least > limit {
+            let message = format!(
+                "no controller has a peak of S below {}: the unstable eigenvalues of the plant grow too much in a sample; \
+                 expected at most {} s",
+                rounded(least),
+                rounded(limit.ln() / rate)
+            );
+            warnings.push(file.error(&["sample_time"], message));
+        }
+    }
+    if linear.b.ncols() == 1 && linear.c.nrows() == 1 && !linear.has_feedthrough() {
+        let found = zeros(&linear.a, &linear.b, &linear.c)?.finite;
+        let of_zeros = found.into_iter().filter(|&zero| is_right(zero) && zero.im >= 0.0);
+        let least = |zero: &Complex<f64>| forced(*zero, &poles);
+        if let Some(zero) = of_zeros.max_by(|x, y| least(x).total_cmp(&least(y))) {
+            warnings.extend(of_zero(file, zero, &poles, limit));
+        }
+    }
+    Ok(warnings)
+}
+
+fn of_zero(
+    file: &PlantFile<'_>,
+    zero: Complex<f64>,
+    poles: &[Complex<f64>],
+    limit: f64,
+) -> Option<PlaceError> {
+    let least = forced(zero, poles);
+    let name = if zero.im == 0.0 {
+        format!("its zero at {} 1/s", rounded(zero.re))
+    } else {
+        format!("its zeros at {} \u{b1} {}i 1/s", rounded(zero.re), rounded(zero.im))
+    };
+    if least > limit {
+        let message = format!(
+            "no controller has a peak of S below {}: {name} is too near to its unstable eigenvalues; expected another \
+             measurement or actuator",
+            rounded(least)
+        );
+        return Some(file.error(&["C", "measurements"], message));
+    }
+    let speed = requested(file)?;
+    let reached = least_peak(zero, least, speed);
+    if zero.im != 0.0 || reached <= limit {
+        return None;
+    }
+    // The angle at which the bound is the limit.
+    let t = (limit / AT_BANDWIDTH).ln() / (least / AT_BANDWIDTH).ln();
+    let allowed = zero.re * (std::f64::consts::PI * (1.0 - 1.0 / t) / 2.0).tan();
+    let message = format!(
+        "a feedback of {} rad/s is too fast for the plant: {name} makes the peak of S {} or more; below {} rad/s it can \
+         stay below {limit}",
+        rounded(speed),
+        rounded(reached),
+        rounded(allowed)
+    );
+    Some(file.error_at(&file.feedback.place, message))
+}
+
+/// The peak of S that a zero forces beside unstable poles.
+fn forced(zero: Complex<f64>, poles: &[Complex<f64>]) -> f64 {
+    poles.iter().map(|pole| (zero + pole.conj()).norm() / (zero - pole).norm()).product()
+}
+
+/// The same for a real zero if S is small up to `speed`.
+fn least_peak(zero: Complex<f64>, least: f64, speed: f64) -> f64 {
+    let pi = std::f64::consts::PI;
+    let t = pi / (pi - 2.0 * (speed / zero.re).atan());
+    least.powf(t) * AT_BANDWIDTH.powf(1.0 - t)
+}
+
+/// The speed of the slowest eigenvalue that the feedback is asked for, or its bandwidth, rad/s.
+fn requested(file: &PlantFile<'_>) -> Option<f64> {
+    let slowest = |sizes: &mut dyn Iterator<Item = f64>| sizes.min_by(f64::total_cmp);
+    match &file.feedback.requirement {
+        Requirement::Eigenvalues(all) => slowest(&mut all.iter().map(|value| value.norm())),
+        Requirement::SampledEigenvalues(all) => {
+            let period = file.sampling?.period;
+            slowest(&mut all.iter().map(|value| value.ln().norm() / period))
+        }
+        Requirement::Bandwidth(Bandwidth { rate, is_stated: true }) => *rate,
+        _ => None,
+    }
+}
+
+fn is_right(value: Complex<f64>) -> bool {
+    value.re > RIGHT * value.norm()
+}
