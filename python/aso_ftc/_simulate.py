@@ -49,7 +49,7 @@ def simulate(
         fmu: the archive, or a folder with the unpacked FMU.
         start_time, stop_time: simulated time in s; default: the ``DefaultExperiment``, else 0 and 1.
         step: communication step in s; default: the ``DefaultExperiment``, else 1 ms.
-        start_values: values of variables before the run.
+        start_values: values of variables before the run, also as ``(value, unit)`` with the unit of the variable.
         input: inputs over time. Either a table with the column ``"time"`` in s, with the interpolation of
             FMPy: a mapping of columns, a structured array, :class:`Results`, a frame of pandas (whose index
             may be the time) or polars, a dataset of xarray, a table of Arrow; units that it states are
@@ -72,7 +72,7 @@ def simulate(
     if isolate is not None:
         # Of the system, so that no function loads the FMU into this process.
         system.isolation["isolate"] = isolate
-    values = None if start_values is None else _prefixed(name, start_values)
+    values = None if start_values is None else _start_values(system, name, start_values)
     variables = _variables(system, name, values)
     changes: dict[str, Any] = {
         "start_values": values,
@@ -101,8 +101,20 @@ def _element(fmu: PathLike) -> str:
     return "".join(letter if letter.isalnum() or letter in "_-" else "_" for letter in stem) or "fmu"
 
 
-def _prefixed(name: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    return {f"{name}.{variable}": value for variable, value in values.items()}
+def _start_values(system: System, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return start values with the names of the system, without the units that they state; checks these."""
+    with_units = {
+        variable: value
+        for variable, value in values.items()
+        if isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str) and not isinstance(value[0], str)
+    }
+    for own in _variables(system, name, None) if with_units else []:
+        variable = own.name if own.name in with_units else own.name.rpartition("[")[0]
+        _, stated = with_units.get(variable, (None, own.unit))
+        if stated != own.unit:
+            sentence = f"start_values: expected {variable} in {own.unit or 'no unit'}, found {stated}"
+            raise ConfigurationError(sentence, "Unit", {"name": variable})
+    return {f"{name}.{variable}": with_units.get(variable, (value,))[0] for variable, value in values.items()}
 
 
 def _variables(system: System, name: str, values: Mapping[str, Any] | None) -> list[Variable]:

@@ -124,3 +124,15 @@ def test_a_check_has_the_findings_of_the_command(pendulum):
     report = af.check(pendulum)
     assert report.ok and report.errors == 0 and len(report.findings) == report.warnings + report.notes
     assert "errors 0" in str(report)
+
+
+def test_a_start_value_with_the_unit_of_its_variable_is_taken_and_another_unit_is_refused(pendulum):
+    values = {"x_p_0": 0.2, "F_c": 15.0}
+    own = af.simulate(pendulum, stop_time=0.1, start_values={"x_p_0": (0.2, "m"), "F_c": 15.0})
+    assert own == af.simulate(pendulum, stop_time=0.1, start_values=values)
+    with pytest.raises(af.ConfigurationError, match="start_values: expected F_c in N, found kN"):
+        af.simulate(pendulum, start_values={"F_c": (0.025, "kN")})
+    with pytest.raises(af.ConfigurationError, match="start_values: expected linearised in no unit, found s"):
+        af.simulate(pendulum, start_values={"linearised": (True, "s")})
+    with pytest.raises(af.ConfigurationError, match="no variable"):
+        af.simulate(pendulum, start_values={"friction": (25.0, "N")})
