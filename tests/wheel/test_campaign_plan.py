@@ -15,8 +15,7 @@ MEASURES = {"peak": "max(abs(plant.x_p))"}
 
 def paper(**entries):
     """A campaign of the paper's loop, 0.1 s long."""
-    entries.setdefault("measures", MEASURES)
-    return Campaign("paper", experiment={"stop-time": 0.1}, **entries)
+    return Campaign("paper", **{"measures": MEASURES, "experiment": {"stop-time": 0.1}} | entries)
 
 
 def columns(campaign):
@@ -220,6 +219,11 @@ def test_a_measure_has_the_value_of_its_definition(text, expected, tolerance):
         ({"parameters": {"plant.F_c": stats.norm(1.0, -1.0)}}, "out of range"),
         ({"measures": {"m": "max(plant.xp)"}}, "similar: plant.x_p"),
         ({"measures": {"m": "maxi(plant.x_p)"}}, "similar: max"),
+        ({"experiment": {"stop_time": -1.0}}, "experiment.stop-time: stop time -1 s: expected more than the start time, 0 s"),
+        ({"experiment": {"start_time": 2.0, "stop_time": 1.0}}, "1 s: expected more than the start time, 2 s"),
+        ({"parameters": {"experiment.stop-time": [1.0, -2.0, 3.0]}}, "parameters.experiment.stop-time: stop time -2 s"),
+        ({"parameters": {"late": {"values": [0.0, 0.2, 0.0], "set": "experiment.start-time"}}}, "parameters.late: stop time 0.1 s"),
+        ({"record_every": -1.0}, "found -1"),
     ],
 )
 def test_what_is_wrong_is_named_before_the_first_run(entries, words):

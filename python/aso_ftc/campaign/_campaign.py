@@ -377,10 +377,13 @@ class Campaign:
                 raise fail(f"measures.{reader}", f"the system has no variable {name}{hint}")
         for run in sorted({0, len(self.plan) - 1}):
             try:
-                self.system.check(**arguments(self.changes(run)), record=recorded or None)
+                self.system.check(
+                    **arguments(self.changes(run)), record=recorded or None, record_every=self.record_every
+                )
             except ConfigurationError as error:
                 text = f"{self.name}, run {run}: {error}"
                 raise ConfigurationError(text, error.kind, error.fields) from None
+        self._check_times()
         zeros = {name: np.zeros(2) for name in recorded}
         known = self.plan.row(0)[0]
         for key, expression in self.expressions.items():
@@ -389,6 +392,23 @@ class Campaign:
                     hint = similar(name, known)
                     raise fail(f"measures.{key}", f"the campaign has no parameter {name}{hint}")
             expression.value(zeros, np.array([0.0, 1.0]), known)
+
+    def _check_times(self) -> None:
+        """Find a stop time that is not after the start time, in every row of the design."""
+        defaults = {"start-time": 0.0, "stop-time": np.inf}
+        times = {name: self.system.experiment.get(name, default) for name, default in defaults.items()}
+        where = "experiment.stop-time"
+        for parameter in self.parameters:
+            for place in parameter.places:
+                table, _, entry = place.replace("_", "-").partition(".")
+                if table == "experiment" and entry in times and parameter.numeric:
+                    times[entry] = np.asarray(self.plan.sampled.values[parameter.name], dtype=float)
+                    where = f"parameters.{parameter.name}"
+        start, stop = np.broadcast_arrays(times["start-time"], times["stop-time"])
+        wrong = np.flatnonzero(stop <= start)
+        if len(wrong):
+            start, stop = start.flat[wrong[0]], stop.flat[wrong[0]]
+            raise fail(where, f"stop time {stop:g} s: expected more than the start time, {start:g} s")
 
     def run(
         self,
