@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import atexit as _atexit
 import importlib as _importlib
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 from typing import Any as _Any
 
 from . import _core
@@ -41,6 +42,9 @@ from ._simulate import CheckReport, check, compile, simulate
 from ._slave import Slave
 from ._system import Cancel, Simulation, System, fault
 from ._trade_off import TradeOff, trade_off
+
+if _TYPE_CHECKING:
+    from . import campaign as campaign
 
 __version__ = _core.__version__
 

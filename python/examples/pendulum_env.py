@@ -28,6 +28,7 @@ class PendulumEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def __init__(self, step: float = 0.02, length: float = 10.0, largest_force: float = 60.0) -> None:
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (4,), np.float64)
         self.action_space = gymnasium.spaces.Box(-largest_force, largest_force, (1,), np.float64)
+        self._largest_force = largest_force
         self._system = af.System().add("pendulum", af.fmus()["FrictionPendulum"])
         self._system.start_values.update({"pendulum.x_p_0": 0.0, "pendulum.theta_0": 0.02})
         self._simulation = self._system.simulation(stop_time=length, step=step)
@@ -46,7 +47,7 @@ class PendulumEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Push the cart for one communication step."""
-        force = float(np.clip(action, self.action_space.low, self.action_space.high)[0])
+        force = max(-self._largest_force, min(self._largest_force, float(action[0])))
         self._simulation.set("pendulum.u", force)
         self._simulation.step()
         observed = self._observe()
