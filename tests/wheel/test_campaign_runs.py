@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import logging
 import os
 import re
 import shutil
@@ -17,6 +18,7 @@ import aso_ftc as af
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
+from distributed import LocalCluster
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -212,6 +214,26 @@ def test_rows_stay_the_same_if_worker_client_and_scheduler_are_killed(campaign, 
     status, out, messages = done(*words)
     assert (status, messages) == (0, "")
     assert not list(folder.rglob("*.tmp"))
+    status, out, messages = done(file, "--out", tmp_path / "undisturbed", "--workers", 2)
+    assert (status, messages) == (0, "")
+    assert rows(folder) == rows(tmp_path / "undisturbed")
+
+
+def test_rows_stay_the_same_if_an_adaptive_cluster_starts_empty_and_shrinks(campaign, tmp_path):
+    file, folder = campaign(runs=120, stop=10.0), tmp_path / "out"
+    adaptive = {"minimum": 0, "interval": "100ms", "wait_count": 1}
+    with LocalCluster(
+        n_workers=0, threads_per_worker=1, dashboard_address=":0", local_directory=tmp_path, silence_logs=logging.CRITICAL
+    ) as cluster:
+        workers = cluster.scheduler.workers
+        cluster.adapt(maximum=2, **adaptive)
+        process = command(file, "--out", folder, "--scheduler", cluster.scheduler_address)
+        wait_for(lambda: (len(workers) > 1 and parts(folder) > 1) or process.poll() is not None)
+        cluster.adapt(maximum=1, **adaptive)
+        wait_for(lambda: len(workers) == 1 or process.poll() is not None)
+        assert process.poll() is None and parts(folder) < 30, process.communicate()
+        out, messages = process.communicate(timeout=180)
+        assert (process.returncode, messages) == (0, ""), out
     status, out, messages = done(file, "--out", tmp_path / "undisturbed", "--workers", 2)
     assert (status, messages) == (0, "")
     assert rows(folder) == rows(tmp_path / "undisturbed")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import logging
+import math
 import os
 import pickle
 import sys
@@ -29,8 +30,9 @@ __all__ = ["Session", "execute"]
 
 # Seconds within which a cluster must have a worker.
 _PATIENCE = 60.0
-# Tasks that wait at each thread of a worker, so that none waits for the client.
-_AHEAD = 2
+# Tasks that wait for each thread of a worker, so that none waits for the client: two at least, and as many as take
+# twice the time after which an adaptive cluster of Dask starts further workers (5 s), at most a hundred.
+_AHEAD, _BACKLOG, _MOST_AHEAD = 2, 10.0, 100
 # Seconds after its start before a worker runs anything: Dask does not replace a worker that ends before
 # its nanny has noticed its start (Nanny._on_worker_exit, status "starting").
 _SETTLING = 1.0
@@ -241,6 +243,8 @@ class _Tasks:
         distributed = package("distributed")
         self._waiting = distributed.as_completed(loop=client.loop, with_results=True, raise_errors=False)
         self._threads, self._asked, self._alive = 0, -_KNOWN, time.monotonic()
+        # Of the last task that ended.
+        self._seconds = _BACKLOG
 
     def __len__(self) -> int:
         return len(self._futures)
@@ -262,7 +266,8 @@ class _Tasks:
     def wanted(self) -> int:
         """Return how many tasks keep the cluster busy."""
         self._look()
-        return max(1, self._threads) * (1 + _AHEAD)
+        ahead = min(_MOST_AHEAD, max(_AHEAD, math.ceil(_BACKLOG / max(self._seconds, 1e-3))))
+        return max(1, self._threads) * (1 + ahead)
 
     def submit(self, numbers: list[int]) -> None:
         """Hand runs to the cluster as one task."""
@@ -283,7 +288,10 @@ class _Tasks:
         future.release()
         if status == "error":
             return numbers, result[1]
-        return numbers, result if isinstance(result, list) else None
+        if not isinstance(result, list):
+            return numbers, None
+        self._seconds = sum(row.seconds for row in result)
+        return numbers, result
 
     def cancel(self) -> None:
         """Forget all tasks."""
@@ -371,15 +379,16 @@ class _Work:
 
     def prepare(self, client: Any, name: str) -> None:
         """Give the job to all workers, and ask each whether it can run it."""
+        plugin = _plugin(name, package("cloudpickle").dumps(Job.of(self.campaign)))
+        client.register_plugin(plugin, name=name)
         try:
-            client.wait_for_workers(1, timeout=_PATIENCE)
+            # An adaptive cluster starts its first worker for a task.
+            client.submit(int, pure=False).result(timeout=_PATIENCE)
         except TimeoutError:
             raise Error(
                 f"the scheduler has no workers within {_PATIENCE:g} s: start some", "Scheduler"
             ) from None
-        plugin = _plugin(name, package("cloudpickle").dumps(Job.of(self.campaign)))
-        client.register_plugin(plugin, name=name)
-        for worker, wrong in client.run(_state, name).items():
+        for worker, wrong in client.run(_state, name, on_error="ignore").items():
             if wrong:
                 raise Error(f"worker {worker}: {wrong}", "Worker", {"worker": worker})
         # Dask's page needs the package bokeh.
