@@ -21,6 +21,7 @@ use crate::reconfiguration::Reconfigurator;
 use crate::sampled::Sampler;
 use crate::shared::Shared;
 use crate::signals::{OperatingPoint, Signals, Values};
+use crate::validity::MeasurementCheck;
 use aso_controller::Design;
 use aso_controller::design::Refusal;
 use aso_controller::design::detection::DetectionDesign;
@@ -68,6 +69,8 @@ pub struct AsoController {
     sampler: Option<Sampler>,
     /// `None` without a detection of faults.
     detector: Option<Detector>,
+    /// `None` if every measurement is used; `values` has those that are.
+    measurement_check: Option<MeasurementCheck>,
     /// Whether the clock of the samples ticks. The samples follow from time, and so does the clock.
     pub(crate) sample_clock: bool,
     /// The design at the scheduling variable of the last sample, or of now in a continuous controller; `None`
@@ -159,6 +162,52 @@ impl AsoController {
         self.detector.get_or_insert_default()
     }
 
+    /// The check of the measurements of a design with ranges or longest times of holds.
+    pub(crate) fn measurement_check_mut(&mut self) -> &mut MeasurementCheck {
+        self.measurement_check.get_or_insert_default()
+    }
+
+    /// Whether a measurement is lost, so that the controller rests.
+    fn is_resting(&self) -> bool {
+        self.measurement_check.as_ref().is_some_and(|check| check.is_lost)
+    }
+
+    /// Takes the measurements by `take`; at `time` in s, after a rest, y_f starts from them and the detection anew. Returns
+    /// whether that is so.
+    fn take_measurements(
+        &mut self,
+        time: f64,
+        take: impl FnOnce(&mut MeasurementCheck, &mut Values),
+    ) -> bool {
+        let rested = self.is_resting();
+        if let Some(check) = &mut self.measurement_check {
+            take(check, &mut self.values);
+        }
+        let resumes = rested && !self.is_resting();
+        if let Some(detector) = self.detector.as_mut().filter(|_| resumes) {
+            detector.rest(time);
+        }
+        resumes
+    }
+
+    /// Rests at `time`, in s: commands and estimates are those of the operating point.
+    fn rest(&mut self, time: f64) {
+        self.mode = self.free_mode(self.is_compensating(time));
+        let Self { design, current, values, operating_point, deviations, mode, .. } = self;
+        let design = current.as_deref().unwrap_or(design);
+        deviations.z.fill(0.0);
+        deviations.f_hat.fill(0.0);
+        deviations.u.fill(0.0);
+        mode.set_limited(design, &mut deviations.u);
+        values.rest(operating_point);
+        values.set_commands(&deviations.u, design, *mode, operating_point);
+        if let Some(detector) = &mut self.detector {
+            detector.rest(time);
+        }
+        self.set_losses();
+        self.has_slopes = false;
+    }
+
     /// The detection of a design that has one.
     pub(crate) fn detection_mut(&mut self) -> &mut DetectionDesign {
         self.design.detection.get_or_insert_default()
@@ -186,6 +235,21 @@ impl AsoController {
         let until_on = self.design.t_on - step.start;
         let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;
         self.reconfigure(step.start, None);
+        let resumes = self.take_measurements(step.start, |check, values| {
+            check.take_step(values, step.start, step.size);
+        });
+        if self.is_resting() {
+            self.rest(step.end());
+            return Ok(());
+        }
+        if resumes {
+            let Self { design, values, operating_point, deviations, .. } = self;
+            for k in 0..design.filter.as_ref().map_or(0, Vec::len) {
+                let at = design.filtered_at(k);
+                values.z[at] = values.y[k];
+                deviations.z[at] = values.z[at] - operating_point.z[at];
+            }
+        }
         // z has its deviations from the step before, or from the start.
         self.deviations.set_inputs(&self.values, &self.operating_point, 0.0);
         if inside {
@@ -204,6 +268,9 @@ impl AsoController {
 
     /// Computes e, u and E_hat at the state reached and at `time`, `offset` s after the inputs were set.
     fn evaluate(&mut self, time: f64, offset: f64) {
+        if self.is_resting() {
+            return;
+        }
         self.interpolate(offset, time);
         let Self { design, current, values, operating_point, deviations, mode, .. } = self;
         let design = current.as_deref().unwrap_or(design);
@@ -222,7 +289,14 @@ impl AsoController {
     /// sampled controller are zero.
     pub(crate) fn with_slopes(&mut self) -> &mut Self {
         if !self.has_slopes && self.sampler.is_none() {
-            self.set_slopes();
+            if self.is_resting() {
+                for slopes in [&mut self.z_slopes, &mut self.f_slopes, &mut self.u_slopes] {
+                    slopes.fill(0.0);
+                }
+                self.losses.iter_mut().for_each(|loss| loss.slope = 0.0);
+            } else {
+                self.set_slopes();
+            }
             self.has_slopes = true;
         }
         self
@@ -270,12 +344,29 @@ impl AsoController {
     fn sample(&mut self, start: f64, end: f64) {
         let Some(mut sampler) = self.sampler.take() else { return };
         while let Some(offset) = sampler.time_to_sample(start, end) {
-            if !sampler.is_at_start() {
-                self.reconfigure(sampler.next_instant(), Some(&mut sampler));
-            }
             let instant = sampler.next_instant();
+            let mut resumes = false;
+            // The measurements of the sample at the start are taken before it.
+            if !sampler.is_at_start() {
+                self.reconfigure(instant, Some(&mut sampler));
+                resumes = self.take_measurements(instant, |check, values| {
+                    check.take_sample(values, offset);
+                });
+            }
             let mode = self.free_mode(self.is_compensating(instant));
             self.interpolate(offset, instant);
+            if self.is_resting() {
+                self.rest(instant);
+                sampler.rest(&self.values.z);
+                continue;
+            }
+            if resumes {
+                let Self { design, values, .. } = self;
+                for k in 0..design.filter.as_ref().map_or(0, Vec::len) {
+                    let y = values.y[k] + values.y_slopes[k] * offset;
+                    sampler.set_prediction(design.filtered_at(k), y);
+                }
+            }
             let Self { design, current, values, operating_point, deviations, detector, .. } = self;
             let whole = &**design;
             let design = current.as_deref().unwrap_or(whole);
@@ -316,6 +407,7 @@ impl AsoController {
             frozen: false,
             sampler: Sampler::new(&design),
             detector: Detector::new(&design),
+            measurement_check: MeasurementCheck::new(&design),
             sample_clock: false,
             schedule_input: start,
             schedule_slope: 0.0,
@@ -392,6 +484,15 @@ impl Model for AsoController {
 
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
         let time = experiment.start_time;
+        let is_sampled = self.sampler.is_some();
+        if let Some(check) = &mut self.measurement_check {
+            check.start(&self.design);
+            if is_sampled {
+                check.take_sample(&mut self.values, 0.0);
+            } else {
+                check.take_step(&mut self.values, time, 0.0);
+            }
+        }
         self.start();
         self.start_detection(time);
         self.observer = None;
@@ -435,6 +536,9 @@ impl Model for AsoController {
 
     fn update(&mut self, time: f64) -> Result<(), Failure> {
         if self.sampler.is_none() {
+            if let Some(check) = &self.measurement_check {
+                check.show(&mut self.values);
+            }
             self.evaluate(time, 0.0);
         }
         Ok(())
@@ -446,6 +550,11 @@ impl Model for AsoController {
             // Between samples nothing changes.
             return Ok(());
         }
+        if let (Some(check), Some(of_direction)) =
+            (&self.measurement_check, &direction.measurement_check)
+        {
+            check.take_direction(of_direction, &mut direction.values);
+        }
         if initial {
             direction.start();
         }
@@ -454,6 +563,19 @@ impl Model for AsoController {
         let Self { design, current, values, operating_point, deviations, z_slopes, .. } = direction;
         let design = current.as_deref().unwrap_or(design);
         operating_point.read(design);
+        if self.is_resting() {
+            deviations.u.fill(0.0);
+            deviations.f_hat.fill(0.0);
+            z_slopes.fill(0.0);
+            direction.losses.iter_mut().for_each(|loss| loss.estimate = 0.0);
+            if initial {
+                values.rest(operating_point);
+                values.set_commands(&deviations.u, design, self.mode, operating_point);
+            } else {
+                values.u.fill(0.0);
+            }
+            return Ok(());
+        }
         deviations.set(values, operating_point, 0.0);
         self.mode.set_limited(design, &mut deviations.u);
         let equations = Equations::<Dual64>::new([self.design_in_force(), design], self.mode);
@@ -483,10 +605,11 @@ impl Model for AsoController {
         Some(&mut self.log)
     }
 
-    /// None for a continuous controller with a detection: the states of its filter are integrated with the
-    /// observer's.
+    /// None for a continuous controller with a detection, as the states of its filter are integrated with the
+    /// observer's, and for one that checks its measurements at communication points.
     fn model_exchange(&self) -> Option<ModelExchange> {
-        if self.detector.is_some() && self.sampler.is_none() {
+        let is_stepped = self.detector.is_some() || self.measurement_check.is_some();
+        if is_stepped && self.sampler.is_none() {
             return None;
         }
         let limited = self.design.actuators.iter().filter(|actuator| actuator.limits.is_some());

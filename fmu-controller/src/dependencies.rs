@@ -101,7 +101,23 @@ pub(crate) fn of_loss(design: &Design) -> Vec<Group> {
 pub(crate) fn of_slope(design: &Design, i: usize) -> Vec<Group> {
     let groups = of_constant_slope(design, i);
     let filtered = design.filtered_at(0)..design.integral_at(0);
-    if filtered.contains(&i) { groups } else { groups_by_schedule(design, groups) }
+    if filtered.contains(&i) {
+        groups_by_validity(design, groups)
+    } else {
+        groups_by_schedule(design, groups)
+    }
+}
+
+/// `groups` of a controller that uses every measurement; in others the factors change when a measurement is held.
+fn groups_by_validity(design: &Design, mut groups: Vec<Group>) -> Vec<Group> {
+    if design.checks_measurements() {
+        for (kind, _) in &mut groups {
+            if matches!(kind, Constant | Fixed) {
+                *kind = Discrete;
+            }
+        }
+    }
+    groups
 }
 
 /// The dependencies of element `i` of z' while the matrices stay.
@@ -242,7 +258,7 @@ pub(crate) fn of_initial_command(design: &Design, j: usize) -> Vec<String> {
 /// dependencies that are not linear.
 pub(crate) fn groups_by_schedule(design: &Design, groups: Vec<Group>) -> Vec<Group> {
     if design.schedule.is_none() {
-        return groups;
+        return groups_by_validity(design, groups);
     }
     let names = groups.into_iter().flat_map(|(_, names)| names).collect();
     vec![(Dependent, by_schedule(design, names))]

@@ -118,6 +118,15 @@ impl Detector {
         self.decision = Decision::default();
     }
 
+    /// Rests at `time` in s: the next sample is the first one after a start from the operating point. The decision stays.
+    pub(crate) fn rest(&mut self, time: f64) {
+        self.state.fill(0.0);
+        (self.start, self.samples) = (time, 0.0);
+        self.residuals.fill(0.0);
+        self.statistics.fill(0.0);
+        self.tests.iter_mut().for_each(TestState::restart);
+    }
+
     /// One sample of a sampled controller at `time`, with the deviations of the commands applied from it on.
     pub(crate) fn sample(&mut self, detection: &DetectionDesign, u: &[f64], y: &[f64], time: f64) {
         let first = self.samples < 1.0;

@@ -16,6 +16,7 @@ mod reconfiguration;
 mod sampled;
 mod shared;
 mod signals;
+mod validity;
 
 pub use controller::AsoController;
 

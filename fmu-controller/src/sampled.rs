@@ -82,6 +82,13 @@ impl Sampler {
         self.prediction[position] = value;
     }
 
+    /// Takes the next sample of a controller that rests: the prediction for the sample after it is `z`, as the importer
+    /// sees it.
+    pub(crate) fn rest(&mut self, z: &[f64]) {
+        self.prediction.copy_from_slice(z);
+        self.next += 1.0;
+    }
+
     /// The instant of the next sample in s.
     pub(crate) fn next_instant(&self) -> f64 {
         self.start + self.next * self.period

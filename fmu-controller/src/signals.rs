@@ -47,6 +47,16 @@ pub(crate) struct Signals {
     pub(crate) u: Vec<f64>,
 }
 
+/// The operating point of signals.
+fn operating(signals: &[Signal]) -> impl Iterator<Item = f64> {
+    signals.iter().map(|signal| signal.operating.unwrap_or_default())
+}
+
+/// The operating point of the measurements.
+fn measured(design: &Design) -> impl Iterator<Item = f64> {
+    design.measurements.iter().map(|signal| signal.operating.unwrap_or_default())
+}
+
 impl OperatingPoint {
     /// The operating point of `design`.
     pub(crate) fn of(design: &Design) -> Self {
@@ -58,16 +68,16 @@ impl OperatingPoint {
 
     /// Takes the operating point from `design`, without allocation.
     pub(crate) fn read(&mut self, design: &Design) {
-        let read = |to: &mut [f64], signals: &[Signal]| {
-            for (to, signal) in to.iter_mut().zip(signals) {
-                *to = signal.operating.unwrap_or_default();
+        let read = |to: &mut [f64], values: &mut dyn Iterator<Item = f64>| {
+            for (to, value) in to.iter_mut().zip(values) {
+                *to = value;
             }
         };
         let [x, _, y_f, _] = design.parts_mut(&mut self.z);
-        read(x, &design.states);
-        read(y_f, &design.measurements);
-        read(&mut self.y, &design.measurements);
-        read(&mut self.r, &design.references);
+        read(x, &mut operating(&design.states));
+        read(y_f, &mut measured(design));
+        read(&mut self.y, &mut measured(design));
+        read(&mut self.r, &mut operating(&design.references));
         for (to, actuator) in self.u.iter_mut().zip(&design.actuators) {
             *to = actuator.operating.unwrap_or_default();
         }
@@ -107,16 +117,16 @@ impl Signals {
         self.z.copy_from_slice(z);
         self.y.copy_from_slice(&values.y_slopes);
         self.r.copy_from_slice(&values.r_slopes);
-        let less = |slopes: &mut [f64], signals: &[Signal]| {
-            for (slope, signal) in slopes.iter_mut().zip(signals) {
-                *slope -= signal.operating.unwrap_or_default();
+        let less = |slopes: &mut [f64], values: &mut dyn Iterator<Item = f64>| {
+            for (slope, value) in slopes.iter_mut().zip(values) {
+                *slope -= value;
             }
         };
         let [x, _, y_f, _] = design.parts_mut(&mut self.z);
-        less(x, &design.states);
-        less(y_f, &design.measurements);
-        less(&mut self.y, &design.measurements);
-        less(&mut self.r, &design.references);
+        less(x, &mut operating(&design.states));
+        less(y_f, &mut measured(design));
+        less(&mut self.y, &mut measured(design));
+        less(&mut self.r, &mut operating(&design.references));
     }
 
     /// Sets y and r only, `offset` s after the inputs in `values` were given.
@@ -141,6 +151,14 @@ impl Values {
     pub(crate) fn set_estimate(&mut self, z: &[f64], point: &OperatingPoint) {
         for ((value, deviation), point) in self.z.iter_mut().zip(z).zip(&point.z) {
             *value = deviation + point;
+        }
+    }
+
+    /// Sets z to the operating point.
+    pub(crate) fn rest(&mut self, point: &OperatingPoint) {
+        for (value, point) in self.z.iter_mut().zip(&point.z) {
+            // As the sum of a deviation and the operating point.
+            *value = 0.0 + point;
         }
     }
 

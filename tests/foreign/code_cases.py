@@ -1,5 +1,6 @@
 """Sampled designs as source code: plant files, their designs, the compiled code, the loop with the plant."""
 
+import json
 import re
 import subprocess
 import tomllib
@@ -105,14 +106,46 @@ UNSTABLE = f"sample_time = 0.05\n{PLANT.replace('bound = 2.0', 'bound = 2.0, ste
 CUSUM = '[detection]\nmethod = "cusum"\nfalse_alarm_interval = 100.0\nnoise = 1e-2\nprocess_noise = 1e-3\nfrom = 1.0\n'
 
 
+# The samples for which the last value of a measurement may replace it, in the designs of `held`.
+MOST_HELD = 5
+
+
+def held(text, has_limit=True):
+    """The plant of a text with a range of each measurement and, if it has that limit, a longest time for which one is held."""
+    longest = (MOST_HELD + 0.5) * tomllib.loads(text)["sample_time"]
+    more = {"range": [-1e3, 1e3], **({"longest_hold": longest} if has_limit else {})}
+    entries = [f"{key} = {json.dumps(value)}" for key, value in more.items()]
+    if "[[measurements]]" in text:
+        return text.replace("[[measurements]]", "\n".join(["[[measurements]]", *entries]))
+    [line] = re.findall(r"^measurements = .*$", text, flags=re.MULTILINE)
+    signals = [own if isinstance(own, dict) else {"name": own} for own in tomllib.loads(line)["measurements"]]
+    tables = [", ".join([*(f"{key} = {json.dumps(value)}" for key, value in own.items()), *entries]) for own in signals]
+    return text.replace(line, f"measurements = [{', '.join(f'{{ {table} }}' for table in tables)}]")
+
+
+def spoiled(k, count):
+    """The measurements of sample k that are outside of their ranges; NaN for the others."""
+    values, phase = np.full(count, np.nan), k % 400
+    if phase in (0, 60):
+        values[0] = 1e300
+    if 150 <= phase < 150 + MOST_HELD + 12:
+        values[-1] = -1e5
+    if 250 <= phase < 250 + MOST_HELD:
+        values[:] = 1e5
+    if 300 <= phase < 320 and phase % 2:
+        values[phase % count] = -2e3
+    return values
+
+
 @dataclass
 class Case:
-    """A plant file; the largest faults, the standard deviation of the measurements, numbers of samples."""
+    """A plant file; the largest faults, the standard deviation of the measurements, numbers of samples, whether measurements are spoiled."""
 
     text: str
     fault: float
     noise: float
     samples: int = 3000
+    is_spoiled: bool = False
     prefix: str = field(default="", repr=False)
 
 
@@ -151,6 +184,18 @@ CASES = {
     ),
     "constant-prediction": Case("sample_time = 1.0\nestimator = 'prediction'\n" + QUADRUPLE, 0.3, 1e-2),
 }
+HELD = {
+    "held-detection": Case(held(TANKS["detection"]), 6e-5, 2e-3),
+    "held-window": Case(held(windows("true")), 0.2, 2e-2),
+    "held-reconfiguration": Case(held(vehicle("estimator = \"prediction\"\nmonitor = true\n") + VEHICLE_DETECTION), 1.0, 1e-3),
+    "held-schedule": Case(held("sample_time = 0.1\nt_on = 2.0\n" + DRIVE), 0.3, 1e-3),
+    "held-schedule-by-measurement": Case(held(measured(TANKS["schedule"])), 6e-5, 1e-3),
+    "held-feedthrough": Case(held(CASES["feedthrough-integral"].text), 0.5, 1e-2),
+    "range-reference": Case(held(CASES["reference"].text, has_limit=False), 6e-5, 1e-3),
+}
+for case in HELD.values():
+    case.is_spoiled = True
+CASES |= HELD
 
 
 class Built:
@@ -184,9 +229,10 @@ class Built:
         always = ["rustc", "--edition", "2021", "-O", "-D", "warnings"]
         source = self.folder / "rust" / "src" / "lib.rs"
         run(*always, "--crate-type", "rlib", "--crate-name", "controller", source, "-o", library)
-        switches = [("single", self.single), ("outside", "schedule" in self.design)]
+        holds = any("longest_hold" in signal for signal in self.design["measurements"])
+        switches = [("single", self.single), ("outside", "schedule" in self.design), ("lost", holds)]
         switches += [(name, self.has(name)) for name in INPUTS]
-        known = ["--check-cfg", f"cfg(single, outside, {', '.join(INPUTS)})"]
+        known = ["--check-cfg", f"cfg(single, outside, lost, {', '.join(INPUTS)})"]
         known += [word for name, is_set in switches if is_set for word in ("--cfg", name)] + ["--extern", f"controller={library}"]
         run(*always, *known, HERE / "controller_loop.rs", "-o", program)
         return program

@@ -52,7 +52,11 @@ fn main() {
         let outside = found.status.outside;
         #[cfg(not(outside))]
         let outside = false;
-        let bits = [held, at_limit, overflow, outside];
+        #[cfg(lost)]
+        let lost = found.status.lost;
+        #[cfg(not(lost))]
+        let lost = false;
+        let bits = [held, at_limit, overflow, outside, lost];
         let status: u8 = bits.iter().enumerate().map(|(k, bit)| u8::from(*bit) << k).sum();
         let mut all: Vec<f64> = commands.iter().chain(&estimates).map(|value| f64::from(*value)).collect();
         #[cfg(detection)]

@@ -9,7 +9,7 @@ import pytest
 from fmpy import extract
 
 from c_abi import OK, Fmu, Instance
-from code_cases import CASES, Built, Plant, bound_of, fed, masses, run
+from code_cases import CASES, HELD, Built, Plant, bound_of, fed, masses, run, spoiled
 from conftest import ROOT
 from design_file import vector
 from design_loop import packed_plant
@@ -36,11 +36,11 @@ class BuiltWithFmu(Built):
     def __init__(self, aso_ftc, case, folder):
         super().__init__(aso_ftc, case.text, folder, "--fmu", folder / "Own.fmu")
         self.fmu = Fmu(extract(str(folder / "Own.fmu"), str(folder / "fmu")))
-        self.samples, self.expected = in_the_loop(self, case)
+        self.samples, self.expected, self.flags = in_the_loop(self, case)
 
 
 def in_the_loop(own, case):
-    """Measurements and switch of each sample in the loop of the FMU with the plant, and the FMU's outputs."""
+    """Measurements and switch of each sample in the loop of the FMU with the plant, the FMU's outputs, and its flags of the measurements."""
     n, m, p, q = own.sizes
     design, plant = own.design, Plant(own.design)
     chance = np.random.default_rng(3)
@@ -54,7 +54,7 @@ def in_the_loop(own, case):
     inputs += [schedule["variable"]] if own.has("schedule") else []
     operating = np.array([signal.get("operating", 0.0) for signal in references])
     period, fault, detection = design["sample_time"], np.zeros(q), design.get("detection")
-    samples, expected = [], []
+    samples, expected, flags = [], [], []
     switched, shares, known = switches_of(design)
     # Decisive losses of effectiveness occur at last.
     reconfigured = [entry["gone"] for entry in design.get("reconfigurations", []) if "loss" in entry]
@@ -69,6 +69,9 @@ def in_the_loop(own, case):
             if schedule:
                 value = swept(schedule, k)
                 y = np.append(y, value) if own.has("schedule") else np.where(np.array(inputs) == schedule["variable"], value, y)
+            if case.is_spoiled:
+                values = spoiled(k, p)
+                y[:p] = np.where(np.isnan(values), y[:p], values)
             known = [k < 2000 and chance.random() < share for share in shares] if k % 100 == 70 else known
             compensate, reset = not 1700 < k < 1800, k % 700 in (640, 641)
             if k == 0:
@@ -82,10 +85,11 @@ def in_the_loop(own, case):
             samples.append([*y, compensate, *([reset] if detection else []), *known])
             expected.append(instance.get(*outputs) + decided(instance, detection))
             expected[-1] += instance.get("reconfiguration") if own.has("reconfigurations") else []
+            flags.append(instance.get("measurement_held", "measurement_lost") if case.is_spoiled else [0, 0])
             if k > 2300 and lost:
                 fault[lost[0]] = -expected[-1][of_lost[0]]
             plant.step(np.array(expected[-1][:m]), fault)
-    return np.array(samples, dtype=float), np.array(expected)
+    return np.array(samples, dtype=float), np.array(expected), np.array(flags) @ [1, 16]
 
 
 def switches_of(design):
@@ -130,7 +134,11 @@ def test_c_has_the_bits_of_the_fmu_at_each_optimisation(designed, name):
     limited = any("limits" in actuator for actuator in own.design["actuators"])
     known = {0.0, 2.0} if limited else {0.0}
     known |= {8.0 + status for status in known} if "schedule" in own.design else set()
-    assert set(found[:, -1]) == known, "the limits and the ends of the schedule are reached and left"
+    status = found[:, -1].astype(int)
+    assert set(status & ~17) == known, "the limits and the ends of the schedule are reached and left"
+    assert (status & 17 == own.flags).all()
+    has_limit = any("longest_hold" in signal for signal in own.design["measurements"])
+    assert set(own.flags) == ({0, 1, 17} if has_limit else {0, 1} if name in HELD else {0})
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -152,7 +160,7 @@ def test_clang_compiles_it_without_warnings_and_with_the_same_bits(designed):
 @pytest.mark.parametrize(
     "name",
     ["sensor-fault", "scheduled-drive", "detection-window", "detection-isolation", "fall-back", "reconfiguration-detection",
-     "proportional-integral-sensor", "sliding-mode-detection", "feedthrough"],
+     "proportional-integral-sensor", "sliding-mode-detection", "feedthrough", "held-reconfiguration", "held-feedthrough"],
 )  # fmt: skip
 def test_the_c_code_follows_all_rules_of_misra_c_that_are_not_advisory(designed, name):
     """Those of MISRA C:2012 that cppcheck knows. Advisory ones: unused macros (2.5), tables outside of functions (8.9), #include (20.1)."""

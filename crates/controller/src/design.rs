@@ -90,7 +90,7 @@ pub struct Design {
     /// The m actuators.
     pub actuators: Vec<Actuator>,
     /// The p measurements; the inputs have the same names.
-    pub measurements: Vec<Signal>,
+    pub measurements: Vec<Measurement>,
     /// The q states of the fault model.
     pub faults: Vec<Fault>,
     /// The t references; the inputs have the same names.
@@ -245,7 +245,7 @@ pub struct SlidingMode {
     pub delta: Vec<f64>,
 }
 
-/// A state, a measurement or a reference.
+/// A state or a reference.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Signal {
@@ -260,6 +260,29 @@ pub struct Signal {
     /// Value at the operating point.
     #[serde(default)]
     pub operating: Option<f64>,
+}
+
+/// A measurement, and when its value is not used; see `fmu-controller/src/validity.rs`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measurement {
+    /// Its name, that of its variables.
+    pub name: String,
+    /// Its unit, as FMI writes it.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// What it is, for a reader.
+    #[serde(default)]
+    pub description: String,
+    /// Value at the operating point.
+    #[serde(default)]
+    pub operating: Option<f64>,
+    /// The smallest and the largest value that is used; the last one of them replaces any other value.
+    #[serde(default)]
+    pub range: Option<[f64; 2]>,
+    /// The longest time in s for which it does; then the controller rests at its operating point.
+    #[serde(default)]
+    pub longest_hold: Option<f64>,
 }
 
 /// An actuator, with its limits if it has any.
@@ -382,7 +405,27 @@ macro_rules! labelled {
     };
 }
 
-labelled!(Signal, Actuator, Fault);
+labelled!(Signal, Measurement, Actuator, Fault);
+
+impl Measurement {
+    /// The smallest and the largest value that is used: the largest numbers without a range.
+    #[must_use]
+    pub fn bounds(&self) -> [f64; 2] {
+        self.range.unwrap_or([-f64::MAX, f64::MAX])
+    }
+
+    /// The most samples for which the last value may be used: those within the longest time, up to rounding. None
+    /// without such a time, and where they are `u32::MAX` or more.
+    #[must_use]
+    pub fn most_held(&self, sample_time: f64) -> Option<u32> {
+        let samples = (self.longest_hold? * (1.0 + HOLD_ROUNDING) / sample_time).floor();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
+        (samples < f64::from(u32::MAX)).then_some(samples as u32)
+    }
+}
+
+/// The part of the longest time of a hold below which a difference is rounding: an importer adds up its steps.
+pub const HOLD_ROUNDING: f64 = 1e-9;
 
 impl Actuator {
     /// The limits as deviations from the operating point.
@@ -418,9 +461,9 @@ impl Design {
 
     /// Sets the missing values of an operating point to 0 where the file states one of them.
     fn complete_the_operating_point(&mut self) {
-        let signals = self.states.iter_mut().chain(&mut self.measurements);
-        let signals = signals.chain(&mut self.references);
+        let signals = self.states.iter_mut().chain(&mut self.references);
         let mut values: Vec<_> = signals.map(|signal| &mut signal.operating).collect();
+        values.extend(self.measurements.iter_mut().map(|measurement| &mut measurement.operating));
         values.extend(self.actuators.iter_mut().map(|actuator| &mut actuator.operating));
         if values.iter().any(|value| value.is_some()) {
             for value in values {
@@ -482,6 +525,18 @@ impl Design {
             let matrices = fallback.k_f.iter_mut().chain([&mut fallback.k_x]);
             matrices.flat_map(|matrix| &mut matrix.values).for_each(|value| *value = 0.0);
         }
+    }
+
+    /// Whether a measurement has a range or a longest time of a hold.
+    #[must_use]
+    pub fn checks_measurements(&self) -> bool {
+        self.measurements.iter().any(|signal| signal.range.is_some()) || self.limits_holds()
+    }
+
+    /// Whether a measurement has a longest time of a hold.
+    #[must_use]
+    pub fn limits_holds(&self) -> bool {
+        self.measurements.iter().any(|signal| signal.longest_hold.is_some())
     }
 
     /// Whether other gains than those of the intact plant may be in force.
@@ -583,5 +638,27 @@ impl Design {
         ];
         let stated = stated.into_iter().filter_map(|(name, matrix)| Some((name, matrix.as_ref()?)));
         always.into_iter().chain(stated)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Measurement;
+
+    #[test]
+    fn the_most_samples_of_a_hold_are_those_within_its_time() {
+        let of = |longest_hold, sample_time| {
+            let (name, unit, description) = (String::new(), None, String::new());
+            let (operating, range) = (None, None);
+            let own = Measurement { name, unit, description, operating, range, longest_hold };
+            own.most_held(sample_time)
+        };
+        // 0.3 / 0.1 is below 3.
+        for (longest, period, expected) in
+            [(0.3, 0.1, 3), (0.29, 0.1, 2), (0.05, 0.1, 0), (1.0, 1e-3, 1000)]
+        {
+            assert_eq!(of(Some(longest), period), Some(expected), "{longest} {period}");
+        }
+        assert_eq!([of(None, 0.1), of(Some(1e9), 0.1), of(Some(f64::INFINITY), 0.1)], [None; 3]);
     }
 }

@@ -16,10 +16,11 @@ pub use design::{Design, DesignError};
 pub use matrix::Matrix;
 
 /// The files of [`sample`], by their paths in `src`: no dependency, no standard library.
-pub const SOURCES: [(&str, &str); 5] = [
+pub const SOURCES: [(&str, &str); 6] = [
     ("sample.rs", include_str!("sample.rs")),
     ("sample/detection.rs", include_str!("sample/detection.rs")),
     ("sample/matrix.rs", include_str!("sample/matrix.rs")),
+    ("sample/measurements.rs", include_str!("sample/measurements.rs")),
     ("sample/number.rs", include_str!("sample/number.rs")),
     ("sample/reconfiguration.rs", include_str!("sample/reconfiguration.rs")),
 ];

@@ -23,6 +23,7 @@
 
 pub mod detection;
 mod matrix;
+pub mod measurements;
 mod number;
 pub mod reconfiguration;
 
@@ -391,6 +392,22 @@ impl<N: Number> Signals<'_, N> {
         self.predict_filter(design);
         self.set_excess();
         self.predict_integrals(design, state);
+    }
+
+    /// The controller at rest: estimates and commands are those of the operating point, without faults; so is the
+    /// estimate for the next sample. Integrals are 0.
+    #[inline(always)]
+    pub fn rest(&mut self, design: &Design<'_, N>) {
+        self.u.fill(N::zero());
+        self.set_command_values(design);
+        self.x_value.fill(N::zero());
+        add(design.x_op, self.x_value);
+        copy(self.x_value, self.next_x_hat);
+        self.f_value.fill(N::zero());
+        self.next_f_hat.fill(N::zero());
+        self.next_y_f.fill(N::zero());
+        add(design.y_op, self.next_y_f);
+        self.next_x_i.fill(N::zero());
     }
 
     /// Whether commands and estimates are numbers.

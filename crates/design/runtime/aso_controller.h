@@ -18,6 +18,9 @@
  * (18), in their general form.)
  * A current estimator adds L_x e and L_f e to x_hat and f_hat before it computes u, and not after it.
  *
+ * A measurement that is no number or outside of its range keeps its last value. While one does so for more samples than it
+ * may, the controller rests at the operating point; afterwards it starts again from there.
+ *
  * Each sum has its terms in the order of the equation that stands above it: the results have the bits of the controller FMU
  * of the same design. For that the compiler must neither contract nor reorder floating-point operations.
  *
@@ -43,6 +46,7 @@
 #define ASO_AT_LIMIT 2U
 #define ASO_OVERFLOW 4U
 #define ASO_OUTSIDE 8U
+#define ASO_LOST 16U
 
 /* The estimate of the faults that the observer predicts from, and the measurements that it observes. */
 #if ASO_HAS_DIRECT_TERM
@@ -54,6 +58,13 @@
 #define ASO_OBSERVED y_f
 #else
 #define ASO_OBSERVED y
+#endif
+
+/* The number of the sample that the detection counts: since the start, or since the controller rested. */
+#if ASO_LIMITS_HOLDS
+#define ASO_RUNNING running
+#else
+#define ASO_RUNNING sample
 #endif
 
 /* The signals of a sample: deviations from the operating point; values; the estimate for the next sample. */
@@ -117,6 +128,7 @@ static bool is_finite(aso_real value)
     return (value >= -ASO_LARGEST) && (value <= ASO_LARGEST);
 }
 
+#if ASO_HAS_REFERENCES || ASO_HAS_SCHEDULE_INPUT || !ASO_CHECKS_MEASUREMENTS
 /* Keeps a value that is a number; returns the flag of the status for one that is none. */
 static uint32_t aso_take(aso_real *kept, aso_real value)
 {
@@ -129,6 +141,55 @@ static uint32_t aso_take(aso_real *kept, aso_real value)
     }
     return status;
 }
+#endif
+
+#if ASO_CHECKS_MEASUREMENTS
+/* Keeps measurement k if it is a number in its range; returns the flag of the status if it is not, and counts the samples
+ * since the last one that was. */
+static uint32_t aso_take_measurement(aso_State *state, uint32_t k, aso_real value)
+{
+    uint32_t status = ASO_HELD;
+
+    if (is_finite(value) && (value >= y_min[k]) && (value <= y_max[k]))
+    {
+        state->y[k] = value;
+        status = 0U;
+    }
+#if ASO_LIMITS_HOLDS
+    if (status == 0U)
+    {
+        state->held[k] = 0U;
+    }
+    else if (state->held[k] < UINT32_MAX)
+    {
+        state->held[k]++;
+    }
+    else
+    {
+        /* counted */
+    }
+#endif
+    return status;
+}
+#endif
+
+#if ASO_LIMITS_HOLDS
+/* Whether the last value of a measurement is too old. */
+static bool is_lost(const aso_State *state)
+{
+    bool lost = false;
+    uint32_t i;
+
+    for (i = 0U; i < ASO_MEASUREMENTS; i++)
+    {
+        if (state->held[i] > most_held[i])
+        {
+            lost = true;
+        }
+    }
+    return lost;
+}
+#endif
 
 static bool are_finite(const aso_real vector[], uint32_t count)
 {
@@ -481,8 +542,8 @@ static void command_without(const aso_State *state, aso_Sample *sample)
 /* ---- The detection of faults ------------------------------------------------------------------------------------------ */
 
 #if ASO_HAS_DETECTION
-/* Clears sums, windows and decision. */
-static void clear_detection(aso_State *state)
+/* Clears sums and windows. */
+static void clear_tests(aso_State *state)
 {
     uint32_t i;
 
@@ -498,11 +559,22 @@ static void clear_detection(aso_State *state)
         state->since[i][1] = 0U;
 #endif
         state->statistic[i] = ASO_ZERO;
-        state->alarmed[i] = false;
     }
 #if ASO_HAS_WINDOWS
     clear(state->sums, ASO_RESIDUALS);
 #endif
+}
+
+/* Clears sums, windows and decision. */
+static void clear_detection(aso_State *state)
+{
+    uint32_t i;
+
+    clear_tests(state);
+    for (i = 0U; i < ASO_TESTS; i++)
+    {
+        state->alarmed[i] = false;
+    }
     state->isolated = 0;
     state->detected_at = 0U;
     state->onset = 0U;
@@ -624,7 +696,7 @@ static void detect(aso_State *state, bool detection_reset)
     {
         clear_detection(state);
     }
-    if (state->sample >= ASO_FIRST_TESTED)
+    if (state->ASO_RUNNING >= ASO_FIRST_TESTED)
     {
         uint32_t onset = 0U;
         uint32_t i;
@@ -683,7 +755,7 @@ static bool compute_residuals(const aso_State *state, aso_Sample *sample)
     for (i = 0U; i < ASO_RESIDUALS; i++)
     {
         sum = ASO_ZERO;
-        if (state->sample > 0U)
+        if (state->ASO_RUNNING > 0U)
         {
             /* r = C x_r + D_u u + D_y y */
             sum = sum + product(C_r[i], state->x_r, ASO_RESIDUAL_STATES);
@@ -707,6 +779,22 @@ static bool compute_residuals(const aso_State *state, aso_Sample *sample)
 #endif
 
 /* ---- The sample ------------------------------------------------------------------------------------------------------- */
+
+#if ASO_LIMITS_HOLDS
+/* No measurement is held. */
+static void clear_holds(aso_State *state)
+{
+    uint32_t i;
+
+    for (i = 0U; i < ASO_MEASUREMENTS; i++)
+    {
+        state->held[i] = 0U;
+    }
+#if ASO_HAS_DETECTION
+    state->running = 0U;
+#endif
+}
+#endif
 
 /* Starts at these estimates of states and faults. */
 static void aso_start(aso_State *state, const aso_real x_hat_0[ASO_STATES], const aso_real f_hat_0[ASO_FAULTS])
@@ -733,6 +821,9 @@ static void aso_start(aso_State *state, const aso_real x_hat_0[ASO_STATES], cons
 #endif
 #if ASO_COUNTS_SAMPLES
     state->sample = 0U;
+#endif
+#if ASO_LIMITS_HOLDS
+    clear_holds(state);
 #endif
 #if ASO_HAS_DETECTION
     start_residuals(state, x_hat_0);
@@ -1135,7 +1226,7 @@ static void keep(aso_State *state, const aso_Sample *sample, bool detection_rese
 #if ASO_HAS_DETECTION
     copy(state->x_r, sample->next_x_r, ASO_RESIDUAL_STATES);
     copy(state->residual, sample->next_residual, ASO_RESIDUALS);
-    if (state->sample > 0U)
+    if (state->ASO_RUNNING > 0U)
     {
         detect(state, detection_reset);
     }
@@ -1192,8 +1283,54 @@ static void estimate_losses(aso_State *state, aso_Sample *sample)
 }
 #endif
 
-/* Takes a sample: the inputs are in `state` already. Returns bits of the status. */
-static uint32_t aso_sample(aso_State *state, aso_Sample *sample, bool compensate, bool detection_reset)
+#if ASO_LIMITS_HOLDS
+/* Rests at the operating point: commands and estimates are those of this point, without faults; integrals are 0. The next
+ * sample starts from there. A decision of the detection stays. */
+static void rest(aso_State *state, aso_Sample *sample)
+{
+    uint32_t i;
+
+    for (i = 0U; i < ASO_STATES; i++)
+    {
+        sample->x_value[i] = ASO_ZERO + ASO_FOLLOWING(sample, x_op)[i];
+    }
+    copy(state->x_hat, sample->x_value, ASO_STATES);
+    clear(sample->f_value, ASO_FAULTS);
+    clear(state->f_hat, ASO_FAULTS);
+    for (i = 0U; i < ASO_ACTUATORS; i++)
+    {
+        sample->u[i] = ASO_ZERO;
+        sample->command[i] = sample->u[i] + ASO_FOLLOWING(sample, u_op)[i];
+#if ASO_HAS_RECONFIGURATION
+        if (state->gone[i])
+        {
+            sample->u[i] = u_stuck[i];
+            sample->command[i] = stuck_at[i];
+        }
+#endif
+    }
+    copy(state->u, sample->command, ASO_ACTUATORS);
+#if ASO_HAS_FEEDTHROUGH
+    copy(state->u_before, sample->u, ASO_ACTUATORS);
+#endif
+#if ASO_HAS_FILTER
+    state->started = false;
+#endif
+#if ASO_HAS_INTEGRALS
+    clear(sample->x_i_value, ASO_REFERENCES);
+    clear(state->x_i, ASO_REFERENCES);
+#endif
+#if ASO_HAS_DETECTION
+    clear(state->x_r, ASO_RESIDUAL_STATES);
+    clear(state->residual, ASO_RESIDUALS);
+    clear_tests(state);
+    state->running = 0U;
+#endif
+}
+#endif
+
+/* Estimates, commands, and the estimate for the next sample. Returns bits of the status. */
+static uint32_t control(aso_State *state, aso_Sample *sample, bool compensate, bool detection_reset)
 {
     uint32_t status = 0U;
     bool finite;
@@ -1213,9 +1350,6 @@ static uint32_t aso_sample(aso_State *state, aso_Sample *sample, bool compensate
 #if ASO_HAS_FALL_BACK && !ASO_FALL_BACK_COMPENSATES
     compensating = compensating && (state->set != (ASO_GAIN_SETS - 1U));
 #endif
-#if ASO_HAS_SCHEDULE
-    status = follow_schedule(sample, state->ASO_THETA);
-#endif
 #if ASO_HAS_FILTER
     if (!state->started)
     {
@@ -1230,7 +1364,7 @@ static uint32_t aso_sample(aso_State *state, aso_Sample *sample, bool compensate
 #if ASO_HAS_LIMITS
     if (limit_commands(state, sample))
     {
-        status = status | ASO_AT_LIMIT;
+        status = ASO_AT_LIMIT;
     }
 #endif
     finite = predict(state, sample, estimating) && finite;
@@ -1241,8 +1375,38 @@ static uint32_t aso_sample(aso_State *state, aso_Sample *sample, bool compensate
     else
     {
         show_kept(state, sample);
-        status = (status & ASO_OUTSIDE) | ASO_OVERFLOW;
+        status = ASO_OVERFLOW;
     }
+#if ASO_LIMITS_HOLDS && ASO_HAS_DETECTION
+    if (state->running < UINT32_MAX)
+    {
+        state->running++;
+    }
+#endif
+    return status;
+}
+
+/* Takes a sample: the inputs are in `state` already. Returns bits of the status. */
+static uint32_t aso_sample(aso_State *state, aso_Sample *sample, bool compensate, bool detection_reset)
+{
+    uint32_t status = 0U;
+
+#if ASO_HAS_SCHEDULE
+    status = follow_schedule(sample, state->ASO_THETA);
+#endif
+#if ASO_LIMITS_HOLDS
+    if (is_lost(state))
+    {
+        rest(state, sample);
+        status = status | ASO_LOST;
+    }
+    else
+    {
+        status = status | control(state, sample, compensate, detection_reset);
+    }
+#else
+    status = status | control(state, sample, compensate, detection_reset);
+#endif
 #if ASO_COUNTS_SAMPLES
     if (state->sample < ASO_LAST_COUNTED)
     {

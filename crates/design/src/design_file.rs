@@ -4,8 +4,8 @@ use aso_controller::Design;
 use aso_controller::design::detection::DetectionDesign;
 use aso_controller::design::schedule::{Point, Schedule};
 use aso_controller::design::{
-    Actuator, Combination, Defaults, Estimator, Fallback, Fault, Reconfiguration, Signal,
-    SlidingMode,
+    Actuator, Combination, Defaults, Estimator, Fallback, Fault, Measurement, Reconfiguration,
+    Signal, SlidingMode,
 };
 use control::Domain;
 use control::aso::{FaultyPlant, Gains};
@@ -49,6 +49,14 @@ impl Designed {
             description: signal.description.clone(),
             operating: operating(signal),
             limits: signal.limits,
+        };
+        let measurement = |signal: &PlantSignal| Measurement {
+            name: signal.name.clone(),
+            unit: signal.unit.clone(),
+            description: signal.description.clone(),
+            operating: operating(signal),
+            range: signal.limits,
+            longest_hold: signal.longest_hold,
         };
         let signals = |all: &[PlantSignal]| all.iter().map(signal).collect::<Vec<_>>();
         let sampled = match nominal.domain {
@@ -97,7 +105,7 @@ impl Designed {
             n_r: tracking.and_then(|tracking| tracking.feedforward()).map(matrix),
             states,
             actuators: linear.actuators.iter().map(actuator).collect(),
-            measurements: signals(&linear.measurements),
+            measurements: linear.measurements.iter().map(measurement).collect(),
             faults: nominal.fault_entries(),
             references: tracking.map_or(Vec::new(), |tracking| signals(&tracking.signals)),
             reconfigurations: reconfigurations

@@ -31,7 +31,7 @@ use crate::plant_file::requirements::{Request, request};
 use crate::plant_file::robustness::RobustnessLimits;
 use crate::plant_file::sampled_matrices::SampledMatrices;
 use crate::plant_file::signals::{
-    EntryPoint, Fault, Signal, all_actuator_faults, description, faults, signals,
+    EntryPoint, Fault, Role, Signal, all_actuator_faults, description, faults, signals,
 };
 use crate::plant_file::variants::{Schedule, Variant, check_action};
 use control::Domain;
@@ -251,6 +251,7 @@ impl<'a> PlantFile<'a> {
         };
         found.check_columns(file)?;
         check_names(&found)?;
+        found.check_holds()?;
         check_action(&found)?;
         Ok(found)
     }
@@ -291,6 +292,41 @@ impl<'a> PlantFile<'a> {
     /// Returns an error at `place`.
     pub(crate) fn error_at(&self, place: &Place, message: impl Into<String>) -> PlaceError {
         self.source.error(place, message)
+    }
+
+    /// Whether a measurement has a range or a longest time of a hold.
+    pub(crate) fn checks_measurements(&self) -> bool {
+        let mut all = self.measurements.iter();
+        all.any(|signal| signal.limits.is_some() || signal.longest_hold.is_some())
+    }
+
+    /// Checks what the controller can do with the ranges and the longest times of holds of the measurements.
+    fn check_holds(&self) -> Result<(), PlaceError> {
+        for signal in &self.measurements {
+            let [_, range, hold] = &signal.places;
+            match (&self.sampling, range.as_ref().or(hold.as_ref())) {
+                (None, Some(place)) if self.schedule.is_some() => {
+                    let message = format!(
+                        "`{}` has a range or a longest time of a hold, which a continuous controller with a \
+                         schedule cannot have; expected `sample_time`, or none of them",
+                        signal.name
+                    );
+                    return Err(self.error_at(place, message));
+                }
+                _ => {}
+            }
+            if let (Some(Sampling { period, .. }), Some(longest), Some(place)) =
+                (&self.sampling, signal.longest_hold, hold)
+                && longest / period >= f64::from(u32::MAX)
+            {
+                let message = format!(
+                    "{longest} s are {:.1e} samples of {period} s; expected fewer than 2^32 samples",
+                    longest / period
+                );
+                return Err(self.error_at(place, message));
+            }
+        }
+        Ok(())
     }
 
     /// Checks that F_a has one column per fault that enters through F_a.
@@ -347,7 +383,7 @@ fn linearised(
             operating_point.push((name.to_owned(), value.number()?));
         }
     }
-    let states = file.get("states").map(|entry| signals(&entry, false)).transpose()?;
+    let states = file.get("states").map(|entry| signals(&entry, Role::State)).transpose()?;
     let model = Model::Fmu(PlantFmu {
         path: folder.join(plant.text()?),
         operating_point,
@@ -358,7 +394,7 @@ fn linearised(
     let actuators = file.require("actuators", "the inputs of the FMU that the controller sets")?;
     let meaning = "the outputs of the FMU that the controller reads";
     let measurements = file.require("measurements", meaning)?;
-    Ok((model, [signals(&actuators, true)?, signals(&measurements, false)?]))
+    Ok((model, [signals(&actuators, Role::Actuator)?, signals(&measurements, Role::Measurement)?]))
 }
 
 /// Reads a text, or a list of texts.
@@ -424,7 +460,12 @@ fn counted(
     let Some(entry) = file.get(key) else {
         return Ok((1..=count).map(|k| Signal::named(format!("{letter}{k}"))).collect());
     };
-    let found = signals(&entry, key == "actuators")?;
+    let role = match key {
+        "actuators" => Role::Actuator,
+        "measurements" => Role::Measurement,
+        _ => Role::State,
+    };
+    let found = signals(&entry, role)?;
     if found.len() == count {
         return Ok(found);
     }

@@ -28,7 +28,7 @@ observer.eigenvalues = [-5, { re = -6, im = 2.5 }]
 "#;
 
 /// What is replaced in `MASS`, by what, and a part of the error.
-const REFUSALS: [(&str, &str, &str); 54] = [
+const REFUSALS: [(&str, &str, &str); 62] = [
     (
         "A = [[0, 1], [0, 0]]",
         "A = [[0, 1], [0]]",
@@ -117,6 +117,46 @@ const REFUSALS: [(&str, &str, &str); 54] = [
         "C = ",
         "actuators = [{ name = \"u\", limits = [2, 1] }]\nC = ",
         "expected lower < upper, found 2 and 1",
+    ),
+    (
+        "C = ",
+        "measurements = [{ name = \"y\", range = [2, 2] }]\nC = ",
+        "3:39: measurements[1].range: expected lower < upper, found 2 and 2",
+    ),
+    (
+        "C = ",
+        "measurements = [{ name = \"y\", range = [-inf, 2] }]\nC = ",
+        "3:40: measurements[1].range[1]: expected a finite number, found -inf",
+    ),
+    (
+        "C = ",
+        "measurements = [{ name = \"y\", range = [1] }]\nC = ",
+        "3:39: measurements[1].range: expected 2 numbers, lower and upper, found 1",
+    ),
+    (
+        "C = ",
+        "measurements = [{ name = \"y\", longest_hold = 0 }]\nC = ",
+        "3:46: measurements[1].longest_hold: expected a number above 0, found 0",
+    ),
+    (
+        "C = ",
+        "measurements = [{ name = \"y\", limits = [0, 1] }]\nC = ",
+        "unknown entry `measurements[1].limits`",
+    ),
+    (
+        "C = ",
+        "actuators = [{ name = \"u\", range = [0, 1] }]\nC = ",
+        "unknown entry `actuators[1].range`",
+    ),
+    (
+        "C = ",
+        "sample_time = 1e-3\nmeasurements = [{ name = \"y\", longest_hold = 1e9 }]\nC = ",
+        "4:46: 1000000000 s are 1.0e12 samples of 0.001 s; expected fewer than 2^32 samples",
+    ),
+    (
+        "C = ",
+        "measurements = [{ name = \"measurement_lost\", range = [0, 1] }]\nC = ",
+        "3:26: the controller FMU has a variable `measurement_lost` of its own",
     ),
     ("C = ", "actuators = [{ name = \"u\", unit = \"N m!\" }]\nC = ", "actuators[1].unit: "),
     ("C = ", "operating_point = { x = 1 }\nC = ", "3:19: operating_point: it belongs to `plant`"),
@@ -402,6 +442,32 @@ fn limits_that_exclude_the_operating_point_are_refused_and_a_limit_at_it_is_a_wa
                      the controller acts in one direction only"];
     assert_eq!(with("limits = [0, 5]").unwrap(), expected);
     assert!(with("limits = [1, 5], operating = 2").unwrap().is_empty());
+}
+
+#[test]
+fn a_range_that_excludes_the_operating_point_is_refused() {
+    let with = |measurement: &str| {
+        let text = format!("measurements = [{{ name = \"y\", {measurement} }}]\nC = ");
+        designed(&MASS.replace("C = ", &text))
+    };
+    let refused = with("unit = \"m\", range = [1, 5]").unwrap_err();
+    let expected = "plant.toml:3:51: the operating point of the measurement `y`, 0 m, is outside of its range \
+                    from 1 to 5; expected a range that contains it";
+    assert!(refused.starts_with(expected), "{refused}");
+    let refused = with("range = [1, 5], operating = 5.5").unwrap_err();
+    assert!(refused.contains("measurement `y`, 5.5, is outside"), "{refused}");
+    assert!(with("range = [1, 5], operating = 1, longest_hold = 2").unwrap().is_empty());
+}
+
+#[test]
+fn a_continuous_schedule_has_no_ranges() {
+    let text = MASS.replace("C = ", "measurements = [{ name = \"y\", longest_hold = 2 }]\nC = ")
+        + "[schedule]\nvariable = \"load\"\n[[schedule.points]]\nat = 0\n[[schedule.points]]\nat = 1\nA = [[0, 2], [0, 0]]\n";
+    let message = read(&text, |_| ()).unwrap_err();
+    let expected = "plant.toml:3:46: `y` has a range or a longest time of a hold, which a continuous controller";
+    assert!(message.starts_with(expected), "{message}");
+    let sampled = format!("sample_time = 0.1\n{text}");
+    read(&sampled, |_| ()).unwrap();
 }
 
 #[test]

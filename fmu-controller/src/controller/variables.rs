@@ -10,7 +10,7 @@ use crate::controller::AsoController;
 use crate::dependencies::Group;
 use crate::{dependencies, names};
 use aso_controller::channel;
-use aso_controller::design::{Design, Fault, Label, Signal};
+use aso_controller::design::{Design, Fault, Label, Measurement, Signal};
 
 /// All variables of `controller`, in the order of the description.
 pub(crate) fn list(controller: &AsoController) -> Vec<Variable<AsoController>> {
@@ -22,6 +22,7 @@ pub(crate) fn list(controller: &AsoController) -> Vec<Variable<AsoController>> {
     all.extend(losses(controller));
     all.extend(schedule_at(design));
     all.extend(reconfiguration(design));
+    all.extend(measurement_flags(design));
     if design.sample_time.is_none() {
         all.extend(slopes(design));
     }
@@ -89,11 +90,22 @@ fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
         .enumerate()
         .map(|(k, signal)| {
             let Label { unit, meaning } = signal.label();
-            let text = format!("Measurement: {meaning}");
+            let text = format!("Measurement: {meaning}{}", validity(signal));
+            let is_checked = design.checks_measurements();
             let variable = Variable::real(&signal.name, text, move |model: &mut AsoController| {
-                &mut model.values.y[k]
+                if is_checked {
+                    &mut model.measurement_check_mut().y[k]
+                } else {
+                    &mut model.values.y[k]
+                }
             });
-            with_unit(variable, unit).input().derivative(move |model| &mut model.values.y_slopes[k])
+            with_unit(variable, unit).input().derivative(move |model: &mut AsoController| {
+                if is_checked {
+                    &mut model.measurement_check_mut().y_slopes[k]
+                } else {
+                    &mut model.values.y_slopes[k]
+                }
+            })
         })
         .collect();
     inputs.extend(design.references.iter().enumerate().map(|(k, signal)| {
@@ -173,6 +185,35 @@ fn reconfiguration(design: &Design) -> Option<Variable<AsoController>> {
     design.is_reconfigurable().then(|| variable.output(&[]))
 }
 
+/// When a measurement is used, in words; empty where it always is.
+fn validity(signal: &Measurement) -> String {
+    let range = signal.range.map(|[low, high]| format!("; used from {low} to {high}"));
+    let hold = signal.longest_hold.map(|time| format!("; held for {time} s at most"));
+    range.into_iter().chain(hold).collect()
+}
+
+/// Whether measurements are held, and whether they are held for too long.
+fn measurement_flags(design: &Design) -> Vec<Variable<AsoController>> {
+    if !design.checks_measurements() {
+        return Vec::new();
+    }
+    let names = || design.measurements.iter().map(|signal| signal.name.clone()).collect::<Vec<_>>();
+    let output =
+        |variable: Variable<AsoController>| variable.output(&[]).discrete().initially(names());
+    vec![
+        output(Variable::boolean(
+            "measurement_held",
+            "Whether a measurement is outside of its range: its last value is used",
+            |model: &mut AsoController| &mut model.measurement_check_mut().is_held,
+        )),
+        output(Variable::boolean(
+            "measurement_lost",
+            "Whether a last value is used for too long: commands and estimates are those of the operating point",
+            |model: &mut AsoController| &mut model.measurement_check_mut().is_lost,
+        )),
+    ]
+}
+
 fn commands(design: &Design) -> Vec<Variable<AsoController>> {
     let actuators = &design.actuators;
     actuators
@@ -208,8 +249,9 @@ fn states(design: &Design) -> Vec<State> {
     let kind = if design.p_f.is_some() { "Integral part of the estimate" } else { "Estimate" };
     let faults = design.faults.iter().map(Fault::label);
     let estimates = estimates.chain(faults.map(move |label| (kind, label)));
-    let filtered = if design.filter.is_some() { &design.measurements[..] } else { &[] };
-    let filtered = filtered.iter().map(|signal| ("Filtered value", signal.label()));
+    let filters = design.filter.as_ref().map_or(0, Vec::len);
+    let filtered = design.measurements.iter().take(filters);
+    let filtered = filtered.map(|signal| ("Filtered value", signal.label()));
     let integrals = if design.k_i.is_some() { &design.references[..] } else { &[] };
     let integrals = integrals.iter().map(|signal| ("Integral", signal.label()));
     names::estimates(design)

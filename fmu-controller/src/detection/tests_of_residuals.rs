@@ -37,8 +37,14 @@ impl TestState {
     }
 
     pub(super) fn clear(&mut self) {
+        self.restart();
+        self.has_alarmed = false;
+    }
+
+    /// Clears the sums.
+    pub(super) fn restart(&mut self) {
         self.sums.fill(0.0);
-        (self.count, self.statistic, self.has_alarmed) = (0, 0.0, false);
+        (self.count, self.statistic) = (0, 0.0);
     }
 
     /// Takes the residuals of the sample at `time`; returns the estimated onset in s if there is an alarm.

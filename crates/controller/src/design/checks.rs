@@ -1,6 +1,6 @@
 //! The checks of a design file: counts, shapes, ranges, entries that belong together.
 
-use super::{Defaults, Design, DesignError, Estimator, Fault, SlidingMode};
+use super::{Defaults, Design, DesignError, Estimator, Fault, Measurement, SlidingMode};
 use crate::channel::channel;
 use crate::matrix::Matrix;
 
@@ -97,6 +97,10 @@ impl Design {
             let text = "schedule and sliding_mode are stated, expected one of them";
             return refuse(text.to_owned());
         }
+        if self.sample_time.is_none() && self.checks_measurements() {
+            let text = "schedule and range or longest_hold of a measurement are stated, expected sample_time, too";
+            return refuse(text.to_owned());
+        }
         if schedule.points.len() < 2 {
             return refuse("schedule: expected at least two points".to_owned());
         }
@@ -147,6 +151,14 @@ impl Design {
             for (name, values, expected) in lists {
                 if values.len() != expected || values.iter().any(|value| !value.is_finite()) {
                     return refuse(format!("{place}: {name}: expected {expected} finite numbers"));
+                }
+            }
+            for (signal, value) in self.measurements.iter().zip(&point.y_op) {
+                if signal.range.is_some_and(|[low, high]| *value < low || *value > high) {
+                    let name = &signal.name;
+                    return refuse(format!(
+                        "{place}: y_op of {name} is {value}, outside of its range"
+                    ));
                 }
             }
             for (actuator, value) in self.actuators.iter().zip(&point.u_op) {
@@ -384,10 +396,11 @@ impl Design {
     }
 
     fn refused_signal(&self) -> Option<Refusal> {
-        let signals = self.states.iter().chain(&self.measurements).chain(&self.references);
+        let signals = self.states.iter().chain(&self.references);
         let values = signals.map(|signal| (&signal.name, signal.operating));
+        let measured = self.measurements.iter().map(|signal| (&signal.name, signal.operating));
         let commands = self.actuators.iter().map(|actuator| (&actuator.name, actuator.operating));
-        for (name, value) in values.chain(commands) {
+        for (name, value) in values.chain(measured).chain(commands) {
             if let Some(value) = value.filter(|value| !value.is_finite()) {
                 return Some(Refusal::new(
                     format!("operating of {name}"),
@@ -395,6 +408,10 @@ impl Design {
                     "a finite number",
                 ));
             }
+        }
+        if let Some(refusal) = self.measurements.iter().find_map(|signal| self.refused_hold(signal))
+        {
+            return Some(refusal);
         }
         for actuator in &self.actuators {
             let Some([low, high]) = actuator.limits else { continue };
@@ -415,6 +432,31 @@ impl Design {
                 Refusal::new(format!("least_command of {name}"), value, "1e-100 to 1e100")
             })
             .next()
+    }
+
+    /// The first of range and longest time of a hold that breaks its rule.
+    fn refused_hold(&self, signal: &Measurement) -> Option<Refusal> {
+        let name = &signal.name;
+        if let Some([low, high]) = signal.range {
+            if !(low.is_finite() && high.is_finite() && low < high) {
+                let what = format!("range of {name} from {low} to");
+                return Some(Refusal::new(what, high, "two finite numbers, the smaller one first"));
+            }
+            // A schedule has its own operating points.
+            let operating = signal.operating.unwrap_or(0.0);
+            if self.schedule.is_none() && !(low..=high).contains(&operating) {
+                let what = format!("operating of {name}");
+                return Some(Refusal::new(what, operating, "a value within its range"));
+            }
+        }
+        let longest = signal.longest_hold?;
+        let what = || format!("longest_hold of {name}");
+        if !(longest > 0.0 && longest.is_finite()) {
+            return Some(Refusal::new(what(), longest, "a time above 0 s"));
+        }
+        let has_too_many = |period| signal.most_held(period).is_none();
+        let rule = "fewer than 2^32 samples";
+        self.sample_time.is_some_and(has_too_many).then(|| Refusal::new(what(), longest, rule))
     }
 
     fn refused_time(&self) -> Option<Refusal> {

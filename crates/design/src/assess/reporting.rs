@@ -220,6 +220,12 @@ fn plant(designed: &Solution, names: &Names) -> Result<Plant, Error> {
         operating: signal.operating.unwrap_or(0.0),
         notes: signal.limits.map_or(String::new(), |[low, high]| format!("from {low} to {high}")),
     };
+    let measurement = |measured: &signals::Signal| {
+        let range = measured.limits.map(|[low, high]| format!("used from {low} to {high}"));
+        let hold = measured.longest_hold.map(|time| format!("held for {time} s at most"));
+        let notes: Vec<_> = range.into_iter().chain(hold).collect();
+        Signal { notes: notes.join(", "), ..signal(measured) }
+    };
     let fault = |fault: &Fault| Signal {
         name: fault.name.clone(),
         unit: fault.unit.clone(),
@@ -231,7 +237,7 @@ fn plant(designed: &Solution, names: &Names) -> Result<Plant, Error> {
         origin: linear.origin.clone(),
         states: linear.states.iter().map(signal).collect(),
         actuators: linear.actuators.iter().map(signal).collect(),
-        measurements: linear.measurements.iter().map(signal).collect(),
+        measurements: linear.measurements.iter().map(measurement).collect(),
         faults: linear.faults.iter().map(fault).collect(),
         matrices: names.plant_matrices(designed),
         eigenvalues: pairs(&eigenvalues(&linear.a)?),

@@ -4,6 +4,7 @@ use std::cell::Cell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use aso_controller::sample::detection::{Cumulative, Decision, Window};
+use aso_controller::sample::measurements::Validity;
 use aso_controller::sample::reconfiguration::Stuck;
 use aso_controller::sample::{self, Number};
 
@@ -130,10 +131,17 @@ impl Arithmetic {
     }
 }
 
-/// Measurements, references and a scheduling variable: finite or not.
+/// Measurements, references and a scheduling variable: finite or not, within a range or not.
 fn take_inputs(controller: &Controller) {
-    let inputs = Kind::Measurement.count(controller) + Kind::Reference.count(controller);
-    sample::all_finite(&vec![Counted; inputs + controller.schedule_inputs().len()]);
+    let measured = vec![Counted; Kind::Measurement.count(controller)];
+    if controller.checks_measurements() {
+        let validity = Validity { low: &measured, high: &measured, most_held: &[] };
+        validity.take(&measured, &mut measured.clone(), &mut []);
+    } else {
+        sample::all_finite(&measured);
+    }
+    let others = Kind::Reference.count(controller) + controller.schedule_inputs().len();
+    sample::all_finite(&vec![Counted; others]);
 }
 
 /// The longest sample: faults are compensated, the most actuators are gone, each window ends, each test gives an alarm.
@@ -222,6 +230,8 @@ impl Memory {
         // The commands of the sample before.
         stored += Kind::Actuator.count(controller) + controller.schedule_inputs().len();
         let mut counters = usize::from(controller.has_counter());
+        let held = if controller.limits_holds() { Kind::Measurement.count(controller) } else { 0 };
+        counters += held + usize::from(controller.counts_since_rest());
         let mut flags = usize::from(controller.filter.is_some());
         if let Some(detection) = &controller.detection {
             stored += detection.stored();
@@ -254,7 +264,7 @@ impl Memory {
         Self {
             state: (stored * size + 4 * counters + flags).next_multiple_of(size),
             stack: stack * size,
-            constants: tables * size + integers + of_cases + of_losses,
+            constants: tables * size + integers + of_cases + of_losses + 4 * held,
         }
     }
 }

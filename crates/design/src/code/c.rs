@@ -68,6 +68,7 @@ impl Source<'_> {
             at_limit: flag("AT_LIMIT"),
             overflow: flag("OVERFLOW"),
             outside: flag("OUTSIDE"),
+            lost: flag("LOST"),
             real: self.real,
             compiler: "-std=c99 -ffp-contract=off without -ffast-math (gcc, clang); on 32-bit x86 also \
                        -msse2 -mfpmath=sse.",

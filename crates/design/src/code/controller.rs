@@ -50,6 +50,8 @@ pub(super) struct Controller {
     pub(super) states: Vec<Signal>,
     pub(super) actuators: Vec<Signal>,
     pub(super) measurements: Vec<Signal>,
+    /// For each measurement the most samples for which its last value may replace it, if there is such a limit.
+    pub(super) most_held: Vec<Option<u32>>,
     pub(super) faults: Vec<Signal>,
     pub(super) references: Vec<Signal>,
     pub(super) losses: Vec<Loss>,
@@ -160,7 +162,8 @@ impl Controller {
             references: signals(references),
             states: signals(states),
             actuators: actuators.into_iter().map(Signal::from).collect(),
-            measurements: signals(measurements),
+            most_held: measurements.iter().map(|signal| signal.most_held(sample_time)).collect(),
+            measurements: measurements.into_iter().map(Signal::from).collect(),
             faults: faults.into_iter().map(Signal::from).collect(),
         })
     }
@@ -193,6 +196,21 @@ impl Controller {
     /// A matrix in each set of gains; `None` if it is the same in all.
     pub(super) fn chosen(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
         self.reconfiguration.as_ref().and_then(|own| own.matrices(matrix))
+    }
+
+    /// Whether a measurement has a range or a longest time of a hold.
+    pub(super) fn checks_measurements(&self) -> bool {
+        self.measurements.iter().any(|signal| signal.limits.is_some()) || self.limits_holds()
+    }
+
+    /// Whether a measurement has a longest time of a hold.
+    pub(super) fn limits_holds(&self) -> bool {
+        self.most_held.iter().any(Option::is_some)
+    }
+
+    /// Whether the detection counts the samples since the controller rested, beside those since the start.
+    pub(super) fn counts_since_rest(&self) -> bool {
+        self.limits_holds() && self.detection.is_some()
     }
 
     /// Whether any actuator has limits.

@@ -1,6 +1,6 @@
 //! What the parts of a controller share: signals, matrices, the numbers of samples.
 
-use aso_controller::design::{Actuator, Fault};
+use aso_controller::design::{Actuator, Fault, Measurement};
 use nalgebra::DMatrix;
 
 /// A state, an actuator, a measurement, a reference or a fault, as the code describes it.
@@ -10,6 +10,7 @@ pub(super) struct Signal {
     pub(super) description: String,
     /// The value at the operating point.
     pub(super) operating: f64,
+    /// The limits of an actuator, the range of a measurement.
     pub(super) limits: Option<[f64; 2]>,
 }
 
@@ -28,6 +29,15 @@ impl From<aso_controller::design::Signal> for Signal {
     fn from(signal: aso_controller::design::Signal) -> Self {
         let aso_controller::design::Signal { name, unit, description, operating } = signal;
         Self::new(name, unit, description, operating.unwrap_or_default())
+    }
+}
+
+impl From<Measurement> for Signal {
+    fn from(measurement: Measurement) -> Self {
+        let Measurement { name, unit, description, operating, range, longest_hold: _ } =
+            measurement;
+        let operating = operating.unwrap_or_default();
+        Self { limits: range, ..Self::new(name, unit, description, operating) }
     }
 }
 

@@ -160,8 +160,9 @@ impl RoundingBound {
             None => "",
             Some(_) => " and no actuator gone",
         };
+        let used = if controller.checks_measurements() { " and no measurement held" } else { "" };
         let mut lines = filled(&format!(
-            "In the loop with the plant of the design, while compensating and with no command at a limit{intact}, \
+            "In the loop with the plant of the design, while compensating and with no command at a limit{intact}{used}, \
              an output differs by at most the sum over the signals of coefficient times largest \
              deviation from the operating point (last row: a constant):"
         ));

@@ -66,6 +66,7 @@ impl Source<'_> {
             at_limit: "Status::at_limit".to_owned(),
             overflow: "Status::overflow".to_owned(),
             outside: "Status::outside".to_owned(),
+            lost: "Status::lost".to_owned(),
             real: self.real,
             compiler: "rustc keeps it.",
         }

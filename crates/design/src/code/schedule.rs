@@ -38,7 +38,7 @@ pub(super) struct Point {
 
 impl Schedule {
     /// The schedule of a design file with these measurements.
-    pub(super) fn of(file: schedule::Schedule, measurements: &[design::Signal]) -> Self {
+    pub(super) fn of(file: schedule::Schedule, measurements: &[design::Measurement]) -> Self {
         let schedule::Schedule { variable, unit, description, points } = file;
         let measurement = measurements.iter().position(|signal| signal.name == variable);
         let points: Vec<_> = points.into_iter().map(Point::of).collect();

@@ -20,6 +20,7 @@ pub(super) struct Vocabulary {
     pub(super) at_limit: String,
     pub(super) overflow: String,
     pub(super) outside: String,
+    pub(super) lost: String,
     pub(super) real: &'static str,
     /// How the compiler keeps the order of operations.
     pub(super) compiler: &'static str,
@@ -254,6 +255,13 @@ fn signals(controller: &Controller, fields: &Fields) -> Vec<String> {
                 .map(|[low, high]| format!("Limits of Commands.{field}: {low:?} to {high:?}")),
         );
     }
+    for (measurement, field) in controller.measurements.iter().zip(&fields.measurements) {
+        lines.extend(
+            measurement
+                .limits
+                .map(|[low, high]| format!("Range of Measurements.{field}: {low:?} to {high:?}")),
+        );
+    }
     for loss in &controller.losses {
         let [fault, actuator] = [&fields.faults[loss.fault], &fields.actuators[loss.actuator]];
         lines.push(format!(
@@ -265,7 +273,7 @@ fn signals(controller: &Controller, fields: &Fields) -> Vec<String> {
 }
 
 fn status(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
-    let Vocabulary { held, at_limit, overflow, outside, real, .. } = vocabulary;
+    let Vocabulary { held, at_limit, overflow, outside, lost, real, .. } = vocabulary;
     let inputs = match controller.schedule_inputs() {
         [] => "measurement or reference",
         _ => "measurement, a reference or the scheduling variable",
@@ -278,9 +286,14 @@ fn status(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
         None => " and estimates",
         Some(_) => ", estimates, residuals, statistics and decision",
     };
+    let (beyond, last) = if controller.checks_measurements() {
+        (", or a measurement outside of its range", "its last other value")
+    } else {
+        ("", "its last finite value")
+    };
     let mut all = vec![
         format!(
-            "{held}: a {inputs} was NaN or infinite; its last finite value was used, before the first \
+            "{held}: a {inputs} was NaN or infinite{beyond}; {last} was used, before the first \
              one its value {place}."
         ),
         format!("{at_limit}: a command is at a limit."),
@@ -295,7 +308,29 @@ fn status(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
             .is_some()
             .then(|| format!("{outside}: the scheduling variable is outside of the schedule.")),
     );
+    all.extend(controller.limits_holds().then(|| rest(controller, lost)));
     all
+}
+
+/// What the controller does while the last value of a measurement is too old.
+fn rest(controller: &Controller, lost: &str) -> String {
+    let measurements = controller.measurements.iter().zip(&controller.most_held);
+    let longest: Vec<_> = measurements
+        .filter_map(|(signal, most)| Some(format!("{} for {}", one_line(&signal.name), (*most)?)))
+        .collect();
+    let detection = match controller.detection {
+        None => "",
+        Some(_) => {
+            " The detection does the same: its decision stays, residuals and statistics are 0, and tests begin as \
+             after the start."
+        }
+    };
+    format!(
+        "{lost}: the last value of a measurement was used for more samples than it may be ({}). Commands and \
+         estimates are those of the operating point, without faults; from the first sample in which no measurement \
+         is lost, the controller continues from there.{detection}",
+        longest.join(", ")
+    )
 }
 
 fn costs(request: &Request<'_>, controller: &Controller) -> [String; 2] {

@@ -96,6 +96,16 @@ pub(super) fn tables(controller: &Controller) -> Vec<Constants> {
             all.push(Constants::vector(name, meaning, Kind::Actuator, values));
         }
     }
+    if controller.checks_measurements() {
+        let meaning = "measurements that are used; the largest number stands for no limit";
+        let limit = |side: usize| {
+            let none = [f64::NEG_INFINITY, f64::INFINITY][side];
+            let limit = |signal: &Signal| signal.limits.map_or(none, |limits| limits[side]);
+            controller.measurements.iter().map(limit).collect()
+        };
+        all.push(Constants::vector("y_min", meaning, Kind::Measurement, limit(0)));
+        all.push(Constants::vector("y_max", "", Kind::Measurement, limit(1)));
+    }
     all
 }
 

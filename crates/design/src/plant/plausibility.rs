@@ -13,14 +13,15 @@ use control::faults::ExtendedPlant;
 const DEPENDENT: f64 = 1e-10;
 /// Coefficients of a combination below this, relative to the largest, count as zero.
 const NEGLIGIBLE: f64 = 1e-6;
-/// Checks that the limits of each actuator contain its operating point; returns the warnings.
+/// Checks that the limits of each actuator and the range of each measurement contain its operating point; returns the
+/// warnings.
 pub(crate) fn check_limits(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
 ) -> Result<Vec<PlaceError>, PlaceError> {
     let mut warnings = Vec::new();
     for actuator in &linear.actuators {
-        let (Some([low, high]), [_, Some(place)]) = (actuator.limits, &actuator.places) else {
+        let (Some([low, high]), [_, Some(place), _]) = (actuator.limits, &actuator.places) else {
             continue;
         };
         let value = actuator.operating.unwrap_or(0.0);
@@ -39,6 +40,21 @@ pub(crate) fn check_limits(
                 "{about}, is at a limit, so that the controller acts in one direction only"
             );
             warnings.push(file.error_at(place, message));
+        }
+    }
+    for signal in &linear.measurements {
+        let (Some([low, high]), [_, Some(place), _]) = (signal.limits, &signal.places) else {
+            continue;
+        };
+        let value = signal.operating.unwrap_or(0.0);
+        if !(low..=high).contains(&value) {
+            let unit = signal.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+            let message = format!(
+                "the operating point of the measurement `{}`, {value}{unit}, is outside of its range from {low} \
+                 to {high}; expected a range that contains it, or another `operating` or `operating_point`",
+                signal.name
+            );
+            return Err(file.error_at(place, message));
         }
     }
     Ok(warnings)

@@ -227,6 +227,9 @@ impl OwnVariables {
         let reconfigured = file.reconfiguration.is_some();
         add(reconfigured, &[("actuator_gone", m), ("u_stuck", m)]);
         let fallback = file.fallback.is_some();
+        if file.checks_measurements() {
+            own.scalars.extend(["measurement_held", "measurement_lost"]);
+        }
         own.scalars.extend((reconfigured || fallback).then_some("reconfiguration"));
         own.scalars.extend(fallback.then_some("fall_back"));
         own

@@ -172,7 +172,7 @@ fn named_after(measurement: &Signal, entry: &Entry<'_>) -> Signal {
             "" => format!("set point of {}", measurement.name),
             text => format!("set point of {text}"),
         },
-        places: [Some(entry.place.clone()), None],
+        places: [Some(entry.place.clone()), None, None],
         ..Signal::named(name)
     }
 }

@@ -13,18 +13,28 @@ pub(crate) struct Signal {
     pub(crate) description: String,
     /// The value at the operating point, if stated.
     pub(crate) operating: Option<f64>,
-    /// The limits of an actuator: smallest and largest value.
+    /// The limits of an actuator, the range of a measurement: smallest and largest value.
     pub(crate) limits: Option<[f64; 2]>,
-    /// The places of name and limits, if the file states them.
-    pub(crate) places: [Option<Place>; 2],
+    /// The longest time in s for which the last value of a measurement may replace it.
+    pub(crate) longest_hold: Option<f64>,
+    /// The places of name, limits or range, and longest time of a hold, if the file states them.
+    pub(crate) places: [Option<Place>; 3],
+}
+
+/// What a signal is, which decides what may be stated about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    State,
+    Actuator,
+    Measurement,
 }
 
 impl Signal {
     /// Creates a signal with a name only.
     pub(crate) fn named(name: String) -> Self {
-        let (unit, operating, limits) = (None, None, None);
-        let (description, places) = (String::new(), [None, None]);
-        Self { name, unit, description, operating, limits, places }
+        let (unit, operating, limits, longest_hold) = (None, None, None, None);
+        let (description, places) = (String::new(), [None, None, None]);
+        Self { name, unit, description, operating, limits, longest_hold, places }
     }
 
     /// Fills missing fields from `other`.
@@ -85,6 +95,8 @@ pub(crate) struct Fault {
 const MOST_LOSSES: usize = 4;
 const SIGNAL: [&str; 4] = ["name", "unit", "description", "operating"];
 const ACTUATOR: [&str; 5] = ["name", "unit", "description", "operating", "limits"];
+const MEASUREMENT: [&str; 6] =
+    ["name", "unit", "description", "operating", "range", "longest_hold"];
 const FAULT: [&str; 13] = [
     "name",
     "unit",
@@ -102,14 +114,14 @@ const FAULT: [&str; 13] = [
 ];
 
 /// Reads the signals under `key`: texts (names) or tables.
-pub(crate) fn signals(entry: &Entry<'_>, limited: bool) -> Result<Vec<Signal>, PlaceError> {
+pub(crate) fn signals(entry: &Entry<'_>, role: Role) -> Result<Vec<Signal>, PlaceError> {
     let members = entry.list()?;
     if members.is_empty() {
         return Err(entry.error("expected at least one"));
     }
     let mut found: Vec<Signal> = Vec::with_capacity(members.len());
     for member in &members {
-        let signal = signal(member, limited)?;
+        let signal = signal(member, role)?;
         if found.iter().any(|other| other.name == signal.name) {
             return Err(member.error(format!("the name `{}` is there twice", signal.name)));
         }
@@ -118,21 +130,32 @@ pub(crate) fn signals(entry: &Entry<'_>, limited: bool) -> Result<Vec<Signal>, P
     Ok(found)
 }
 
-fn signal(entry: &Entry<'_>, limited: bool) -> Result<Signal, PlaceError> {
+fn signal(entry: &Entry<'_>, role: Role) -> Result<Signal, PlaceError> {
     if entry.is_text() {
-        let places = [Some(entry.place.clone()), None];
+        let places = [Some(entry.place.clone()), None, None];
         return Ok(Signal { places, ..Signal::named(name(entry)?) });
     }
     let table = entry.table()?;
-    table.allow(if limited { &ACTUATOR } else { &SIGNAL })?;
+    table.allow(match role {
+        Role::State => &SIGNAL[..],
+        Role::Actuator => &ACTUATOR,
+        Role::Measurement => &MEASUREMENT,
+    })?;
+    let limited = table.get(if role == Role::Measurement { "range" } else { "limits" });
+    let longest_hold = table.get("longest_hold");
     let named = table.require("name", "the name of the signal")?;
     Ok(Signal {
         name: name(&named)?,
         unit: unit(&table)?,
         description: description(&table)?,
         operating: table.get("operating").map(|entry| entry.number()).transpose()?,
-        limits: table.get("limits").map(|entry| limits(&entry)).transpose()?,
-        places: [Some(named.place), table.get("limits").map(|entry| entry.place)],
+        limits: limited.as_ref().map(limits).transpose()?,
+        longest_hold: longest_hold.as_ref().map(Entry::positive).transpose()?,
+        places: [
+            Some(named.place),
+            limited.map(|entry| entry.place),
+            longest_hold.map(|entry| entry.place),
+        ],
     })
 }
 

@@ -146,7 +146,7 @@ pub(crate) fn schedule(
         None => Variable::Input(Signal {
             unit: unit(&table)?,
             description: description(&table)?,
-            places: [Some(named.place.clone()), None],
+            places: [Some(named.place.clone()), None, None],
             ..Signal::named(own)
         }),
     };

@@ -97,6 +97,26 @@ fn each_optional_entry_is_refused_where_it_does_not_fit() {
         let message = message("", after, &format!("{after}\n{entry}"));
         assert!(message.contains(expected), "{message:?} has no {expected:?}");
     }
+    let measured = "[[measurements]]\nname = \"x\"";
+    let wrong = [
+        ("range = [1.0, 1.0]", "range of x from 1 to = 1, expected two finite numbers"),
+        ("range = [-1.0, inf]", "range of x from -1 to = inf, expected two finite numbers"),
+        ("range = [1.0, 2.0]", "operating of x = 0, expected a value within its range"),
+        ("longest_hold = 0.0", "longest_hold of x = 0, expected a time above 0 s"),
+        ("longest_hold = inf", "longest_hold of x = inf, expected a time above 0 s"),
+    ];
+    for (entry, expected) in wrong {
+        let message = message("", measured, &format!("{measured}\n{entry}"));
+        assert!(message.contains(expected), "{message:?} has no {expected:?}");
+    }
+    let sampled = "sample_time = 0.001\nestimator = \"current\"\n";
+    let text = sampled.to_owned()
+        + &small("").replace(measured, &format!("{measured}\nlongest_hold = 1e9"));
+    let found = with_design(&text).err().unwrap().to_string();
+    assert!(
+        found.contains("longest_hold of x = 1000000000, expected fewer than 2^32 samples"),
+        "{found}"
+    );
     let limits = "limits = [1.0, 2.0]";
     let message = message(limits, "name = \"v\"", "name = \"v\"\noperating = 1.0");
     assert!(

@@ -55,6 +55,12 @@ impl Source<'_> {
         if controller.has_counter() {
             lines.push("    uint32_t sample;".to_owned());
         }
+        if controller.limits_holds() {
+            lines.push(format!("    uint32_t held[{}];", self.count(Kind::Measurement)));
+        }
+        if controller.counts_since_rest() {
+            lines.push("    uint32_t running;".to_owned());
+        }
         self.reconfiguration_state(&mut lines, false);
         self.detection_state(&mut lines, false);
         if controller.filter.is_some() {
@@ -117,6 +123,9 @@ impl Source<'_> {
         ]);
         if controller.schedule.is_some() {
             lines.push(format!("#define {capital}_OUTSIDE 8U"));
+        }
+        if controller.limits_holds() {
+            lines.push(format!("#define {capital}_LOST 16U"));
         }
         lines.push(String::new());
     }

@@ -15,6 +15,13 @@ impl Source<'_> {
             self.tables_of_reconfiguration(lines, reconfiguration);
         }
         self.tables_of_losses(lines);
+        if self.controller.limits_holds() {
+            let text = "The most samples for which the last value of a measurement may replace it.";
+            lines.push(format!("\n/* {text} */"));
+            let most =
+                self.controller.most_held.iter().map(|most| most.unwrap_or(u32::MAX) as usize);
+            numbers(lines, ["most_held", &self.count(Kind::Measurement)], most);
+        }
     }
 
     fn tables_of_tests(&self, lines: &mut Vec<String>, detection: &Detection) {

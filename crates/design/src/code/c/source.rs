@@ -73,13 +73,18 @@ void {name}_init_at({name}_State *state, const {real} x_hat_0[{n}],
         lines.extend(["    return status;", "}"].map(str::to_owned));
     }
 
-    /// The last finite inputs.
+    /// The last inputs that are used.
     fn inputs(&self, lines: &mut Vec<String>) {
+        let is_checked = self.controller.checks_measurements();
         for (owner, fields, vector) in [
             ("measurements", &self.fields.measurements, "y"),
             ("references", &self.fields.references, "r"),
         ] {
             lines.extend(fields.iter().enumerate().map(|(k, field)| {
+                if is_checked && vector == "y" {
+                    let take = format!("aso_take_measurement(state, {k}U, {owner}->{field})");
+                    return format!("    status = status | {take};");
+                }
                 format!("    status = status | aso_take(&state->{vector}[{k}], {owner}->{field});")
             }));
         }

@@ -62,7 +62,7 @@ impl Source<'_> {
         }
     }
 
-    fn switches(&self) -> [(&'static str, bool); 23] {
+    fn switches(&self) -> [(&'static str, bool); 25] {
         let controller = self.controller;
         let fallback = controller
             .reconfiguration
@@ -94,6 +94,8 @@ impl Source<'_> {
             ("HAS_DETECTION", controller.detection.is_some()),
             ("HAS_WINDOWS", windows),
             ("HAS_RECONFIGURATION", controller.reconfiguration.is_some()),
+            ("CHECKS_MEASUREMENTS", controller.checks_measurements()),
+            ("LIMITS_HOLDS", controller.limits_holds()),
             ("HAS_FALL_BACK", fallback.is_some()),
             ("FALL_BACK_COMPENSATES", fallback == Some(true)),
         ]

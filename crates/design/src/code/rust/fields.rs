@@ -1,4 +1,4 @@
-//! The fields of an instance that belong to tests and to actuators that may be gone.
+//! The fields of an instance that belong to tests, to actuators that may be gone, and to measurements that are held.
 
 use super::Source;
 use crate::code::detection::Method;
@@ -36,6 +36,21 @@ impl Source<'_> {
             field("decision", "Decision", "Decision { isolated: 0, detected_at: 0, onset: 0 }"),
         ]);
         all
+    }
+
+    /// The counters of the samples for which the last values of measurements are used, and of those since the
+    /// controller rested.
+    pub(super) fn fields_of_measurements(&self) -> Vec<Field> {
+        let held = field("held", "[u32; MEASUREMENTS]", "[0; MEASUREMENTS]");
+        let running = field("running", "u32", "0");
+        let held = self.controller.limits_holds().then_some(held);
+        held.into_iter().chain(self.controller.counts_since_rest().then_some(running)).collect()
+    }
+
+    /// All of these fields.
+    pub(super) fn other_fields(&self) -> impl Iterator<Item = Field> {
+        let of_tests = self.fields_of_tests().into_iter().chain(self.fields_of_reconfiguration());
+        of_tests.chain(self.fields_of_measurements())
     }
 
     /// The fields of the choice of gains.

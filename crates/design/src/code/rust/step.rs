@@ -24,6 +24,9 @@ impl Source<'_> {
                 if reconfiguration.cases.is_empty() { "" } else { "Case, Request, Watch, " };
             lines.push(format!("use sample::reconfiguration::{{{cases}Choice, Sets, Stuck}};"));
         }
+        if self.controller.checks_measurements() {
+            lines.push("use sample::measurements::Validity;".to_owned());
+        }
         lines.push("use sample::{Design, Matrix, Signals, State};".to_owned());
         lines.join("\n")
     }
@@ -49,8 +52,10 @@ impl Source<'_> {
             parameters.push_str(" actuators: &Actuators,");
         }
         let reset = if controller.detection.is_some() { ", detection_reset: bool" } else { "" };
-        lines.push(format!(
-            "
+        let is_checked = controller.checks_measurements();
+        if !is_checked || !inputs.is_empty() {
+            lines.push(format!(
+                "
 /// Keeps the values that are numbers; returns whether there is another one.
 fn take(kept: &mut [{real}], values: &[{real}]) -> bool {{
     let mut held = false;
@@ -62,16 +67,29 @@ fn take(kept: &mut [{real}], values: &[{real}]) -> bool {{
         }}
     }}
     held
-}}
-
+}}"
+            ));
+        }
+        let taken = match (is_checked, controller.limits_holds()) {
+            (false, _) => "take(&mut self.y, &measured);",
+            (true, false) => "VALIDITY.take(&measured, &mut self.y, &mut []);",
+            (true, true) => {
+                "VALIDITY.take(&measured, &mut self.y, &mut self.held);
+        status.lost = VALIDITY.is_lost(&self.held);"
+            }
+        };
+        let last =
+            if is_checked { "The last inputs that are used." } else { "The last finite inputs." };
+        lines.push(format!(
+            "
 impl Controller {{
     /// Takes a sample.
     #[must_use]
     pub fn step(&mut self, measurements: &Measurements,{parameters} compensate: bool{reset}) -> Outputs {{
         let mut status = Status::default();
-        // The last finite inputs.
+        // {last}
         let measured: [{real}; MEASUREMENTS] = (*measurements).into();
-        status.held |= take(&mut self.y, &measured);{inputs}"
+        status.held |= {taken}{inputs}"
         ));
         let compensating = match controller.first_compensated {
             0 => "compensate",
@@ -90,12 +108,64 @@ impl Controller {{
             );
         }
         if controller.h.is_some() {
-            lines.push("        let x_i_value = self.x_i;".to_owned());
+            let mutable = if controller.limits_holds() { "mut " } else { "" };
+            lines.push(format!("        let {mutable}x_i_value = self.x_i;"));
         }
         self.design(lines);
         self.signals(lines);
-        self.take_sample(lines);
+        if controller.limits_holds() {
+            let mut regular = Vec::new();
+            self.take_sample(&mut regular);
+            self.rest(lines);
+            lines.extend(regular.iter().map(|part| indented(part)));
+            lines.push("        }".to_owned());
+        } else {
+            self.take_sample(lines);
+        }
+        self.count_sample(lines);
         self.outputs(lines);
+    }
+
+    /// The sample in which a measurement is lost, and the start of the other case.
+    fn rest(&self, lines: &mut Vec<String>) {
+        let controller = self.controller;
+        lines.push("        if status.lost {\n            signals.rest(&design);".to_owned());
+        if controller.reconfiguration.is_some() {
+            lines.push(
+                "            let stuck = Stuck {
+                k_s: Matrix::NONE,
+                without: &[false; ACTUATORS],
+                gone: &self.gone,
+                commands: [&U_STUCK, &STUCK_AT],
+            };
+            signals.add_stuck(&design, &stuck);"
+                    .to_owned(),
+            );
+        }
+        lines.push("            signals.keep(&mut state, true);".to_owned());
+        if controller.filter.is_some() {
+            lines.push("            self.started = false;".to_owned());
+        }
+        if controller.h.is_some() {
+            lines.push("            x_i_value = [0.0; REFERENCES];".to_owned());
+        }
+        if controller.detection.is_some() {
+            lines.push("            self.x_r = [0.0; RESIDUAL_STATES];".to_owned());
+            lines.push("            self.residual = [0.0; RESIDUALS];".to_owned());
+            // A decision stays.
+            let fields = self.fields_of_tests().into_iter();
+            let cleared = fields.filter(|field| !["alarmed", "decision"].contains(&field.name));
+            lines.extend(
+                cleared.map(|field| format!("            self.{} = {};", field.name, field.start)),
+            );
+            lines.push("            self.running = 0;".to_owned());
+        }
+        lines.push("        } else {".to_owned());
+    }
+
+    /// The number of the sample from which the detection counts.
+    fn running(&self) -> &'static str {
+        if self.controller.counts_since_rest() { "self.running" } else { "self.sample" }
     }
 
     /// The choice of the gains at the start of a sample.
@@ -285,23 +355,22 @@ impl Controller {{
         status.at_limit = signals.limit(&design, {gone});
         signals.predict(&design, &state, estimating);"
         ));
+        let running = self.running();
         if controller.detection.is_some() {
-            lines.push(
+            lines.push(format!(
                 "        let (mut x_r, mut residual) = ([0.0; RESIDUAL_STATES], [0.0; RESIDUALS]);
         let inputs: [&[_]; 3] = [&self.x_r, signals.u, signals.y];
-        let is_finite = RESIDUAL_FILTER.advance(inputs, self.sample == 0, &mut x_r, &mut residual) && is_finite;"
-                    .to_owned(),
-            );
+        let is_finite = RESIDUAL_FILTER.advance(inputs, {running} == 0, &mut x_r, &mut residual) && is_finite;"
+            ));
         }
         lines.push("        if signals.keep(&mut state, is_finite) {".to_owned());
         if controller.detection.is_some() {
-            lines.push(
+            lines.push(format!(
                 "            (self.x_r, self.residual) = (x_r, residual);
-            if self.sample > 0 {
+            if {running} > 0 {{
                 self.detect(detection_reset);
-            }"
-                .to_owned(),
-            );
+            }}"
+            ));
         }
         lines.push(
             "        } else {
@@ -309,6 +378,13 @@ impl Controller {{
         }"
             .to_owned(),
         );
+        if controller.counts_since_rest() {
+            lines.push("        self.running = self.running.saturating_add(1);".to_owned());
+        }
+    }
+
+    fn count_sample(&self, lines: &mut Vec<String>) {
+        let controller = self.controller;
         if controller.counts_all() {
             // The times of a detection follow from the number of samples.
             lines.push("        self.sample = self.sample.saturating_add(1);".to_owned());
@@ -385,14 +461,14 @@ impl Controller {{
         let clear: Vec<_> = fields
             .map(|field| format!("\n            self.{} = {};", field.name, field.start))
             .collect();
-        let clear = clear.concat();
+        let (clear, running) = (clear.concat(), self.running());
         lines.push(format!(
             "
     /// Tests the residuals of a sample.
     fn detect(&mut self, detection_reset: bool) {{
         if detection_reset {{{clear}
         }}
-        if self.sample < FIRST_TESTED {{
+        if {running} < FIRST_TESTED {{
             return;
         }}
         let mut outcomes = Outcomes {{
@@ -477,4 +553,10 @@ fn at_place<'a, const N: usize>(
 }}"
         ));
     }
+}
+
+/// The lines of a part, one level deeper.
+fn indented(part: &str) -> String {
+    let lines: Vec<_> = part.lines().map(|line| format!("    {line}")).collect();
+    lines.join("\n")
 }

@@ -13,10 +13,35 @@ impl Source<'_> {
         for table in tables(self.controller) {
             self.table(lines, &table);
         }
+        self.validity(lines);
         self.tables_of_tests(lines);
         if let Some(reconfiguration) = &self.controller.reconfiguration {
             self.tables_of_reconfiguration(lines, reconfiguration);
         }
+    }
+
+    /// When a measurement is used.
+    fn validity(&self, lines: &mut Vec<String>) {
+        if !self.controller.checks_measurements() {
+            return;
+        }
+        let most_held = if self.controller.limits_holds() {
+            let most = self.controller.most_held.iter();
+            let most = most.map(|most| most.map_or("u32::MAX".to_owned(), |most| most.to_string()));
+            list(lines, "MOST_HELD: [u32; MEASUREMENTS]", most);
+            "&MOST_HELD"
+        } else {
+            "&[]"
+        };
+        lines.push(format!(
+            "
+static VALIDITY: Validity<'static, {}> = Validity {{
+    low: &Y_MIN,
+    high: &Y_MAX,
+    most_held: {most_held},
+}};",
+            self.real
+        ));
     }
 
     /// A vector, or a matrix row by row; the vectors or matrices of all points of a schedule or sets of gains.

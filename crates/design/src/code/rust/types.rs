@@ -52,6 +52,35 @@ impl Source<'_> {
         }
         self.actuators_structure(lines);
         self.detection_structure(lines);
+        self.outputs_structure(lines);
+        lines.push(
+            "
+/// One instance of the controller.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Controller {"
+                .to_owned(),
+        );
+        for vector in stored(controller).into_iter().chain([Vector::U]) {
+            lines.push(format!("    {}: [{real}; {}],", vector.name(), vector.kind().plural()));
+        }
+        if !controller.schedule_inputs().is_empty() {
+            lines.push(format!("    theta: [{real}; 1],"));
+        }
+        lines.extend(
+            self.other_fields().map(|field| format!("    {}: {},", field.name, field.kind)),
+        );
+        if controller.has_counter() {
+            lines.push("    sample: u32,".to_owned());
+        }
+        if controller.filter.is_some() {
+            lines.push("    started: bool,".to_owned());
+        }
+        lines.push("}".to_owned());
+    }
+
+    /// The structures of what was unusual in a sample, and of its results.
+    fn outputs_structure(&self, lines: &mut Vec<String>) {
+        let controller = self.controller;
         let reconfiguration = match controller.reconfiguration {
             None => "",
             Some(_) => {
@@ -75,17 +104,30 @@ impl Source<'_> {
     pub outside: bool,"
             }
         };
+        let held = if controller.checks_measurements() {
+            "A measurement or reference was NaN or infinite, or a measurement outside of its range; its last other
+    /// value was used."
+        } else {
+            "A measurement or reference was NaN or infinite; its last finite value was used."
+        };
+        let lost = if controller.limits_holds() {
+            "
+    /// The last value of a measurement was used for too long; commands and estimates are those of the operating point.
+    pub lost: bool,"
+        } else {
+            ""
+        };
         lines.push(format!(
             "
 /// What was unusual in a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status {{
-    /// A measurement or reference was NaN or infinite; its last finite value was used.
+    /// {held}
     pub held: bool,
     /// A command is at a limit.
     pub at_limit: bool,
     /// A sum was beyond the range of the numbers; commands and estimates keep their values.
-    pub overflow: bool,{outside}
+    pub overflow: bool,{outside}{lost}
 }}
 
 /// The results of a sample.
@@ -97,27 +139,8 @@ pub struct Outputs {{
     pub estimates: Estimates,{detection}{reconfiguration}
     /// What was unusual.
     pub status: Status,
-}}
-
-/// One instance of the controller.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Controller {{"
+}}"
         ));
-        for vector in stored(controller).into_iter().chain([Vector::U]) {
-            lines.push(format!("    {}: [{real}; {}],", vector.name(), vector.kind().plural()));
-        }
-        if !controller.schedule_inputs().is_empty() {
-            lines.push(format!("    theta: [{real}; 1],"));
-        }
-        let fields = self.fields_of_tests().into_iter().chain(self.fields_of_reconfiguration());
-        lines.extend(fields.map(|field| format!("    {}: {},", field.name, field.kind)));
-        if controller.has_counter() {
-            lines.push("    sample: u32,".to_owned());
-        }
-        if controller.filter.is_some() {
-            lines.push("    started: bool,".to_owned());
-        }
-        lines.push("}".to_owned());
     }
 
     pub(super) fn start(&self, lines: &mut Vec<String>) {
@@ -159,8 +182,10 @@ impl Controller {{
         if controller.filter.is_some() {
             lines.push(format!("            y_f: {y},\n            started: false,"));
         }
-        let fields = self.fields_of_tests().into_iter().chain(self.fields_of_reconfiguration());
-        lines.extend(fields.map(|field| format!("            {}: {},", field.name, field.start)));
+        lines.extend(
+            self.other_fields()
+                .map(|field| format!("            {}: {},", field.name, field.start)),
+        );
         if controller.has_counter() {
             lines.push("            sample: 0,".to_owned());
         }
