@@ -5,7 +5,7 @@ use design::report::fallback::FallbackReport;
 use design::report::family::MemberReport;
 use design::report::losses::LossLoop;
 use design::report::reconfiguration::ReconfigurationReport;
-use design::report::robustness::{Number, ToleranceResult};
+use design::report::robustness::{Number, ToleranceProof, ToleranceResult};
 use design::report::schedule::ScheduleReport;
 use design::report::{CommandPeak, Loop, Matrix, ReferenceStep};
 use design::{Comparison, Report};
@@ -42,6 +42,7 @@ pub(crate) fn summarise(report: &Report) {
             number(robustness.longest_hold)
         );
         print_tolerance(&robustness.tolerance);
+        print_proof(&robustness.tolerance, &robustness.tolerance_proof);
     }
     if let Some(family) = &report.family {
         let members: Vec<_> = family.members.iter().collect();
@@ -116,6 +117,18 @@ fn print_tolerance(tolerance: &ToleranceResult) {
         limit => format!("an unstable case from {} of the tolerances on", number(limit)),
     };
     println!("    {}, {worst}", stable_cases(tolerance));
+}
+
+/// Prints the fraction of the tolerances for which stability is proven, or why there is none.
+fn print_proof(tested: &ToleranceResult, proof: &Result<ToleranceProof, String>) {
+    match proof {
+        _ if !tested.is_examined() => {}
+        Ok(proof) => println!(
+            "    proven: stable for every plant within {} of the tolerances",
+            number(proof.fraction)
+        ),
+        Err(reason) => println!("    stability of all cases: {reason}"),
+    }
 }
 
 /// The percentage of random cases that are stable.

@@ -18,6 +18,7 @@
 //! | effect of measurement noise | [`noise_gains`] |
 //! | which of several loops has the lowest peaks of S | [`least_sensitive`] |
 //! | errors of the plant's parameters | [`EntryFamily`], [`PlantFamily`], [`tolerance_test`] |
+//! | stability within tolerances, proven | [`proven_tolerance`], [`structured_bound`] |
 //! | gains for comparison | [`regulator_of_same_speed`] |
 
 mod channel;
@@ -33,6 +34,7 @@ mod noise;
 mod opened;
 mod scaling;
 mod speed;
+mod structured;
 mod sweep;
 mod tolerance;
 mod worst_case;
@@ -48,6 +50,9 @@ pub use noise::noise_gains;
 pub use opened::OpenedLoop;
 pub use scaling::ScaledPeak;
 pub use speed::regulator_of_same_speed;
+pub use structured::{
+    Block, ProvenTolerance, StructuredBound, Unproven, proven_tolerance, structured_bound,
+};
 pub use tolerance::{
     EntryFamily, PlantEntry, ToleranceSearch, ToleranceTest, Tolerances, random_deviations,
     tolerance_test,

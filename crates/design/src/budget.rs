@@ -64,6 +64,11 @@ impl Budget {
         Self { start: Instant::now(), limit, phase, option, interrupted }
     }
 
+    /// Starts the clock of a phase within this one, which has a part of the whole time.
+    pub(crate) fn part(&self, part: f64, phase: &'static str) -> Self {
+        Self { start: Instant::now(), limit: self.limit.mul_f64(part), phase, ..self.clone() }
+    }
+
     pub(crate) fn is_over(&self) -> bool {
         self.start.elapsed() >= self.limit || self.interrupted.load(Ordering::Relaxed)
     }

@@ -512,7 +512,9 @@ fn a_fault_of_a_mode_that_no_measurement_shows_is_refused() {
 fn judged(text: &str) -> (Level, String) {
     read(text, |file| {
         let designed = design(file).unwrap();
-        let found = robustness(&designed.nominal, &file.robustness, None, &unobserved()).unwrap();
+        let time = TimeLimits { certificates: Duration::ZERO, ..TimeLimits::default() };
+        let (nominal, steps) = (&designed.nominal, unobserved());
+        let (found, _) = robustness(nominal, &file.robustness, None, &time, &steps).unwrap();
         let verdict =
             verdict(&checks(&designed.nominal), found.as_ref(), &file.robustness, vec![], vec![]);
         (verdict.level, verdict.reasons.join("; "))
@@ -579,6 +581,37 @@ fn report_within(
     let steps = unobserved();
     let assessment = Assessment::new(file, None, designed, &steps);
     report(Assessment { limits, ..assessment })
+}
+
+/// For one entry the proof reaches the case found; without time, or without an entry that varies, it says so.
+#[test]
+fn a_fraction_of_the_tolerances_is_proven() {
+    let proof = |text: &str, time: Duration| {
+        let time = TimeLimits { certificates: time, ..TimeLimits::default() };
+        let report = |file: &PlantFile<'_>| {
+            report_within(file, &design(file).unwrap(), time.clone()).unwrap().robustness.unwrap()
+        };
+        let robustness = read(text, report).unwrap();
+        let fraction = robustness.tolerance_proof.map(|proof| proof.fraction);
+        (fraction, robustness.tolerance.first_unstable)
+    };
+    let damped = MASS.replace("[0, 0]]", "[-1, -0.5]]");
+    let long = TimeLimits::default().certificates;
+    for sampling in ["", "sample_time = 0.05\n"] {
+        let one = "robustness.tolerance = { entries = { \"A[2][1]\" = 0.5 } }\n";
+        let (fraction, first) = proof(&format!("{damped}{sampling}{one}"), long);
+        let part = fraction.unwrap() / first;
+        assert!((0.9..1.0).contains(&part), "{sampling}: {part} {first}");
+        let (fraction, first) = proof(&format!("{damped}{sampling}"), long);
+        let part = fraction.unwrap() / first;
+        assert!((0.5..1.0).contains(&part), "{sampling}: {part} {first}");
+    }
+    let reason = |text: &str, time| proof(text, time).0.unwrap_err();
+    let expected = "left out after 0 s, the time for the proof for the tolerances; \
+                    --certificate-time allows more";
+    assert_eq!(reason(&damped, Duration::ZERO), expected);
+    let none = format!("{damped}robustness.tolerance = 0\n");
+    assert_eq!(reason(&none, long), "not examined: no entry of the plant varies");
 }
 
 #[test]

@@ -157,7 +157,7 @@ impl HInfinity {
 /// ```text
 /// A_c = R (A - I),  B_c = sqrt(2) R B,  C_c = sqrt(2) C R,  D_c = D - C R B
 /// ```
-fn continuous_equivalent(system: &StateSpace) -> Result<StateSpace, Error> {
+pub(crate) fn continuous_equivalent(system: &StateSpace) -> Result<StateSpace, Error> {
     let StateSpace { a, b, c, d, domain } = system.clone();
     if domain == Domain::Continuous {
         return Ok(StateSpace { a, b, c, d, domain });

@@ -280,6 +280,26 @@ impl<'a> EntryFamily<'a> {
         groups.retain(|group| !group.is_empty());
         Ok(Self { plant, deviations: groups })
     }
+
+    /// The plant without deviations.
+    pub(super) fn nominal(&self) -> &StateSpace {
+        self.plant
+    }
+
+    /// The change of [A, B; C, D] by each deviation of 1.
+    pub(super) fn changes(&self) -> Vec<DMatrix<f64>> {
+        let (n, m) = self.plant.b.shape();
+        let p = self.plant.c.nrows();
+        let change = |entries: &Vec<Entry>| {
+            let mut change = DMatrix::zeros(n + p, n + m);
+            for Entry { place: PlantEntry { matrix, row, column }, size } in entries {
+                let (first_row, first_column) = [(0, 0), (0, n), (n, 0), (n, n)][*matrix];
+                change[(first_row + row, first_column + column)] = *size;
+            }
+            change
+        };
+        self.deviations.iter().map(change).collect()
+    }
 }
 
 impl PlantFamily for EntryFamily<'_> {

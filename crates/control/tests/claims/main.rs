@@ -34,6 +34,7 @@ mod response;
 mod riccati;
 mod robustness;
 mod sampled;
+mod structured;
 mod theorem1;
 mod tracking;
 mod zeros;

@@ -103,7 +103,7 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
     let references = reference_steps(nominal)?;
     let mut checks = checks(nominal);
     checks.extend(reached(&references));
-    let robustness = robustness(nominal, &file.robustness, parameters, steps)?;
+    let (robustness, budget) = robustness(nominal, &file.robustness, parameters, &limits, steps)?;
     let (errors, norms) = rayon::join(
         || estimation::errors(nominal, robustness.as_ref(), &file.robustness),
         || loops.norms(),
@@ -111,7 +111,6 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
     let mut missing = Vec::new();
     let errors = unless_numerical("the errors of the estimates", errors, &mut missing)?;
     let norms = unless_numerical("the norms of the estimation errors", norms, &mut missing)?;
-    let budget = limits.of_certificates();
     let certificate = steps.run(Step::Certificates, || certificate(nominal, norms, &budget));
     let (bounds, without_bounds) = steps.run(Step::Bounds, || loops.bounds(&budget))?;
     let losses = losses(nominal, &budget)?;

@@ -1,6 +1,7 @@
 //! Analyses the robustness of a design and judges it.
 
 mod noise;
+mod proof;
 mod tolerances;
 
 pub(crate) use noise::noise_peaks;
@@ -18,6 +19,7 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use crate::budget::{Budget, TimeLimits};
 use crate::matrix::rows;
 use crate::plant::linear::LinearPlant;
 use crate::plant::parameters::ParameterFamily;
@@ -40,16 +42,18 @@ pub(crate) fn loop_of(designed: &Solution) -> Result<Loop, Error> {
     physical.closed(&physical.controller)
 }
 
-/// Returns the robustness of a design; None if the loop is not stable. `family`: the plants whose
-/// parameters vary; without it the entries of the matrices vary.
+/// Returns the robustness of a design, None if the loop is not stable, and the time for certificates, whose clock
+/// starts with the proof for the tolerances. `family`: the plants whose parameters vary; without it the entries
+/// of the matrices vary.
 pub(crate) fn robustness(
     designed: &Solution,
     limits: &RobustnessLimits,
     family: Option<&ParameterFamily<'_>>,
+    time: &TimeLimits,
     steps: &Steps<'_>,
-) -> Result<Option<Robustness>, crate::Error> {
+) -> Result<(Option<Robustness>, Budget), crate::Error> {
     if designed.instability >= 0.0 {
-        return Ok(None);
+        return Ok((None, time.of_certificates()));
     }
     let physical = Physical::of(designed)?;
     let own = physical.closed(&physical.controller)?;
@@ -70,10 +74,14 @@ pub(crate) fn robustness(
             })
         },
     );
-    Ok(Some(Robustness {
-        comparison: comparison?,
-        tolerance: tolerance?,
-        curves: curves?,
+    let (comparison, curves, tolerance) = (comparison?, curves?, tolerance?);
+    let budget = time.of_certificates();
+    let tolerance_proof = proof::of_entries(&physical, limits, &tolerance, &budget);
+    let robustness = Robustness {
+        comparison,
+        tolerance,
+        tolerance_proof,
+        curves,
         sensitivity: sensitivity(designed, &physical.plant, &slopes),
         points,
         delay_margin: delay,
@@ -81,7 +89,8 @@ pub(crate) fn robustness(
         noise_of_measurements: limits.noise.clone(),
         noise,
         noise_together,
-    }))
+    };
+    Ok((Some(robustness), budget))
 }
 
 /// The margins of a loop, and what the noise of the measurements does in it.

@@ -7,7 +7,9 @@ use super::matrix::matrices;
 use super::number::number;
 use super::plots::Plots;
 use super::table::{Cell, table};
-use crate::report::robustness::{Disk, Parameter, PeakSensitivity, Robustness, ToleranceResult};
+use crate::report::robustness::{
+    Disk, Parameter, PeakSensitivity, Robustness, ToleranceProof, ToleranceResult,
+};
 use crate::report::{Matrix, Report};
 
 /// Number of parameters in the table of the sensitivities.
@@ -54,6 +56,7 @@ fn section<'a>(report: &Report, found: &'a Robustness, plots: &mut Plots<'a>) ->
         (parameters(report, found))
         h3 id="tolerances" { "Tolerances of the parameters" }
         (tolerances(report, &found.tolerance))
+        (proof(&found.tolerance, &found.tolerance_proof))
     }
 }
 
@@ -241,10 +244,35 @@ fn tolerances(report: &Report, found: &ToleranceResult) -> Markup {
             @if report.sampling.is_some() { "largest modulus less 1" } @else { "largest real part, 1/s" }
             "). In its direction the loop is stable up to " (number(found.first_unstable.min(tried)))
             " of the tolerances" @if found.first_unstable > tried { ", the most that was tried" }
-            ". A case that was not tried may be worse."
+            "."
         }
         @if !found.parameters.is_empty() { (limits(&found.parameters)) }
         (matrices("worst", &found.worst))
+    }
+}
+
+/// What is proven for the cases that were not tried.
+fn proof(tested: &ToleranceResult, proof: &Result<ToleranceProof, String>) -> Markup {
+    html! {
+        @if tested.is_examined() {
+            p {
+                @match proof {
+                    Ok(proof) => {
+                        "Proven by the structured singular value: every plant within "
+                        (number(proof.fraction)) " of the tolerances is stable, while it is constant. "
+                        @if proof.frequency > 0.0 && proof.fraction < 0.99 * proof.most {
+                            "The frequency " (number(proof.frequency)) " rad/s limits it. "
+                        }
+                        (number(f64::from(proof.deviations))) " independent deviations, "
+                        (number(f64::from(proof.intervals))) " intervals of the frequency. "
+                        @if proof.fraction < 1.0 { "Between this fraction and the tolerances a case that was not tried may be unstable." }
+                    }
+                    Err(reason) => {
+                        "A case that was not tried may be worse; stability of all of them is " (reason) "."
+                    }
+                }
+            }
+        }
     }
 }
 

@@ -112,6 +112,9 @@ fn figures(report: &Report) -> Markup {
             } @else {
                 "unstable from " (number(tolerance.first_unstable)) " of the tolerances on"
             }
+            @if let Ok(proof) = &robustness.tolerance_proof {
+                ", proven to be stable within " (number(proof.fraction)) " of them"
+            }
         }))
     }
 }

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::report::number::rounded;
-use crate::report::{Frequency, Matrix};
+use crate::report::{Frequency, Matrix, OrReason, or_reason};
 
 /// How a design is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -101,6 +101,10 @@ pub struct Robustness {
     pub comparison: Vec<Compared>,
     /// Stability while the parameters vary.
     pub tolerance: ToleranceResult,
+    /// The fraction of the tolerances within which every plant is stable, proven; or the reason why nothing is proven.
+    #[serde(serialize_with = "or_reason")]
+    #[schemars(with = "OrReason<ToleranceProof>")]
+    pub tolerance_proof: Result<ToleranceProof, String>,
     /// How the judged peak of S depends on the parameters, one entry for each point.
     pub sensitivity: Vec<PeakSensitivity>,
     /// Singular values of S and T over frequency.
@@ -255,6 +259,25 @@ pub struct ToleranceResult {
     pub first_unstable: f64,
     /// A, B and C of the worst plant.
     pub worst: Vec<Matrix>,
+}
+
+/// A proof that the loop is stable while the entries of the plant vary, by the structured singular value.
+#[derive(Serialize, JsonSchema)]
+pub struct ToleranceProof {
+    /// The loop is stable for every constant plant whose entries deviate by less than this multiple of their
+    /// tolerances.
+    pub fraction: f64,
+    /// The largest multiple that was examined: `first_unstable` of the worst plant, or 16.
+    pub most: f64,
+    /// The frequency that limits it, rad/s.
+    #[schemars(with = "Option<f64>")]
+    pub frequency: f64,
+    /// Number of independent deviations.
+    pub deviations: u32,
+    /// Number of channels through which they act.
+    pub channels: u32,
+    /// Number of intervals of the frequency, each with its own scales, that cover the axis.
+    pub intervals: u32,
 }
 
 /// The most entries that are named one by one.

@@ -340,6 +340,7 @@ fn robustness(numbers: &mut Numbers) -> Robustness {
             first_unstable: 0.75,
             worst: vec![numbers.matrix("A", 10, 10)],
         },
+        tolerance_proof: Err(MARKUP.to_owned()),
         sensitivity: vec![PeakSensitivity {
             point: QUOTES.to_owned(),
             matrices: vec![numbers.matrix("A", 10, 10)],

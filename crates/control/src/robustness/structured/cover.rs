@@ -1,0 +1,146 @@
+//! The frequency axis, covered by intervals in which scales bound the structured singular value.
+
+use super::blocks::{Block, balanced, scaled};
+use super::interval::{Interval, Response};
+use super::scales::Scales;
+use crate::eigen::eigenvalues;
+use crate::response::grid;
+use crate::svd::ComplexSvd;
+use crate::{Error, StateSpace};
+
+/// Frequencies for each decade at which scales are sought first.
+const PER_DECADE: u32 = 6;
+/// Relative width of the bound: where scales for it do not exist, or hold on a short interval only, it is raised by
+/// this part.
+const RAISE: f64 = 5e-3;
+/// Relative width of an interval below which the bound is raised.
+const SHORT: f64 = 1e-3;
+const ROUNDS: usize = 3000;
+
+/// The bound so far and the frequencies that it does not cover yet.
+pub(super) struct Cover<'a> {
+    response: Response,
+    blocks: &'a [Block],
+    pub(super) bound: f64,
+    /// The frequency at which the bound was raised last.
+    pub(super) frequency: f64,
+    pub(super) intervals: usize,
+    gaps: Vec<Interval>,
+    /// Frequencies at which scales are sought next, the last one first.
+    candidates: Vec<f64>,
+    fastest: f64,
+}
+
+impl<'a> Cover<'a> {
+    /// `system`: in continuous time, stable.
+    pub(super) fn new(
+        system: &StateSpace,
+        blocks: &'a [Block],
+        enough: f64,
+    ) -> Result<Self, Error> {
+        let response = Response::new(system);
+        let modes = eigenvalues(&system.a)?;
+        let mut all = grid(system, &modes, PER_DECADE);
+        all.extend(modes.iter().flat_map(|mode| [mode.im.abs(), mode.norm()]));
+        all.push(0.0);
+        let fastest = modes.iter().map(|mode| mode.norm()).fold(0.0, f64::max);
+        let mut sized = Vec::with_capacity(all.len());
+        for frequency in all {
+            let m = response.at(frequency)?;
+            let size = ComplexSvd::new(&scaled(&m, &balanced(&m, blocks)))?.values()[0];
+            sized.push((size, frequency));
+        }
+        sized.sort_by(|x, y| x.0.total_cmp(&y.0));
+        Ok(Self {
+            response,
+            blocks,
+            bound: enough,
+            frequency: 0.0,
+            intervals: 0,
+            gaps: vec![Interval { from: 0.0, to: f64::INFINITY }],
+            candidates: sized.into_iter().map(|(_, frequency)| frequency).collect(),
+            fastest,
+        })
+    }
+
+    /// Covers the whole axis; false if `ending` came first.
+    pub(super) fn complete(&mut self, ending: &dyn Fn() -> bool) -> Result<bool, Error> {
+        for _ in 0..ROUNDS {
+            let Some(frequency) = self.next_frequency() else { return Ok(true) };
+            if ending() {
+                return Ok(false);
+            }
+            self.cover(frequency)?;
+        }
+        Err(Error::NotConverged { what: "the structured singular value", iterations: ROUNDS })
+    }
+
+    /// The next frequency that is not covered.
+    fn next_frequency(&mut self) -> Option<f64> {
+        let gap = *self.gaps.last()?;
+        while let Some(frequency) = self.candidates.pop() {
+            let inside = |gap: &Interval| (gap.from..=gap.to).contains(&frequency);
+            if self.gaps.iter().any(inside) {
+                return Some(frequency);
+            }
+        }
+        let Interval { from, to } = gap;
+        Some(match (from, to) {
+            (0.0, _) => 0.0,
+            (from, f64::INFINITY) if from < 1e9 * self.fastest => 10.0 * from.max(self.fastest),
+            (_, f64::INFINITY) => f64::INFINITY,
+            (from, to) => (from * to).sqrt().clamp(from, to),
+        })
+    }
+
+    /// Removes an interval about `frequency` from the gaps, with a raised bound if necessary.
+    fn cover(&mut self, frequency: f64) -> Result<(), Error> {
+        let m = self.response.at(frequency)?;
+        let shortest = SHORT * frequency.min(f64::MAX).max(SHORT * SHORT * self.fastest);
+        let mut raise = RAISE;
+        loop {
+            let scales = Scales::search(&m, self.blocks, self.bound)?;
+            if scales.bound > self.bound {
+                self.raise(scales.bound * (1.0 + RAISE), frequency)?;
+                continue;
+            }
+            let interval = self.response.interval(&scales, frequency)?;
+            let long = |own: &Interval| frequency.is_infinite() || own.to - own.from > shortest;
+            if let Some(interval) = interval.filter(long) {
+                self.intervals += 1;
+                self.remove(interval);
+                return Ok(());
+            }
+            self.raise(self.bound * (1.0 + raise), frequency)?;
+            raise *= 2.0;
+        }
+    }
+
+    fn raise(&mut self, bound: f64, frequency: f64) -> Result<(), Error> {
+        (self.bound, self.frequency) = (bound, frequency);
+        if bound.is_finite() {
+            return Ok(());
+        }
+        Err(Error::Overflow { what: "the structured singular value" })
+    }
+
+    fn remove(&mut self, own: Interval) {
+        let rest = |gap: &Interval| {
+            if own.to <= gap.from || own.from >= gap.to {
+                // An open interval does not contain its ends.
+                return vec![*gap];
+            }
+            let before = Interval { from: gap.from, to: own.from };
+            let after = Interval { from: own.to, to: gap.to };
+            let mut parts = Vec::new();
+            if own.from >= gap.from {
+                parts.push(before);
+            }
+            if own.to <= gap.to && own.to.is_finite() {
+                parts.push(after);
+            }
+            parts
+        };
+        self.gaps = self.gaps.iter().flat_map(rest).collect();
+    }
+}

@@ -1,0 +1,130 @@
+//! The interval of frequencies in which given scales bound the structured singular value.
+
+use super::hermitian::{ComplexMatrix, times};
+use super::scales::Scales;
+use crate::balance::{Balance, divide_rows, multiply_columns};
+use crate::blocks::to_complex;
+use crate::eigen::complex_eigenvalues;
+use crate::response::Transfer;
+use crate::{Error, StateSpace};
+use nalgebra::{Complex, DMatrix};
+
+/// M(s) = C (s I - A)^-1 B + D in continuous time, square, with A balanced.
+pub(super) struct Response {
+    system: StateSpace,
+    transfer: Transfer,
+}
+
+/// An open interval of frequencies; a lower end below zero contains zero, an infinite upper end infinity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Interval {
+    pub(super) from: f64,
+    pub(super) to: f64,
+}
+
+impl Response {
+    pub(super) fn new(system: &StateSpace) -> Self {
+        let transfer = Transfer::new(system);
+        let Balance { matrix, scale } = Balance::new(&system.a);
+        let (b, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
+        let system = StateSpace { a: matrix, b, c, ..system.clone() };
+        Self { system, transfer }
+    }
+
+    /// M at j w; D at an infinite frequency.
+    pub(super) fn at(&self, frequency: f64) -> Result<ComplexMatrix, Error> {
+        if frequency.is_infinite() {
+            return Ok(to_complex(&self.system.d));
+        }
+        // M(-j w) is the conjugate.
+        let m = self.transfer.gain(frequency.abs())?;
+        Ok(if frequency < 0.0 { m.map(|x| x.conj()) } else { m })
+    }
+
+    /// The largest interval about `frequency` in which `scales` hold for their bound; None if they do not there.
+    ///
+    /// F, see [`super::scales::form`], is positive definite at `frequency` and singular at the imaginary eigenvalues
+    /// of a Hamiltonian matrix only, so that it is definite up to the first of them on each side. It need
+    /// not be decided which eigenvalues are imaginary: where F is positive definite at the imaginary part and
+    /// between it and the next one, the interval goes on.
+    pub(super) fn interval(
+        &self,
+        scales: &Scales,
+        frequency: f64,
+    ) -> Result<Option<Interval>, Error> {
+        let holds =
+            |frequency: f64| Ok::<_, Error>(scales.hold(&self.at(frequency)?, scales.bound));
+        if !holds(frequency)? {
+            return Ok(None);
+        }
+        let Some(hamiltonian) = self.hamiltonian(scales) else { return Ok(None) };
+        let mut places: Vec<f64> =
+            complex_eigenvalues(&hamiltonian)?.iter().map(|value| value.im).collect();
+        places.sort_by(f64::total_cmp);
+        let above: Vec<f64> = places.iter().copied().filter(|place| *place > frequency).collect();
+        let below: Vec<f64> =
+            places.iter().rev().copied().filter(|place| *place <= frequency).collect();
+        let mut to = f64::INFINITY;
+        for (at, &place) in above.iter().enumerate() {
+            let middle = above.get(at + 1).map_or(f64::INFINITY, |next| 0.5 * (place + next));
+            if !(holds(place)? && holds(middle)?) {
+                to = place;
+                break;
+            }
+        }
+        if to.is_infinite() && !holds(f64::INFINITY)? {
+            to = f64::MAX;
+        }
+        let mut from = f64::NEG_INFINITY;
+        for (at, &place) in below.iter().enumerate() {
+            if place < 0.0 {
+                from = place;
+                break;
+            }
+            let middle = below.get(at + 1).map_or(-1.0, |next| 0.5 * (place + next));
+            if !(holds(place)? && holds(middle)?) {
+                from = place;
+                break;
+            }
+        }
+        Ok(Some(Interval { from, to }))
+    }
+
+    /// The matrix whose imaginary eigenvalues j w are the frequencies at which F is singular:
+    ///
+    /// ```text
+    /// [A + B W S*, B W B*; -(Q + S W S*), -(A + B W S*)*],
+    /// Q = C' D C,  S = C' (D M_oo - j G),  W = (F at infinite frequency)^-1
+    /// ```
+    ///
+    /// None if F at infinite frequency is singular.
+    fn hamiltonian(&self, scales: &Scales) -> Option<ComplexMatrix> {
+        let [a, b, c, direct] =
+            [&self.system.a, &self.system.b, &self.system.c, &self.system.d].map(to_complex);
+        let n = a.nrows();
+        let Scales { d, g, bound } = scales;
+        // The size of the scales is free: with one of about 1 / bound the blocks are of similar size.
+        let size = d.diagonal().iter().map(|x| x.re).fold(0.0, f64::max) * bound;
+        let (d, g) = (d.unscale(size), g.unscale(size));
+        let weight = super::scales::form(&direct, &d, &g, *bound).try_inverse()?;
+        let ct = c.adjoint();
+        let cross = times(&ct, &(times(&d, &direct) - g.map(|x| x * Complex::i())));
+        let through = times(&times(&b, &weight), &cross.adjoint());
+        let dynamics = a + &through;
+        let mut upper = times(&times(&b, &weight), &b.adjoint());
+        let mut lower =
+            -(times(&times(&ct, &d), &c) + times(&times(&cross, &weight), &cross.adjoint()));
+        let ratio = (lower.norm() / upper.norm()).sqrt();
+        if ratio.is_normal() {
+            upper.scale_mut(ratio);
+            lower.unscale_mut(ratio);
+        }
+        let mut whole: ComplexMatrix = DMatrix::zeros(2 * n, 2 * n);
+        whole.view_mut((0, 0), (n, n)).copy_from(&dynamics);
+        whole.view_mut((0, n), (n, n)).copy_from(&upper);
+        whole.view_mut((n, 0), (n, n)).copy_from(&lower);
+        whole.view_mut((n, n), (n, n)).copy_from(&-dynamics.adjoint());
+        let finite = whole.iter().all(|x| x.re.is_finite() && x.im.is_finite());
+        finite.then_some(whole)
+    }
+}

@@ -1,0 +1,179 @@
+//! The part of the tolerances of a plant within which a loop is stable for certain.
+
+use super::blocks::Block;
+use super::held::HeldFamily;
+use super::opened::{Channels, Opened};
+use super::{StructuredBound, structured_bound};
+use crate::robustness::Loop;
+use crate::robustness::tolerance::EntryFamily;
+use crate::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
+
+/// The most channels of the perturbation, and the most states of the loop.
+const LARGEST: usize = 100;
+/// A proven fraction within this part of that for which the error of the Gauss method was bounded ends the search;
+/// otherwise the error is bounded again for a fraction a little above the proven one.
+const NEAR: f64 = 0.97;
+const FURTHER: f64 = 1.02;
+const ROUNDS: usize = 4;
+
+/// What is proven about a loop whose plant varies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct ProvenTolerance {
+    /// The loop is stable for every plant whose deviations are below this fraction of the tolerances.
+    pub fraction: f64,
+    /// The frequency that limits the fraction, in rad per unit of time.
+    pub frequency: f64,
+    /// Number of independent deviations.
+    pub deviations: usize,
+    /// Number of channels of the perturbation: a deviation has one for each dimension of its effect, and for each stage
+    /// of the Gauss method in a sampled loop.
+    pub channels: usize,
+    /// Number of intervals that cover the frequencies.
+    pub intervals: usize,
+}
+
+/// Why nothing is proven.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Unproven {
+    /// The perturbation has too many channels, or the loop too many states.
+    Large {
+        /// Channels.
+        channels: usize,
+        /// States.
+        states: usize,
+        /// The most of each.
+        most: usize,
+    },
+    /// The sample time is long against the time constants of the plant.
+    LongSampleTime,
+    /// The time was over.
+    Ended,
+}
+
+/// Proves that the loop of `controller` is stable for all plants of `family` within a fraction of the tolerances.
+///
+/// Each deviation delta_i adds delta_i L_i R_i' to [A, B; C, D], so that the loop is M in feedback with
+/// diag(delta_i I), exact for products of B, C and the controller's D too; the fraction is 1 / [`structured_bound`] of M.
+/// `most`: the largest fraction of interest; one at which instability was found ends the search.
+///
+/// For a sampled controller the deviations act on the exponential of [A, B; 0, 0] h. It is that of the nominal plant
+/// plus the change of a step of the Gauss method, linear fractional in the deviations with 1 to 3
+/// channels for each, plus the change of the error of that method. The last part is bounded entry by entry by its
+/// power series and is one more block, of any matrix. It is small if the sample time is short against the time
+/// constants of the plant.
+///
+/// # Errors
+///
+/// Same as [`structured_bound`], [`super::super::Loop::new`], [`crate::hold::zero_order_hold`].
+pub fn proven_tolerance(
+    family: &EntryFamily<'_>,
+    controller: &StateSpace,
+    most: f64,
+    ending: &dyn Fn() -> bool,
+) -> Result<Result<ProvenTolerance, Unproven>, Error> {
+    let changes = family.changes();
+    let perturbed = Perturbed { plant: family.nominal(), changes, controller };
+    match controller.domain {
+        Domain::Continuous => {
+            Loop::new(perturbed.plant.clone(), controller.clone())?;
+            let (system, blocks) = perturbed.continuous();
+            perturbed.bounded(&system, &blocks, most, ending)
+        }
+        Domain::Sampled { period } => perturbed.sampled_fraction(period, most, ending),
+    }
+}
+
+struct Perturbed<'a> {
+    plant: &'a StateSpace,
+    /// The change of [A, B; C, D] for each deviation.
+    changes: Vec<DMatrix<f64>>,
+    controller: &'a StateSpace,
+}
+
+impl Perturbed<'_> {
+    fn bounded(
+        &self,
+        system: &StateSpace,
+        blocks: &[Block],
+        most: f64,
+        ending: &dyn Fn() -> bool,
+    ) -> Result<Result<ProvenTolerance, Unproven>, Error> {
+        let (channels, states) = (system.d.nrows(), system.a.nrows());
+        if channels > LARGEST || states > LARGEST {
+            return Ok(Err(Unproven::Large { channels, states, most: LARGEST }));
+        }
+        if channels == 0 {
+            let (frequency, intervals) = (0.0, 0);
+            return Ok(Ok(ProvenTolerance {
+                fraction: most,
+                frequency,
+                deviations: 0,
+                channels,
+                intervals,
+            }));
+        }
+        let Some(bound) = structured_bound(system, blocks, 1.0 / most, ending)? else {
+            return Ok(Err(Unproven::Ended));
+        };
+        let StructuredBound { upper, frequency, intervals } = bound;
+        let deviations = self.changes.len();
+        Ok(Ok(ProvenTolerance {
+            fraction: 1.0 / upper,
+            frequency,
+            deviations,
+            channels,
+            intervals,
+        }))
+    }
+
+    fn continuous(&self) -> (StateSpace, Vec<Block>) {
+        let StateSpace { a, b, c, d, domain } = self.plant;
+        let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
+        let Channels { left, right, ranks } = Channels::of(&self.changes, (n + p, n + m));
+        let r = left.ncols();
+        let opened = Opened {
+            a: a.clone(),
+            b: [left.rows(0, n).into(), b.clone()],
+            c: [right.rows(0, n).transpose(), c.clone()],
+            d: [
+                [DMatrix::zeros(r, r), right.rows(n, m).transpose()],
+                [left.rows(n, p).into(), d.clone()],
+            ],
+            domain: *domain,
+        };
+        let blocks = ranks.into_iter().filter(|rank| *rank > 0).map(Block::Real).collect();
+        (opened.closed(self.controller), blocks)
+    }
+
+    /// The largest fraction for which the error of the Gauss method is as small as assumed.
+    fn sampled_fraction(
+        &self,
+        period: f64,
+        most: f64,
+        ending: &dyn Fn() -> bool,
+    ) -> Result<Result<ProvenTolerance, Unproven>, Error> {
+        let held = HeldFamily::new(self.plant, &self.changes, self.controller, period)?;
+        let mut assumed = most;
+        let mut best: Option<ProvenTolerance> = None;
+        for _ in 0..ROUNDS {
+            let Some((system, blocks, largest)) = held.system(assumed)? else { break };
+            let bound = match self.bounded(&system, &blocks, largest, ending)? {
+                Ok(bound) => bound,
+                Err(reason) => return Ok(best.ok_or(reason)),
+            };
+            let fraction = bound.fraction.min(largest);
+            if best.is_none_or(|best| best.fraction < fraction) {
+                best = Some(ProvenTolerance { fraction, ..bound });
+            }
+            if bound.fraction >= NEAR * largest {
+                break;
+            }
+            // The error for a smaller fraction is smaller, relative to it too.
+            assumed = bound.fraction * FURTHER;
+        }
+        Ok(best.ok_or(Unproven::LongSampleTime))
+    }
+}

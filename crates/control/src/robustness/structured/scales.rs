@@ -1,0 +1,177 @@
+//! Scales D and G that bound the structured singular value of one complex matrix.
+
+use super::barrier::{Barrier, Point};
+use super::blocks::{Block, balanced, scaled};
+use super::hermitian::{ComplexMatrix, factor, forward, largest_eigenvalue, times};
+use crate::Error;
+use nalgebra::Complex;
+
+/// Part of the distance to the bound of the present scales that a step keeps, so that they stay inside.
+const KEPT: f64 = 0.2;
+const STEPS: usize = 60;
+/// Relative progress of a step below which the bound counts as the least one.
+const STALLED: f64 = 2e-3;
+
+/// Hermitian matrices D > 0 and G that commute with the structure.
+#[derive(Debug, Clone)]
+pub(super) struct Scales {
+    pub(super) d: ComplexMatrix,
+    pub(super) g: ComplexMatrix,
+    /// The bound for which they hold.
+    pub(super) bound: f64,
+}
+
+/// F = beta^2 D - M* D M - j (G M - M* G).
+///
+/// If F is positive definite, I - Delta M is regular for every Delta of the structure with a norm up to 1 / beta: with
+/// w = Delta M w and z = M w, w* F w = beta^2 w* D w - z* D z is at most zero, as D commutes with Delta and G Delta is
+/// Hermitian.
+pub(super) fn form(
+    m: &ComplexMatrix,
+    d: &ComplexMatrix,
+    g: &ComplexMatrix,
+    bound: f64,
+) -> ComplexMatrix {
+    let (adjoint, turned) = (m.adjoint(), g.map(|x| x * Complex::i()));
+    let left = times(&adjoint, d) + &turned;
+    d.scale(bound * bound) - times(&left, m) + times(&adjoint, &turned)
+}
+
+/// The sizes of the sums that are the diagonal of [`form`], which its rounding errors are relative to.
+pub(super) fn form_size(
+    m: &ComplexMatrix,
+    d: &ComplexMatrix,
+    g: &ComplexMatrix,
+    bound: f64,
+) -> Vec<f64> {
+    let [m, d, g] = [m, d, g].map(|matrix| matrix.map(Complex::norm));
+    let (of_d, of_g) = (&d * &m, &g * &m);
+    let size = |at: usize| {
+        bound * bound * d[(at, at)] + m.column(at).dot(&of_d.column(at)) + 2.0 * of_g[(at, at)]
+    };
+    (0..m.ncols()).map(size).collect()
+}
+
+impl Scales {
+    /// The scales of `m` for the bound `goal`, near their analytic centre; if there are none, those for the least
+    /// bound that the method of centres reaches.
+    ///
+    /// Each step halves, about, the distance from the least bound, at which the centre for the bound before is
+    /// still inside. Source: S. Boyd and L. El Ghaoui, Method of centers for minimizing generalized eigenvalues,
+    /// Linear Algebra and its Applications 188 (1993).
+    pub(super) fn search(m: &ComplexMatrix, blocks: &[Block], goal: f64) -> Result<Self, Error> {
+        let exponents = balanced(m, blocks);
+        let m = scaled(m, &exponents);
+        let first = largest_eigenvalue(&times(&m.adjoint(), &m))?.max(0.0).sqrt();
+        let barrier = Barrier::new(&m, blocks, goal.max(first));
+        let mut point = barrier.start();
+        let mut bound = goal.max(1.01 * first);
+        for _ in 0..STEPS {
+            let Some(centre) = barrier.centre(point.clone(), bound) else { break };
+            point = centre;
+            if bound <= goal {
+                break;
+            }
+            let least = least_bound(&m, &point)?;
+            let next = if least < goal * (1.0 - 1e-9) {
+                goal
+            } else {
+                (least + KEPT * (bound - least)).max(goal)
+            };
+            if next > goal && bound - next < STALLED * bound {
+                break;
+            }
+            bound = next;
+        }
+        let back = |matrix: &ComplexMatrix| {
+            ComplexMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
+                matrix[(i, j)] * (exponents[i] + exponents[j]).exp()
+            })
+        };
+        Ok(Self { d: back(&point.d), g: back(&point.g), bound })
+    }
+
+    /// Whether [`form`] is positive definite at M, by more than rounding errors.
+    pub(super) fn hold(&self, m: &ComplexMatrix, bound: f64) -> bool {
+        let size = form_size(m, &self.d, &self.g, bound);
+        factor(&form(m, &self.d, &self.g, bound), &size).is_some()
+    }
+}
+
+/// The least bound for which the scales of a point hold.
+fn least_bound(m: &ComplexMatrix, at: &Point) -> Result<f64, Error> {
+    let Point { d, g, .. } = at;
+    let size: Vec<f64> = d.diagonal().iter().map(|x| x.re).collect();
+    let Some(lower) = factor(d, &size) else { return Ok(f64::INFINITY) };
+    let inner = -form(m, d, g, 0.0);
+    let half = forward(&lower, &inner);
+    let whole = forward(&lower, &half.adjoint());
+    Ok(largest_eigenvalue(&whole)?.max(0.0).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check::as_number;
+
+    /// l_i r_j, complex.
+    fn of_rank_one(count: usize, seed: f64) -> ComplexMatrix {
+        let entry = |at: usize, turn: f64| {
+            let x = as_number(at) + seed;
+            Complex::from_polar(10.0_f64.powf((3.1 * x).sin()), turn * x * x)
+        };
+        ComplexMatrix::from_fn(count, count, |i, j| entry(i, 1.7) * entry(j, 2.9))
+    }
+
+    /// The structured singular value of a matrix of rank one with the diagonal c for complex numbers: the sum of |c_i|. For
+    /// real ones, by the duality of linear programs, the least sum of |Re c_i + g Im c_i| over g; at one of its kinks.
+    /// Both are equal to their bounds: P. M. Young, The rank one mixed mu problem and "Kharitonov-type" analysis,
+    /// Automatica 30 (1994).
+    #[test]
+    fn the_bounds_of_a_matrix_of_rank_one_are_its_closed_forms() {
+        for (count, seed) in [(1, 0.2), (2, 0.7), (3, 1.1), (5, 2.3), (9, 0.4), (16, 3.3)] {
+            let m = of_rank_one(count, seed);
+            let c = m.diagonal();
+            let complex: f64 = c.iter().map(|x| x.norm()).sum();
+            let sum = |g: f64| c.iter().map(|x| (x.re + g * x.im).abs()).sum::<f64>();
+            let real = c.iter().map(|x| sum(-x.re / x.im)).fold(f64::INFINITY, f64::min);
+            let bound = |block: Block| {
+                let blocks = vec![block; count];
+                let mut goal = 1e-3 * complex;
+                loop {
+                    let scales = Scales::search(&m, &blocks, goal).unwrap();
+                    if scales.bound <= goal {
+                        assert!(scales.hold(&m, goal));
+                        break goal;
+                    }
+                    goal = scales.bound * 1.001;
+                }
+            };
+            let (found, both) = (bound(Block::Full(1)), [count, 1]);
+            assert!((1.0..1.01).contains(&(found / complex)), "{both:?} {found} {complex}");
+            let found = bound(Block::Real(1));
+            assert!(found >= real.max(1e-3 * complex) * 0.999_999, "{both:?} {found} {real}");
+            assert!(found <= real.max(1e-3 * complex) * 1.02, "{both:?} {found} {real} {complex}");
+        }
+    }
+
+    /// One real number on all channels: it cannot make I - delta M singular beyond the largest real eigenvalue of M, which
+    /// no scaling by numbers alone shows.
+    #[test]
+    fn a_repeated_real_number_is_bounded_by_the_real_eigenvalues() {
+        let t = ComplexMatrix::from_fn(3, 3, |i, j| {
+            Complex::from_polar(1.0, as_number(3 * i + 2 * j * j) + f64::from(u8::from(i == j)))
+        });
+        let eigenvalues = [Complex::new(0.8, 0.0), Complex::new(0.0, 2.0), Complex::new(1.0, -3.0)];
+        let diagonal = ComplexMatrix::from_diagonal(&eigenvalues.to_vec().into());
+        let m = &t * diagonal * t.clone().try_inverse().unwrap();
+        let mut goal = 0.01;
+        while let Ok(scales) = Scales::search(&m, &[Block::Real(3)], goal) {
+            if scales.bound <= goal {
+                break;
+            }
+            goal = scales.bound * 1.001;
+        }
+        assert!((1.0..1.02).contains(&(goal / 0.8)), "{goal}");
+    }
+}

@@ -1,0 +1,65 @@
+//! The fraction of the tolerances for which stability is proven.
+
+use control::robustness::{EntryFamily, ProvenTolerance, Unproven, proven_tolerance};
+
+use crate::assess::robustness::Physical;
+use crate::budget::Budget;
+use crate::plant::entries::tolerances;
+use crate::plant_file::robustness::RobustnessLimits;
+use crate::report::robustness::{ToleranceProof, ToleranceResult};
+
+/// The largest multiple of the tolerances that is examined, as for the worst case.
+const MOST: f64 = 16.0;
+/// Part of the time for certificates and bounds.
+const PART: f64 = 0.25;
+
+/// Returns the fraction of the tolerances of the entries within which every plant is stable, or why none is proven.
+pub(super) fn of_entries(
+    physical: &Physical,
+    limits: &RobustnessLimits,
+    tested: &ToleranceResult,
+    budget: &Budget,
+) -> Result<ToleranceProof, String> {
+    if !tested.parameters.is_empty() {
+        return Err(
+            "not examined: the parameters of an FMU enter its matrices nonlinearly".to_owned()
+        );
+    }
+    if !tested.is_examined() {
+        return Err("not examined: no entry of the plant varies".to_owned());
+    }
+    let budget = budget.part(PART, "the proof for the tolerances");
+    if budget.is_over() {
+        return Err(budget.reason());
+    }
+    let most = tested.first_unstable.min(MOST);
+    let tolerances = tolerances(&physical.plant, limits);
+    let family =
+        EntryFamily::new(&physical.plant, &tolerances).map_err(|error| error.to_string())?;
+    let proof = proven_tolerance(&family, &physical.controller, most, &|| budget.is_over());
+    match proof.map_err(|error| format!("not proven: {error}"))? {
+        Ok(proof) => Ok(reported(&proof, most)),
+        Err(Unproven::Ended) => Err(budget.reason()),
+        Err(Unproven::LongSampleTime) => {
+            Err("not proven: the sample time is too long against the time constants of the plant"
+                .to_owned())
+        }
+        Err(Unproven::Large { channels, states, most }) => Err(format!(
+            "not examined: the entries act through {channels} channels on a loop of {states} states; up to \
+             {most} of each are examined"
+        )),
+        Err(_) => Err("not proven".to_owned()),
+    }
+}
+
+fn reported(proof: &ProvenTolerance, most: f64) -> ToleranceProof {
+    let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+    ToleranceProof {
+        fraction: proof.fraction,
+        most,
+        frequency: proof.frequency,
+        deviations: count(proof.deviations),
+        channels: count(proof.channels),
+        intervals: count(proof.intervals),
+    }
+}
