@@ -99,10 +99,11 @@ impl<'a> Cover<'a> {
         let shortest = SHORT * frequency.min(f64::MAX).max(SHORT * SHORT * self.fastest);
         let mut raise = RAISE;
         loop {
-            let scales = Scales::search(&m, self.blocks, self.bound)?;
+            let mut scales = Scales::search(&m, self.blocks, self.bound)?;
             if scales.bound > self.bound {
-                self.raise(scales.bound * (1.0 + RAISE), frequency)?;
-                continue;
+                // They hold for a larger bound too.
+                scales.bound *= 1.0 + RAISE;
+                self.raise(scales.bound, frequency)?;
             }
             let interval = self.response.interval(&scales, frequency)?;
             let long = |own: &Interval| frequency.is_infinite() || own.to - own.from > shortest;

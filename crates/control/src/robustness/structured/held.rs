@@ -34,10 +34,21 @@ pub(super) struct HeldFamily<'a> {
     states: usize,
 }
 
+/// M and its blocks.
+pub(super) struct HeldLoop {
+    pub(super) system: StateSpace,
+    pub(super) blocks: Vec<Block>,
+    /// The fraction of the tolerances up to which the error of the Gauss method is bounded.
+    pub(super) fraction: f64,
+    /// Whether that error is small.
+    pub(super) precise: bool,
+}
+
 /// A bound of the error of the Gauss method for deviations up to a fraction of the tolerances.
 struct GaussError {
     stages: usize,
     fraction: f64,
+    precise: bool,
     /// Entry by entry for the states, relative to the fraction.
     bound: DMatrix<f64>,
 }
@@ -73,12 +84,9 @@ impl<'a> HeldFamily<'a> {
         })
     }
 
-    /// M and its blocks for deviations up to the fraction `assumed` of the tolerances, or up to a smaller one for which
-    /// the error of the Gauss method has a bound; returns also this fraction. None if there is none.
-    pub(super) fn system(
-        &self,
-        assumed: f64,
-    ) -> Result<Option<(StateSpace, Vec<Block>, f64)>, Error> {
+    /// M for deviations up to the fraction `assumed` of the tolerances, or up to a smaller one for which the error of the
+    /// Gauss method has a bound; None if there is none.
+    pub(super) fn system(&self, assumed: f64) -> Result<Option<HeldLoop>, Error> {
         let Some(error) = self.error(assumed) else { return Ok(None) };
         let (n, inner) = (self.states, self.z.nrows());
         let Channels { left, right, .. } = &self.on_states;
@@ -118,7 +126,8 @@ impl<'a> HeldFamily<'a> {
             d: system.d.select_rows(&places).select_columns(&places),
             ..system
         };
-        Ok(Some((system, blocks, error.fraction)))
+        let GaussError { fraction, precise, .. } = error;
+        Ok(Some(HeldLoop { system, blocks, fraction, precise }))
     }
 
     /// The Gauss method with the fewest stages that is precise, and its error.
@@ -132,7 +141,7 @@ impl<'a> HeldFamily<'a> {
                 let Some(bound) = remainder(&x, &largest, stages) else { continue };
                 let precise = bound.norm() <= PRECISE * largest.norm();
                 let bound = bound.rows(0, self.states) / fraction;
-                last = Some(GaussError { stages, fraction, bound });
+                last = Some(GaussError { stages, fraction, precise, bound });
                 if precise {
                     break;
                 }

@@ -159,16 +159,16 @@ impl Perturbed<'_> {
         let mut assumed = most;
         let mut best: Option<ProvenTolerance> = None;
         for _ in 0..ROUNDS {
-            let Some((system, blocks, largest)) = held.system(assumed)? else { break };
-            let bound = match self.bounded(&system, &blocks, largest, ending)? {
+            let Some(loops) = held.system(assumed)? else { break };
+            let bound = match self.bounded(&loops.system, &loops.blocks, loops.fraction, ending)? {
                 Ok(bound) => bound,
                 Err(reason) => return Ok(best.ok_or(reason)),
             };
-            let fraction = bound.fraction.min(largest);
+            let fraction = bound.fraction.min(loops.fraction);
             if best.is_none_or(|best| best.fraction < fraction) {
                 best = Some(ProvenTolerance { fraction, ..bound });
             }
-            if bound.fraction >= NEAR * largest {
+            if loops.precise || bound.fraction >= NEAR * loops.fraction {
                 break;
             }
             // The error for a smaller fraction is smaller, relative to it too.

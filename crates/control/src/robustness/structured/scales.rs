@@ -7,10 +7,10 @@ use crate::Error;
 use nalgebra::Complex;
 
 /// Part of the distance to the bound of the present scales that a step keeps, so that they stay inside.
-const KEPT: f64 = 0.2;
+const KEPT: f64 = 0.1;
 const STEPS: usize = 60;
 /// Relative progress of a step below which the bound counts as the least one.
-const STALLED: f64 = 2e-3;
+const STALLED: f64 = 5e-4;
 
 /// Hermitian matrices D > 0 and G that commute with the structure.
 #[derive(Debug, Clone)]
