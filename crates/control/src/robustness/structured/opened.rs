@@ -36,7 +36,7 @@ impl Opened {
     }
 }
 
-/// The channels of all deviations: their changes are L_i R_i', side by side.
+/// The channels of all deviations: their changes are `L_i R_i'`, side by side.
 pub(super) struct Channels {
     pub(super) left: DMatrix<f64>,
     pub(super) right: DMatrix<f64>,

@@ -55,8 +55,8 @@ pub enum Unproven {
 
 /// Proves that the loop of `controller` is stable for all plants of `family` within a fraction of the tolerances.
 ///
-/// Each deviation delta_i adds delta_i L_i R_i' to [A, B; C, D], so that the loop is M in feedback with
-/// diag(delta_i I), exact for products of B, C and the controller's D too; the fraction is 1 / [`structured_bound`] of M.
+/// Each deviation d adds d L R' to [A, B; C, D], so that the loop is M in feedback with the diagonal matrix of the
+/// deviations, exact for products of B, C and the controller's D too; the fraction is 1 / [`structured_bound`] of M.
 /// `most`: the largest fraction of interest; one at which instability was found ends the search.
 ///
 /// For a sampled controller the deviations act on the exponential of [A, B; 0, 0] h. It is that of the nominal plant

@@ -12,7 +12,7 @@ const ROUNDING: f64 = 1e-6;
 /// Entrywise bound of |E(Z + dZ) - E(Z)| for |dZ| <= Y, entry by entry, with E(Z) = e^Z - (its diagonal Padé
 /// approximation of degree `stages`).
 ///
-/// With E(x) = sum of c_k x^k from k = 2 `stages` + 1 on and X = |Z| it is the sum of |c_k| ((X + Y)^k - X^k). None if the
+/// With E(x) = sum of c x^k from k = 2 `stages` + 1 on and X = |Z| it is the sum of |c| ((X + Y)^k - X^k). None if the
 /// series does not converge: the poles of the approximations have moduli of 2, 3.46 and 4.64.
 pub(super) fn remainder(x: &DMatrix<f64>, y: &DMatrix<f64>, stages: usize) -> Option<DMatrix<f64>> {
     let n = x.nrows();
@@ -80,7 +80,7 @@ mod tests {
         for stages in 1..=3 {
             let bound = remainder(&z.abs(), &change.abs(), stages).unwrap();
             let step = |z: &DMatrix<f64>| {
-                let matrix = |v: &DVector<f64>| DMatrix::from_columns(&[v.clone()]);
+                let matrix = |v: &DVector<f64>| DMatrix::from_columns(std::slice::from_ref(v));
                 let step =
                     Gauss::new(stages).step(z, [&matrix(&left), &matrix(&right)], 1.0).unwrap();
                 (step.b, step.c, step.d)

@@ -114,7 +114,7 @@ mod tests {
     use super::*;
     use crate::check::as_number;
 
-    /// l_i r_j, complex.
+    /// l r', complex.
     fn of_rank_one(count: usize, seed: f64) -> ComplexMatrix {
         let entry = |at: usize, turn: f64| {
             let x = as_number(at) + seed;
@@ -123,8 +123,8 @@ mod tests {
         ComplexMatrix::from_fn(count, count, |i, j| entry(i, 1.7) * entry(j, 2.9))
     }
 
-    /// The structured singular value of a matrix of rank one with the diagonal c for complex numbers: the sum of |c_i|. For
-    /// real ones, by the duality of linear programs, the least sum of |Re c_i + g Im c_i| over g; at one of its kinks.
+    /// The structured singular value of a matrix of rank one with the diagonal c for complex numbers: the sum of |c|. For
+    /// real ones, by the duality of linear programs, the least sum of |Re c + g Im c| over g; at one of its kinks.
     /// Both are equal to their bounds: P. M. Young, The rank one mixed mu problem and "Kharitonov-type" analysis,
     /// Automatica 30 (1994).
     #[test]
