@@ -30,9 +30,11 @@ __all__ = ["Session", "execute"]
 
 # Seconds within which a cluster must have a worker.
 _PATIENCE = 60.0
-# Tasks that wait for each thread of a worker, so that none waits for the client: two at least, and as many as take
-# twice the time after which an adaptive cluster of Dask starts further workers (5 s), at most a hundred.
-_AHEAD, _BACKLOG, _MOST_AHEAD = 2, 10.0, 100
+# Tasks that wait for each thread of a worker, so that none waits for the client.
+_AHEAD = 2
+# Seconds of work that wait for each thread of a cluster, at most so many tasks: an adaptive cluster of Dask starts
+# further workers for more than 5 s.
+_BACKLOG, _MOST_AHEAD = 10.0, 100
 # Seconds after its start before a worker runs anything: Dask does not replace a worker that ends before
 # its nanny has noticed its start (Nanny._on_worker_exit, status "starting").
 _SETTLING = 1.0
@@ -237,8 +239,10 @@ def _do(name: str, *work: Any) -> list[Row]:
 class _Tasks:
     """The tasks that a cluster has at present, and their runs."""
 
-    def __init__(self, client: Any, name: str, work: Callable[[Sequence[int]], tuple[Any, ...]]) -> None:
-        self.client, self.name, self.work = client, name, work
+    def __init__(
+        self, client: Any, name: str, work: Callable[[Sequence[int]], tuple[Any, ...]], backlog: float
+    ) -> None:
+        self.client, self.name, self.work, self.backlog = client, name, work, backlog
         self._futures: dict[Any, list[int]] = {}
         distributed = package("distributed")
         self._waiting = distributed.as_completed(loop=client.loop, with_results=True, raise_errors=False)
@@ -266,7 +270,7 @@ class _Tasks:
     def wanted(self) -> int:
         """Return how many tasks keep the cluster busy."""
         self._look()
-        ahead = min(_MOST_AHEAD, max(_AHEAD, math.ceil(_BACKLOG / max(self._seconds, 1e-3))))
+        ahead = max(_AHEAD, min(_MOST_AHEAD, math.ceil(self.backlog / max(self._seconds, 1e-3))))
         return max(1, self._threads) * (1 + ahead)
 
     def submit(self, numbers: list[int]) -> None:
@@ -336,7 +340,9 @@ class _Work:
         try:
             if prepared is None:
                 self.prepare(client, name)
-            tasks = _Tasks(client, name, self._task)
+            # What waits is done before a pause, so a page keeps it short.
+            backlog = _BACKLOG if scheduler is not None and self.view is None else 0.0
+            tasks = _Tasks(client, name, self._task, backlog)
             left, suspects = iter(self.open_parts), deque[int]()
             while True:
                 self._attend()
