@@ -139,7 +139,7 @@ def spoiled(k, count):
 
 @dataclass
 class Case:
-    """A plant file; the largest faults, the standard deviation of the measurements, numbers of samples, whether measurements are spoiled."""
+    """A plant file; the largest faults, the deviation of the measurements, numbers of samples, whether measurements are spoiled."""
 
     text: str
     fault: float

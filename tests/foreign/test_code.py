@@ -40,7 +40,7 @@ class BuiltWithFmu(Built):
 
 
 def in_the_loop(own, case):
-    """Measurements and switch of each sample in the loop of the FMU with the plant, the FMU's outputs, and its flags of the measurements."""
+    """Measurements and switch of each sample in the loop of the FMU with the plant, the FMU's outputs, its flags of measurements."""
     n, m, p, q = own.sizes
     design, plant = own.design, Plant(own.design)
     chance = np.random.default_rng(3)

@@ -37,9 +37,12 @@ def built(aso_ftc, packed, tmp_path_factory):
 @pytest.fixture(scope="module")
 def programs(built):
     """The programs in C, at two levels, and in Rust of a plant file."""
-    return lambda text, *options: [
-        own.compiled("-O0") for own in [built(text, *options)]
-    ] + [built(text, *options).compiled("-O3", "-march=native"), built(text, *options).crate()]
+
+    def of(text, *options):
+        own = built(text, *options)
+        return [own.compiled("-O0"), own.compiled("-O3", "-march=native"), own.crate()]
+
+    return of
 
 
 def measured(own, count, extra=1):
@@ -123,7 +126,7 @@ def test_after_a_loss_the_controller_is_one_that_starts(built, programs, name):
 
 def test_a_decision_of_the_detection_stays_and_no_alarm_is_given_while_a_measurement_is_lost(built, programs):
     text = CASES["held-detection"].text
-    own, (n, m, p, q) = built(text), built(text).sizes
+    own, (n, m, _, q) = built(text), built(text).sizes
     first = round(own.design["detection"]["from"] / own.design["sample_time"])
     lost, back = first + 300, first + 400
     samples = measured(own, back + first + 300, 2)
@@ -182,12 +185,13 @@ from = 1.0
 
 def test_a_continuous_controller_rests_while_a_measurement_is_lost_and_keeps_its_decision(aso_ftc, packed, tmp_path):
     (tmp_path / "plant.toml").write_text(CONTINUOUS, encoding="utf-8")
-    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "d.toml", "--fmu", tmp_path / "Own.fmu", "--certificate-time", "0")
+    wanted = ("--out", tmp_path / "d.toml", "--fmu", tmp_path / "Own.fmu", "--certificate-time", "0")
+    done = aso_ftc("design", tmp_path / "plant.toml", *wanted)
     assert done.returncode in (0, 1), done.stderr
     fmu = Fmu(extract(str(tmp_path / "Own.fmu"), str(tmp_path / "fmu")))
     names = ("force", "f_hat", "x_hat[1]", "residual", "statistic", "t_detected")
     size, lost = 0.05, [(3.0, 5.0), (13.0, 15.0)]
-    rows, flags = [], []
+    found, flags = [], []
     with Instance(fmu) as instance:
         instance.start({"position": 0.0})
         for k in range(400):
@@ -196,9 +200,9 @@ def test_a_continuous_controller_rests_while_a_measurement_is_lost_and_keeps_its
             y = 1e300 if any(start <= time < end for start, end in lost) else 1e-6 * np.sin(time) + 0.5 * (time >= 10.0)
             instance.set({"position": y})
             instance.step(time, size)
-            rows.append(instance.get(*names))
+            found.append(instance.get(*names))
             flags.append(instance.get("measurement_held", "measurement_lost", "fault_detected"))
-    rows, (held_flag, lost_flag, detected), times = np.array(rows), np.array(flags, dtype=bool).T, np.arange(400) * size
+    rows, (held_flag, lost_flag, detected), times = np.array(found), np.array(flags, dtype=bool).T, np.arange(400) * size
     spoilt = np.any([(times > start - 1e-9) & (times < end - 1e-9) for start, end in lost], axis=0)
     late = np.any([(times > start + 0.5 - 1e-9) & (times < end - 1e-9) for start, end in lost], axis=0)
     assert (held_flag == spoilt).all() and (lost_flag == late).all()
