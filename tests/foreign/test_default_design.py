@@ -106,8 +106,8 @@ def test_units_of_states_and_measurements_do_not_change_the_loop(designed):
     scaled = [(state @ a @ np.linalg.inv(state)).tolist(), (state @ b).tolist(), (output @ c @ np.linalg.inv(state)).tolist()]
     one, other = (designed(written(plant) + 'actuator_faults = "all"\n') for plant in (PLANTS["two masses"], scaled))
     for part in ("feedback", "observer"):
-        values = [np.sort_complex([complex(*value) for value in report[part]["eigenvalues"]]) for report in (one, other)]
-        np.testing.assert_allclose(*values, rtol=1e-6)
+        found, expected = (np.sort_complex([complex(*value) for value in report[part]["eigenvalues"]]) for report in (one, other))
+        np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
 def test_a_sampled_design_without_requirements_is_slower_than_its_samples(designed):

@@ -49,8 +49,8 @@ def test_sampled_matrices_give_the_design_of_the_plant_that_was_sampled(design):
         reports.append(json.loads(done.stdout))
     for one, other in zip(reports[0]["gains"], reports[1]["gains"], strict=True):
         np.testing.assert_allclose(one["values"], other["values"], rtol=1e-8, atol=1e-9)
-    peaks = [[point["s_peak"] for point in report["robustness"]["points"]] for report in reports]
-    np.testing.assert_allclose(*peaks, rtol=1e-6)
+    found, expected = ([point["s_peak"] for point in report["robustness"]["points"]] for report in reports)
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
 def test_the_worst_plant_of_sampled_matrices_is_a_plant_file(design, aso_ftc, tmp_path):

@@ -54,7 +54,7 @@ const ARROWS: [(&str, &[&str]); 20] = [
     ("fmu", &["fmu-derive", "fmu-description"]),
     ("slave", &["fmu-description"]),
     ("fmu-import", &["fmu-description", "slave"]),
-    ("linearise", &["fmu-description", "fmu-import", "slave"]),
+    ("linearise", &["control", "fmu-description", "fmu-import", "slave"]),
     ("ssp", &["fmu-description", "slave"]),
     ("results", &[]),
     ("report", &["figure", "results"]),
