@@ -7,6 +7,7 @@
 mod barrier;
 mod blocks;
 mod cover;
+mod form;
 mod gauss;
 mod held;
 mod hermitian;

@@ -1,8 +1,8 @@
 //! The analytic centre of the scales D and G that satisfy a bound.
 
 use super::blocks::{Block, Direction, SparseEntry, directions};
+use super::form::{form, form_size};
 use super::hermitian::{ComplexMatrix, factor, forward, times};
-use super::scales::{form, form_size};
 use nalgebra::{Cholesky, Complex, DMatrix, DVector};
 
 /// The largest G, relative to D and the size of M: a number with a smaller angle to the real axis than about the

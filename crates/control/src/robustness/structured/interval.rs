@@ -43,7 +43,7 @@ impl Response {
 
     /// The largest interval about `frequency` in which `scales` hold for their bound; None if they do not there.
     ///
-    /// F, see [`super::scales::form`], is positive definite at `frequency` and singular at the imaginary eigenvalues
+    /// F, see [`super::form::form`], is positive definite at `frequency` and singular at the imaginary eigenvalues
     /// of a Hamiltonian matrix only, so that it is definite up to the first of them on each side. It need
     /// not be decided which eigenvalues are imaginary: where F is positive definite at the imaginary part and
     /// between it and the next one, the interval goes on.
@@ -106,7 +106,7 @@ impl Response {
         // The size of the scales is free: with one of about 1 / bound the blocks are of similar size.
         let size = d.diagonal().iter().map(|x| x.re).fold(0.0, f64::max) * bound;
         let (d, g) = (d.unscale(size), g.unscale(size));
-        let weight = super::scales::form(&direct, &d, &g, *bound).try_inverse()?;
+        let weight = super::form::form(&direct, &d, &g, *bound).try_inverse()?;
         let ct = c.adjoint();
         let cross = times(&ct, &(times(&d, &direct) - g.map(|x| x * Complex::i())));
         let through = times(&times(&b, &weight), &cross.adjoint());

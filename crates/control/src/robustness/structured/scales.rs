@@ -2,9 +2,9 @@
 
 use super::barrier::{Barrier, Point};
 use super::blocks::{Block, balanced, scaled};
+use super::form::{form, form_size};
 use super::hermitian::{ComplexMatrix, factor, forward, largest_eigenvalue, times};
 use crate::Error;
-use nalgebra::Complex;
 
 /// Part of the distance to the bound of the present scales that a step keeps, so that they stay inside.
 const KEPT: f64 = 0.1;
@@ -19,37 +19,6 @@ pub(super) struct Scales {
     pub(super) g: ComplexMatrix,
     /// The bound for which they hold.
     pub(super) bound: f64,
-}
-
-/// F = beta^2 D - M* D M - j (G M - M* G).
-///
-/// If F is positive definite, I - Delta M is regular for every Delta of the structure with a norm up to 1 / beta: with
-/// w = Delta M w and z = M w, w* F w = beta^2 w* D w - z* D z is at most zero, as D commutes with Delta and G Delta is
-/// Hermitian.
-pub(super) fn form(
-    m: &ComplexMatrix,
-    d: &ComplexMatrix,
-    g: &ComplexMatrix,
-    bound: f64,
-) -> ComplexMatrix {
-    let (adjoint, turned) = (m.adjoint(), g.map(|x| x * Complex::i()));
-    let left = times(&adjoint, d) + &turned;
-    d.scale(bound * bound) - times(&left, m) + times(&adjoint, &turned)
-}
-
-/// The sizes of the sums that are the diagonal of [`form`], which its rounding errors are relative to.
-pub(super) fn form_size(
-    m: &ComplexMatrix,
-    d: &ComplexMatrix,
-    g: &ComplexMatrix,
-    bound: f64,
-) -> Vec<f64> {
-    let [m, d, g] = [m, d, g].map(|matrix| matrix.map(Complex::norm));
-    let (of_d, of_g) = (&d * &m, &g * &m);
-    let size = |at: usize| {
-        bound * bound * d[(at, at)] + m.column(at).dot(&of_d.column(at)) + 2.0 * of_g[(at, at)]
-    };
-    (0..m.ncols()).map(size).collect()
 }
 
 impl Scales {
@@ -111,6 +80,8 @@ fn least_bound(m: &ComplexMatrix, at: &Point) -> Result<f64, Error> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Complex;
+
     use super::*;
     use crate::check::as_number;
 
