@@ -277,3 +277,90 @@ fn the_bound_over_all_frequencies_is_the_peak_of_slicot() {
         assert!((0.995..1.02).contains(&part), "{}: {found:?} {part}", case.name);
     }
 }
+
+/// Two inertias and an elastic shaft, with entries and frequencies of very different sizes: examples/plants/two-mass-drive.toml.
+#[test]
+#[expect(clippy::unreadable_literal, reason = "the digits of the design")]
+fn a_stiff_drive_is_proven_to_near_the_instability_that_is_found() {
+    let (motor, load, (k, c)) = (0.0019, 0.003, (50.0, 0.02));
+    let plant = StateSpace {
+        a: matrix(
+            5,
+            5,
+            &[
+                0.0,
+                1.0,
+                0.0,
+                0.0,
+                0.0,
+                -k / motor,
+                -c / motor,
+                k / motor,
+                c / motor,
+                1.0 / motor,
+                0.0,
+                0.0,
+                0.0,
+                1.0,
+                0.0,
+                k / load,
+                c / load,
+                -k / load,
+                -c / load,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                -1000.0,
+            ],
+        ),
+        b: matrix(5, 1, &[0.0, 0.0, 0.0, 0.0, 1000.0]),
+        c: matrix(1, 5, &[1.0, 0.0, 0.0, 0.0, 0.0]),
+        d: matrix(1, 1, &[0.0]),
+        domain: CONTINUOUS,
+    };
+    // The observer has one more state, a constant torque that is compensated.
+    let k_x = matrix(
+        1,
+        6,
+        &[
+            21.097402283415235,
+            -0.4027483040935672,
+            -27.379258283415226,
+            0.1416839264935668,
+            -0.07280701754385985,
+            -1.0,
+        ],
+    );
+    let l = matrix(
+        6,
+        1,
+        &[
+            2982.8070175438606,
+            3143234.1951369694,
+            -44883.33522992294,
+            14038063.128558446,
+            5106635.643564357,
+            5078700.0,
+        ],
+    );
+    let mut own = plant.a.clone().resize(6, 6, 0.0);
+    own[(4, 5)] = 1000.0;
+    let (b, c) =
+        (plant.b.clone().resize_vertically(6, 0.0), plant.c.clone().resize_horizontally(6, 0.0));
+    let controller = StateSpace {
+        a: own + b * &k_x - &l * c,
+        b: l,
+        c: k_x,
+        d: matrix(1, 1, &[0.0]),
+        domain: CONTINUOUS,
+    };
+    let tolerances = Tolerances::unless_structural(&plant, [0.1; 4]);
+    let family = EntryFamily::new(&plant, &tolerances).expect("fits");
+    for most in [16.0, 0.922_669_4] {
+        let found = proven_tolerance(&family, &controller, most, &|| false);
+        let found = found.expect("no error").expect("a proof");
+        assert!((0.8..0.923).contains(&found.fraction), "{most}: {found:?}");
+    }
+}

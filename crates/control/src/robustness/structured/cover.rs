@@ -15,6 +15,8 @@ const PER_DECADE: u32 = 6;
 const RAISE: f64 = 5e-3;
 /// Relative width of an interval below which the bound is raised.
 const SHORT: f64 = 1e-3;
+/// Part of the slowest frequency below which scales for zero itself are sought.
+const NEAR_ZERO: f64 = 1e-4;
 const ROUNDS: usize = 3000;
 
 /// The bound so far and the frequencies that it does not cover yet.
@@ -28,6 +30,8 @@ pub(super) struct Cover<'a> {
     gaps: Vec<Interval>,
     /// Frequencies at which scales are sought next, the last one first.
     candidates: Vec<f64>,
+    /// The frequencies between which the response changes most.
+    slowest: f64,
     fastest: f64,
 }
 
@@ -40,10 +44,11 @@ impl<'a> Cover<'a> {
     ) -> Result<Self, Error> {
         let response = Response::new(system);
         let modes = eigenvalues(&system.a)?;
+        let fastest = modes.iter().map(|mode| mode.norm()).fold(0.0, f64::max);
         let mut all = grid(system, &modes, PER_DECADE);
         all.extend(modes.iter().flat_map(|mode| [mode.im.abs(), mode.norm()]));
-        all.push(0.0);
-        let fastest = modes.iter().map(|mode| mode.norm()).fold(0.0, f64::max);
+        all.retain(|frequency| *frequency > 0.0);
+        let slowest = all.iter().copied().fold(fastest, f64::min);
         let mut sized = Vec::with_capacity(all.len());
         for frequency in all {
             let m = response.at(frequency)?;
@@ -59,6 +64,7 @@ impl<'a> Cover<'a> {
             intervals: 0,
             gaps: vec![Interval { from: 0.0, to: f64::INFINITY }],
             candidates: sized.into_iter().map(|(_, frequency)| frequency).collect(),
+            slowest,
             fastest,
         })
     }
@@ -86,6 +92,8 @@ impl<'a> Cover<'a> {
         }
         let Interval { from, to } = gap;
         Some(match (from, to) {
+            // At zero M is real, and a part of it often zero, so that scales that are made for it hold nowhere else.
+            (0.0, to) if to > NEAR_ZERO * self.slowest => (0.1 * to).min(self.slowest),
             (0.0, _) => 0.0,
             (from, f64::INFINITY) if from < 1e9 * self.fastest => 10.0 * from.max(self.fastest),
             (_, f64::INFINITY) => f64::INFINITY,
