@@ -15,7 +15,7 @@ use crate::text;
 /// The design that the controller FMU contains.
 fn design() -> Design {
     use aso_controller::Matrix;
-    use aso_controller::design::{Actuator, Defaults, Fault, Signal};
+    use aso_controller::design::{Actuator, Defaults, Fault, Measurement, Signal};
     include!(concat!(env!("OUT_DIR"), "/design.rs"))
 }
 
