@@ -25,7 +25,11 @@ SMALL = "Troubles.fmu"
 
 # What differs between pages of two runs: wall-clock times, the hash of their script, messages of the run.
 FREEING = re.compile(rb"(\S+ fmi2(Terminate|FreeInstance)\(.*\n)+\Z")
-VARYING = re.compile(rb"in \d+ steps? and [^<]*? times real time|sha256-[^']*|<section[^>]*messages.*?</section>", re.S)
+VARYING = re.compile(
+    rb"in \d+ steps? and [^<]*? times real time|sha256-[^']*"
+    rb"|<p><a href=.#messages.>[^<]*</a></p>|<section[^>]*messages.*?</section>",
+    re.S,
+)
 TEMPORARY = re.compile(r"^\.(?=.*\.tmp$)|\.\d+\.(partial|old|tmp)")
 # The first bytes of a checkpoint; a checksum and the content, with absolute paths, follow.
 CHECKPOINT = b"aso-ftc-state-5\n"
