@@ -262,7 +262,7 @@ pub struct Signal {
     pub operating: Option<f64>,
 }
 
-/// A measurement, and when its value is not used; see `fmu-controller/src/validity.rs`.
+/// A measurement, and when its value is not used; see [`crate::sample::measurements`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measurement {

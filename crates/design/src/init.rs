@@ -11,9 +11,8 @@ use files::{Source, Table};
 
 use crate::Error;
 use crate::assess::bandwidths;
-use crate::budget::TimeLimits;
+use crate::budget::{Budget, TimeLimits};
 use crate::plant_file::PlantFile;
-use crate::plant_file::requirements::{Bandwidth, Requirement};
 use draft::{Draft, Settings};
 
 /// Rates of a measurement filter, in 1/s, that are tried for a plant with direct feedthrough.
@@ -57,8 +56,8 @@ pub fn new_plant_file(
     for settings in attempts(&draft) {
         let text = draft.text(&settings, &[]);
         match bandwidths(out, &text, &budget) {
-            Ok([feedback, observer]) => {
-                let settings = Settings { bandwidths: Some([feedback, observer]), ..settings };
+            Ok(bandwidths) => {
+                let settings = Settings { bandwidths, ..settings };
                 return Ok(NewPlantFile { text: draft.text(&settings, &[]), refusal: None });
             }
             Err(error) => refusal = refusal.or_else(|| Some(files::sentence(&error))),
@@ -89,13 +88,10 @@ fn attempts(draft: &Draft) -> Vec<Settings> {
 }
 
 /// The bandwidths that the design of a plant file without requirements has.
-fn bandwidths(path: &Path, text: &str, budget: &crate::budget::Budget) -> Result<[f64; 2], Error> {
+fn bandwidths(path: &Path, text: &str, budget: &Budget) -> Result<Option<(f64, f64)>, Error> {
     let source = Source::new(path, text.to_owned());
     let parsed = source.parse()?;
     let file = PlantFile::read(&source, &Table::whole(&source, &parsed))?;
     let file = bandwidths::chosen(&file, budget)?;
-    Ok([&file.feedback, &file.observer].map(|request| match request.requirement {
-        Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }) => rate,
-        _ => f64::NAN,
-    }))
+    Ok(file.feedback.bandwidth().zip(file.observer.bandwidth()))
 }

@@ -142,8 +142,15 @@ fn outcome(run: &Run) -> Markup {
     html! {
         p.outcome.failed[run.failed] role="status" { (run.outcome) }
         @if !run.messages.is_empty() {
-            p { a href="#messages" { (run.messages.len()) " warnings and errors" } }
+            p { a href="#messages" { (counted(run.messages.len())) } }
         }
+    }
+}
+
+fn counted(messages: usize) -> String {
+    match messages {
+        1 => "1 warning or error".to_owned(),
+        several => format!("{several} warnings and errors"),
     }
 }
 

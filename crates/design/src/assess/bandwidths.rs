@@ -38,6 +38,8 @@ const CANDIDATES: [(f64, f64); 18] = [
 /// From this number of states on, only the first candidates are examined, without the tolerances.
 const LARGE: usize = 24;
 const OF_LARGE: usize = 3;
+/// Candidates that are examined at the same time: fixed, so that the result is that of every machine.
+const TOGETHER: usize = 3;
 /// Eigenvalues smaller than this part of the largest one have no speed.
 const NO_SPEED: f64 = 1e-9;
 /// Largest bandwidth of the feedback in rad per sample.
@@ -68,7 +70,7 @@ pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantF
     };
     let mut best: Option<(PlantFile<'a>, Judged)> = None;
     let mut refusal: Option<Error> = None;
-    for candidates in candidates.chunks(rayon::current_num_threads().max(2)) {
+    for candidates in candidates.chunks(TOGETHER) {
         let examined: Vec<_> = candidates.par_iter().map(examine).collect();
         for (other, judged) in examined {
             match judged {

@@ -47,7 +47,7 @@ pub(super) struct Settings {
     /// Rate of the measurement filter, 1/s.
     pub(super) filter: Option<f64>,
     /// Of feedback and observer, rad/s.
-    pub(super) bandwidths: Option<[f64; 2]>,
+    pub(super) bandwidths: Option<(f64, f64)>,
 }
 
 impl Settings {
@@ -84,7 +84,7 @@ impl Draft {
                 let _ = writeln!(text, "#   {}", line.trim_end());
             }
         }
-        if let Some([feedback, observer]) = settings.bandwidths {
+        if let Some((feedback, observer)) = settings.bandwidths {
             text += "\n# rad/s. A larger bandwidth is faster, and asks for larger commands and better sensors.\n";
             line(&mut text, "feedback.bandwidth", feedback);
             line(&mut text, "observer.bandwidth", observer);

@@ -63,6 +63,14 @@ impl Request {
         Self { requirement, place, other: None }
     }
 
+    /// The bandwidth in rad/s, if it is the requirement and is chosen.
+    pub(crate) fn bandwidth(&self) -> Option<f64> {
+        match self.requirement {
+            Requirement::Bandwidth(Bandwidth { rate, .. }) => rate,
+            _ => None,
+        }
+    }
+
     /// Whether the bandwidth is to be chosen.
     pub(crate) fn is_open(&self) -> bool {
         matches!(self.requirement, Requirement::Bandwidth(Bandwidth { rate: None, .. }))

@@ -85,7 +85,7 @@ impl Bandwidth {
         let chosen = if self.is_stated {
             ""
         } else {
-            ", chosen by the peaks of S as the file states no requirement"
+            ", chosen by the verdict as the file states no requirement"
         };
         let reached = match loop_gain {
             gain if gain > 1.1 => {
