@@ -353,6 +353,9 @@ def test_the_frames_of_a_bus_trace_are_counted_and_drawn_at_their_times(aso_ftc,
     assert curve["dots"] and not curves(page)["a"]["dots"]
     rows = np.isfinite(curve["values"])
     assert np.allclose([curve["time"][rows], curve["values"][rows]], [times[1:], gaps])
+    part, _ = report(aso_ftc, write("own.csv", frame()), "--bus-trace", trace, "--to", 0.002, "--out", tmp_path / "part.html")
+    counts = {name: row[0] for name, row in table(part, "frames").items()}
+    assert counts == {"can0 100": 2, "can0 00000101": 1}
 
 
 def test_a_line_of_a_trace_that_is_no_frame_is_named(aso_ftc, write, tmp_path):

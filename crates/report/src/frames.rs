@@ -48,8 +48,8 @@ impl Message {
     }
 }
 
-/// Reads a trace: lines `(time) bus identifier#data`.
-pub(crate) fn read(path: &Path) -> Result<Vec<Message>, Error> {
+/// Reads the frames of a trace from time `from` to `to` in s: lines `(time) bus identifier#data`.
+pub(crate) fn read(path: &Path, (from, to): (f64, f64)) -> Result<Vec<Message>, Error> {
     let unreadable = |source| Error::Trace { file: name(path), source };
     let mut messages: BTreeMap<(String, String), Message> = BTreeMap::new();
     for (number, line) in BufReader::new(File::open(path).map_err(unreadable)?).lines().enumerate()
@@ -62,6 +62,9 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Message>, Error> {
             let file = name(path);
             Error::Frame { file, line: number + 1, found: line.chars().take(80).collect() }
         })?;
+        if !(from..=to).contains(&time) {
+            continue;
+        }
         let known = messages.entry((bus.to_owned(), identifier.to_owned()));
         known
             .and_modify(|message| message.push(time))

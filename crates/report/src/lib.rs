@@ -261,7 +261,7 @@ pub fn page(request: &Request<'_>) -> Result<Page, Error> {
         }
         None => (None, collect(&view, positions, &groups)?),
     };
-    let frames = request.bus_trace.map(frames::read).transpose()?;
+    let frames = request.bus_trace.map(|path| frames::read(path, request.range)).transpose()?;
     let mut plots = Plots::default();
     let is_compared = compared.as_ref().map_or(&[][..], |compared| &compared.common);
     let difference = |group: &Group| {

@@ -358,7 +358,7 @@ fn bus_frames(messages: &[frames::Message], file: &Path) -> Markup {
     html! {
         section aria-labelledby="frames" {
             h2 #frames { "Frames on the bus" }
-            @if messages.is_empty() { p { "There is no frame in " (file.display()) "." } }
+            @if messages.is_empty() { p { (file.display()) " has no frame at the times of this page." } }
             div.scroll tabindex="0" role="region" aria-labelledby="frames" {
                 table {
                     thead {
