@@ -66,6 +66,19 @@ pub(crate) fn size_between(start: f64, end: f64) -> f64 {
     if start + size < end && start + size.next_up() <= end { size.next_up() } else { size }
 }
 
+/// Checks that the stop time, in s, is finite and later than the start time.
+///
+/// # Errors
+///
+/// Returns [`SystemError::Time`] if it is not.
+pub fn check_stop_time(start: f64, stop: f64) -> Result<(), SystemError> {
+    if stop > start && stop.is_finite() {
+        return Ok(());
+    }
+    let rule = format!("more than the start time, {start} s");
+    Err(SystemError::Time { what: "the stop time", value: stop, rule })
+}
+
 impl Grid {
     /// Creates the grid from start to stop time with steps of `step` s. `multiples` are the
     /// communication steps in one step of each slave. Also returns the reason if the run ends
@@ -81,11 +94,8 @@ impl Grid {
             let (what, rule) = ("the communication step", "more than 0".to_owned());
             return Err(SystemError::Time { what, value: step, rule });
         }
-        if let Some(stop) = stop
-            && !(stop > start && stop.is_finite())
-        {
-            let (what, rule) = ("the stop time", "more than the start time".to_owned());
-            return Err(SystemError::Time { what, value: stop, rule });
+        if let Some(stop) = stop {
+            check_stop_time(start, stop)?;
         }
         let points = (start, start + step);
         let mut grid = Self { start, stop, step, count: 0, points, time: start };

@@ -53,7 +53,7 @@ pub use choose::{AlgorithmChoice, AlgorithmRequest, choose};
 pub use coupling::Fallbacks;
 pub use drive::Scenario;
 pub use error::SystemError;
-pub use grid::EarlyEnd;
+pub use grid::{EarlyEnd, check_stop_time};
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use readout::Readout;

@@ -6,7 +6,7 @@ use fmu_description::Experiment;
 use fmu_description::number::{rounded, seconds};
 use master::{
     Algorithm, AlgorithmRequest, Coupling, Extrapolation, Method, StepControl, System,
-    by_direct_dependencies, choose,
+    by_direct_dependencies, check_stop_time, choose,
 };
 use toml::Spanned;
 
@@ -48,6 +48,7 @@ pub fn plan(config: &mut Config, assembled: &AssembledSystem) -> Result<Plan, Er
     propose_steps(&mut config.algorithm, assembled, &mut reasons);
     check_step(&config.algorithm)?;
     let (start, stop) = times(config, assembled, &mut reasons);
+    check_stop_time(start, stop)?;
     let chosen = choose(system, &config.algorithm, stop - start)?;
     reasons.extend(chosen.reasons);
     let algorithm = chosen.algorithm;
