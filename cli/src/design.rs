@@ -258,7 +258,7 @@ fn compare(options: &Options) -> anyhow::Result<()> {
     if !options.force {
         check_own(&path, &comparison.identity)?;
     }
-    let text = comparison.page();
+    let text = design::comparison_page(&comparison);
     let mut staged = Outputs::default();
     staged.stage(&path, |path| fs::write(path, &text))?;
     staged.commit()?;

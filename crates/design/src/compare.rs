@@ -12,10 +12,10 @@ use crate::plant_file::estimation::Law;
 use crate::progress::Steps;
 use crate::report::comparison::{Comparison, LawFigures, LawResult};
 use crate::report::identity::identity;
+use crate::reporting;
 use crate::solve::designed::design_by;
 use crate::solve::law::LawProblem;
 use crate::solve::solution::Solution;
-use crate::{page, reporting};
 use files::{Source, Table};
 
 /// Designs the controller of the plant file at `path` with each law.
@@ -75,12 +75,4 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
     }
     let model = file.fmu().map(Path::to_owned);
     Ok(Comparison { plant_file: file.name(), laws, identity: own_identity, model })
-}
-
-impl Comparison {
-    /// The comparison as an HTML page that needs no other file.
-    #[must_use]
-    pub fn page(&self) -> String {
-        page::comparison(self)
-    }
 }

@@ -17,11 +17,9 @@ mod design_file;
 mod error;
 mod init;
 mod matrix;
-mod page;
 mod plant;
 mod plant_file;
 mod progress;
-pub mod report;
 mod solve;
 #[cfg(test)]
 mod tests;
@@ -33,9 +31,11 @@ use control::robustness::Loop;
 use files::{Source, Table};
 
 pub use budget::TimeLimits;
-pub use code::{Code, Language, Precision};
 pub use compare::compare;
+pub use controller_code::{Code, Language, Precision};
 pub use controller_fmu::ControllerFmu;
+pub use design_page::comparison as comparison_page;
+pub use design_report as report;
 pub use error::Error;
 pub use init::{NewPlantFile, new_plant_file};
 pub use progress::{Observer, Progress};
@@ -184,7 +184,7 @@ impl Design {
     /// The report as an HTML page that needs no other file.
     #[must_use]
     pub fn page(&self) -> String {
-        page::page(&self.report, &self.identity)
+        design_page::page(&self.report, &self.identity)
     }
 
     /// Whether all checks hold and the verdict is not red.

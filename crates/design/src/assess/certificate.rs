@@ -2,7 +2,7 @@
 
 use control::Domain;
 use control::lmi::Outcome;
-use control::theorem1::{self, certify, largest_decay, smallest_radius, ultimate_bound};
+use control::theorem1::{certify, largest_decay, smallest_radius, ultimate_bound};
 
 use crate::budget::Budget;
 use crate::matrix::rows;
@@ -76,22 +76,17 @@ fn solvable(designed: &Solution) -> Result<(), String> {
 fn printed(designed: &Solution) -> Result<Theorem1, String> {
     applies(designed)?;
     let beta = fault_bound(designed)?;
-    let found = certify(&designed.plant, &designed.gains, ALPHA, beta);
-    found.map(|found| (&found).into()).map_err(|error| error.to_string())
-}
-
-impl From<&theorem1::Certificate> for Theorem1 {
-    fn from(found: &theorem1::Certificate) -> Self {
-        Self {
-            alpha: found.alpha,
-            beta: found.beta,
-            p: rows(&found.p),
-            smallest_eigenvalue: found.p_range.0,
-            largest_eigenvalue: found.p_range.1,
-            residual: found.residual,
-            delta: found.delta,
-        }
-    }
+    let certificate = certify(&designed.plant, &designed.gains, ALPHA, beta);
+    let certificate = certificate.map_err(|error| error.to_string())?;
+    Ok(Theorem1 {
+        alpha: certificate.alpha,
+        beta: certificate.beta,
+        p: rows(&certificate.p),
+        smallest_eigenvalue: certificate.p_range.0,
+        largest_eigenvalue: certificate.p_range.1,
+        residual: certificate.residual,
+        delta: certificate.delta,
+    })
 }
 
 fn verified<T>(outcome: Result<Outcome<T>, control::Error>) -> Result<T, String> {

@@ -1,0 +1,120 @@
+//! The tables of a design that are no real numbers: of tests, of actuators that may be gone, of losses.
+
+use super::{Source, end_list, wrapped};
+use crate::detection::{Detection, Method, Test};
+use crate::parts::Loss;
+use crate::reconfiguration::{Case, Reconfiguration};
+use crate::symbols::Kind;
+
+impl Source<'_> {
+    pub(super) fn integer_tables(&self, lines: &mut Vec<String>) {
+        if let Some(detection) = &self.controller.detection {
+            self.tables_of_tests(lines, detection);
+        }
+        if let Some(reconfiguration) = &self.controller.reconfiguration {
+            self.tables_of_reconfiguration(lines, reconfiguration);
+        }
+        self.tables_of_losses(lines);
+        if self.controller.limits_holds() {
+            let text = "The most samples for which the last value of a measurement may replace it.";
+            lines.push(format!("\n/* {text} */"));
+            let most =
+                self.controller.most_held.iter().map(|most| most.unwrap_or(u32::MAX) as usize);
+            numbers(lines, ["most_held", &self.count(Kind::Measurement)], most);
+        }
+    }
+
+    fn tables_of_tests(&self, lines: &mut Vec<String>, detection: &Detection) {
+        let (tests, suspects) = (self.count(Kind::Test), self.count(Kind::Suspect));
+        if detection.method == Method::Window {
+            let of_tests = detection.tests.iter();
+            let residuals = |test: &Test| test.residuals;
+            numbers(lines, ["taken_residuals", &tests], of_tests.clone().map(residuals));
+            let samples = |test: &Test| test.window as usize;
+            numbers(lines, ["window", &tests], of_tests.map(samples));
+        }
+        lines.push("\n/* Which tests react to each fault. */".to_owned());
+        flags(lines, &format!("reacts[{suspects}][{tests}]"), reactions(detection).into_iter());
+    }
+
+    fn tables_of_reconfiguration(
+        &self,
+        lines: &mut Vec<String>,
+        reconfiguration: &Reconfiguration,
+    ) {
+        let (cases, actuators) = (self.count(Kind::Case), self.count(Kind::Actuator));
+        let (sets, faults) = (self.count(Kind::GainSet), self.count(Kind::Fault));
+        let row = |row: &[bool]| row.iter().map(bool::to_string).collect();
+        lines.push("\n/* The actuators without which each set of gains is. */".to_owned());
+        let gone = reconfiguration.sets.iter().map(|set| row(&set.gone));
+        flags(lines, &format!("set_gone[{sets}][{actuators}]"), gone);
+        if reconfiguration.cases.is_empty() {
+            return;
+        }
+        if reconfiguration.fallback.is_none() {
+            let text = "The set of gains without one actuator; 0 if there is none.";
+            lines.push(format!("\n/* {text} */"));
+            let singles = reconfiguration.single_sets(self.controller.actuators.len());
+            numbers(lines, ["single_set", &actuators], singles.into_iter());
+        }
+        let text = "The actuators that may be gone; the samples for which a loss must last; the loss, or the number \
+                    of losses.";
+        lines.push(format!("\n/* {text} */"));
+        let of_cases = reconfiguration.cases.iter();
+        let place = |case: &Case| case.actuator;
+        numbers(lines, ["case_actuator", &cases], of_cases.clone().map(place));
+        let samples = |case: &Case| case.decision.map_or(0, |decision| decision.2 as usize);
+        numbers(lines, ["case_samples", &cases], of_cases.clone().map(samples));
+        let losses = self.controller.losses.len();
+        if losses > 0 {
+            let loss = |case: &Case| case.decision.map_or(losses, |decision| decision.0);
+            numbers(lines, ["case_loss", &cases], of_cases.clone().map(loss));
+        }
+        lines.push("\n/* The faults whose estimates restart at 0. */".to_owned());
+        let restarts = of_cases.map(|case| row(&case.restarts));
+        flags(lines, &format!("case_restarts[{cases}][{faults}]"), restarts);
+    }
+
+    fn tables_of_losses(&self, lines: &mut Vec<String>) {
+        let losses = &self.controller.losses;
+        if losses.is_empty() {
+            return;
+        }
+        lines.push(
+            "\n/* Faults and actuators of the losses of effectiveness, and u_e^2. */".to_owned(),
+        );
+        let fault = |loss: &Loss| loss.fault;
+        numbers(lines, ["loss_fault", "ASO_LOSSES"], losses.iter().map(fault));
+        let actuator = |loss: &Loss| loss.actuator;
+        numbers(lines, ["loss_actuator", "ASO_LOSSES"], losses.iter().map(actuator));
+        let squared =
+            losses.iter().map(|loss| self.literal(loss.least_command * loss.least_command));
+        lines.push(format!("static const {} squared_least_command[ASO_LOSSES] =\n{{", self.real));
+        lines.extend(wrapped(squared, "    "));
+        end_list(lines);
+        lines.push("};".to_owned());
+    }
+}
+
+/// A table of whole numbers with this name and size.
+fn numbers(lines: &mut Vec<String>, [name, size]: [&str; 2], values: impl Iterator<Item = usize>) {
+    lines.push(format!("static const uint32_t {name}[{size}] =\n{{"));
+    lines.extend(wrapped(values.map(|value| format!("{value}U")), "    "));
+    end_list(lines);
+    lines.push("};".to_owned());
+}
+
+/// A table of truth values.
+fn flags(lines: &mut Vec<String>, head: &str, rows: impl Iterator<Item = Vec<String>>) {
+    lines.push(format!("static const bool {head} =\n{{"));
+    lines.extend(rows.map(|row| format!("    {{{}}},", row.join(", "))));
+    end_list(lines);
+    lines.push("};".to_owned());
+}
+
+/// For each fault whether each test reacts to it, as C and Rust write it.
+pub(crate) fn reactions(detection: &Detection) -> Vec<Vec<String>> {
+    let row =
+        |fault: usize| detection.tests.iter().map(|test| test.reacts[fault].to_string()).collect();
+    (0..detection.faults.len()).map(row).collect()
+}

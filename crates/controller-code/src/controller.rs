@@ -1,0 +1,366 @@
+//! The sampled controller as its design file states it.
+
+use aso_controller::Design;
+use aso_controller::design::{Actuator, Estimator, Fault, SlidingMode};
+use nalgebra::DMatrix;
+
+use super::Precision;
+use super::detection::Detection;
+use super::parts::{Loss, Signal, dense, first_at};
+use super::reconfiguration::{Plant, Reconfiguration};
+use super::schedule::Schedule;
+use super::symbols::{Kind, Matrix};
+use crate::Error;
+
+/// The controller of a sampled design: matrices, signals, switches. Shapes as in the design file.
+pub(super) struct Controller {
+    pub(super) description: String,
+    /// T in s.
+    pub(super) sample_time: f64,
+    pub(super) estimator: Estimator,
+    /// Start of the compensation in s, and the first sample at or after it.
+    pub(super) t_on: f64,
+    pub(super) first_compensated: u32,
+    /// Whether the fault is estimated while it is not compensated.
+    pub(super) monitor: bool,
+    /// The diagonal of W.
+    pub(super) filter: Option<Vec<f64>>,
+    pub(super) a: DMatrix<f64>,
+    pub(super) b: DMatrix<f64>,
+    pub(super) c: DMatrix<f64>,
+    /// The part of the commands in the measurements, if they contain them.
+    pub(super) d: Option<DMatrix<f64>>,
+    pub(super) f_a: DMatrix<f64>,
+    /// The identity where faults are constant.
+    pub(super) a_f: DMatrix<f64>,
+    pub(super) constant_faults: bool,
+    pub(super) k_x: DMatrix<f64>,
+    pub(super) k_f: DMatrix<f64>,
+    pub(super) l_x: DMatrix<f64>,
+    pub(super) l_f: DMatrix<f64>,
+    /// The direct term of the estimated faults, where the law has one.
+    pub(super) p_f: Option<DMatrix<f64>>,
+    pub(super) sliding_mode: Option<SlidingMode>,
+    /// H, `K_i`, `F_i`, `L_w`, `N_r` of the references, where the design states them.
+    pub(super) h: Option<DMatrix<f64>>,
+    pub(super) k_i: Option<DMatrix<f64>>,
+    pub(super) f_i: Option<DMatrix<f64>>,
+    pub(super) l_w: Option<DMatrix<f64>>,
+    pub(super) n_r: Option<DMatrix<f64>>,
+    pub(super) states: Vec<Signal>,
+    pub(super) actuators: Vec<Signal>,
+    pub(super) measurements: Vec<Signal>,
+    /// For each measurement the most samples for which its last value may replace it, if there is such a limit.
+    pub(super) most_held: Vec<Option<u32>>,
+    pub(super) faults: Vec<Signal>,
+    pub(super) references: Vec<Signal>,
+    pub(super) losses: Vec<Loss>,
+    /// Matrices and operating points that follow a variable, in place of those above.
+    pub(super) schedule: Option<Schedule>,
+    pub(super) detection: Option<Detection>,
+    pub(super) reconfiguration: Option<Reconfiguration>,
+}
+
+impl Controller {
+    /// The controller of a design file; the error names what has no code.
+    pub(super) fn of(file: Design) -> Result<Self, Error> {
+        // Each entry of a design file has code, or the reason why it needs none.
+        let Design {
+            description,
+            t_on,
+            monitor,
+            sample_time,
+            estimator,
+            filter,
+            a,
+            b,
+            c,
+            d,
+            f_a,
+            a_f,
+            p_f,
+            sliding_mode,
+            k_x,
+            k_f,
+            l_x,
+            l_f,
+            h,
+            k_i,
+            f_i,
+            l_w,
+            n_r,
+            states,
+            actuators,
+            measurements,
+            faults,
+            references,
+            reconfigurations,
+            combinations,
+            fallback,
+            // For importers of the FMU.
+            experiment: _,
+            schedule,
+            detection,
+        } = file;
+        let (Some(sample_time), Some(estimator)) = (sample_time, estimator) else {
+            return Err(Error(
+                "there is code for sampled designs only, and this one is continuous; state \
+                 `sample_time` in the plant file"
+                    .to_owned(),
+            ));
+        };
+        let first_compensated = first_compensated(t_on, sample_time)?;
+        let detection =
+            detection.map(|detection| Detection::of(detection, sample_time)).transpose()?;
+        let schedule = schedule.map(|schedule| Schedule::of(schedule, &measurements));
+        let (k_x, k_f) = (dense(&k_x), dense(&k_f));
+        let losses = losses(&faults, &actuators);
+        let plant = Plant {
+            sample_time,
+            actuators: &actuators,
+            faults: &faults,
+            losses: &losses,
+            k_x: &k_x,
+            k_f: &k_f,
+        };
+        let reconfiguration =
+            Reconfiguration::of(&reconfigurations, &combinations, fallback.as_ref(), &plant)?;
+        let stated = |matrix: Option<aso_controller::Matrix>| matrix.as_ref().map(dense);
+        let q = faults.len();
+        let signals =
+            |all: Vec<aso_controller::design::Signal>| all.into_iter().map(Signal::from).collect();
+        Ok(Self {
+            reconfiguration,
+            schedule,
+            detection,
+            losses,
+            description,
+            sample_time,
+            estimator,
+            t_on,
+            first_compensated,
+            monitor,
+            filter,
+            a: dense(&a),
+            b: dense(&b),
+            c: dense(&c),
+            d: stated(d),
+            f_a: dense(&f_a),
+            constant_faults: a_f.is_none(),
+            a_f: stated(a_f).unwrap_or_else(|| DMatrix::identity(q, q)),
+            k_x,
+            k_f,
+            l_x: dense(&l_x),
+            l_f: dense(&l_f),
+            p_f: stated(p_f),
+            sliding_mode,
+            h: stated(h),
+            k_i: stated(k_i),
+            f_i: stated(f_i),
+            l_w: stated(l_w),
+            n_r: stated(n_r),
+            references: signals(references),
+            states: signals(states),
+            actuators: actuators.into_iter().map(Signal::from).collect(),
+            most_held: measurements.iter().map(|signal| signal.most_held(sample_time)).collect(),
+            measurements: measurements.into_iter().map(Signal::from).collect(),
+            faults: faults.into_iter().map(Signal::from).collect(),
+        })
+    }
+
+    /// The operating point of some signals.
+    pub(super) fn operating(signals: &[Signal]) -> Vec<f64> {
+        signals.iter().map(|signal| signal.operating).collect()
+    }
+
+    /// The scheduling variable where it is an input of its own; else none.
+    pub(super) fn schedule_inputs(&self) -> &[Signal] {
+        self.schedule.as_ref().and_then(Schedule::input).map_or(&[], std::slice::from_ref)
+    }
+
+    /// A matrix at each point of the schedule; `None` if it is constant.
+    pub(super) fn scheduled(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
+        self.schedule.as_ref().and_then(|own| own.matrices(matrix))
+    }
+
+    /// Whether an instance counts its samples.
+    pub(super) fn has_counter(&self) -> bool {
+        self.first_compensated > 0 || self.counts_all()
+    }
+
+    /// Whether it counts all of them: times of a detection and of a reconfiguration follow from their number.
+    pub(super) fn counts_all(&self) -> bool {
+        self.detection.is_some() || self.reconfiguration.is_some()
+    }
+
+    /// A matrix in each set of gains; `None` if it is the same in all.
+    pub(super) fn chosen(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
+        self.reconfiguration.as_ref().and_then(|own| own.matrices(matrix))
+    }
+
+    /// Whether a measurement has a range or a longest time of a hold.
+    pub(super) fn checks_measurements(&self) -> bool {
+        self.measurements.iter().any(|signal| signal.limits.is_some()) || self.limits_holds()
+    }
+
+    /// Whether a measurement has a longest time of a hold.
+    pub(super) fn limits_holds(&self) -> bool {
+        self.most_held.iter().any(Option::is_some)
+    }
+
+    /// Whether the detection counts the samples since the controller rested, beside those since the start.
+    pub(super) fn counts_since_rest(&self) -> bool {
+        self.limits_holds() && self.detection.is_some()
+    }
+
+    /// Whether any actuator has limits.
+    pub(super) fn is_limited(&self) -> bool {
+        self.actuators.iter().any(|actuator| actuator.limits.is_some())
+    }
+
+    /// Checks that `precision` can hold every constant.
+    pub(super) fn check_range(&self, precision: Precision) -> Result<(), Error> {
+        if precision == Precision::Double {
+            return Ok(());
+        }
+        for matrix in Matrix::ALL {
+            let largest = matrix.of(self).map_or(0.0, DMatrix::amax);
+            if largest > LARGEST_SINGLE {
+                return Err(too_large(matrix.name(), largest));
+            }
+        }
+        let signals = [&self.states, &self.actuators, &self.measurements, &self.references];
+        for signal in signals.into_iter().flatten() {
+            let values = signal.limits.iter().flatten().chain([&signal.operating]);
+            let largest = values.fold(0.0, |largest: f64, value| largest.max(value.abs()));
+            if largest > LARGEST_SINGLE {
+                return Err(too_large(&signal.name, largest));
+            }
+        }
+        let of_tests = self.detection.iter().flat_map(Detection::numbers);
+        if let Some(value) = of_tests.into_iter().find(|value| value.abs() > LARGEST_SINGLE) {
+            return Err(too_large("[detection]", value));
+        }
+        let of_gains = self.reconfiguration.iter().flat_map(Reconfiguration::numbers);
+        if let Some(value) = of_gains.into_iter().find(|value| value.abs() > LARGEST_SINGLE) {
+            return Err(too_large("[reconfiguration]", value));
+        }
+        if let Some(schedule) = &self.schedule {
+            schedule.check_range(precision, LARGEST_SINGLE)?;
+        }
+        if let Some(SlidingMode { rho, delta }) = &self.sliding_mode {
+            let range = SMALLEST_SINGLE..=LARGEST_SINGLE;
+            if let Some(value) = rho.iter().chain(delta).find(|value| !range.contains(*value)) {
+                return Err(Error(format!(
+                    "the sliding-mode law has rho or delta = {value:?}; `float` code has them from \
+                     {SMALLEST_SINGLE:?} to {LARGEST_SINGLE:?} only"
+                )));
+            }
+        }
+        match self.losses.iter().find(|loss| !COMMANDS.contains(&loss.least_command)) {
+            None => Ok(()),
+            Some(loss) => Err(Error(format!(
+                "least_command = {:?} of {}: `float` cannot hold its square; expected {:?} to {:?}",
+                loss.least_command,
+                self.faults[loss.fault].name,
+                COMMANDS.start(),
+                COMMANDS.end()
+            ))),
+        }
+    }
+}
+
+/// The largest constant in single precision: its product with a signal of its own size is finite.
+const LARGEST_SINGLE: f64 = 1e18;
+/// The smallest bound of a sliding-mode law in single precision: its product with a signal of its own size is a
+/// normal number.
+const SMALLEST_SINGLE: f64 = 1e-18;
+/// The `least_command` whose square is a normal number in single precision.
+const COMMANDS: std::ops::RangeInclusive<f64> = SMALLEST_SINGLE..=LARGEST_SINGLE;
+
+fn too_large(name: &str, value: f64) -> Error {
+    Error(format!(
+        "{name} has the number {value:?}; `float` code has constants up to {LARGEST_SINGLE:?} only"
+    ))
+}
+
+/// The number of the first sample at which faults are compensated.
+fn first_compensated(t_on: f64, sample_time: f64) -> Result<u32, Error> {
+    first_at(t_on, sample_time).ok_or_else(|| {
+        Error(format!(
+            "t_on = {t_on} s is more than 2^32 samples of {sample_time} s after the start; a counter of \
+             the code has 32 bits"
+        ))
+    })
+}
+
+fn losses(faults: &[Fault], actuators: &[Actuator]) -> Vec<Loss> {
+    let loss = |(fault, own): (usize, &Fault)| {
+        let name = own.loss_of.as_ref()?;
+        let actuator = actuators.iter().position(|actuator| actuator.name == *name)?;
+        Some(Loss { fault, actuator, least_command: own.least_command? })
+    };
+    faults.iter().enumerate().filter_map(loss).collect()
+}
+
+impl Matrix {
+    /// The matrix of a controller, if it has it.
+    pub(super) fn of(self, controller: &Controller) -> Option<&DMatrix<f64>> {
+        Some(match self {
+            Self::A => &controller.a,
+            Self::B => &controller.b,
+            Self::C => &controller.c,
+            Self::D => return controller.d.as_ref(),
+            Self::FA => &controller.f_a,
+            Self::AF => &controller.a_f,
+            Self::KX => &controller.k_x,
+            Self::KF => &controller.k_f,
+            Self::LX => &controller.l_x,
+            Self::LF => &controller.l_f,
+            Self::PF => return controller.p_f.as_ref(),
+            Self::H => return controller.h.as_ref(),
+            Self::KI => return controller.k_i.as_ref(),
+            Self::FI => return controller.f_i.as_ref(),
+            Self::LW => return controller.l_w.as_ref(),
+            Self::NR => return controller.n_r.as_ref(),
+            Self::ResidualA
+            | Self::ResidualBu
+            | Self::ResidualBy
+            | Self::ResidualC
+            | Self::ResidualDu
+            | Self::ResidualDy => {
+                let own = controller.detection.as_ref()?;
+                match self {
+                    Self::ResidualA => &own.a,
+                    Self::ResidualBu => &own.b_u,
+                    Self::ResidualBy => &own.b_y,
+                    Self::ResidualC => &own.c,
+                    Self::ResidualDu => &own.d_u,
+                    _ => &own.d_y,
+                }
+            }
+        })
+    }
+}
+
+impl Kind {
+    /// The number of these of a controller.
+    pub(super) fn count(self, controller: &Controller) -> usize {
+        let detection = controller.detection.as_ref();
+        match self {
+            Self::State => controller.states.len(),
+            Self::Fault => controller.faults.len(),
+            Self::Actuator => controller.actuators.len(),
+            Self::Measurement => controller.measurements.len(),
+            Self::Reference => controller.references.len(),
+            Self::Integral => controller.h.as_ref().map_or(0, DMatrix::nrows),
+            Self::Point => controller.schedule.as_ref().map_or(0, |own| own.points.len()),
+            Self::GainSet => controller.reconfiguration.as_ref().map_or(0, |own| own.sets.len()),
+            Self::Case => controller.reconfiguration.as_ref().map_or(0, |own| own.cases.len()),
+            Self::ResidualState => detection.map_or(0, |detection| detection.a.nrows()),
+            Self::Residual => detection.map_or(0, |detection| detection.c.nrows()),
+            Self::Test => detection.map_or(0, |detection| detection.tests.len()),
+            Self::Suspect => detection.map_or(0, |detection| detection.faults.len()),
+        }
+    }
+}

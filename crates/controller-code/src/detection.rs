@@ -1,0 +1,148 @@
+//! The detection of a controller: its matrices and tests as data. `fmu-controller/src/detection.rs` has the equations.
+
+use aso_controller::design::detection::{DetectionDesign, TestDesign};
+use nalgebra::DMatrix;
+
+use super::constants::Constants;
+use super::parts::{dense, first_at};
+use super::symbols::{Kind, Vector};
+use crate::Error;
+
+/// The detection of a design.
+pub(super) struct Detection {
+    /// The first sample whose residuals are tested; at least 1, as the sample at the start has none.
+    pub(super) first_tested: u32,
+    /// A, k x k, of the filter x_r[k+1] = A x_r[k] + B_u u[k] + B_y y[k].
+    pub(super) a: DMatrix<f64>,
+    pub(super) b_u: DMatrix<f64>,
+    pub(super) b_y: DMatrix<f64>,
+    /// C, rows x k, of the residuals r[k] = C x_r[k] + D_u u[k] + D_y y[k].
+    pub(super) c: DMatrix<f64>,
+    pub(super) d_u: DMatrix<f64>,
+    pub(super) d_y: DMatrix<f64>,
+    /// The initial x_r is this matrix times the initial deviations of the states; k x n.
+    pub(super) start: DMatrix<f64>,
+    /// The faults that a decision counts from 1.
+    pub(super) faults: Vec<String>,
+    pub(super) method: Method,
+    pub(super) tests: Vec<Test>,
+}
+
+/// What all tests of a detection do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Method {
+    /// Two cumulative sums of one residual.
+    Cusum,
+    /// The squared mean of several residuals over a window.
+    Window,
+}
+
+/// A test of some rows of r in turn.
+pub(super) struct Test {
+    pub(super) name: String,
+    pub(super) residuals: usize,
+    /// kappa of the cumulative sums, or 0.
+    pub(super) drift: f64,
+    /// The samples of a window, or 0.
+    pub(super) window: u32,
+    pub(super) threshold: f64,
+    /// For each fault whether this test reacts to it.
+    pub(super) reacts: Vec<bool>,
+}
+
+impl Detection {
+    /// The detection of a design file with this sample time in s.
+    pub(super) fn of(file: DetectionDesign, sample_time: f64) -> Result<Self, Error> {
+        let first_tested = first_at(file.from, sample_time).ok_or_else(|| {
+            Error(format!(
+                "detection.from = {} s is more than 2^32 samples of {sample_time} s after the start; a \
+                 counter of the code has 32 bits",
+                file.from
+            ))
+        })?;
+        let cusums = file.tests.iter().filter(|test| test.drift.is_some()).count();
+        let method = match file.tests.len() - cusums {
+            0 => Method::Cusum,
+            windows if windows == file.tests.len() => Method::Window,
+            _ => {
+                let text = "only the FMU has this controller: its detection has cumulative sums and windows";
+                return Err(Error(text.to_owned()));
+            }
+        };
+        let test = |own: TestDesign| Test {
+            name: own.name,
+            residuals: own.residuals,
+            drift: own.drift.unwrap_or_default(),
+            window: own.window.unwrap_or_default(),
+            threshold: own.threshold,
+            reacts: own.reacts,
+        };
+        Ok(Self {
+            first_tested: first_tested.max(1),
+            a: dense(&file.a),
+            b_u: dense(&file.b_u),
+            b_y: dense(&file.b_y),
+            c: dense(&file.c),
+            d_u: dense(&file.d_u),
+            d_y: dense(&file.d_y),
+            start: dense(&file.start),
+            faults: file.faults,
+            method,
+            tests: file.tests.into_iter().map(test).collect(),
+        })
+    }
+
+    /// The numbers of the tests and of the start of the filter, for a check of their range.
+    pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
+        let tests = self.tests.iter().flat_map(|test| [test.drift, test.threshold]);
+        self.start.iter().copied().chain(tests)
+    }
+
+    /// The constants of the tests in real numbers, and the start of the filter.
+    pub(super) fn tables(&self) -> Vec<Constants> {
+        let of_tests = |name, meaning, value: fn(&Test) -> f64| {
+            Constants::vector(name, meaning, Kind::Test, self.tests.iter().map(value).collect())
+        };
+        let start = Constants {
+            name: "start_r",
+            meaning: "start of x_r, times the deviations of the states",
+            rows: Kind::ResidualState,
+            columns: Some(Kind::State),
+            layers: None,
+            values: self.start.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        };
+        let mut all = vec![start];
+        if self.method == Method::Cusum {
+            all.push(of_tests("drift", "tests", |test| test.drift));
+        }
+        let meaning = if self.method == Method::Cusum { "" } else { "tests" };
+        all.push(of_tests("threshold", meaning, |test| test.threshold));
+        all
+    }
+
+    /// The real numbers of an instance besides the vectors of the filter: statistics and sums.
+    pub(super) fn stored(&self) -> usize {
+        self.tests.len()
+            + if self.method == Method::Cusum { 2 * self.tests.len() } else { self.c.nrows() }
+    }
+
+    /// The 32-bit counters of an instance besides that of the samples: the starts of sums or windows, the
+    /// samples in windows, alarm and onset, the isolated fault.
+    pub(super) fn counters(&self) -> usize {
+        2 * self.tests.len() + 3
+    }
+
+    /// The bytes of the constants that are no real numbers: reactions and windows.
+    pub(super) fn integer_bytes(&self) -> usize {
+        let windows = if self.method == Method::Window { 8 * self.tests.len() } else { 0 };
+        windows + self.tests.len() * self.faults.len()
+    }
+
+    /// The flags of an instance: the alarms of tests.
+    pub(super) fn flags(&self) -> usize {
+        self.tests.len()
+    }
+}
+
+/// The vectors that the filter stores.
+pub(super) const STORED: [Vector; 2] = [Vector::StoredXR, Vector::StoredResidual];

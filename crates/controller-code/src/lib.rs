@@ -1,0 +1,135 @@
+//! The sampled controller as source code: C99, or a Rust crate without the standard library.
+//!
+//! The design file, which the controller FMU reads, becomes a [`Controller`]. Its equations stand in two files that are the
+//! same for each design: `aso_controller::sample`, which the Rust crate contains, and from which the count of operations
+//! and the bound of rounding errors follow, and `runtime/aso_controller.h`.
+#![forbid(unsafe_code)]
+
+mod arithmetic;
+mod c;
+mod constants;
+mod controller;
+mod detection;
+mod fields;
+mod names;
+mod numbers;
+mod parts;
+mod reconfiguration;
+mod rounding;
+mod rust;
+mod schedule;
+mod summary;
+mod symbols;
+mod tables;
+mod text;
+
+use std::path::PathBuf;
+
+use controller::Controller;
+use fields::Fields;
+use rounding::RoundingBound;
+
+pub use names::prefix;
+
+/// The programming language of a controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Language {
+    /// C99: a header and a source file.
+    C,
+    /// A Rust crate without the standard library.
+    Rust,
+}
+
+/// The floating-point numbers of a controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// 64 bits: the results of the FMU.
+    Double,
+    /// 32 bits: with a bound of the difference.
+    Single,
+}
+
+impl Precision {
+    /// Bytes of a number.
+    fn size(self) -> usize {
+        match self {
+            Self::Double => 8,
+            Self::Single => 4,
+        }
+    }
+
+    /// The nearest number of this precision.
+    fn rounded(self, value: f64) -> f64 {
+        match self {
+            Self::Double => value,
+            #[expect(clippy::cast_possible_truncation, reason = "the nearest number")]
+            Self::Single => f64::from(value as f32),
+        }
+    }
+
+    /// A number as both languages write it, without suffix; the nearest one of this precision.
+    fn literal(self, value: f64) -> String {
+        match self {
+            Self::Double => format!("{value:?}"),
+            #[expect(clippy::cast_possible_truncation, reason = "the nearest number")]
+            Self::Single => format!("{:?}", value as f32),
+        }
+    }
+}
+
+/// The source code of a controller.
+pub struct Code {
+    /// The files: their paths, relative to a folder, and their contents.
+    pub files: Vec<(PathBuf, String)>,
+    /// What makes the code worse than the design.
+    pub warnings: Vec<String>,
+}
+
+/// What the code states of its design, and its form.
+pub struct Request<'a> {
+    /// The start of the names of files, types and functions, as [`prefix`] makes it of any name.
+    pub prefix: String,
+    /// The text that every file of the design contains.
+    pub identity: &'a str,
+    /// The verdict on the design: one word.
+    pub verdict: &'static str,
+    /// The delay of all commands at which the loop becomes unstable, in s.
+    pub delay_margin: Option<f64>,
+    /// The language.
+    pub language: Language,
+    /// The numbers.
+    pub precision: Precision,
+}
+
+/// A design that has no code.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Error(String);
+
+/// Writes the controller of a sampled design as source code.
+///
+/// In double precision its results have the bits of the controller FMU of this design.
+///
+/// # Errors
+///
+/// Returns an [`Error`] for a continuous design; for an entry of the design that has no code; for a number beyond the
+/// range of the precision.
+pub fn write(design: aso_controller::Design, request: &Request<'_>) -> Result<Code, Error> {
+    let controller = Controller::of(design)?;
+    controller.check_range(request.precision)?;
+    let bound = match request.precision {
+        Precision::Double => None,
+        Precision::Single => Some(RoundingBound::of(&controller)),
+    };
+    let fields = Fields::of(&controller);
+    let files = match request.language {
+        Language::C => c::files(request, &controller, &fields, bound.as_ref()),
+        Language::Rust => rust::files(request, &controller, &fields, bound.as_ref()),
+    };
+    let warnings = bound.map(|bound| bound.warnings(&controller)).unwrap_or_default();
+    Ok(Code { files, warnings })
+}
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

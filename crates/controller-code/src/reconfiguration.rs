@@ -1,0 +1,212 @@
+//! The reconfiguration of a controller: gains without actuators that are gone, and the fall-back.
+//! `fmu-controller/src/reconfiguration.rs` has the equations.
+
+use aso_controller::design::{self, Actuator, Fault};
+use nalgebra::DMatrix;
+
+use super::constants::Constants;
+use super::parts::{Loss, Signal, dense};
+use super::symbols::{Kind, Matrix};
+use crate::Error;
+
+/// What a controller does without some actuators.
+pub(super) struct Reconfiguration {
+    /// The actuators that may be gone.
+    pub(super) cases: Vec<Case>,
+    /// The gains, first those of the intact plant, last the fall-back, if there is one.
+    pub(super) sets: Vec<GainSet>,
+    /// `None` without a fall-back, else whether it compensates faults.
+    pub(super) fallback: Option<bool>,
+}
+
+/// An actuator that may be gone.
+pub(super) struct Case {
+    /// Its position.
+    pub(super) actuator: usize,
+    /// The command at which it is stuck.
+    pub(super) stuck_at: f64,
+    /// Whether the estimate of each state of the fault model restarts at 0.
+    pub(super) restarts: Vec<bool>,
+    /// The loss that decides, with the fraction above which it does and the number of samples.
+    pub(super) decision: Option<(usize, f64, u32)>,
+}
+
+/// Gains in force while exactly these actuators are gone.
+pub(super) struct GainSet {
+    /// For each actuator whether it is gone.
+    pub(super) gone: Vec<bool>,
+    k_x: DMatrix<f64>,
+    k_f: DMatrix<f64>,
+    /// Actuators x actuators; 0 in the columns of those that are not gone.
+    k_s: DMatrix<f64>,
+}
+
+/// What the positions and shapes follow from.
+pub(super) struct Plant<'a> {
+    pub(super) sample_time: f64,
+    pub(super) actuators: &'a [Actuator],
+    pub(super) faults: &'a [Fault],
+    pub(super) losses: &'a [Loss],
+    /// Those of the intact plant.
+    pub(super) k_x: &'a DMatrix<f64>,
+    pub(super) k_f: &'a DMatrix<f64>,
+}
+
+impl Reconfiguration {
+    /// The reconfiguration of a design file; `None` if it has none.
+    pub(super) fn of(
+        cases: &[design::Reconfiguration],
+        combinations: &[design::Combination],
+        fallback: Option<&design::Fallback>,
+        plant: &Plant<'_>,
+    ) -> Result<Option<Self>, Error> {
+        if cases.is_empty() && fallback.is_none() {
+            return Ok(None);
+        }
+        let m = plant.actuators.len();
+        let gone = |names: &[String]| {
+            let own = |actuator: &Actuator| names.contains(&actuator.name);
+            plant.actuators.iter().map(own).collect::<Vec<_>>()
+        };
+        // The columns of `k_s`, one for each stuck actuator in order, at the places of these actuators.
+        let scattered = |k_s: &DMatrix<f64>, gone: &[bool]| {
+            let mut all = DMatrix::zeros(m, m);
+            let places = gone.iter().enumerate().filter_map(|(j, gone)| gone.then_some(j));
+            for (column, place) in k_s.column_iter().zip(places) {
+                all.set_column(place, &column);
+            }
+            all
+        };
+        let (k_x, k_f) = (plant.k_x.clone(), plant.k_f.clone());
+        let none = vec![false; m];
+        let mut sets = vec![GainSet { gone: none.clone(), k_x, k_f, k_s: DMatrix::zeros(m, m) }];
+        let mut kept = Vec::new();
+        for own in cases {
+            kept.push(Case {
+                actuator: own.actuator,
+                stuck_at: own.stuck_at,
+                restarts: plant
+                    .faults
+                    .iter()
+                    .map(|fault| own.restart.contains(&fault.name))
+                    .collect(),
+                decision: decision(own, plant)?,
+            });
+            if let (Some(k_x), Some(k_f), Some(k_s)) = (&own.k_x, &own.k_f, &own.k_s) {
+                let gone = gone(std::slice::from_ref(&own.gone));
+                let k_s = scattered(&DMatrix::from_column_slice(m, 1, k_s), &gone);
+                sets.push(GainSet { gone, k_x: dense(k_x), k_f: dense(k_f), k_s });
+            }
+        }
+        for own in combinations {
+            let gone = gone(&own.gone);
+            let k_s = scattered(&dense(&own.k_s), &gone);
+            sets.push(GainSet { gone, k_x: dense(&own.k_x), k_f: dense(&own.k_f), k_s });
+        }
+        let compensates = fallback.map(|own| own.k_f.is_some());
+        if let Some(design::Fallback { k_x, k_f }) = fallback {
+            let no_compensation = || DMatrix::zeros(m, plant.faults.len());
+            let k_f = k_f.as_ref().map_or_else(no_compensation, dense);
+            sets.push(GainSet { gone: none, k_x: dense(k_x), k_f, k_s: DMatrix::zeros(m, m) });
+        }
+        Ok(Some(Self { cases: kept, sets, fallback: compensates }))
+    }
+
+    /// A matrix in each of the sets; `None` if it is the same in all.
+    pub(super) fn matrices(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
+        match matrix {
+            Matrix::KX => Some(self.sets.iter().map(|own| &own.k_x).collect()),
+            Matrix::KF => Some(self.sets.iter().map(|own| &own.k_f).collect()),
+            _ => None,
+        }
+    }
+
+    /// The number of sets that belong to certain actuators that are gone; the first set is that of none.
+    pub(super) fn regular_sets(&self) -> usize {
+        self.sets.len() - usize::from(self.fallback.is_some())
+    }
+
+    /// For each actuator the position of the set without it alone; 0 if there is none.
+    pub(super) fn single_sets(&self, actuators: usize) -> Vec<usize> {
+        let single = |j: usize| {
+            let is_single =
+                |own: &GainSet| own.gone.iter().enumerate().all(|(k, gone)| *gone == (k == j));
+            self.sets.iter().position(is_single).unwrap_or(0)
+        };
+        (0..actuators).map(single).collect()
+    }
+
+    /// The bytes of the constants that are no real numbers.
+    pub(super) fn integer_bytes(&self, actuators: usize, faults: usize) -> usize {
+        let singles = if self.fallback.is_none() { 4 * actuators } else { 0 };
+        let of_cases = self.cases.len() * (12 + faults);
+        self.sets.len() * actuators + if self.cases.is_empty() { 0 } else { singles + of_cases }
+    }
+
+    /// The largest number of actuators that a set does without.
+    pub(super) fn most_gone(&self) -> usize {
+        let count = |own: &GainSet| own.gone.iter().filter(|gone| **gone).count();
+        self.sets.iter().map(count).max().unwrap_or(0)
+    }
+
+    /// All real numbers, for a check of their range.
+    pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
+        let matrices = self.sets.iter().flat_map(|own| [&own.k_x, &own.k_f, &own.k_s]);
+        let of_cases =
+            self.cases.iter().flat_map(|own| [Some(own.stuck_at), own.decision.map(|own| own.1)]);
+        matrices.flat_map(|own| own.iter().copied()).chain(of_cases.flatten())
+    }
+
+    /// The constants in real numbers: the gains from stuck actuators, their commands, the fractions.
+    pub(super) fn tables(&self, actuators: &[Signal]) -> Vec<Constants> {
+        let rows = self.sets.iter().flat_map(|own| own.k_s.row_iter());
+        let case = |j: usize| self.cases.iter().find(|own| own.actuator == j);
+        let stuck = |j: usize| case(j).map_or(0.0, |own| own.stuck_at);
+        let vector = |name, meaning, value: &dyn Fn(usize) -> f64| {
+            let values = (0..actuators.len()).map(value).collect();
+            Constants::vector(name, meaning, Kind::Actuator, values)
+        };
+        let mut all = vec![
+            Constants {
+                name: "K_s",
+                meaning: "gains from the commands of stuck actuators",
+                rows: Kind::Actuator,
+                columns: Some(Kind::Actuator),
+                layers: Some(Kind::GainSet),
+                values: rows.map(|row| row.iter().copied().collect()).collect(),
+            },
+            vector("stuck_at", "commands of stuck actuators, and their deviations", &stuck),
+            vector("u_stuck", "", &|j| stuck(j) - actuators[j].operating),
+        ];
+        if !self.cases.is_empty() {
+            let most = self.cases.iter().map(|own| own.decision.map_or(f64::INFINITY, |own| own.1));
+            let meaning = "losses above which an actuator counts as gone";
+            all.push(Constants::vector("most_lost", meaning, Kind::Case, most.collect()));
+        }
+        all
+    }
+}
+
+/// The loss that decides, its fraction, and the samples that it lasts.
+fn decision(
+    own: &design::Reconfiguration,
+    plant: &Plant<'_>,
+) -> Result<Option<(usize, f64, u32)>, Error> {
+    let (Some(most), Some(time)) = (own.loss, own.time) else { return Ok(None) };
+    let of_actuator = |loss: &Loss| plant.actuators[loss.actuator].name == own.gone;
+    let Some(loss) = plant.losses.iter().position(of_actuator) else { return Ok(None) };
+    // The first whole number of samples that last as long, with the tolerance of the FMU.
+    let least = time * (1.0 - 1e-9);
+    let mut samples = (least / plant.sample_time).floor().max(0.0);
+    while samples * plant.sample_time < least {
+        samples += 1.0;
+    }
+    if samples > f64::from(u32::MAX) {
+        return Err(Error(format!(
+            "reconfiguration without {}: {time} s are more than 2^32 samples; a counter of the code has 32 bits",
+            own.gone
+        )));
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number")]
+    Ok(Some((loss, most, samples as u32)))
+}

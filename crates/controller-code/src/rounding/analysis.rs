@@ -1,0 +1,463 @@
+//! What the errors of a sample do to the loop of plant and controller.
+
+use std::ops::AddAssign as _;
+
+use aso_controller::sample::{Design, Number};
+use control::{Domain, StateSpace};
+use nalgebra::{DMatrix, DVector, RowDVector};
+
+use super::first_signal;
+use super::rounded::{Elements, Rounded, UNIT, Widths, constant_error};
+use crate::controller::Controller;
+use crate::numbers::{Memory, Numbers, Vectors};
+use crate::symbols::{Kind, Vector};
+use aso_controller::design::{Estimator, SlidingMode};
+
+/// Follows the equations of a sample.
+pub(super) struct Analysis<'a> {
+    controller: &'a Controller,
+    /// A bound of the elements of `x_r`, states x signals; see [`residual_states`].
+    state_of_filter: DMatrix<f64>,
+    known: Vec<(Vector, Elements)>,
+    /// kappa: a row over the signals for each error.
+    errors: Vec<RowDVector<f64>>,
+    /// The inputs v of a sliding-mode law, which have a row of zeros among the errors: their positions there,
+    /// and rho / (2 delta).
+    chords: Vec<(usize, f64)>,
+}
+
+impl<'a> Analysis<'a> {
+    /// The analysis of the longest sample: faults are compensated, and no command is at a limit.
+    pub(super) fn of(controller: &'a Controller, state_of_filter: DMatrix<f64>) -> Self {
+        let mut analysis = Self::new(controller, state_of_filter);
+        analysis.follow();
+        analysis
+    }
+
+    fn new(controller: &'a Controller, state_of_filter: DMatrix<f64>) -> Self {
+        let (known, errors, chords) = (Vec::new(), Vec::new(), Vec::new());
+        let mut own = Self { controller, state_of_filter, known, errors, chords };
+        let [n, p] = [Kind::State, Kind::Measurement].map(|kind| own.count(kind));
+        own.start(Vector::StoredXHat, |form| form.columns_mut(n, n).fill_with_identity());
+        let q = own.count(Kind::Fault);
+        own.start(Vector::StoredFHat, |form| form.columns_mut(2 * n, q).fill_with_identity());
+        match &controller.filter {
+            None => own.start(Vector::Measured, |form| {
+                form.columns_mut(0, n).copy_from(&controller.c);
+            }),
+            Some(filter) => {
+                // The last states of the design are the filtered measurements, which the controller
+                // computes: y_f[k+1] = y_f + w (C x - y_f).
+                let first = n - p;
+                own.start(Vector::StoredYF, |form| {
+                    form.columns_mut(first, p).fill_with_identity();
+                });
+                own.start(Vector::Measured, |form| {
+                    for (k, w) in filter.iter().enumerate() {
+                        let row = controller.a.view((first + k, 0), (1, first)) / *w;
+                        form.view_mut((k, 0), (1, first)).copy_from(&row);
+                    }
+                });
+            }
+        }
+        let integrals = own.count(Kind::Integral);
+        own.start(Vector::StoredXI, |form| {
+            form.columns_mut(2 * n + q, integrals).fill_with_identity();
+        });
+        let k = own.count(Kind::ResidualState);
+        own.start(Vector::StoredXR, |form| {
+            form.columns_mut(2 * n + q + integrals, k).fill_with_identity();
+        });
+        own.start(Vector::Referred, |_| {});
+        // The measurements contain D times the commands of the sample before, which the controller takes off again:
+        // what remains is D times the rounding of these commands as values.
+        own.start(Vector::StoredU, |_| {});
+        if controller.d.is_some() {
+            let deviations = own.get(Vector::StoredU).numbers();
+            let sums = deviations.into_iter().zip(own.get(Vector::UOp).numbers());
+            let rounded: Vec<_> = sums.map(|(deviation, point)| deviation + point).collect();
+            own.learn(Vector::StoredU, Elements::of(&rounded, own.widths()));
+        }
+        for vector in [Vector::Measured, Vector::Referred] {
+            let mut rounded = own.get(vector);
+            rounded.error = &rounded.magnitude * UNIT;
+            own.learn(vector, rounded);
+        }
+        own
+    }
+
+    fn count(&self, kind: Kind) -> usize {
+        kind.count(self.controller)
+    }
+
+    /// States of the loop: plant, stored `x_hat`, stored `f_hat`, `x_i`, `x_r`.
+    pub(super) fn order(&self) -> usize {
+        let [n, q, t, k] = [Kind::State, Kind::Fault, Kind::Integral, Kind::ResidualState]
+            .map(|kind| self.count(kind));
+        2 * n + q + t + k
+    }
+
+    /// The columns of forms, with room for the errors of 6 vectors of each kind and for v, and the signals.
+    fn widths(&self) -> Widths {
+        let signals: usize = Kind::ALL.map(|kind| self.count(kind)).iter().sum();
+        let detection = self.count(Kind::ResidualState) + self.count(Kind::Residual);
+        let forms = self.order() + 6 * signals + detection + self.count(Kind::Fault);
+        Widths { forms, signals: signals + 1 }
+    }
+
+    /// Sets the exact elements of a vector at the start of a sample.
+    fn start(&mut self, vector: Vector, fill: impl FnOnce(&mut DMatrix<f64>)) {
+        let mut elements = Elements::zero(self.count(vector.kind()), self.widths());
+        fill(&mut elements.form);
+        elements.magnitude = self.magnitude(vector);
+        self.known.push((vector, elements));
+    }
+
+    /// A vector as it is now; zero if no statement has computed it.
+    fn get(&self, vector: Vector) -> Elements {
+        let operating = match vector {
+            Vector::XOp => Some(&self.controller.states),
+            Vector::UOp => Some(&self.controller.actuators),
+            Vector::YOp => Some(&self.controller.measurements),
+            Vector::ROp => Some(&self.controller.references),
+            _ => None,
+        };
+        let zero = || Elements::zero(self.count(vector.kind()), self.widths());
+        if let Some(signals) = operating {
+            let mut constant = zero();
+            let last = constant.error.ncols() - 1;
+            for (i, signal) in signals.iter().enumerate() {
+                constant.magnitude[(i, last)] = signal.operating.abs();
+                constant.error[(i, last)] = constant_error(signal.operating);
+            }
+            return constant;
+        }
+        let found = self.known.iter().rev().find(|(other, _)| *other == vector);
+        found.map_or_else(zero, |(_, elements)| elements.clone())
+    }
+
+    /// A bound of the elements of a vector, from the largest deviations of the signals.
+    fn magnitude(&self, vector: Vector) -> DMatrix<f64> {
+        let mut own = match vector {
+            Vector::StoredXR | Vector::NextXR => return self.state_of_filter.clone(),
+            Vector::Residual => return self.residual_magnitude(),
+            Vector::S => return self.controller.l_f.abs() * self.get(Vector::E).magnitude,
+            Vector::E => return self.innovation(&self.get(Vector::XHat).magnitude),
+            Vector::StoredXHat | Vector::NextXHat | Vector::XHat if self.is_predicted(vector) => {
+                let Controller { a, b, f_a, .. } = self.controller;
+                a.abs() * self.unit(Kind::State)
+                    + b.abs() * self.unit(Kind::Actuator)
+                    + f_a.abs() * self.integral_part()
+            }
+            Vector::StoredFHat | Vector::NextFHat | Vector::FHat | Vector::FHatI
+                if self.is_predicted(vector) =>
+            {
+                self.controller.a_f.abs() * self.integral_part()
+            }
+            Vector::StoredFHat | Vector::NextFHat | Vector::FHatI => self.integral_part(),
+            Vector::Y | Vector::StoredYF | Vector::YF | Vector::NextYF => self.given(),
+            _ => self.unit(vector.kind()),
+        };
+        let operating = match vector {
+            Vector::StoredXHat | Vector::XValue | Vector::NextXHat => &self.controller.states,
+            Vector::StoredYF | Vector::Measured | Vector::NextYF => &self.controller.measurements,
+            Vector::Command => &self.controller.actuators,
+            Vector::Referred => &self.controller.references,
+            _ => return own,
+        };
+        let last = own.ncols() - 1;
+        for (i, signal) in operating.iter().enumerate() {
+            own[(i, last)] += signal.operating.abs();
+        }
+        own
+    }
+
+    /// Whether a vector is one that a current estimator corrects before a user sees it: its size follows from
+    /// the signals of the sample before.
+    fn is_predicted(&self, vector: Vector) -> bool {
+        let is_first = || !self.known.iter().any(|(other, _)| *other == vector);
+        let is_current = self.controller.estimator == Estimator::Current;
+        is_current
+            && match vector {
+                Vector::StoredXHat | Vector::NextXHat | Vector::StoredFHat | Vector::NextFHat => {
+                    true
+                }
+                Vector::XHat | Vector::FHatI => is_first(),
+                Vector::FHat => self.controller.p_f.is_none() && is_first(),
+                _ => false,
+            }
+    }
+
+    /// The largest deviations of a kind of signals.
+    fn unit(&self, kind: Kind) -> DMatrix<f64> {
+        let (rows, signals) = (self.count(kind), self.widths().signals);
+        let mut own = DMatrix::zeros(rows, signals);
+        own.columns_mut(first_signal(kind, self.controller), rows).fill_with_identity();
+        own
+    }
+
+    /// |e| <= |y - D u| + |C| |x_hat|.
+    fn innovation(&self, x_hat: &DMatrix<f64>) -> DMatrix<f64> {
+        self.given() + self.controller.c.abs() * x_hat
+    }
+
+    /// |y - D u| <= |y| + |D| |u|; y without D.
+    fn given(&self) -> DMatrix<f64> {
+        let y = self.unit(Kind::Measurement);
+        match &self.controller.d {
+            None => y,
+            Some(d) => y + d.abs() * self.unit(Kind::Actuator),
+        }
+    }
+
+    /// |f_hat_i| <= |f_hat| + |P_f| |e| with a direct term, else |f_hat|.
+    fn integral_part(&self) -> DMatrix<f64> {
+        let f_hat = self.unit(Kind::Fault);
+        match &self.controller.p_f {
+            None => f_hat,
+            Some(p_f) => f_hat + p_f.abs() * self.innovation(&self.unit(Kind::State)),
+        }
+    }
+
+    /// |r| <= |C| |x_r| + |D_u| |u| + |D_y| |y|, residuals x signals.
+    fn residual_magnitude(&self) -> DMatrix<f64> {
+        let Some(own) = &self.controller.detection else {
+            return DMatrix::zeros(0, self.widths().signals);
+        };
+        let mut all = own.c.abs() * &self.state_of_filter;
+        for (kind, matrix) in [(Kind::Actuator, &own.d_u), (Kind::Measurement, &own.d_y)] {
+            let first = first_signal(kind, self.controller);
+            all.columns_mut(first, matrix.ncols()).add_assign(&matrix.abs());
+        }
+        all
+    }
+
+    /// Takes the elements that a statement computes; their errors become elements of w.
+    fn learn(&mut self, vector: Vector, mut elements: Elements) {
+        elements.magnitude = self.magnitude(vector);
+        for (i, error) in elements.error.row_iter().enumerate() {
+            if error.amax() > 0.0 {
+                elements.form[(i, self.order() + self.errors.len())] = 1.0;
+                self.errors.push(error.into_owned());
+            }
+        }
+        elements.error.fill(0.0);
+        self.known.push((vector, elements));
+    }
+
+    /// Follows the equations in the order of `Signals::estimate`, `Signals::set_commands` and `Signals::predict`.
+    fn follow(&mut self) {
+        let controller = self.controller;
+        let numbers = Numbers::of(controller, Rounded::Constant, Rounded::Constant);
+        let points = [Vector::XOp, Vector::UOp, Vector::YOp, Vector::ROp];
+        let points = points.map(|vector| self.get(vector).numbers());
+        let [x_op, u_op, y_op, r_op] = &points;
+        let design = Design { x_op, u_op, y_op, r_op, ..numbers.design() };
+        let mut memory = Memory::of(|vector| match vector.length(controller) {
+            0 => Vec::new(),
+            _ => self.get(vector).numbers(),
+        });
+        let (state, mut vectors) = (memory.state(), Vectors::zero(controller));
+        let has_direct_term = controller.p_f.is_some();
+        let integral = if has_direct_term { Vector::FHatI } else { Vector::FHat };
+        vectors.signals().set_deviations(&design, &state);
+        self.take(&mut vectors, [Vector::Y, Vector::XHat, Vector::YF, Vector::R]);
+        self.take_as(&mut vectors, Vector::FHatI, integral);
+        if controller.d.is_some() {
+            vectors.signals().remove_feedthrough(&design, &state);
+            self.take(&mut vectors, [Vector::Y]);
+        }
+        vectors.signals().set_innovation(&design);
+        self.take(&mut vectors, [Vector::E]);
+        if design.is_current {
+            vectors.signals().correct_states(&design);
+            self.take(&mut vectors, [Vector::XHat]);
+            if controller.sliding_mode.is_some() {
+                vectors.signals().set_sliding_variable(&design);
+                self.take_as(&mut vectors, Vector::FHatI, Vector::S);
+                let mut injected = Elements::zero(self.count(Kind::Fault), self.widths());
+                self.inject(&mut injected);
+                vectors.get_mut(Vector::FHatI).clone_from_slice(&injected.numbers());
+            } else {
+                vectors.signals().correct_faults(&design);
+            }
+            self.take_as(&mut vectors, Vector::FHatI, integral);
+            if has_direct_term {
+                vectors.signals().set_innovation(&design);
+                self.take(&mut vectors, [Vector::E]);
+            }
+        }
+        vectors.signals().add_direct_term(&design, true);
+        if has_direct_term {
+            self.take(&mut vectors, [Vector::FHat]);
+        }
+        vectors.signals().set_values(&design, &state);
+        vectors.signals().set_commands(&design, &state, true);
+        self.take(&mut vectors, [Vector::XValue, Vector::FValue, Vector::U]);
+        vectors.signals().set_command_values(&design);
+        self.take(&mut vectors, [Vector::Command]);
+        // Without limits u - v is exactly zero.
+        vectors.get_mut(Vector::Excess).fill(Rounded::zero());
+        vectors.signals().predict_states(&design);
+        vectors.signals().predict_faults(&design, true);
+        vectors.signals().predict_filter(&design);
+        vectors.signals().predict_integrals(&design, &state);
+        self.take(
+            &mut vectors,
+            [Vector::NextXHat, Vector::NextFHat, Vector::NextYF, Vector::NextXI],
+        );
+        if controller.detection.is_some() {
+            let of = |kind| vec![Rounded::zero(); kind];
+            let (mut next, mut residuals) =
+                (of(self.count(Kind::ResidualState)), of(self.count(Kind::Residual)));
+            let x_r = self.get(Vector::StoredXR).numbers();
+            let signals = vectors.signals();
+            let inputs: [&[_]; 3] = [&x_r, signals.u, signals.y];
+            numbers.filter_of_residuals().advance(inputs, false, &mut next, &mut residuals);
+            self.learn(Vector::Residual, Elements::of(&residuals, self.widths()));
+            self.learn(Vector::NextXR, Elements::of(&next, self.widths()));
+        }
+    }
+
+    /// Takes vectors that the equations have computed; their errors become elements of w.
+    fn take<const N: usize>(&mut self, vectors: &mut Vectors<Rounded>, computed: [Vector; N]) {
+        for vector in computed {
+            self.take_as(vectors, vector, vector);
+        }
+    }
+
+    /// The same for the vector `meaning`, which the equations have in the place of `place`.
+    fn take_as(&mut self, vectors: &mut Vectors<Rounded>, place: Vector, meaning: Vector) {
+        let numbers = vectors.get_mut(place);
+        if numbers.is_empty() {
+            return;
+        }
+        self.learn(meaning, Elements::of(numbers, self.widths()));
+        numbers.clone_from_slice(&self.get(meaning).numbers());
+    }
+
+    /// Follows rho s / (|s| + delta): the chord of half the largest slope, and v.
+    fn inject(&mut self, own: &mut Elements) {
+        let Some(SlidingMode { rho, delta }) = &self.controller.sliding_mode else { return };
+        let s = self.get(Vector::S);
+        own.magnitude = self.magnitude(Vector::FHat);
+        for (i, (rho, delta)) in rho.iter().zip(delta).enumerate() {
+            let half = rho / (2.0 * delta);
+            let position = self.errors.len();
+            own.form.row_mut(i).copy_from(&(s.form.row(i) * half));
+            own.form[(i, self.order() + position)] = 1.0;
+            self.errors.push(RowDVector::zeros(self.widths().signals));
+            self.chords.push((position, half));
+            // Of the product, the sum, the quotient and the constants, relative to the result.
+            let relative = 3.0 * UNIT + constant_error(*rho) / rho + constant_error(*delta) / delta;
+            let rounding = own.magnitude.row(i) * relative;
+            own.error.row_mut(i).add_assign(&rounding);
+        }
+    }
+
+    /// A bound of the differences of the outputs, outputs x signals, from the peak-to-peak gains of
+    /// [`Self::system`].
+    ///
+    /// # Errors
+    ///
+    /// The reason why there is none.
+    pub(super) fn bound(&self, gains: &DMatrix<f64>) -> Result<DMatrix<f64>, String> {
+        let linear = gains * self.kappa();
+        let count = self.chords.len();
+        if count == 0 {
+            return Ok(linear);
+        }
+        let outputs = gains.nrows() - count;
+        let back = DMatrix::from_fn(gains.nrows(), count, |i, j| {
+            let (position, half) = self.chords[j];
+            gains[(i, position)] * half
+        });
+        let Some(loops) = without_loop(&back.rows(outputs, count).into_owned()) else {
+            return Err("the slope of the sliding-mode law changes too much for one".to_owned());
+        };
+        let of_s = loops * linear.rows(outputs, count);
+        Ok(linear.rows(0, outputs) + back.rows(0, outputs) * of_s)
+    }
+
+    /// Whether the bound of the differences of all signals, [`Self::bound`], is smaller than the signals: then
+    /// no rounding makes the loop unstable.
+    pub(super) fn contracts(&self, bound: &DMatrix<f64>) -> bool {
+        let [n, q, p, m, _, integrals] = Kind::ALL.map(|kind| self.count(kind));
+        let residuals = self.count(Kind::Residual);
+        let signals = self.widths().signals - 1;
+        let mut all = DMatrix::zeros(signals, signals);
+        let mut first = 0;
+        for (kind, rows) in [
+            (Some(Kind::Actuator), m),
+            (Some(Kind::Fault), q),
+            (None, residuals),
+            (Some(Kind::State), n),
+            (Some(Kind::Measurement), p),
+            (Some(Kind::Integral), integrals),
+        ] {
+            if let Some(kind) = kind {
+                let place = first_signal(kind, self.controller);
+                all.rows_mut(place, rows).copy_from(&bound.view((first, 0), (rows, signals)));
+            }
+            first += rows;
+        }
+        without_loop(&all).is_some()
+    }
+
+    /// The loop from the errors w, v included, to [u; `f_hat`; r; `x_hat`; y; `x_i`], and s of a sliding-mode law.
+    pub(super) fn system(&self) -> StateSpace {
+        let ([n, q, p, m, _, integrals], order) =
+            (Kind::ALL.map(|kind| self.count(kind)), self.order());
+        let inputs = self.errors.len();
+        let command = self.get(Vector::Command).form;
+        let mut next = DMatrix::zeros(order, self.widths().forms);
+        next.view_mut((0, 0), (n, n)).copy_from(&self.controller.a);
+        next.rows_mut(0, n).add_assign(&(&self.controller.b * &command));
+        if self.controller.filter.is_some() {
+            next.rows_mut(n - p, p).copy_from(&self.get(Vector::NextYF).form);
+        }
+        next.rows_mut(n, n).copy_from(&self.get(Vector::NextXHat).form);
+        next.rows_mut(2 * n, q).copy_from(&self.get(Vector::NextFHat).form);
+        next.rows_mut(2 * n + q, integrals).copy_from(&self.get(Vector::NextXI).form);
+        let [k, residuals] = [Kind::ResidualState, Kind::Residual].map(|kind| self.count(kind));
+        next.rows_mut(order - k, k).copy_from(&self.get(Vector::NextXR).form);
+        let chords = self.chords.len();
+        let sizes = [m, q, residuals, n, p, integrals, chords];
+        let mut outputs = DMatrix::zeros(sizes.iter().sum(), self.widths().forms);
+        let mut first = 0;
+        for (rows, vector) in sizes.into_iter().zip([
+            Vector::Command,
+            Vector::FValue,
+            Vector::Residual,
+            Vector::XValue,
+            Vector::Measured,
+            Vector::StoredXI,
+            Vector::S,
+        ]) {
+            let form = self.get(vector).form;
+            outputs.rows_mut(first, rows).copy_from(&form.rows(0, rows));
+            first += rows;
+        }
+        StateSpace {
+            a: next.columns(0, order).into_owned(),
+            b: next.columns(order, inputs).into_owned(),
+            c: outputs.columns(0, order).into_owned(),
+            d: outputs.columns(order, inputs).into_owned(),
+            domain: Domain::Sampled { period: self.controller.sample_time },
+        }
+    }
+
+    /// kappa, errors x signals.
+    fn kappa(&self) -> DMatrix<f64> {
+        DMatrix::from_rows(&self.errors)
+    }
+}
+
+/// (1 - M)^-1 of a matrix M without negative elements, if its spectral radius is below 1.
+fn without_loop(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let count = matrix.nrows();
+    let inverse = (DMatrix::identity(count, count) - matrix).try_inverse()?;
+    // It is, if M x < x for some x > 0: here M x = x - 1.
+    let x = &inverse * DVector::from_element(count, 1.0);
+    x.iter().all(|own| *own >= 1.0 - 1e-9 && own.is_finite()).then_some(inverse)
+}

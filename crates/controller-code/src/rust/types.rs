@@ -1,0 +1,299 @@
+//! The types of the crate, and how an instance starts.
+
+use super::Source;
+use crate::summary::{descriptions, descriptions_of_estimates};
+use crate::symbols::Vector;
+use crate::tables::{starts, stored};
+
+impl Source<'_> {
+    pub(super) fn structures(&self, lines: &mut Vec<String>) {
+        let Self { controller, fields, real, .. } = self;
+        let estimates = fields.estimates(controller);
+        let described = [
+            descriptions(&controller.measurements),
+            descriptions(&controller.references),
+            descriptions(controller.schedule_inputs()),
+            descriptions(&controller.actuators),
+            descriptions_of_estimates(controller),
+        ];
+        let groups = [
+            ("Measurements", "The measurements of a sample.", "MEASUREMENTS", &fields.measurements),
+            ("References", "The references of a sample.", "REFERENCES", &fields.references),
+            ("Schedule", "The scheduling variable of a sample.", "1", &fields.schedule),
+            ("Commands", "The commands of a sample.", "ACTUATORS", &fields.actuators),
+            ("Estimates", "The estimates of a sample.", "ESTIMATES", &estimates),
+        ];
+        for ((name, text, count, fields), described) in groups.into_iter().zip(&described) {
+            if fields.is_empty() {
+                continue;
+            }
+            lines.push(format!("\n/// {text}"));
+            lines.push("#[derive(Clone, Copy, Debug, Default, PartialEq)]".to_owned());
+            lines.push(format!("pub struct {name} {{"));
+            for (field, text) in fields.iter().zip(described) {
+                lines.push(format!("    /// {text}.\n    pub {field}: {real},"));
+            }
+            lines.push("}".to_owned());
+            let values: Vec<_> = (1..=fields.len()).map(|k| format!("v{k}")).collect();
+            let pairs =
+                fields.iter().zip(&values).map(|(field, value)| format!("{field}: {value}"));
+            lines.push(format!("\nimpl From<[{real}; {count}]> for {name} {{"));
+            lines.push(format!(
+                "    fn from([{}]: [{real}; {count}]) -> Self {{",
+                values.join(", ")
+            ));
+            lines.push(format!("        Self {{ {} }}", pairs.collect::<Vec<_>>().join(", ")));
+            lines.push("    }\n}".to_owned());
+            let reads: Vec<_> = fields.iter().map(|field| format!("own.{field}")).collect();
+            lines.push(format!("\nimpl From<{name}> for [{real}; {count}] {{"));
+            lines.push(format!("    fn from(own: {name}) -> Self {{"));
+            lines.push(format!("        [{}]", reads.join(", ")));
+            lines.push("    }\n}".to_owned());
+        }
+        self.actuators_structure(lines);
+        self.detection_structure(lines);
+        self.outputs_structure(lines);
+        lines.push(
+            "
+/// One instance of the controller.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Controller {"
+                .to_owned(),
+        );
+        for vector in stored(controller).into_iter().chain([Vector::U]) {
+            lines.push(format!("    {}: [{real}; {}],", vector.name(), vector.kind().plural()));
+        }
+        if !controller.schedule_inputs().is_empty() {
+            lines.push(format!("    theta: [{real}; 1],"));
+        }
+        lines.extend(
+            self.other_fields().map(|field| format!("    {}: {},", field.name, field.kind)),
+        );
+        if controller.has_counter() {
+            lines.push("    sample: u32,".to_owned());
+        }
+        if controller.filter.is_some() {
+            lines.push("    started: bool,".to_owned());
+        }
+        lines.push("}".to_owned());
+    }
+
+    /// The structures of what was unusual in a sample, and of its results.
+    fn outputs_structure(&self, lines: &mut Vec<String>) {
+        let controller = self.controller;
+        let reconfiguration = match controller.reconfiguration {
+            None => "",
+            Some(_) => {
+                "
+    /// The position from 1 of the first actuator that the controller does without; 0 if there is none, -1 in the
+    /// fall-back.
+    pub reconfiguration: i32,"
+            }
+        };
+        let detection = match controller.detection {
+            None => "",
+            Some(_) => {
+                "\n    /// Decision, residuals and statistics.\n    pub detection: Detection,"
+            }
+        };
+        let outside = match controller.schedule {
+            None => "",
+            Some(_) => {
+                "
+    /// The scheduling variable is outside of the schedule; the nearest point was used.
+    pub outside: bool,"
+            }
+        };
+        let held = if controller.checks_measurements() {
+            "A measurement or reference was NaN or infinite, or a measurement outside of its range; its last other
+    /// value was used."
+        } else {
+            "A measurement or reference was NaN or infinite; its last finite value was used."
+        };
+        let lost = if controller.limits_holds() {
+            "
+    /// The last value of a measurement was used for too long; commands and estimates are those of the operating point.
+    pub lost: bool,"
+        } else {
+            ""
+        };
+        lines.push(format!(
+            "
+/// What was unusual in a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Status {{
+    /// {held}
+    pub held: bool,
+    /// A command is at a limit.
+    pub at_limit: bool,
+    /// A sum was beyond the range of the numbers; commands and estimates keep their values.
+    pub overflow: bool,{outside}{lost}
+}}
+
+/// The results of a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Outputs {{
+    /// The commands.
+    pub commands: Commands,
+    /// The estimates.
+    pub estimates: Estimates,{detection}{reconfiguration}
+    /// What was unusual.
+    pub status: Status,
+}}"
+        ));
+    }
+
+    pub(super) fn start(&self, lines: &mut Vec<String>) {
+        let Self { controller, real, .. } = self;
+        let [x, u, y, r] = starts(controller).map(|(name, _)| name.to_ascii_uppercase());
+        let filter = match controller.detection {
+            None => String::new(),
+            Some(_) => format!(
+                "
+        let (mut deviations, mut x_r) = (x_hat, [0.0; RESIDUAL_STATES]);
+        for (deviation, x_op) in deviations.iter_mut().zip(&{x}) {{
+            *deviation -= *x_op;
+        }}
+        Matrix::new(&START_R).add_product(&deviations, &mut x_r);"
+            ),
+        };
+        lines.push(format!(
+            "
+impl Default for Controller {{
+    fn default() -> Self {{
+        Self::new()
+    }}
+}}
+
+impl Controller {{
+    /// Starts at the operating point, without faults.
+    #[must_use]
+    pub fn new() -> Self {{
+        Self::starting_at({x}, [0.0; FAULTS])
+    }}
+
+    /// Starts at these estimates of states and faults.
+    #[must_use]
+    pub fn starting_at(x_hat: [{real}; STATES], f_hat: [{real}; FAULTS]) -> Self {{{filter}
+        Self {{
+            x_hat,
+            f_hat,"
+        ));
+        if controller.filter.is_some() {
+            lines.push(format!("            y_f: {y},\n            started: false,"));
+        }
+        lines.extend(
+            self.other_fields()
+                .map(|field| format!("            {}: {},", field.name, field.start)),
+        );
+        if controller.has_counter() {
+            lines.push("            sample: 0,".to_owned());
+        }
+        if controller.detection.is_some() {
+            lines.push("            x_r,\n            residual: [0.0; RESIDUALS],".to_owned());
+        }
+        if !controller.references.is_empty() {
+            lines.push(format!("            r: {r},"));
+        }
+        if controller.h.is_some() {
+            lines.push("            x_i: [0.0; REFERENCES],".to_owned());
+        }
+        if controller.d.is_some() {
+            lines.push("            u_before: [0.0; ACTUATORS],".to_owned());
+        }
+        if let [input] = controller.schedule_inputs() {
+            lines.push(format!("            theta: [{}],", self.literal(input.operating)));
+        }
+        lines.push(format!("            y: {y},\n            u: {u},\n        }}\n    }}\n}}"));
+    }
+
+    /// The structure with decision, residuals and statistics of a sample.
+    pub(super) fn detection_structure(&self, lines: &mut Vec<String>) {
+        if self.controller.detection.is_none() {
+            return;
+        }
+        let real = self.real;
+        lines.push(format!(
+            "
+/// Decision, residuals and statistics of a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detection {{
+    /// Whether a test has given an alarm since the last reset.
+    pub detected: bool,
+    /// The position from 1 of the fault that the alarms fit; 0 without an alarm, -1 if they fit none or several.
+    pub isolated: i32,
+    /// The time of the first alarm in s; -1 before.
+    pub t_detected: {real},
+    /// The estimated time in s at which the fault started; -1 before an alarm.
+    pub t_onset: {real},
+    /// The residuals in standard deviations.
+    pub residual: [{real}; RESIDUALS],
+    /// The statistics of the tests.
+    pub statistic: [{real}; TESTS],
+}}
+
+impl Default for Detection {{
+    fn default() -> Self {{
+        Self {{
+            detected: false,
+            isolated: 0,
+            t_detected: -1.0,
+            t_onset: -1.0,
+            residual: [0.0; RESIDUALS],
+            statistic: [0.0; TESTS],
+        }}
+    }}
+}}"
+        ));
+    }
+
+    /// The structure of what is known about the actuators in a sample.
+    pub(super) fn actuators_structure(&self, lines: &mut Vec<String>) {
+        if self.controller.reconfiguration.is_none() {
+            return;
+        }
+        let fields = self.fields.switches(self.controller);
+        let count = fields.len();
+        lines.push(format!(
+            "
+/// Number of [`Actuators`].
+pub const SWITCHES: usize = {count};
+
+/// What is known about the actuators in a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Actuators {{"
+        ));
+        for field in &fields {
+            let text = match field.strip_prefix("gone_") {
+                Some(actuator) => format!("Whether `{actuator}` is gone"),
+                None => {
+                    "Whether an unknown actuator has failed: the gains are those of the fall-back"
+                        .to_owned()
+                }
+            };
+            lines.push(format!("    /// {text}.\n    pub {field}: bool,"));
+        }
+        let values: Vec<_> = (1..=count).map(|k| format!("v{k}")).collect();
+        let pairs: Vec<_> =
+            fields.iter().zip(&values).map(|(field, value)| format!("{field}: {value}")).collect();
+        let reads: Vec<_> = fields.iter().map(|field| format!("own.{field}")).collect();
+        lines.push(format!(
+            "}}
+
+impl From<[bool; SWITCHES]> for Actuators {{
+    fn from([{}]: [bool; SWITCHES]) -> Self {{
+        Self {{ {} }}
+    }}
+}}
+
+impl From<Actuators> for [bool; SWITCHES] {{
+    fn from(own: Actuators) -> Self {{
+        [{}]
+    }}
+}}",
+            values.join(", "),
+            pairs.join(", "),
+            reads.join(", ")
+        ));
+    }
+}

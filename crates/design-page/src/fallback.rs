@@ -1,0 +1,105 @@
+//! The section on the fall-back.
+
+use maud::{Markup, html};
+
+use super::number::number;
+use super::table::{Cell, table};
+use design_report::Report;
+use design_report::fallback::{FallbackCase, FallbackReport};
+use design_report::robustness::{LoopPoint, Number};
+
+pub(super) fn fallback(report: &Report) -> Markup {
+    html! { @if let Some(found) = &report.fallback { (section(found)) } }
+}
+
+fn section(found: &FallbackReport) -> Markup {
+    html! {
+        p {
+            "The fall-back serves all cases below without knowing which one it is. It is in force while the \
+             input fall_back of the controller FMU is true, and while actuators are gone for which there \
+             are no other gains. The observer stays in the loop and does not know of the loss. " (found.method)
+        }
+        p {
+            "The loop of plant, observer and feedback decays with at least " (number(found.decay))
+            " 1/s in all cases, the intact controller with " (number(found.intact_decay))
+            " 1/s. Norm of K" sub { "x" } " " (number(found.gain_norm)) ", of the intact controller "
+            (number(found.intact_gain_norm)) ". "
+            @if found.compensates {
+                "The estimated faults are compensated: the loop with the compensation decays at the required \
+                 rate, too."
+            } @else {
+                "The estimated faults are not compensated: with the compensation the loop would not decay \
+                 at the required rate in all cases. What they cause stays in the states."
+            }
+        }
+        @match &found.whole {
+            Ok(certificate) => p {
+                "One P serves the loops of all cases (margin " (number(certificate.margin)) "): the loop is \
+                 stable while losses change in any way, if their fractions of the largest loss are at most \
+                 1 in sum."
+            },
+            Err(reason) => p {
+                strong { "Stability while losses change with time is not proven: " } (reason)
+                ". The table is about constant losses."
+            },
+        }
+        (cases(&found.cases))
+        (at_rest("Commands of the fall-back at rest", &found.cases, |own| &own.commands))
+        (at_rest(
+            "Deviations of the measurements in the fall-back at rest",
+            &found.cases,
+            |own| &own.measurements,
+        ))
+    }
+}
+
+fn cases(cases: &[FallbackCase]) -> Markup {
+    let peak = |points: &[LoopPoint], at: usize| Cell::from(points.get(at).map(|own| own.judged));
+    let row = |own: &FallbackCase| {
+        let price = own.worst_price();
+        vec![
+            own.name.as_str().into(),
+            own.decay.into(),
+            own.feedback_decay.into(),
+            peak(&own.points, 0),
+            peak(&own.points, 1),
+            own.delay_margin.into(),
+            price.map(|price| price.value).into(),
+            price.map_or("", |price| &price.name).into(),
+        ]
+    };
+    let heads = [
+        "case",
+        "decay of the loop, 1/s",
+        "decay of A + B K_x, 1/s",
+        "peak of S, input",
+        "peak of S, output",
+        "delay margin, s",
+        "price",
+        "of",
+    ];
+    html! {
+        p {
+            "The price is the root-mean-square value of a measurement under white noise on the commands, \
+             relative to that of the intact plant with the intact controller: the largest one."
+        }
+        (table("Cases of the fall-back", &heads, &cases.iter().map(row).collect::<Vec<_>>()))
+    }
+}
+
+/// A table with a row for each signal and a column for each case.
+fn at_rest(
+    title: &str,
+    cases: &[FallbackCase],
+    numbers: impl Fn(&FallbackCase) -> &[Number],
+) -> Markup {
+    let Some(first) = cases.first() else { return html! {} };
+    let row = |(at, own): (usize, &Number)| {
+        let values = cases.iter().map(|case| Cell::from(numbers(case)[at].value));
+        [own.name.as_str().into(), (&own.unit).into()].into_iter().chain(values).collect()
+    };
+    let rows: Vec<Vec<Cell>> = numbers(first).iter().enumerate().map(row).collect();
+    let names = cases.iter().map(|case| case.name.as_str());
+    let heads: Vec<_> = ["signal", "unit"].into_iter().chain(names).collect();
+    table(title, &heads, &rows)
+}

@@ -1,0 +1,219 @@
+//! `report.html`: the design report as one self-contained page.
+
+mod advice;
+mod certificate;
+mod chart;
+mod comparison;
+mod curves;
+mod detection;
+mod estimation;
+mod fallback;
+mod family;
+mod loops;
+mod losses;
+mod matrix;
+mod number;
+mod plane;
+mod plant;
+mod plots;
+mod pole_map;
+mod reconfiguration;
+mod references;
+mod region;
+mod robustness;
+mod table;
+mod verdict;
+
+pub use comparison::comparison;
+use figure::interactive::{
+    BASE_STYLE, COLOURS, FOLD, LINKED, LINKED_STYLE, UPLOT, UPLOT_LICENCE, UPLOT_STYLE, USAGE,
+};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use plots::Plots;
+
+use design_report::Report;
+
+const STYLE: &str = include_str!("page.css");
+const COPY: &str = include_str!("copy.js");
+const FIGURES: &str = include_str!("figures.js");
+/// The content security policy: the page loads nothing, even if a text contains markup.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+
+/// Returns the page of a design, a complete HTML document. Equal reports give equal bytes.
+///
+/// `plant.eigenvalues` are eigenvalues of the continuous plant in 1/s; the eigenvalues of the loops
+/// are in the z-plane if the design is sampled. `identity` names the design in the head of the page.
+#[must_use]
+pub fn page(report: &Report, identity: &str) -> String {
+    let title =
+        if report.description.is_empty() { &report.plant_file } else { &report.description };
+    let mut plots = Plots::default();
+    let sections = sections(report, &mut plots);
+    let document = html! {
+        (DOCTYPE)
+        html lang="en" {
+            (head(title, identity))
+            body {
+                header {
+                    p.kind { "Design report" }
+                    h1 { (title) }
+                    p.file { "Plant file " code { (report.plant_file) } }
+                    (verdict::verdict(report))
+                    @if !plots.is_empty() {
+                        (about_plots())
+                        noscript {
+                            p.warned {
+                                "The curves over time and frequency need JavaScript; their points come from "
+                                code { "aso-ftc design --json" } ", too. Tables and maps need no JavaScript."
+                            }
+                        }
+                    }
+                }
+                main {
+                    @for (index, section) in sections.iter().enumerate() {
+                        section aria-labelledby=(section.id) {
+                            details {
+                                summary { h2 id=(section.id) { (index + 1) ". " (section.title) } }
+                                (section.content)
+                            }
+                        }
+                    }
+                }
+                footer {
+                    p {
+                        "Written by aso-ftc " (env!("CARGO_PKG_VERSION")) ". Numbers are shown with \
+                         five digits, the pointer shows all. The same numbers, and the points of \
+                         the curves, come from "
+                        code { "aso-ftc design --json" } "."
+                    }
+                    @if !plots.is_empty() {
+                        p { "Plots by uPlot." }
+                        details.stays { summary { "Licence of uPlot" } pre tabindex="0" { (UPLOT_LICENCE) } }
+                    }
+                    p role="status" #copied {}
+                }
+                (script(FOLD))
+                @if !plots.is_empty() {
+                    script type="application/json" #curves { (PreEscaped(plots.json())) }
+                    @for text in [UPLOT, LINKED, FIGURES] { (script(text)) }
+                }
+                (script(COPY))
+            }
+        }
+    };
+    document.into_string().replace(|sign: char| sign.is_control() && sign != '\n', " ")
+}
+
+/// How to use the plots.
+fn about_plots() -> Markup {
+    html! {
+        details.said.stays {
+            summary { "How to zoom, read values and differences in the plots, by mouse, keyboard and touch" }
+            @for sentence in USAGE { p { (sentence) } }
+        }
+    }
+}
+
+/// A script that is the same in HTML and in XML, where `<` and `&` would otherwise be markup.
+fn script(text: &str) -> Markup {
+    html! { script { "/*" (PreEscaped("<![CDATA[")) "*/\n" (PreEscaped(text)) "\n/*" (PreEscaped("]]>")) "*/" } }
+}
+
+fn head(title: &str, identity: &str) -> Markup {
+    html! {
+        head {
+            meta charset="utf-8";
+            meta name="viewport" content="width=device-width, initial-scale=1";
+            meta name="color-scheme" content="light dark";
+            meta http-equiv="Content-Security-Policy" content=(POLICY);
+            meta name="generator" content=(identity);
+            title { (title) ", design report" }
+            style {
+                @for text in [UPLOT_STYLE, COLOURS, BASE_STYLE, LINKED_STYLE, STYLE] { (PreEscaped(text)) }
+            }
+        }
+    }
+}
+
+struct Section {
+    id: &'static str,
+    title: &'static str,
+    content: Markup,
+}
+
+/// Returns the non-empty sections in reading order.
+fn sections<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Vec<Section> {
+    let all = [
+        (true, "plant", "Plant", plant::plant(&report.plant)),
+        (!report.checks.is_empty(), "checks", "Checks", plant::checks(report)),
+        (!report.gains.is_empty(), "gains", "Gains", plant::gains(report)),
+        (true, "poles", "Eigenvalues", loops::poles(report)),
+        (true, "conditioning", "Condition and pole errors", loops::conditioning(report)),
+        (
+            !report.estimation.errors.is_empty(),
+            "estimation",
+            "Estimation of the faults",
+            estimation::estimation(report),
+        ),
+        (
+            report.robustness.is_some(),
+            "robustness",
+            "Robustness",
+            robustness::robustness(report, plots),
+        ),
+        (report.family.is_some(), "family", "Family of plants", family::family(report)),
+        (report.schedule.is_some(), "schedule", "Schedule", family::schedule(report)),
+        (
+            report.detection.is_some(),
+            "detection",
+            "Detection of faults",
+            report.detection.as_ref().map_or_else(Markup::default, detection::detection),
+        ),
+        (
+            !report.frequency.is_empty(),
+            "frequency",
+            "Singular values",
+            curves::frequencies(report, plots),
+        ),
+        (
+            !report.references.is_empty(),
+            "references",
+            "References",
+            references::references(report, plots),
+        ),
+        (!report.steps.is_empty(), "steps", "Sudden faults", curves::responses(report, plots)),
+        (!report.bounds.is_empty(), "bounds", "Bounds of the errors", certificate::bounds(report)),
+        (true, "certificate", "Certificate", certificate::certificate(report)),
+        (!report.assumptions.is_empty(), "assumptions", "Assumptions", plant::assumptions(report)),
+        (
+            !report.effectiveness.is_empty(),
+            "effectiveness",
+            "Loss of effectiveness",
+            losses::losses(report),
+        ),
+        (
+            report.reconfiguration.is_some(),
+            "reconfiguration",
+            "Without an actuator",
+            reconfiguration::reconfiguration(report),
+        ),
+        (report.fallback.is_some(), "fallback", "Fall-back", fallback::fallback(report)),
+        (
+            !report.interface.is_empty(),
+            "interface",
+            "Interface of the FMU",
+            plant::interface(report),
+        ),
+    ];
+    all.into_iter()
+        .filter(|(shown, ..)| *shown)
+        .map(|(_, id, title, content)| Section { id, title, content })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,0 +1,100 @@
+//! The section on losses of effectiveness.
+
+use maud::{Markup, html};
+
+use super::number::number;
+use super::plant::effectiveness;
+use super::table::{Cell, table};
+use design_report::Report;
+use design_report::losses::{LossLoop, LossReport, described};
+
+pub(super) fn losses(report: &Report) -> Markup {
+    html! {
+        (effectiveness(report))
+        @if let Some(losses) = &report.losses { (stated(losses)) }
+    }
+}
+
+/// What is proven about losses up to the stated fractions.
+fn stated(losses: &LossReport) -> Markup {
+    html! {
+        p {
+            "The plant file states losses up to " (described(&losses.stated)) ". A loss may have any value \
+             from 0 to this one. Proven are losses that change at any time and as fast as they like: one \
+             matrix P decreases xᵀ P x along all motions (quadratic stability; Boyd et al. 1994). The \
+             inequalities are checked again by eigenvalues. Losses beyond the largest constant ones make \
+             the loop unstable. Between the two, constant losses are stable as far as they were tested, \
+             and nothing is known of losses that change."
+        }
+        @for own in &losses.loops { (of_loop(own, losses)) }
+    }
+}
+
+fn of_loop(own: &LossLoop, losses: &LossReport) -> Markup {
+    let limits: Vec<Vec<Cell>> = own
+        .constant
+        .iter()
+        .enumerate()
+        .map(|(at, constant)| {
+            let certified = own.certified.get(at);
+            let case = match at {
+                0 if losses.stated.len() > 1 => {
+                    "all, in proportion to the stated losses".to_owned()
+                }
+                0 => losses.stated[0].name.clone(),
+                at => format!("{} alone", losses.stated[at - 1].name),
+            };
+            vec![
+                case.as_str().into(),
+                certified.map_or(Cell::Missing, |own| described(&own.losses).as_str().into()),
+                certified.map(|own| own.factor).into(),
+                described(&constant.losses).as_str().into(),
+                Some(constant.factor).filter(|_| !constant.stable).into(),
+                if constant.stable { "stable up to here" } else { "unstable beyond" }.into(),
+            ]
+        })
+        .collect();
+    let heads = [
+        "losses",
+        "proven up to",
+        "factor of the stated losses",
+        "largest constant losses",
+        "their factor",
+        "there",
+    ];
+    html! {
+        h3 { "Losses, " (own.name) }
+        p { (own.meaning) "." }
+        @match &own.proof {
+            Ok(proof) => {
+                p {
+                    strong { "The stated losses are proven" } " with the margin "
+                    (number(proof.margin))
+                    @if let Some(decay) = proof.decay {
+                        "; the loop decays with at least " (number(decay)) " 1/s for all of them"
+                    }
+                    "."
+                }
+            }
+            Err(reason) => p { strong { "The stated losses are not proven: " } (reason) "." },
+        }
+        (table(&format!("Limits of the losses, {}", own.name), &heads, &limits))
+        @if let Ok(proof) = &own.proof {
+            @let rows: Vec<Vec<Cell>> = proof
+                .peaks
+                .iter()
+                .map(|peak| vec![
+                    format!("{} → {}", peak.disturbance, peak.state).as_str().into(),
+                    peak.size.into(),
+                    peak.largest.into(),
+                    (&peak.unit).into(),
+                ])
+                .collect();
+            (table(
+                &format!("Largest states for all stated losses, {}", own.name),
+                &["disturbance → state", "largest disturbance", "bound of the state", "unit"],
+                &rows,
+            ))
+        }
+    }
+}

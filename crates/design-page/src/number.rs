@@ -1,0 +1,35 @@
+//! Formats numbers.
+
+use maud::{Markup, html};
+
+use design_report::number::rounded;
+
+/// Returns the shortest text that parses to the same number in TOML, numpy and MATLAB.
+pub(super) fn exact(value: f64) -> String {
+    format!("{value:?}")
+}
+
+/// Formats a complex number; `part` formats each part.
+pub(super) fn complex([re, im]: [f64; 2], part: fn(f64) -> String) -> String {
+    if im == 0.0 {
+        return part(re);
+    }
+    let sign = if im < 0.0 { '-' } else { '+' };
+    format!("{} {sign} {}i", part(re), part(im.abs()))
+}
+
+/// Formats a number in a sentence: rounded, with all digits in the tooltip.
+pub(super) fn number(value: f64) -> Markup {
+    html! { data value=(exact(value)) title=(exact(value)) { (rounded(value)) } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_complex_number_has_two_parts_and_a_real_one_has_none() {
+        assert_eq!(complex([-4.5, -3.25], rounded), "-4.5 - 3.25i");
+        assert_eq!(complex([-4.5, 0.0], rounded), "-4.5");
+    }
+}

@@ -1,0 +1,306 @@
+//! The section on robustness: margins, noise, comparison, tolerances, S and T.
+
+use maud::{Markup, html};
+
+use super::curves::frequency;
+use super::matrix::matrices;
+use super::number::number;
+use super::plots::Plots;
+use super::table::{Cell, table};
+use design_report::robustness::{
+    Disk, Parameter, PeakSensitivity, Robustness, ToleranceProof, ToleranceResult,
+};
+use design_report::{Matrix, Report};
+
+/// Number of parameters in the table of the sensitivities.
+const SHOWN: usize = 12;
+
+pub(super) fn robustness<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Markup {
+    html! { @if let Some(found) = &report.robustness { (section(report, found, plots)) } }
+}
+
+fn section<'a>(report: &Report, found: &'a Robustness, plots: &mut Plots<'a>) -> Markup {
+    let limit = report.sampling.as_ref();
+    let limit = limit.map(|sampled| std::f64::consts::PI / sampled.sample_time);
+    html! {
+        p {
+            "S is the sensitivity of the loop, T = I − S. Where the channels have different units, \
+             the peak of S in the units that make it least is judged. The table "
+            code { "[robustness]" } " of the plant file changes tolerances, noise and limits."
+        }
+        (peaks(found))
+        (channels(found))
+        (disks(found))
+        p {
+            "All commands may be delayed by up to " (number(found.delay_margin)) " s. "
+            @if report.sampling.is_some() {
+                "With the same matrices of the controller the loop is stable up to a sample time of "
+                (number(found.longest_hold)) " s."
+            } @else {
+                "Plant and controller may hold the signals that they exchange for up to "
+                (number(found.longest_hold)) " s: a longer communication step without extrapolation, \
+                 or a longer sample time of the discretised controller, makes the loop unstable."
+            }
+        }
+        h3 id="s-and-t" { "S and T" }
+        div.figures {
+            @for (index, curve) in found.curves.iter().enumerate() {
+                (frequency(format!("sensitivity-{}", index + 1), curve, limit, plots))
+            }
+        }
+        h3 id="noise" { "Measurement noise" }
+        (noise(report, found))
+        h3 id="comparison" { "Comparison" }
+        (comparison(found))
+        h3 id="parameters" { "Sensitivity to the parameters" }
+        (parameters(report, found))
+        h3 id="tolerances" { "Tolerances of the parameters" }
+        (tolerances(report, &found.tolerance))
+        (proof(&found.tolerance, &found.tolerance_proof))
+    }
+}
+
+const DISK: [&str; 6] =
+    ["disk margin α", "certified α", "at rad/s", "gain from", "gain to", "phase (degrees)"];
+
+fn disk_cells(name: &str, disk: &Disk) -> Vec<Cell> {
+    let Disk { alpha, certified, frequency, gain: [low, high], phase } = *disk;
+    let numbers = [alpha, certified, frequency, low, high, phase];
+    std::iter::once(name.into()).chain(numbers.map(Cell::from)).collect()
+}
+
+fn disks(found: &Robustness) -> Markup {
+    let mut rows = Vec::new();
+    for point in &found.points {
+        rows.push(disk_cells(&format!("all at the {}", point.point), &point.together));
+        rows.extend(point.channels.iter().map(|channel| disk_cells(&channel.name, &channel.disk)));
+    }
+    let heads: Vec<&str> = std::iter::once("channel").chain(DISK).collect();
+    html! {
+        p {
+            "Each factor of the disk (1 + δα/2) / (1 − δα/2), |δ| < 1, may multiply a channel: gain \
+             and phase change together. For all channels the factors are independent of each other."
+        }
+        (table("Disk margins", &heads, &rows))
+    }
+}
+
+fn peaks(found: &Robustness) -> Markup {
+    let row = |point: &design_report::robustness::LoopPoint| {
+        vec![
+            format!("at the {}", point.point).as_str().into(),
+            point.s_peak.into(),
+            point.s_frequency.into(),
+            point.s_peak_scaled.into(),
+            point.t_peak.into(),
+            point.t_frequency.into(),
+            point.judged.into(),
+            point.judged_frequency.into(),
+        ]
+    };
+    let rows: Vec<Vec<Cell>> = found.points.iter().map(row).collect();
+    let heads = [
+        "loop opened",
+        "peak of S",
+        "at rad/s",
+        "peak of S in the best units",
+        "peak of T",
+        "at rad/s",
+        "judged",
+        "at rad/s",
+    ];
+    table("Peaks of the largest singular value", &heads, &rows)
+}
+
+fn channels(found: &Robustness) -> Markup {
+    let rows: Vec<Vec<Cell>> = found
+        .points
+        .iter()
+        .flat_map(|point| &point.channels)
+        .map(|channel| {
+            vec![
+                channel.name.as_str().into(),
+                channel.gain[0].into(),
+                channel.gain[1].into(),
+                channel.phase.into(),
+                channel.delay.into(),
+            ]
+        })
+        .collect();
+    let heads = ["channel", "gain from", "gain to", "phase margin (degrees)", "delay margin (s)"];
+    table("One channel changes, the others are exact", &heads, &rows)
+}
+
+fn noise(report: &Report, found: &Robustness) -> Markup {
+    let rows: Vec<Vec<Cell>> = found
+        .noise_together
+        .iter()
+        .map(|one| vec![one.name.as_str().into(), (&one.unit).into(), one.value.into()])
+        .collect();
+    let assumed = found.noise.columns.iter().zip(&found.noise_of_measurements);
+    let assumed: Vec<Vec<Cell>> =
+        assumed.map(|(name, noise)| vec![name.as_str().into(), (*noise).into()]).collect();
+    html! {
+        p {
+            "Root-mean-square values under independent white noise of the measurements. "
+            @if report.sampling.is_some() {
+                "The noise of a measurement is stated as the standard deviation of a sample."
+            } @else {
+                "The noise of a measurement is stated as the root of its spectral density: its unit \
+                 times √s."
+            }
+        }
+        (table("Assumed noise", &["measurement", "noise"], &assumed))
+        (table("Under all noises", &["signal", "unit", "root mean square"], &rows))
+        (matrices("noise-each", std::slice::from_ref(&found.noise)))
+    }
+}
+
+fn comparison(found: &Robustness) -> Markup {
+    let rows: Vec<Vec<Cell>> = found
+        .comparison
+        .iter()
+        .map(|one| vec![one.name.as_str().into(), one.design.into(), one.linear_quadratic.into()])
+        .collect();
+    html! {
+        p {
+            "The linear-quadratic regulator and the Kalman filter whose eigenvalues have the same sum \
+             of decay rates show what the required speed costs at least: a design that is many times \
+             larger has eigenvalues that the plant resists."
+        }
+        (table("Norms and peaks", &["quantity", "this design", "linear-quadratic"], &rows))
+    }
+}
+
+/// Shows the parameters with the largest effect on the peaks of S.
+fn parameters(report: &Report, found: &Robustness) -> Markup {
+    let entries = |own: &PeakSensitivity| -> Vec<(String, f64)> {
+        let named = |matrix: &Matrix| -> Vec<(String, f64)> {
+            let at = |(i, row): (usize, &Vec<f64>)| -> Vec<(String, f64)> {
+                let name = |j: usize| format!("{}[{}, {}]", matrix.name, i + 1, j + 1);
+                row.iter().enumerate().map(|(j, value)| (name(j), *value)).collect()
+            };
+            matrix.values.iter().enumerate().flat_map(at).collect()
+        };
+        own.matrices.iter().flat_map(named).collect()
+    };
+    let all: Vec<_> = found.sensitivity.iter().map(entries).collect();
+    let Some(first) = all.first() else { return html! {} };
+    let size = |at: usize| all.iter().map(|own| own[at].1.abs()).fold(0.0, f64::max);
+    let mut order: Vec<usize> = (0..first.len()).filter(|&at| size(at) > 0.0).collect();
+    order.sort_by(|&i, &j| size(j).total_cmp(&size(i)));
+    let values: Vec<f64> = ["A", "B", "C", "D"]
+        .iter()
+        .filter_map(|name| report.plant.matrices.iter().find(|own| own.name == *name))
+        .flat_map(|own| own.values.iter().flatten().copied())
+        .collect();
+    let row = |&at: &usize| {
+        let value = Cell::from(values.get(at).copied());
+        let effects = all.iter().map(|own| Cell::from(0.01 * own[at].1));
+        [first[at].0.as_str().into(), value].into_iter().chain(effects).collect()
+    };
+    let rows: Vec<Vec<Cell>> = order.iter().take(SHOWN).map(row).collect();
+    let points = found.sensitivity.iter().map(|own| format!("change at the {}", own.point));
+    let heads: Vec<String> =
+        ["entry", "value"].into_iter().map(str::to_owned).chain(points).collect();
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    html! {
+        p {
+            "The change of the judged peak of S for a change of one entry of the plant by +1 %, to \
+             first order; the " (rows.len()) " entries with the largest effect."
+        }
+        (table("Sensitivity of the peaks of S", &heads, &rows))
+        @for (index, own) in found.sensitivity.iter().enumerate() {
+            p { "At the " (own.point) ", for a change by 100 %:" }
+            (matrices(&format!("sensitivity-of-{}", index + 1), &own.matrices))
+        }
+    }
+}
+
+fn tolerances(report: &Report, found: &ToleranceResult) -> Markup {
+    if !found.is_examined() {
+        return html! { p { "Not examined: no entry and no parameter of the plant varies." } };
+    }
+    let tried = if found.parameters.is_empty() { 16.0 } else { 1.0 };
+    html! {
+        p {
+            @if found.parameters.is_empty() {
+                (number(f64::from(found.entries))) " entries vary: " (found.range()) ". Each varies by itself, unless \
+                 stated together; zeros and structural rows do not vary; "
+            } @else {
+                "The parameters of the table vary between their limits, and the FMU is linearised \
+                 with each set of them at the same operating point; "
+            }
+            "the controller does not. "
+            @match found.stable {
+                Some(part) => {
+                    "Of " (number(f64::from(found.cases))) " random cases (seed " (number(f64::from(found.seed))) ") the fraction "
+                    (number(part)) " is stable. "
+                }
+                None => "There are no random cases. "
+            }
+            "The worst plant found has the stability figure "
+            (number(found.worst_instability)) " (negative: stable; "
+            @if report.sampling.is_some() { "largest modulus less 1" } @else { "largest real part, 1/s" }
+            "). In its direction the loop is stable up to " (number(found.first_unstable.min(tried)))
+            " of the tolerances" @if found.first_unstable > tried { ", the most that was tried" }
+            "."
+        }
+        @if !found.parameters.is_empty() { (limits(&found.parameters)) }
+        (matrices("worst", &found.worst))
+    }
+}
+
+/// What is proven for the cases that were not tried.
+fn proof(tested: &ToleranceResult, proof: &Result<ToleranceProof, String>) -> Markup {
+    html! {
+        @if tested.is_examined() {
+            p {
+                @match proof {
+                    Ok(proof) => {
+                        "Proven by the structured singular value: every plant within "
+                        (number(proof.fraction)) " of the tolerances is stable, while it is constant. "
+                        @if proof.frequency > 0.0 && proof.fraction < 0.99 * proof.most {
+                            "The frequency " (number(proof.frequency)) " rad/s limits it. "
+                        }
+                        (number(f64::from(proof.deviations))) " independent deviations, "
+                        (number(f64::from(proof.intervals))) " intervals of the frequency. "
+                        @if proof.fraction < 1.0 { "Between this fraction and the tolerances a case that was not tried may be unstable." }
+                    }
+                    Err(reason) => {
+                        "A case that was not tried may be worse; stability of all of them is " (reason) "."
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn limits(all: &[Parameter]) -> Markup {
+    let heads = [
+        "parameter",
+        "value",
+        "lowest",
+        "highest",
+        "worst",
+        "change at the commands",
+        "change at the measurements",
+    ];
+    let row = |own: &Parameter| {
+        let name = match &own.unit {
+            Some(unit) => format!("{} ({unit})", own.name),
+            None => own.name.clone(),
+        };
+        let values = [own.value, own.limits[0], own.limits[1], own.worst];
+        let numbers = values.iter().chain(&own.effects).map(|value| Cell::Number(*value));
+        std::iter::once(Cell::Text(name)).chain(numbers).collect()
+    };
+    let rows: Vec<Vec<Cell>> = all.iter().map(row).collect();
+    html! {
+        p {
+            "The last two columns: change of the judged peak of S while the parameter goes from its \
+             value to a limit, to first order."
+        }
+        (table("Parameters of the FMU", &heads, &rows))
+    }
+}

@@ -1,0 +1,125 @@
+//! Tables that can be copied.
+
+use design_report::number::rounded;
+use maud::{Markup, html};
+
+use super::number::{complex, exact};
+
+/// The content of a cell.
+pub(super) enum Cell {
+    Text(String),
+    Number(f64),
+    Complex([f64; 2]),
+    Holds(bool),
+    Missing,
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        if text.is_empty() { Self::Missing } else { Self::Text(text.to_owned()) }
+    }
+}
+
+impl From<&Option<String>> for Cell {
+    fn from(text: &Option<String>) -> Self {
+        text.as_deref().map_or(Self::Missing, Self::from)
+    }
+}
+
+impl From<f64> for Cell {
+    fn from(number: f64) -> Self {
+        Self::Number(number)
+    }
+}
+
+impl From<Option<f64>> for Cell {
+    fn from(number: Option<f64>) -> Self {
+        number.map_or(Self::Missing, Self::Number)
+    }
+}
+
+impl From<Option<[f64; 2]>> for Cell {
+    fn from(number: Option<[f64; 2]>) -> Self {
+        number.map_or(Self::Missing, Self::Complex)
+    }
+}
+
+impl Cell {
+    fn is_missing(&self) -> bool {
+        matches!(self, Self::Missing)
+    }
+
+    fn is_number(&self) -> bool {
+        matches!(self, Self::Number(_) | Self::Complex(_))
+    }
+
+    fn render(&self, numeric: bool) -> Markup {
+        match self {
+            Self::Text(text) => html! { td { (text) } },
+            Self::Number(value) => {
+                html! { td.number title=(exact(*value)) { (rounded(*value)) } }
+            }
+            Self::Complex(value) => {
+                html! { td.number title=(complex(*value, exact)) { (complex(*value, rounded)) } }
+            }
+            Self::Holds(true) => html! { td.holds { "✓ yes" } },
+            Self::Holds(false) => html! { td.fails { "✗ no" } },
+            Self::Missing => html! { td .number[numeric] { "–" } },
+        }
+    }
+}
+
+/// Returns a table whose first column names its rows. Empty columns are left out; a table without
+/// rows is empty.
+pub(super) fn table(caption: &str, heads: &[&str], rows: &[Vec<Cell>]) -> Markup {
+    let filled = |column: usize| rows.iter().any(|row| !row[column].is_missing());
+    let numeric = |column: usize| rows.iter().any(|row| row[column].is_number());
+    let columns: Vec<usize> =
+        (0..heads.len()).filter(|column| *column == 0 || filled(*column)).collect();
+    html! {
+        @if !rows.is_empty() {
+            (scrolled(caption, &html! {
+                table {
+                    caption { (caption) }
+                    thead {
+                        tr {
+                            @for column in &columns {
+                                th scope="col" .number[numeric(*column)] { (heads[*column]) }
+                            }
+                        }
+                    }
+                    tbody {
+                        @for row in rows {
+                            tr {
+                                @for column in &columns {
+                                    @if *column == 0 {
+                                        (row_name(&row[0]))
+                                    } @else {
+                                        (row[*column].render(numeric(*column)))
+                                    }
+                                }
+                            }
+                        }
+                    }
+                }
+            }))
+        }
+    }
+}
+
+fn row_name(cell: &Cell) -> Markup {
+    html! {
+        th scope="row" {
+            @match cell {
+                Cell::Text(text) => (text),
+                Cell::Number(value) => (rounded(*value)),
+                _ => "–",
+            }
+        }
+    }
+}
+
+/// Returns a scrollable container for wide content, also scrollable by keys.
+pub(super) fn scrolled(name: &str, content: &Markup) -> Markup {
+    html! { div.scroll role="region" tabindex="0" aria-label=(name) { (content) } }
+}

@@ -1,0 +1,303 @@
+//! The page of a real design, of a hostile one and of a bare one, read by a strict XML parser.
+
+mod content;
+mod hostile;
+mod pendulum;
+mod plots;
+
+use resvg::usvg::roxmltree::{Document, Node};
+
+use design_report::Report;
+use design_report::robustness::Level;
+use hostile::{bare, hostile};
+use pendulum::pendulum;
+
+fn page(report: &Report) -> String {
+    super::page(report, hostile::QUOTES)
+}
+
+/// Converts the page to XML: only the `meta` elements of its head lack an end tag.
+fn xml(html: &str) -> String {
+    let body = html.strip_prefix("<!DOCTYPE html>").expect("begins with the document type");
+    let mut parts = body.split("<meta");
+    let mut text = parts.next().unwrap().to_owned();
+    for part in parts {
+        let (tag, rest) = part.split_once('>').unwrap();
+        text.extend(["<meta", tag, "/>", rest]);
+    }
+    text.replace(" hidden ", " hidden=\"\" ")
+}
+
+/// Looks at the page of each design.
+fn with_pages(look: impl Fn(&Report, &Document<'_>)) {
+    for report in [pendulum(), hostile(), bare()] {
+        let text = xml(&page(&report));
+        look(&report, &Document::parse(&text).expect("well-formed"));
+    }
+}
+
+fn elements<'a>(document: &'a Document<'_>, name: &'a str) -> impl Iterator<Item = Node<'a, 'a>> {
+    document.descendants().filter(move |node| node.has_tag_name(name))
+}
+
+/// All text in an element.
+fn text(node: Node<'_, '_>) -> String {
+    let texts = node.descendants().filter(Node::is_text);
+    texts.map(|node| node.text().unwrap()).collect()
+}
+
+#[test]
+fn the_same_design_gives_the_same_bytes() {
+    assert_eq!(page(&hostile()), page(&hostile()));
+}
+
+#[test]
+fn identifiers_are_unique_and_every_reference_has_a_target() {
+    with_pages(|_, document| {
+        let all = document.descendants().filter_map(|node| node.attribute("id"));
+        let mut identifiers: Vec<_> = all.collect();
+        let count = identifiers.len();
+        identifiers.sort_unstable();
+        identifiers.dedup();
+        assert_eq!(identifiers.len(), count);
+        let mut references = 0;
+        for attribute in document.descendants().flat_map(|node| node.attributes()) {
+            let targets = match attribute.name() {
+                "href" => attribute.value().strip_prefix('#').unwrap(),
+                "clip-path" => {
+                    attribute.value().strip_prefix("url(#").unwrap().trim_end_matches(')')
+                }
+                "aria-labelledby" | "data-copy" => attribute.value(),
+                _ => continue,
+            };
+            for target in targets.split(' ') {
+                assert!(identifiers.contains(&target), "nothing is called {target}");
+                references += 1;
+            }
+        }
+        assert!(references > 10);
+    });
+}
+
+#[test]
+fn paragraphs_and_captions_hold_only_text() {
+    const INLINE: [&str; 12] =
+        ["p", "code", "data", "strong", "sub", "sup", "span", "button", "a", "svg", "path", "line"];
+    with_pages(|_, document| {
+        for name in ["p", "h1", "h2", "h3", "caption", "figcaption", "th", "dt"] {
+            for node in elements(document, name) {
+                let mut inside = node.descendants().skip(1).filter(Node::is_element);
+                let block = inside.find(|node| !INLINE[1..].contains(&node.tag_name().name()));
+                assert!(block.is_none(), "{name}: {block:?}");
+            }
+        }
+    });
+}
+
+#[test]
+fn the_page_makes_no_requests() {
+    with_pages(|_, document| {
+        let plots = elements(document, "div").any(|node| node.attribute("class") == Some("plot"));
+        assert_eq!(elements(document, "script").count(), if plots { 6 } else { 2 });
+        assert_eq!(elements(document, "style").count(), 1);
+        for name in ["link", "img", "image", "iframe", "object", "embed", "use", "base", "form"] {
+            assert_eq!(elements(document, name).count(), 0, "{name}");
+        }
+        for attribute in document.descendants().flat_map(|node| node.attributes()) {
+            assert!(!["src", "srcset", "action"].contains(&attribute.name()));
+            assert!(!attribute.name().starts_with("on"), "{}", attribute.name());
+        }
+        let all = ["script", "style"].into_iter().flat_map(|name| elements(document, name));
+        let code: String = all
+            .filter(|node| node.attribute("type").is_none())
+            .map(text)
+            .collect::<Vec<_>>()
+            .join("\n")
+            .replace("/*! https://github.com/leeoniya/uPlot (v1.6.32) */", "");
+        for word in ["http:", "https:", "//", "@import", "url(", "import ", "fetch"] {
+            assert!(!code.contains(word), "{word}");
+        }
+        let policy = elements(document, "meta")
+            .find(|node| node.attribute("http-equiv") == Some("Content-Security-Policy"));
+        assert!(policy.unwrap().attribute("content").unwrap().starts_with("default-src 'none';"));
+    });
+}
+
+#[test]
+fn no_section_or_cell_is_empty() {
+    with_pages(|_, document| {
+        for name in ["section", "h2", "h3", "p", "ul", "li", "dl", "dd", "table", "caption", "pre"]
+        {
+            for node in elements(document, name) {
+                let status = node.attribute("role") == Some("status");
+                assert!(status || !text(node).trim().is_empty(), "an empty {name}");
+            }
+        }
+        for body in elements(document, "tbody") {
+            assert!(body.children().count() > 0);
+        }
+        for section in elements(document, "section") {
+            let folded = section.first_element_child().unwrap();
+            assert!(folded.children().filter(Node::is_element).count() > 1, "{}", text(section));
+        }
+    });
+}
+
+#[test]
+fn only_sections_with_content_appear_in_reading_order() {
+    let titles = |report: &Report| -> Vec<String> {
+        let text = xml(&page(report));
+        let document = Document::parse(&text).unwrap();
+        elements(&document, "h2").map(self::text).collect()
+    };
+    assert_eq!(
+        titles(&hostile()),
+        [
+            "1. Plant",
+            "2. Checks",
+            "3. Gains",
+            "4. Eigenvalues",
+            "5. Condition and pole errors",
+            "6. Estimation of the faults",
+            "7. Robustness",
+            "8. Detection of faults",
+            "9. Singular values",
+            "10. References",
+            "11. Sudden faults",
+            "12. Bounds of the errors",
+            "13. Certificate",
+            "14. Assumptions",
+            "15. Loss of effectiveness",
+            "16. Without an actuator",
+            "17. Fall-back",
+            "18. Interface of the FMU",
+        ]
+    );
+    assert_eq!(
+        titles(&bare()),
+        ["1. Plant", "2. Eigenvalues", "3. Condition and pole errors", "4. Certificate"]
+    );
+}
+
+#[test]
+fn tables_have_captions_and_scoped_heads_and_figures_have_titles_and_descriptions() {
+    with_pages(|_, document| {
+        for table in elements(document, "table") {
+            let caption = table.children().find(Node::is_element).unwrap();
+            assert!(caption.has_tag_name("caption"));
+            let heads = table.descendants().filter(|node| node.has_tag_name("th"));
+            assert!(heads.map(|node| node.attribute("scope")).all(|scope| scope.is_some()));
+            let widths: Vec<usize> = table
+                .descendants()
+                .filter(|node| node.has_tag_name("tr"))
+                .map(|row| row.children().filter(Node::is_element).count())
+                .collect();
+            assert!(widths.iter().all(|width| *width == widths[0]), "{widths:?}");
+        }
+        for svg in elements(document, "svg") {
+            if svg.attribute("aria-hidden") != Some("true") {
+                assert_eq!(svg.attribute("role"), Some("img"));
+                for name in ["title", "desc"] {
+                    let said = svg.children().find(|node| node.has_tag_name(name)).unwrap();
+                    assert!(text(said).len() > 5, "{name}: {}", text(said));
+                }
+            }
+        }
+        assert_eq!(elements(document, "h1").count(), 1);
+    });
+}
+
+#[test]
+fn the_verdict_names_the_failed_checks() {
+    let verdict = |report: &Report| {
+        let page = xml(&page(report));
+        let document = Document::parse(&page).unwrap();
+        let mut all = elements(&document, "div");
+        text(all.find(|node| node.attribute("class").unwrap().starts_with("verdict")).unwrap())
+    };
+    assert!(
+        verdict(&pendulum())
+            .starts_with("✓ Verdict: green; all 4 checks hold; both loops are stable.")
+    );
+    let mut amber = pendulum();
+    amber.verdict.level = Level::Amber;
+    amber.verdict.reasons = vec!["the peak of S".to_owned()];
+    let said = verdict(&amber);
+    assert!(
+        said.starts_with("! Verdict: amberthe peak of SAll 4 checks hold; both loops are stable."),
+        "{said}"
+    );
+    let failed = verdict(&hostile());
+    assert!(failed.starts_with("✗") && failed.contains("detectable"), "{failed}");
+    assert!(!failed.contains("observable"), "{failed}");
+    let mut unstable = bare();
+    unstable.observer.eigenvalues[0] = [0.0, 1.0];
+    assert!(verdict(&unstable).contains("The observer is unstable"));
+    assert!(!verdict(&unstable).contains("feedback loop is unstable"));
+    let mut sampled = hostile();
+    sampled.feedback.eigenvalues[0] = [-0.9, 0.5];
+    assert!(verdict(&sampled).contains("The feedback loop is unstable"));
+}
+
+/// The places at which a map shows the signs of a kind, and its frame.
+fn signs(map: Node<'_, '_>, class: &str) -> Vec<(f64, f64)> {
+    map.descendants()
+        .filter(|node| node.attribute("class") == Some(class))
+        .map(|node| {
+            let path = node.attribute("d").unwrap()[1..].split('m').next().unwrap();
+            let (x, y) = path.split_once(' ').unwrap();
+            (x.parse().unwrap(), y.parse().unwrap())
+        })
+        .collect()
+}
+
+fn map<'a>(document: &'a Document<'_>, id: &str) -> Node<'a, 'a> {
+    let title = format!("{id}-title");
+    let title = elements(document, "title").find(|node| node.attribute("id") == Some(&title));
+    title.unwrap_or_else(|| panic!("no map {id}")).parent().unwrap()
+}
+
+#[test]
+fn maps_show_every_eigenvalue_inside_the_frame_required_around_actual() {
+    with_pages(|report, document| {
+        for (id, system) in [("map-feedback", &report.feedback), ("map-observer", &report.observer)]
+        {
+            let planes = if report.sampling.is_some() { &["", "-z"][..] } else { &[""] };
+            for plane in planes {
+                let map = map(document, &format!("{id}{plane}"));
+                let reached = signs(map, "sign ink-2");
+                assert_eq!(reached.len(), system.eigenvalues.len(), "{id}{plane}");
+                for (x, y) in &reached {
+                    assert!((66.0..=426.0).contains(x) && (10.0..=322.0).contains(y), "{x} {y}");
+                }
+                for (x, y) in signs(map, "sign ink-1") {
+                    let near = |place: &(f64, f64)| (place.0 - x).hypot(place.1 - y) < 1.0;
+                    assert!(reached.iter().any(near), "{id}: nothing near the required {x} {y}");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn the_stability_boundary_is_between_stable_and_unstable_eigenvalues() {
+    let text = xml(&page(&pendulum()));
+    let document = Document::parse(&text).unwrap();
+    let map = map(&document, "map-all");
+    let edge = map.descendants().find(|node| node.attribute("class") == Some("boundary")).unwrap();
+    let edge: f64 = edge.attribute("x1").unwrap().parse().unwrap();
+    let right = |class: &str| signs(map, class).iter().filter(|sign| sign.0 > edge + 1.0).count();
+    assert_eq!([right("sign ink-3"), right("sign ink-2"), right("sign ink-4")], [1, 0, 0]);
+    let text = xml(&page(&hostile()));
+    let document = Document::parse(&text).unwrap();
+    let map = self::map(&document, "map-observer-z");
+    let circle = map.descendants().find(|node| node.has_tag_name("circle")).unwrap();
+    let [x, y, radius] =
+        ["cx", "cy", "r"].map(|name| circle.attribute(name).unwrap().parse::<f64>().unwrap());
+    let distances = signs(map, "sign ink-2");
+    let distances = distances.iter().map(|sign| (sign.0 - x).hypot(sign.1 - y) / radius);
+    let expected = hostile().observer.eigenvalues;
+    for (distance, pole) in distances.zip(expected) {
+        assert!((distance - pole[0].hypot(pole[1])).abs() < 2e-3);
+    }
+}

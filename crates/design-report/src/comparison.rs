@@ -1,0 +1,48 @@
+//! The data of a comparison of the laws that estimate faults.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use crate::Estimation;
+use crate::robustness::Verdict;
+
+/// The laws on one plant, all for the same requirement.
+#[derive(Serialize)]
+pub struct Comparison {
+    /// Name of the plant file.
+    pub plant_file: String,
+    /// The laws, those that do not exist with the reason.
+    pub laws: Vec<LawResult>,
+    /// The text that every file about this plant contains.
+    #[serde(skip)]
+    pub identity: String,
+    /// The FMU of the plant, if the plant file names one.
+    #[serde(skip)]
+    pub model: Option<PathBuf>,
+}
+
+/// A law on the plant.
+#[derive(Serialize)]
+pub struct LawResult {
+    /// Its name in the plant file.
+    pub law: String,
+    /// Its authors.
+    pub sources: String,
+    /// Why it does not exist, in a sentence.
+    pub reason: Option<String>,
+    /// What it does on this plant; none if it does not exist.
+    pub result: Option<LawFigures>,
+}
+
+/// What a law does on the plant.
+#[derive(Serialize)]
+pub struct LawFigures {
+    /// Equations, parameters, conditions, errors of the estimates.
+    pub estimation: Estimation,
+    /// Disk margin alpha, all channels together, at the commands and at the measurements; none if the
+    /// loop is not stable.
+    pub disk_margin: Option<[f64; 2]>,
+    /// The verdict on the design with this law.
+    pub verdict: Verdict,
+}
