@@ -3,7 +3,10 @@
 
 mod checks;
 pub mod detection;
+mod error;
+mod reconfiguration;
 pub mod schedule;
+mod signals;
 mod written;
 
 use serde::{Deserialize, Serialize};
@@ -11,7 +14,10 @@ use serde::{Deserialize, Serialize};
 use crate::matrix::Matrix;
 pub use checks::Refusal;
 use detection::DetectionDesign;
+pub use error::DesignError;
+pub use reconfiguration::{Combination, Fallback, GainSet, Reconfiguration};
 use schedule::Schedule;
+pub use signals::{Actuator, Fault, HOLD_ROUNDING, Label, Measurement, Signal};
 
 /// The content of a design file. Shapes: n states, m actuators, p measurements, q states of the
 /// fault model, t references.
@@ -115,116 +121,6 @@ pub struct Design {
     pub detection: Option<DetectionDesign>,
 }
 
-/// What the controller does without an actuator; see `fmu-controller/src/reconfiguration.rs`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Reconfiguration {
-    /// The actuator that is gone.
-    pub gone: String,
-    /// Its position; set when the file is read.
-    #[serde(default)]
-    pub actuator: usize,
-    /// The command at which it is stuck.
-    pub stuck_at: f64,
-    /// K_x, m x n. It is missing, with K_f and K_s, if only the fall-back serves this case.
-    #[serde(rename = "K_x", default)]
-    pub k_x: Option<Matrix>,
-    /// K_f, m x q.
-    #[serde(rename = "K_f", default)]
-    pub k_f: Option<Matrix>,
-    /// K_s, m numbers.
-    #[serde(rename = "K_s", default)]
-    pub k_s: Option<Vec<f64>>,
-    /// The states of the fault model that restart at 0 when the actuator is gone or back.
-    #[serde(default)]
-    pub restart: Vec<String>,
-    /// Their positions; set when the file is read.
-    #[serde(default)]
-    pub restarted: Vec<usize>,
-    /// The actuator counts as gone if its estimated loss of effectiveness is above `loss` for `time` s.
-    #[serde(default)]
-    pub loss: Option<f64>,
-    /// See `loss`; in s.
-    #[serde(default)]
-    pub time: Option<f64>,
-}
-
-/// What the controller does without several actuators; each of them has a [`Reconfiguration`], too.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Combination {
-    /// The actuators that are gone, in the order of the actuators.
-    pub gone: Vec<String>,
-    /// Bit j: actuator j is one of them; set when the file is read.
-    #[serde(default)]
-    pub mask: u64,
-    /// K_x, m x n.
-    #[serde(rename = "K_x")]
-    pub k_x: Matrix,
-    /// K_f, m x q.
-    #[serde(rename = "K_f")]
-    pub k_f: Matrix,
-    /// K_s, m numbers for each actuator that is gone.
-    #[serde(rename = "K_s")]
-    pub k_s: Matrix,
-}
-
-/// The fall-back; see `fmu-controller/src/reconfiguration.rs`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Fallback {
-    /// K_x, m x n.
-    #[serde(rename = "K_x")]
-    pub k_x: Matrix,
-    /// K_f, m x q; without it the estimated faults are not compensated.
-    #[serde(rename = "K_f", default)]
-    pub k_f: Option<Matrix>,
-}
-
-/// The gains in force in place of those of the intact plant.
-#[derive(Clone, Copy)]
-pub enum GainSet<'a> {
-    /// Those without one actuator.
-    Single(&'a Reconfiguration),
-    /// Those without several actuators.
-    Several(&'a Combination),
-    /// Those of the fall-back.
-    Fallback(&'a Fallback),
-}
-
-impl<'a> GainSet<'a> {
-    /// Row `j` of K_x.
-    #[must_use]
-    pub fn k_x(self, j: usize) -> &'a [f64] {
-        match self {
-            Self::Single(case) => case.k_x.as_ref().map_or(&[], |k_x| k_x.row(j)),
-            Self::Several(combination) => combination.k_x.row(j),
-            Self::Fallback(fallback) => fallback.k_x.row(j),
-        }
-    }
-
-    /// Row `j` of K_f, empty without compensation.
-    #[must_use]
-    pub fn k_f(self, j: usize) -> &'a [f64] {
-        let k_f = match self {
-            Self::Single(case) => case.k_f.as_ref(),
-            Self::Several(combination) => Some(&combination.k_f),
-            Self::Fallback(fallback) => fallback.k_f.as_ref(),
-        };
-        k_f.map_or(&[], |k_f| k_f.row(j))
-    }
-
-    /// Row `j` of K_s: a number for each stuck actuator, in their order; empty in the fall-back.
-    #[must_use]
-    pub fn k_s(self, j: usize) -> &'a [f64] {
-        match self {
-            Self::Single(case) => case.k_s.as_ref().map_or(&[], |k_s| &k_s[j..=j]),
-            Self::Several(combination) => combination.k_s.row(j),
-            Self::Fallback(_) => &[],
-        }
-    }
-}
-
 /// The measurements that the command of a sampled controller is computed from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -245,86 +141,6 @@ pub struct SlidingMode {
     pub delta: Vec<f64>,
 }
 
-/// A state or a reference.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Signal {
-    /// Its name, that of its variables.
-    pub name: String,
-    /// Its unit, as FMI writes it.
-    #[serde(default)]
-    pub unit: Option<String>,
-    /// What it is, for a reader.
-    #[serde(default)]
-    pub description: String,
-    /// Value at the operating point.
-    #[serde(default)]
-    pub operating: Option<f64>,
-}
-
-/// A measurement, and when its value is not used; see [`crate::sample::measurements`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Measurement {
-    /// Its name, that of its variables.
-    pub name: String,
-    /// Its unit, as FMI writes it.
-    #[serde(default)]
-    pub unit: Option<String>,
-    /// What it is, for a reader.
-    #[serde(default)]
-    pub description: String,
-    /// Value at the operating point.
-    #[serde(default)]
-    pub operating: Option<f64>,
-    /// The smallest and the largest value that is used; the last one of them replaces any other value.
-    #[serde(default)]
-    pub range: Option<[f64; 2]>,
-    /// The longest time in s for which it does; then the controller rests at its operating point.
-    #[serde(default)]
-    pub longest_hold: Option<f64>,
-}
-
-/// An actuator, with its limits if it has any.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Actuator {
-    /// Its name, that of its variables.
-    pub name: String,
-    /// Its unit, as FMI writes it.
-    #[serde(default)]
-    pub unit: Option<String>,
-    /// What it is, for a reader.
-    #[serde(default)]
-    pub description: String,
-    /// Command at the operating point.
-    #[serde(default)]
-    pub operating: Option<f64>,
-    /// The smallest and the largest command.
-    #[serde(default)]
-    pub limits: Option<[f64; 2]>,
-}
-
-/// A state of the fault model: a fault, or the rate of one.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Fault {
-    /// Its name, that of its variables.
-    pub name: String,
-    /// Its unit, as FMI writes it.
-    #[serde(default)]
-    pub unit: Option<String>,
-    /// What it is, for a reader.
-    #[serde(default)]
-    pub description: String,
-    /// The actuator whose loss of effectiveness this fault is.
-    #[serde(default)]
-    pub loss_of: Option<String>,
-    /// The smallest command from which the loss can be estimated.
-    #[serde(default)]
-    pub least_command: Option<f64>,
-}
-
 /// `DefaultExperiment`, times in s.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -334,107 +150,6 @@ pub struct Defaults {
     /// `None` means the sample time of a sampled controller.
     #[serde(default)]
     pub step_size: Option<f64>,
-}
-
-/// Why a design file cannot be used; `path` is that of the file.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DesignError {
-    /// It is not TOML, or has an entry that does not exist or lacks one.
-    #[error("{path}: {message}")]
-    Malformed {
-        /// The file.
-        path: String,
-        /// The reason, with the line.
-        message: String,
-    },
-    /// A matrix has a wrong number of rows or columns.
-    #[error("{path}: {what} is {found}, expected {expected} ({meaning})")]
-    Shape {
-        /// The file.
-        path: String,
-        /// The matrix.
-        what: &'static str,
-        /// Its shape.
-        found: String,
-        /// The shape that it must have.
-        expected: String,
-        /// What rows and columns stand for.
-        meaning: String,
-    },
-    /// A number is out of its range.
-    #[error("{path}: {what} = {value}, expected {rule}")]
-    Value {
-        /// The file.
-        path: String,
-        /// The entry.
-        what: String,
-        /// The number.
-        value: f64,
-        /// The range.
-        rule: &'static str,
-    },
-    /// Entries do not fit together.
-    #[error("{path}: {what}")]
-    Entry {
-        /// The file.
-        path: String,
-        /// The contradiction.
-        what: String,
-    },
-}
-
-/// Unit and meaning of a signal.
-#[derive(Clone, Copy)]
-pub struct Label<'a> {
-    /// Its unit.
-    pub unit: Option<&'a String>,
-    /// Its description, or its name if it has none.
-    pub meaning: &'a str,
-}
-
-macro_rules! labelled {
-    ($($signal:ty),*) => {
-        $(impl $signal {
-            /// Unit and meaning.
-            pub fn label(&self) -> Label<'_> {
-                let text = if self.description.is_empty() { &self.name } else { &self.description };
-                Label { unit: self.unit.as_ref(), meaning: text }
-            }
-        })*
-    };
-}
-
-labelled!(Signal, Measurement, Actuator, Fault);
-
-impl Measurement {
-    /// The smallest and the largest value that is used: the largest numbers without a range.
-    #[must_use]
-    pub fn bounds(&self) -> [f64; 2] {
-        self.range.unwrap_or([-f64::MAX, f64::MAX])
-    }
-
-    /// The most samples for which the last value may be used: those within the longest time, up to rounding. None
-    /// without such a time, and where they are `u32::MAX` or more.
-    #[must_use]
-    pub fn most_held(&self, sample_time: f64) -> Option<u32> {
-        let samples = (self.longest_hold? * (1.0 + HOLD_ROUNDING) / sample_time).floor();
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
-        (samples < f64::from(u32::MAX)).then_some(samples as u32)
-    }
-}
-
-/// The part of the longest time of a hold below which a difference is rounding: an importer adds up its steps.
-pub const HOLD_ROUNDING: f64 = 1e-9;
-
-impl Actuator {
-    /// The limits as deviations from the operating point.
-    #[must_use]
-    pub fn range(&self) -> Option<[f64; 2]> {
-        let [low, high] = self.limits?;
-        let operating = self.operating.unwrap_or(0.0);
-        Some([low - operating, high - operating])
-    }
 }
 
 impl Design {
@@ -638,27 +353,5 @@ impl Design {
         ];
         let stated = stated.into_iter().filter_map(|(name, matrix)| Some((name, matrix.as_ref()?)));
         always.into_iter().chain(stated)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Measurement;
-
-    #[test]
-    fn the_most_samples_of_a_hold_are_those_within_its_time() {
-        let of = |longest_hold, sample_time| {
-            let (name, unit, description) = (String::new(), None, String::new());
-            let (operating, range) = (None, None);
-            let own = Measurement { name, unit, description, operating, range, longest_hold };
-            own.most_held(sample_time)
-        };
-        // 0.3 / 0.1 is below 3.
-        for (longest, period, expected) in
-            [(0.3, 0.1, 3), (0.29, 0.1, 2), (0.05, 0.1, 0), (1.0, 1e-3, 1000)]
-        {
-            assert_eq!(of(Some(longest), period), Some(expected), "{longest} {period}");
-        }
-        assert_eq!([of(None, 0.1), of(Some(1e9), 0.1), of(Some(f64::INFINITY), 0.1)], [None; 3]);
     }
 }

@@ -1,0 +1,115 @@
+//! The gains without actuators that are gone, and the fall-back.
+
+use serde::{Deserialize, Serialize};
+
+use crate::matrix::Matrix;
+
+/// What the controller does without an actuator; see `fmu-controller/src/reconfiguration.rs`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reconfiguration {
+    /// The actuator that is gone.
+    pub gone: String,
+    /// Its position; set when the file is read.
+    #[serde(default)]
+    pub actuator: usize,
+    /// The command at which it is stuck.
+    pub stuck_at: f64,
+    /// K_x, m x n. It is missing, with K_f and K_s, if only the fall-back serves this case.
+    #[serde(rename = "K_x", default)]
+    pub k_x: Option<Matrix>,
+    /// K_f, m x q.
+    #[serde(rename = "K_f", default)]
+    pub k_f: Option<Matrix>,
+    /// K_s, m numbers.
+    #[serde(rename = "K_s", default)]
+    pub k_s: Option<Vec<f64>>,
+    /// The states of the fault model that restart at 0 when the actuator is gone or back.
+    #[serde(default)]
+    pub restart: Vec<String>,
+    /// Their positions; set when the file is read.
+    #[serde(default)]
+    pub restarted: Vec<usize>,
+    /// The actuator counts as gone if its estimated loss of effectiveness is above `loss` for `time` s.
+    #[serde(default)]
+    pub loss: Option<f64>,
+    /// See `loss`; in s.
+    #[serde(default)]
+    pub time: Option<f64>,
+}
+
+/// What the controller does without several actuators; each of them has a [`Reconfiguration`], too.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Combination {
+    /// The actuators that are gone, in the order of the actuators.
+    pub gone: Vec<String>,
+    /// Bit j: actuator j is one of them; set when the file is read.
+    #[serde(default)]
+    pub mask: u64,
+    /// K_x, m x n.
+    #[serde(rename = "K_x")]
+    pub k_x: Matrix,
+    /// K_f, m x q.
+    #[serde(rename = "K_f")]
+    pub k_f: Matrix,
+    /// K_s, m numbers for each actuator that is gone.
+    #[serde(rename = "K_s")]
+    pub k_s: Matrix,
+}
+
+/// The fall-back; see `fmu-controller/src/reconfiguration.rs`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fallback {
+    /// K_x, m x n.
+    #[serde(rename = "K_x")]
+    pub k_x: Matrix,
+    /// K_f, m x q; without it the estimated faults are not compensated.
+    #[serde(rename = "K_f", default)]
+    pub k_f: Option<Matrix>,
+}
+
+/// The gains in force in place of those of the intact plant.
+#[derive(Clone, Copy)]
+pub enum GainSet<'a> {
+    /// Those without one actuator.
+    Single(&'a Reconfiguration),
+    /// Those without several actuators.
+    Several(&'a Combination),
+    /// Those of the fall-back.
+    Fallback(&'a Fallback),
+}
+
+impl<'a> GainSet<'a> {
+    /// Row `j` of K_x.
+    #[must_use]
+    pub fn k_x(self, j: usize) -> &'a [f64] {
+        match self {
+            Self::Single(case) => case.k_x.as_ref().map_or(&[], |k_x| k_x.row(j)),
+            Self::Several(combination) => combination.k_x.row(j),
+            Self::Fallback(fallback) => fallback.k_x.row(j),
+        }
+    }
+
+    /// Row `j` of K_f, empty without compensation.
+    #[must_use]
+    pub fn k_f(self, j: usize) -> &'a [f64] {
+        let k_f = match self {
+            Self::Single(case) => case.k_f.as_ref(),
+            Self::Several(combination) => Some(&combination.k_f),
+            Self::Fallback(fallback) => fallback.k_f.as_ref(),
+        };
+        k_f.map_or(&[], |k_f| k_f.row(j))
+    }
+
+    /// Row `j` of K_s: a number for each stuck actuator, in their order; empty in the fall-back.
+    #[must_use]
+    pub fn k_s(self, j: usize) -> &'a [f64] {
+        match self {
+            Self::Single(case) => case.k_s.as_ref().map_or(&[], |k_s| &k_s[j..=j]),
+            Self::Several(combination) => combination.k_s.row(j),
+            Self::Fallback(_) => &[],
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! The signals of a design file: names, units, limits and ranges.
+
+use serde::{Deserialize, Serialize};
+
+/// A state or a reference.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Signal {
+    /// Its name, that of its variables.
+    pub name: String,
+    /// Its unit, as FMI writes it.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// What it is, for a reader.
+    #[serde(default)]
+    pub description: String,
+    /// Value at the operating point.
+    #[serde(default)]
+    pub operating: Option<f64>,
+}
+
+/// A measurement, and when its value is not used; see [`crate::sample::measurements`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measurement {
+    /// Its name, that of its variables.
+    pub name: String,
+    /// Its unit, as FMI writes it.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// What it is, for a reader.
+    #[serde(default)]
+    pub description: String,
+    /// Value at the operating point.
+    #[serde(default)]
+    pub operating: Option<f64>,
+    /// The smallest and the largest value that is used; the last one of them replaces any other value.
+    #[serde(default)]
+    pub range: Option<[f64; 2]>,
+    /// The longest time in s for which it does; then the controller rests at its operating point.
+    #[serde(default)]
+    pub longest_hold: Option<f64>,
+}
+
+/// An actuator, with its limits if it has any.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Actuator {
+    /// Its name, that of its variables.
+    pub name: String,
+    /// Its unit, as FMI writes it.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// What it is, for a reader.
+    #[serde(default)]
+    pub description: String,
+    /// Command at the operating point.
+    #[serde(default)]
+    pub operating: Option<f64>,
+    /// The smallest and the largest command.
+    #[serde(default)]
+    pub limits: Option<[f64; 2]>,
+}
+
+/// A state of the fault model: a fault, or the rate of one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fault {
+    /// Its name, that of its variables.
+    pub name: String,
+    /// Its unit, as FMI writes it.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// What it is, for a reader.
+    #[serde(default)]
+    pub description: String,
+    /// The actuator whose loss of effectiveness this fault is.
+    #[serde(default)]
+    pub loss_of: Option<String>,
+    /// The smallest command from which the loss can be estimated.
+    #[serde(default)]
+    pub least_command: Option<f64>,
+}
+
+/// Unit and meaning of a signal.
+#[derive(Clone, Copy)]
+pub struct Label<'a> {
+    /// Its unit.
+    pub unit: Option<&'a String>,
+    /// Its description, or its name if it has none.
+    pub meaning: &'a str,
+}
+
+macro_rules! labelled {
+    ($($signal:ty),*) => {
+        $(impl $signal {
+            /// Unit and meaning.
+            pub fn label(&self) -> Label<'_> {
+                let text = if self.description.is_empty() { &self.name } else { &self.description };
+                Label { unit: self.unit.as_ref(), meaning: text }
+            }
+        })*
+    };
+}
+
+labelled!(Signal, Measurement, Actuator, Fault);
+
+impl Measurement {
+    /// The smallest and the largest value that is used: the largest numbers without a range.
+    #[must_use]
+    pub fn bounds(&self) -> [f64; 2] {
+        self.range.unwrap_or([-f64::MAX, f64::MAX])
+    }
+
+    /// The most samples for which the last value may be used: those within the longest time, up to rounding. None
+    /// without such a time, and where they are `u32::MAX` or more.
+    #[must_use]
+    pub fn most_held(&self, sample_time: f64) -> Option<u32> {
+        let samples = (self.longest_hold? * (1.0 + HOLD_ROUNDING) / sample_time).floor();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
+        (samples < f64::from(u32::MAX)).then_some(samples as u32)
+    }
+}
+
+/// The part of the longest time of a hold below which a difference is rounding: an importer adds up its steps.
+pub const HOLD_ROUNDING: f64 = 1e-9;
+
+impl Actuator {
+    /// The limits as deviations from the operating point.
+    #[must_use]
+    pub fn range(&self) -> Option<[f64; 2]> {
+        let [low, high] = self.limits?;
+        let operating = self.operating.unwrap_or(0.0);
+        Some([low - operating, high - operating])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Measurement;
+
+    #[test]
+    fn the_most_samples_of_a_hold_are_those_within_its_time() {
+        let of = |longest_hold, sample_time| {
+            let (name, unit, description) = (String::new(), None, String::new());
+            let (operating, range) = (None, None);
+            let measurement =
+                Measurement { name, unit, description, operating, range, longest_hold };
+            measurement.most_held(sample_time)
+        };
+        // 0.3 / 0.1 is below 3.
+        for (longest, period, expected) in
+            [(0.3, 0.1, 3), (0.29, 0.1, 2), (0.05, 0.1, 0), (1.0, 1e-3, 1000)]
+        {
+            assert_eq!(of(Some(longest), period), Some(expected), "{longest} {period}");
+        }
+        assert_eq!([of(None, 0.1), of(Some(1e9), 0.1), of(Some(f64::INFINITY), 0.1)], [None; 3]);
+    }
+}
