@@ -39,7 +39,7 @@ pub(crate) fn remedies(
     let mut reasons: Vec<_> = of_peaks
         .filter_map(|(at, point)| {
             let (_, text) = peak_reason(point, limits)?;
-            Some(Reason { text, aim: Aim::Peak { at, present: point.judged } })
+            Some(Reason { text, aim: Aim::Peak(at) })
         })
         .collect();
     // Other parameters of an FMU are not tried.
@@ -57,14 +57,19 @@ pub(crate) fn remedies(
     if reasons.is_empty() || !single || order > LARGEST_ORDER || budget.is_over() {
         return Vec::new();
     }
-    let varies = reasons.iter().any(|reason| matches!(reason.aim, Aim::Stable));
+    let present = Present {
+        peaks: robustness.points.iter().map(|point| point.judged).collect(),
+        is_unstable: robustness.tolerance.is_unstable(),
+    };
+    // A change for a peak must not cost the stability within the tolerances.
+    let varies = limits.parameters.is_empty();
     let mut trials: Vec<_> = variants(file)
         .into_par_iter()
         .filter(|_| !budget.is_over())
         .filter_map(|variant| variant.trial(file, varies))
         .collect();
     trials.sort_by(|one, other| one.distance.total_cmp(&other.distance));
-    let remedy = |reason: Reason| reason.remedy(&trials, limits);
+    let remedy = |reason: Reason| reason.remedy(&trials, &present, limits);
     reasons.into_iter().map(remedy).collect()
 }
 
@@ -75,10 +80,16 @@ struct Reason {
 }
 
 enum Aim {
-    /// The peak at a point of the loop below its limit.
-    Peak { at: usize, present: f64 },
+    /// The peak at a point of the loop, by its position, below its limit.
+    Peak(usize),
     /// Stability within the tolerances.
     Stable,
+}
+
+/// The loop of the plant file.
+struct Present {
+    peaks: Vec<f64>,
+    is_unstable: bool,
 }
 
 /// Other requirements in the plant file.
@@ -200,6 +211,14 @@ impl Variant {
 }
 
 impl Trial {
+    /// Whether no peak rises above its limit, or above its present value if that is larger, and the loop does not become
+    /// unstable within the tolerances.
+    fn is_harmless(&self, present: &Present, limits: &RobustnessLimits) -> bool {
+        let mut peaks = self.judged.points.iter().zip(&present.peaks);
+        peaks.all(|(point, peak)| point.judged <= peak.max(limits.amber))
+            && (present.is_unstable || !self.judged.is_unstable)
+    }
+
     fn peaks(&self) -> String {
         let one = |point: &LoopPoint| format!("{} at the {}", rounded(point.judged), point.point);
         self.judged.points.iter().map(one).collect::<Vec<_>>().join(" and ")
@@ -207,21 +226,24 @@ impl Trial {
 }
 
 impl Reason {
-    /// The smallest change that removes all reasons, else this one; else the one with the lowest peak.
-    fn remedy(self, trials: &[Trial], limits: &RobustnessLimits) -> Remedy {
+    /// The smallest change that removes all reasons, else this one; else the one with the lowest peak. A change that
+    /// is for the worse elsewhere is none.
+    fn remedy(self, trials: &[Trial], present: &Present, limits: &RobustnessLimits) -> Remedy {
+        let harmless = || trials.iter().filter(|trial| trial.is_harmless(present, limits));
         let reached = |trial: &&Trial| match self.aim {
-            Aim::Peak { at, .. } => trial.judged.points[at].judged <= limits.amber,
+            Aim::Peak(at) => trial.judged.points[at].judged <= limits.amber,
             Aim::Stable => !trial.judged.is_unstable,
         };
         let green = trials.iter().find(|trial| trial.judged.is_green(limits));
         let least = match self.aim {
             Aim::Stable => None,
-            Aim::Peak { at, present } => trials
-                .iter()
-                .min_by(|x, y| x.judged.points[at].judged.total_cmp(&y.judged.points[at].judged))
-                .filter(|trial| trial.judged.points[at].judged < LOWER * present),
+            Aim::Peak(at) => {
+                let peak = |trial: &Trial| trial.judged.points[at].judged;
+                let least = harmless().min_by(|x, y| peak(x).total_cmp(&peak(y)));
+                least.filter(|trial| peak(trial) < LOWER * present.peaks[at])
+            }
         };
-        let chosen = green.or_else(|| trials.iter().find(reached));
+        let chosen = green.or_else(|| harmless().find(reached));
         let (trial, change) = match (chosen, least) {
             (Some(trial), _) => {
                 let peaks = trial.peaks();
@@ -244,8 +266,8 @@ impl Reason {
             }
             (None, None) => {
                 let change = format!(
-                    "none of {} other stable designs, from {SLOWEST} to {FASTEST} times as fast, is better: other \
-                     measurements, actuators or requirements are needed",
+                    "none of {} other stable designs, from {SLOWEST} to {FASTEST} times as fast, is better \
+                     without being worse elsewhere: other measurements, actuators or requirements are needed",
                     trials.len()
                 );
                 return Remedy { reason: self.text, change, lines: Vec::new() };
