@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from design_oracle import made
+
 # Published plants: the source, A, B, C, and the number of actuators whose faults the measurements can tell apart.
 PLANTS = {
     "double integrator": ([[0, 1], [0, 0]], [[0], [1]], [[1, 0]]),
@@ -128,10 +130,10 @@ def test_a_table_with_names_becomes_a_plant_file_that_is_designed(aso_ftc, tmp_p
     (tmp_path / "trolley.csv").write_text(TABLE, encoding="utf-8")
     done = aso_ftc("design", "--init", tmp_path / "trolley.csv", "--out", tmp_path / "trolley.toml")
     assert done.returncode == 0 and done.stderr == "", done.stderr
-    made = tomllib.loads((tmp_path / "trolley.toml").read_text(encoding="utf-8"))
-    assert (made["A"], made["B"], made["C"]) == ([[0, 1], [0, -0.5]], [[0], [0.5]], [[1, 0]])
-    assert made["states"] == [{"name": "position", "unit": "m"}, {"name": "speed", "unit": "m/s"}]
-    assert (made["actuators"], made["measurements"]) == ([{"name": "force", "unit": "N"}], [{"name": "y", "unit": "m"}])
+    file = tomllib.loads((tmp_path / "trolley.toml").read_text(encoding="utf-8"))
+    assert (file["A"], file["B"], file["C"]) == ([[0, 1], [0, -0.5]], [[0], [0.5]], [[1, 0]])
+    assert file["states"] == [{"name": "position", "unit": "m"}, {"name": "speed", "unit": "m/s"}]
+    assert (file["actuators"], file["measurements"]) == ([{"name": "force", "unit": "N"}], [{"name": "y", "unit": "m"}])
     designed = aso_ftc("design", tmp_path / "trolley.toml", "--out", tmp_path / "design.toml")
     assert designed.returncode == 0 and "verdict: green" in designed.stdout, designed.stderr
 
@@ -142,10 +144,10 @@ def test_matlab_variables_become_a_plant_file_with_the_same_matrices(aso_ftc, tm
     savemat(tmp_path / "plant.mat", {"A": a, "B": b, "C": c, "title": "text"}, do_compression=compressed)
     done = aso_ftc("design", "--init", tmp_path / "plant.mat", "--out", tmp_path / "plant.toml")
     assert done.returncode == 0 and done.stderr == "", done.stderr
-    made = tomllib.loads((tmp_path / "plant.toml").read_text(encoding="utf-8"))
+    file = tomllib.loads((tmp_path / "plant.toml").read_text(encoding="utf-8"))
     for name, matrix in (("A", a), ("B", b), ("C", c)):
-        np.testing.assert_array_equal(made[name], matrix)
-    assert made["actuator_faults"] == "all" and made["observer"]["bandwidth"] > made["feedback"]["bandwidth"] > 0
+        np.testing.assert_array_equal(file[name], matrix)
+    assert file["actuator_faults"] == "all" and file["observer"]["bandwidth"] > file["feedback"]["bandwidth"] > 0
 
 
 def test_measurements_that_cannot_tell_all_faults_apart_get_fewer(aso_ftc, tmp_path):
@@ -153,8 +155,8 @@ def test_measurements_that_cannot_tell_all_faults_apart_get_fewer(aso_ftc, tmp_p
     savemat(tmp_path / "plant.mat", {"A": a, "B": b, "C": c[:1]})
     done = aso_ftc("design", "--init", tmp_path / "plant.mat", "--out", tmp_path / "plant.toml")
     assert done.returncode == 0, done.stderr
-    made = tomllib.loads((tmp_path / "plant.toml").read_text(encoding="utf-8"))
-    assert made["faults"] == [{"name": "f_u1", "actuator": "u1"}]
+    file = tomllib.loads((tmp_path / "plant.toml").read_text(encoding="utf-8"))
+    assert file["actuator_faults"] == ["u1"]
 
 
 def test_a_plant_with_feedthrough_gets_a_filter(aso_ftc, tmp_path):
@@ -167,8 +169,8 @@ def test_a_plant_with_feedthrough_gets_a_filter(aso_ftc, tmp_path):
 def test_an_fmu_becomes_a_plant_file_with_its_inputs_and_outputs(aso_ftc, tmp_path, examples):
     done = aso_ftc("design", "--init", examples["ThreeTank"], "--out", tmp_path / "tank.toml")
     assert done.returncode == 0 and done.stderr == "", done.stderr
-    made = tomllib.loads((tmp_path / "tank.toml").read_text(encoding="utf-8"))
-    assert [signal["name"] for signal in made["actuators"]] == ["Q_1", "Q_2"]
+    file = tomllib.loads((tmp_path / "tank.toml").read_text(encoding="utf-8"))
+    assert [signal["name"] for signal in file["actuators"]] == ["Q_1", "Q_2"]
     designed = aso_ftc("design", tmp_path / "tank.toml", "--out", tmp_path / "design.toml")
     assert designed.returncode == 0 and "verdict: green" in designed.stdout, designed.stderr
 
@@ -238,3 +240,26 @@ def test_matlab_variables_that_are_no_plant_are_refused(aso_ftc, tmp_path, varia
     savemat(tmp_path / "plant.mat", variables)
     done = aso_ftc("design", "--init", tmp_path / "plant.mat", "--out", tmp_path / "plant.toml")
     assert done.returncode == 2 and message in done.stderr, done.stderr
+
+
+# J. Roskam's Boeing 747 at Mach 0.8: a combination of aileron and rudder hardly moves yaw rate and roll angle at rest.
+AIRLINER = """A = [[-0.0558, -0.9968, 0.0802, 0.0415], [0.598, -0.115, -0.0318, 0], [-3.05, 0.388, -0.465, 0], [0, 0.0805, 1, 0]]
+B = [[0.00729, 0], [-0.475, 0.00775], [0.153, 0.143], [0, 0]]
+C = [[0, 1, 0, 0], [0, 0, 0, 1]]
+actuators = ["rudder", "aileron"]
+actuator_faults = "all"
+"""
+
+
+def test_an_estimate_that_is_much_slower_than_the_feedback_is_a_warning_whose_remedy_works(aso_ftc, tmp_path):
+    _, report = made(aso_ftc, tmp_path, AIRLINER)
+    slowest = -max(pole[0] for pole in report["observer"]["eigenvalues"])
+    (warning,) = report["warnings"]
+    time = float(warning.split("settle in ")[1].split(" s")[0])
+    assert time == pytest.approx(4 / slowest, rel=1e-3) and "f_rudder, f_aileron" in warning
+    # The weak direction of the gain at rest, which the estimate of it is slow for.
+    a, b, c = (np.array(tomllib.loads(AIRLINER)[name], float) for name in "ABC")
+    assert np.linalg.cond(c @ np.linalg.solve(a, b)) > 1e5
+    _, report = made(aso_ftc, tmp_path, AIRLINER.replace('"all"', '["rudder"]'))
+    assert [fault["name"] for fault in report["plant"]["faults"]] == ["f_rudder"] and not report["warnings"]
+    assert -max(pole[0] for pole in report["observer"]["eigenvalues"]) > 100 * slowest

@@ -18,5 +18,6 @@ pub(crate) mod reporting;
 pub(crate) mod responses;
 pub(crate) mod robustness;
 pub(crate) mod schedule;
+pub(crate) mod slow_estimates;
 pub(crate) mod verdict;
 pub(crate) mod worst_case;

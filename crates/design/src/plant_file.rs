@@ -25,13 +25,13 @@ use crate::plant_file::channel::ChannelSignals;
 use crate::plant_file::detection::{DetectionRequest, Disturbance, disturbances};
 use crate::plant_file::estimation::EstimationRequest;
 use crate::plant_file::fallback::FallbackRequest;
-use crate::plant_file::reconfiguration::ReconfigurationRequest;
+use crate::plant_file::reconfiguration::{ReconfigurationRequest, positions};
 use crate::plant_file::references::References;
 use crate::plant_file::requirements::{Request, request};
 use crate::plant_file::robustness::RobustnessLimits;
 use crate::plant_file::sampled_matrices::SampledMatrices;
 use crate::plant_file::signals::{
-    EntryPoint, Fault, Role, Signal, all_actuator_faults, description, faults, signals,
+    EntryPoint, Fault, Role, Signal, actuator_faults, description, faults, signals,
 };
 use crate::plant_file::variants::{Schedule, Variant, check_action};
 use control::Domain;
@@ -472,7 +472,7 @@ fn counted(
     Err(entry.error(format!("expected {count} {meaning}, found {}", found.len())))
 }
 
-/// Reads `actuator_faults = "all"` and the faults under `[[faults]]`.
+/// Reads `actuator_faults`, "all" or names, and the faults under `[[faults]]`.
 fn all_faults(
     file: &Table<'_>,
     actuators: &[Signal],
@@ -480,10 +480,8 @@ fn all_faults(
 ) -> Result<Vec<Fault>, PlaceError> {
     let mut found = Vec::new();
     if let Some(entry) = file.get("actuator_faults") {
-        match entry.text()? {
-            "all" => found.extend(all_actuator_faults(actuators, &entry.place)),
-            other => return Err(entry.error(format!("expected \"all\", found {other:?}"))),
-        }
+        let positions = positions(&entry, actuators, "actuator")?;
+        found.extend(actuator_faults(actuators, &positions, &entry.place));
     }
     if let Some(entry) = file.get("faults") {
         found.extend(faults(&entry, actuators, measurements)?);

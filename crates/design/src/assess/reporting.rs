@@ -26,6 +26,7 @@ use crate::assess::remedies::remedies;
 use crate::assess::responses::responses;
 use crate::assess::robustness::robustness;
 use crate::assess::schedule::{self as schedule_report, judge_schedule};
+use crate::assess::slow_estimates;
 use crate::assess::verdict::verdict;
 use crate::budget::TimeLimits;
 use crate::matrix::pairs;
@@ -140,6 +141,7 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
     }
     let mut warnings: Vec<_> =
         designed.warnings.iter().map(|warning| line(file, warning)).collect();
+    warnings.extend(slow_estimates::warning(file, nominal)?);
     warnings.extend(references.iter().filter_map(beyond_limits));
     warnings.extend(without_bounds);
     let (detection, of_detection) = detection.map(|own| (own.report, own.warnings)).unzip();

@@ -135,13 +135,10 @@ impl Draft {
             return;
         }
         *text += "\n# What adds to these commands is estimated and cancelled. The measurements cannot tell apart that of \
-                  all actuators.\nfaults = [\n";
-        for &at in &settings.faulty {
-            let name = &self.actuators[at].name;
-            let fault = quoted(&format!("f_{name}"));
-            let _ = writeln!(text, "    {{ name = {fault}, actuator = {} }},", quoted(name));
-        }
-        *text += "]\n";
+                  all actuators.\n";
+        let names = settings.faulty.iter().map(|&at| quoted(&self.actuators[at].name));
+        let names = names.collect::<Vec<_>>().join(", ");
+        let _ = writeln!(text, "actuator_faults = [{names}]");
     }
 }
 

@@ -343,16 +343,20 @@ pub(crate) fn position(
     })
 }
 
-/// Returns one additive fault for each actuator.
-pub(crate) fn all_actuator_faults(actuators: &[Signal], place: &Place) -> Vec<Fault> {
-    let fault = |(at, actuator): (usize, &Signal)| Fault {
-        name: format!("f_{}", actuator.name),
-        unit: actuator.unit.clone(),
-        description: format!("fault of {}", actuator.name),
+/// Returns one additive fault for each actuator at `positions`.
+pub(crate) fn actuator_faults(
+    actuators: &[Signal],
+    positions: &[usize],
+    place: &Place,
+) -> Vec<Fault> {
+    let fault = |&at: &usize| Fault {
+        name: format!("f_{}", actuators[at].name),
+        unit: actuators[at].unit.clone(),
+        description: format!("fault of {}", actuators[at].name),
         entry_point: EntryPoint::Actuator(at),
         ..Fault::constant(place)
     };
-    actuators.iter().enumerate().map(fault).collect()
+    positions.iter().map(fault).collect()
 }
 
 impl Fault {
