@@ -217,7 +217,7 @@ impl<'a> PlantFile<'a> {
             let entry = experiment.as_ref().and_then(|table| table.get(key));
             entry.map(|entry| entry.positive()).transpose()
         };
-        let found = Self {
+        let plant_file = Self {
             source,
             places: PLACES.iter().filter_map(place).collect(),
             description: Some(description(file)?).filter(|text| !text.is_empty()),
@@ -249,11 +249,11 @@ impl<'a> PlantFile<'a> {
             references,
             sampling,
         };
-        found.check_columns(file)?;
-        check_names(&found)?;
-        found.check_holds()?;
-        check_action(&found)?;
-        Ok(found)
+        plant_file.check_columns(file)?;
+        check_names(&plant_file)?;
+        plant_file.check_holds()?;
+        check_action(&plant_file)?;
+        Ok(plant_file)
     }
 
     /// Returns the file name without its folder.
@@ -357,8 +357,9 @@ impl<'a> PlantFile<'a> {
         match file.get("F_a") {
             None => Ok(()),
             Some(entry) => {
-                let found = entry.matrix()?.ncols();
-                let message = format!("expected {expected} columns, one per fault, found {found}");
+                let columns = entry.matrix()?.ncols();
+                let message =
+                    format!("expected {expected} columns, one per fault, found {columns}");
                 Err(entry.error(message))
             }
         }
@@ -465,11 +466,11 @@ fn counted(
         "measurements" => Role::Measurement,
         _ => Role::State,
     };
-    let found = signals(&entry, role)?;
-    if found.len() == count {
-        return Ok(found);
+    let members = signals(&entry, role)?;
+    if members.len() == count {
+        return Ok(members);
     }
-    Err(entry.error(format!("expected {count} {meaning}, found {}", found.len())))
+    Err(entry.error(format!("expected {count} {meaning}, found {}", members.len())))
 }
 
 /// Reads `actuator_faults`, "all" or names, and the faults under `[[faults]]`.
@@ -478,27 +479,27 @@ fn all_faults(
     actuators: &[Signal],
     measurements: &[Signal],
 ) -> Result<Vec<Fault>, PlaceError> {
-    let mut found = Vec::new();
+    let mut all = Vec::new();
     if let Some(entry) = file.get("actuator_faults") {
         let positions = positions(&entry, actuators, "actuator")?;
-        found.extend(actuator_faults(actuators, &positions, &entry.place));
+        all.extend(actuator_faults(actuators, &positions, &entry.place));
     }
     if let Some(entry) = file.get("faults") {
-        found.extend(faults(&entry, actuators, measurements)?);
+        all.extend(faults(&entry, actuators, measurements)?);
     } else if let Some(entry) = file.get("F_a") {
         let unnamed = |k: usize| Fault {
             name: format!("f{k}"),
             entry_point: EntryPoint::Column(k - 1),
             ..Fault::constant(&entry.place)
         };
-        found.extend((1..=entry.matrix()?.ncols()).map(unnamed));
+        all.extend((1..=entry.matrix()?.ncols()).map(unnamed));
     }
-    if found.is_empty() {
+    if all.is_empty() {
         let message =
             "no fault is stated: expected `F_a`, `actuator_faults = \"all\"` or [[faults]]";
         return Err(file.source.error(&file.place, message));
     }
-    Ok(found)
+    Ok(all)
 }
 
 fn sampling(file: &Table<'_>) -> Result<Option<Sampling>, PlaceError> {
@@ -554,10 +555,10 @@ fn filter(
         }
         (Some(entry), _) => {
             let members = entry.list()?;
-            let (expected, found) = (measurements.len(), members.len());
-            if found != expected {
+            let (expected, count) = (measurements.len(), members.len());
+            if count != expected {
                 let message =
-                    format!("expected {expected} rates, one per measurement, found {found}");
+                    format!("expected {expected} rates, one per measurement, found {count}");
                 return Err(entry.error(message));
             }
             members.iter().map(Entry::positive).collect::<Result<_, _>>().map(Some)

@@ -59,14 +59,14 @@ impl Channel {
         signals: &ChannelSignals<'_>,
         domain: Domain,
     ) -> Result<Self, PlaceError> {
-        let mut found = Self::default();
+        let mut channel = Self::default();
         if let Some(entry) = table.get("weights") {
             let one = |name: &&str| ChannelWeight {
                 signal: (*name).to_owned(),
                 weight: Weight::constant(1.0),
                 deviation: None,
             };
-            found.weights = signals.outputs.iter().map(one).collect();
+            channel.weights = signals.outputs.iter().map(one).collect();
             for (name, value) in entry.table()?.entries() {
                 let Some(at) = signals.outputs.iter().position(|output| *output == name) else {
                     let known = signals.outputs.join(", ");
@@ -74,7 +74,7 @@ impl Channel {
                         value.error(format!("`{name}` has no weight: expected one of {known}"))
                     );
                 };
-                found.weights[at] = weight(&value, name.to_owned(), domain)?;
+                channel.weights[at] = weight(&value, name.to_owned(), domain)?;
             }
         }
         if let Some(entry) = table.get("noise") {
@@ -83,9 +83,9 @@ impl Channel {
                     "a state feedback has no measurement noise: expected it in `observer`",
                 ));
             };
-            found.noise = noises(&entry, names, domain)?;
+            channel.noise = noises(&entry, names, domain)?;
         }
-        Ok(found)
+        Ok(channel)
     }
 }
 
@@ -102,10 +102,10 @@ fn noises(
         return Ok(names.iter().map(named).collect());
     }
     let members = entry.list()?;
-    let (expected, found) = (names.len(), members.len());
-    if found != expected {
+    let (expected, count) = (names.len(), members.len());
+    if count != expected {
         return Err(
-            entry.error(format!("expected {expected} numbers, one per measurement, found {found}"))
+            entry.error(format!("expected {expected} numbers, one per measurement, found {count}"))
         );
     }
     let both = members.iter().zip(names);
@@ -133,10 +133,10 @@ fn weight(entry: &Entry<'_>, signal: String, domain: Domain) -> Result<ChannelWe
         if let Some(other) = ["low", "frequency", "high"].iter().find_map(|key| table.get(key)) {
             return Err(other.error(alone));
         }
-        let found = weight_of_table(&read_points(&points, domain)?, order)
+        let table_weight = weight_of_table(&read_points(&points, domain)?, order)
             .map_err(|error| points.error(error.to_string()))?;
-        let deviation = Some(found.deviation);
-        return Ok(ChannelWeight { signal, weight: found.weight, deviation });
+        let deviation = Some(table_weight.deviation);
+        return Ok(ChannelWeight { signal, weight: table_weight.weight, deviation });
     }
     let low = table.require("low", "the magnitude at low frequencies")?.positive()?;
     let meaning = "in rad/s, where the magnitude is the geometric mean of `low` and `high`";

@@ -188,13 +188,13 @@ fn noise(file: &Table<'_>, table: &Table<'_>, measurements: usize) -> Result<Vec
         Some(entry) => entry,
         None => table.require("noise", meaning)?,
     };
-    let found = not_negative(&entry)?;
-    if found.iter().any(|noise| *noise <= 0.0) {
+    let levels = not_negative(&entry)?;
+    if levels.iter().any(|noise| *noise <= 0.0) {
         return Err(entry.error("thresholds follow from the noise: expected numbers above 0"));
     }
-    match found.len() {
-        1 => Ok(vec![found[0]; measurements]),
-        count if count == measurements => Ok(found),
+    match levels.len() {
+        1 => Ok(vec![levels[0]; measurements]),
+        count if count == measurements => Ok(levels),
         count => {
             let message =
                 format!("expected {measurements} numbers, one per measurement, found {count}");
@@ -222,8 +222,8 @@ fn sizes(entry: &Entry<'_>, faults: &[Fault]) -> Result<Vec<f64>, PlaceError> {
         stated.allow(&names)?;
     }
     let size = |fault: &Fault| {
-        let own = stated.as_ref().and_then(|table| table.get(&fault.name));
-        match own.map(|entry| entry.positive()).transpose()?.or(fault.step).or(fault.bound) {
+        let stated_size = stated.as_ref().and_then(|table| table.get(&fault.name));
+        match stated_size.map(|entry| entry.positive()).transpose()?.or(fault.step).or(fault.bound) {
             Some(size) => Ok(size),
             None => Err(entry.error(format!(
                 "the size of fault `{0}` that shall be detected is missing: expected sizes.{0} here, or \
@@ -250,11 +250,12 @@ fn model_error(table: &Table<'_>, actuators: &[Signal]) -> Result<Option<ModelEr
     };
     let stated = stated.map(|entry| entry.table()).transpose()?;
     if let Some(stated) = &stated {
-        stated.allow(&actuators.iter().map(|own| own.name.as_str()).collect::<Vec<_>>())?;
+        stated
+            .allow(&actuators.iter().map(|actuator| actuator.name.as_str()).collect::<Vec<_>>())?;
     }
     let bound = |actuator: &Signal| {
-        let own = stated.as_ref().and_then(|table| table.get(&actuator.name));
-        own.map(|entry| entry.positive()).transpose()
+        let bound = stated.as_ref().and_then(|table| table.get(&actuator.name));
+        bound.map(|entry| entry.positive()).transpose()
     };
     let commands = actuators.iter().map(bound).collect::<Result<_, _>>()?;
     Ok(Some(ModelError { margin, commands, place: entry.place }))
@@ -273,21 +274,21 @@ pub(crate) fn disturbances(
     if file.get("detection").is_none() {
         return Err(entry.error("the detection decouples them; expected [detection], too"));
     }
-    let mut found: Vec<Disturbance> = Vec::new();
+    let mut all: Vec<Disturbance> = Vec::new();
     for member in entry.list()? {
-        let mut own = disturbance(file, &member, actuators, measurements)?;
+        let mut stated = disturbance(file, &member, actuators, measurements)?;
         if let (DisturbanceEntry::Column(e), Model::Matrices { sampled: Some(sampled), .. }) =
-            (&mut own.entry_point, model)
+            (&mut stated.entry_point, model)
         {
             let held = sampled.held(&DMatrix::from_column_slice(e.len(), 1, e.as_slice()));
             e.copy_from(&held.column(0));
         }
-        if found.iter().any(|other| other.name == own.name) {
-            return Err(member.error(format!("the name `{}` is there twice", own.name)));
+        if all.iter().any(|other| other.name == stated.name) {
+            return Err(member.error(format!("the name `{}` is there twice", stated.name)));
         }
-        found.push(own);
+        all.push(stated);
     }
-    Ok(found)
+    Ok(all)
 }
 
 fn disturbance(
@@ -300,34 +301,34 @@ fn disturbance(
     table.allow(&DISTURBANCE)?;
     let keys = ["E", "actuator", "sensor", "input"];
     let stated: Vec<_> = keys.iter().filter_map(|key| Some((*key, table.get(key)?))).collect();
-    let [(key, own)] = stated.as_slice() else {
+    let [(key, value)] = stated.as_slice() else {
         return Err(entry.error("expected one of E, actuator, sensor, input"));
     };
     let is_fmu = file.get("plant").is_some();
     let entry_point = match *key {
         "E" if is_fmu => {
-            return Err(own.error("the plant is an FMU: expected `input`, one of its inputs"));
+            return Err(value.error("the plant is an FMU: expected `input`, one of its inputs"));
         }
         "input" if !is_fmu => {
-            return Err(own.error("the plant is no FMU: expected `E`, a number for each state"));
+            return Err(value.error("the plant is no FMU: expected `E`, a number for each state"));
         }
         "E" => {
             let states =
                 file.get("A").map_or(Ok(0), |entry| entry.list().map(|rows| rows.len()))?;
-            let column = own.numbers()?;
+            let column = value.numbers()?;
             if column.len() != states {
                 let message =
                     format!("expected {states} numbers, one per state, found {}", column.len());
-                return Err(own.error(message));
+                return Err(value.error(message));
             }
             if column.iter().all(|number| *number == 0.0) {
-                return Err(own.error("expected a number other than 0"));
+                return Err(value.error("expected a number other than 0"));
             }
             DisturbanceEntry::Column(column.into())
         }
-        "actuator" => DisturbanceEntry::Actuator(position(own, actuators, "actuator")?),
-        "sensor" => DisturbanceEntry::Sensor(position(own, measurements, "measurement")?),
-        _ => DisturbanceEntry::Input(name(own)?),
+        "actuator" => DisturbanceEntry::Actuator(position(value, actuators, "actuator")?),
+        "sensor" => DisturbanceEntry::Sensor(position(value, measurements, "measurement")?),
+        _ => DisturbanceEntry::Input(name(value)?),
     };
     Ok(Disturbance {
         name: name(&table.require("name", "the name of the disturbance")?)?,

@@ -119,16 +119,16 @@ impl EstimationRequest {
         let table = entry.table()?;
         let names = Law::ALL.map(|law| law.name());
         let stated = table.require("law", &format!("one of {}", names.join(", ")))?;
-        let found = stated.text()?;
-        let Some(law) = Law::ALL.into_iter().find(|law| law.name() == found) else {
-            let message = format!("expected one of {}, found {found:?}", names.join(", "));
+        let text = stated.text()?;
+        let Some(law) = Law::ALL.into_iter().find(|law| law.name() == text) else {
+            let message = format!("expected one of {}, found {text:?}", names.join(", "));
             return Err(stated.error(message));
         };
         for key in ["family", "schedule", "reconfiguration", "fallback"] {
             if !law.allows(key) && file.get(key).is_some() {
                 let all = Law::ALL.iter().filter(|law| law.allows(key)).map(Law::name);
                 let all = all.collect::<Vec<_>>().join(", ");
-                let message = format!("with `{key}` the law is one of {all}; found {found:?}");
+                let message = format!("with `{key}` the law is one of {all}; found {text:?}");
                 return Err(stated.error(message));
             }
         }
@@ -156,11 +156,12 @@ impl EstimationRequest {
                 Law::SlidingMode { rho: numbers("rho")?, delta: numbers("delta")? }
             }
             Law::Learning { .. } => {
-                let kept = number("K_1")?;
-                if let Some((kept, entry)) = kept.zip(table.get("K_1")).filter(|own| own.0 > 1.0) {
-                    return Err(entry.error(format!("expected at most 1, found {kept}")));
+                let share = number("K_1")?;
+                if let Some((k_1, entry)) = share.zip(table.get("K_1")).filter(|pair| pair.0 > 1.0)
+                {
+                    return Err(entry.error(format!("expected at most 1, found {k_1}")));
                 }
-                Law::Learning { kept }
+                Law::Learning { kept: share }
             }
         };
         Ok(Self { law, place: stated.place })
@@ -182,8 +183,8 @@ fn each(entry: &Entry<'_>, faults: usize) -> Result<Vec<f64>, PlaceError> {
     }
     let members = entry.list()?;
     if members.len() != faults {
-        let found = members.len();
-        let message = format!("expected {faults} numbers, one for each fault, found {found}");
+        let count = members.len();
+        let message = format!("expected {faults} numbers, one for each fault, found {count}");
         return Err(entry.error(message));
     }
     members.iter().map(Entry::positive).collect()

@@ -37,7 +37,7 @@ impl FallbackRequest {
         let table = entry.table()?;
         table.allow(&KEYS)?;
         let meaning = "the names of the actuators that may fail, or \"all\"";
-        let own = positions(&table.require("actuators", meaning)?, actuators, "actuator")?;
+        let used = positions(&table.require("actuators", meaning)?, actuators, "actuator")?;
         let loss = match table.get("loss") {
             None => 1.0,
             Some(entry) => match entry.positive()? {
@@ -49,6 +49,6 @@ impl FallbackRequest {
             },
         };
         let region = table.get("region").map(|entry| stated_region(&entry, sampled)).transpose()?;
-        Ok(Some(Self { actuators: own, loss, region, place: entry.place }))
+        Ok(Some(Self { actuators: used, loss, region, place: entry.place }))
     }
 }

@@ -25,7 +25,7 @@ const DETECTION: [&str; 7] = [
 /// Checks the names of actuators and measurements, which are variables of the controller FMU, and
 /// that no two faults have the same name.
 pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
-    let own = OwnVariables::of(file);
+    let variables = OwnVariables::of(file);
     let references = file.references.as_ref().map_or(&[][..], |references| &references.signals);
     for signal in file
         .actuators
@@ -43,7 +43,7 @@ pub(crate) fn check_names(file: &PlantFile<'_>) -> Result<(), PlaceError> {
             );
             return Err(at_name(file, signal, message));
         }
-        if own.include(name) {
+        if variables.include(name) {
             let message = format!(
                 "the controller FMU has a variable `{name}` of its own; expected another name"
             );
@@ -169,38 +169,38 @@ impl OwnVariables {
             file.faults.iter().filter(|fault| fault.dynamics == FaultDynamics::Ramp).count();
         let q = Some(file.faults.len() + ramps);
         let lossy = |fault: &Fault| matches!(fault.entry_point, EntryPoint::Loss { .. });
-        let mut own = Self {
+        let mut variables = Self {
             scalars: vec!["time", "compensate", "t_on", "monitor"],
             signals: vec![("x_hat", states), ("f_hat", q), ("x_hat_0", states), ("f_hat_0", q)],
             matrices: MATRICES.to_vec(),
         };
         if file.sampling.is_some() {
-            own.scalars.extend(["T_s", "sample_clock"]);
+            variables.scalars.extend(["T_s", "sample_clock"]);
         }
         if file.schedule.is_some() {
-            own.scalars.push("schedule_at");
+            variables.scalars.push("schedule_at");
         }
         if ramps > 0 {
-            own.matrices.push("A_f");
+            variables.matrices.push("A_f");
         }
         let fed = match &file.model {
             Model::Matrices { d, .. } => d.amax() > 0.0,
             Model::Fmu(_) => file.filter.is_some(),
         };
         if fed {
-            own.matrices.push("D");
+            variables.matrices.push("D");
         }
         let t = file.references.as_ref().map(|references| references.signals.len());
         if file.references.is_some() {
-            own.matrices.extend(["H", "K_i", "F_i", "L_w", "N_r"]);
+            variables.matrices.extend(["H", "K_i", "F_i", "L_w", "N_r"]);
         }
         if file.detection.is_some() {
-            own.scalars.extend(DETECTION);
+            variables.scalars.extend(DETECTION);
         }
         let operating = |signal: &Signal| signal.operating.is_some_and(|value| value != 0.0);
         let stated = states.is_none() || file.signals().any(operating);
         let mut add = |present: bool, signals: &[(&'static str, Option<usize>)]| {
-            own.signals.extend_from_slice(if present { signals } else { &[] });
+            variables.signals.extend_from_slice(if present { signals } else { &[] });
         };
         add(
             file.detection.is_some(),
@@ -214,13 +214,13 @@ impl OwnVariables {
             Law::Augmented => {}
             Law::ProportionalIntegral { .. } | Law::FastAdaptive { .. } => {
                 add(true, &[("f_hat_i", q)]);
-                own.matrices.push("P_f");
+                variables.matrices.push("P_f");
             }
             Law::SlidingMode { .. } => {
                 add(true, &[("rho", q), ("delta", q)]);
-                own.matrices.push("A_f");
+                variables.matrices.push("A_f");
             }
-            Law::Learning { .. } => own.matrices.push("A_f"),
+            Law::Learning { .. } => variables.matrices.push("A_f"),
         }
         let limited = file.actuators.iter().any(|actuator| actuator.limits.is_some());
         add(limited, &[("u_min", m), ("u_max", m)]);
@@ -228,11 +228,11 @@ impl OwnVariables {
         add(reconfigured, &[("actuator_gone", m), ("u_stuck", m)]);
         let fallback = file.fallback.is_some();
         if file.checks_measurements() {
-            own.scalars.extend(["measurement_held", "measurement_lost"]);
+            variables.scalars.extend(["measurement_held", "measurement_lost"]);
         }
-        own.scalars.extend((reconfigured || fallback).then_some("reconfiguration"));
-        own.scalars.extend(fallback.then_some("fall_back"));
-        own
+        variables.scalars.extend((reconfigured || fallback).then_some("reconfiguration"));
+        variables.scalars.extend(fallback.then_some("fall_back"));
+        variables
     }
 
     /// Whether `name` is one of these variables, their derivatives, or an element of their arrays.
@@ -240,7 +240,7 @@ impl OwnVariables {
         let derivative = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
         if let Some(state) = derivative {
             let states = ["x_hat", "f_hat", "f_hat_i", "y_f", "x_i"];
-            let signals = self.signals.iter().filter(|(own, _)| states.contains(own));
+            let signals = self.signals.iter().filter(|(signal, _)| states.contains(signal));
             return !self.scalars.contains(&"T_s") && Self::is_among(state, signals);
         }
         let indexed = array_element(name).map(|(array, _)| array);
@@ -254,9 +254,9 @@ impl OwnVariables {
         mut signals: impl Iterator<Item = &'a (&'static str, Option<usize>)>,
     ) -> bool {
         let array = array_element(name).map(|(array, _)| array);
-        signals.any(|(own, count)| match array {
-            None => name == *own && count.is_none_or(|count| count == 1),
-            Some(array) => array == *own && count.is_none_or(|count| count > 1),
+        signals.any(|(signal, count)| match array {
+            None => name == *signal && count.is_none_or(|count| count == 1),
+            Some(array) => array == *signal && count.is_none_or(|count| count > 1),
         })
     }
 }

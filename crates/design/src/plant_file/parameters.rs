@@ -29,9 +29,9 @@ pub(crate) fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceEr
             match entry.list()?.as_slice() {
                 [low, high] => Tolerance::Limits([low.number()?, high.number()?]),
                 other => {
-                    let found = other.len();
+                    let count = other.len();
                     let message =
-                        format!("expected the lowest and the highest value, found {found} numbers");
+                        format!("expected the lowest and the highest value, found {count} numbers");
                     return Err(entry.error(message));
                 }
             }
@@ -40,11 +40,11 @@ pub(crate) fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceEr
         };
         Ok(ParameterTolerance { name: name.to_owned(), tolerance, place: entry.place.clone() })
     };
-    let found: Vec<_> = entry.table()?.entries().map(one).collect::<Result<_, _>>()?;
-    if found.is_empty() {
+    let all: Vec<_> = entry.table()?.entries().map(one).collect::<Result<_, _>>()?;
+    if all.is_empty() {
         return Err(entry.error("expected parameters of the FMU and their tolerances, found none"));
     }
-    Ok(found)
+    Ok(all)
 }
 
 /// Reads a fraction from 0 to below 1.

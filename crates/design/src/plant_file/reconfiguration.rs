@@ -45,16 +45,16 @@ impl ReconfigurationRequest {
         let table = entry.table()?;
         table.allow(&KEYS)?;
         let meaning = "the names of the actuators that may be gone, or \"all\"";
-        let own = positions(&table.require("actuators", meaning)?, actuators, "actuator")?;
+        let used = positions(&table.require("actuators", meaning)?, actuators, "actuator")?;
         let keep = match table.get("keep") {
             Some(entry) => positions(&entry, measurements, "measurement")?,
             None => (0..measurements.len()).collect(),
         };
         Ok(Some(Self {
-            together: together(&table, own.len(), actuators.len())?,
-            stuck_at: stuck(&table, actuators, &own)?,
-            decision: decision(&table, &own, faults)?,
-            actuators: own,
+            together: together(&table, used.len(), actuators.len())?,
+            stuck_at: stuck(&table, actuators, &used)?,
+            decision: decision(&table, &used, faults)?,
+            actuators: used,
             keep,
             place: entry.place,
         }))
@@ -62,23 +62,23 @@ impl ReconfigurationRequest {
 
     /// The command at which an actuator is stuck; 0 if it is none of those that may be gone.
     pub(crate) fn stuck_at(&self, actuator: usize) -> f64 {
-        let position = self.actuators.iter().position(|own| *own == actuator);
+        let position = self.actuators.iter().position(|used| *used == actuator);
         position.map_or(0.0, |at| self.stuck_at[at])
     }
 
     /// The sets of actuators that may be gone, each in ascending order: first each one alone.
     pub(crate) fn cases(&self) -> Vec<Vec<usize>> {
-        let alone = self.actuators.iter().map(|own| vec![*own]);
+        let alone = self.actuators.iter().map(|actuator| vec![*actuator]);
         alone.chain((2..=self.together).flat_map(|size| self.sets(size))).collect()
     }
 
     /// The sets of `size` of the actuators that may be gone, each in ascending order.
     pub(crate) fn sets(&self, size: usize) -> Vec<Vec<usize>> {
-        let mut own = self.actuators.clone();
-        own.sort_unstable();
+        let mut ordered = self.actuators.clone();
+        ordered.sort_unstable();
         let extended = |sets: Vec<Vec<usize>>, _| {
             let after = |set: &Vec<usize>| {
-                let later = own.iter().filter(|at| set.last().is_none_or(|last| *at > last));
+                let later = ordered.iter().filter(|at| set.last().is_none_or(|last| *at > last));
                 let longer = later.map(|at| set.iter().copied().chain([*at]).collect::<Vec<_>>());
                 longer.collect::<Vec<_>>()
             };
@@ -89,23 +89,23 @@ impl ReconfigurationRequest {
 }
 
 /// Reads `together`; 1 if missing. `own`: the number of actuators that may be gone, of `all`.
-fn together(table: &Table<'_>, own: usize, all: usize) -> Result<usize, PlaceError> {
+fn together(table: &Table<'_>, used: usize, all: usize) -> Result<usize, PlaceError> {
     let Some(entry) = table.get("together") else {
         return Ok(1);
     };
-    let most = own.min(all - 1);
+    let most = used.min(all - 1);
     let number = entry.number()?;
-    let found = (1..=most)
+    let most_together = (1..=most)
         .find(|count| f64::from(u32::try_from(*count).unwrap_or(0)).total_cmp(&number).is_eq());
-    let Some(found) = found else {
+    let Some(most_together) = most_together else {
         return Err(entry.error(format!(
             "expected how many actuators may be gone together, from 1 to {most}, found {number}"
         )));
     };
     let mut sets = 0;
     let mut of_size = 1;
-    for size in 1..=found {
-        of_size = of_size * (own + 1 - size) / size;
+    for size in 1..=most_together {
+        of_size = of_size * (used + 1 - size) / size;
         sets += of_size;
         if sets > MOST_SETS {
             return Err(entry.error(format!(
@@ -114,7 +114,7 @@ fn together(table: &Table<'_>, own: usize, all: usize) -> Result<usize, PlaceErr
             )));
         }
     }
-    Ok(found)
+    Ok(most_together)
 }
 
 /// Reads names of signals, or the text "all".
@@ -131,47 +131,47 @@ pub(crate) fn positions(
             }
         };
     }
-    let mut found = Vec::new();
+    let mut all = Vec::new();
     for member in entry.list()? {
         let name = member.text()?;
         let at = signals.iter().position(|signal| signal.name == name).ok_or_else(|| {
             let names: Vec<_> = signals.iter().map(|signal| signal.name.as_str()).collect();
             member.error(format!("no {what} is named {name:?}; there are {}", names.join(", ")))
         })?;
-        if found.contains(&at) {
+        if all.contains(&at) {
             return Err(member.error(format!("the {what} `{name}` is there twice")));
         }
-        found.push(at);
+        all.push(at);
     }
-    if found.is_empty() {
+    if all.is_empty() {
         return Err(entry.error("expected at least one name, or \"all\""));
     }
-    Ok(found)
+    Ok(all)
 }
 
 /// Reads `stuck_at`, a table from actuators to commands; 0 if missing.
-fn stuck(table: &Table<'_>, actuators: &[Signal], own: &[usize]) -> Result<Vec<f64>, PlaceError> {
-    let mut found = vec![0.0; own.len()];
+fn stuck(table: &Table<'_>, actuators: &[Signal], used: &[usize]) -> Result<Vec<f64>, PlaceError> {
+    let mut commands = vec![0.0; used.len()];
     let Some(entry) = table.get("stuck_at") else {
-        return Ok(found);
+        return Ok(commands);
     };
     for (name, value) in entry.table()?.entries() {
-        let Some(at) = own.iter().position(|at| actuators[*at].name == name) else {
-            let names: Vec<_> = own.iter().map(|at| actuators[*at].name.as_str()).collect();
+        let Some(at) = used.iter().position(|at| actuators[*at].name == name) else {
+            let names: Vec<_> = used.iter().map(|at| actuators[*at].name.as_str()).collect();
             let known = names.join(", ");
             return Err(
                 value.error(format!("expected one of `actuators`: {known}, found `{name}`"))
             );
         };
-        found[at] = value.number()?;
+        commands[at] = value.number()?;
     }
-    Ok(found)
+    Ok(commands)
 }
 
 /// Reads `loss` and `time`, which belong together and to actuators whose loss is estimated.
 fn decision(
     table: &Table<'_>,
-    own: &[usize],
+    used: &[usize],
     faults: &[Fault],
 ) -> Result<Option<(f64, f64)>, PlaceError> {
     let (loss, time) = match (table.get("loss"), table.get("time")) {
@@ -190,7 +190,7 @@ fn decision(
         return Err(loss.error(message));
     }
     let estimated = |fault: &Fault| match fault.entry_point {
-        EntryPoint::Loss { actuator, .. } => own.contains(&actuator),
+        EntryPoint::Loss { actuator, .. } => used.contains(&actuator),
         _ => false,
     };
     if !faults.iter().any(estimated) {

@@ -58,7 +58,7 @@ impl References {
         if let Some(entry) = windup_time.as_ref().filter(|_| !integral) {
             return Err(entry.error("only integral action winds up, and `integral` is false"));
         }
-        let mut found = Self {
+        let mut references = Self {
             signals: Vec::new(),
             h: DMatrix::zeros(members.len(), measurements.len()),
             steps: Vec::new(),
@@ -66,20 +66,20 @@ impl References {
             integral,
             feedforward,
             action_places: [by_integral, stated]
-                .map(|own| own.map_or_else(|| entry.place.clone(), |own| own.place)),
+                .map(|stated| stated.map_or_else(|| entry.place.clone(), |entry| entry.place)),
             windup_time: windup_time.map(|entry| entry.positive()).transpose()?,
         };
         for (at, member) in members.iter().enumerate() {
             let (signal, weights, step) = reference(member, measurements)?;
-            if found.signals.iter().any(|other| other.name == signal.name) {
+            if references.signals.iter().any(|other| other.name == signal.name) {
                 return Err(member.error(format!("the name `{}` is there twice", signal.name)));
             }
-            found.h.row_mut(at).copy_from_slice(&weights);
-            found.signals.push(signal);
-            found.steps.push(step);
-            found.places.push(member.place.clone());
+            references.h.row_mut(at).copy_from_slice(&weights);
+            references.signals.push(signal);
+            references.steps.push(step);
+            references.places.push(member.place.clone());
         }
-        Ok(Some(found))
+        Ok(Some(references))
     }
 
     /// Returns the references with operating points and units from those of the measurements.
@@ -142,9 +142,9 @@ fn reference(
             Signal::named(String::new())
         }
     };
-    if let Some(own) = own_name {
-        signal.name = name(&own)?;
-        signal.places[0] = Some(own.place);
+    if let Some(entry) = own_name {
+        signal.name = name(&entry)?;
+        signal.places[0] = Some(entry.place);
     }
     signal.unit = unit(&table)?.or(signal.unit);
     let text = description(&table)?;

@@ -192,23 +192,23 @@ fn only_one<'a>(table: &Table<'a>, weight: &str) -> Result<Option<Entry<'a>>, Pl
 
 /// Reads a bandwidth, which a sampled loop has below its Nyquist frequency.
 fn bandwidth(entry: &Entry<'_>, domain: Domain) -> Result<Bandwidth, PlaceError> {
-    let found = entry.positive()?;
+    let rate = entry.positive()?;
     match domain {
-        Domain::Sampled { period } if found * period >= PI => Err(entry.error(format!(
-            "expected less than pi / sample_time = {:.6} rad/s, found {found}",
+        Domain::Sampled { period } if rate * period >= PI => Err(entry.error(format!(
+            "expected less than pi / sample_time = {:.6} rad/s, found {rate}",
             PI / period
         ))),
-        _ => Ok(Bandwidth { rate: Some(found), is_stated: true }),
+        _ => Ok(Bandwidth { rate: Some(rate), is_stated: true }),
     }
 }
 
 /// Reads the eigenvalues and checks that they are stable.
 fn stable(entry: &Entry<'_>, sampled: bool) -> Result<Vec<Complex<f64>>, PlaceError> {
-    let found = eigenvalues(entry)?;
+    let all = eigenvalues(entry)?;
     let unstable =
         |value: &&Complex<f64>| if sampled { value.norm() >= 1.0 } else { value.re >= 0.0 };
-    match found.iter().find(unstable) {
-        None => Ok(found),
+    match all.iter().find(unstable) {
+        None => Ok(all),
         Some(value) => {
             let rule = if sampled { "a modulus below 1" } else { "a real part below 0" };
             let shown = if value.im == 0.0 { value.re.to_string() } else { value.to_string() };
@@ -220,19 +220,19 @@ fn stable(entry: &Entry<'_>, sampled: bool) -> Result<Vec<Complex<f64>>, PlaceEr
 
 /// Reads numbers, and `{ re = -3.0, im = 4.0 }` for a complex conjugate pair.
 fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>, PlaceError> {
-    let mut found = Vec::new();
+    let mut all = Vec::new();
     for member in entry.list()? {
         if !member.is_table() {
-            found.push(Complex::new(member.number()?, 0.0));
+            all.push(Complex::new(member.number()?, 0.0));
             continue;
         }
         let table = member.table()?;
         table.allow(&["re", "im"])?;
         let re = table.require("re", "the real part")?.number()?;
         let im = table.require("im", "the imaginary part")?.positive()?;
-        found.extend([Complex::new(re, im), Complex::new(re, -im)]);
+        all.extend([Complex::new(re, im), Complex::new(re, -im)]);
     }
-    Ok(found)
+    Ok(all)
 }
 
 /// Reads a region that is stated alone; that of a sampled design has a decay rate only.

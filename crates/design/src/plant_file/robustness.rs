@@ -52,7 +52,7 @@ impl RobustnessLimits {
         model: &Model,
         measurements: usize,
     ) -> Result<Self, PlaceError> {
-        let mut found = Self {
+        let mut limits = Self {
             tolerance: [TOLERANCE; 4],
             entries: Vec::new(),
             parameters: Vec::new(),
@@ -63,16 +63,16 @@ impl RobustnessLimits {
             red: RED,
         };
         let Some(entry) = file.get("robustness") else {
-            return Ok(found);
+            return Ok(limits);
         };
         let table = entry.table()?;
         table.allow(&KEYS)?;
         if let Some(entry) = table.get("tolerance") {
-            found.tolerance = tolerances(&entry)?;
+            limits.tolerance = tolerances(&entry)?;
             if entry.is_table()
                 && let Some(entry) = entry.table()?.get("entries")
             {
-                found.entries = entries(&entry, model)?;
+                limits.entries = entries(&entry, model)?;
             }
         }
         if let Some(entry) = table.get("parameters") {
@@ -86,29 +86,29 @@ impl RobustnessLimits {
                                `parameters`, found both";
                 return Err(entry.error(message));
             }
-            found.parameters = parameters::read(&entry)?;
-            found.tolerance = [0.0; 4];
+            limits.parameters = parameters::read(&entry)?;
+            limits.tolerance = [0.0; 4];
         }
         if let Some(entry) = table.get("cases") {
-            found.cases = whole(&entry, 100_000)?;
+            limits.cases = whole(&entry, 100_000)?;
         }
         if let Some(entry) = table.get("seed") {
-            found.seed = whole(&entry, u32::MAX)?;
+            limits.seed = whole(&entry, u32::MAX)?;
         }
         if let Some(entry) = table.get("noise") {
-            found.noise = noise(&entry, measurements)?;
+            limits.noise = noise(&entry, measurements)?;
         }
         let (amber, red) = (table.get("amber"), table.get("red"));
-        for (entry, limit) in [(&amber, &mut found.amber), (&red, &mut found.red)] {
+        for (entry, limit) in [(&amber, &mut limits.amber), (&red, &mut limits.red)] {
             if let Some(entry) = entry {
                 *limit = at_least_one(entry)?;
             }
         }
-        if let Some(entry) = red.or(amber).filter(|_| found.amber > found.red) {
-            let Self { amber, red, .. } = found;
+        if let Some(entry) = red.or(amber).filter(|_| limits.amber > limits.red) {
+            let Self { amber, red, .. } = limits;
             return Err(entry.error(format!("expected amber <= red, found {amber} and {red}")));
         }
-        Ok(found)
+        Ok(limits)
     }
 }
 
@@ -120,7 +120,7 @@ fn entries(entry: &Entry<'_>, model: &Model) -> Result<Vec<EntryTolerance>, Plac
             entry.error("an FMU is the plant: expected `parameters`, its parameters that vary")
         );
     };
-    let mut found: Vec<EntryTolerance> = Vec::new();
+    let mut all: Vec<EntryTolerance> = Vec::new();
     for (text, entry) in entry.table()?.entries() {
         let mut places = Vec::new();
         for name in text.split(',').map(str::trim) {
@@ -138,21 +138,21 @@ fn entries(entry: &Entry<'_>, model: &Model) -> Result<Vec<EntryTolerance>, Plac
             if *value == 0.0 {
                 return Err(entry.error(format!("{name} is 0, of which a fraction is nothing")));
             }
-            let mut stated = found.iter().flat_map(|own| &own.entries).chain(&places);
+            let mut stated = all.iter().flat_map(|tolerance| &tolerance.entries).chain(&places);
             if stated.any(|other| *other == place) {
                 return Err(entry.error(format!("{name} is stated twice")));
             }
             places.push(place);
         }
-        found.push(EntryTolerance { entries: places, relative: fraction(&entry)? });
+        all.push(EntryTolerance { entries: places, relative: fraction(&entry)? });
     }
-    Ok(found)
+    Ok(all)
 }
 
 /// Reads `A[2][1]`; rows and columns count from 1.
 fn plant_entry(text: &str) -> Option<PlantEntry> {
     let (name, rest) = text.split_once('[')?;
-    let matrix = MATRICES.iter().position(|own| *own == name)?;
+    let matrix = MATRICES.iter().position(|symbol| *symbol == name)?;
     let (row, column) = rest.strip_suffix(']')?.split_once("][")?;
     let index = |text: &str| text.parse::<usize>().ok()?.checked_sub(1);
     Some(PlantEntry { matrix, row: index(row)?, column: index(column)? })
@@ -165,13 +165,13 @@ fn tolerances(entry: &Entry<'_>) -> Result<[f64; 4], PlaceError> {
     }
     let table = entry.table()?;
     table.allow(&["A", "B", "C", "D", "entries"])?;
-    let mut found = [0.0; 4];
-    for (key, tolerance) in MATRICES.into_iter().zip(&mut found) {
+    let mut all = [0.0; 4];
+    for (key, tolerance) in MATRICES.into_iter().zip(&mut all) {
         if let Some(entry) = table.get(key) {
             *tolerance = fraction(&entry)?;
         }
     }
-    Ok(found)
+    Ok(all)
 }
 
 fn at_least_one(entry: &Entry<'_>) -> Result<f64, PlaceError> {
@@ -204,9 +204,9 @@ fn noise(entry: &Entry<'_>, measurements: usize) -> Result<Vec<f64>, PlaceError>
     }
     let members = entry.list()?;
     if members.len() != measurements {
-        let found = members.len();
+        let count = members.len();
         let message =
-            format!("expected {measurements} numbers, one per measurement, found {found}");
+            format!("expected {measurements} numbers, one per measurement, found {count}");
         return Err(entry.error(message));
     }
     members.iter().map(positive).collect()

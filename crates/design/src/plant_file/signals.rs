@@ -119,15 +119,15 @@ pub(crate) fn signals(entry: &Entry<'_>, role: Role) -> Result<Vec<Signal>, Plac
     if members.is_empty() {
         return Err(entry.error("expected at least one"));
     }
-    let mut found: Vec<Signal> = Vec::with_capacity(members.len());
+    let mut all: Vec<Signal> = Vec::with_capacity(members.len());
     for member in &members {
         let signal = signal(member, role)?;
-        if found.iter().any(|other| other.name == signal.name) {
+        if all.iter().any(|other| other.name == signal.name) {
             return Err(member.error(format!("the name `{}` is there twice", signal.name)));
         }
-        found.push(signal);
+        all.push(signal);
     }
-    Ok(found)
+    Ok(all)
 }
 
 fn signal(entry: &Entry<'_>, role: Role) -> Result<Signal, PlaceError> {
@@ -219,22 +219,21 @@ pub(crate) fn faults(
     if members.is_empty() {
         return Err(entry.error("expected at least one fault"));
     }
-    let mut found: Vec<Fault> = Vec::with_capacity(members.len());
+    let mut all: Vec<Fault> = Vec::with_capacity(members.len());
     for member in &members {
-        let columns =
-            found.iter().filter(|fault| matches!(fault.entry_point, EntryPoint::Column(_)));
+        let columns = all.iter().filter(|fault| matches!(fault.entry_point, EntryPoint::Column(_)));
         let fault = fault(member, actuators, measurements, columns.count())?;
-        if found.iter().any(|other| other.name == fault.name) {
+        if all.iter().any(|other| other.name == fault.name) {
             return Err(member.error(format!("the name `{}` is there twice", fault.name)));
         }
-        found.push(fault);
-        if found.iter().filter(|fault| fault.up_to.is_some()).count() > MOST_LOSSES {
+        all.push(fault);
+        if all.iter().filter(|fault| fault.up_to.is_some()).count() > MOST_LOSSES {
             return Err(member.error(format!(
                 "losses are proven for all combinations: expected `up_to` for at most {MOST_LOSSES} faults"
             )));
         }
     }
-    Ok(found)
+    Ok(all)
 }
 
 fn fault(

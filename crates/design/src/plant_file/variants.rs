@@ -70,14 +70,14 @@ impl PlantFile<'_> {
 
     /// The file with another plant, without family and schedule.
     pub(crate) fn with(&self, variant: &Variant) -> Self {
-        let mut own = self.clone();
-        own.is_point = self.schedule.is_some();
-        (own.family, own.schedule) = (Vec::new(), None);
-        own.model = variant.model.clone();
+        let mut file = self.clone();
+        file.is_point = self.schedule.is_some();
+        (file.family, file.schedule) = (Vec::new(), None);
+        file.model = variant.model.clone();
         let [u_op, y_op] = &variant.operating;
-        for (signals, values) in [(&mut own.actuators, u_op), (&mut own.measurements, y_op)] {
+        for (signals, values) in [(&mut file.actuators, u_op), (&mut file.measurements, y_op)] {
             for (at, signal) in signals.iter_mut().enumerate() {
-                match (values, &own.model) {
+                match (values, &file.model) {
                     (Some(values), _) => signal.operating = Some(values[at]),
                     // The FMU states the values at its operating point.
                     (None, Model::Fmu(_)) => signal.operating = None,
@@ -85,7 +85,7 @@ impl PlantFile<'_> {
                 }
             }
         }
-        own
+        file
     }
 }
 
@@ -97,31 +97,31 @@ pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, Pl
             schedule.error("expected `family` (one gain) or `schedule` (gains by a variable)")
         );
     }
-    let mut found: Vec<Variant> = Vec::new();
+    let mut variants: Vec<Variant> = Vec::new();
     for (at, member) in entry.list()?.iter().enumerate() {
         let table = member.table()?;
         let keys = allowed(model, &["name"], false);
         table.allow(&keys)?;
-        let own = match table.get("name") {
+        let title = match table.get("name") {
             Some(entry) => name(&entry)?,
             None => format!("member {}", at + 1),
         };
-        if own == "nominal" || found.iter().any(|other| other.name == own) {
+        if title == "nominal" || variants.iter().any(|other| other.name == title) {
             let message =
-                format!("the name `{own}` is there twice; `nominal` is the plant of the file");
+                format!("the name `{title}` is there twice; `nominal` is the plant of the file");
             return Err(member.error(message));
         }
-        let variant = variant(&table, own, member.place.clone(), model)?;
+        let variant = variant(&table, title, member.place.clone(), model)?;
         if !keys[1..].iter().any(|key| table.get(key).is_some()) {
             let expected = keys[1..].join(", ");
             return Err(member.error(format!("the plant of the file again: expected {expected}")));
         }
-        found.push(variant);
+        variants.push(variant);
     }
-    if found.is_empty() {
+    if variants.is_empty() {
         return Err(entry.error("expected at least one plant"));
     }
-    Ok(found)
+    Ok(variants)
 }
 
 /// Reads `[schedule]`.
@@ -135,11 +135,11 @@ pub(crate) fn schedule(
     table.allow(&["variable", "unit", "description", "rate_bound", "points"])?;
     let named =
         table.require("variable", "a measurement, or the name of an input of the controller")?;
-    let own = name(&named)?;
-    let variable = match measurements.iter().position(|signal| signal.name == own) {
+    let variable_name = name(&named)?;
+    let variable = match measurements.iter().position(|signal| signal.name == variable_name) {
         Some(at) => {
             if let Some(entry) = ["unit", "description"].iter().find_map(|key| table.get(key)) {
-                return Err(entry.error(format!("the measurement `{own}` states it")));
+                return Err(entry.error(format!("the measurement `{variable_name}` states it")));
             }
             Variable::Measurement(at)
         }
@@ -147,7 +147,7 @@ pub(crate) fn schedule(
             unit: unit(&table)?,
             description: description(&table)?,
             places: [Some(named.place.clone()), None, None],
-            ..Signal::named(own)
+            ..Signal::named(variable_name)
         }),
     };
     let listed = table.require("points", "the plants at two or more values of the variable")?;
@@ -161,7 +161,7 @@ pub(crate) fn schedule(
 }
 
 fn points(listed: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usize), PlaceError> {
-    let mut found: Vec<SchedulePoint> = Vec::new();
+    let mut all: Vec<SchedulePoint> = Vec::new();
     let mut nominal = None;
     for member in &listed.list()? {
         let table = member.table()?;
@@ -169,25 +169,25 @@ fn points(listed: &Entry<'_>, model: &Model) -> Result<(Vec<SchedulePoint>, usiz
         table.allow(&keys)?;
         let at = table.require("at", "the value of the scheduling variable")?;
         let value = at.number()?;
-        if let Some(last) = found.last().filter(|last| last.at >= value) {
+        if let Some(last) = all.last().filter(|last| last.at >= value) {
             let message = format!("expected ascending values, found {value} after {}", last.at);
             return Err(at.error(message));
         }
         let is_nominal = !keys[1..].iter().any(|key| table.get(key).is_some());
-        if is_nominal && nominal.replace(found.len()).is_some() {
+        if is_nominal && nominal.replace(all.len()).is_some() {
             let expected = keys[1..].join(", ");
             let message = format!("a second point with the plant of the file: expected {expected}");
             return Err(member.error(message));
         }
         let plant = variant(&table, value.to_string(), member.place.clone(), model)?;
-        found.push(SchedulePoint { at: value, plant });
+        all.push(SchedulePoint { at: value, plant });
     }
-    if found.len() < 2 {
-        return Err(listed.error(format!("expected at least two points, found {}", found.len())));
+    if all.len() < 2 {
+        return Err(listed.error(format!("expected at least two points, found {}", all.len())));
     }
     let missing = "expected exactly one point with only `at`: the plant of this file";
     let nominal = nominal.ok_or_else(|| listed.error(missing))?;
-    Ok((found, nominal))
+    Ok((all, nominal))
 }
 
 /// `first`, then the entries that a variant of `model` may have.
@@ -212,12 +212,12 @@ fn variant(
     let mut model = model.clone();
     let mut operating = [None, None];
     match &mut model {
-        Model::Fmu(own) => {
+        Model::Fmu(fmu) => {
             let stated = table.get(POINT).map(|entry| entry.table()).transpose()?;
             for (name, value) in stated.iter().flat_map(Table::entries) {
                 let value = value.number()?;
-                own.operating_point.retain(|(other, _)| other != name);
-                own.operating_point.push((name.to_owned(), value));
+                fmu.operating_point.retain(|(other, _)| other != name);
+                fmu.operating_point.push((name.to_owned(), value));
             }
         }
         Model::Matrices { a, b, c, d: _, f_a, states, sampled: _ } => {
@@ -248,17 +248,20 @@ fn variant(
 /// Reads a list of `count` numbers.
 fn numbers(table: &Table<'_>, key: &str, count: usize) -> Result<Option<Vec<f64>>, PlaceError> {
     let Some(entry) = table.get(key) else { return Ok(None) };
-    let found = entry.numbers()?;
-    if found.len() == count {
-        return Ok(Some(found));
+    let values = entry.numbers()?;
+    if values.len() == count {
+        return Ok(Some(values));
     }
-    Err(entry.error(format!("expected {count} numbers, found {}", found.len())))
+    Err(entry.error(format!("expected {count} numbers, found {}", values.len())))
 }
 
 /// Checks that the members of a family reach their references.
 pub(crate) fn check_action(file: &PlantFile<'_>) -> Result<(), PlaceError> {
-    let own = file.references.as_ref().filter(|own| !own.integral && !file.family.is_empty());
-    let Some(References { action_places: [place, _], .. }) = own else { return Ok(()) };
+    let references = file
+        .references
+        .as_ref()
+        .filter(|references| !references.integral && !file.family.is_empty());
+    let Some(References { action_places: [place, _], .. }) = references else { return Ok(()) };
     let message = "without integral action the other members of the family would miss their references, \
                    because one constant gain N_r fits one plant; expected `integral = true`";
     Err(file.error_at(place, message))
