@@ -52,8 +52,8 @@ pub(crate) fn warnings(
         }
     }
     if linear.b.ncols() == 1 && linear.c.nrows() == 1 && !linear.has_feedthrough() {
-        let found = zeros(&linear.a, &linear.b, &linear.c)?.finite;
-        let of_zeros = found.into_iter().filter(|&zero| is_right(zero) && zero.im >= 0.0);
+        let finite = zeros(&linear.a, &linear.b, &linear.c)?.finite;
+        let of_zeros = finite.into_iter().filter(|&zero| is_right(zero) && zero.im >= 0.0);
         let least = |zero: &Complex<f64>| forced(*zero, &poles);
         if let Some(zero) = of_zeros.max_by(|x, y| least(x).total_cmp(&least(y))) {
             warnings.extend(of_zero(file, zero, &poles, limit));

@@ -72,9 +72,9 @@ pub(crate) fn check(file: &PlantFile<'_>, linear: &LinearPlant) -> Result<(), Pl
         return Err(file.error_at(&file.feedback.place, message));
     }
     match &file.detection {
-        Some(own) if own.model_error.is_some() => {
+        Some(detection) if detection.model_error.is_some() => {
             let message = format!("{fed}; `model_error` is not possible then");
-            Err(file.error_at(&own.place, message))
+            Err(file.error_at(&detection.place, message))
         }
         _ => Ok(()),
     }
@@ -142,8 +142,8 @@ mod tests {
             ),
             (observer, &format!("{observer}\n{detected}"), "`model_error` is not possible then"),
         ] {
-            let found = refused(from, to);
-            assert!(found.contains(expected), "{from} -> {to}: {found}");
+            let error = refused(from, to);
+            assert!(error.contains(expected), "{from} -> {to}: {error}");
         }
     }
 }

@@ -128,60 +128,64 @@ fn on_signals(fault: &Fault, b: &DMatrix<f64>, d: &DMatrix<f64>) -> Model {
 /// Returns the FMU of the file as a linear plant.
 fn linearised(
     file: &PlantFile<'_>,
-    own: &plant_file::PlantFmu,
+    fmu: &plant_file::PlantFmu,
 ) -> Result<LinearPlant, crate::Error> {
-    let (model, found) = linearisation(file, own)?;
+    let (model, linearised) = linearisation(file, fmu)?;
     let known = |signal: &linearise::Signal| Signal {
         unit: signal.unit.clone(),
         operating: Some(signal.value),
         ..Signal::named(signal.name.clone())
     };
-    let merged = |own: &[Signal], found: &[linearise::Signal]| {
-        own.iter().zip(found).map(|(own, found)| own.clone().or(known(found))).collect()
+    let merged = |signals: &[Signal], from_fmu: &[linearise::Signal]| {
+        signals
+            .iter()
+            .zip(from_fmu)
+            .map(|(signal, known_signal)| signal.clone().or(known(known_signal)))
+            .collect()
     };
-    let d = significant(found.matrices.d.clone(), &found.matrices.c);
-    let (faults, models) = faults(file, &found, &d)?;
+    let d = significant(linearised.matrices.d.clone(), &linearised.matrices.c);
+    let (faults, models) = faults(file, &linearised, &d)?;
     Ok(LinearPlant {
-        disturbances: disturbances(file, &found.matrices.b, &d, Some(&found.matrices))?,
-        states: found.states.iter().map(known).collect(),
-        actuators: merged(&file.actuators, &found.inputs),
-        measurements: merged(&file.measurements, &found.outputs),
+        disturbances: disturbances(file, &linearised.matrices.b, &d, Some(&linearised.matrices))?,
+        states: linearised.states.iter().map(known).collect(),
+        actuators: merged(&file.actuators, &linearised.inputs),
+        measurements: merged(&file.measurements, &linearised.outputs),
         faults,
         models,
-        origin: format!("{model}, linearised by {}.", found.method),
-        residual: Some(found.residual),
-        a: found.matrices.a,
-        b: found.matrices.b,
-        c: found.matrices.c,
+        origin: format!("{model}, linearised by {}.", linearised.method),
+        residual: Some(linearised.residual),
+        a: linearised.matrices.a,
+        b: linearised.matrices.b,
+        c: linearised.matrices.c,
         d,
     })
 }
 
 /// Opens the FMU of the file, with the libraries that it needs.
-pub(crate) fn open(file: &PlantFile<'_>, own: &plant_file::PlantFmu) -> Result<Fmu, crate::Error> {
-    for library in &own.preload {
+pub(crate) fn open(file: &PlantFile<'_>, fmu: &plant_file::PlantFmu) -> Result<Fmu, crate::Error> {
+    for library in &fmu.preload {
         fmu_import::preload(library.as_ref())
             .map_err(|error| file.error(&["preload"], files::sentence(&error)))?;
     }
-    let opened = Fmu::open_any(&own.path);
+    let opened = Fmu::open_any(&fmu.path);
     Ok(opened.map_err(|error| file.error(&["plant"], files::sentence(&error)))?)
 }
 
 /// The request for the linear plant at the operating point of the file.
-pub(crate) fn request(file: &PlantFile<'_>, own: &plant_file::PlantFmu) -> Linearise {
+pub(crate) fn request(file: &PlantFile<'_>, fmu: &plant_file::PlantFmu) -> Linearise {
     let names = |signals: &[Signal]| signals.iter().map(|signal| signal.name.clone()).collect();
     let inputs = file.faults.iter().filter_map(|fault| match &fault.entry_point {
         EntryPoint::Input(name) => Some(name.clone()),
         _ => None,
     });
-    let at = own.operating_point.iter();
+    let at = fmu.operating_point.iter();
     Linearise {
         inputs: names(&file.actuators),
         faults: inputs.chain(disturbance_inputs(file)).collect(),
         outputs: names(&file.measurements),
-        states: own.states.clone(),
+        states: fmu.states.clone(),
         at: at.map(|(name, value)| (name.clone(), value.to_string())).collect(),
-        step: own.step,
+        step: fmu.step,
         ..Linearise::default()
     }
 }
@@ -200,31 +204,31 @@ fn disturbances(
     file: &PlantFile<'_>,
     b: &DMatrix<f64>,
     d: &DMatrix<f64>,
-    found: Option<&linearise::Matrices>,
+    matrices: Option<&linearise::Matrices>,
 ) -> Result<Vec<UnknownInput>, PlaceError> {
-    let columns = found.map_or(0, |found| found.f.ncols());
+    let columns = matrices.map_or(0, |matrices| matrices.f.ncols());
     let mut next = columns - disturbance_inputs(file).count().min(columns)..;
     let (n, p) = (b.nrows(), d.nrows());
-    let one = |own: &Disturbance| {
+    let one = |disturbance: &Disturbance| {
         let (mut on_states, mut on_measurements) = (DVector::zeros(n), DVector::zeros(p));
-        match (&own.entry_point, found) {
+        match (&disturbance.entry_point, matrices) {
             (DisturbanceEntry::Column(e), _) => on_states.copy_from(e),
             (DisturbanceEntry::Actuator(at), _) => {
                 (on_states, on_measurements) = (column(b, *at), column(d, *at));
             }
             (DisturbanceEntry::Sensor(at), _) => on_measurements[*at] = 1.0,
             (DisturbanceEntry::Input(_), None) => {}
-            (DisturbanceEntry::Input(_), Some(found)) => {
+            (DisturbanceEntry::Input(_), Some(matrices)) => {
                 let at = next.next().unwrap_or_default();
-                (on_states, on_measurements) = (column(&found.f, at), column(&found.g, at));
+                (on_states, on_measurements) = (column(&matrices.f, at), column(&matrices.g, at));
             }
         }
         if on_states.amax() <= 0.0 && on_measurements.amax() <= 0.0 {
             let message = format!(
                 "disturbance `{}` acts neither on a state nor on a measurement at the operating point",
-                own.name
+                disturbance.name
             );
-            return Err(file.error_at(&own.place, message));
+            return Err(file.error_at(&disturbance.place, message));
         }
         Ok(UnknownInput { on_states, on_measurements })
     };
@@ -234,11 +238,11 @@ fn disturbances(
 /// Linearises the FMU of the file; returns its name and the result.
 fn linearisation(
     file: &PlantFile<'_>,
-    own: &plant_file::PlantFmu,
+    fmu_table: &plant_file::PlantFmu,
 ) -> Result<(String, Linearisation), crate::Error> {
-    let plant_file::PlantFmu { path, operating_point, .. } = own;
-    let fmu = open(file, own)?;
-    let found = linearise(&fmu, &request(file, own)).map_err(|error| {
+    let plant_file::PlantFmu { path, operating_point, .. } = fmu_table;
+    let fmu = open(file, fmu_table)?;
+    let linearised = linearise(&fmu, &request(file, fmu_table)).map_err(|error| {
         let place = match &error {
             LineariseError::UnknownVariable { name, .. } => stating(file, operating_point, name),
             LineariseError::NoStep { .. } => "linearisation_step",
@@ -251,7 +255,7 @@ fn linearisation(
         file.error(&[place, "plant"], format!("{}: {error}{help}", path.display()))
     })?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    Ok((format!("{} ({name})", fmu.description().model_name), found))
+    Ok((format!("{} ({name})", fmu.description().model_name), linearised))
 }
 
 /// Returns the entry of the file that names this variable of the FMU.
@@ -271,7 +275,7 @@ fn stating(file: &PlantFile<'_>, operating_point: &[(String, f64)], name: &str) 
 /// Returns the faults of the file with units of the FMU, and their entry points.
 fn faults(
     file: &PlantFile<'_>,
-    found: &Linearisation,
+    linearised: &Linearisation,
     d: &DMatrix<f64>,
 ) -> Result<(Vec<Fault>, Vec<Model>), crate::Error> {
     let mut inputs = 0..;
@@ -281,11 +285,16 @@ fn faults(
         let (signal, model) = match fault.entry_point {
             EntryPoint::Input(_) => {
                 let at = inputs.next().unwrap_or_default();
-                (&found.faults[at], modelled(fault, entry(file, fault, &found.matrices, at)?))
+                (
+                    &linearised.faults[at],
+                    modelled(fault, entry(file, fault, &linearised.matrices, at)?),
+                )
             }
-            EntryPoint::Sensor(at) => (&found.outputs[at], on_signals(fault, &found.matrices.b, d)),
+            EntryPoint::Sensor(at) => {
+                (&linearised.outputs[at], on_signals(fault, &linearised.matrices.b, d))
+            }
             EntryPoint::Actuator(at) | EntryPoint::Loss { actuator: at, .. } => {
-                (&found.inputs[at], on_signals(fault, &found.matrices.b, d))
+                (&linearised.inputs[at], on_signals(fault, &linearised.matrices.b, d))
             }
             EntryPoint::Column(_) => {
                 let message = format!("fault `{}`: an FMU has no F_a", fault.name);
@@ -302,10 +311,10 @@ fn faults(
 fn entry(
     file: &PlantFile<'_>,
     fault: &Fault,
-    found: &linearise::Matrices,
+    matrices: &linearise::Matrices,
     at: usize,
 ) -> Result<FaultEntry, crate::Error> {
-    let (states, measurements) = (column(&found.f, at), column(&found.g, at));
+    let (states, measurements) = (column(&matrices.f, at), column(&matrices.g, at));
     if measurements.amax() > 0.0 && file.filter.is_none() {
         let message = format!(
             "fault `{}` enters the measurements, which needs `filter`: the rates, in 1/s, of the filter \

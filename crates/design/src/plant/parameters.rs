@@ -38,23 +38,23 @@ impl<'a> ParameterFamily<'a> {
     /// The family that the plant file asks for, if it does.
     pub(crate) fn of(file: &'a PlantFile<'a>) -> Result<Option<Self>, crate::Error> {
         let tolerances = &file.robustness.parameters;
-        let crate::plant_file::Model::Fmu(own) = &file.model else {
+        let crate::plant_file::Model::Fmu(table) = &file.model else {
             return Ok(None);
         };
         if tolerances.is_empty() {
             return Ok(None);
         }
-        let fmu = linear::open(file, own)?;
+        let fmu = linear::open(file, table)?;
         let parameters = tolerances
             .iter()
-            .map(|tolerance| varied(file, own, &fmu, tolerance))
+            .map(|tolerance| varied(file, table, &fmu, tolerance))
             .collect::<Result<Vec<_>, _>>()?;
-        let request = linear::request(file, own);
+        let request = linear::request(file, table);
         let directions = Vec::new();
-        let mut found = Self { file, own, fmu, request, parameters, directions };
-        found.directions =
-            (0..found.count()).map(|at| found.direction(at)).collect::<Result<_, _>>()?;
-        Ok(Some(found))
+        let mut family = Self { file, own: table, fmu, request, parameters, directions };
+        family.directions =
+            (0..family.count()).map(|at| family.direction(at)).collect::<Result<_, _>>()?;
+        Ok(Some(family))
     }
 
     fn direction(&self, at: usize) -> Result<[DMatrix<f64>; 4], crate::Error> {
@@ -82,14 +82,14 @@ impl<'a> ParameterFamily<'a> {
             request.at.retain(|(name, _)| *name != parameter.name);
             request.at.push((parameter.name.clone(), value));
         }
-        let found = linearise(&self.fmu, &request).map_err(|error| {
+        let linearised = linearise(&self.fmu, &request).map_err(|error| {
             let (path, values) = (self.own.path.display(), values.join(", "));
             let message = format!("{path} with {values}: {error}");
             crate::Error::from(self.file.error(&["robustness"], message))
         })?;
-        let measured = found.outputs.iter().map(|signal| signal.value);
-        let measured = DVector::from_iterator(found.outputs.len(), measured);
-        let matrices = found.matrices;
+        let measured = linearised.outputs.iter().map(|signal| signal.value);
+        let measured = DVector::from_iterator(linearised.outputs.len(), measured);
+        let matrices = linearised.matrices;
         let d = significant(matrices.d, &matrices.c);
         let plant = StateSpace {
             a: matrices.a,
@@ -98,19 +98,19 @@ impl<'a> ParameterFamily<'a> {
             d,
             domain: Domain::Continuous,
         };
-        Ok((plant, DVector::from_vec(found.rates), measured))
+        Ok((plant, DVector::from_vec(linearised.rates), measured))
     }
 
     /// The parameters for the report; `deviations`: those of the worst plant; `peaks`: derivatives of
     /// the peaks of S at the commands and at the measurements with respect to the entries.
     pub(crate) fn report(&self, deviations: &[f64], peaks: &[[DMatrix<f64>; 4]]) -> Vec<Parameter> {
         let effects: Vec<Vec<f64>> = peaks.iter().map(|entries| self.slopes(entries)).collect();
-        let one = |(at, own): (usize, &Varied)| Parameter {
-            name: own.name.clone(),
-            unit: own.unit.clone(),
-            value: own.nominal,
-            limits: own.limits,
-            worst: own.value(deviations[at]),
+        let one = |(at, parameter): (usize, &Varied)| Parameter {
+            name: parameter.name.clone(),
+            unit: parameter.unit.clone(),
+            value: parameter.nominal,
+            limits: parameter.limits,
+            worst: parameter.value(deviations[at]),
             effects: effects.iter().map(|point| point[at]).collect(),
         };
         self.parameters.iter().enumerate().map(one).collect()
@@ -128,7 +128,7 @@ impl Varied {
 /// Resolves a parameter: its value at the operating point, and its limits.
 fn varied(
     file: &PlantFile<'_>,
-    own: &PlantFmu,
+    table: &PlantFmu,
     fmu: &Fmu,
     parameter: &ParameterTolerance,
 ) -> Result<Varied, crate::Error> {
@@ -148,7 +148,7 @@ fn varied(
             )));
         }
     };
-    let stated = own.operating_point.iter().find(|(other, _)| other == name);
+    let stated = table.operating_point.iter().find(|(other, _)| other == name);
     let nominal = stated.map(|(_, value)| *value).or(real.start).ok_or_else(|| {
         refused(format!("{name} has no start value; `operating_point` can state it"))
     })?;

@@ -132,7 +132,7 @@ fn dependences(m: &DMatrix<f64>) -> Vec<Dependence> {
     let mut scaled = m.clone();
     scaled.row_iter_mut().for_each(|mut row| row /= unit(row.amax()));
     scaled.column_iter_mut().for_each(|mut column| column /= unit(column.norm()));
-    let (mut found, mut kept) = (Vec::new(), Vec::new());
+    let (mut dependences, mut independent) = (Vec::new(), Vec::new());
     // Columns of the orthonormal basis, and of R with M = Q R.
     let (mut basis, mut r) = (Vec::<DVector<f64>>::new(), Vec::<DVector<f64>>::new());
     for column in 0..m.ncols() {
@@ -151,7 +151,7 @@ fn dependences(m: &DMatrix<f64>) -> Vec<Dependence> {
             parts[last] = length;
             basis.push(rest / length);
             r.push(parts);
-            kept.push(column);
+            independent.push(column);
             continue;
         }
         let order = basis.len();
@@ -160,9 +160,10 @@ fn dependences(m: &DMatrix<f64>) -> Vec<Dependence> {
         let coefficients = upper.solve_upper_triangular(&parts).unwrap_or(parts);
         let least = NEGLIGIBLE * coefficients.amax();
         let taking_part = (0..order).filter(|&at| coefficients[at].abs() > least);
-        found.push(Dependence { column, of: taking_part.map(|at| kept[at]).collect() });
+        dependences
+            .push(Dependence { column, of: taking_part.map(|at| independent[at]).collect() });
     }
-    found
+    dependences
 }
 
 /// Returns `plant.toml:3:5: message` for a warning.

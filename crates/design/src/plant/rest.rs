@@ -22,13 +22,18 @@ pub(crate) struct Rest {
 
 impl Rest {
     /// The equilibrium at deviations x and u from the operating point.
-    pub(crate) fn of(linear: &LinearPlant, x: &DVector<f64>, u: DVector<f64>, kept: bool) -> Self {
+    pub(crate) fn of(
+        linear: &LinearPlant,
+        x: &DVector<f64>,
+        u: DVector<f64>,
+        is_held: bool,
+    ) -> Self {
         let measured = &linear.c * x;
         let measurements = linear.measurements.iter().zip(measured.iter());
         Self {
             u,
-            measurements: measurements.map(|(own, value)| number(own, *value)).collect(),
-            kept,
+            measurements: measurements.map(|(signal, value)| number(signal, *value)).collect(),
+            kept: is_held,
         }
     }
 }
@@ -44,10 +49,10 @@ pub(crate) fn commands(
     deviations: &DVector<f64>,
     stuck: &[(usize, f64)],
 ) -> Vec<Number> {
-    let one = |(at, (own, deviation)): (usize, (&Signal, &f64))| {
+    let one = |(at, (signal, deviation)): (usize, (&Signal, &f64))| {
         let stuck = stuck.iter().find(|(gone, _)| *gone == at);
-        let free = own.operating.unwrap_or(0.0) + deviation;
-        number(own, stuck.map_or(free, |(_, command)| *command))
+        let free = signal.operating.unwrap_or(0.0) + deviation;
+        number(signal, stuck.map_or(free, |(_, command)| *command))
     };
     actuators.iter().zip(deviations.iter()).enumerate().map(one).collect()
 }
@@ -58,9 +63,9 @@ pub(crate) fn beyond_limits(
     commands: &[Number],
     gone: &[usize],
 ) -> Vec<String> {
-    let beyond = |(at, (own, command)): (usize, (&Signal, &Number))| {
-        let [low, high] = own.limits.filter(|_| !gone.contains(&at))?;
-        (command.value < low || command.value > high).then(|| own.name.clone())
+    let beyond = |(at, (signal, command)): (usize, (&Signal, &Number))| {
+        let [low, high] = signal.limits.filter(|_| !gone.contains(&at))?;
+        (command.value < low || command.value > high).then(|| signal.name.clone())
     };
     actuators.iter().zip(commands).enumerate().filter_map(beyond).collect()
 }
