@@ -59,7 +59,7 @@ pub(crate) fn fallback(
     let Some(request) = &file.fallback else { return Ok(None) };
     let search = Search { cases: Cases { designed, request }, judge };
     match search.run()? {
-        Ok(found) => Ok(Some(found)),
+        Ok(design) => Ok(Some(design)),
         Err(reason) => {
             let message = format!("there is no fall-back: {reason}");
             Err(file.error_at(&request.place, message).into())
@@ -155,7 +155,7 @@ impl Search<'_> {
         let mut best = Err(String::new());
         for region in regions {
             best = better(best, self.within(region)?);
-            if best.as_ref().is_ok_and(|found| found.k_f.is_some()) {
+            if best.as_ref().is_ok_and(|design| design.k_f.is_some()) {
                 break;
             }
         }
@@ -208,8 +208,9 @@ impl Search<'_> {
         }
         for factor in FASTER {
             let faster = Region { decay: region.decay.map(|decay| decay * factor), ..region };
-            let compensates =
-                best.as_ref().is_some_and(|own| own.as_ref().is_ok_and(|own| own.k_f.is_some()));
+            let compensates = best
+                .as_ref()
+                .is_some_and(|outcome| outcome.as_ref().is_ok_and(|design| design.k_f.is_some()));
             if compensates || factor > 1.0 && faster == region {
                 break;
             }
@@ -219,9 +220,11 @@ impl Search<'_> {
                         "One gain for the {} cases by linear matrix inequalities, with one P.",
                         vertices.len()
                     );
-                    let found = self.verified(&gain, region, certificate, method)?;
-                    best =
-                        Some(best.map_or_else(|| found.clone(), |own| better(own, found.clone())));
+                    let design = self.verified(&gain, region, certificate, method)?;
+                    best = Some(best.map_or_else(
+                        || design.clone(),
+                        |previous| better(previous, design.clone()),
+                    ));
                 }
                 _ if best.is_some() => break,
                 Outcome::Infeasible { conflict } => {
@@ -255,8 +258,8 @@ impl Search<'_> {
     ) -> Result<Result<Fallback, String>, Error> {
         let gains = &self.cases.designed.gains;
         let k_x = gain.clone().resize_horizontally(gains.k_x.ncols(), 0.0);
-        let mut found = Fallback { k_x, k_f: None, region, certificate, method };
-        if let Some(SlowCase { name, rate }) = (self.judge)(&self.cases, &found)? {
+        let mut design = Fallback { k_x, k_f: None, region, certificate, method };
+        if let Some(SlowCase { name, rate }) = (self.judge)(&self.cases, &design)? {
             let slowest = if rate < 0.0 {
                 format!("the loop with {name} is unstable and grows with {} 1/s", rounded(-rate))
             } else {
@@ -268,11 +271,11 @@ impl Search<'_> {
                  expected fewer `actuators`, a smaller `loss`, a smaller decay rate, or a faster observer"
             )));
         }
-        found.k_f = Some(gains.k_f.clone());
-        if (self.judge)(&self.cases, &found)?.is_some() {
-            found.k_f = None;
+        design.k_f = Some(gains.k_f.clone());
+        if (self.judge)(&self.cases, &design)?.is_some() {
+            design.k_f = None;
         }
-        Ok(Ok(found))
+        Ok(Ok(design))
     }
 }
 

@@ -72,12 +72,12 @@ pub(crate) fn check_states(
         let names: Vec<_> = signals.iter().map(|signal| signal.name.as_str()).collect();
         names.join(", ")
     };
-    let (expected, found) = (names(&nominal.states), names(&linear.states));
-    if expected == found {
+    let (expected, states) = (names(&nominal.states), names(&linear.states));
+    if expected == states {
         return Ok(());
     }
     let message =
-        format!("expected the states of the plant of the file, {expected}; found {found}");
+        format!("expected the states of the plant of the file, {expected}; found {states}");
     Err(file.error_at(&variant.place, message))
 }
 

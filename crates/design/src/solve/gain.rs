@@ -65,16 +65,19 @@ pub(crate) fn unique(gain: DMatrix<f64>, method: String) -> GainResult {
     GainResult { gain, method, required: Vec::new(), quality: None, norm: None, choice: None }
 }
 
-pub(crate) fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<GainResult, Refusal> {
-    match found {
-        Outcome::Optimal(found) => {
-            let bound = found.bound.as_ref();
+pub(crate) fn synthesised(
+    outcome: Outcome<Synthesis>,
+    method: &str,
+) -> Result<GainResult, Refusal> {
+    match outcome {
+        Outcome::Optimal(synthesis) => {
+            let bound = synthesis.bound.as_ref();
             let bound = bound.map_or(String::new(), |bound| {
                 format!("; bound {:.4e}, verified with margin {:.1e}", bound.gamma, bound.margin)
             });
-            let margin = found.region.margin;
+            let margin = synthesis.region.margin;
             let method = format!("{method}; region verified with margin {margin:.1e}{bound}.");
-            Ok(unique(found.gain, method))
+            Ok(unique(synthesis.gain, method))
         }
         Outcome::Infeasible { conflict } => Err(Refusal::Conflict(contradiction(&conflict))),
         Outcome::Inconclusive(reason) => Err(Refusal::Conflict(format!(
@@ -101,7 +104,7 @@ fn contradiction(conflict: &[&str]) -> String {
 
 impl GainChoice {
     pub(crate) fn candidates(&self) -> [Vec<&GainResult>; 2] {
-        self.candidates.each_ref().map(|own| own.iter().collect())
+        self.candidates.each_ref().map(|results| results.iter().collect())
     }
 }
 

@@ -37,25 +37,25 @@ pub(crate) fn feedback(
             if part.fixed.is_empty() {
                 return Ok(assigned(&assign(a, b, &movable)?, &required));
             }
-            let found = assign(&part.a, &part.b, &movable)?.map(|gain| part.gain(gain));
-            Ok(partly_assigned(&found, &required, &part))
+            let gains = assign(&part.a, &part.b, &movable)?.map(|gain| part.gain(gain));
+            Ok(partly_assigned(&gains, &required, &part))
         }
         Requirement::Weights { states, channels } => {
             let weights = Weights { q: states.clone(), r: channels.clone(), n: None };
-            let found = lqr(a, b, &weights, domain)?;
-            Ok(weighted(found.gain, "Linear-quadratic regulator", found.residual))
+            let regulator = lqr(a, b, &weights, domain)?;
+            Ok(weighted(regulator.gain, "Linear-quadratic regulator", regulator.residual))
         }
         Requirement::Bandwidth(bandwidth) => problem.by_bandwidth(bandwidth, domain),
         Requirement::Region(region) => {
             let part = controllable_part(a, b)?;
             region.require(&part.fixed, domain)?;
-            let found = if part.fixed.is_empty() {
+            let outcome = if part.fixed.is_empty() {
                 lmi::state_feedback(a, b, &region.stated(), None, domain)?
             } else {
                 lmi::state_feedback(&part.a, &part.b, &region.stated(), None, domain)?
             };
-            let found = synthesised(found, IN_REGION)?;
-            Ok(if part.fixed.is_empty() { found } else { found.mapped(|gain| part.gain(gain)) })
+            let result = synthesised(outcome, IN_REGION)?;
+            Ok(if part.fixed.is_empty() { result } else { result.mapped(|gain| part.gain(gain)) })
         }
         Requirement::HInfinity { bound, region, channel } => {
             region.require(&uncontrollable_modes(a, b)?, domain)?;
@@ -74,8 +74,8 @@ pub(crate) fn observer(
     domain: Domain,
 ) -> Result<GainResult, Refusal> {
     let ObserverProblem { a_0, c_0, estimator, .. } = *problem;
-    let seen = estimator.output_matrix(a_0, c_0);
-    let (a_dual, b_dual) = (a_0.transpose(), seen.transpose());
+    let output = estimator.output_matrix(a_0, c_0);
+    let (a_dual, b_dual) = (a_0.transpose(), output.transpose());
     match required {
         Requirement::Eigenvalues(_) | Requirement::SampledEigenvalues(_) => {
             let part = controllable_part(&a_dual, &b_dual)?;
@@ -84,7 +84,7 @@ pub(crate) fn observer(
                 [] => (&a_dual, &b_dual),
                 _ => (&part.a, &part.b),
             };
-            let found = match domain {
+            let gains = match domain {
                 Domain::Continuous => {
                     alternatives_balanced(a_1, b_1, &movable)?.map(|gain| -gain.transpose())
                 }
@@ -93,31 +93,31 @@ pub(crate) fn observer(
                 }
             };
             if part.fixed.is_empty() {
-                return Ok(assigned(&found, &required));
+                return Ok(assigned(&gains, &required));
             }
-            let found = found.map(|gain| part.gain(&gain.transpose()).transpose());
-            Ok(partly_assigned(&found, &required, &part))
+            let gains = gains.map(|gain| part.gain(&gain.transpose()).transpose());
+            Ok(partly_assigned(&gains, &required, &part))
         }
         Requirement::Weights { states, channels } => {
-            let found = kalman(a_0, c_0, states, channels, domain)?;
-            let gain = found
+            let filter = kalman(a_0, c_0, states, channels, domain)?;
+            let gain = filter
                 .current_gain
                 .filter(|_| estimator == Estimator::Current)
-                .unwrap_or(found.gain);
-            Ok(weighted(gain, "Kalman filter", found.residual))
+                .unwrap_or(filter.gain);
+            Ok(weighted(gain, "Kalman filter", filter.residual))
         }
         Requirement::Bandwidth(bandwidth) => problem.by_bandwidth(bandwidth, domain),
         Requirement::Region(region) => {
             let part = controllable_part(&a_dual, &b_dual)?;
             region.require(&part.fixed, domain)?;
             if part.fixed.is_empty() {
-                let found = lmi::observer_gain(a_0, &seen, &region.stated(), None, domain)?;
-                return synthesised(found, IN_REGION);
+                let outcome = lmi::observer_gain(a_0, &output, &region.stated(), None, domain)?;
+                return synthesised(outcome, IN_REGION);
             }
             let (a_1, c_1) = (part.a.transpose(), part.b.transpose());
-            let found = lmi::observer_gain(&a_1, &c_1, &region.stated(), None, domain)?;
-            let found = synthesised(found, IN_REGION)?;
-            Ok(found.mapped(|gain| part.gain(&gain.transpose()).transpose()))
+            let outcome = lmi::observer_gain(&a_1, &c_1, &region.stated(), None, domain)?;
+            let result = synthesised(outcome, IN_REGION)?;
+            Ok(result.mapped(|gain| part.gain(&gain.transpose()).transpose()))
         }
         Requirement::HInfinity { bound, region, channel } => {
             region.require(&uncontrollable_modes(&a_dual, &b_dual)?, domain)?;
@@ -143,7 +143,7 @@ fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Ass
         _ => None,
     };
     let mut rest = required.eigenvalues().to_vec();
-    let mut taken = Vec::new();
+    let mut fixed_eigenvalues = Vec::new();
     for mode in fixed {
         let stated = sampling.map_or(mode.eigenvalue, |period| mode.eigenvalue.ln() / period);
         let near = |one: &Complex<f64>| (one - stated).norm();
@@ -152,16 +152,16 @@ fn movable(required: &Requirement, fixed: &[Mode], domain: Domain) -> Result<Ass
             Some(at) => drop(rest.swap_remove(at)),
             None => return Err(Refusal::Fixed(mode.clone())),
         }
-        taken.push(mode.eigenvalue);
+        fixed_eigenvalues.push(mode.eigenvalue);
     }
     let movable = match sampling {
         Some(period) => sampled_poles(&rest, period)?,
         None => rest,
     };
-    Ok(Assignment { required: movable.iter().copied().chain(taken).collect(), movable })
+    Ok(Assignment { required: movable.iter().copied().chain(fixed_eigenvalues).collect(), movable })
 }
 
-fn assigned(found: &Alternatives, required: &[Complex<f64>]) -> GainResult {
+fn assigned(alternatives: &Alternatives, required: &[Complex<f64>]) -> GainResult {
     let method = "Eigenvalues assigned, with eigenvectors as well-conditioned as was found.";
     let result = |placement: &Placement| GainResult {
         gain: placement.gain.clone(),
@@ -171,17 +171,20 @@ fn assigned(found: &Alternatives, required: &[Complex<f64>]) -> GainResult {
         norm: None,
         choice: None,
     };
-    let candidates = found.candidates().map(|own| own.into_iter().map(result).collect());
-    let standard = found.standard.each_ref().map(|own| own.as_ref().map(|own| own.gain.clone()));
+    let candidates = alternatives.candidates().map(|gains| gains.into_iter().map(result).collect());
+    let standard = alternatives
+        .standard
+        .each_ref()
+        .map(|choice| choice.as_ref().map(|alternative| alternative.gain.clone()));
     GainResult {
         choice: Some(Box::new(GainChoice { candidates, standard })),
-        ..result(&found.chosen)
+        ..result(&alternatives.chosen)
     }
 }
 
 /// The quality is that of the movable part, so that it is not stated.
 fn partly_assigned(
-    found: &Alternatives,
+    alternatives: &Alternatives,
     required: &[Complex<f64>],
     part: &ControllablePart,
 ) -> GainResult {
@@ -190,11 +193,11 @@ fn partly_assigned(
         "{movable} of {all} eigenvalues assigned, with eigenvectors as well-conditioned as was found; no gain moves \
          the others."
     );
-    let named = |own: GainResult| GainResult { method: method.clone(), quality: None, ..own };
-    let mut result = named(assigned(found, required));
+    let named = |choice: GainResult| GainResult { method: method.clone(), quality: None, ..choice };
+    let mut result = named(assigned(alternatives, required));
     if let Some(choice) = &mut result.choice {
         let candidates = std::mem::take(&mut choice.candidates);
-        choice.candidates = candidates.map(|own| own.into_iter().map(named).collect());
+        choice.candidates = candidates.map(|results| results.into_iter().map(named).collect());
     }
     result
 }

@@ -74,7 +74,7 @@ impl DesignedLaw {
 impl LawProblem<'_> {
     /// Designs `law`; the error says in a sentence why it does not exist.
     pub(crate) fn design(&self, law: &Law) -> Result<DesignedLaw, String> {
-        let mut found = DesignedLaw {
+        let mut design = DesignedLaw {
             law: law.clone(),
             gains: self.gains.clone(),
             a_f: None,
@@ -83,18 +83,18 @@ impl LawProblem<'_> {
             conditions: Vec::new(),
         };
         match law {
-            Law::Augmented => return Ok(found),
+            Law::Augmented => return Ok(design),
             Law::ProportionalIntegral { proportional } => {
                 self.require_current()?;
                 let part = proportional.unwrap_or(1.0);
-                found.gains = proportional_integral(self.plant, self.gains, self.domain, part)
+                design.gains = proportional_integral(self.plant, self.gains, self.domain, part)
                     .map_err(text)?;
-                found.parameters.push(number("proportional", None, part));
-                return Ok(found);
+                design.parameters.push(number("proportional", None, part));
+                return Ok(design);
             }
             Law::FastAdaptive { .. } | Law::SlidingMode { .. } | Law::Learning { .. } => {}
         }
-        let form = self.direct_form(&mut found.conditions)?;
+        let form = self.direct_form(&mut design.conditions)?;
         if matches!(law, Law::SlidingMode { .. } | Law::Learning { .. })
             && self.domain == Domain::Continuous
         {
@@ -112,12 +112,12 @@ impl LawProblem<'_> {
                 let count = self.linear.faults.len();
                 let gamma = gamma.clone().unwrap_or_else(|| vec![rate * APART; count]);
                 let law = FastAdaptive { sigma: sigma.unwrap_or(rate / APART), gamma };
-                found.gains = fast_adaptive(plant, &form, gains, &law, rate).map_err(text)?;
-                found.parameters.push(number("sigma", Some("1/s"), law.sigma));
-                found.parameters.extend(self.each("gamma", Some("1/s"), &law.gamma));
+                design.gains = fast_adaptive(plant, &form, gains, &law, rate).map_err(text)?;
+                design.parameters.push(number("sigma", Some("1/s"), law.sigma));
+                design.parameters.extend(self.each("gamma", Some("1/s"), &law.gamma));
             }
             Law::SlidingMode { rho, delta } => {
-                let rho = self.reach(rho.as_ref(), &mut found.conditions)?;
+                let rho = self.reach(rho.as_ref(), &mut design.conditions)?;
                 let law = SlidingMode { rho, delta: delta.clone() };
                 let (OwnModel { gains, a_f, .. }, delta) = sliding_mode(
                     plant, &form, gains, &law, rate,
@@ -129,22 +129,22 @@ impl LawProblem<'_> {
                     ),
                     other => text(other),
                 })?;
-                (found.gains, found.a_f) = (gains, Some(a_f));
-                found.parameters.extend(self.each("rho", None, &law.rho));
-                found.parameters.extend(self.each("delta", None, &delta));
-                found.injection = Some(Injection { f: form.m_1, rho: law.rho, delta });
+                (design.gains, design.a_f) = (gains, Some(a_f));
+                design.parameters.extend(self.each("rho", None, &law.rho));
+                design.parameters.extend(self.each("delta", None, &delta));
+                design.injection = Some(Injection { f: form.m_1, rho: law.rho, delta });
             }
-            Law::Learning { kept } => {
-                let law = Learning { kept: kept.unwrap_or(KEPT) };
+            Law::Learning { kept: share } => {
+                let law = Learning { kept: share.unwrap_or(KEPT) };
                 let OwnModel { gains, a_f, .. } =
                     learning(plant, &form, gains, &law, rate).map_err(text)?;
-                (found.gains, found.a_f) = (gains, Some(a_f));
-                found.parameters.push(number("K_1", None, law.kept));
+                (design.gains, design.a_f) = (gains, Some(a_f));
+                design.parameters.push(number("K_1", None, law.kept));
             }
             Law::Augmented | Law::ProportionalIntegral { .. } => {}
         }
-        self.require_stable(&mut found)?;
-        Ok(found)
+        self.require_stable(&mut design)?;
+        Ok(design)
     }
 
     /// The names of the laws that exist with default parameters.
@@ -229,21 +229,22 @@ impl LawProblem<'_> {
     }
 
     /// Checks the error dynamics as they will run.
-    fn require_stable(&self, found: &mut DesignedLaw) -> Result<(), String> {
+    fn require_stable(&self, design: &mut DesignedLaw) -> Result<(), String> {
         let mut plant = self.plant.clone();
-        if let Some(a_f) = &found.a_f {
+        if let Some(a_f) = &design.a_f {
             plant.a_f.copy_from(a_f);
         }
-        let excess = instability(&found.gains.error_dynamics(&plant), self.domain).map_err(text)?;
+        let excess =
+            instability(&design.gains.error_dynamics(&plant), self.domain).map_err(text)?;
         if excess >= 0.0 {
             return Err(format!("its error dynamics would not be stable, by {excess:.3e}"));
         }
-        let linear = if found.injection.is_some() { " within the boundary layer" } else { "" };
+        let linear = if design.injection.is_some() { " within the boundary layer" } else { "" };
         let margin = match self.domain {
             Domain::Continuous => "largest real part of the eigenvalues, 1/s",
             Domain::Sampled { .. } => "largest modulus of the eigenvalues, less 1",
         };
-        found.conditions.push(check(
+        design.conditions.push(check(
             "the estimation errors decay",
             Some(excess),
             format!("{margin}{linear}"),

@@ -127,14 +127,14 @@ impl ObserverProblem<'_> {
         if unsuitable || self.a_0.nrows() > LARGEST_ORDER {
             return Ok(None);
         }
-        let given = self.performance(required, domain);
-        let seen = self.estimator.output_matrix(self.a_0, self.c_0);
+        let performance = self.performance(required, domain);
+        let output = self.estimator.output_matrix(self.a_0, self.c_0);
         let problem = NormFilterProblem {
             a: self.a_0,
-            c: &seen,
-            disturbance: &given.disturbance,
-            feedthrough: &given.feedthrough,
-            output: &given.output,
+            c: &output,
+            disturbance: &performance.disturbance,
+            feedthrough: &performance.feedthrough,
+            output: &performance.output,
         };
         // A plant with a mode at rest that no fault excites has no such filter.
         let Ok(filter) = NormFilter::new(&problem, domain) else { return Ok(None) };
@@ -143,10 +143,10 @@ impl ObserverProblem<'_> {
         }
         let norm = |gain: &DMatrix<f64>| -> Result<f64, Error> {
             let system = StateSpace {
-                a: self.a_0 - gain * &seen,
-                b: &given.disturbance - gain * &given.feedthrough,
-                c: given.output.clone(),
-                d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
+                a: self.a_0 - gain * &output,
+                b: &performance.disturbance - gain * &performance.feedthrough,
+                c: performance.output.clone(),
+                d: DMatrix::zeros(performance.output.nrows(), performance.disturbance.ncols()),
                 domain,
             };
             Ok(h_infinity(&system, WIDTH)?.upper)
@@ -175,12 +175,12 @@ impl ObserverProblem<'_> {
         if !required.channel.noise.is_empty() {
             return Ok(self.noisy_lower_bound(required, domain)?.map(LowerBound::for_filters));
         }
-        let seen = self.estimator.output_matrix(self.a_0, self.c_0);
+        let output = self.estimator.output_matrix(self.a_0, self.c_0);
         let performance = self.performance(required, domain);
         let of_filters = match self.weights(required.channel, domain)? {
-            None => noiseless_norm_lower_bound(self.a_0, &seen, &performance, domain),
+            None => noiseless_norm_lower_bound(self.a_0, &output, &performance, domain),
             Some(weights) => {
-                let (a, c, performance) = weights.extend(self.a_0, &seen, &performance);
+                let (a, c, performance) = weights.extend(self.a_0, &output, &performance);
                 noiseless_norm_lower_bound(&a, &c, &performance, domain)
             }
         };
@@ -190,15 +190,15 @@ impl ObserverProblem<'_> {
         let of_disc = match disc.filter(|_| !required.channel.has_states()) {
             Some((center, radius)) => {
                 let (disc, decay) = (lmi::Disc { center, radius }, decay.unwrap_or(0.0));
-                disc_norm_lower_bound(self.a_0, &seen, &performance, disc, decay).unwrap_or(None)
+                disc_norm_lower_bound(self.a_0, &output, &performance, disc, decay).unwrap_or(None)
             }
             None => None,
         };
         Ok(match (of_filters, of_disc) {
-            (found, Some(norm)) if found.is_none_or(|found| found < norm) => {
+            (bound, Some(norm)) if bound.is_none_or(|norm_bound| norm_bound < norm) => {
                 Some(LowerBound { norm, holds_for: LowerBoundFor::Disc })
             }
-            (found, _) => found.map(LowerBound::for_filters),
+            (bound, _) => bound.map(LowerBound::for_filters),
         })
     }
 
@@ -215,23 +215,23 @@ impl ObserverProblem<'_> {
             return Ok(None);
         }
         let Some(filter) = self.filter else {
-            let seen = self.estimator.output_matrix(self.a_0, self.c_0);
+            let output = self.estimator.output_matrix(self.a_0, self.c_0);
             let performance = self.performance(required, domain);
             return match self.weights(required.channel, domain)? {
-                None => observer_norm_lower_bound(self.a_0, &seen, &performance, domain),
+                None => observer_norm_lower_bound(self.a_0, &output, &performance, domain),
                 Some(weights) => {
-                    let (a, c, performance) = weights.extend(self.a_0, &seen, &performance);
+                    let (a, c, performance) = weights.extend(self.a_0, &output, &performance);
                     observer_norm_lower_bound(&a, &c, &performance, domain)
                 }
             };
         };
         let first = order - self.faults - filter.len();
-        let kept: Vec<_> =
+        let states: Vec<_> =
             (0..order).filter(|at| !(first..first + filter.len()).contains(at)).collect();
-        let kept_columns = self.a_0.select_columns(&kept);
+        let kept_columns = self.a_0.select_columns(&states);
         let rates = DVector::from_column_slice(filter).map(|rate| 1.0 / rate);
         let unfiltered = ObserverProblem {
-            a_0: &kept_columns.select_rows(&kept),
+            a_0: &kept_columns.select_rows(&states),
             c_0: &(DMatrix::from_diagonal(&rates) * kept_columns.rows(first, filter.len())),
             b: &self.b.rows(0, first).into_owned(),
             channels: self.channels,
@@ -248,23 +248,23 @@ impl ObserverProblem<'_> {
         required: NormRequirement<'_>,
         domain: Domain,
     ) -> Result<GainResult, Refusal> {
-        let seen = self.estimator.output_matrix(self.a_0, self.c_0);
+        let output = self.estimator.output_matrix(self.a_0, self.c_0);
         let plain = NormRequirement { channel: &Channel::default(), ..required };
         let unweighted = self.performance(plain, domain);
         let weights = self.weights(required.channel, domain)?;
         let search = Search {
             synthesise: &|region, performance| match performance.zip(weights.as_ref()) {
-                None => lmi::observer_gain(self.a_0, &seen, region, performance, domain),
+                None => lmi::observer_gain(self.a_0, &output, region, performance, domain),
                 Some((performance, weights)) => {
-                    weights.observer_gain(self.a_0, &seen, region, performance, domain)
+                    weights.observer_gain(self.a_0, &output, region, performance, domain)
                 }
             },
             weights: weights.as_ref(),
-            system: &|gain, given| StateSpace {
-                a: self.a_0 - gain * &seen,
-                b: &given.disturbance - gain * &given.feedthrough,
-                c: given.output.clone(),
-                d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
+            system: &|gain, performance| StateSpace {
+                a: self.a_0 - gain * &output,
+                b: &performance.disturbance - gain * &performance.feedthrough,
+                c: performance.output.clone(),
+                d: DMatrix::zeros(performance.output.nrows(), performance.disturbance.ncols()),
                 domain,
             },
             performance: self.performance(required, domain),
@@ -344,11 +344,11 @@ impl FeedbackProblem<'_> {
                 }
             },
             weights: weights.as_ref(),
-            system: &|gain, given| StateSpace {
+            system: &|gain, performance| StateSpace {
                 a: self.a + self.b * gain,
-                b: given.disturbance.clone(),
-                c: &given.output + &given.feedthrough * gain,
-                d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
+                b: performance.disturbance.clone(),
+                c: &performance.output + &performance.feedthrough * gain,
+                d: DMatrix::zeros(performance.output.nrows(), performance.disturbance.ncols()),
                 domain,
             },
             performance,

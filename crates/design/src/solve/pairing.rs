@@ -36,13 +36,13 @@ impl PairProblem<'_> {
         if let ([only], []) = (first.as_slice(), second.as_slice()) {
             return Ok(chosen(*only));
         }
-        let own = |(feedback, observer): &(&GainResult, &GainResult)| {
+        let closed = |(feedback, observer): &(&GainResult, &GainResult)| {
             self.closed(&gains(&feedback.gain, &observer.gain))
         };
-        let loops = |pairs: &[_]| pairs.iter().map(own).collect::<Result<Vec<_>, Error>>();
+        let loops = |pairs: &[_]| pairs.iter().map(closed).collect::<Result<Vec<_>, Error>>();
         let standard = feedback.standard.iter().zip(&observer.standard);
-        let standard = standard.filter_map(|(own, other)| own.as_ref().zip(other.as_ref()));
-        let references = standard.map(|(own, other)| self.closed(&gains(own, other)));
+        let standard = standard.filter_map(|(gain, other)| gain.as_ref().zip(other.as_ref()));
+        let references = standard.map(|(gain, other)| self.closed(&gains(gain, other)));
         let references = references.collect::<Result<Vec<_>, Error>>()?;
         let best = least_sensitive([&loops(&first)?, &loops(&second)?], &references);
         Ok(chosen(*first.iter().chain(&second).nth(best).unwrap_or(&first[0])))

@@ -84,28 +84,28 @@ pub(crate) fn reconfigurations(
     let (mut single, mut combinations) = (Vec::new(), Vec::new());
     let (mut without, mut several, mut by_fallback) = (Vec::new(), Vec::new(), Vec::new());
     for gone in request.cases() {
-        let own = Without { designed, request, gone };
-        let (gains, outcome) = match own.design(requirement)? {
+        let case = Without { designed, request, gone };
+        let (gains, outcome) = match case.design(requirement)? {
             Ok((gains, report)) => (Some(gains), Ok(report)),
             Err(reason) => (None, Err(reason)),
         };
         if let (None, Some(fallback)) = (&gains, &fallback) {
-            by_fallback.push(own.served(fallback)?);
+            by_fallback.push(case.served(fallback)?);
         }
-        if let [actuator] = own.gone[..] {
+        if let [actuator] = case.gone[..] {
             let signal = &designed.linear.actuators[actuator];
             let stuck_at = request.stuck_at(actuator);
             if gains.is_some() || fallback.is_some() {
-                let decision = request.decision.filter(|_| own.is_estimated(actuator));
-                let restart = own.restarted();
+                let decision = request.decision.filter(|_| case.is_estimated(actuator));
+                let restart = case.restarted();
                 single.push(Reconfiguration { actuator, stuck_at, gains, restart, decision });
             }
             let (actuator, unit) = (signal.name.clone(), signal.unit.clone());
             without.push(WithoutActuator { actuator, unit, stuck_at, outcome });
         } else {
-            let actuators = own.names();
+            let actuators = case.names();
             several.push(WithoutSeveral { actuators, outcome });
-            combinations.extend(gains.map(|gains| Combination { gone: own.gone, gains }));
+            combinations.extend(gains.map(|gains| Combination { gone: case.gone, gains }));
         }
     }
     if let Some(fallback) = fallback.as_ref().filter(|_| request.together == 1) {
@@ -213,7 +213,8 @@ impl Without<'_> {
         if first.len() + second.len() == 1 {
             return Ok(first.swap_remove(0));
         }
-        let closed = |(own, _): &(ReconfiguredGains, Rest)| self.known_loop(&own.k_x, &own.k_f);
+        let closed =
+            |(gains, _): &(ReconfiguredGains, Rest)| self.known_loop(&gains.k_x, &gains.k_f);
         let loops = |all: &[_]| all.iter().map(closed).collect::<Result<Vec<_>, Error>>();
         let references = loops(&of(&feedbacks.standard)?)?;
         let best = least_sensitive([&loops(&first)?, &loops(&second)?], &references);
@@ -226,8 +227,8 @@ impl Without<'_> {
         let Solution { plant, gains, domain, .. } = self.designed;
         let mut reduced = plant.clone();
         reduced.b = self.without_columns(&plant.b);
-        let own = Gains { k_x: k_x.clone(), k_f: k_f.clone(), ..gains.clone() };
-        let controller = controller(&reduced, &own, *domain)?;
+        let reduced_gains = Gains { k_x: k_x.clone(), k_f: k_f.clone(), ..gains.clone() };
+        let controller = controller(&reduced, &reduced_gains, *domain)?;
         let FaultyPlant { a, b, c, .. } = reduced;
         let d = DMatrix::zeros(c.nrows(), b.ncols());
         Loop::new(StateSpace { a, b, c, d, domain: *domain }, controller)
@@ -264,16 +265,16 @@ impl Without<'_> {
     /// The distance of each command from its nearest limit, relative to the largest such distance; 1
     /// without limits.
     fn authority(&self) -> Vec<f64> {
-        let distance = |own: &Signal| {
-            let operating = own.operating.unwrap_or(0.0);
-            own.limits.map(|[low, high]| (operating - low).min(high - operating))
+        let distance = |signal: &Signal| {
+            let operating = signal.operating.unwrap_or(0.0);
+            signal.limits.map(|[low, high]| (operating - low).min(high - operating))
         };
         let distances: Vec<_> = self.designed.linear.actuators.iter().map(distance).collect();
         let largest = distances.iter().flatten().copied().fold(0.0, f64::max);
         if largest <= 0.0 || distances.iter().any(Option::is_none) {
             return vec![1.0; distances.len()];
         }
-        distances.iter().flatten().map(|own| (own / largest).max(1e-3)).collect()
+        distances.iter().flatten().map(|distance| (distance / largest).max(1e-3)).collect()
     }
 
     /// Feedbacks of the other actuators that meet the requirement of the plant file, and the method.
@@ -289,8 +290,8 @@ impl Without<'_> {
             Requirement::HInfinity { bound, region, channel } => {
                 let mut channel = channel.clone();
                 if !channel.weights.is_empty() {
-                    for own in gone.iter().rev() {
-                        channel.weights.remove(linear.c.nrows() + own);
+                    for actuator in gone.iter().rev() {
+                        channel.weights.remove(linear.c.nrows() + actuator);
                     }
                 }
                 Requirement::HInfinity { bound: *bound, region: *region, channel }
@@ -305,13 +306,14 @@ impl Without<'_> {
             f_a: &plant.f_a.rows(0, n).into(),
         };
         match feedback(&requirement, &problem, *domain) {
-            Ok(found) => {
+            Ok(result) => {
                 let with_zeros = |gain: DMatrix<f64>, at: &usize| gain.insert_row(*at, 0.0);
-                let method = found.method.clone();
+                let method = result.method.clone();
                 let complete = |gain: DMatrix<f64>| gone.iter().fold(gain, with_zeros);
-                let GainChoice { candidates, standard } = found.into_choice();
-                let all =
-                    candidates.map(|own| own.into_iter().map(|own| complete(own.gain)).collect());
+                let GainChoice { candidates, standard } = result.into_choice();
+                let all = candidates.map(|results| {
+                    results.into_iter().map(|result| complete(result.gain)).collect()
+                });
                 let standard = standard.into_iter().flatten().map(complete).collect();
                 Ok((Feedbacks { all, standard }, method))
             }
@@ -334,7 +336,7 @@ impl Without<'_> {
         authority: &[f64],
     ) -> Result<(DMatrix<f64>, DMatrix<f64>, Rest), Error> {
         let Solution { linear, extended, domain, .. } = self.designed;
-        let kept = linear.c.select_rows(&self.request.keep);
+        let output = linear.c.select_rows(&self.request.keep);
         let mut reduced = extended.clone();
         reduced.plant.b = self.without_columns(&extended.plant.b);
         let mut k_f = sampled::compensation_gain(&reduced, *domain)?;
@@ -345,7 +347,7 @@ impl Without<'_> {
         let (mut x, mut u, mut is_kept) = (DVector::zeros(n), DVector::zeros(m), true);
         for (position, (actuator, stuck_at)) in self.stuck().into_iter().enumerate() {
             let b_g: DVector<f64> = linear.b.column(actuator).into();
-            let unit = equilibrium(&linear.a, &actuators, &kept, &b_g)?;
+            let unit = equilibrium(&linear.a, &actuators, &output, &b_g)?;
             let answer = &unit.u - k_x * &unit.x;
             for (at, channel) in self.faults_of(actuator) {
                 // The intact gain has the mean of the modelled fault over a sample.
@@ -369,19 +371,19 @@ impl Without<'_> {
     /// The faults of an actuator: their first column, and their channels.
     fn faults_of(&self, gone: usize) -> impl Iterator<Item = (usize, FaultChannel)> + '_ {
         let Solution { linear, extended, .. } = self.designed;
-        let own = move |point: &EntryPoint| match point {
+        let acts = move |point: &EntryPoint| match point {
             EntryPoint::Actuator(actuator) | EntryPoint::Loss { actuator, .. } => *actuator == gone,
             _ => false,
         };
         let faults = linear.faults.iter().zip(&extended.channels);
         faults
-            .filter(move |(fault, _)| own(&fault.entry_point))
+            .filter(move |(fault, _)| acts(&fault.entry_point))
             .map(|(_, channel)| (channel.estimate, *channel))
     }
 
     fn restarted(&self) -> Vec<usize> {
         let faults = self.gone.iter().flat_map(|gone| self.faults_of(*gone));
-        faults.flat_map(|(_, own)| [Some(own.estimate), own.rate]).flatten().collect()
+        faults.flat_map(|(_, channel)| [Some(channel.estimate), channel.rate]).flatten().collect()
     }
 
     fn is_estimated(&self, gone: usize) -> bool {

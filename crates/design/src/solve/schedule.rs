@@ -63,13 +63,13 @@ impl Scheduled {
                 points.push((point.at, None));
                 continue;
             }
-            let own = solve(&file.with(&point.plant), law)
+            let solution = solve(&file.with(&point.plant), law)
                 .map_err(|error| {
                     error.within(format!("schedule with {} = {}", variable.name, point.at))
                 })?
                 .solution;
-            check_states(file, &point.plant, nominal, &own.linear)?;
-            points.push((point.at, Some(own)));
+            check_states(file, &point.plant, nominal, &solution.linear)?;
+            points.push((point.at, Some(solution)));
         }
         Ok(Some(Self {
             measurement: match schedule.variable {
@@ -87,25 +87,25 @@ impl Scheduled {
         &'a self,
         nominal: &'a Solution,
     ) -> impl Iterator<Item = (f64, &'a Solution)> {
-        self.points.iter().map(move |(at, own)| (*at, own.as_ref().unwrap_or(nominal)))
+        self.points.iter().map(move |(at, solution)| (*at, solution.as_ref().unwrap_or(nominal)))
     }
 
     /// The points besides that of the plant of the file.
     pub(crate) fn others(&self) -> impl Iterator<Item = (f64, &Solution)> {
-        self.points.iter().filter_map(|(at, own)| Some((*at, own.as_ref()?)))
+        self.points.iter().filter_map(|(at, solution)| Some((*at, solution.as_ref()?)))
     }
 }
 
 impl Point {
-    fn of(own: &Solution) -> Result<Self, Error> {
-        let linear = &own.linear;
+    fn of(solution: &Solution) -> Result<Self, Error> {
+        let linear = &solution.linear;
         let (mut a, mut b) = (linear.a.clone(), linear.b.clone());
-        if let Domain::Sampled { period } = own.domain {
+        if let Domain::Sampled { period } = solution.domain {
             (a, b) = zero_order_hold(&a, &b, period)?;
         }
         let d = DMatrix::zeros(linear.c.nrows(), b.ncols());
-        let physical = StateSpace { a, b, c: linear.c.clone(), d, domain: own.domain };
-        Ok(Self { physical, model: own.plant.clone(), gains: own.gains.clone() })
+        let physical = StateSpace { a, b, c: linear.c.clone(), d, domain: solution.domain };
+        Ok(Self { physical, model: solution.plant.clone(), gains: solution.gains.clone() })
     }
 
     /// The matrices at the part `t` of the way to `other`, as the controller FMU interpolates them.
@@ -136,12 +136,12 @@ impl Point {
                     .p_f
                     .as_ref()
                     .zip(other.gains.p_f.as_ref())
-                    .map(|(own, next)| mix(own, next)),
+                    .map(|(matrix, next)| mix(matrix, next)),
                 integral: gains.integral.as_ref().zip(other.gains.integral.as_ref()).map(
-                    |(own, next)| IntegralAction {
-                        output: mix(&own.output, &next.output),
-                        gain: mix(&own.gain, &next.gain),
-                        ..own.clone()
+                    |(action, next)| IntegralAction {
+                        output: mix(&action.output, &next.output),
+                        gain: mix(&action.gain, &next.gain),
+                        ..action.clone()
                     },
                 ),
                 ..gains.clone()
@@ -152,8 +152,8 @@ impl Point {
     /// The dynamics of plant and controller together.
     fn closed(self, filter: Option<&[f64]>) -> Result<DMatrix<f64>, Error> {
         let domain = self.physical.domain;
-        let own = complete_controller(&self.model, &self.gains, filter, domain)?;
-        Ok(Loop::new(self.physical, own.commands)?.dynamics())
+        let controller = complete_controller(&self.model, &self.gains, filter, domain)?;
+        Ok(Loop::new(self.physical, controller.commands)?.dynamics())
     }
 }
 
@@ -165,11 +165,14 @@ pub(crate) struct ScheduledLoop {
 }
 
 impl ScheduledLoop {
-    pub(crate) fn of(own: &Scheduled, nominal: &Solution) -> Result<Self, Error> {
-        let all: Vec<_> = own.points(nominal).collect();
+    pub(crate) fn of(scheduled: &Scheduled, nominal: &Solution) -> Result<Self, Error> {
+        let all: Vec<_> = scheduled.points(nominal).collect();
         Ok(Self {
             at: all.iter().map(|(at, _)| *at).collect(),
-            points: all.iter().map(|(_, own)| Point::of(own)).collect::<Result<_, _>>()?,
+            points: all
+                .iter()
+                .map(|(_, solution)| Point::of(solution))
+                .collect::<Result<_, _>>()?,
             filter: nominal.filter.clone(),
         })
     }
@@ -198,9 +201,9 @@ impl ScheduledLoop {
         for k in 0..self.points.len() - 1 {
             for j in 0..=count {
                 let t = f64::from(j) / f64::from(count);
-                let found = instability(&self.dynamics(k, t)?, domain)?;
-                if found > worst.0 {
-                    worst = (found, self.at[k] * (1.0 - t) + self.at[k + 1] * t);
+                let real = instability(&self.dynamics(k, t)?, domain)?;
+                if real > worst.0 {
+                    worst = (real, self.at[k] * (1.0 - t) + self.at[k + 1] * t);
                 }
             }
         }
@@ -225,9 +228,12 @@ impl ScheduledLoop {
 ///
 /// Between two intervals the slopes jump; the worse side counts. Source: W. J. Rugh and J. S. Shamma,
 /// Research on gain scheduling, Automatica 36 (2000), section 3.
-pub(crate) fn coupled(own: &Scheduled, nominal: &Solution) -> Result<Option<Vec<f64>>, Error> {
-    let Some(j) = own.measurement else { return Ok(None) };
-    let all: Vec<_> = own.points(nominal).collect();
+pub(crate) fn coupled(
+    scheduled: &Scheduled,
+    nominal: &Solution,
+) -> Result<Option<Vec<f64>>, Error> {
+    let Some(j) = scheduled.measurement else { return Ok(None) };
+    let all: Vec<_> = scheduled.points(nominal).collect();
     let slopes: Vec<_> = all.windows(2).map(|pair| Slopes::between(pair[0], pair[1])).collect();
     let one = |k: usize| {
         let sides = [k.checked_sub(1), (k + 1 < all.len()).then_some(k)].into_iter().flatten();
@@ -236,8 +242,9 @@ pub(crate) fn coupled(own: &Scheduled, nominal: &Solution) -> Result<Option<Vec<
             let design = all[k].1;
             let point = Point::of(design)?;
             let filter = design.filter.as_deref();
-            let own = complete_controller(&point.model, &point.gains, filter, design.domain)?;
-            let mut changed = slopes[side].act_on(&own.commands, filter.is_some(), j);
+            let controller =
+                complete_controller(&point.model, &point.gains, filter, design.domain)?;
+            let mut changed = slopes[side].act_on(&controller.commands, filter.is_some(), j);
             slopes[side].move_references(design, &mut changed, j);
             let whole = Loop::new(point.physical, changed)?;
             worst = worst.max(instability(&whole.dynamics(), design.domain)?);
@@ -304,22 +311,22 @@ impl Slopes {
     /// `own`, the controller with its filter, scheduled by its measurement `j`. Its states are the
     /// filtered measurements, if there are any, x_hat, the filtered measurements of the model, f_hat,
     /// and the integrals, which have no operating point.
-    fn act_on(&self, own: &StateSpace, is_filtered: bool, j: usize) -> StateSpace {
+    fn act_on(&self, system: &StateSpace, is_filtered: bool, j: usize) -> StateSpace {
         let filtered = if is_filtered { &self.y[..] } else { &[] };
         let slopes = [filtered, &self.x, filtered].concat();
         let z = DMatrix::from_column_slice(slopes.len(), 1, &slopes);
-        let z = z.resize_vertically(own.a.nrows(), 0.0);
+        let z = z.resize_vertically(system.a.nrows(), 0.0);
         let y = DMatrix::from_column_slice(self.y.len(), 1, &self.y);
         let u = DMatrix::from_column_slice(self.u.len(), 1, &self.u);
-        let mut found = own.clone();
-        let kept = match own.domain {
+        let mut changed = system.clone();
+        let held = match system.domain {
             Domain::Continuous => z.scale(0.0),
             Domain::Sampled { .. } => z.clone(),
         };
-        let to_z = kept - &own.a * &z - &own.b * &y;
-        let to_u = u - &own.c * &z - &own.d * &y;
-        found.b.set_column(j, &(own.b.column(j) + to_z.column(0)));
-        found.d.set_column(j, &(own.d.column(j) + to_u.column(0)));
-        found
+        let to_z = held - &system.a * &z - &system.b * &y;
+        let to_u = u - &system.c * &z - &system.d * &y;
+        changed.b.set_column(j, &(system.b.column(j) + to_z.column(0)));
+        changed.d.set_column(j, &(system.d.column(j) + to_u.column(0)));
+        changed
     }
 }

@@ -98,8 +98,9 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let (domain, mut plant) = in_domain(file, &extended)?;
     let references = file.references.as_ref();
     let states = extended.states;
-    let own = (plant.a.view((0, 0), (states, states)).into_owned(), plant.b.rows(0, states).into());
-    let pair = feedback_pair(references, [&own.0, &own.1, c], domain)?;
+    let part =
+        (plant.a.view((0, 0), (states, states)).into_owned(), plant.b.rows(0, states).into());
+    let pair = feedback_pair(references, [&part.0, &part.1, c], domain)?;
     let members = family::members(file, &linear, &mut warnings)?;
     let (common, certificate) = feedback_of_family(file, &linear, &members, domain)?.unzip();
     let problem = GainProblem {
@@ -147,8 +148,8 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let problem = TrackingProblem {
         file,
         linear: &linear,
-        a: &own.0,
-        b: &own.1,
+        a: &part.0,
+        b: &part.1,
         gains: &gains,
         feedback: &controlled,
         domain,
@@ -190,8 +191,8 @@ fn feedback_of_family(
     match &file.feedback.requirement {
         Requirement::Region(region) if !members.is_empty() => {
             let references = file.references.as_ref();
-            let found = common_feedback(linear, members, references, *region, domain);
-            found.map(Some).map_err(|refusal| feedback_refused(file, linear, domain, refusal))
+            let gain = common_feedback(linear, members, references, *region, domain);
+            gain.map(Some).map_err(|refusal| feedback_refused(file, linear, domain, refusal))
         }
         _ => Ok(None),
     }
@@ -382,16 +383,16 @@ fn check_detectable(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
     extended: &ExtendedPlant,
-    found: &Detectability,
+    detectability: &Detectability,
     warnings: &mut Vec<PlaceError>,
 ) -> Result<(), crate::Error> {
     let measurements = names(linear.measurements.iter().map(|signal| signal.name.as_str()));
-    let modes = found.unobservable.iter();
+    let modes = detectability.unobservable.iter();
     for (mode, stable) in modes.filter(|(mode, _)| above_or_on_the_real_axis(mode)) {
         let message = format!(
             "the measurements {measurements} show {} of {} states only: no observer moves {}{}",
-            found.observability.rank,
-            found.observability.n,
+            detectability.observability.rank,
+            detectability.observability.n,
             described(mode, |at| state_name(linear, at).to_owned()),
             consequence(*stable, mode),
         );
@@ -402,14 +403,14 @@ fn check_detectable(
         warnings.push(error);
     }
     let fault_names = fault_names(linear, extended);
-    if let Some(&unseen) = found.invisible_faults().first() {
+    if let Some(&unseen) = detectability.invisible_faults().first() {
         let message = format!(
             "fault `{}` cannot be seen from the measurements {measurements}",
             fault_names[unseen]
         );
         return Err(at_fault(file, linear, unseen, message).into());
     }
-    if let Some(hidden) = found.hidden.first() {
+    if let Some(hidden) = detectability.hidden.first() {
         let faults = hidden.faults();
         let states: Vec<_> = hidden.states().iter().map(|&at| state_name(linear, at)).collect();
         let mut hiding = faults.iter().map(|&fault| fault_names[fault].as_str());
@@ -507,8 +508,8 @@ fn refused(
         Refusal::Conflict(message) => message,
         Refusal::Fixed(mode) => fixed(&request.requirement, &mode, domain, name),
         Refusal::Control(Error::PoleCount { .. }) => {
-            let found = request.requirement.eigenvalues().len();
-            format!("expected {order} eigenvalues, one for each of the {meaning}, found {found}")
+            let count = request.requirement.eigenvalues().len();
+            format!("expected {order} eigenvalues, one for each of the {meaning}, found {count}")
         }
         Refusal::Control(ref error @ Error::Unweighted { weight: "W", .. }) => {
             match request.requirement.without_noise() {

@@ -109,16 +109,16 @@ pub(crate) fn check_member(
     let Some(References { h, .. }) = &file.references else {
         return Ok(());
     };
-    let found = tracking_rank(&linear.a, &linear.b, &(h * &linear.c))
+    let rank = tracking_rank(&linear.a, &linear.b, &(h * &linear.c))
         .map_err(|error| file.error_at(&variant.place, error.to_string()))?;
-    if found.is_full() {
+    if rank.is_full() {
         return Ok(());
     }
     let message = format!(
         "no integral action exists for the member `{}`: its commands cannot hold every constant value of \
          what is to follow (rank [A, B; H C, 0] is {}, expected {}); expected a member without a \
          zero at s = 0",
-        variant.name, found.rank, found.expected
+        variant.name, rank.rank, rank.expected
     );
     Err(file.error_at(&variant.place, message))
 }
@@ -189,14 +189,14 @@ impl TrackingProblem<'_> {
             let windup = windup_gain(&integral.gain, &ranges, rate, domain).map_err(refuse)?;
             let k_x = gains.k_x.columns(0, linear.a.nrows()).into_owned();
             let k = beside(&k_x, &integral.gain);
-            let own = references.feedforward.then(|| {
-                let found = integral_feedforward(a, b, &output, &k, domain).map_err(refuse)?;
-                found.map_err(|reason| references.without_feedforward(file, reason))
+            let feedforward = references.feedforward.then(|| {
+                let gain = integral_feedforward(a, b, &output, &k, domain).map_err(refuse)?;
+                gain.map_err(|reason| references.without_feedforward(file, reason))
             });
             TrackingAction::Integral {
                 windup: ranges.iter().any(Option::is_some).then_some(windup),
                 windup_time: rate.recip(),
-                feedforward: own.transpose()?,
+                feedforward: feedforward.transpose()?,
             }
         } else {
             let k_x = gains.k_x.columns(0, linear.a.nrows()).into_owned();
@@ -281,7 +281,7 @@ impl DesignLoop {
             return Ok(Self { plant: plant.clone(), controller });
         }
         let n = linear.a.nrows();
-        let own = FaultyPlant {
+        let faulty = FaultyPlant {
             a: plant.a.view((0, 0), (n, n)).into(),
             b: plant.b.rows(0, n).into(),
             c: linear.c.clone(),
@@ -289,6 +289,6 @@ impl DesignLoop {
             a_f: plant.a_f.clone(),
         };
         let whole = complete_controller(plant, gains, filter, domain)?;
-        Ok(Self { plant: own, controller: whole.commands })
+        Ok(Self { plant: faulty, controller: whole.commands })
     }
 }

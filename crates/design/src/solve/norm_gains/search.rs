@@ -100,8 +100,8 @@ impl Search<'_> {
     /// Computes the gain by linear matrix inequalities.
     fn by_inequalities(&self, channel: &str) -> Result<GainResult, Refusal> {
         let region = self.required.region.stated();
-        let found = (self.synthesise)(&region, Some(&self.performance))?;
-        let mut chosen = synthesised(found, channel)?;
+        let outcome = (self.synthesise)(&region, Some(&self.performance))?;
+        let mut chosen = synthesised(outcome, channel)?;
         if self.required.bound.is_some() {
             return Ok(chosen);
         }
@@ -177,9 +177,9 @@ impl Search<'_> {
         let gain = if let Some(filter) = &self.filter {
             filter.clone()
         } else {
-            let found = (self.synthesise)(&lmi::Region::default(), Some(&self.performance))?;
-            let Outcome::Optimal(found) = found else { return Ok(None) };
-            found.gain
+            let outcome = (self.synthesise)(&lmi::Region::default(), Some(&self.performance))?;
+            let Outcome::Optimal(synthesis) = outcome else { return Ok(None) };
+            synthesis.gain
         };
         let (norm, size) = (self.weighted_norm(&gain)?, gain.norm());
         Ok(Some(format!(

@@ -20,18 +20,18 @@ const CHECKED: u32 = 19;
 /// that this could not be decided, and that references without integral action are exact at the points only.
 pub(crate) fn examine(
     file: &PlantFile<'_>,
-    own: &Scheduled,
+    scheduled: &Scheduled,
     nominal: &Solution,
 ) -> Result<Vec<PlaceError>, crate::Error> {
     let Some(references) = &file.references else { return Ok(Vec::new()) };
-    let all: Vec<_> = own.points(nominal).collect();
+    let all: Vec<_> = scheduled.points(nominal).collect();
     let mut warnings = Vec::new();
     if references.integral {
         for pair in all.windows(2) {
-            warnings.extend(windup(file, own, [pair[0], pair[1]])?);
+            warnings.extend(windup(file, scheduled, [pair[0], pair[1]])?);
         }
     } else {
-        warnings.extend(missed(file, own, references, &all)?);
+        warnings.extend(missed(file, scheduled, references, &all)?);
     }
     Ok(warnings)
 }
@@ -41,7 +41,7 @@ type DesignAt<'a> = (f64, &'a Solution);
 /// Examines the back-calculation between two points.
 fn windup(
     file: &PlantFile<'_>,
-    own: &Scheduled,
+    scheduled: &Scheduled,
     [(from, first), (to, second)]: [DesignAt<'_>; 2],
 ) -> Result<Option<PlaceError>, crate::Error> {
     let gains = |design: &Solution| {
@@ -57,17 +57,17 @@ fn windup(
         let verb = if limited.len() == 1 { "is" } else { "are" };
         format!("while {} {verb} at the limits", names.join(" and "))
     };
-    let variable = &own.variable.name;
+    let variable = &scheduled.variable.name;
     match interpolated_windup([&k_0, &k_1], [&l_0, &l_1], &ranges, first.domain)? {
         InterpolatedWindup::Stable => Ok(None),
         InterpolatedWindup::Unstable { part, limited, instability } => {
-            let found = match first.domain {
+            let eigenvalue = match first.domain {
                 Domain::Continuous => format!("real part {instability:.3} 1/s"),
                 Domain::Sampled { .. } => format!("modulus {:.3}", 1.0 + instability),
             };
             let message = format!(
                 "with {variable} = {:.6} the interpolated back-calculation of the integrals is not \
-                 stable {} (eigenvalue of {found}), because K_i differs too much between \
+                 stable {} (eigenvalue of {eigenvalue}), because K_i differs too much between \
                  {from} and {to}; expected more points, or another `windup_time`",
                 from * (1.0 - part) + to * part,
                 at_limits(&limited),
@@ -91,15 +91,15 @@ fn windup(
 /// with all matrices interpolated.
 fn missed(
     file: &PlantFile<'_>,
-    own: &Scheduled,
+    scheduled: &Scheduled,
     references: &References,
     all: &[DesignAt<'_>],
 ) -> Result<Option<PlaceError>, crate::Error> {
     let mut worst = (0.0, all[0].0);
     for pair in all.windows(2) {
         let [(from, first), (to, second)] = [pair[0], pair[1]];
-        let gains = first.tracking.as_ref().and_then(|own| own.feedforward());
-        let next = second.tracking.as_ref().and_then(|own| own.feedforward());
+        let gains = first.tracking.as_ref().and_then(|tracking| tracking.feedforward());
+        let next = second.tracking.as_ref().and_then(|tracking| tracking.feedforward());
         let (Some(n_0), Some(n_1)) = (gains, next) else { continue };
         let ends = [Point::of(first)?, Point::of(second)?];
         for step in 1..=CHECKED {
@@ -120,7 +120,7 @@ fn missed(
          {:.2} % of a step, with {} = {:.6} (of {CHECKED} values in each interval); expected \
          `integral = true`, or more points",
         100.0 * worst.0,
-        own.variable.name,
+        scheduled.variable.name,
         worst.1,
     );
     Ok(Some(file.error_at(&references.action_places[0], message)))
@@ -130,11 +130,11 @@ fn missed(
 fn error(point: &Point, h: &DMatrix<f64>, n_r: &DMatrix<f64>) -> Result<f64, Error> {
     let plant = &point.physical;
     let n = plant.a.nrows();
-    let kept = match plant.domain {
+    let held = match plant.domain {
         Domain::Continuous => DMatrix::zeros(n, n),
         Domain::Sampled { .. } => DMatrix::identity(n, n),
     };
-    let dynamics = kept - &plant.a - &plant.b * point.gains.k_x.columns(0, n);
+    let dynamics = held - &plant.a - &plant.b * point.gains.k_x.columns(0, n);
     let states = dynamics.lu().solve(&(&plant.b * n_r));
     let states = states.ok_or(Error::Overflow { what: "the gain at rest" })?;
     let constant = h * &plant.c * states;
