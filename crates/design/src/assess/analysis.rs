@@ -53,7 +53,7 @@ impl Outputs {
 /// whole system at z = 1, it is the largest value on a grid of frequencies.
 pub(crate) fn largest_gain(system: &StateSpace) -> Result<(f64, &'static str), Error> {
     match h_infinity(system, WIDTH) {
-        Ok(found) => Ok((found.upper, "largest singular value over all frequencies (level sets)")),
+        Ok(norm) => Ok((norm.upper, "largest singular value over all frequencies (level sets)")),
         Err(Error::NotConverged { .. }) => {
             let grid = frequency_grid(system, POINTS_PER_DECADE)?;
             let points = frequency_response(system, &grid)?;
@@ -112,11 +112,11 @@ impl<'a> Loops<'a> {
             // Each state is read at all parts: about as many rows as the loop has states.
             Domain::Sampled { .. } => 1 + self.of_faults.a.nrows() / PARTS as usize,
         };
-        let mut found = vec![Err(Missing::Time); positions.len()];
+        let mut peaks = vec![Err(Missing::Time); positions.len()];
         let mut rest = positions.len();
         while rest > 0 && !budget.is_over() {
             let first = rest.saturating_sub(outputs_at_once * rayon::current_num_threads());
-            let at_once = found[first..rest].par_chunks_mut(outputs_at_once);
+            let at_once = peaks[first..rest].par_chunks_mut(outputs_at_once);
             let rows = positions[first..rest].par_chunks(outputs_at_once);
             at_once.zip(rows).try_for_each(|(places, rows)| {
                 places.clone_from_slice(&self.gains_of(rows)?);
@@ -124,20 +124,20 @@ impl<'a> Loops<'a> {
             })?;
             rest = first;
         }
-        Ok(found)
+        Ok(peaks)
     }
 
     /// Returns the gains of some outputs. If those of one do not converge, each is computed alone.
     fn gains_of(&self, rows: &[usize]) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
         let Solution { extended, plant, gains, domain, .. } = self.designed;
-        let found = match *domain {
+        let peaks = match *domain {
             Domain::Continuous => fault_gains(plant, gains, *domain, rows, WIDTH),
             Domain::Sampled { period } => {
                 let sampled = SampledLoop { extended, plant, gains, period };
                 gains_between_samples(&sampled, PARTS, rows, WIDTH)
             }
         };
-        match found {
+        match peaks {
             Ok(all) => {
                 let row = |row| all.each_ref().map(|gains| gains.row(row).into_owned());
                 Ok((0..rows.len()).map(|at| Ok(row(at))).collect())
@@ -155,7 +155,7 @@ impl<'a> Loops<'a> {
     /// each reason why some outputs have none.
     pub(crate) fn bounds(&self, budget: &Budget) -> Result<(Vec<Bound>, Vec<String>), Error> {
         let gains = self.peak_gains(budget)?;
-        let mut found = Vec::new();
+        let mut bounds = Vec::new();
         for (column, fault) in self.faults() {
             for (at, gains) in gains.iter().enumerate() {
                 let Ok([jumping, gliding, uncancelled]) = gains else { continue };
@@ -170,7 +170,7 @@ impl<'a> Loops<'a> {
                     _ => None,
                 };
                 let by_size = fault.bound.map(|bound| of_fault * bound);
-                found.push(Bound {
+                bounds.push(Bound {
                     fault: fault.name.clone(),
                     error: self.outputs.names[at].clone(),
                     unit: self.outputs.units[at].clone(),
@@ -193,7 +193,7 @@ impl<'a> Loops<'a> {
             let count = gains.iter().filter(|gains| gains.as_ref().err() == Some(&missing)).count();
             (count > 0).then(|| format!("the bounds of {count} states and errors {reason}"))
         };
-        Ok((found, reasons.into_iter().filter_map(warning).collect()))
+        Ok((bounds, reasons.into_iter().filter_map(warning).collect()))
     }
 
     /// Returns the transfer function from the faults, as `system` has them, to their estimation

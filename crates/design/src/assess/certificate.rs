@@ -31,8 +31,8 @@ fn in_time<T>(budget: &Budget, solve: impl FnOnce() -> Result<T, String>) -> Res
     if budget.is_over() {
         return Err(budget.reason());
     }
-    let found = budget.run(solve);
-    if found.is_err() && budget.is_over() { Err(budget.reason()) } else { found }
+    let outcome = budget.run(solve);
+    if outcome.is_err() && budget.is_over() { Err(budget.reason()) } else { outcome }
 }
 
 /// Returns the largest norm of the fault vector, from the bounds of the plant file.
@@ -91,7 +91,7 @@ fn printed(designed: &Solution) -> Result<Theorem1, String> {
 
 fn verified<T>(outcome: Result<Outcome<T>, control::Error>) -> Result<T, String> {
     match outcome {
-        Ok(Outcome::Optimal(found)) => Ok(found),
+        Ok(Outcome::Optimal(certificate)) => Ok(certificate),
         Ok(Outcome::Infeasible { conflict }) => Err(format!("infeasible: {}", conflict.join("; "))),
         Ok(Outcome::Inconclusive(reason)) => Err(format!("not proven: {reason}")),
         Err(error) => Err(error.to_string()),
@@ -122,7 +122,7 @@ fn ultimate(designed: &Solution) -> Result<Ultimate, String> {
     let (order, q) = (dynamics.nrows(), designed.plant.f_a.ncols());
     let mut enters = nalgebra::DMatrix::zeros(order, q);
     enters.view_mut((order - q, 0), (q, q)).fill_with_identity();
-    let found = verified(ultimate_bound(&dynamics, &enters, rate))?;
-    let peaks = found.peaks.iter().copied().collect();
-    Ok(Ultimate { rate, radius: found.radius, peaks, margin: found.margin })
+    let bound = verified(ultimate_bound(&dynamics, &enters, rate))?;
+    let peaks = bound.peaks.iter().copied().collect();
+    Ok(Ultimate { rate, radius: bound.radius, peaks, margin: bound.margin })
 }

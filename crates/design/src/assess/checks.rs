@@ -61,9 +61,9 @@ fn existence(designed: &Solution) -> [Check; 3] {
             distance.upper
         ),
     };
-    let seen = &detectability.observability;
+    let observability = &detectability.observability;
     let reached = format!("rank {} of {}", controllability.rank, controllability.n);
-    let shown = format!("rank {} of {}", seen.rank, seen.n);
+    let shown = format!("rank {} of {}", observability.rank, observability.n);
     let fixed = "; the other modes are stable and keep their eigenvalues";
     [
         if controllability.is_full() {
@@ -71,7 +71,7 @@ fn existence(designed: &Solution) -> [Check; 3] {
         } else {
             check("(A, B) is stabilisable", true, None, reached + fixed)
         },
-        if seen.is_full() {
+        if observability.is_full() {
             check("(A, C) is observable", true, None, shown)
         } else {
             check("(A, C) is detectable", detectability.is_detectable(), None, shown + fixed)

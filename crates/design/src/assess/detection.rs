@@ -76,7 +76,7 @@ pub(crate) fn detection(
     let problem = Problem::new(file, request, &designed.nominal)?;
     let refuse = |error: control::Error| file.error_at(&request.place, error.to_string());
     let errors =
-        request.model_error.as_ref().map(|own| ModelErrors::new(file, own, designed, family));
+        request.model_error.as_ref().map(|bounds| ModelErrors::new(file, bounds, designed, family));
     let errors = errors.transpose()?;
     let planner = Planner { file, request, problem: &problem, errors: errors.as_ref() };
     let parts = planner.parts()?;
@@ -206,16 +206,17 @@ fn reacting(
     problem: &Problem,
     decoupling: &Decoupling,
     test: &PlannedTest,
-    own: usize,
+    tested: usize,
 ) -> Result<Vec<bool>, control::Error> {
     let peak = |fault: usize| {
         let means = problem.means(decoupling, problem.fault_at(fault))?;
         Ok(largest(&(&test.rows * means)))
     };
-    let least = INSENSITIVE * peak(own)?;
+    let least = INSENSITIVE * peak(tested)?;
     (0..problem.faults.len())
         .map(|fault| {
-            Ok(!decoupling.has(problem.fault_at(fault)) && (fault == own || peak(fault)? > least))
+            Ok(!decoupling.has(problem.fault_at(fault))
+                && (fault == tested || peak(fault)? > least))
         })
         .collect()
 }
@@ -325,8 +326,8 @@ fn fault_report(
     let (input, period) = (problem.fault_at(fault), problem.period);
     let name = &problem.names[input];
     // One test for each fault, or one for all.
-    let own = if tests(parts).count() == 1 { 0 } else { fault };
-    let Some((decoupling, test)) = tests(parts).nth(own) else {
+    let position = if tests(parts).count() == 1 { 0 } else { fault };
+    let Some((decoupling, test)) = tests(parts).nth(position) else {
         return Ok(None);
     };
     let means = &test.rows * problem.means(decoupling, input)?;
@@ -381,8 +382,8 @@ fn warn(tests: &[Test], confused: &[Vec<String>], warnings: &mut Vec<String>) {
 /// Names the faults of their size that errors of the model hide.
 fn hidden(tests: &[Test], faults: &[DetectedFault], warnings: &mut Vec<String>) {
     for fault in faults.iter().filter(|fault| fault.delay.is_none()) {
-        let own = tests.iter().find(|test| test.name == fault.test && test.model_error > 0.0);
-        if let Some(test) = own {
+        let blind = tests.iter().find(|test| test.name == fault.test && test.model_error > 0.0);
+        if let Some(test) = blind {
             warnings.push(format!(
                 "{} of {} moves the mean of its residuals by {:.3} standard deviations, errors of the model by \
                  up to {:.3}: it may stay undetected; smaller tolerances in [robustness] or smaller `commands` \

@@ -42,18 +42,18 @@ pub(crate) fn errors(
     limits: &RobustnessLimits,
 ) -> Result<Vec<EstimationErrors>, Error> {
     let peaks = robustness.map(|_| noise_peaks(designed, &limits.noise)).transpose()?;
-    let noise = robustness.map(|found| {
+    let noise = robustness.map(|figures| {
         let commands = designed.linear.actuators.len();
-        found.noise_together[commands..].iter().map(|number| number.value).collect::<Vec<_>>()
+        figures.noise_together[commands..].iter().map(|number| number.value).collect::<Vec<_>>()
     });
-    let own = Errors::of(designed)?;
+    let estimation = Errors::of(designed)?;
     let errors = designed.linear.faults.par_iter().enumerate().map(|(at, fault)| {
         Ok::<_, Error>(EstimationErrors {
             noise: noise.as_ref().map(|list| list[at]),
             noise_peak: peaks.as_ref().map(|list| list[at]),
             fault: fault.name.clone(),
             unit: fault.unit.clone(),
-            ..own.of_fault(at)?
+            ..estimation.of_fault(at)?
         })
     });
     errors.collect()

@@ -64,11 +64,12 @@ pub(crate) fn report(
     let intact = plants.whole(&designed.gains, None)?;
     let reference = noise(designed, &intact)?;
     let stuck_at =
-        |actuator| file.reconfiguration.as_ref().map_or(0.0, |own| own.stuck_at(actuator));
+        |actuator| file.reconfiguration.as_ref().map_or(0.0, |table| table.stuck_at(actuator));
     let of = Examination { cases: plants, gains, reference };
     let plants = &of.cases;
     let cases = plants.all().into_iter().enumerate();
-    let cases = cases.map(|(at, case)| of.case(at, case.map(|own| (own, stuck_at(own)))));
+    let cases =
+        cases.map(|(at, case)| of.case(at, case.map(|actuator| (actuator, stuck_at(actuator)))));
     let cases = cases.collect::<Result<Vec<_>, _>>()?;
     let loops = plants.all().into_iter().map(|case| {
         let lossy = case.map(|actuator| (actuator, request.loss));
@@ -79,7 +80,7 @@ pub(crate) fn report(
     Ok(Some(FallbackReport {
         loss: request.loss,
         method: fallback.method.clone(),
-        decay: cases.iter().map(|own| own.decay).fold(f64::INFINITY, f64::min),
+        decay: cases.iter().map(|case| case.decay).fold(f64::INFINITY, f64::min),
         compensates: fallback.k_f.is_some(),
         k_x: rows(&fallback.k_x),
         gain_norm: fallback.k_x.norm(),
@@ -106,12 +107,14 @@ impl Examination<'_> {
         let Cases { designed, request } = self.cases;
         let Solution { linear, extended, domain, .. } = designed;
         let actuator = failed.map(|(actuator, _)| actuator);
-        let whole = self.cases.whole(&self.gains, actuator.map(|own| (own, request.loss)))?;
+        let whole = self
+            .cases
+            .whole(&self.gains, actuator.map(|failed_actuator| (failed_actuator, request.loss)))?;
         let Vertex { a, b } = self.cases.vertices().swap_remove(at);
         let fed_back = &a + &b * self.gains.k_x.columns(0, extended.states);
         let (points, delay_margin) = self.margins(actuator)?;
-        let relative = |(signal, (own, intact)): (&Signal, (&f64, &f64))| {
-            let (name, value) = (signal.name.clone(), own / intact);
+        let relative = |(signal, (share, intact)): (&Signal, (&f64, &f64))| {
+            let (name, value) = (signal.name.clone(), share / intact);
             value.is_finite().then_some(Number { name, unit: None, value })
         };
         let noise = self::noise(designed, &whole)?;
@@ -147,12 +150,12 @@ impl Examination<'_> {
             controller.c = controller.c.remove_row(gone);
             controller.d = controller.d.remove_row(gone);
         }
-        let own = closed(&plant, &controller)?;
+        let closed_loop = closed(&plant, &controller)?;
         let delay = match designed.domain {
-            Domain::Continuous => delay_margin(&own),
+            Domain::Continuous => delay_margin(&closed_loop),
             Domain::Sampled { .. } => sampled_delay_margin(&plant, &controller),
         };
-        Ok((loop_points(&own, &inputs, measurements)?, delay?))
+        Ok((loop_points(&closed_loop, &inputs, measurements)?, delay?))
     }
 
     /// The equilibrium of the loop, and the actuator that is gone with its command.
@@ -176,16 +179,16 @@ impl Examination<'_> {
             input.rows_mut(0, n).copy_from(&(plant.b.column(actuator) * part));
             stuck.extend(gone.then_some((actuator, stuck_at)));
         }
-        let kept = match domain {
+        let held = match domain {
             Domain::Continuous => -whole,
             Domain::Sampled { .. } => DMatrix::identity(order, order) - whole,
         };
-        let solved = kept.lu().solve(&input);
+        let solved = held.lu().solve(&input);
         let what = "the equilibrium of the fall-back";
-        let found = solved.ok_or(Error::NotConverged { what, iterations: 1 })?;
+        let solution = solved.ok_or(Error::NotConverged { what, iterations: 1 })?;
         let StateSpace { c, d, .. } = controller(plant, &self.gains, *domain)?;
-        let x: DVector<f64> = found.rows(0, n).into();
-        let u = c * found.rows(n, order - n) + d * &plant.c * &x;
+        let x: DVector<f64> = solution.rows(0, n).into();
+        let u = c * solution.rows(n, order - n) + d * &plant.c * &x;
         Ok((Rest::of(linear, &x.rows(0, extended.states).into(), u, true), stuck))
     }
 }
@@ -208,23 +211,23 @@ fn noise(designed: &Solution, whole: &DMatrix<f64>) -> Result<Vec<f64>, Error> {
 /// What the fall-back contributes to the verdict; `limit`: the peak of S above which a design is red and
 /// its fall-back amber.
 pub(crate) fn reasons(report: &FallbackReport, limit: f64) -> Vec<(Level, String)> {
-    let mut found = Vec::new();
-    let mut amber = |text: String| found.push((Level::Amber, text + " (amber)"));
+    let mut reasons = Vec::new();
+    let mut amber = |text: String| reasons.push((Level::Amber, text + " (amber)"));
     if let (Err(reason), false) = (&report.whole, report.whole_left_out) {
         amber(format!(
             "the fall-back is not proven for losses that change with time: {reason}; constant losses \
              are stable"
         ));
     }
-    for own in &report.cases {
-        let name = &own.name;
-        if !own.beyond_limits.is_empty() {
-            let names = own.beyond_limits.join(", ");
+    for case in &report.cases {
+        let name = &case.name;
+        if !case.beyond_limits.is_empty() {
+            let names = case.beyond_limits.join(", ");
             amber(format!(
                 "the fall-back needs commands at rest beyond the limits of {names}, {name}"
             ));
         }
-        let highest = own.points.iter().max_by(|x, y| x.judged.total_cmp(&y.judged));
+        let highest = case.points.iter().max_by(|x, y| x.judged.total_cmp(&y.judged));
         if let Some(point) = highest.filter(|point| point.judged > limit) {
             let (peak, place) = (point.judged, &point.point);
             amber(format!(
@@ -232,5 +235,5 @@ pub(crate) fn reasons(report: &FallbackReport, limit: f64) -> Vec<(Level, String
             ));
         }
     }
-    found
+    reasons
 }

@@ -23,13 +23,15 @@ pub(crate) fn family(
     limits: &RobustnessLimits,
     budget: &Budget,
 ) -> Result<Option<FamilyReport>, crate::Error> {
-    let Designed { nominal: solution, family: Some(own), .. } = designed else { return Ok(None) };
+    let Designed { nominal: solution, family: Some(family), .. } = designed else {
+        return Ok(None);
+    };
     let nominal = (NOMINAL.to_owned(), &solution.linear);
-    let others = own.members.iter().map(|member| (member.name.clone(), &member.linear));
+    let others = family.members.iter().map(|member| (member.name.clone(), &member.linear));
     let all: Vec<_> = std::iter::once(nominal).chain(others).collect();
     let one = |(name, linear): &(String, &LinearPlant)| {
-        let found = member(solution, linear, name.clone(), limits);
-        found.map_err(|error| error.within(format!("member `{name}` of the family")))
+        let point = member(solution, linear, name.clone(), limits);
+        point.map_err(|error| error.within(format!("member `{name}` of the family")))
     };
     let members = all.par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
     let closed = |(_, linear): &(String, &LinearPlant)| {
@@ -37,10 +39,10 @@ pub(crate) fn family(
         Ok(physical.closed(&physical.controller)?.dynamics())
     };
     let loops = all.iter().map(closed).collect::<Result<Vec<_>, Error>>()?;
-    let named = |at: usize| name(&own.members, at).to_owned();
+    let named = |at: usize| name(&family.members, at).to_owned();
     Ok(Some(FamilyReport {
         members,
-        feedback: own.feedback.as_ref().map(reported),
+        feedback: family.feedback.as_ref().map(reported),
         whole: common(&loops, solution.domain, budget, named)?,
     }))
 }
@@ -53,13 +55,13 @@ pub(crate) fn member(
     limits: &RobustnessLimits,
 ) -> Result<MemberReport, crate::Error> {
     let physical = Physical::with(designed, linear)?;
-    let own = physical.closed(&physical.controller)?;
-    let instability = instability(&own.dynamics(), designed.domain)?;
+    let closed_loop = physical.closed(&physical.controller)?;
+    let instability = instability(&closed_loop.dynamics(), designed.domain)?;
     if instability >= 0.0 {
         return Ok(MemberReport { name, instability, margins: None });
     }
     let Margins { points, delay, hold, noise_together, .. } =
-        margins(designed, &physical, &own, limits)?;
+        margins(designed, &physical, &closed_loop, limits)?;
     let tolerance = limits.parameters.is_empty().then(|| by_entries(designed, &physical, limits));
     let margins = MemberMargins {
         points,
@@ -81,12 +83,12 @@ pub(crate) fn common(
     if budget.is_over() {
         return Ok(Err(format!("it was {}", budget.reason())));
     }
-    let found = budget.run(|| certify_common(loops, &lmi::Region::default(), domain))?;
-    if !matches!(found, Outcome::Optimal(_)) && budget.is_over() {
+    let outcome = budget.run(|| certify_common(loops, &lmi::Region::default(), domain))?;
+    if !matches!(outcome, Outcome::Optimal(_)) && budget.is_over() {
         return Ok(Err(format!("it was {}", budget.reason())));
     }
-    Ok(match found {
-        Outcome::Optimal(found) => Ok(reported(&found)),
+    Ok(match outcome {
+        Outcome::Optimal(certificate) => Ok(reported(&certificate)),
         Outcome::Infeasible { conflict } => {
             let mut names: Vec<_> = conflict.into_iter().map(name).collect();
             names.dedup();
@@ -97,13 +99,13 @@ pub(crate) fn common(
 }
 
 /// Returns a certificate for the report.
-pub(crate) fn reported(found: &RegionCertificate) -> CommonCertificate {
-    CommonCertificate { p: rows(&found.p), margin: found.margin }
+pub(crate) fn reported(certificate: &RegionCertificate) -> CommonCertificate {
+    CommonCertificate { p: rows(&certificate.p), margin: certificate.margin }
 }
 
 /// Judges what is proven of plants that are no member.
-pub(crate) fn judge_proof(verdict: &mut Verdict, found: &FamilyReport) {
-    if found.whole.is_err() {
+pub(crate) fn judge_proof(verdict: &mut Verdict, report: &FamilyReport) {
+    if report.whole.is_err() {
         let text = "stability of plants between the members of the family, and while the plant moves between \
                     them, is not proven; only the members themselves were checked";
         verdict.add(Level::Amber, text.to_owned());
@@ -123,8 +125,10 @@ pub(crate) fn judge(
         let names = unstable.join(", ");
         verdict.add(Level::Red, format!("the loop is not stable with the {kind} {names}"));
     }
-    let stable = || members.iter().filter_map(|own| Some((&own.name, own.margins.as_ref()?)));
-    let peaks = stable().flat_map(|(name, own)| own.points.iter().map(move |point| (name, point)));
+    let stable =
+        || members.iter().filter_map(|member| Some((&member.name, member.margins.as_ref()?)));
+    let peaks =
+        stable().flat_map(|(name, margins)| margins.points.iter().map(move |point| (name, point)));
     if let Some((name, point)) = peaks.max_by(|x, y| x.1.judged.total_cmp(&y.1.judged)) {
         let peak = point.judged;
         let reached = match peak {
@@ -141,18 +145,19 @@ pub(crate) fn judge(
             verdict.add(level, text);
         }
     }
-    let tolerances = stable().filter_map(|(name, own)| Some((name, own.tolerance.as_ref()?)));
+    let tolerances =
+        stable().filter_map(|(name, margins)| Some((name, margins.tolerance.as_ref()?)));
     let worst = tolerances
-        .filter(|(_, found)| found.is_unstable())
+        .filter(|(_, tolerance)| tolerance.is_unstable())
         .min_by(|x, y| x.1.first_unstable.total_cmp(&y.1.first_unstable));
-    if let Some((name, found)) = worst {
+    if let Some((name, tolerance)) = worst {
         let text = format!(
             "parameters within their tolerances ({}) make the loop with the {kind} {name} unstable: {:.1} % \
              of {} random cases, the worst case found from {:.3} of the tolerances on",
-            found.range(),
-            100.0 * (1.0 - found.stable.unwrap_or(1.0)),
-            found.cases,
-            found.first_unstable
+            tolerance.range(),
+            100.0 * (1.0 - tolerance.stable.unwrap_or(1.0)),
+            tolerance.cases,
+            tolerance.first_unstable
         );
         verdict.add(Level::Red, text);
     }

@@ -27,8 +27,9 @@ impl Judged {
         let closed = physical.closed(&physical.controller)?;
         let linear = &solution.linear;
         let points = loop_points(&closed, &linear.actuators, &linear.measurements)?;
-        let within =
-            |limits| by_entries(solution, &physical, limits).map(|found| found.is_unstable());
+        let within = |limits| {
+            by_entries(solution, &physical, limits).map(|tolerance| tolerance.is_unstable())
+        };
         let is_unstable = tolerances.map_or(Ok(false), within)?;
         Ok(Some(Self { points, is_unstable }))
     }

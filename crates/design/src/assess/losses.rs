@@ -56,9 +56,9 @@ pub(crate) fn losses(designed: &Solution, budget: &Budget) -> Result<Option<Loss
     let inputs: Vec<_> = stated.iter().map(|loss| loss.actuator).collect();
     let loops = controllers(designed)?
         .into_iter()
-        .map(|own| {
-            let lossy = LossyLoop::new(&own.closed.plant, &own.closed.controller, &inputs)?;
-            Examination { designed, stated: &stated, lossy, budget }.report(&own)
+        .map(|variant| {
+            let lossy = LossyLoop::new(&variant.closed.plant, &variant.closed.controller, &inputs)?;
+            Examination { designed, stated: &stated, lossy, budget }.report(&variant)
         })
         .collect::<Result<_, Error>>()?;
     Ok(Some(LossReport { stated: numbers(&stated, |loss| loss.up_to), loops }))
@@ -74,26 +74,26 @@ fn number(name: &str, value: f64) -> Number {
 
 /// What the losses contribute to the verdict.
 pub(crate) fn reasons(report: &LossReport) -> Vec<(Level, String)> {
-    report.loops.iter().filter_map(|own| reason(own, &report.stated)).collect()
+    report.loops.iter().filter_map(|lossy| reason(lossy, &report.stated)).collect()
 }
 
 /// A loop that constant losses within the stated range make unstable is red, a loop without a proof
 /// amber. With the compensation off, which may never happen, the first is amber, too.
-fn reason(own: &LossLoop, stated: &[Number]) -> Option<(Level, String)> {
-    let on = own.name == ON;
-    let limit = &own.constant[0];
+fn reason(report: &LossLoop, stated: &[Number]) -> Option<(Level, String)> {
+    let on = report.name == ON;
+    let limit = &report.constant[0];
     if !limit.stable && limit.factor <= 1.0 {
         let level = if on { Level::Red } else { Level::Amber };
         let reason = format!(
             "constant losses of effectiveness within the stated range make the loop unstable, \
              {}: from {} on ({})",
-            own.name,
+            report.name,
             described(&limit.losses),
             level.word()
         );
         return Some((level, reason));
     }
-    let reason = own.proof.as_ref().err().filter(|_| on)?;
+    let reason = report.proof.as_ref().err().filter(|_| on)?;
     let losses = described(stated);
     Some((
         Level::Amber,
@@ -177,18 +177,21 @@ struct Examination<'a> {
 }
 
 impl Examination<'_> {
-    fn report(&self, own: &Variant) -> Result<LossLoop, Error> {
-        let constant: Vec<_> =
-            self.boxes().iter().map(|own| self.constant(own)).collect::<Result<_, Error>>()?;
+    fn report(&self, variant: &Variant) -> Result<LossLoop, Error> {
+        let constant: Vec<_> = self
+            .boxes()
+            .iter()
+            .map(|losses| self.constant(losses))
+            .collect::<Result<_, Error>>()?;
         let proof = match self.obstacle(&constant[0]) {
             Some(reason) => Err(reason),
-            None => self.proof(own.name == ON)?,
+            None => self.proof(variant.name == ON)?,
         };
         let certified = match &proof {
             Err(_) if self.is_too_large() => Vec::new(),
             _ => self.certified(&constant)?,
         };
-        let (name, meaning) = (own.name.to_owned(), own.meaning.to_owned());
+        let (name, meaning) = (variant.name.to_owned(), variant.meaning.to_owned());
         Ok(LossLoop { name, meaning, constant, proof, certified })
     }
 
@@ -228,15 +231,15 @@ impl Examination<'_> {
     /// The constant losses that make the loop unstable, up to a loss of 1.
     fn constant(&self, largest: &[f64]) -> Result<ConstantLoss, Error> {
         let most = 1.0 / largest.iter().copied().fold(0.0, f64::max);
-        let found = self.lossy.constant_limit(largest, most)?;
-        let losses = self.stated.iter().zip(&found.loss);
+        let limit = self.lossy.constant_limit(largest, most)?;
+        let losses = self.stated.iter().zip(&limit.loss);
         Ok(ConstantLoss {
             losses: losses
-                .map(|(own, loss)| number(&own.name, *loss))
+                .map(|(stated, loss)| number(&stated.name, *loss))
                 .filter(|loss| loss.value > 0.0)
                 .collect(),
-            stable: found.factor >= most,
-            factor: found.factor,
+            stable: limit.factor >= most,
+            factor: limit.factor,
         })
     }
 
@@ -271,7 +274,7 @@ impl Examination<'_> {
             if self.budget.is_over() {
                 break;
             }
-            let found = self.budget.run(|| self.lossy.certified(largest, limit.factor))?;
+            let bound = self.budget.run(|| self.lossy.certified(largest, limit.factor))?;
             if self.budget.is_over() {
                 break;
             }
@@ -279,9 +282,9 @@ impl Examination<'_> {
             all.push(CertifiedLoss {
                 losses: losses
                     .filter(|(_, largest)| **largest > 0.0)
-                    .map(|(own, largest)| Number { value: largest * found.factor, ..own })
+                    .map(|(number, largest)| Number { value: largest * bound.factor, ..number })
                     .collect(),
-                factor: found.factor,
+                factor: bound.factor,
             });
         }
         Ok(all)
@@ -293,7 +296,7 @@ impl Examination<'_> {
         let corners = self.lossy.corners(&self.largest());
         let (n, order) = (linear.states.len(), self.lossy.intact.nrows());
         let outputs = DMatrix::identity(n, order);
-        let mut found = Vec::new();
+        let mut peaks = Vec::new();
         for Disturbance { name, size, column } in self.disturbances() {
             let column = column.resize_vertically(order, 0.0);
             let mut smallest = vec![f64::INFINITY; n];
@@ -311,7 +314,7 @@ impl Examination<'_> {
                 }
             }
             let states = linear.states.iter().zip(smallest);
-            found.extend(states.filter(|(_, largest)| largest.is_finite()).map(
+            peaks.extend(states.filter(|(_, largest)| largest.is_finite()).map(
                 |(state, largest)| LossPeak {
                     disturbance: name.clone(),
                     size,
@@ -321,7 +324,7 @@ impl Examination<'_> {
                 },
             ));
         }
-        Ok(found)
+        Ok(peaks)
     }
 
     /// What acts on the plant with a known size: the lost part of each command of the operating point,

@@ -36,7 +36,10 @@ impl Names {
         Self {
             actuators: names(&linear.actuators),
             faults: fault_names(linear, &designed.extended),
-            references: designed.tracking.as_ref().map_or(Vec::new(), |own| names(&own.signals)),
+            references: designed
+                .tracking
+                .as_ref()
+                .map_or(Vec::new(), |tracking| names(&tracking.signals)),
             states,
             extended,
             measurements,
@@ -58,23 +61,23 @@ impl Names {
             let meaning = "commands in the measurements";
             matrices.insert(3, matrix("D", meaning, &linear.d, measurements, actuators));
         }
-        let own = &designed.plant;
-        if own.a != linear.a {
+        let extended_plant = &designed.plant;
+        if extended_plant.a != linear.a {
             let kind = match designed.domain {
                 Domain::Continuous => "extended",
                 Domain::Sampled { .. } => "sampled",
             };
             for (name, values, rows, columns) in [
-                ("A_e", &own.a, extended, extended),
-                ("B_e", &own.b, extended, actuators),
-                ("C_e", &own.c, measurements, extended),
-                ("F_e", &own.f_a, extended, faults),
+                ("A_e", &extended_plant.a, extended, extended),
+                ("B_e", &extended_plant.b, extended, actuators),
+                ("C_e", &extended_plant.c, measurements, extended),
+                ("F_e", &extended_plant.f_a, extended, faults),
             ] {
                 matrices.push(matrix(name, &format!("{kind} plant"), values, rows, columns));
             }
         }
-        if own.a_f.amax() > 0.0 {
-            matrices.push(matrix("A_f", "fault model", &own.a_f, faults, faults));
+        if extended_plant.a_f.amax() > 0.0 {
+            matrices.push(matrix("A_f", "fault model", &extended_plant.a_f, faults, faults));
         }
         matrices
     }

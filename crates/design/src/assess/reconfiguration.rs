@@ -5,17 +5,17 @@ use crate::report::robustness::Level;
 
 /// What actuators that are gone contribute to the verdict.
 pub(crate) fn reasons(report: &ReconfigurationReport) -> Vec<(Level, String)> {
-    let single = report.without.iter().map(|own| (vec![own.actuator.clone()], &own.outcome));
-    let several = report.several.iter().map(|own| (own.actuators.clone(), &own.outcome));
+    let single = report.without.iter().map(|case| (vec![case.actuator.clone()], &case.outcome));
+    let several = report.several.iter().map(|case| (case.actuators.clone(), &case.outcome));
     let amber = |(actuators, outcome): (Vec<String>, &Result<Reconfigured, String>)| {
         let name = actuators.join(", ");
-        let mut served = report.by_fallback.iter().filter(|own| own.stable);
+        let mut served = report.by_fallback.iter().filter(|case| case.stable);
         let text = match outcome {
-            Err(_) if served.any(|own| own.actuators == actuators) => return None,
+            Err(_) if served.any(|case| case.actuators == actuators) => return None,
             Err(reason) => format!("without {name} there is no controller: {reason} (amber)"),
-            Ok(found) if !found.beyond_limits.is_empty() => format!(
+            Ok(rest) if !rest.beyond_limits.is_empty() => format!(
                 "without {name} the operating point needs commands beyond the limits of {} (amber)",
-                found.beyond_limits.join(", ")
+                rest.beyond_limits.join(", ")
             ),
             Ok(_) => return None,
         };

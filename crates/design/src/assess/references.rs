@@ -20,8 +20,8 @@ pub(crate) fn reference_steps(designed: &Solution) -> Result<Vec<ReferenceStep>,
     let Some(tracking) = &designed.tracking else {
         return Ok(Vec::new());
     };
-    let own = ReferenceLoop::of(designed, tracking)?;
-    (0..tracking.signals.len()).map(|at| own.step(at)).collect()
+    let reference_loop = ReferenceLoop::of(designed, tracking)?;
+    (0..tracking.signals.len()).map(|at| reference_loop.step(at)).collect()
 }
 
 /// Returns the condition that constant references are reached.
@@ -187,8 +187,8 @@ impl<'a> ReferenceLoop<'a> {
         } else {
             trace.time.iter().zip(trace.output.row(row).iter()).map(|(t, z)| (*t, *z)).collect()
         };
-        let own = trace.transient(row, SETTLED);
-        let largest = points.iter().fold((own.peak_time, own.peak), |best, point| {
+        let transient = trace.transient(row, SETTLED);
+        let largest = points.iter().fold((transient.peak_time, transient.peak), |best, point| {
             if point.1.abs() > best.1.abs() { *point } else { best }
         });
         Curve {
@@ -196,7 +196,7 @@ impl<'a> ReferenceLoop<'a> {
             unit: output.unit.clone(),
             peak: size * largest.1,
             peak_time: largest.0,
-            settling_time: own.settling_time,
+            settling_time: transient.settling_time,
             times: points.iter().map(|point| point.0).collect(),
             values: points.iter().map(|point| size * point.1).collect(),
         }
@@ -279,16 +279,16 @@ fn settled(points: &[(f64, f64)]) -> f64 {
 
 /// The largest negative and positive step within the limits, from the commands of a step of `size`.
 fn largest_step(commands: &[CommandPeak], size: f64) -> [f64; 2] {
-    let mut found = [f64::NEG_INFINITY, f64::INFINITY];
+    let mut sizes = [f64::NEG_INFINITY, f64::INFINITY];
     for command in commands {
         let Some([low, high]) = command.limits else { continue };
         for extreme in command.range.into_iter().map(|value| value / size).filter(|x| *x != 0.0) {
             let ends = if extreme > 0.0 { [low, high] } else { [high, low] };
-            found[0] = found[0].max(ends[0] / extreme);
-            found[1] = found[1].min(ends[1] / extreme);
+            sizes[0] = sizes[0].max(ends[0] / extreme);
+            sizes[1] = sizes[1].min(ends[1] / extreme);
         }
     }
-    found
+    sizes
 }
 
 #[cfg(test)]
@@ -304,7 +304,7 @@ mod tests {
             limits,
             final_value: 0.0,
         };
-        let limits = |own, size| largest_step(&[own], size).map(|limit| format!("{limit}"));
+        let limits = |command, size| largest_step(&[command], size).map(|limit| format!("{limit}"));
         let free = command([-9.0, 9.0], None);
         assert_eq!(limits(free, 2.0), ["-inf", "inf"]);
         // A step of 2 moves u from -1 to 4; per unit -0.5 to 2.

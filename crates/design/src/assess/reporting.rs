@@ -124,27 +124,30 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
     let frequency =
         unless_numerical("the gains from faults over frequency", frequency, &mut missing)?;
     further.extend(missing.into_iter().map(|reason| (Level::Amber, reason)));
-    let fallback = fallback.map(|own| fallback::report(file, nominal, own, &budget));
+    let fallback =
+        fallback.map(|fallback_design| fallback::report(file, nominal, fallback_design, &budget));
     let fallback = fallback.transpose()?.flatten();
-    further.extend(fallback.iter().flat_map(|own| fallback::reasons(own, file.robustness.red)));
+    further
+        .extend(fallback.iter().flat_map(|report| fallback::reasons(report, file.robustness.red)));
     let family_report = family_report::family(designed, &file.robustness, &budget)?;
     let schedule = schedule_report::schedule(designed, &file.robustness, &budget)?;
     let remedies = steps.run(Step::Remedies, || remedies(file, robustness.as_ref(), &budget));
     let mut verdict = verdict(&checks, robustness.as_ref(), &file.robustness, further, remedies);
-    if let Some(found) = &family_report {
-        let members: Vec<_> = found.members.iter().skip(1).collect();
+    if let Some(family) = &family_report {
+        let members: Vec<_> = family.members.iter().skip(1).collect();
         judge(&mut verdict, "member", &members, &file.robustness);
-        judge_proof(&mut verdict, found);
+        judge_proof(&mut verdict, family);
     }
-    if let Some(found) = &schedule {
-        judge_schedule(&mut verdict, designed, found, &file.robustness);
+    if let Some(report) = &schedule {
+        judge_schedule(&mut verdict, designed, report, &file.robustness);
     }
     let mut warnings: Vec<_> =
         designed.warnings.iter().map(|warning| line(file, warning)).collect();
     warnings.extend(slow_estimates::warning(file, nominal)?);
     warnings.extend(references.iter().filter_map(beyond_limits));
     warnings.extend(without_bounds);
-    let (detection, of_detection) = detection.map(|own| (own.report, own.warnings)).unzip();
+    let (detection, of_detection) =
+        detection.map(|section| (section.report, section.warnings)).unzip();
     warnings.extend(of_detection.into_iter().flatten());
     Ok(Report {
         description,
@@ -200,15 +203,15 @@ fn sampling(solution: &Solution) -> Option<Sampled> {
 /// Returns a part of the report; an empty one, with a reason in `missing`, if rounding errors prevent it.
 fn unless_numerical<T>(
     part: &str,
-    found: Result<Vec<T>, Error>,
+    results: Result<Vec<T>, Error>,
     missing: &mut Vec<String>,
 ) -> Result<Vec<T>, Error> {
-    match found {
+    match results {
         Err(error) if error.is_numerical() => {
             missing.push(format!("{part} cannot be computed: {error}"));
             Ok(Vec::new())
         }
-        found => found,
+        results => results,
     }
 }
 
@@ -273,19 +276,19 @@ fn notes(fault: &Fault, designed: &Solution) -> String {
 fn closed(
     name: &str,
     dynamics: &DMatrix<f64>,
-    found: &GainResult,
+    result: &GainResult,
     requirement: Option<&Requirement>,
 ) -> Result<Loop, Error> {
-    let quality = found.quality;
+    let quality = result.quality;
     let region = match requirement {
         Some(Requirement::Region(region) | Requirement::HInfinity { region, .. }) => Some(*region),
         _ => None,
     };
     let number = |number: fn(&Quality) -> f64| quality.as_ref().map(number);
-    let required = pairs(&sorted(&found.required));
+    let required = pairs(&sorted(&result.required));
     Ok(Loop {
         matrix: name.to_owned(),
-        method: found.method.clone(),
+        method: result.method.clone(),
         wanted: required.clone(),
         required,
         eigenvalues: pairs(&eigenvalues(dynamics)?),
@@ -300,7 +303,7 @@ fn closed(
                 sector: region.sector,
             }
         }),
-        norm: found.norm.clone(),
+        norm: result.norm.clone(),
     })
 }
 
@@ -321,12 +324,12 @@ fn effectiveness(designed: &Solution) -> Result<Vec<Effectiveness>, Error> {
         return Ok(Vec::new());
     }
     let DesignLoop { plant, controller } = &designed.whole;
-    let found = loss_tolerance(plant, controller, &inputs, 1.0)?;
+    let limits = loss_tolerance(plant, controller, &inputs, 1.0)?;
     let one = |(input, loss): (&usize, &f64)| Effectiveness {
         actuator: designed.linear.actuators[*input].name.clone(),
         largest_stable_loss: *loss,
     };
-    Ok(inputs.iter().zip(&found.single).map(one).collect())
+    Ok(inputs.iter().zip(&limits.single).map(one).collect())
 }
 
 fn assumptions(designed: &Designed) -> Vec<String> {
@@ -399,10 +402,10 @@ fn tracking_assumption(designed: &Solution) -> Option<String> {
              While a command is at a limit, the integrals follow it with a time constant of {} s; the \
              responses are those within the limits.{}",
             rounded(*windup_time),
-            feedforward.as_ref().map_or(String::new(), |own| format!(
+            feedforward.as_ref().map_or(String::new(), |action| format!(
                 " In the plant of the model, references do not excite the slowest eigenvalues of the \
                  feedback ({}): these answer disturbances and errors of the model.",
-                own.silent
+                action.silent
                     .iter()
                     .filter(|value| value.im >= 0.0)
                     .map(|value| shown(*value))

@@ -25,7 +25,7 @@ const LARGE: usize = 48;
 /// Returns the responses to a change of each fault, as a step and as a ramp at the bound of its rate,
 /// and to steps of all faults together.
 pub(crate) fn responses(designed: &Solution) -> Result<Vec<StepResponse>, Error> {
-    let own = ShownLoop::of(designed)?;
+    let shown = ShownLoop::of(designed)?;
     let faults = &designed.linear.faults;
     let changes = faults.iter().zip(&designed.extended.channels).flat_map(|(fault, channel)| {
         let rates = std::iter::once(None).chain(fault.rate_bound.map(Some));
@@ -35,8 +35,8 @@ pub(crate) fn responses(designed: &Solution) -> Result<Vec<StepResponse>, Error>
     let one = |&(fault, input, rate): &(&Fault, usize, Option<f64>)| {
         let size = size(fault);
         let trace = match rate {
-            None => step_response(&own.system, input)?,
-            Some(rate) => ramp_response(&own.system, input, size / rate)?,
+            None => step_response(&shown.system, input)?,
+            Some(rate) => ramp_response(&shown.system, input, size / rate)?,
         };
         Ok(StepResponse {
             fault: fault.name.clone(),
@@ -44,7 +44,7 @@ pub(crate) fn responses(designed: &Solution) -> Result<Vec<StepResponse>, Error>
             size,
             rate,
             parts: vec![part(fault)],
-            curves: own.curves(&trace, size),
+            curves: shown.curves(&trace, size),
         })
     };
     let together = || {
@@ -55,7 +55,7 @@ pub(crate) fn responses(designed: &Solution) -> Result<Vec<StepResponse>, Error>
             size: 1.0,
             rate: None,
             parts: faults.iter().map(part).collect(),
-            curves: own.curves(&step_response(&own.together(), 0)?, 1.0),
+            curves: shown.curves(&step_response(&shown.together(), 0)?, 1.0),
         })
     };
     let (all, last) = rayon::join(
@@ -114,11 +114,11 @@ impl<'a> ShownLoop<'a> {
         add_outputs(&mut system, &commands, &DMatrix::zeros(m, q));
         if let Domain::Sampled { period } = *domain {
             let n = designed.extended.states;
-            let own = &designed.extended.plant;
-            let a = own.a.view((0, 0), (n, n)).into_owned();
+            let model = &designed.extended.plant;
+            let a = model.a.view((0, 0), (n, n)).into_owned();
             let mut b = DMatrix::zeros(n, m + q);
-            b.columns_mut(0, m).copy_from(&own.b.rows(0, n));
-            b.columns_mut(m, q).copy_from(&own.f_a.rows(0, n));
+            b.columns_mut(0, m).copy_from(&model.b.rows(0, n));
+            b.columns_mut(m, q).copy_from(&model.f_a.rows(0, n));
             for part in 1..=BETWEEN {
                 let time = period * f64::from(part) / f64::from(BETWEEN + 1);
                 // x(t_k + time) from x(t_k), with command and fault constant since t_k.
@@ -150,7 +150,7 @@ impl<'a> ShownLoop<'a> {
         let first_between = first_command + plant.b.ncols();
         let signals = self.outputs.names.iter().zip(&self.outputs.units);
         let signals = signals.zip(&self.outputs.positions);
-        let mut found = Vec::new();
+        let mut curves = Vec::new();
         for (at, ((name, unit), &row)) in signals.enumerate() {
             let between = |part: usize| first_between + part * extended.states + at;
             let is_state = at < linear.states.len();
@@ -160,16 +160,16 @@ impl<'a> ShownLoop<'a> {
                 Some(_) => None,
             });
             let shown = ShownSignal { name: name.clone(), unit: unit.clone(), row };
-            found.push(self.curve(shown, trace, factor, &times));
+            curves.push(self.curve(shown, trace, factor, &times));
         }
         for (at, actuator) in linear.actuators.iter().enumerate() {
             let row = first_command + at;
             let times = self.times(trace, |k, _| Some(trace.output[(row, k)]));
             let name = format!("command {}", actuator.name);
             let shown = ShownSignal { name, unit: actuator.unit.clone(), row };
-            found.push(self.curve(shown, trace, factor, &times));
+            curves.push(self.curve(shown, trace, factor, &times));
         }
-        found
+        curves
     }
 
     /// Returns the points of a curve, each a time and a value.
@@ -241,11 +241,11 @@ fn thinned(points: &[(f64, f64)], parts: usize) -> Vec<(f64, f64)> {
         let by_height = |i: &usize, j: &usize| part[*i].1.total_cmp(&part[*j].1);
         let (lowest, highest) =
             ((0..part.len()).min_by(by_height), (0..part.len()).max_by(by_height));
-        let mut kept: Vec<usize> = lowest.into_iter().chain(highest).collect();
-        kept.extend([0, part.len() - 1]);
-        kept.sort_unstable();
-        kept.dedup();
-        kept.into_iter().map(|at| part[at]).collect::<Vec<_>>()
+        let mut places: Vec<usize> = lowest.into_iter().chain(highest).collect();
+        places.extend([0, part.len() - 1]);
+        places.sort_unstable();
+        places.dedup();
+        places.into_iter().map(|at| part[at]).collect::<Vec<_>>()
     };
     let parts = rest.chunk_by(|one, next| part(one).total_cmp(&part(next)).is_eq());
     before.iter().copied().chain(parts.flat_map(shown)).collect()
@@ -284,13 +284,13 @@ mod tests {
         let point =
             |k: u32| (f64::from(k), if k == 12_345 { 9.0 } else { (0.1 * f64::from(k)).sin() });
         let all: Vec<_> = (0..50_000).map(point).collect();
-        let kept = thinned(&all, 250);
-        assert!(kept.len() <= 1005 && kept.is_sorted_by(|x, y| x.0 < y.0), "{}", kept.len());
-        assert_eq!((kept[0], kept[kept.len() - 1]), (all[0], all[49_999]));
-        assert!(kept.contains(&(12_345.0, 9.0)));
+        let thin = thinned(&all, 250);
+        assert!(thin.len() <= 1005 && thin.is_sorted_by(|x, y| x.0 < y.0), "{}", thin.len());
+        assert_eq!((thin[0], thin[thin.len() - 1]), (all[0], all[49_999]));
+        assert!(thin.contains(&(12_345.0, 9.0)));
         assert_eq!(thinned(&all[..1000], 250), all[..1000]);
         // By index the decade to 10^4 would have a fifth of what is kept.
-        let shown = kept.iter().filter(|point| (1e3..1e4).contains(&point.0)).count();
+        let shown = thin.iter().filter(|point| (1e3..1e4).contains(&point.0)).count();
         assert!((150..=220).contains(&shown), "{shown}");
     }
 
@@ -299,10 +299,10 @@ mod tests {
         // Two modes, 1e-2 s and 10 s.
         let value = |time: f64| 2.0 - (-100.0 * time).exp() - (-0.1 * time).exp();
         let all: Vec<_> = (0..50_000).map(|k| 1e-3 * f64::from(k)).map(|t| (t, value(t))).collect();
-        let kept = thinned(&all, 250);
+        let thin = thinned(&all, 250);
         for (time, exact) in &all[1..] {
-            let next = kept.partition_point(|point| point.0 < *time);
-            let ((from, low), (to, high)) = (kept[next.max(2) - 1], kept[next.max(2)]);
+            let next = thin.partition_point(|point| point.0 < *time);
+            let ((from, low), (to, high)) = (thin[next.max(2) - 1], thin[next.max(2)]);
             let share = (time / from).ln() / (to / from).ln();
             let drawn = low + share * (high - low);
             assert!((drawn - exact).abs() < 2e-3, "{time}: {drawn}, expected {exact}");

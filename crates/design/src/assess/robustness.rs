@@ -56,14 +56,14 @@ pub(crate) fn robustness(
         return Ok((None, time.of_certificates()));
     }
     let physical = Physical::of(designed)?;
-    let own = physical.closed(&physical.controller)?;
+    let closed_loop = physical.closed(&physical.controller)?;
     let Margins { points, delay, hold, noise, noise_together } =
-        steps.run(Step::Margins, || margins(designed, &physical, &own, limits))?;
+        steps.run(Step::Margins, || margins(designed, &physical, &closed_loop, limits))?;
     let slopes = slopes(&designed.linear, &physical, &points)?;
     let ((comparison, curves), tolerance) = rayon::join(
         || {
             let comparison = || comparison(designed, &physical, &points);
-            rayon::join(|| steps.run(Step::Comparison, comparison), || curves(&own))
+            rayon::join(|| steps.run(Step::Comparison, comparison), || curves(&closed_loop))
         },
         || {
             steps.run(Step::Tolerances, || match family {
@@ -107,10 +107,10 @@ pub(crate) struct Margins {
 pub(crate) fn margins(
     designed: &Solution,
     physical: &Physical,
-    own: &Loop,
+    closed_loop: &Loop,
     limits: &RobustnessLimits,
 ) -> Result<Margins, crate::Error> {
-    let opened = POINTS.into_par_iter().map(|(at, _)| OpenedLoop::new(own, at));
+    let opened = POINTS.into_par_iter().map(|(at, _)| OpenedLoop::new(closed_loop, at));
     let opened = opened.collect::<Result<Vec<_>, Error>>()?;
     let point = |(opened, (point, name)): (&OpenedLoop, (Point, &str))| {
         let signals = match point {
@@ -124,7 +124,9 @@ pub(crate) fn margins(
     let (points, (delay, hold)) = rayon::join(
         || opened.par_iter().zip(POINTS).map(point).collect::<Result<Vec<_>, Error>>(),
         || match designed.domain {
-            Domain::Continuous => rayon::join(|| at_input.delay_margin(), || longest_hold(own)),
+            Domain::Continuous => {
+                rayon::join(|| at_input.delay_margin(), || longest_hold(closed_loop))
+            }
             Domain::Sampled { .. } => rayon::join(
                 || at_input.sampled_delay_margin(plant, controller),
                 || longest_period(plant, controller),
@@ -132,13 +134,13 @@ pub(crate) fn margins(
         },
     );
     let (points, delay, hold) = (points?, delay?, hold?);
-    let (noise, noise_together) = noise::noise(designed, own, &physical.estimates, limits)?;
+    let (noise, noise_together) = noise::noise(designed, closed_loop, &physical.estimates, limits)?;
     Ok(Margins { points, delay, hold, noise, noise_together })
 }
 
 /// Returns the margins of a loop opened at its `inputs` and at its `outputs`.
 pub(crate) fn loop_points(
-    own: &Loop,
+    closed_loop: &Loop,
     inputs: &[Signal],
     outputs: &[Signal],
 ) -> Result<Vec<LoopPoint>, Error> {
@@ -147,7 +149,7 @@ pub(crate) fn loop_points(
             Point::Input => inputs,
             Point::Output => outputs,
         };
-        self::point(&OpenedLoop::new(own, at)?, name, signals)
+        self::point(&OpenedLoop::new(closed_loop, at)?, name, signals)
     };
     POINTS.into_par_iter().map(point).collect()
 }
@@ -207,24 +209,27 @@ pub(crate) fn closed(plant: &StateSpace, controller: &StateSpace) -> Result<Loop
 /// gives them.
 fn complete(designed: &Solution, gains: &Gains) -> Result<CompleteController, Error> {
     let filter = designed.filter.as_deref();
-    let found = complete_controller(&designed.plant, gains, filter, designed.domain)?;
+    let controller = complete_controller(&designed.plant, gains, filter, designed.domain)?;
     if !designed.linear.has_feedthrough() {
-        return Ok(found);
+        return Ok(controller);
     }
-    let own = |system| with_feedthrough(system, &found.commands.c, &designed.linear.d);
-    Ok(CompleteController { commands: own(&found.commands)?, estimates: own(&found.estimates)? })
+    let complete = |system| with_feedthrough(system, &controller.commands.c, &designed.linear.d);
+    Ok(CompleteController {
+        commands: complete(&controller.commands)?,
+        estimates: complete(&controller.estimates)?,
+    })
 }
 
 fn point(opened: &OpenedLoop, name: &str, signals: &[Signal]) -> Result<LoopPoint, Error> {
     let channel = |(index, signal): (usize, &Signal)| {
         let margins = || opened.channel_margins(index);
-        let (found, disk) = rayon::join(margins, || opened.disk_margin(Some(index)));
-        let found = found?;
+        let (result, disk) = rayon::join(margins, || opened.disk_margin(Some(index)));
+        let margins = result?;
         Ok(Channel {
             name: signal.name.clone(),
-            gain: found.gain,
-            phase: found.phase.to_degrees(),
-            delay: found.delay,
+            gain: margins.gain,
+            phase: margins.phase.to_degrees(),
+            delay: margins.delay,
             disk: self::disk(&disk?),
         })
     };
@@ -263,12 +268,12 @@ fn slopes(
     physical: &Physical,
     points: &[LoopPoint],
 ) -> Result<Vec<[DMatrix<f64>; 4]>, Error> {
-    let one = |((point, _), found): ((Point, &str), &LoopPoint)| {
+    let one = |((point, _), loop_point): ((Point, &str), &LoopPoint)| {
         let signals = match point {
             Point::Input => &linear.actuators,
             Point::Output => &linear.measurements,
         };
-        let frequency = found.judged_frequency;
+        let frequency = loop_point.judged_frequency;
         let peak = SensitivityPeak { point, frequency, scaled: !same_unit(signals) };
         let slopes = peak_derivatives(&physical.plant, &physical.controller, &peak)?;
         Ok([slopes.a, slopes.b, slopes.c, slopes.d])
@@ -314,13 +319,13 @@ fn names(signals: &[Signal]) -> Vec<String> {
     signals.iter().map(|signal| signal.name.clone()).collect()
 }
 
-fn disk(found: &DiskMargin) -> Disk {
+fn disk(margin: &DiskMargin) -> Disk {
     Disk {
-        alpha: found.alpha,
-        certified: found.certified,
-        frequency: found.frequency,
-        gain: found.gains(),
-        phase: found.phase().to_degrees(),
+        alpha: margin.alpha,
+        certified: margin.certified,
+        frequency: margin.frequency,
+        gain: margin.gains(),
+        phase: margin.phase().to_degrees(),
     }
 }
 
@@ -334,17 +339,17 @@ fn comparison(
     let n = extended.states;
     let ((a, b), k) = (&designed.feedback_pair, &designed.feedback.gain);
     let a_0 = plant.augmented_dynamics();
-    let seen = gains.estimator.output_matrix(&a_0, &plant.augmented_output());
+    let output = gains.estimator.output_matrix(&a_0, &plant.augmented_output());
     let l = gains.observer_gain();
     let dual = (-&l).transpose();
     // A law with its own model of the fault has no Kalman filter of the same kind.
     let observer = || match designed.law.a_f {
-        None => regulator_of_same_speed(&a_0.transpose(), &seen.transpose(), &dual, *domain),
+        None => regulator_of_same_speed(&a_0.transpose(), &output.transpose(), &dual, *domain),
         Some(_) => Ok(None),
     };
     let (feedback, observer) = rayon::join(|| regulator_of_same_speed(a, b, k, *domain), observer);
     let (feedback, observer) = (feedback?, observer?.map(|gain| -gain.transpose()));
-    let mut found = vec![
+    let mut alternatives = vec![
         Compared {
             name: match gains.integral {
                 None => "norm of K_x".to_owned(),
@@ -364,9 +369,9 @@ fn comparison(
             let all = plant.a.nrows();
             let other = Gains {
                 k_x: feedback.columns(0, n).into_owned().resize_horizontally(all, 0.0),
-                integral: gains.integral.clone().map(|own| IntegralAction {
-                    gain: feedback.columns(n, own.gain.ncols()).into(),
-                    ..own
+                integral: gains.integral.clone().map(|action| IntegralAction {
+                    gain: feedback.columns(n, action.gain.ncols()).into(),
+                    ..action
                 }),
                 l_x: observer.rows(0, all).into(),
                 l_f: -observer.rows(all, plant.f_a.ncols()),
@@ -382,11 +387,11 @@ fn comparison(
         Compared {
             name: format!("peak of S at the {name}"),
             design: point.s_peak,
-            linear_quadratic: other.as_ref().and_then(peak).map(|found| found.lower),
+            linear_quadratic: other.as_ref().and_then(peak).map(|norm| norm.lower),
         }
     });
-    found.par_extend(peaks);
-    Ok(found)
+    alternatives.par_extend(peaks);
+    Ok(alternatives)
 }
 
 /// Returns the 2-norm.
@@ -395,9 +400,9 @@ fn norm(m: &DMatrix<f64>) -> f64 {
 }
 
 /// Returns the singular values of S and T at both points.
-fn curves(own: &Loop) -> Result<Vec<Frequency>, Error> {
+fn curves(closed_loop: &Loop) -> Result<Vec<Frequency>, Error> {
     let systems = POINTS.into_iter().flat_map(|(at, name)| {
-        [("S", own.sensitivity(at), name), ("T", own.complementary(at), name)]
+        [("S", closed_loop.sensitivity(at), name), ("T", closed_loop.complementary(at), name)]
     });
     let one = |(symbol, system, name): &(&str, StateSpace, &str)| {
         let grid = frequency_grid(system, POINTS_PER_DECADE)?;

@@ -28,29 +28,30 @@ pub(crate) fn schedule(
     limits: &RobustnessLimits,
     budget: &Budget,
 ) -> Result<Option<ScheduleReport>, crate::Error> {
-    let Designed { nominal, schedule: Some(own), .. } = designed else { return Ok(None) };
-    let coupled = coupled(own, nominal)?;
-    let all: Vec<_> = own.points(nominal).collect();
-    let variable = &own.variable;
+    let Designed { nominal, schedule: Some(scheduled), .. } = designed else { return Ok(None) };
+    let coupled = coupled(scheduled, nominal)?;
+    let all: Vec<_> = scheduled.points(nominal).collect();
+    let variable = &scheduled.variable;
     let one = |(k, (at, point)): (usize, &(f64, &Solution))| {
         let name = format!("{} = {at}", variable.name);
         let linear = &point.linear;
-        let found = member(point, linear, name.clone(), limits);
+        let report = member(point, linear, name.clone(), limits);
         let operating = [&linear.states, &linear.actuators, &linear.measurements];
         Ok::<_, crate::Error>(SchedulePointReport {
             at: *at,
             operating: operating
                 .map(|all| all.iter().map(|signal| signal.operating.unwrap_or(0.0)).collect()),
             gains: gains(point),
-            closed: found.map_err(|error| error.within(format!("schedule with {name}")))?,
+            closed: report.map_err(|error| error.within(format!("schedule with {name}")))?,
             coupled_instability: coupled.as_ref().map(|all| all[k]),
         })
     };
     let points = all.par_iter().enumerate().map(one).collect::<Result<Vec<_>, _>>()?;
-    let whole = ScheduledLoop::of(own, nominal)?;
+    let whole = ScheduledLoop::of(scheduled, nominal)?;
     let intervals = whole.intervals()?;
     let (worst_instability, worst_at) = whole.worst(CHECKED, nominal.domain)?;
-    let vertices: Vec<_> = intervals.iter().flat_map(|own| own.coefficients.clone()).collect();
+    let vertices: Vec<_> =
+        intervals.iter().flat_map(|interval| interval.coefficients.clone()).collect();
     let degree = intervals[0].coefficients.len() - 1;
     let named = |vertex: usize| {
         let (k, j) = (vertex / (degree + 1), vertex % (degree + 1));
@@ -63,13 +64,13 @@ pub(crate) fn schedule(
     let any_rate = common(&vertices, nominal.domain, budget, named)?;
     let bounded_rate = match &any_rate {
         Ok(_) => Err("one P serves any rate".to_owned()),
-        Err(_) => bounded(own, &intervals, nominal.domain, budget)?,
+        Err(_) => bounded(scheduled, &intervals, nominal.domain, budget)?,
     };
     Ok(Some(ScheduleReport {
         variable: variable.name.clone(),
         unit: variable.unit.clone(),
-        measured: own.measurement.is_some(),
-        rate_bound: own.rate_bound,
+        measured: scheduled.measurement.is_some(),
+        rate_bound: scheduled.rate_bound,
         checked: intervals.len() * usize::try_from(CHECKED).unwrap_or(usize::MAX) + 1,
         points,
         any_rate,
@@ -81,7 +82,7 @@ pub(crate) fn schedule(
 
 /// P(variable) for the stated rate, or for the largest one that is found.
 fn bounded(
-    own: &Scheduled,
+    scheduled: &Scheduled,
     intervals: &[control::lmi::Interval],
     domain: Domain,
     budget: &Budget,
@@ -89,13 +90,13 @@ fn bounded(
     if budget.is_over() {
         return Ok(Err(format!("it was {}", budget.reason())));
     }
-    let shortest = intervals.iter().map(|own| own.length).fold(f64::INFINITY, f64::min);
+    let shortest = intervals.iter().map(|interval| interval.length).fold(f64::INFINITY, f64::min);
     // The time in which the variable changes once: a sample, or a second.
     let (time, is_sampled) = match domain {
         Domain::Continuous => (1.0, false),
         Domain::Sampled { period } => (period, true),
     };
-    let found = match own.rate_bound {
+    let certificate = match scheduled.rate_bound {
         Some(rate) if is_sampled && rate * time > shortest => {
             return Ok(Err(format!(
                 "at the stated rate the variable passes the shortest interval, {shortest}, in less \
@@ -105,15 +106,15 @@ fn bounded(
         Some(rate) => budget.run(|| certify_schedule(intervals, rate * time, domain))?,
         None => budget.run(|| largest_change(intervals, domain))?,
     };
-    if found.is_none() && budget.is_over() {
+    if certificate.is_none() && budget.is_over() {
         return Ok(Err(format!("it was {}", budget.reason())));
     }
-    Ok(match found {
+    Ok(match certificate {
         Some(ScheduleCertificate { change, p, margin, .. }) => {
             let p = p.iter().map(rows).collect();
-            Ok(RateCertificate { rate: own.rate_bound.unwrap_or(change / time), p, margin })
+            Ok(RateCertificate { rate: scheduled.rate_bound.unwrap_or(change / time), p, margin })
         }
-        None => Err(match own.rate_bound {
+        None => Err(match scheduled.rate_bound {
             Some(rate) => format!("no P was found for the stated rate {rate} per s"),
             None => "no P was found, even for slow changes".to_owned(),
         }),
@@ -124,42 +125,43 @@ fn bounded(
 pub(crate) fn judge_schedule(
     verdict: &mut Verdict,
     designed: &Designed,
-    found: &ScheduleReport,
+    report: &ScheduleReport,
     limits: &RobustnessLimits,
 ) {
-    let members: Vec<_> = found.points.iter().map(|point| &point.closed).collect();
+    let members: Vec<_> = report.points.iter().map(|point| &point.closed).collect();
     judge(verdict, "schedule at", &members, limits);
     let others = designed.schedule.iter().flat_map(Scheduled::others);
     for (at, point) in others {
         for check in checks(point).iter().filter(|check| !check.holds) {
-            let text = format!("with {} = {at} does not hold: {}", found.variable, check.condition);
+            let text =
+                format!("with {} = {at} does not hold: {}", report.variable, check.condition);
             verdict.add(Level::Red, text);
         }
     }
-    if found.worst_instability >= 0.0 {
+    if report.worst_instability >= 0.0 {
         verdict.add(
             Level::Red,
             format!(
                 "the interpolated loop is not stable with {} = {}",
-                found.variable, found.worst_at
+                report.variable, report.worst_at
             ),
         );
     }
-    for point in &found.points {
+    for point in &report.points {
         if point.coupled_instability.is_some_and(|value| value >= -NEUTRAL) {
             let text = format!(
                 "the loop at {} = {} is not stable, because the measurement moves the operating point; \
                  schedule by an input, such as its set point",
-                found.variable, point.at
+                report.variable, point.at
             );
             verdict.add(Level::Red, text);
         }
     }
-    if found.any_rate.is_err() && found.bounded_rate.is_err() {
+    if report.any_rate.is_err() && report.bounded_rate.is_err() {
         let text = format!(
             "stability while {} changes is not proven, neither for any rate nor for a bounded one; only \
              constant values were checked",
-            found.variable
+            report.variable
         );
         verdict.add(Level::Amber, text);
     }

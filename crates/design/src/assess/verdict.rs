@@ -22,15 +22,15 @@ pub(crate) fn verdict(
         level = Level::Red;
         reasons.push(format!("does not hold: {}", check.condition));
     }
-    for point in robustness.iter().flat_map(|found| &found.points) {
+    for point in robustness.iter().flat_map(|figures| &figures.points) {
         let Some((reached, reason)) = peak_reason(point, limits) else { continue };
         level = level.max(reached);
         reasons.push(reason);
     }
-    let tolerance = robustness.map(|found| &found.tolerance);
-    if let Some(found) = tolerance.filter(|found| found.is_unstable()) {
+    let tolerance = robustness.map(|figures| &figures.tolerance);
+    if let Some(unstable) = tolerance.filter(|test| test.is_unstable()) {
         level = Level::Red;
-        reasons.push(instability(found));
+        reasons.push(instability(unstable));
     }
     for (reached, reason) in further {
         level = level.max(reached);
@@ -52,11 +52,11 @@ pub(crate) fn peak_reason(point: &LoopPoint, limits: &RobustnessLimits) -> Optio
 }
 
 /// The sentence about a loop that parameters within their tolerances make unstable.
-pub(crate) fn instability(found: &ToleranceResult) -> String {
-    let range = found.range();
-    let (cases, first) = (found.cases, found.first_unstable);
+pub(crate) fn instability(test: &ToleranceResult) -> String {
+    let range = test.range();
+    let (cases, first) = (test.cases, test.first_unstable);
     let worst = format!("the worst case found, from {first:.3} of the tolerances on");
-    let unstable = match found.stable {
+    let unstable = match test.stable {
         Some(part) if part < 1.0 => {
             format!("{:.1} % of {cases} random cases, and {worst}", 100.0 * (1.0 - part))
         }

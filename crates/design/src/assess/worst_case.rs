@@ -39,7 +39,7 @@ pub(crate) fn plant_file(
     let within = if parameters.is_empty() {
         format!("within {}", robustness.tolerance.range())
     } else {
-        let worst = |own: &Parameter| format!("{} = {}", own.name, own.worst);
+        let worst = |parameter: &Parameter| format!("{} = {}", parameter.name, parameter.worst);
         format!("with {}", parameters.iter().map(worst).collect::<Vec<_>>().join(", "))
     };
     Ok(Some(format!(
@@ -80,8 +80,8 @@ fn without_fmu(table: &mut Table, designed: &Solution) -> bool {
     }
     let mut columns = Vec::new();
     if let Some(Value::Array(faults)) = table.get_mut("faults") {
-        let own = linear.models.len() - faults.len();
-        for (fault, model) in faults.iter_mut().zip(&linear.models[own..]) {
+        let first = linear.models.len() - faults.len();
+        for (fault, model) in faults.iter_mut().zip(&linear.models[first..]) {
             let input = fault.as_table_mut().and_then(|fault| fault.remove("input"));
             match (input, &model.entry) {
                 (None, _) => {}

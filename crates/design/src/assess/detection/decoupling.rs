@@ -30,8 +30,8 @@ pub(super) struct Decoupling {
 impl Decoupling {
     /// The filter that decouples nothing.
     pub(super) fn without(problem: &Problem) -> Result<Self, Error> {
-        let found = attempt(problem, Vec::new())?;
-        found
+        let decoupling = attempt(problem, Vec::new())?;
+        decoupling
             .ok_or(Error::NotConverged { what: "the filter without unknown inputs", iterations: 0 })
     }
 
@@ -56,7 +56,7 @@ impl Decoupling {
     }
 
     pub(super) fn has(&self, input: usize) -> bool {
-        self.inputs.iter().any(|(own, _)| *own == input)
+        self.inputs.iter().any(|(decoupled, _)| *decoupled == input)
     }
 }
 
@@ -70,8 +70,8 @@ fn attempt(problem: &Problem, inputs: Vec<(usize, bool)>) -> Result<Option<Decou
             Domain::Continuous => intensity,
             Domain::Sampled { period } => intensity * period,
         };
-        let own = problem.inputs[input].extended(plant.a.nrows());
-        plant = plant.with_random_walk(&own, intensity)?;
+        let entry = problem.inputs[input].extended(plant.a.nrows());
+        plant = plant.with_random_walk(&entry, intensity)?;
     }
     let states = plant.a.nrows();
     let exact: Vec<_> = inputs
@@ -105,31 +105,31 @@ impl Problem {
             let place = request.map_or(0..0, |request| request.place.clone());
             file.error_at(&place, error.to_string())
         };
-        let mut found = Decoupling::without(self).map_err(refuse)?;
-        for (input, own) in file.disturbances.iter().enumerate() {
-            if let Some(next) = found.with(self, input, true).map_err(refuse)? {
-                found = next;
+        let mut decoupling = Decoupling::without(self).map_err(refuse)?;
+        for (input, disturbance) in file.disturbances.iter().enumerate() {
+            if let Some(next) = decoupling.with(self, input, true).map_err(refuse)? {
+                decoupling = next;
                 continue;
             }
-            if own.bound.is_none() {
+            if disturbance.bound.is_none() {
                 let message = format!(
                     "the measurements do not show disturbance `{}` at once, so that it cannot be removed \
                      exactly (rank C E = rank E, stable zeros): expected `bound`, its largest value, for an \
                      approximation",
-                    own.name
+                    disturbance.name
                 );
-                return Err(file.error_at(&own.place, message).into());
+                return Err(file.error_at(&disturbance.place, message).into());
             }
-            found = found.with(self, input, false).map_err(refuse)?.ok_or_else(|| {
+            decoupling = decoupling.with(self, input, false).map_err(refuse)?.ok_or_else(|| {
                 let message = format!(
                     "the measurements cannot tell disturbance `{}` from a motion of the states, or no \
                      residual is left without it; expected more measurements, or fewer disturbances",
-                    own.name
+                    disturbance.name
                 );
-                file.error_at(&own.place, message)
+                file.error_at(&disturbance.place, message)
             })?;
         }
-        Ok(found)
+        Ok(decoupling)
     }
 
     /// The steady mean of the residuals of `base` after each fault of its size; an error names a fault
@@ -166,23 +166,23 @@ impl Problem {
         others: &[usize],
         shift: f64,
     ) -> Result<Decoupling, Error> {
-        let mut found = base.clone();
+        let mut decoupling = base.clone();
         for &other in others {
             for exact in [true, false] {
-                let next = found.with(self, self.fault_at(other), exact)?;
+                let next = decoupling.with(self, self.fault_at(other), exact)?;
                 let Some(next) = next else { continue };
                 if self.steady_mean(&next, self.fault_at(fault))?.norm() > NO_TRACE * shift {
-                    found = next;
+                    decoupling = next;
                     break;
                 }
             }
         }
-        Ok(found)
+        Ok(decoupling)
     }
 
     fn effect(&self, decoupling: &Decoupling, input: usize) -> Result<StateSpace, Error> {
-        let own = self.inputs[input].extended(decoupling.states);
-        decoupling.filter.effect(&own)
+        let entry = self.inputs[input].extended(decoupling.states);
+        decoupling.filter.effect(&entry)
     }
 
     /// The mean of the residuals long after a step of an input by its size.
@@ -215,6 +215,6 @@ impl Problem {
     ) -> Result<f64, Error> {
         filters
             .map(|decoupling| self.decay(&decoupling.filter.generator.a))
-            .try_fold(f64::INFINITY, |least, own| Ok(least.min(own?)))
+            .try_fold(f64::INFINITY, |least, decay| Ok(least.min(decay?)))
     }
 }

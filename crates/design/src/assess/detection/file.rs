@@ -28,17 +28,17 @@ pub(super) fn section(
     let (mut state, mut row) = (0, 0);
     for part in parts {
         let filter = &part.decoupling.filter;
-        let own = &filter.generator;
-        let order = own.a.nrows();
-        a.view_mut((state, state), (order, order)).copy_from(&own.a);
-        b_u.rows_mut(state, order).copy_from(&own.b_u);
-        b_y.rows_mut(state, order).copy_from(&own.b_y);
+        let generator = &filter.generator;
+        let order = generator.a.nrows();
+        a.view_mut((state, state), (order, order)).copy_from(&generator.a);
+        b_u.rows_mut(state, order).copy_from(&generator.b_u);
+        b_y.rows_mut(state, order).copy_from(&generator.b_y);
         start.view_mut((state, 0), (order, n)).copy_from(&filter.start.columns(0, n));
         for test in &part.tests {
             let count = test.rows.nrows();
-            c.view_mut((row, state), (count, order)).copy_from(&(&test.rows * &own.c));
-            d_u.rows_mut(row, count).copy_from(&(&test.rows * &own.d_u));
-            d_y.rows_mut(row, count).copy_from(&(&test.rows * &own.d_y));
+            c.view_mut((row, state), (count, order)).copy_from(&(&test.rows * &generator.c));
+            d_u.rows_mut(row, count).copy_from(&(&test.rows * &generator.d_u));
+            d_y.rows_mut(row, count).copy_from(&(&test.rows * &generator.d_y));
             row += count;
         }
         state += order;

@@ -118,12 +118,13 @@ impl<'a> ModelErrors<'a> {
             let mean = scale * self.plants.iter().try_fold(0.0, most)?;
             return Ok(LargestMean { mean, interior_excess: None });
         };
-        let found = parameter_box::largest(family.count(), &self.random, |deviations| {
+        let largest = parameter_box::largest(family.count(), &self.random, |deviations| {
             let case = self.case(family, deviations)?;
             self.bound_of(&case.0, &case.1, decoupling, rows)
         })?;
-        let excess = if found.corners > 0.0 { found.everywhere / found.corners - 1.0 } else { 0.0 };
-        Ok(LargestMean { mean: scale * found.everywhere, interior_excess: Some(excess) })
+        let excess =
+            if largest.corners > 0.0 { largest.everywhere / largest.corners - 1.0 } else { 0.0 };
+        Ok(LargestMean { mean: scale * largest.everywhere, interior_excess: Some(excess) })
     }
 
     /// The number of random cases of the parameters of an FMU.
@@ -173,14 +174,14 @@ impl<'a> ModelErrors<'a> {
         let inputs = bounds.len();
         filter.b_u = filter.b_u.resize_horizontally(inputs, 0.0);
         filter.d_u = filter.d_u.resize_horizontally(inputs, 0.0);
-        let found = plant.largest_mean(&filter, rows, bounds).map_err(|error| match error {
+        let bound = plant.largest_mean(&filter, rows, bounds).map_err(|error| match error {
             error @ control::Error::NotHurwitz { .. } => refuse(format!(
                 "the residuals of a wrong model are bounded only if the plant is stable without the \
                  controller: {error}"
             )),
             error => refuse(error.to_string()),
         })?;
-        let bounds = found.ok_or_else(|| {
+        let bounds = bound.ok_or_else(|| {
             refuse(
                 "the tolerances of [robustness] are too large for a bound of the residuals: expected smaller \
                  ones, or `parameters` if the plant is an FMU"

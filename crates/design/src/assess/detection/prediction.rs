@@ -85,15 +85,15 @@ impl Prediction<'_> {
     /// The least factor of the size that is detected within `time` s with probability 0.95.
     pub(super) fn least(&self, time: f64) -> Option<f64> {
         let most = whole(time / self.period).min(2 * MOST_SAMPLES);
-        let found =
+        let detects =
             |factor: f64| self.kind.delay(self.means, factor, most).detected_within(most) >= POWER;
-        if !found(LARGEST) {
+        if !detects(LARGEST) {
             return None;
         }
         let (mut low, mut high) = (1.0 / LARGEST, LARGEST);
         for _ in 0..BISECTIONS {
             let middle = f64::sqrt(low * high);
-            *(if found(middle) { &mut high } else { &mut low }) = middle;
+            *(if detects(middle) { &mut high } else { &mut low }) = middle;
         }
         Some(high)
     }

@@ -121,11 +121,11 @@ impl Problem {
             "The plant file states it.".clone_into(&mut self.origin_of_process_noise);
             return Ok(());
         }
-        let found = self.unit_process_noises().into_iter().find_map(|(source, unit)| {
+        let least_noise = self.unit_process_noises().into_iter().find_map(|(source, unit)| {
             let factor = self.least_factor(&unit)?;
             Some((source, factor, unit * factor))
         });
-        let Some((source, factor, noise)) = found else {
+        let Some((source, factor, noise)) = least_noise else {
             let message = "no process noise was found with which a filter exists: expected `process_noise`, \
                            one number for each state";
             return Err(file.error_at(&request.place, message).into());
@@ -153,15 +153,18 @@ impl Problem {
         };
         let mut slower = Vec::new();
         for factor in std::iter::once(0.0).chain((-16..=12).map(|power| 4f64.powi(power))) {
-            let Some(own) = decay(factor) else { continue };
-            if own >= NEARLY * self.rate {
+            let Some(decay_rate) = decay(factor) else { continue };
+            if decay_rate >= NEARLY * self.rate {
                 return Some(factor);
             }
-            slower.push((factor, own));
+            slower.push((factor, decay_rate));
         }
         // Not always that with the most noise: a sampled filter approaches the zeros of the sampled plant.
-        let fastest = slower.iter().map(|(_, own)| *own).fold(0.0, f64::max);
-        slower.into_iter().find(|(_, own)| *own >= NEARLY * fastest).map(|(factor, _)| factor)
+        let fastest = slower.iter().map(|(_, decay_rate)| *decay_rate).fold(0.0, f64::max);
+        slower
+            .into_iter()
+            .find(|(_, decay_rate)| *decay_rate >= NEARLY * fastest)
+            .map(|(factor, _)| factor)
     }
 
     /// Process noise by which each fault that acts on the states varies by its size within a time

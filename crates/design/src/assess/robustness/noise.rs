@@ -16,18 +16,18 @@ use crate::solve::solution::Solution;
 /// together.
 pub(super) fn noise(
     designed: &Solution,
-    own: &Loop,
+    closed_loop: &Loop,
     estimates: &StateSpace,
     limits: &RobustnessLimits,
 ) -> Result<(Matrix, Vec<Number>), Error> {
     let of = |output: &StateSpace| {
-        let mut gains = noise_or_infinite(own.from_noise(output)?)?;
+        let mut gains = noise_or_infinite(closed_loop.from_noise(output)?)?;
         for (mut column, noise) in gains.column_iter_mut().zip(&limits.noise) {
             column *= *noise;
         }
         Ok::<_, Error>(gains)
     };
-    let (commands, faults) = (of(own.controller())?, of(estimates)?);
+    let (commands, faults) = (of(closed_loop.controller())?, of(estimates)?);
     let linear = &designed.linear;
     let named = linear.actuators.iter().map(|signal| (signal.name.clone(), signal.unit.clone()));
     let estimated = linear.faults.iter();
@@ -68,8 +68,8 @@ fn noise_or_infinite(mut system: StateSpace) -> Result<DMatrix<f64>, Error> {
 /// estimate, all measurements together, in the units of `noise`.
 pub(crate) fn noise_peaks(designed: &Solution, noise: &[f64]) -> Result<Vec<f64>, Error> {
     let physical = Physical::of(designed)?;
-    let own = physical.closed(&physical.controller)?;
-    let mut system = own.from_noise(&physical.estimates)?;
+    let closed_loop = physical.closed(&physical.controller)?;
+    let mut system = closed_loop.from_noise(&physical.estimates)?;
     for (k, noise) in noise.iter().enumerate() {
         system.b.column_mut(k).scale_mut(*noise);
         system.d.column_mut(k).scale_mut(*noise);

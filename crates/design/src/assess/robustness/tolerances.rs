@@ -29,11 +29,11 @@ pub(crate) fn by_entries(
     let cases = cases.map(|case| search.evaluate(case));
     let cases = cases.collect::<Result<Vec<_>, _>>()?;
     let climbs = search.starts(&cases)?.into_par_iter().map(|start| search.climb(start));
-    let found = search.result(&cases, climbs.collect::<Result<Vec<_>, _>>()?)?;
+    let test = search.result(&cases, climbs.collect::<Result<Vec<_>, _>>()?)?;
     let entries = u32::try_from(tolerances.entries().count()).unwrap_or(u32::MAX);
-    let stable = stable(&found).filter(|_| entries > 0);
+    let stable = stable(&test).filter(|_| entries > 0);
     let varying = varying(&tolerances);
-    Ok(ToleranceResult { entries, varying, stable, ..tested(designed, limits, &found) })
+    Ok(ToleranceResult { entries, varying, stable, ..tested(designed, limits, &test) })
 }
 
 /// Examines the loop for other parameters of the plant's FMU, as [`by_entries`] does for entries.
@@ -45,9 +45,9 @@ pub(super) fn by_parameters(
     slopes: &[[DMatrix<f64>; 4]],
 ) -> Result<ToleranceResult, crate::Error> {
     let seed = u64::from(limits.seed);
-    let found = tolerance_test(family, &physical.controller, limits.cases, seed)?;
-    let parameters = family.report(&found.deviations, slopes);
-    Ok(ToleranceResult { parameters, ..tested(designed, limits, &found) })
+    let test = tolerance_test(family, &physical.controller, limits.cases, seed)?;
+    let parameters = family.report(&test.deviations, slopes);
+    Ok(ToleranceResult { parameters, ..tested(designed, limits, &test) })
 }
 
 /// The entries that vary: one item for each factor.
@@ -71,15 +71,11 @@ fn varying(tolerances: &Tolerances) -> Vec<VaryingEntries> {
 }
 
 /// The part of the random cases that is stable; none without cases.
-fn stable(found: &ToleranceTest) -> Option<f64> {
-    (found.cases > 0).then(|| f64::from(found.stable) / f64::from(found.cases))
+fn stable(test: &ToleranceTest) -> Option<f64> {
+    (test.cases > 0).then(|| f64::from(test.stable) / f64::from(test.cases))
 }
 
-fn tested(
-    designed: &Solution,
-    limits: &RobustnessLimits,
-    found: &ToleranceTest,
-) -> ToleranceResult {
+fn tested(designed: &Solution, limits: &RobustnessLimits, test: &ToleranceTest) -> ToleranceResult {
     let linear = &designed.linear;
     let (states, actuators) = (names(&linear.states), names(&linear.actuators));
     let matrix = |name: &str, values: &DMatrix<f64>, of: &[String], by: &[String]| Matrix {
@@ -91,22 +87,22 @@ fn tested(
     };
     let measurements = names(&linear.measurements);
     let mut worst = vec![
-        matrix("A", &found.worst.a, &states, &states),
-        matrix("B", &found.worst.b, &states, &actuators),
-        matrix("C", &found.worst.c, &measurements, &states),
+        matrix("A", &test.worst.a, &states, &states),
+        matrix("B", &test.worst.b, &states, &actuators),
+        matrix("C", &test.worst.c, &measurements, &states),
     ];
     if linear.has_feedthrough() {
-        worst.push(matrix("D", &found.worst.d, &measurements, &actuators));
+        worst.push(matrix("D", &test.worst.d, &measurements, &actuators));
     }
     ToleranceResult {
         entries: 0,
         varying: Vec::new(),
         parameters: Vec::new(),
-        cases: found.cases,
+        cases: test.cases,
         seed: limits.seed,
-        stable: stable(found),
-        worst_instability: found.worst_instability,
-        first_unstable: found.first_unstable.unwrap_or(f64::INFINITY),
+        stable: stable(test),
+        worst_instability: test.worst_instability,
+        first_unstable: test.first_unstable.unwrap_or(f64::INFINITY),
         worst,
     }
 }

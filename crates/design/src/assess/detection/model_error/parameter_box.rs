@@ -35,11 +35,11 @@ pub(super) fn largest<E>(
 ) -> Result<LargestValue, E> {
     let best = RefCell::new((f64::NEG_INFINITY, vec![0.0; count]));
     let rises = |at: Vec<f64>| {
-        let found = value(&at)?;
+        let height = value(&at)?;
         let mut best = best.borrow_mut();
-        let rises = found > best.0;
+        let rises = height > best.0;
         if rises {
-            *best = (found, at);
+            *best = (height, at);
         }
         Ok(rises)
     };
@@ -93,28 +93,31 @@ mod tests {
     fn a_maximum_between_the_corners_is_found_and_told_from_the_corners() {
         // 2 at (0.3, -0.6), less along both axes; at the corner (1, -1) it is 1.35.
         let hill = |at: &[f64]| Ok(2.0 - (at[0] - 0.3).powi(2) - (at[1] + 0.6).powi(2));
-        let found: Found = largest(2, &[], hill);
-        let found = found.unwrap();
-        assert!(found.everywhere > 1.99 && found.everywhere <= 2.0, "{found:?}");
+        let outcome: Found = largest(2, &[], hill);
+        let largest_value = outcome.unwrap();
+        assert!(
+            largest_value.everywhere > 1.99 && largest_value.everywhere <= 2.0,
+            "{largest_value:?}"
+        );
         // The centre of a face, (0, -1), is above all corners: 2 - 0.09 - 0.16.
-        assert!((found.corners - 1.75).abs() < 1e-12, "{found:?}");
+        assert!((largest_value.corners - 1.75).abs() < 1e-12, "{largest_value:?}");
     }
 
     #[test]
     fn a_narrow_maximum_is_found_by_a_random_case_alone() {
         let narrow =
             |at: &[f64]| Ok(at[0] + 10.0 * f64::from(u8::from((at[0] - 0.3).abs() < 1e-3)));
-        let found: Found = largest(1, &[vec![-0.8], vec![0.3005]], narrow);
-        assert_eq!(found.unwrap(), LargestValue { corners: 1.0, everywhere: 10.3005 });
-        let found: Found = largest(1, &[vec![-0.8]], narrow);
-        assert_eq!(found.unwrap(), LargestValue { corners: 1.0, everywhere: 1.0 });
+        let outcome: Found = largest(1, &[vec![-0.8], vec![0.3005]], narrow);
+        assert_eq!(outcome.unwrap(), LargestValue { corners: 1.0, everywhere: 10.3005 });
+        let outcome: Found = largest(1, &[vec![-0.8]], narrow);
+        assert_eq!(outcome.unwrap(), LargestValue { corners: 1.0, everywhere: 1.0 });
     }
 
     #[test]
     fn a_linear_function_of_eight_parameters_is_largest_at_a_corner() {
         let slopes = [1.0, -2.0, 3.0, -4.0, 5.0, -6.0, 7.0, -8.0];
         let linear = |at: &[f64]| Ok(at.iter().zip(slopes).map(|(at, slope)| at * slope).sum());
-        let found: Found = largest(8, &[vec![0.5; 8]], linear);
-        assert_eq!(found.unwrap(), LargestValue { corners: 36.0, everywhere: 36.0 });
+        let outcome: Found = largest(8, &[vec![0.5; 8]], linear);
+        assert_eq!(outcome.unwrap(), LargestValue { corners: 36.0, everywhere: 36.0 });
     }
 }
