@@ -39,21 +39,21 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
     for law in Law::ALL {
         let stated = file.estimation.law.name() == law.name();
         let law = if stated { file.estimation.law.clone() } else { law };
-        let mut found = LawResult {
+        let mut result = LawResult {
             law: law.name().to_owned(),
             sources: law.sources().to_owned(),
             reason: problem.design(&law).err(),
             result: None,
         };
         if file.schedule.is_some() && !law.allows("schedule") {
-            found.reason = Some("it is not possible with a schedule".to_owned());
+            result.reason = Some("it is not possible with a schedule".to_owned());
         }
-        if found.reason.is_none() {
+        if result.reason.is_none() {
             let designed = match design_by(&file, &law) {
                 // The law may exist for the plant of the file and not at another point.
                 Err(error) if file.schedule.is_some() => {
-                    found.reason = Some(files::sentence(&error));
-                    laws.push(found);
+                    result.reason = Some(files::sentence(&error));
+                    laws.push(result);
                     continue;
                 }
                 designed => designed?,
@@ -62,16 +62,16 @@ pub fn compare(path: &Path) -> Result<Comparison, Error> {
             let assessment = Assessment::new(&file, family.as_ref(), &designed, &steps);
             let report = reporting::report(assessment)?;
             own_identity = identity(&report);
-            found.result = Some(LawFigures {
-                disk_margin: report.robustness.as_ref().and_then(|found| {
-                    let points = found.points.iter().map(|point| point.together.alpha);
+            result.result = Some(LawFigures {
+                disk_margin: report.robustness.as_ref().and_then(|robustness| {
+                    let points = robustness.points.iter().map(|point| point.together.alpha);
                     points.collect::<Vec<_>>().try_into().ok()
                 }),
                 estimation: report.estimation,
                 verdict: report.verdict,
             });
         }
-        laws.push(found);
+        laws.push(result);
     }
     let model = file.fmu().map(Path::to_owned);
     Ok(Comparison { plant_file: file.name(), laws, identity: own_identity, model })

@@ -176,9 +176,9 @@ impl Design {
     /// [`Error`]: `base` is no packed ASO controller, or its library refuses the design.
     pub fn fmu(&mut self, base: &Path) -> Result<ControllerFmu, Error> {
         let content = Content { design: &self.file, plant: &self.plant };
-        let made = ControllerFmu::new(base, &content)?;
-        self.report.interface = reporting::interface(&made.description);
-        Ok(made)
+        let fmu = ControllerFmu::new(base, &content)?;
+        self.report.interface = reporting::interface(&fmu.description);
+        Ok(fmu)
     }
 
     /// The report as an HTML page that needs no other file.

@@ -27,8 +27,8 @@ impl MatrixEntry for Entry<'_> {
             let numbers = row.numbers()?;
             let expected = *columns.get_or_insert(numbers.len());
             if numbers.len() != expected {
-                let found = numbers.len();
-                let message = format!("expected {expected} entries as in row 1, found {found}");
+                let count = numbers.len();
+                let message = format!("expected {expected} entries as in row 1, found {count}");
                 return Err(row.error(message));
             }
             values.extend(numbers);
@@ -49,8 +49,8 @@ impl MatrixEntry for Entry<'_> {
         if matrix.shape() == (rows, columns) {
             return Ok(matrix);
         }
-        let found = format!("{}x{}", matrix.nrows(), matrix.ncols());
-        Err(self.error(format!("expected {rows}x{columns} ({meaning}), found {found}")))
+        let shape = format!("{}x{}", matrix.nrows(), matrix.ncols());
+        Err(self.error(format!("expected {rows}x{columns} ({meaning}), found {shape}")))
     }
 }
 

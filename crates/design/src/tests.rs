@@ -383,8 +383,8 @@ feedback.R = [[2]]
 observer.region = { decay = 20 }
 "#;
     let (path, point) = read(text, |file| {
-        let Model::Fmu(own) = &file.model else { panic!("an FMU") };
-        (own.path.clone(), own.operating_point.clone())
+        let Model::Fmu(fmu) = &file.model else { panic!("an FMU") };
+        (fmu.path.clone(), fmu.operating_point.clone())
     })
     .unwrap();
     assert_eq!(path, Path::new("Plant.fmu"));
@@ -415,13 +415,13 @@ fn an_observer_that_is_unstable_before_t_on_fails_a_check_unless_it_estimates_fr
 
 /// The first line of the error of a design, or its warnings.
 fn designed(text: &str) -> Result<Vec<String>, String> {
-    let found = read(text, |file| {
+    let warnings = read(text, |file| {
         let first = |error: crate::Error| error.to_string().lines().next().unwrap().to_owned();
         let line = |warning: &files::PlaceError| crate::plant::plausibility::line(file, warning);
-        let found = design(file).map_err(first)?;
-        Ok(found.warnings.iter().map(line).collect())
+        let design_result = design(file).map_err(first)?;
+        Ok(design_result.warnings.iter().map(line).collect())
     });
-    found.unwrap()
+    warnings.unwrap()
 }
 
 #[test]
@@ -478,24 +478,24 @@ fn faults_that_no_measurement_can_tell_apart_are_named_with_the_reason() {
         let faults = format!("F_a = {f_a}\nfaults = [{}]", names.join(", "));
         designed(&text.replace("actuator_faults = \"all\"", &faults)).unwrap_err()
     };
-    let found = of(&two, "[[0, 0], [1, -2]]", &["wind", "slope"]);
+    let message = of(&two, "[[0, 0], [1, -2]]", &["wind", "slope"]);
     let expected = "plant.toml:5:30: the faults `wind` and `slope` act on the plant in the same \
                     direction (their columns of F_a are parallel)";
-    assert!(found.starts_with(expected), "{found}");
-    let found = of(&two, "[[0, 1, 2], [1, 0, 3]]", &["a", "b", "c"]);
+    assert!(message.starts_with(expected), "{message}");
+    let message = of(&two, "[[0, 1, 2], [1, 0, 3]]", &["a", "b", "c"]);
     let expected = "plant.toml:5:43: fault `c` acts on the plant as a combination of `a`, `b` does";
-    assert!(found.starts_with(expected), "{found}");
-    let found = of(&two, "[[0, 0], [1, 0]]", &["a", "b"]);
+    assert!(message.starts_with(expected), "{message}");
+    let message = of(&two, "[[0, 0], [1, 0]]", &["a", "b"]);
     let expected =
         "plant.toml:5:27: fault `b` has no effect on the plant: its column of F_a is zero";
-    assert_eq!(found, expected);
-    let found = of(MASS, "[[0, 1], [1, 0]]", &["a", "b"]);
+    assert_eq!(message, expected);
+    let message = of(MASS, "[[0, 1], [1, 0]]", &["a", "b"]);
     let expected = "plant.toml:5:27: 2 faults (a, b) cannot be estimated from 1 measurement (y1): \
                     expected at least as many independent measurements as faults";
-    assert_eq!(found, expected);
+    assert_eq!(message, expected);
     let copies = two.replace("C = [[1, 0], [0, 1]]", "C = [[1, 0], [-3, 0]]");
-    let found = of(&copies, "[[0, 1], [1, 0]]", &["a", "b"]);
-    assert!(found.contains("from 1 independent measurement (y1, y2)"), "{found}");
+    let message = of(&copies, "[[0, 1], [1, 0]]", &["a", "b"]);
+    assert!(message.contains("from 1 independent measurement (y1, y2)"), "{message}");
 }
 
 /// The second state and its fault reach no measurement.
@@ -504,8 +504,8 @@ fn a_fault_of_a_mode_that_no_measurement_shows_is_refused() {
     let text = "A = [[1, 0], [0, -2]]\nB = [[1], [0]]\nC = [[1, 0]]\nF_a = [[0], [1]]\n\
                 faults = [{ name = \"leak\" }]\nfeedback.Q = [1, 1]\nfeedback.R = [1]\n\
                 observer.W = [1, 1, 1]\nobserver.V = [1]\n";
-    let found = designed(text).unwrap_err();
-    assert_eq!(found, "plant.toml:5:11: fault `leak` cannot be seen from the measurements y1");
+    let message = designed(text).unwrap_err();
+    assert_eq!(message, "plant.toml:5:11: fault `leak` cannot be seen from the measurements y1");
 }
 
 /// The level and the reasons of a plant file.
@@ -514,9 +514,9 @@ fn judged(text: &str) -> (Level, String) {
         let designed = design(file).unwrap();
         let time = TimeLimits { certificates: Duration::ZERO, ..TimeLimits::default() };
         let (nominal, steps) = (&designed.nominal, unobserved());
-        let (found, _) = robustness(nominal, &file.robustness, None, &time, &steps).unwrap();
+        let (figures, _) = robustness(nominal, &file.robustness, None, &time, &steps).unwrap();
         let verdict =
-            verdict(&checks(&designed.nominal), found.as_ref(), &file.robustness, vec![], vec![]);
+            verdict(&checks(&designed.nominal), figures.as_ref(), &file.robustness, vec![], vec![]);
         (verdict.level, verdict.reasons.join("; "))
     })
     .unwrap()
@@ -715,16 +715,16 @@ fn unobserved() -> crate::progress::Steps<'static> {
 #[test]
 fn each_step_of_a_design_is_reported_once_with_the_part_that_is_done() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let seen = std::sync::Mutex::new(Vec::new());
-    let observe = |step| seen.lock().unwrap().push(step);
+    let steps_done = std::sync::Mutex::new(Vec::new());
+    let observe = |step| steps_done.lock().unwrap().push(step);
     let plant = root.join("fmu-controller/pendulum.toml");
     crate::design_within(&plant, &TimeLimits::default(), &observe).unwrap();
-    let seen = seen.into_inner().unwrap();
-    let mut names: Vec<_> = seen.iter().map(|step| step.step).collect();
+    let reported = steps_done.into_inner().unwrap();
+    let mut names: Vec<_> = reported.iter().map(|step| step.step).collect();
     assert_eq!((names.len(), names[0]), (10, "gains"), "{names:?}");
     names.sort_unstable();
     names.dedup();
     assert_eq!(names.len(), 10);
-    assert!(seen.iter().all(|step| (0.0..1.0).contains(&step.done)), "{seen:?}");
-    assert!(seen[9].done > 0.5);
+    assert!(reported.iter().all(|step| (0.0..1.0).contains(&step.done)), "{reported:?}");
+    assert!(reported[9].done > 0.5);
 }

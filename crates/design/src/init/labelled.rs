@@ -40,8 +40,8 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
     for (at, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty()) {
         let cells = cells(line);
         if cells.len() != columns.len() + 1 {
-            let (expected, found) = (columns.len() + 1, cells.len());
-            return Err(format!("line {}: expected {expected} cells, found {found}", at + 1));
+            let (expected, count) = (columns.len() + 1, cells.len());
+            return Err(format!("line {}: expected {expected} cells, found {count}", at + 1));
         }
         let number = |(cell, column): (&String, &Named)| {
             let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
