@@ -59,7 +59,7 @@ pub(super) fn files(
 impl Source<'_> {
     fn vocabulary(&self) -> Vocabulary {
         let (name, capital) = (&self.request.prefix, &self.capital);
-        let flag = |own: &str| format!("{capital}_{own}");
+        let flag = |suffix: &str| format!("{capital}_{suffix}");
         Vocabulary {
             init: format!("{name}_init"),
             init_at: format!("{name}_init_at"),

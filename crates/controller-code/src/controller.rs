@@ -180,7 +180,7 @@ impl Controller {
 
     /// A matrix at each point of the schedule; `None` if it is constant.
     pub(super) fn scheduled(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
-        self.schedule.as_ref().and_then(|own| own.matrices(matrix))
+        self.schedule.as_ref().and_then(|schedule| schedule.matrices(matrix))
     }
 
     /// Whether an instance counts its samples.
@@ -195,7 +195,7 @@ impl Controller {
 
     /// A matrix in each set of gains; `None` if it is the same in all.
     pub(super) fn chosen(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
-        self.reconfiguration.as_ref().and_then(|own| own.matrices(matrix))
+        self.reconfiguration.as_ref().and_then(|reconfiguration| reconfiguration.matrices(matrix))
     }
 
     /// Whether a measurement has a range or a longest time of a hold.
@@ -295,10 +295,10 @@ fn first_compensated(t_on: f64, sample_time: f64) -> Result<u32, Error> {
 }
 
 fn losses(faults: &[Fault], actuators: &[Actuator]) -> Vec<Loss> {
-    let loss = |(fault, own): (usize, &Fault)| {
-        let name = own.loss_of.as_ref()?;
+    let loss = |(fault, entry): (usize, &Fault)| {
+        let name = entry.loss_of.as_ref()?;
         let actuator = actuators.iter().position(|actuator| actuator.name == *name)?;
-        Some(Loss { fault, actuator, least_command: own.least_command? })
+        Some(Loss { fault, actuator, least_command: entry.least_command? })
     };
     faults.iter().enumerate().filter_map(loss).collect()
 }
@@ -329,14 +329,14 @@ impl Matrix {
             | Self::ResidualC
             | Self::ResidualDu
             | Self::ResidualDy => {
-                let own = controller.detection.as_ref()?;
+                let detection = controller.detection.as_ref()?;
                 match self {
-                    Self::ResidualA => &own.a,
-                    Self::ResidualBu => &own.b_u,
-                    Self::ResidualBy => &own.b_y,
-                    Self::ResidualC => &own.c,
-                    Self::ResidualDu => &own.d_u,
-                    _ => &own.d_y,
+                    Self::ResidualA => &detection.a,
+                    Self::ResidualBu => &detection.b_u,
+                    Self::ResidualBy => &detection.b_y,
+                    Self::ResidualC => &detection.c,
+                    Self::ResidualDu => &detection.d_u,
+                    _ => &detection.d_y,
                 }
             }
         })
@@ -354,9 +354,15 @@ impl Kind {
             Self::Measurement => controller.measurements.len(),
             Self::Reference => controller.references.len(),
             Self::Integral => controller.h.as_ref().map_or(0, DMatrix::nrows),
-            Self::Point => controller.schedule.as_ref().map_or(0, |own| own.points.len()),
-            Self::GainSet => controller.reconfiguration.as_ref().map_or(0, |own| own.sets.len()),
-            Self::Case => controller.reconfiguration.as_ref().map_or(0, |own| own.cases.len()),
+            Self::Point => controller.schedule.as_ref().map_or(0, |schedule| schedule.points.len()),
+            Self::GainSet => controller
+                .reconfiguration
+                .as_ref()
+                .map_or(0, |reconfiguration| reconfiguration.sets.len()),
+            Self::Case => controller
+                .reconfiguration
+                .as_ref()
+                .map_or(0, |reconfiguration| reconfiguration.cases.len()),
             Self::ResidualState => detection.map_or(0, |detection| detection.a.nrows()),
             Self::Residual => detection.map_or(0, |detection| detection.c.nrows()),
             Self::Test => detection.map_or(0, |detection| detection.tests.len()),

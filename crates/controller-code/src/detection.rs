@@ -69,13 +69,13 @@ impl Detection {
                 return Err(Error(text.to_owned()));
             }
         };
-        let test = |own: TestDesign| Test {
-            name: own.name,
-            residuals: own.residuals,
-            drift: own.drift.unwrap_or_default(),
-            window: own.window.unwrap_or_default(),
-            threshold: own.threshold,
-            reacts: own.reacts,
+        let test = |design: TestDesign| Test {
+            name: design.name,
+            residuals: design.residuals,
+            drift: design.drift.unwrap_or_default(),
+            window: design.window.unwrap_or_default(),
+            threshold: design.threshold,
+            reacts: design.reacts,
         };
         Ok(Self {
             first_tested: first_tested.max(1),

@@ -19,26 +19,29 @@ pub(super) struct Fields {
 
 impl Fields {
     pub(super) fn of(controller: &Controller) -> Self {
-        let own = |signals: &[Signal]| fields(signals.iter().map(|signal| signal.name.as_str()));
+        let names = |signals: &[Signal]| fields(signals.iter().map(|signal| signal.name.as_str()));
         Self {
-            states: own(&controller.states),
-            faults: own(&controller.faults),
-            actuators: own(&controller.actuators),
-            measurements: own(&controller.measurements),
+            states: names(&controller.states),
+            faults: names(&controller.faults),
+            actuators: names(&controller.actuators),
+            measurements: names(&controller.measurements),
             integrals: match controller.h {
-                Some(_) => own(&controller.references),
+                Some(_) => names(&controller.references),
                 None => Vec::new(),
             },
-            references: own(&controller.references),
-            schedule: own(controller.schedule_inputs()),
+            references: names(&controller.references),
+            schedule: names(controller.schedule_inputs()),
         }
     }
 
     /// The fields of what is known about the actuators: those that may be gone, and the fall-back.
     pub(super) fn switches(&self, controller: &Controller) -> Vec<String> {
-        let Some(own) = &controller.reconfiguration else { return Vec::new() };
-        let gone = own.cases.iter().map(|case| format!("gone_{}", self.actuators[case.actuator]));
-        gone.chain(own.fallback.map(|_| "fall_back".to_owned())).collect()
+        let Some(reconfiguration) = &controller.reconfiguration else { return Vec::new() };
+        let gone = reconfiguration
+            .cases
+            .iter()
+            .map(|case| format!("gone_{}", self.actuators[case.actuator]));
+        gone.chain(reconfiguration.fallback.map(|_| "fall_back".to_owned())).collect()
     }
 
     /// The fields of the estimates, in order: states, faults, losses, integrals.

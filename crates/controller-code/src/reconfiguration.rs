@@ -65,8 +65,8 @@ impl Reconfiguration {
         }
         let m = plant.actuators.len();
         let gone = |names: &[String]| {
-            let own = |actuator: &Actuator| names.contains(&actuator.name);
-            plant.actuators.iter().map(own).collect::<Vec<_>>()
+            let is_among = |actuator: &Actuator| names.contains(&actuator.name);
+            plant.actuators.iter().map(is_among).collect::<Vec<_>>()
         };
         // The columns of `k_s`, one for each stuck actuator in order, at the places of these actuators.
         let scattered = |k_s: &DMatrix<f64>, gone: &[bool]| {
@@ -80,43 +80,48 @@ impl Reconfiguration {
         let (k_x, k_f) = (plant.k_x.clone(), plant.k_f.clone());
         let none = vec![false; m];
         let mut sets = vec![GainSet { gone: none.clone(), k_x, k_f, k_s: DMatrix::zeros(m, m) }];
-        let mut kept = Vec::new();
-        for own in cases {
-            kept.push(Case {
-                actuator: own.actuator,
-                stuck_at: own.stuck_at,
+        let mut known_cases = Vec::new();
+        for case in cases {
+            known_cases.push(Case {
+                actuator: case.actuator,
+                stuck_at: case.stuck_at,
                 restarts: plant
                     .faults
                     .iter()
-                    .map(|fault| own.restart.contains(&fault.name))
+                    .map(|fault| case.restart.contains(&fault.name))
                     .collect(),
-                decision: decision(own, plant)?,
+                decision: decision(case, plant)?,
             });
-            if let (Some(k_x), Some(k_f), Some(k_s)) = (&own.k_x, &own.k_f, &own.k_s) {
-                let gone = gone(std::slice::from_ref(&own.gone));
+            if let (Some(k_x), Some(k_f), Some(k_s)) = (&case.k_x, &case.k_f, &case.k_s) {
+                let gone = gone(std::slice::from_ref(&case.gone));
                 let k_s = scattered(&DMatrix::from_column_slice(m, 1, k_s), &gone);
                 sets.push(GainSet { gone, k_x: dense(k_x), k_f: dense(k_f), k_s });
             }
         }
-        for own in combinations {
-            let gone = gone(&own.gone);
-            let k_s = scattered(&dense(&own.k_s), &gone);
-            sets.push(GainSet { gone, k_x: dense(&own.k_x), k_f: dense(&own.k_f), k_s });
+        for combination in combinations {
+            let gone = gone(&combination.gone);
+            let k_s = scattered(&dense(&combination.k_s), &gone);
+            sets.push(GainSet {
+                gone,
+                k_x: dense(&combination.k_x),
+                k_f: dense(&combination.k_f),
+                k_s,
+            });
         }
-        let compensates = fallback.map(|own| own.k_f.is_some());
+        let compensates = fallback.map(|design| design.k_f.is_some());
         if let Some(design::Fallback { k_x, k_f }) = fallback {
             let no_compensation = || DMatrix::zeros(m, plant.faults.len());
             let k_f = k_f.as_ref().map_or_else(no_compensation, dense);
             sets.push(GainSet { gone: none, k_x: dense(k_x), k_f, k_s: DMatrix::zeros(m, m) });
         }
-        Ok(Some(Self { cases: kept, sets, fallback: compensates }))
+        Ok(Some(Self { cases: known_cases, sets, fallback: compensates }))
     }
 
     /// A matrix in each of the sets; `None` if it is the same in all.
     pub(super) fn matrices(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
         match matrix {
-            Matrix::KX => Some(self.sets.iter().map(|own| &own.k_x).collect()),
-            Matrix::KF => Some(self.sets.iter().map(|own| &own.k_f).collect()),
+            Matrix::KX => Some(self.sets.iter().map(|set| &set.k_x).collect()),
+            Matrix::KF => Some(self.sets.iter().map(|set| &set.k_f).collect()),
             _ => None,
         }
     }
@@ -130,7 +135,7 @@ impl Reconfiguration {
     pub(super) fn single_sets(&self, actuators: usize) -> Vec<usize> {
         let single = |j: usize| {
             let is_single =
-                |own: &GainSet| own.gone.iter().enumerate().all(|(k, gone)| *gone == (k == j));
+                |set: &GainSet| set.gone.iter().enumerate().all(|(k, gone)| *gone == (k == j));
             self.sets.iter().position(is_single).unwrap_or(0)
         };
         (0..actuators).map(single).collect()
@@ -145,23 +150,25 @@ impl Reconfiguration {
 
     /// The largest number of actuators that a set does without.
     pub(super) fn most_gone(&self) -> usize {
-        let count = |own: &GainSet| own.gone.iter().filter(|gone| **gone).count();
+        let count = |set: &GainSet| set.gone.iter().filter(|gone| **gone).count();
         self.sets.iter().map(count).max().unwrap_or(0)
     }
 
     /// All real numbers, for a check of their range.
     pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
-        let matrices = self.sets.iter().flat_map(|own| [&own.k_x, &own.k_f, &own.k_s]);
-        let of_cases =
-            self.cases.iter().flat_map(|own| [Some(own.stuck_at), own.decision.map(|own| own.1)]);
-        matrices.flat_map(|own| own.iter().copied()).chain(of_cases.flatten())
+        let matrices = self.sets.iter().flat_map(|set| [&set.k_x, &set.k_f, &set.k_s]);
+        let of_cases = self
+            .cases
+            .iter()
+            .flat_map(|case| [Some(case.stuck_at), case.decision.map(|limit| limit.1)]);
+        matrices.flat_map(|matrix| matrix.iter().copied()).chain(of_cases.flatten())
     }
 
     /// The constants in real numbers: the gains from stuck actuators, their commands, the fractions.
     pub(super) fn tables(&self, actuators: &[Signal]) -> Vec<Constants> {
-        let rows = self.sets.iter().flat_map(|own| own.k_s.row_iter());
-        let case = |j: usize| self.cases.iter().find(|own| own.actuator == j);
-        let stuck = |j: usize| case(j).map_or(0.0, |own| own.stuck_at);
+        let rows = self.sets.iter().flat_map(|set| set.k_s.row_iter());
+        let case = |j: usize| self.cases.iter().find(|case| case.actuator == j);
+        let stuck = |j: usize| case(j).map_or(0.0, |case| case.stuck_at);
         let vector = |name, meaning, value: &dyn Fn(usize) -> f64| {
             let values = (0..actuators.len()).map(value).collect();
             Constants::vector(name, meaning, Kind::Actuator, values)
@@ -179,7 +186,8 @@ impl Reconfiguration {
             vector("u_stuck", "", &|j| stuck(j) - actuators[j].operating),
         ];
         if !self.cases.is_empty() {
-            let most = self.cases.iter().map(|own| own.decision.map_or(f64::INFINITY, |own| own.1));
+            let most =
+                self.cases.iter().map(|case| case.decision.map_or(f64::INFINITY, |limit| limit.1));
             let meaning = "losses above which an actuator counts as gone";
             all.push(Constants::vector("most_lost", meaning, Kind::Case, most.collect()));
         }
@@ -189,11 +197,11 @@ impl Reconfiguration {
 
 /// The loss that decides, its fraction, and the samples that it lasts.
 fn decision(
-    own: &design::Reconfiguration,
+    case: &design::Reconfiguration,
     plant: &Plant<'_>,
 ) -> Result<Option<(usize, f64, u32)>, Error> {
-    let (Some(most), Some(time)) = (own.loss, own.time) else { return Ok(None) };
-    let of_actuator = |loss: &Loss| plant.actuators[loss.actuator].name == own.gone;
+    let (Some(most), Some(time)) = (case.loss, case.time) else { return Ok(None) };
+    let of_actuator = |loss: &Loss| plant.actuators[loss.actuator].name == case.gone;
     let Some(loss) = plant.losses.iter().position(of_actuator) else { return Ok(None) };
     // The first whole number of samples that last as long, with the tolerance of the FMU.
     let least = time * (1.0 - 1e-9);
@@ -204,7 +212,7 @@ fn decision(
     if samples > f64::from(u32::MAX) {
         return Err(Error(format!(
             "reconfiguration without {}: {time} s are more than 2^32 samples; a counter of the code has 32 bits",
-            own.gone
+            case.gone
         )));
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number")]

@@ -89,8 +89,8 @@ impl RoundingBound {
         }
         let system = analysis.system();
         let domain = Domain::Sampled { period: controller.sample_time };
-        let slowest =
-            control::stability::instability(&system.a, domain).map_or(f64::NAN, |own| -own);
+        let slowest = control::stability::instability(&system.a, domain)
+            .map_or(f64::NAN, |instability| -instability);
         let gains = peak_gain(&system, WIDTH).map_err(|error| error.to_string());
         let all = gains.and_then(|gains| analysis.bound(&gains.upper));
         let all = all.map(|bound| bound * SECOND_ORDER);
@@ -115,9 +115,11 @@ impl RoundingBound {
         };
         let first = |kind| first_signal(kind, controller);
         let commands = controller.actuators.iter().enumerate();
-        let commands = commands.map(|(j, own)| (&own.name, bound[(j, first(Kind::Actuator) + j)]));
+        let commands =
+            commands.map(|(j, signal)| (&signal.name, bound[(j, first(Kind::Actuator) + j)]));
         let (m, faults) = (controller.actuators.len(), controller.faults.iter().enumerate());
-        let faults = faults.map(|(i, own)| (&own.name, bound[(m + i, first(Kind::Fault) + i)]));
+        let faults =
+            faults.map(|(i, signal)| (&signal.name, bound[(m + i, first(Kind::Fault) + i)]));
         let coarse = commands.chain(faults).filter(|(_, part)| *part > COARSE);
         let unstable = (!self.contracts).then(|| {
             format!(
@@ -175,7 +177,7 @@ impl RoundingBound {
             lines.extend([String::new(), output]);
             let rows = signals.iter().zip(row.iter());
             let rows: Vec<_> =
-                rows.map(|(name, own)| [format!("  {name}"), format!("{own:.4e}")]).collect();
+                rows.map(|(name, error)| [format!("  {name}"), format!("{error:.4e}")]).collect();
             lines.extend(aligned(&rows));
         }
         lines
@@ -188,10 +190,10 @@ fn residual_states(controller: &Controller) -> Result<DMatrix<f64>, Error> {
     let signals: usize = Kind::ALL.map(|kind| kind.count(controller)).iter().sum();
     let k = Kind::ResidualState.count(controller);
     let mut all = DMatrix::zeros(k, signals + 1);
-    let Some(own) = &controller.detection else { return Ok(all) };
-    for (kind, b) in [(Kind::Actuator, &own.b_u), (Kind::Measurement, &own.b_y)] {
+    let Some(detection) = &controller.detection else { return Ok(all) };
+    for (kind, b) in [(Kind::Actuator, &detection.b_u), (Kind::Measurement, &detection.b_y)] {
         let system = StateSpace {
-            a: own.a.clone(),
+            a: detection.a.clone(),
             b: b.clone(),
             c: DMatrix::identity(k, k),
             d: DMatrix::zeros(k, b.ncols()),
@@ -229,8 +231,8 @@ mod tests {
         );
         let file = aso_controller::Design::parse(&text, "design.toml".to_owned()).unwrap();
         let controller = Controller::of(file).unwrap();
-        let found = RoundingBound::of(&controller);
-        found.bound.map(|bound| bound[(1, 1)])
+        let rounding = RoundingBound::of(&controller);
+        rounding.bound.map(|bound| bound[(1, 1)])
     }
 
     /// s[k+1] = 0.9 s - s / (|s| + delta): the chords have slopes from 0.9 - 1 / delta to 0.9, so that it contracts

@@ -50,10 +50,10 @@ publish = false
         ascii(request.identity),
         request.prefix,
     );
-    let own = [("Cargo.toml".into(), manifest), ("src/lib.rs".into(), source.library(bound))];
+    let generated = [("Cargo.toml".into(), manifest), ("src/lib.rs".into(), source.library(bound))];
     let runtime = aso_controller::SOURCES;
     let runtime = runtime.map(|(path, text)| (Path::new("src").join(path), text.to_owned()));
-    own.into_iter().chain(runtime).collect()
+    generated.into_iter().chain(runtime).collect()
 }
 
 impl Source<'_> {
@@ -129,9 +129,9 @@ impl Source<'_> {
             let first = controller.first_compensated;
             lines.push(format!("const FIRST_COMPENSATED: u32 = {first};"));
         }
-        if let Some(own) = &controller.detection {
+        if let Some(detection) = &controller.detection {
             lines.push("/// The first sample whose residuals are tested.".to_owned());
-            lines.push(format!("const FIRST_TESTED: u32 = {};", own.first_tested));
+            lines.push(format!("const FIRST_TESTED: u32 = {};", detection.first_tested));
         }
         self.tables(&mut lines);
         self.structures(&mut lines);

@@ -60,19 +60,19 @@ impl Schedule {
 
     /// A matrix at each point; `None` if it does not depend on the scheduling variable.
     pub(super) fn matrices(&self, matrix: Matrix) -> Option<Vec<&DMatrix<f64>>> {
-        let at = |point: &'_ Point| point.matrices.iter().position(|(own, _)| *own == matrix);
+        let at = |point: &'_ Point| point.matrices.iter().position(|(name, _)| *name == matrix);
         self.points.iter().map(|point| Some(&point.matrices[at(point)?].1)).collect()
     }
 
     /// A part of the operating point at each point: one of [`super::tables::operating_vectors`].
     pub(super) fn operating(&self, vector: Vector) -> Vec<Vec<f64>> {
-        let own = |point: &Point| match vector {
+        let values = |point: &Point| match vector {
             Vector::XOp => point.x_op.clone(),
             Vector::UOp => point.u_op.clone(),
             Vector::YOp => point.y_op.clone(),
             _ => point.r_op.clone(),
         };
-        self.points.iter().map(own).collect()
+        self.points.iter().map(values).collect()
     }
 
     /// Checks that the values of the grid differ in `precision`, and that it can hold each number.
@@ -87,7 +87,7 @@ impl Schedule {
             }
         }
         for point in &self.points {
-            let matrices = point.matrices.iter().flat_map(|(_, own)| own.iter());
+            let matrices = point.matrices.iter().flat_map(|(_, values)| values.iter());
             let operating = [&point.x_op, &point.u_op, &point.y_op, &point.r_op];
             let numbers = matrices.chain(operating.into_iter().flatten()).chain([&point.at]);
             if let Some(value) = numbers.copied().find(|value| value.abs() > largest) {

@@ -282,7 +282,7 @@ fn status(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
         None => "at the operating point",
         Some(_) => "in the column `start`",
     };
-    let kept = match controller.detection {
+    let also_constant = match controller.detection {
         None => " and estimates",
         Some(_) => ", estimates, residuals, statistics and decision",
     };
@@ -298,7 +298,7 @@ fn status(controller: &Controller, vocabulary: &Vocabulary) -> Vec<String> {
         ),
         format!("{at_limit}: a command is at a limit."),
         format!(
-            "{overflow}: a sum was beyond the range of {real}; commands{kept} keep their values. \
+            "{overflow}: a sum was beyond the range of {real}; commands{also_constant} keep their values. \
              So every output is a finite number in every sample."
         ),
     ];

@@ -40,8 +40,8 @@ pub(super) fn tables(controller: &Controller) -> Vec<Constants> {
     let mut all = Vec::new();
     for matrix in Matrix::all_stated(controller) {
         let [rows, columns] = matrix.kinds();
-        let points = controller.scheduled(matrix).map(|own| (Some(Kind::Point), own));
-        let sets = controller.chosen(matrix).map(|own| (Some(Kind::GainSet), own));
+        let points = controller.scheduled(matrix).map(|matrices| (Some(Kind::Point), matrices));
+        let sets = controller.chosen(matrix).map(|matrices| (Some(Kind::GainSet), matrices));
         let one = || (None, matrix.of(controller).into_iter().collect());
         let (layers, all_of_it): (_, Vec<_>) = points.or(sets).unwrap_or_else(one);
         let values = all_of_it.into_iter().flat_map(DMatrix::row_iter);
@@ -57,15 +57,15 @@ pub(super) fn tables(controller: &Controller) -> Vec<Constants> {
     all.extend(controller.filter.clone().map(|filter| {
         Constants::vector("filter", "gains of the measurement filter", Kind::Measurement, filter)
     }));
-    all.extend(controller.sliding_mode.iter().flat_map(|own| {
+    all.extend(controller.sliding_mode.iter().flat_map(|law| {
         let meaning = "bounds of the estimated faults, and half-widths of the boundary layer";
-        let rho = Constants::vector("rho", meaning, Kind::Fault, own.rho.clone());
-        [rho, Constants::vector("delta", "", Kind::Fault, own.delta.clone())]
+        let rho = Constants::vector("rho", meaning, Kind::Fault, law.rho.clone());
+        [rho, Constants::vector("delta", "", Kind::Fault, law.delta.clone())]
     }));
     all.extend(schedule(controller));
     all.extend(controller.detection.iter().flat_map(Detection::tables));
     let reconfiguration = controller.reconfiguration.iter();
-    all.extend(reconfiguration.flat_map(|own| own.tables(&controller.actuators)));
+    all.extend(reconfiguration.flat_map(|switches| switches.tables(&controller.actuators)));
     let meanings = if controller.schedule.is_some() {
         ["values at the start", "", "", ""]
     } else {

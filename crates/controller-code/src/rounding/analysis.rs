@@ -36,23 +36,23 @@ impl<'a> Analysis<'a> {
 
     fn new(controller: &'a Controller, state_of_filter: DMatrix<f64>) -> Self {
         let (known, errors, chords) = (Vec::new(), Vec::new(), Vec::new());
-        let mut own = Self { controller, state_of_filter, known, errors, chords };
-        let [n, p] = [Kind::State, Kind::Measurement].map(|kind| own.count(kind));
-        own.start(Vector::StoredXHat, |form| form.columns_mut(n, n).fill_with_identity());
-        let q = own.count(Kind::Fault);
-        own.start(Vector::StoredFHat, |form| form.columns_mut(2 * n, q).fill_with_identity());
+        let mut analysis = Self { controller, state_of_filter, known, errors, chords };
+        let [n, p] = [Kind::State, Kind::Measurement].map(|kind| analysis.count(kind));
+        analysis.start(Vector::StoredXHat, |form| form.columns_mut(n, n).fill_with_identity());
+        let q = analysis.count(Kind::Fault);
+        analysis.start(Vector::StoredFHat, |form| form.columns_mut(2 * n, q).fill_with_identity());
         match &controller.filter {
-            None => own.start(Vector::Measured, |form| {
+            None => analysis.start(Vector::Measured, |form| {
                 form.columns_mut(0, n).copy_from(&controller.c);
             }),
             Some(filter) => {
                 // The last states of the design are the filtered measurements, which the controller
                 // computes: y_f[k+1] = y_f + w (C x - y_f).
                 let first = n - p;
-                own.start(Vector::StoredYF, |form| {
+                analysis.start(Vector::StoredYF, |form| {
                     form.columns_mut(first, p).fill_with_identity();
                 });
-                own.start(Vector::Measured, |form| {
+                analysis.start(Vector::Measured, |form| {
                     for (k, w) in filter.iter().enumerate() {
                         let row = controller.a.view((first + k, 0), (1, first)) / *w;
                         form.view_mut((k, 0), (1, first)).copy_from(&row);
@@ -60,30 +60,30 @@ impl<'a> Analysis<'a> {
                 });
             }
         }
-        let integrals = own.count(Kind::Integral);
-        own.start(Vector::StoredXI, |form| {
+        let integrals = analysis.count(Kind::Integral);
+        analysis.start(Vector::StoredXI, |form| {
             form.columns_mut(2 * n + q, integrals).fill_with_identity();
         });
-        let k = own.count(Kind::ResidualState);
-        own.start(Vector::StoredXR, |form| {
+        let k = analysis.count(Kind::ResidualState);
+        analysis.start(Vector::StoredXR, |form| {
             form.columns_mut(2 * n + q + integrals, k).fill_with_identity();
         });
-        own.start(Vector::Referred, |_| {});
+        analysis.start(Vector::Referred, |_| {});
         // The measurements contain D times the commands of the sample before, which the controller takes off again:
         // what remains is D times the rounding of these commands as values.
-        own.start(Vector::StoredU, |_| {});
+        analysis.start(Vector::StoredU, |_| {});
         if controller.d.is_some() {
-            let deviations = own.get(Vector::StoredU).numbers();
-            let sums = deviations.into_iter().zip(own.get(Vector::UOp).numbers());
+            let deviations = analysis.get(Vector::StoredU).numbers();
+            let sums = deviations.into_iter().zip(analysis.get(Vector::UOp).numbers());
             let rounded: Vec<_> = sums.map(|(deviation, point)| deviation + point).collect();
-            own.learn(Vector::StoredU, Elements::of(&rounded, own.widths()));
+            analysis.learn(Vector::StoredU, Elements::of(&rounded, analysis.widths()));
         }
         for vector in [Vector::Measured, Vector::Referred] {
-            let mut rounded = own.get(vector);
+            let mut rounded = analysis.get(vector);
             rounded.error = &rounded.magnitude * UNIT;
-            own.learn(vector, rounded);
+            analysis.learn(vector, rounded);
         }
-        own
+        analysis
     }
 
     fn count(&self, kind: Kind) -> usize {
@@ -132,13 +132,13 @@ impl<'a> Analysis<'a> {
             }
             return constant;
         }
-        let found = self.known.iter().rev().find(|(other, _)| *other == vector);
-        found.map_or_else(zero, |(_, elements)| elements.clone())
+        let entry = self.known.iter().rev().find(|(other, _)| *other == vector);
+        entry.map_or_else(zero, |(_, elements)| elements.clone())
     }
 
     /// A bound of the elements of a vector, from the largest deviations of the signals.
     fn magnitude(&self, vector: Vector) -> DMatrix<f64> {
-        let mut own = match vector {
+        let mut magnitude = match vector {
             Vector::StoredXR | Vector::NextXR => return self.state_of_filter.clone(),
             Vector::Residual => return self.residual_magnitude(),
             Vector::S => return self.controller.l_f.abs() * self.get(Vector::E).magnitude,
@@ -163,13 +163,13 @@ impl<'a> Analysis<'a> {
             Vector::StoredYF | Vector::Measured | Vector::NextYF => &self.controller.measurements,
             Vector::Command => &self.controller.actuators,
             Vector::Referred => &self.controller.references,
-            _ => return own,
+            _ => return magnitude,
         };
-        let last = own.ncols() - 1;
+        let last = magnitude.ncols() - 1;
         for (i, signal) in operating.iter().enumerate() {
-            own[(i, last)] += signal.operating.abs();
+            magnitude[(i, last)] += signal.operating.abs();
         }
-        own
+        magnitude
     }
 
     /// Whether a vector is one that a current estimator corrects before a user sees it: its size follows from
@@ -191,9 +191,9 @@ impl<'a> Analysis<'a> {
     /// The largest deviations of a kind of signals.
     fn unit(&self, kind: Kind) -> DMatrix<f64> {
         let (rows, signals) = (self.count(kind), self.widths().signals);
-        let mut own = DMatrix::zeros(rows, signals);
-        own.columns_mut(first_signal(kind, self.controller), rows).fill_with_identity();
-        own
+        let mut unit = DMatrix::zeros(rows, signals);
+        unit.columns_mut(first_signal(kind, self.controller), rows).fill_with_identity();
+        unit
     }
 
     /// |e| <= |y - D u| + |C| |x_hat|.
@@ -221,11 +221,13 @@ impl<'a> Analysis<'a> {
 
     /// |r| <= |C| |x_r| + |D_u| |u| + |D_y| |y|, residuals x signals.
     fn residual_magnitude(&self) -> DMatrix<f64> {
-        let Some(own) = &self.controller.detection else {
+        let Some(detection) = &self.controller.detection else {
             return DMatrix::zeros(0, self.widths().signals);
         };
-        let mut all = own.c.abs() * &self.state_of_filter;
-        for (kind, matrix) in [(Kind::Actuator, &own.d_u), (Kind::Measurement, &own.d_y)] {
+        let mut all = detection.c.abs() * &self.state_of_filter;
+        for (kind, matrix) in
+            [(Kind::Actuator, &detection.d_u), (Kind::Measurement, &detection.d_y)]
+        {
             let first = first_signal(kind, self.controller);
             all.columns_mut(first, matrix.ncols()).add_assign(&matrix.abs());
         }
@@ -337,21 +339,21 @@ impl<'a> Analysis<'a> {
     }
 
     /// Follows rho s / (|s| + delta): the chord of half the largest slope, and v.
-    fn inject(&mut self, own: &mut Elements) {
+    fn inject(&mut self, injected: &mut Elements) {
         let Some(SlidingMode { rho, delta }) = &self.controller.sliding_mode else { return };
         let s = self.get(Vector::S);
-        own.magnitude = self.magnitude(Vector::FHat);
+        injected.magnitude = self.magnitude(Vector::FHat);
         for (i, (rho, delta)) in rho.iter().zip(delta).enumerate() {
             let half = rho / (2.0 * delta);
             let position = self.errors.len();
-            own.form.row_mut(i).copy_from(&(s.form.row(i) * half));
-            own.form[(i, self.order() + position)] = 1.0;
+            injected.form.row_mut(i).copy_from(&(s.form.row(i) * half));
+            injected.form[(i, self.order() + position)] = 1.0;
             self.errors.push(RowDVector::zeros(self.widths().signals));
             self.chords.push((position, half));
             // Of the product, the sum, the quotient and the constants, relative to the result.
             let relative = 3.0 * UNIT + constant_error(*rho) / rho + constant_error(*delta) / delta;
-            let rounding = own.magnitude.row(i) * relative;
-            own.error.row_mut(i).add_assign(&rounding);
+            let rounding = injected.magnitude.row(i) * relative;
+            injected.error.row_mut(i).add_assign(&rounding);
         }
     }
 
@@ -459,5 +461,5 @@ fn without_loop(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let inverse = (DMatrix::identity(count, count) - matrix).try_inverse()?;
     // It is, if M x < x for some x > 0: here M x = x - 1.
     let x = &inverse * DVector::from_element(count, 1.0);
-    x.iter().all(|own| *own >= 1.0 - 1e-9 && own.is_finite()).then_some(inverse)
+    x.iter().all(|entry| *entry >= 1.0 - 1e-9 && entry.is_finite()).then_some(inverse)
 }

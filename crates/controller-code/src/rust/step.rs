@@ -70,7 +70,7 @@ fn take(kept: &mut [{real}], values: &[{real}]) -> bool {{
 }}"
             ));
         }
-        let taken = match (is_checked, controller.limits_holds()) {
+        let measured = match (is_checked, controller.limits_holds()) {
             (false, _) => "take(&mut self.y, &measured);",
             (true, false) => "VALIDITY.take(&measured, &mut self.y, &mut []);",
             (true, true) => {
@@ -89,7 +89,7 @@ impl Controller {{
         let mut status = Status::default();
         // {last}
         let measured: [{real}; MEASUREMENTS] = (*measurements).into();
-        status.held |= {taken}{inputs}"
+        status.held |= {measured}{inputs}"
         ));
         let compensating = match controller.first_compensated {
             0 => "compensate",

@@ -9,10 +9,10 @@ use crate::text::one_line;
 
 /// The gains without some actuators, and the meaning of the switches.
 pub(super) fn reconfiguration(controller: &Controller, fields: &Fields) -> Vec<String> {
-    let Some(own) = &controller.reconfiguration else { return Vec::new() };
+    let Some(reconfiguration) = &controller.reconfiguration else { return Vec::new() };
     let names: Vec<_> = fields.switches(controller);
     let mut all = Vec::new();
-    for (case, field) in own.cases.iter().zip(&names) {
+    for (case, field) in reconfiguration.cases.iter().zip(&names) {
         let actuator = one_line(&controller.actuators[case.actuator].name);
         let decided = case.decision.map_or_else(String::new, |(loss, most, samples)| {
             let fault = &fields.faults[controller.losses[loss].fault];
@@ -26,7 +26,7 @@ pub(super) fn reconfiguration(controller: &Controller, fields: &Fields) -> Vec<S
             case.stuck_at
         ));
     }
-    if own.fallback.is_some() {
+    if reconfiguration.fallback.is_some() {
         let uncovered =
             "also in force where there are no gains without exactly the actuators that are gone";
         let text =
@@ -37,7 +37,7 @@ pub(super) fn reconfiguration(controller: &Controller, fields: &Fields) -> Vec<S
                     of them are in force.";
         all.push(text.to_owned());
     }
-    let fall_back = if own.fallback.is_some() { ", -1 in the fall-back" } else { "" };
+    let fall_back = if reconfiguration.fallback.is_some() { ", -1 in the fall-back" } else { "" };
     all.push(format!(
         "The decision is made in each sample but the first one. The output `reconfiguration` is the number from 1 \
          of the first actuator that is gone, 0 if there is none{fall_back}."
@@ -47,14 +47,14 @@ pub(super) fn reconfiguration(controller: &Controller, fields: &Fields) -> Vec<S
 
 /// The tests, and the meaning of the outputs of a detection.
 pub(super) fn detection(controller: &Controller, precision: Precision) -> Vec<String> {
-    let Some(own) = &controller.detection else { return Vec::new() };
-    let faults: Vec<_> = own
+    let Some(detection) = &controller.detection else { return Vec::new() };
+    let faults: Vec<_> = detection
         .faults
         .iter()
         .enumerate()
         .map(|(k, name)| format!("{} {}", k + 1, one_line(name)))
         .collect();
-    let method = match own.method {
+    let method = match detection.method {
         Method::Cusum => {
             "cumulative sums of a residual, S+ = max(0, S+ + r - drift) and S- = max(0, S- - r - drift); the \
              statistic is the larger one"
@@ -69,7 +69,7 @@ pub(super) fn detection(controller: &Controller, precision: Precision) -> Vec<St
             "Residuals r, white with variance 1 without faults, are computed in each sample but the first one, \
              whether faults are compensated or not, and tested from sample {} on by {method}. A statistic above \
              its threshold is an alarm.",
-            own.first_tested
+            detection.first_tested
         ),
         format!(
             "Detection.detected: there was an alarm since the last sample with `detection_reset`, which clears \
@@ -81,11 +81,11 @@ pub(super) fn detection(controller: &Controller, precision: Precision) -> Vec<St
         ),
     ];
     let mut first = 0;
-    for (k, test) in own.tests.iter().enumerate() {
+    for (k, test) in detection.tests.iter().enumerate() {
         let last = first + test.residuals;
         let residuals = if test.residuals == 1 { "" } else { "s" };
         let range: Vec<_> = (first..last).map(|row| row.to_string()).collect();
-        let window = match own.method {
+        let window = match detection.method {
             Method::Cusum => format!(", drift {:?}", test.drift),
             Method::Window => format!(", N = {}", test.window),
         };
