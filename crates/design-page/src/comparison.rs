@@ -9,12 +9,12 @@ use design_report::comparison::{Comparison, LawResult};
 
 /// Returns the page of a comparison, a complete HTML document.
 #[must_use]
-pub fn comparison(found: &Comparison) -> String {
-    let title = format!("Estimation laws for {}", found.plant_file);
+pub fn comparison(comparison: &Comparison) -> String {
+    let title = format!("Estimation laws for {}", comparison.plant_file);
     let document = html! {
         (DOCTYPE)
         html lang="en" {
-            (head(&title, &found.identity))
+            (head(&title, &comparison.identity))
             body {
                 header {
                     p.kind { "Comparison of estimation laws" }
@@ -28,9 +28,9 @@ pub fn comparison(found: &Comparison) -> String {
                 main {
                     section aria-labelledby="overview" {
                         h2 id="overview" { "Overview" }
-                        (overview(found))
+                        (overview(comparison))
                     }
-                    @for law in &found.laws {
+                    @for law in &comparison.laws {
                         section aria-labelledby=(law.law) {
                             h2 id=(law.law) { (law.law) }
                             (one(law))
@@ -43,9 +43,9 @@ pub fn comparison(found: &Comparison) -> String {
     document.into_string().replace(|sign: char| sign.is_control() && sign != '\n', " ")
 }
 
-fn overview(found: &Comparison) -> Markup {
+fn overview(comparison: &Comparison) -> Markup {
     let mut rows = Vec::new();
-    for law in &found.laws {
+    for law in &comparison.laws {
         let Some(result) = &law.result else {
             let mut row: Vec<Cell> = vec![law.law.as_str().into(), Cell::Holds(false)];
             row.resize_with(12, || Cell::Missing);

@@ -42,7 +42,8 @@ pub(super) fn frequency<'a>(
         _ => format!("no. {}", index + 1),
     };
     let lines = response.singular_values.iter().enumerate();
-    let limit = limit.filter(|limit| response.frequencies.iter().any(|own| own >= limit));
+    let limit =
+        limit.filter(|limit| response.frequencies.iter().any(|frequency| frequency >= limit));
     let place = plots.add(Plot {
         id,
         quantity: Quantity::Frequency,

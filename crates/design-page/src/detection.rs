@@ -8,24 +8,24 @@ use super::table::{Cell, table};
 use design_report::detection::{DecoupledInput, DetectedFault, Detection, Test};
 
 /// Shows tests, delays and structure.
-pub(super) fn detection(found: &Detection) -> Markup {
+pub(super) fn detection(section: &Detection) -> Markup {
     html! {
         p {
             "The residuals are white with variance 1 while there is no fault. They are tested every "
-            (number(found.sample_time)) " s from " (number(found.from)) " s after the start on. All tests \
-             together give a false alarm every " (number(found.false_alarm_interval)) " s on average, with \
-             the stated noise. Process noise: " (found.process_noise)
+            (number(section.sample_time)) " s from " (number(section.from)) " s after the start on. All tests \
+             together give a false alarm every " (number(section.false_alarm_interval)) " s on average, with \
+             the stated noise. Process noise: " (section.process_noise)
         }
-        (tests(&found.tests))
-        (examined(found))
-        (faults(&found.faults))
+        (tests(&section.tests))
+        (examined(section))
+        (faults(&section.faults))
         p {
             "The largest mean of the residuals after a step of each fault by its size, in standard \
              deviations; below, the tests that react to each fault."
         }
-        (matrix("detection-structure", &found.structure))
-        (reactions(found))
-        @for group in &found.confused {
+        (matrix("detection-structure", &section.structure))
+        (reactions(section))
+        @for group in &section.confused {
             p { strong { "The residuals cannot tell these faults apart: " } (group.join(", ")) "." }
         }
     }
@@ -68,13 +68,13 @@ fn tests(tests: &[Test]) -> Markup {
 }
 
 /// Says which parameters of an FMU the means by model errors are for.
-fn examined(found: &Detection) -> Markup {
-    let Some(own) = &found.parameter_cases else { return html! {} };
+fn examined(section: &Detection) -> Markup {
+    let Some(cases) = &section.parameter_cases else { return html! {} };
     html! {
         p {
             "The means by model errors are the largest at the corners of the limits of the parameters and of "
-            (own.cases) " random parameters within (seed " (own.seed) "), times the factor of the plant file. With a \
-             confidence of 99 %, at most the part " (number(own.uncovered)) " of the parameters within their \
+            (cases.cases) " random parameters within (seed " (cases.seed) "), times the factor of the plant file. With a \
+             confidence of 99 %, at most the part " (number(cases.uncovered)) " of the parameters within their \
              limits gives a test a larger mean, before the factor."
         }
     }
@@ -106,15 +106,15 @@ fn faults(faults: &[DetectedFault]) -> Markup {
     table("Predicted detection", &heads, &faults.iter().map(row).collect::<Vec<_>>())
 }
 
-fn reactions(found: &Detection) -> Markup {
+fn reactions(section: &Detection) -> Markup {
     let mut heads = vec!["test"];
-    heads.extend(found.faults.iter().map(|fault| fault.fault.as_str()));
+    heads.extend(section.faults.iter().map(|fault| fault.fault.as_str()));
     let row = |(test, reacts): (&Test, &Vec<bool>)| {
         let mut cells = vec![Cell::from(test.name.as_str())];
         let sign = |reacts: &bool| Cell::from(if *reacts { "1" } else { "0" });
         cells.extend(reacts.iter().map(sign));
         cells
     };
-    let rows: Vec<_> = found.tests.iter().zip(&found.reacts).map(row).collect();
+    let rows: Vec<_> = section.tests.iter().zip(&section.reacts).map(row).collect();
     table("Structure", &heads, &rows)
 }

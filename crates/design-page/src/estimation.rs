@@ -8,23 +8,23 @@ use design_report::robustness::Number;
 use design_report::{Check, Estimation, EstimationErrors, Report};
 
 pub(super) fn estimation(report: &Report) -> Markup {
-    let own = &report.estimation;
+    let estimation = &report.estimation;
     html! {
-        p { "Law " code { (own.law) } " (" (own.sources) "), with the gains above:" }
-        ul { @for line in &own.equations { li { code { (line) } } } }
-        (parameters(own))
-        (conditions(own))
-        (errors(&own.errors))
+        p { "Law " code { (estimation.law) } " (" (estimation.sources) "), with the gains above:" }
+        ul { @for line in &estimation.equations { li { code { (line) } } } }
+        (parameters(estimation))
+        (conditions(estimation))
+        (errors(&estimation.errors))
     }
 }
 
-pub(super) fn parameters(own: &Estimation) -> Markup {
+pub(super) fn parameters(estimation: &Estimation) -> Markup {
     let row = |one: &Number| vec![one.name.as_str().into(), (&one.unit).into(), one.value.into()];
-    let rows: Vec<Vec<Cell>> = own.parameters.iter().map(row).collect();
+    let rows: Vec<Vec<Cell>> = estimation.parameters.iter().map(row).collect();
     table("Parameters", &["parameter", "unit", "value"], &rows)
 }
 
-pub(super) fn conditions(own: &Estimation) -> Markup {
+pub(super) fn conditions(estimation: &Estimation) -> Markup {
     let row = |one: &Check| {
         vec![
             one.condition.as_str().into(),
@@ -33,7 +33,7 @@ pub(super) fn conditions(own: &Estimation) -> Markup {
             one.explanation.as_str().into(),
         ]
     };
-    let rows: Vec<Vec<Cell>> = own.conditions.iter().map(row).collect();
+    let rows: Vec<Vec<Cell>> = estimation.conditions.iter().map(row).collect();
     table("Conditions for its existence", &["condition", "holds", "value", "explanation"], &rows)
 }
 

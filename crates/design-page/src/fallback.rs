@@ -9,22 +9,22 @@ use design_report::fallback::{FallbackCase, FallbackReport};
 use design_report::robustness::{LoopPoint, Number};
 
 pub(super) fn fallback(report: &Report) -> Markup {
-    html! { @if let Some(found) = &report.fallback { (section(found)) } }
+    html! { @if let Some(fallback) = &report.fallback { (section(fallback)) } }
 }
 
-fn section(found: &FallbackReport) -> Markup {
+fn section(fallback: &FallbackReport) -> Markup {
     html! {
         p {
             "The fall-back serves all cases below without knowing which one it is. It is in force while the \
              input fall_back of the controller FMU is true, and while actuators are gone for which there \
-             are no other gains. The observer stays in the loop and does not know of the loss. " (found.method)
+             are no other gains. The observer stays in the loop and does not know of the loss. " (fallback.method)
         }
         p {
-            "The loop of plant, observer and feedback decays with at least " (number(found.decay))
-            " 1/s in all cases, the intact controller with " (number(found.intact_decay))
-            " 1/s. Norm of K" sub { "x" } " " (number(found.gain_norm)) ", of the intact controller "
-            (number(found.intact_gain_norm)) ". "
-            @if found.compensates {
+            "The loop of plant, observer and feedback decays with at least " (number(fallback.decay))
+            " 1/s in all cases, the intact controller with " (number(fallback.intact_decay))
+            " 1/s. Norm of K" sub { "x" } " " (number(fallback.gain_norm)) ", of the intact controller "
+            (number(fallback.intact_gain_norm)) ". "
+            @if fallback.compensates {
                 "The estimated faults are compensated: the loop with the compensation decays at the required \
                  rate, too."
             } @else {
@@ -32,7 +32,7 @@ fn section(found: &FallbackReport) -> Markup {
                  at the required rate in all cases. What they cause stays in the states."
             }
         }
-        @match &found.whole {
+        @match &fallback.whole {
             Ok(certificate) => p {
                 "One P serves the loops of all cases (margin " (number(certificate.margin)) "): the loop is \
                  stable while losses change in any way, if their fractions of the largest loss are at most \
@@ -43,27 +43,28 @@ fn section(found: &FallbackReport) -> Markup {
                 ". The table is about constant losses."
             },
         }
-        (cases(&found.cases))
-        (at_rest("Commands of the fall-back at rest", &found.cases, |own| &own.commands))
+        (cases(&fallback.cases))
+        (at_rest("Commands of the fall-back at rest", &fallback.cases, |case| &case.commands))
         (at_rest(
             "Deviations of the measurements in the fall-back at rest",
-            &found.cases,
-            |own| &own.measurements,
+            &fallback.cases,
+            |case| &case.measurements,
         ))
     }
 }
 
 fn cases(cases: &[FallbackCase]) -> Markup {
-    let peak = |points: &[LoopPoint], at: usize| Cell::from(points.get(at).map(|own| own.judged));
-    let row = |own: &FallbackCase| {
-        let price = own.worst_price();
+    let peak =
+        |points: &[LoopPoint], at: usize| Cell::from(points.get(at).map(|point| point.judged));
+    let row = |case: &FallbackCase| {
+        let price = case.worst_price();
         vec![
-            own.name.as_str().into(),
-            own.decay.into(),
-            own.feedback_decay.into(),
-            peak(&own.points, 0),
-            peak(&own.points, 1),
-            own.delay_margin.into(),
+            case.name.as_str().into(),
+            case.decay.into(),
+            case.feedback_decay.into(),
+            peak(&case.points, 0),
+            peak(&case.points, 1),
+            case.delay_margin.into(),
             price.map(|price| price.value).into(),
             price.map_or("", |price| &price.name).into(),
         ]
@@ -94,9 +95,9 @@ fn at_rest(
     numbers: impl Fn(&FallbackCase) -> &[Number],
 ) -> Markup {
     let Some(first) = cases.first() else { return html! {} };
-    let row = |(at, own): (usize, &Number)| {
+    let row = |(at, signal): (usize, &Number)| {
         let values = cases.iter().map(|case| Cell::from(numbers(case)[at].value));
-        [own.name.as_str().into(), (&own.unit).into()].into_iter().chain(values).collect()
+        [signal.name.as_str().into(), (&signal.unit).into()].into_iter().chain(values).collect()
     };
     let rows: Vec<Vec<Cell>> = numbers(first).iter().enumerate().map(row).collect();
     let names = cases.iter().map(|case| case.name.as_str());

@@ -10,19 +10,19 @@ use design_report::schedule::{RateCertificate, ScheduleReport};
 use design_report::{Matrix, Report};
 
 pub(super) fn family(report: &Report) -> Markup {
-    html! { @if let Some(found) = &report.family { (members_section(report, found)) } }
+    html! { @if let Some(family) = &report.family { (members_section(report, family)) } }
 }
 
-fn members_section(report: &Report, found: &FamilyReport) -> Markup {
+fn members_section(report: &Report, family: &FamilyReport) -> Markup {
     html! {
         p {
             "One controller for all members; its observer has the model of the nominal plant. The worst \
              member is judged. A constant member is judged by the eigenvalues of the whole loop; a \
              common P is about a plant that moves between the members, arbitrarily fast."
         }
-        (margins("Members of the family", "member", &found.members.iter().collect::<Vec<_>>()))
-        (noise(&found.members.iter().collect::<Vec<_>>()))
-        @match &found.whole {
+        (margins("Members of the family", "member", &family.members.iter().collect::<Vec<_>>()))
+        (noise(&family.members.iter().collect::<Vec<_>>()))
+        @match &family.whole {
             Ok(certificate) => {
                 p {
                     "One P serves all members with the whole controller (margin "
@@ -38,7 +38,7 @@ fn members_section(report: &Report, found: &FamilyReport) -> Markup {
                 (reason) ". The table is about constant members."
             }
         }
-        @if let Some(certificate) = &found.feedback {
+        @if let Some(certificate) = &family.feedback {
             p {
                 "One P proves the region of the state feedback for all members (margin "
                 (number(certificate.margin)) ")."
@@ -49,33 +49,33 @@ fn members_section(report: &Report, found: &FamilyReport) -> Markup {
 }
 
 pub(super) fn schedule(report: &Report) -> Markup {
-    html! { @if let Some(found) = &report.schedule { (schedule_section(report, found)) } }
+    html! { @if let Some(schedule) = &report.schedule { (schedule_section(report, schedule)) } }
 }
 
-fn schedule_section(report: &Report, found: &ScheduleReport) -> Markup {
-    let unit = found.unit.as_deref().unwrap_or("1");
-    let members: Vec<_> = found.points.iter().map(|point| &point.closed).collect();
+fn schedule_section(report: &Report, schedule: &ScheduleReport) -> Markup {
+    let unit = schedule.unit.as_deref().unwrap_or("1");
+    let members: Vec<_> = schedule.points.iter().map(|point| &point.closed).collect();
     let (instant, figure, less) = match report.sampling {
         Some(_) => ("At each sample", "modulus", ", less 1,"),
         None => ("At each instant", "real part", ", in 1/s,"),
     };
     html! {
         p {
-            "The gains depend on " strong { (found.variable) } ", "
-            @if found.measured { "a measurement" } @else { "an input of the controller" }
+            "The gains depend on " strong { (schedule.variable) } ", "
+            @if schedule.measured { "a measurement" } @else { "an input of the controller" }
             ", in " (unit) ". " (instant) " plant model, gains and operating point are interpolated \
              linearly between the points; values outside of them are held at the ends."
         }
         (margins("Points of the schedule", "point", &members))
         (noise(&members))
-        (operating(report, found))
+        (operating(report, schedule))
         p {
             "Between the points: the largest " (figure) " of the eigenvalues of the interpolated loop" (less)
-            " is " (number(found.worst_instability)) " at " (found.variable) " = "
-            (number(found.worst_at)) ", the worst of " (found.checked) " constant values. "
+            " is " (number(schedule.worst_instability)) " at " (schedule.variable) " = "
+            (number(schedule.worst_at)) ", the worst of " (schedule.checked) " constant values. "
             strong { "This is a check of these values, not a proof." }
         }
-        @match (&found.any_rate, &found.bounded_rate) {
+        @match (&schedule.any_rate, &schedule.bounded_rate) {
             (Ok(certificate), _) => {
                 p {
                     "Proven: one P (margin " (number(certificate.margin)) ") serves all values between \
@@ -91,14 +91,14 @@ fn schedule_section(report: &Report, found: &ScheduleReport) -> Markup {
                      stable while the variable changes by at most " (number(bounded.rate)) " "
                     (unit) " per s."
                 }
-                (rate_matrices(report, found, bounded))
+                (rate_matrices(report, schedule, bounded))
             }
             (Err(any), Err(bounded)) => p {
                 strong { "Stability while the variable changes is not proven. " }
                 "For any rate: " (any) ". For a bounded rate: " (bounded) "."
             }
         }
-        @for (index, point) in found.points.iter().enumerate() {
+        @for (index, point) in schedule.points.iter().enumerate() {
             h3 { (point.closed.name) }
             (matrices(&format!("schedule-{}", index + 1), &point.gains))
         }
@@ -119,20 +119,20 @@ fn margins(caption: &str, kind: &str, members: &[&MemberReport]) -> Markup {
         "unstable from (tolerances)",
     ];
     let row = |member: &&MemberReport| {
-        let own = member.margins.as_ref();
-        let point = |at: usize| own.and_then(|own| own.points.get(at));
-        let tolerance = own.and_then(|own| own.tolerance.as_ref());
+        let margins = member.margins.as_ref();
+        let point = |at: usize| margins.and_then(|margins| margins.points.get(at));
+        let tolerance = margins.and_then(|margins| margins.tolerance.as_ref());
         vec![
             member.name.as_str().into(),
-            Cell::Holds(own.is_some()),
+            Cell::Holds(margins.is_some()),
             member.instability.into(),
             point(0).map(|point| point.judged).into(),
             point(1).map(|point| point.judged).into(),
             point(0).map(|point| point.together.alpha).into(),
             point(1).map(|point| point.together.alpha).into(),
-            own.map(|own| own.delay_margin).into(),
-            tolerance.and_then(|found| found.stable).map(|part| 100.0 * part).into(),
-            tolerance.map(|found| found.first_unstable).into(),
+            margins.map(|margins| margins.delay_margin).into(),
+            tolerance.and_then(|test| test.stable).map(|part| 100.0 * part).into(),
+            tolerance.map(|test| test.first_unstable).into(),
         ]
     };
     let rows: Vec<Vec<Cell>> = members.iter().map(row).collect();
@@ -141,15 +141,18 @@ fn margins(caption: &str, kind: &str, members: &[&MemberReport]) -> Markup {
 
 /// The effect of the measurement noise, a column for each member.
 fn noise(members: &[&MemberReport]) -> Markup {
-    let stable: Vec<_> =
-        members.iter().filter_map(|own| Some((&own.name, own.margins.as_ref()?))).collect();
+    let stable: Vec<_> = members
+        .iter()
+        .filter_map(|member| Some((&member.name, member.margins.as_ref()?)))
+        .collect();
     let Some((_, first)) = stable.first() else { return html! {} };
     let row = |(at, number): (usize, &design_report::robustness::Number)| {
         let name = match &number.unit {
             Some(unit) => format!("{} ({unit})", number.name),
             None => number.name.clone(),
         };
-        let values = stable.iter().map(|(_, own)| Cell::Number(own.noise_together[at].value));
+        let values =
+            stable.iter().map(|(_, margins)| Cell::Number(margins.noise_together[at].value));
         std::iter::once(Cell::Text(name)).chain(values).collect()
     };
     let rows: Vec<Vec<Cell>> = first.noise_together.iter().enumerate().map(row).collect();
@@ -158,27 +161,27 @@ fn noise(members: &[&MemberReport]) -> Markup {
     table("Root-mean-square values under the noise of all measurements", &heads, &rows)
 }
 
-fn operating(report: &Report, found: &ScheduleReport) -> Markup {
+fn operating(report: &Report, schedule: &ScheduleReport) -> Markup {
     let plant = &report.plant;
     let names = [&plant.states, &plant.actuators, &plant.measurements];
     let coupled = "stability figure with the schedule's own feedback";
     let mut rows: Vec<Vec<Cell>> = Vec::new();
     for (group, names) in names.iter().enumerate() {
         for (at, signal) in names.iter().enumerate() {
-            let values = found.points.iter().map(|point| Cell::from(point.operating[group][at]));
+            let values = schedule.points.iter().map(|point| Cell::from(point.operating[group][at]));
             rows.push(std::iter::once(signal.name.as_str().into()).chain(values).collect());
         }
     }
-    if found.measured {
-        let values = found.points.iter().map(|point| point.coupled_instability.into());
+    if schedule.measured {
+        let values = schedule.points.iter().map(|point| point.coupled_instability.into());
         rows.push(std::iter::once(coupled.into()).chain(values).collect());
     }
     let heads: Vec<&str> = std::iter::once("value at the operating point")
-        .chain(found.points.iter().map(|point| point.closed.name.as_str()))
+        .chain(schedule.points.iter().map(|point| point.closed.name.as_str()))
         .collect();
     html! {
         (table("Operating points", &heads, &rows))
-        @if found.measured {
+        @if schedule.measured {
             p {
                 "A measurement schedules: through the interpolated operating points it acts on the \
                  commands in a way that the designs at the points do not know (“hidden coupling”, \
@@ -199,46 +202,48 @@ fn feedback_names(report: &Report) -> Vec<String> {
 
 /// The integrals of the distances from references.
 fn integral_names(report: &Report) -> Vec<String> {
-    let k_i = report.gains.iter().find(|own| own.name == "K_i");
-    let names = k_i.iter().flat_map(|own| &own.columns);
+    let k_i = report.gains.iter().find(|gain| gain.name == "K_i");
+    let names = k_i.iter().flat_map(|gain| &gain.columns);
     names.map(|name| format!("integral of {name}")).collect()
 }
 
 /// The states of plant and controller together.
 fn loop_names(report: &Report) -> Vec<String> {
     let mut names = state_names(report);
-    let Some(k_x) = report.gains.iter().find(|own| own.name == "K_x") else { return names };
+    let Some(k_x) = report.gains.iter().find(|gain| gain.name == "K_x") else { return names };
     let measurements = report.plant.measurements.iter();
     if k_x.columns.len() > names.len() {
         names.extend(measurements.map(|signal| format!("filter of {}", signal.name)));
     }
     names.extend(k_x.columns.iter().map(|name| format!("estimate of {name}")));
-    let faults = report.gains.iter().find(|own| own.name == "L_f");
-    names.extend(faults.iter().flat_map(|own| &own.rows).map(|name| format!("estimate of {name}")));
+    let faults = report.gains.iter().find(|gain| gain.name == "L_f");
+    names.extend(
+        faults.iter().flat_map(|gain| &gain.rows).map(|name| format!("estimate of {name}")),
+    );
     names.extend(integral_names(report));
     names
 }
 
-fn p_matrix(id: &str, names: &[String], found: &CommonCertificate) -> Markup {
-    named(id, "P", names, &found.p)
+fn p_matrix(id: &str, names: &[String], certificate: &CommonCertificate) -> Markup {
+    named(id, "P", names, &certificate.p)
 }
 
-fn rate_matrices(report: &Report, found: &ScheduleReport, bounded: &RateCertificate) -> Markup {
+fn rate_matrices(report: &Report, schedule: &ScheduleReport, bounded: &RateCertificate) -> Markup {
     let names = loop_names(report);
     html! {
-        @for (index, (point, p)) in found.points.iter().zip(&bounded.p).enumerate() {
+        @for (index, (point, p)) in schedule.points.iter().zip(&bounded.p).enumerate() {
             (named(&format!("schedule-P-{}", index + 1), &format!("P at {}", point.at), &names, p))
         }
     }
 }
 
 fn named(id: &str, name: &str, names: &[String], values: &[Vec<f64>]) -> Markup {
-    let own = Matrix {
+    let labelled = Matrix {
         name: name.to_owned(),
         meaning: "Lyapunov matrix".to_owned(),
         rows: names.to_vec(),
         columns: names.to_vec(),
         values: values.to_vec(),
     };
-    matrix(id, &own)
+    matrix(id, &labelled)
 }

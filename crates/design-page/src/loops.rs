@@ -217,17 +217,17 @@ fn norms(report: &Report) -> Markup {
     let rows: Vec<_> = loops
         .into_iter()
         .filter_map(|(name, system)| {
-            let found = system.norm.as_ref()?;
+            let norm = system.norm.as_ref()?;
             Some(vec![
                 name.into(),
-                found.channel.as_str().into(),
-                Some(found.norm).into(),
-                found.certified.into(),
-                found.lower_bound.into(),
-                found.lower_bound_for.map_or("", bound_for).into(),
-                found.gap.map(|gap| 100.0 * gap).into(),
-                found.unweighted.into(),
-                Some(found.gain).into(),
+                norm.channel.as_str().into(),
+                Some(norm.norm).into(),
+                norm.certified.into(),
+                norm.lower_bound.into(),
+                norm.lower_bound_for.map_or("", bound_for).into(),
+                norm.gap.map(|gap| 100.0 * gap).into(),
+                norm.unweighted.into(),
+                Some(norm.gain).into(),
             ])
         })
         .collect();

@@ -26,17 +26,17 @@ fn stated(losses: &LossReport) -> Markup {
              the loop unstable. Between the two, constant losses are stable as far as they were tested, \
              and nothing is known of losses that change."
         }
-        @for own in &losses.loops { (of_loop(own, losses)) }
+        @for loop_losses in &losses.loops { (of_loop(loop_losses, losses)) }
     }
 }
 
-fn of_loop(own: &LossLoop, losses: &LossReport) -> Markup {
-    let limits: Vec<Vec<Cell>> = own
+fn of_loop(loop_losses: &LossLoop, losses: &LossReport) -> Markup {
+    let limits: Vec<Vec<Cell>> = loop_losses
         .constant
         .iter()
         .enumerate()
         .map(|(at, constant)| {
-            let certified = own.certified.get(at);
+            let certified = loop_losses.certified.get(at);
             let case = match at {
                 0 if losses.stated.len() > 1 => {
                     "all, in proportion to the stated losses".to_owned()
@@ -46,8 +46,8 @@ fn of_loop(own: &LossLoop, losses: &LossReport) -> Markup {
             };
             vec![
                 case.as_str().into(),
-                certified.map_or(Cell::Missing, |own| described(&own.losses).as_str().into()),
-                certified.map(|own| own.factor).into(),
+                certified.map_or(Cell::Missing, |bound| described(&bound.losses).as_str().into()),
+                certified.map(|bound| bound.factor).into(),
                 described(&constant.losses).as_str().into(),
                 Some(constant.factor).filter(|_| !constant.stable).into(),
                 if constant.stable { "stable up to here" } else { "unstable beyond" }.into(),
@@ -63,9 +63,9 @@ fn of_loop(own: &LossLoop, losses: &LossReport) -> Markup {
         "there",
     ];
     html! {
-        h3 { "Losses, " (own.name) }
-        p { (own.meaning) "." }
-        @match &own.proof {
+        h3 { "Losses, " (loop_losses.name) }
+        p { (loop_losses.meaning) "." }
+        @match &loop_losses.proof {
             Ok(proof) => {
                 p {
                     strong { "The stated losses are proven" } " with the margin "
@@ -78,8 +78,8 @@ fn of_loop(own: &LossLoop, losses: &LossReport) -> Markup {
             }
             Err(reason) => p { strong { "The stated losses are not proven: " } (reason) "." },
         }
-        (table(&format!("Limits of the losses, {}", own.name), &heads, &limits))
-        @if let Ok(proof) = &own.proof {
+        (table(&format!("Limits of the losses, {}", loop_losses.name), &heads, &limits))
+        @if let Ok(proof) = &loop_losses.proof {
             @let rows: Vec<Vec<Cell>> = proof
                 .peaks
                 .iter()
@@ -91,7 +91,7 @@ fn of_loop(own: &LossLoop, losses: &LossReport) -> Markup {
                 ])
                 .collect();
             (table(
-                &format!("Largest states for all stated losses, {}", own.name),
+                &format!("Largest states for all stated losses, {}", loop_losses.name),
                 &["disturbance → state", "largest disturbance", "bound of the state", "unit"],
                 &rows,
             ))

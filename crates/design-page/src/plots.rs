@@ -78,7 +78,7 @@ impl<'a> Plots<'a> {
     /// signed); the values of each curve (64 bits, 32 if there are more than [`DOUBLE`]). A list is stored as all
     /// first bytes, little endian, then all second bytes and so on, since neighbours differ little in most of them.
     pub(super) fn json(&self) -> String {
-        let grids = [Quantity::Time, Quantity::Frequency].map(|own| self.grid(own));
+        let grids = [Quantity::Time, Quantity::Frequency].map(|quantity| self.grid(quantity));
         let mut steps = Vec::new();
         let mut values = Vec::new();
         for plot in &self.0 {

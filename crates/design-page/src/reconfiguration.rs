@@ -9,7 +9,7 @@ use design_report::reconfiguration::{Reconfigured, ServedByFallback};
 use design_report::robustness::Number;
 
 pub(super) fn reconfiguration(report: &Report) -> Markup {
-    let Some(found) = &report.reconfiguration else {
+    let Some(section) = &report.reconfiguration else {
         return html! {};
     };
     html! {
@@ -17,26 +17,26 @@ pub(super) fn reconfiguration(report: &Report) -> Markup {
             "An actuator that is gone is stuck at a constant command. The controller FMU then uses that \
              command in its observer and the gains below for the other actuators. The input actuator_gone \
              says that an actuator is gone"
-            @if let Some([loss, time]) = found.by_estimate {
+            @if let Some([loss, time]) = section.by_estimate {
                 "; an estimated loss of effectiveness above " (number(loss)) " for " (number(time))
                 " s does the same"
             }
             ". The observer stays the same, so that its eigenvalues and those of the feedback are those of \
              the loop."
         }
-        @for own in &found.without { (without(&own.actuator, &own.outcome)) }
-        @for own in &found.several { (without(&own.actuators.join(", "), &own.outcome)) }
-        (by_fallback(&found.by_fallback))
+        @for case in &section.without { (without(&case.actuator, &case.outcome)) }
+        @for case in &section.several { (without(&case.actuators.join(", "), &case.outcome)) }
+        (by_fallback(&section.by_fallback))
     }
 }
 
 /// A table of the sets of actuators that have no gains of their own: when they are gone, the controller falls back.
-fn by_fallback(found: &[ServedByFallback]) -> Markup {
-    let row = |own: &ServedByFallback| {
-        let stable = Cell::Holds(own.stable);
-        vec![own.actuators.join(", ").as_str().into(), own.decay.into(), stable]
+fn by_fallback(cases: &[ServedByFallback]) -> Markup {
+    let row = |case: &ServedByFallback| {
+        let stable = Cell::Holds(case.stable);
+        vec![case.actuators.join(", ").as_str().into(), case.decay.into(), stable]
     };
-    let rows: Vec<Vec<Cell>> = found.iter().map(row).collect();
+    let rows: Vec<Vec<Cell>> = cases.iter().map(row).collect();
     html! {
         @if !rows.is_empty() {
             h3 { "Without gains of their own" }
@@ -58,49 +58,50 @@ fn without(name: &str, outcome: &Result<Reconfigured, String>) -> Markup {
         h3 { "Without " (name) }
         @match outcome {
             Err(reason) => p { strong { "There is no controller: " } (reason) "." },
-            Ok(found) => (controller(name, found)),
+            Ok(case) => (controller(name, case)),
         }
     }
 }
 
-fn controller(name: &str, found: &Reconfigured) -> Markup {
+fn controller(name: &str, case: &Reconfigured) -> Markup {
     let numbers = |all: &[Number]| -> Vec<Vec<Cell>> {
-        let row =
-            |own: &Number| vec![own.name.as_str().into(), own.value.into(), (&own.unit).into()];
+        let row = |signal: &Number| {
+            vec![signal.name.as_str().into(), signal.value.into(), (&signal.unit).into()]
+        };
         all.iter().map(row).collect()
     };
-    let eigenvalues: Vec<Vec<Cell>> = found
+    let eigenvalues: Vec<Vec<Cell>> = case
         .eigenvalues
         .iter()
         .enumerate()
         .map(|(at, value)| vec![(at + 1).to_string().as_str().into(), Some(*value).into()])
         .collect();
     html! {
-        p { (found.method) }
+        p { (case.method) }
         p {
-            "Norm of K" sub { "x" } " " (number(found.gain_norm)) ", with all actuators "
-            (number(found.intact_gain_norm)) ". Part of the effect that the others cannot produce: "
-            (number(found.residual)) ". "
-            @if found.kept {
+            "Norm of K" sub { "x" } " " (number(case.gain_norm)) ", with all actuators "
+            (number(case.intact_gain_norm)) ". Part of the effect that the others cannot produce: "
+            (number(case.residual)) ". "
+            @if case.kept {
                 "The measurements that must be kept rest at the operating point."
             } @else {
                 "The measurements that must be kept do not rest at the operating point, but as near as \
                  the other actuators allow."
             }
-            @if !found.beyond_limits.is_empty() {
-                " " strong { "Beyond their limits: " } (found.beyond_limits.join(", ")) "."
+            @if !case.beyond_limits.is_empty() {
+                " " strong { "Beyond their limits: " } (case.beyond_limits.join(", ")) "."
             }
         }
         (table(&format!("Eigenvalues without {name}"), &["number", "eigenvalue of A + B K_x"], &eigenvalues))
         (table(
             &format!("Commands at rest without {name}"),
             &["actuator", "command", "unit"],
-            &numbers(&found.commands),
+            &numbers(&case.commands),
         ))
         (table(
             &format!("Measurements at rest without {name}"),
             &["measurement", "deviation from the operating point", "unit"],
-            &numbers(&found.measurements),
+            &numbers(&case.measurements),
         ))
     }
 }

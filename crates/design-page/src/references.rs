@@ -43,14 +43,14 @@ fn step<'a>(id: &str, step: &'a ReferenceStep, plots: &mut Plots<'a>) -> Markup 
         limit(step.largest_step[0]),
         limit(step.largest_step[1]),
     ];
-    let command = |own: &CommandPeak| {
-        let [low, high] = own.limits.map_or([None; 2], |limits| limits.map(Some));
+    let command = |peak: &CommandPeak| {
+        let [low, high] = peak.limits.map_or([None; 2], |limits| limits.map(Some));
         vec![
-            own.name.as_str().into(),
-            (&own.unit).into(),
-            own.range[0].into(),
-            own.range[1].into(),
-            own.final_value.into(),
+            peak.name.as_str().into(),
+            (&peak.unit).into(),
+            peak.range[0].into(),
+            peak.range[1].into(),
+            peak.final_value.into(),
             low.into(),
             high.into(),
         ]

@@ -16,10 +16,10 @@ use design_report::{Matrix, Report};
 const SHOWN: usize = 12;
 
 pub(super) fn robustness<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Markup {
-    html! { @if let Some(found) = &report.robustness { (section(report, found, plots)) } }
+    html! { @if let Some(robustness) = &report.robustness { (section(report, robustness, plots)) } }
 }
 
-fn section<'a>(report: &Report, found: &'a Robustness, plots: &mut Plots<'a>) -> Markup {
+fn section<'a>(report: &Report, robustness: &'a Robustness, plots: &mut Plots<'a>) -> Markup {
     let limit = report.sampling.as_ref();
     let limit = limit.map(|sampled| std::f64::consts::PI / sampled.sample_time);
     html! {
@@ -28,35 +28,35 @@ fn section<'a>(report: &Report, found: &'a Robustness, plots: &mut Plots<'a>) ->
              the peak of S in the units that make it least is judged. The table "
             code { "[robustness]" } " of the plant file changes tolerances, noise and limits."
         }
-        (peaks(found))
-        (channels(found))
-        (disks(found))
+        (peaks(robustness))
+        (channels(robustness))
+        (disks(robustness))
         p {
-            "All commands may be delayed by up to " (number(found.delay_margin)) " s. "
+            "All commands may be delayed by up to " (number(robustness.delay_margin)) " s. "
             @if report.sampling.is_some() {
                 "With the same matrices of the controller the loop is stable up to a sample time of "
-                (number(found.longest_hold)) " s."
+                (number(robustness.longest_hold)) " s."
             } @else {
                 "Plant and controller may hold the signals that they exchange for up to "
-                (number(found.longest_hold)) " s: a longer communication step without extrapolation, \
+                (number(robustness.longest_hold)) " s: a longer communication step without extrapolation, \
                  or a longer sample time of the discretised controller, makes the loop unstable."
             }
         }
         h3 id="s-and-t" { "S and T" }
         div.figures {
-            @for (index, curve) in found.curves.iter().enumerate() {
+            @for (index, curve) in robustness.curves.iter().enumerate() {
                 (frequency(format!("sensitivity-{}", index + 1), curve, limit, plots))
             }
         }
         h3 id="noise" { "Measurement noise" }
-        (noise(report, found))
+        (noise(report, robustness))
         h3 id="comparison" { "Comparison" }
-        (comparison(found))
+        (comparison(robustness))
         h3 id="parameters" { "Sensitivity to the parameters" }
-        (parameters(report, found))
+        (parameters(report, robustness))
         h3 id="tolerances" { "Tolerances of the parameters" }
-        (tolerances(report, &found.tolerance))
-        (proof(&found.tolerance, &found.tolerance_proof))
+        (tolerances(report, &robustness.tolerance))
+        (proof(&robustness.tolerance, &robustness.tolerance_proof))
     }
 }
 
@@ -69,9 +69,9 @@ fn disk_cells(name: &str, disk: &Disk) -> Vec<Cell> {
     std::iter::once(name.into()).chain(numbers.map(Cell::from)).collect()
 }
 
-fn disks(found: &Robustness) -> Markup {
+fn disks(robustness: &Robustness) -> Markup {
     let mut rows = Vec::new();
-    for point in &found.points {
+    for point in &robustness.points {
         rows.push(disk_cells(&format!("all at the {}", point.point), &point.together));
         rows.extend(point.channels.iter().map(|channel| disk_cells(&channel.name, &channel.disk)));
     }
@@ -85,7 +85,7 @@ fn disks(found: &Robustness) -> Markup {
     }
 }
 
-fn peaks(found: &Robustness) -> Markup {
+fn peaks(robustness: &Robustness) -> Markup {
     let row = |point: &design_report::robustness::LoopPoint| {
         vec![
             format!("at the {}", point.point).as_str().into(),
@@ -98,7 +98,7 @@ fn peaks(found: &Robustness) -> Markup {
             point.judged_frequency.into(),
         ]
     };
-    let rows: Vec<Vec<Cell>> = found.points.iter().map(row).collect();
+    let rows: Vec<Vec<Cell>> = robustness.points.iter().map(row).collect();
     let heads = [
         "loop opened",
         "peak of S",
@@ -112,8 +112,8 @@ fn peaks(found: &Robustness) -> Markup {
     table("Peaks of the largest singular value", &heads, &rows)
 }
 
-fn channels(found: &Robustness) -> Markup {
-    let rows: Vec<Vec<Cell>> = found
+fn channels(robustness: &Robustness) -> Markup {
+    let rows: Vec<Vec<Cell>> = robustness
         .points
         .iter()
         .flat_map(|point| &point.channels)
@@ -131,13 +131,13 @@ fn channels(found: &Robustness) -> Markup {
     table("One channel changes, the others are exact", &heads, &rows)
 }
 
-fn noise(report: &Report, found: &Robustness) -> Markup {
-    let rows: Vec<Vec<Cell>> = found
+fn noise(report: &Report, robustness: &Robustness) -> Markup {
+    let rows: Vec<Vec<Cell>> = robustness
         .noise_together
         .iter()
         .map(|one| vec![one.name.as_str().into(), (&one.unit).into(), one.value.into()])
         .collect();
-    let assumed = found.noise.columns.iter().zip(&found.noise_of_measurements);
+    let assumed = robustness.noise.columns.iter().zip(&robustness.noise_of_measurements);
     let assumed: Vec<Vec<Cell>> =
         assumed.map(|(name, noise)| vec![name.as_str().into(), (*noise).into()]).collect();
     html! {
@@ -152,12 +152,12 @@ fn noise(report: &Report, found: &Robustness) -> Markup {
         }
         (table("Assumed noise", &["measurement", "noise"], &assumed))
         (table("Under all noises", &["signal", "unit", "root mean square"], &rows))
-        (matrices("noise-each", std::slice::from_ref(&found.noise)))
+        (matrices("noise-each", std::slice::from_ref(&robustness.noise)))
     }
 }
 
-fn comparison(found: &Robustness) -> Markup {
-    let rows: Vec<Vec<Cell>> = found
+fn comparison(robustness: &Robustness) -> Markup {
+    let rows: Vec<Vec<Cell>> = robustness
         .comparison
         .iter()
         .map(|one| vec![one.name.as_str().into(), one.design.into(), one.linear_quadratic.into()])
@@ -173,8 +173,8 @@ fn comparison(found: &Robustness) -> Markup {
 }
 
 /// Shows the parameters with the largest effect on the peaks of S.
-fn parameters(report: &Report, found: &Robustness) -> Markup {
-    let entries = |own: &PeakSensitivity| -> Vec<(String, f64)> {
+fn parameters(report: &Report, robustness: &Robustness) -> Markup {
+    let entries = |sensitivity: &PeakSensitivity| -> Vec<(String, f64)> {
         let named = |matrix: &Matrix| -> Vec<(String, f64)> {
             let at = |(i, row): (usize, &Vec<f64>)| -> Vec<(String, f64)> {
                 let name = |j: usize| format!("{}[{}, {}]", matrix.name, i + 1, j + 1);
@@ -182,25 +182,28 @@ fn parameters(report: &Report, found: &Robustness) -> Markup {
             };
             matrix.values.iter().enumerate().flat_map(at).collect()
         };
-        own.matrices.iter().flat_map(named).collect()
+        sensitivity.matrices.iter().flat_map(named).collect()
     };
-    let all: Vec<_> = found.sensitivity.iter().map(entries).collect();
+    let all: Vec<_> = robustness.sensitivity.iter().map(entries).collect();
     let Some(first) = all.first() else { return html! {} };
-    let size = |at: usize| all.iter().map(|own| own[at].1.abs()).fold(0.0, f64::max);
+    let size = |at: usize| all.iter().map(|entries| entries[at].1.abs()).fold(0.0, f64::max);
     let mut order: Vec<usize> = (0..first.len()).filter(|&at| size(at) > 0.0).collect();
     order.sort_by(|&i, &j| size(j).total_cmp(&size(i)));
     let values: Vec<f64> = ["A", "B", "C", "D"]
         .iter()
-        .filter_map(|name| report.plant.matrices.iter().find(|own| own.name == *name))
-        .flat_map(|own| own.values.iter().flatten().copied())
+        .filter_map(|name| report.plant.matrices.iter().find(|matrix| matrix.name == *name))
+        .flat_map(|matrix| matrix.values.iter().flatten().copied())
         .collect();
     let row = |&at: &usize| {
         let value = Cell::from(values.get(at).copied());
-        let effects = all.iter().map(|own| Cell::from(0.01 * own[at].1));
+        let effects = all.iter().map(|entries| Cell::from(0.01 * entries[at].1));
         [first[at].0.as_str().into(), value].into_iter().chain(effects).collect()
     };
     let rows: Vec<Vec<Cell>> = order.iter().take(SHOWN).map(row).collect();
-    let points = found.sensitivity.iter().map(|own| format!("change at the {}", own.point));
+    let points = robustness
+        .sensitivity
+        .iter()
+        .map(|sensitivity| format!("change at the {}", sensitivity.point));
     let heads: Vec<String> =
         ["entry", "value"].into_iter().map(str::to_owned).chain(points).collect();
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
@@ -210,44 +213,44 @@ fn parameters(report: &Report, found: &Robustness) -> Markup {
              first order; the " (rows.len()) " entries with the largest effect."
         }
         (table("Sensitivity of the peaks of S", &heads, &rows))
-        @for (index, own) in found.sensitivity.iter().enumerate() {
-            p { "At the " (own.point) ", for a change by 100 %:" }
-            (matrices(&format!("sensitivity-of-{}", index + 1), &own.matrices))
+        @for (index, sensitivity) in robustness.sensitivity.iter().enumerate() {
+            p { "At the " (sensitivity.point) ", for a change by 100 %:" }
+            (matrices(&format!("sensitivity-of-{}", index + 1), &sensitivity.matrices))
         }
     }
 }
 
-fn tolerances(report: &Report, found: &ToleranceResult) -> Markup {
-    if !found.is_examined() {
+fn tolerances(report: &Report, tolerances: &ToleranceResult) -> Markup {
+    if !tolerances.is_examined() {
         return html! { p { "Not examined: no entry and no parameter of the plant varies." } };
     }
-    let tried = if found.parameters.is_empty() { 16.0 } else { 1.0 };
+    let tried = if tolerances.parameters.is_empty() { 16.0 } else { 1.0 };
     html! {
         p {
-            @if found.parameters.is_empty() {
-                (number(f64::from(found.entries))) " entries vary: " (found.range()) ". Each varies by itself, unless \
+            @if tolerances.parameters.is_empty() {
+                (number(f64::from(tolerances.entries))) " entries vary: " (tolerances.range()) ". Each varies by itself, unless \
                  stated together; zeros and structural rows do not vary; "
             } @else {
                 "The parameters of the table vary between their limits, and the FMU is linearised \
                  with each set of them at the same operating point; "
             }
             "the controller does not. "
-            @match found.stable {
+            @match tolerances.stable {
                 Some(part) => {
-                    "Of " (number(f64::from(found.cases))) " random cases (seed " (number(f64::from(found.seed))) ") the fraction "
+                    "Of " (number(f64::from(tolerances.cases))) " random cases (seed " (number(f64::from(tolerances.seed))) ") the fraction "
                     (number(part)) " is stable. "
                 }
                 None => "There are no random cases. "
             }
             "The worst plant found has the stability figure "
-            (number(found.worst_instability)) " (negative: stable; "
+            (number(tolerances.worst_instability)) " (negative: stable; "
             @if report.sampling.is_some() { "largest modulus less 1" } @else { "largest real part, 1/s" }
-            "). In its direction the loop is stable up to " (number(found.first_unstable.min(tried)))
-            " of the tolerances" @if found.first_unstable > tried { ", the most that was tried" }
+            "). In its direction the loop is stable up to " (number(tolerances.first_unstable.min(tried)))
+            " of the tolerances" @if tolerances.first_unstable > tried { ", the most that was tried" }
             "."
         }
-        @if !found.parameters.is_empty() { (limits(&found.parameters)) }
-        (matrices("worst", &found.worst))
+        @if !tolerances.parameters.is_empty() { (limits(&tolerances.parameters)) }
+        (matrices("worst", &tolerances.worst))
     }
 }
 
@@ -286,13 +289,13 @@ fn limits(all: &[Parameter]) -> Markup {
         "change at the commands",
         "change at the measurements",
     ];
-    let row = |own: &Parameter| {
-        let name = match &own.unit {
-            Some(unit) => format!("{} ({unit})", own.name),
-            None => own.name.clone(),
+    let row = |parameter: &Parameter| {
+        let name = match &parameter.unit {
+            Some(unit) => format!("{} ({unit})", parameter.name),
+            None => parameter.name.clone(),
         };
-        let values = [own.value, own.limits[0], own.limits[1], own.worst];
-        let numbers = values.iter().chain(&own.effects).map(|value| Cell::Number(*value));
+        let values = [parameter.value, parameter.limits[0], parameter.limits[1], parameter.worst];
+        let numbers = values.iter().chain(&parameter.effects).map(|value| Cell::Number(*value));
         std::iter::once(Cell::Text(name)).chain(numbers).collect()
     };
     let rows: Vec<Vec<Cell>> = all.iter().map(row).collect();

@@ -540,7 +540,7 @@ pub fn schema() -> serde_json::Value {
 /// Requires all properties of each object and allows no others.
 fn close(schema: &mut serde_json::Value) {
     if let Some(object) = schema.as_object_mut() {
-        if let Some(properties) = object.get("properties").and_then(|found| found.as_object()) {
+        if let Some(properties) = object.get("properties").and_then(|value| value.as_object()) {
             let all: Vec<_> = properties.keys().cloned().collect();
             object.insert("required".to_owned(), all.into());
             object.insert("additionalProperties".to_owned(), false.into());
@@ -553,11 +553,11 @@ fn close(schema: &mut serde_json::Value) {
 
 /// Serializes a value, or `{ "reason": ... }` if there is none.
 fn or_reason<T: Serialize, S: Serializer>(
-    found: &Result<T, String>,
+    outcome: &Result<T, String>,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
-    match found {
-        Ok(found) => found.serialize(serializer),
+    match outcome {
+        Ok(result) => result.serialize(serializer),
         Err(reason) => serializer.collect_map([("reason", reason)]),
     }
 }

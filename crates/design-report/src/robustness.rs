@@ -300,9 +300,9 @@ impl ToleranceResult {
     /// What varies, and how far: `±10 % of A[2][1], B[2][1]`, many entries by their number.
     #[must_use]
     pub fn range(&self) -> String {
-        let limits = |own: &Parameter| {
-            let [low, high] = own.limits.map(rounded);
-            format!("{} from {low} to {high}", own.name)
+        let limits = |parameter: &Parameter| {
+            let [low, high] = parameter.limits.map(rounded);
+            format!("{} from {low} to {high}", parameter.name)
         };
         let mut parts: Vec<_> = self.parameters.iter().map(limits).collect();
         let (single, common): (Vec<_>, Vec<_>) =

@@ -10,13 +10,15 @@ use design_report::{Matrix, Report};
 
 /// The values of a report that are not points of curves, as JSON sees them.
 fn values(report: &Report) -> Vec<Value> {
-    fn collect(value: Value, found: &mut Vec<Value>) {
+    fn collect(value: Value, plain_values: &mut Vec<Value>) {
         match value {
-            Value::Array(members) => members.into_iter().for_each(|member| collect(member, found)),
-            Value::Object(members) => {
-                members.into_iter().for_each(|(_, member)| collect(member, found));
+            Value::Array(members) => {
+                members.into_iter().for_each(|member| collect(member, plain_values))
             }
-            plain => found.push(plain),
+            Value::Object(members) => {
+                members.into_iter().for_each(|(_, member)| collect(member, plain_values));
+            }
+            plain => plain_values.push(plain),
         }
     }
     let mut all = serde_json::to_value(report).unwrap();
@@ -37,9 +39,9 @@ fn values(report: &Report) -> Vec<Value> {
             curve["values"].take();
         }
     }
-    let mut found = Vec::new();
-    collect(all, &mut found);
-    found
+    let mut all_values = Vec::new();
+    collect(all, &mut all_values);
+    all_values
 }
 
 #[test]
@@ -120,8 +122,10 @@ fn matrices_read_back_bit_by_bit_in_each_language() {
     with_pages(|report, document| {
         let check = |id: &str, matrix: &Matrix| {
             for form in ["TOML", "numpy", "MATLAB"] {
-                let found = read(form, &literal(document.root(), id, form));
-                let [(name, rows)] = &found[..] else { panic!("{id}: {} matrices", found.len()) };
+                let matrices = read(form, &literal(document.root(), id, form));
+                let [(name, rows)] = &matrices[..] else {
+                    panic!("{id}: {} matrices", matrices.len())
+                };
                 assert_eq!(bits(rows), bits(&matrix.values), "{id} in {form}");
                 if form == "TOML" {
                     assert_eq!(*name, matrix.name);
@@ -142,16 +146,16 @@ fn matrices_read_back_bit_by_bit_in_each_language() {
             let together = read("numpy", &literal(document.root(), "all", "numpy"));
             let matrices = report.plant.matrices.iter().chain(&report.gains);
             let expected: Vec<_> = matrices.map(|matrix| bits(&matrix.values)).collect();
-            let found: Vec<_> = together.iter().map(|(_, rows)| bits(rows)).collect();
-            assert_eq!(found, expected);
+            let matrices: Vec<_> = together.iter().map(|(_, rows)| bits(rows)).collect();
+            assert_eq!(matrices, expected);
         }
         for (id, p) in [
             ("p-printed", report.certificate.printed.as_ref().ok().map(|theorem| &theorem.p)),
             ("p-free", report.certificate.free.as_ref().ok().map(|free| &free.p)),
         ] {
             if let Some(p) = p {
-                let found = read("MATLAB", &literal(document.root(), id, "MATLAB"));
-                assert_eq!(bits(&found[0].1), bits(p), "{id}");
+                let matrices = read("MATLAB", &literal(document.root(), id, "MATLAB"));
+                assert_eq!(bits(&matrices[0].1), bits(p), "{id}");
             }
         }
     });

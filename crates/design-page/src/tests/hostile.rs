@@ -146,7 +146,7 @@ fn region() -> Region {
 
 fn reconfiguration() -> ReconfigurationReport {
     let number = || Number { name: MARKUP.to_owned(), unit: Some(QUOTES.to_owned()), value: -0.0 };
-    let found = Reconfigured {
+    let reconfigured = Reconfigured {
         method: MARKUP.to_owned(),
         residual: 0.25,
         eigenvalues: vec![[-1.0, 2.0], [-1.0, -2.0]],
@@ -168,7 +168,7 @@ fn reconfiguration() -> ReconfigurationReport {
     };
     ReconfigurationReport {
         by_estimate: Some([0.9, 1.0]),
-        without: vec![without(Ok(found)), without(Err(MARKUP.to_owned()))],
+        without: vec![without(Ok(reconfigured)), without(Err(MARKUP.to_owned()))],
         several: vec![WithoutSeveral {
             actuators: vec![QUOTES.to_owned(), MARKUP.to_owned()],
             outcome: Err(QUOTES.to_owned()),
@@ -213,7 +213,7 @@ fn fallback() -> FallbackReport {
 fn losses() -> LossReport {
     let numbers = || vec![Number { name: MARKUP.to_owned(), unit: None, value: 0.25 }];
     let constant = || ConstantLoss { losses: numbers(), stable: false, factor: 1.5 };
-    let own = |proof| LossLoop {
+    let loop_losses = |proof| LossLoop {
         name: format!("passive {QUOTES}"),
         meaning: MARKUP.to_owned(),
         constant: vec![constant()],
@@ -228,7 +228,10 @@ fn losses() -> LossReport {
         largest: -0.0,
     };
     let proof = LossProof { margin: 1e-300, p: vec![vec![1.0]], decay: None, peaks: vec![peak] };
-    LossReport { stated: numbers(), loops: vec![own(Ok(proof)), own(Err(MARKUP.to_owned()))] }
+    LossReport {
+        stated: numbers(),
+        loops: vec![loop_losses(Ok(proof)), loop_losses(Err(MARKUP.to_owned()))],
+    }
 }
 
 fn interface() -> Vec<Variable> {

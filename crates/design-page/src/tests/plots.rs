@@ -11,9 +11,9 @@ use design_report::Report;
 
 /// The next list of a block: numbers of `N` bytes, all first bytes before all second bytes.
 fn list<const N: usize>(block: &mut &[u8], count: usize) -> Vec<[u8; N]> {
-    let (own, rest) = block.split_at(N * count);
+    let (first, rest) = block.split_at(N * count);
     *block = rest;
-    (0..count).map(|k| std::array::from_fn(|byte| own[byte * count + k])).collect()
+    (0..count).map(|k| std::array::from_fn(|byte| first[byte * count + k])).collect()
 }
 
 fn size(value: &Value) -> usize {
@@ -26,13 +26,13 @@ fn unpacked(data: &Value) -> Vec<u8> {
 
 /// The points of each curve of the report in the order of the page: places and values.
 fn curves(report: &Report) -> Vec<(&[f64], Vec<&[f64]>)> {
-    let robustness = report.robustness.iter().flat_map(|own| &own.curves);
-    let gains = robustness
-        .chain(&report.frequency)
-        .map(|own| (&own.frequencies[..], own.singular_values.iter().map(Vec::as_slice).collect()));
-    let references = report.references.iter().flat_map(|own| &own.curves);
-    let responses = references.chain(report.steps.iter().flat_map(|own| &own.curves));
-    gains.chain(responses.map(|own| (&own.times[..], vec![&own.values[..]]))).collect()
+    let robustness = report.robustness.iter().flat_map(|section| &section.curves);
+    let gains = robustness.chain(&report.frequency).map(|curve| {
+        (&curve.frequencies[..], curve.singular_values.iter().map(Vec::as_slice).collect())
+    });
+    let references = report.references.iter().flat_map(|reference| &reference.curves);
+    let responses = references.chain(report.steps.iter().flat_map(|step| &step.curves));
+    gains.chain(responses.map(|curve| (&curve.times[..], vec![&curve.values[..]]))).collect()
 }
 
 fn positive(places: &[f64], values: &[f64]) -> Vec<(u64, u64)> {
@@ -70,9 +70,9 @@ fn every_point_of_every_curve_is_on_the_page_bit_by_bit() {
             let places: Vec<f64> = places.collect();
             assert_eq!(plot["curves"].as_array().unwrap().len(), lines.len());
             for line in lines {
-                let own = values.by_ref().take(places.len()).map(f64::from_le_bytes);
-                let own: Vec<f64> = own.collect();
-                assert_eq!(positive(&places, &own), positive(at, line), "{id:?}");
+                let numbers = values.by_ref().take(places.len()).map(f64::from_le_bytes);
+                let numbers: Vec<f64> = numbers.collect();
+                assert_eq!(positive(&places, &numbers), positive(at, line), "{id:?}");
             }
         }
         assert!(steps.next().is_none() && values.next().is_none());
@@ -99,9 +99,9 @@ fn many_values_are_rounded_to_single_precision() {
     let block = unpacked(&data);
     let count = places.len();
     let mut rest = &block[(8 + 4) * count..];
-    for (found, value) in list::<4>(&mut rest, count).into_iter().zip(&values) {
-        let found = f64::from(f32::from_le_bytes(found));
-        assert!((found - value).abs() <= 6e-8 * value.abs(), "{found} is not {value}");
+    for (bytes, value) in list::<4>(&mut rest, count).into_iter().zip(&values) {
+        let rounded = f64::from(f32::from_le_bytes(bytes));
+        assert!((rounded - value).abs() <= 6e-8 * value.abs(), "{rounded} is not {value}");
     }
     assert!(rest.is_empty());
 }
