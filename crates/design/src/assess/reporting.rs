@@ -144,8 +144,7 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
     let mut warnings: Vec<_> =
         designed.warnings.iter().map(|warning| line(file, warning)).collect();
     warnings.extend(slow_estimates::warning(file, nominal)?);
-    warnings.extend(references.iter().filter_map(beyond_limits));
-    warnings.extend(without_bounds);
+    warnings.extend(references.iter().filter_map(beyond_limits).chain(without_bounds));
     let (detection, of_detection) =
         detection.map(|section| (section.report, section.warnings)).unzip();
     warnings.extend(of_detection.into_iter().flatten());

@@ -135,12 +135,11 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let gains = with(&feedback.gain, &observer.gain);
     let problem =
         LawProblem { linear: &linear, extended: &extended, plant: &plant, gains: &gains, domain };
-    let designed_law =
+    let designed =
         problem.design(law).map_err(|reason| not_existing(file, law, &reason, &problem))?;
-    let observer =
-        if designed_law.keeps_error_dynamics() { observer } else { by_law(&designed_law) };
+    let observer = if designed.keeps_error_dynamics() { observer } else { by_law(&designed) };
     let required_error_dynamics = gains.error_dynamics(&plant);
-    let (gains, own_model) = (designed_law.gains.clone(), designed_law.a_f.clone());
+    let (gains, own_model) = (designed.gains.clone(), designed.a_f.clone());
     plant.a_f = own_model.unwrap_or(plant.a_f);
     let whole = DesignLoop::of(&linear, &plant, &gains, filter.as_deref(), domain)?;
     let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
@@ -166,7 +165,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
         domain,
         plant,
         gains,
-        law: designed_law,
+        law: designed,
         required_error_dynamics,
         feedback,
         observer,
