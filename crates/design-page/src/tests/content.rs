@@ -13,10 +13,14 @@ fn values(report: &Report) -> Vec<Value> {
     fn collect(value: Value, plain_values: &mut Vec<Value>) {
         match value {
             Value::Array(members) => {
-                members.into_iter().for_each(|member| collect(member, plain_values))
+                for member in members {
+                    collect(member, plain_values);
+                }
             }
             Value::Object(members) => {
-                members.into_iter().for_each(|(_, member)| collect(member, plain_values));
+                for (_, member) in members {
+                    collect(member, plain_values);
+                }
             }
             plain => plain_values.push(plain),
         }
