@@ -7,8 +7,6 @@ use crate::assess::reporting::Assessment;
 use crate::budget::TimeLimits;
 use crate::error::Error;
 use crate::plant::parameters::ParameterFamily;
-use crate::plant_file::PlantFile;
-use crate::plant_file::estimation::Law;
 use crate::progress::Steps;
 use crate::report::comparison::{Comparison, LawFigures, LawResult};
 use crate::report::identity::identity;
@@ -17,6 +15,8 @@ use crate::solve::designed::design_by;
 use crate::solve::law::LawProblem;
 use crate::solve::solution::Solution;
 use files::{Source, Table};
+use plant_file::PlantFile;
+use plant_file::estimation::Law;
 
 /// Designs the controller of the plant file at `path` with each law.
 ///

@@ -13,8 +13,6 @@ use fmu_description::unit::Unit;
 
 use crate::matrix::matrix;
 use crate::plant::linear::LinearPlant;
-use crate::plant_file::PlantFile;
-use crate::plant_file::signals::{EntryPoint, Signal as PlantSignal};
 use crate::report::number::round;
 use crate::solve::designed::Designed;
 use crate::solve::reconfiguration::{
@@ -23,6 +21,8 @@ use crate::solve::reconfiguration::{
 };
 use crate::solve::schedule::Scheduled;
 use crate::solve::solution::{Solution, fault_names};
+use plant_file::PlantFile;
+use plant_file::signals::{EntryPoint, Signal as PlantSignal};
 
 impl Designed {
     /// Returns the design file.

@@ -12,8 +12,8 @@ use files::{Source, Table};
 use crate::Error;
 use crate::assess::bandwidths;
 use crate::budget::{Budget, TimeLimits};
-use crate::plant_file::PlantFile;
 use draft::{Draft, Settings};
+use plant_file::PlantFile;
 
 /// Rates of a measurement filter, in 1/s, that are tried for a plant with direct feedthrough.
 const FILTERS: [f64; 4] = [10.0, 100.0, 1000.0, 1.0];

@@ -18,7 +18,6 @@ mod error;
 mod init;
 mod matrix;
 mod plant;
-mod plant_file;
 mod progress;
 mod solve;
 #[cfg(test)]

@@ -10,14 +10,14 @@ use crate::assess::reporting::{Assessment, report};
 use crate::assess::robustness::robustness;
 use crate::assess::verdict::verdict;
 use crate::budget::TimeLimits;
-use crate::plant_file::channel::Channel;
-use crate::plant_file::requirements::{Bandwidth, Region, Requirement};
-use crate::plant_file::signals::{EntryPoint, FaultDynamics};
-use crate::plant_file::{Model, PlantFile};
 use crate::report::Report;
 use crate::report::robustness::Level;
 use crate::solve::designed::{Designed, design};
 use files::{Source, Table};
+use plant_file::channel::Channel;
+use plant_file::requirements::{Bandwidth, Region, Requirement};
+use plant_file::signals::{EntryPoint, FaultDynamics};
+use plant_file::{Model, PlantFile};
 
 const MASS: &str = r#"A = [[0, 1], [0, 0]]
 B = [[0], [1]]
@@ -38,7 +38,11 @@ const REFUSALS: [(&str, &str, &str); 62] = [
     ("[0, 0]]", "[0, nan]]", "1:18: A[2][2]: expected a finite number, found nan"),
     ("[0], [1]", "[0], [1], [2]", "2:5: B: expected 2x1 (states x actuators), found 3x1"),
     ("[[1, 0]]", "[[1, 0, 0]]", "3:5: C: expected 1x2 (measurements x states), found 1x3"),
-    ("\"all\"", "\"both\"", "4:19: actuator_faults: expected a list of names or \"all\", found \"both\""),
+    (
+        "\"all\"",
+        "\"both\"",
+        "4:19: actuator_faults: expected a list of names or \"all\", found \"both\"",
+    ),
     ("observer", "obsever", "6:1: unknown entry `obsever`; did you mean `observer`?"),
     ("feedback", "something", "5:1: unknown entry `something`; expected one of description, "),
     (

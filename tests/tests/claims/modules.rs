@@ -176,9 +176,8 @@ fn no_modules_use_each_other_but_parent_and_child() {
 }
 
 /// The layers of crates/design, the earliest first. A module imports its own layer and earlier ones.
-const LAYERS: [&[&str]; 7] = [
+const LAYERS: [&[&str]; 6] = [
     &["budget", "error", "matrix", "progress", "threads"],
-    &["plant_file"],
     &["plant"],
     &["solve"],
     &["assess"],

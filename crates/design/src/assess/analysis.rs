@@ -9,9 +9,9 @@ use nalgebra::{DMatrix, RowDVector};
 use rayon::prelude::*;
 
 use crate::budget::Budget;
-use crate::plant_file::signals::Fault;
 use crate::report::{Bound, Frequency, Norm};
 use crate::solve::solution::Solution;
+use plant_file::signals::Fault;
 
 /// Relative width of the brackets of peak gains and norms.
 const WIDTH: f64 = 1e-3;

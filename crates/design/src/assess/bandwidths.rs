@@ -9,9 +9,9 @@ use crate::Error;
 use crate::assess::judged::Judged;
 use crate::budget::Budget;
 use crate::plant::linear::LinearPlant;
-use crate::plant_file::PlantFile;
-use crate::plant_file::requirements::{Bandwidth, Request, Requirement};
 use crate::solve::designed::design;
+use plant_file::PlantFile;
+use plant_file::requirements::{Bandwidth, Request, Requirement};
 
 /// Bandwidths of the feedback relative to the speed of the plant, with those of the observer relative to the feedback:
 /// the first that makes the verdict green is taken.

@@ -6,9 +6,9 @@ use control::theorem1::{certify, largest_decay, smallest_radius, ultimate_bound}
 
 use crate::budget::Budget;
 use crate::matrix::rows;
-use crate::plant_file::estimation::Law;
 use crate::report::{Certificate, FreeP, Norm, Theorem1, Ultimate};
 use crate::solve::solution::Solution;
+use plant_file::estimation::Law;
 
 /// The design parameter alpha of (12); it cancels in delta.
 const ALPHA: f64 = 1.0;

@@ -13,8 +13,6 @@ use nalgebra::DMatrix;
 
 use crate::matrix::rows;
 use crate::plant::parameters::ParameterFamily;
-use crate::plant_file::PlantFile;
-use crate::plant_file::detection::{DetectionRequest, Method};
 use crate::report::Matrix;
 use crate::report::detection::{
     DecoupledInput, DetectedFault, Detection as Report, ParameterCases, Test,
@@ -22,6 +20,8 @@ use crate::report::detection::{
 use crate::solve::designed::Designed;
 use decoupling::Decoupling;
 use model_error::{LargestMean, ModelErrors};
+use plant_file::PlantFile;
+use plant_file::detection::{DetectionRequest, Method};
 use prediction::{Prediction, TestKind};
 use problem::Problem;
 

@@ -9,10 +9,10 @@ use control::{Domain, Error, StateSpace};
 use rayon::prelude::*;
 
 use crate::assess::robustness::noise_peaks;
-use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::robustness::Robustness;
 use crate::report::{Estimation, EstimationErrors};
 use crate::solve::solution::Solution;
+use plant_file::robustness::RobustnessLimits;
 
 /// Relative width of the brackets of the peak gains.
 const WIDTH: f64 = 1e-3;

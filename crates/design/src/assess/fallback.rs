@@ -14,13 +14,13 @@ use crate::budget::Budget;
 use crate::matrix::rows;
 use crate::plant::linear::LinearPlant;
 use crate::plant::rest::{Rest, beyond_limits, commands};
-use crate::plant_file::PlantFile;
-use crate::plant_file::signals::Signal;
 use crate::report::fallback::{FallbackCase, FallbackReport};
 use crate::report::robustness::{Level, LoopPoint, Number};
 use crate::solve::fallback::{Cases, Fallback, SlowCase, remaining};
 use crate::solve::solution::Solution;
 use crate::solve::tracking::decay;
+use plant_file::PlantFile;
+use plant_file::signals::Signal;
 
 /// Number of losses between 0 and the largest one at which the decay rate is tested.
 const LOSSES: u32 = 10;

@@ -10,12 +10,12 @@ use crate::assess::robustness::{Margins, Physical, by_entries, margins};
 use crate::budget::Budget;
 use crate::matrix::rows;
 use crate::plant::linear::LinearPlant;
-use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::family::{CommonCertificate, FamilyReport, MemberMargins, MemberReport};
 use crate::report::robustness::{Level, Verdict};
 use crate::solve::designed::Designed;
 use crate::solve::family::{NOMINAL, name};
 use crate::solve::solution::Solution;
+use plant_file::robustness::RobustnessLimits;
 
 /// Returns the report on the family of `designed`, if it has one.
 pub(crate) fn family(

@@ -4,9 +4,9 @@ use std::cmp::Ordering;
 
 use crate::Error;
 use crate::assess::robustness::{Physical, by_entries, loop_points};
-use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::robustness::LoopPoint;
 use crate::solve::solution::Solution;
+use plant_file::robustness::RobustnessLimits;
 
 /// The peaks of S of a stable loop, and its stability within the tolerances.
 pub(crate) struct Judged {

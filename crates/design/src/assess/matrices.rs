@@ -3,9 +3,9 @@
 use control::Domain;
 use nalgebra::DMatrix;
 
-use crate::plant_file::signals::Signal;
 use crate::report::Matrix;
 use crate::solve::solution::{Solution, fault_names};
+use plant_file::signals::Signal;
 
 /// Returns the gains of a design.
 pub(crate) fn gains(designed: &Solution) -> Vec<Matrix> {

@@ -6,12 +6,12 @@ use rayon::prelude::*;
 use crate::assess::judged::Judged;
 use crate::assess::verdict::{instability, peak_reason};
 use crate::budget::Budget;
-use crate::plant_file::PlantFile;
-use crate::plant_file::requirements::{Bandwidth, Requirement};
-use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::number::rounded;
 use crate::report::robustness::{LoopPoint, Remedy, Robustness};
 use crate::solve::designed::design;
+use plant_file::PlantFile;
+use plant_file::requirements::{Bandwidth, Requirement};
+use plant_file::robustness::RobustnessLimits;
 
 /// Factors on the speed of a loop, between the slowest and the fastest one.
 const FACTORS: [f64; 8] = [SLOWEST, 0.4, 0.6, 0.8, 1.25, 1.7, 2.5, FASTEST];

@@ -33,9 +33,6 @@ use crate::matrix::pairs;
 use crate::plant::fixed_mode::shown;
 use crate::plant::parameters::ParameterFamily;
 use crate::plant::plausibility::line;
-use crate::plant_file::requirements::{self, Requirement};
-use crate::plant_file::signals::{self, EntryPoint, Fault, FaultDynamics};
-use crate::plant_file::{PlantFile, estimator};
 use crate::progress::{Step, Steps};
 use crate::report::number::rounded;
 use crate::report::reconfiguration::ReconfigurationReport;
@@ -46,6 +43,9 @@ use crate::solve::fallback::Fallback;
 use crate::solve::gain::GainResult;
 use crate::solve::solution::Solution;
 use crate::solve::tracking::{DesignLoop, TrackingAction};
+use plant_file::requirements::{self, Requirement};
+use plant_file::signals::{self, EntryPoint, Fault, FaultDynamics};
+use plant_file::{PlantFile, estimator};
 
 /// A design with all that its report is about.
 pub(crate) struct Assessment<'a> {

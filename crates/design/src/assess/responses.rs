@@ -7,10 +7,10 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::assess::analysis::Outputs;
-use crate::plant_file::signals::Fault;
 use crate::report::robustness::Number;
 use crate::report::{Curve, StepResponse};
 use crate::solve::solution::Solution;
+use plant_file::signals::Fault;
 
 /// Relative band of the settling time: a response has settled when it stays within this fraction of
 /// its largest distance.

@@ -23,14 +23,14 @@ use crate::budget::{Budget, TimeLimits};
 use crate::matrix::rows;
 use crate::plant::linear::LinearPlant;
 use crate::plant::parameters::ParameterFamily;
-use crate::plant_file::robustness::RobustnessLimits;
-use crate::plant_file::signals::Signal;
 use crate::progress::{Step, Steps};
 use crate::report::robustness::{
     Channel, Compared, Disk, LoopPoint, Number, PeakSensitivity, Robustness,
 };
 use crate::report::{Frequency, Matrix};
 use crate::solve::solution::Solution;
+use plant_file::robustness::RobustnessLimits;
+use plant_file::signals::Signal;
 
 const WIDTH: f64 = 1e-4;
 const POINTS_PER_DECADE: u32 = 20;

@@ -9,12 +9,12 @@ use crate::assess::family::{common, judge, member};
 use crate::assess::matrices::gains;
 use crate::budget::Budget;
 use crate::matrix::rows;
-use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::robustness::{Level, Verdict};
 use crate::report::schedule::{RateCertificate, SchedulePointReport, ScheduleReport};
 use crate::solve::designed::Designed;
 use crate::solve::schedule::{Scheduled, ScheduledLoop, coupled};
 use crate::solve::solution::Solution;
+use plant_file::robustness::RobustnessLimits;
 
 /// Values of the scheduling variable in each interval, its ends included, at which eigenvalues are
 /// computed, less 1.

@@ -4,10 +4,10 @@ use control::eigen::eigenvalues;
 use control::{Domain, Error};
 use nalgebra::Complex;
 
-use crate::plant_file::PlantFile;
-use crate::plant_file::requirements::Requirement;
 use crate::report::number::rounded;
 use crate::solve::solution::Solution;
+use plant_file::PlantFile;
+use plant_file::requirements::Requirement;
 
 /// An estimate that decays slower than this part of the slowest mode of the feedback is too slow for it.
 const SLOW: f64 = 0.05;

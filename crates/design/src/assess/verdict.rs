@@ -1,10 +1,10 @@
 //! Judges a design by its checks, its margins and its tolerances.
 
-use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::Check;
 use crate::report::robustness::{
     Level, Limits, LoopPoint, Remedy, Robustness, ToleranceResult, Verdict,
 };
+use plant_file::robustness::RobustnessLimits;
 
 /// Judges a design.
 pub(crate) fn verdict(

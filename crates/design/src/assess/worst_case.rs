@@ -4,12 +4,12 @@ use control::faults::FaultEntry;
 use nalgebra::DMatrix;
 use toml::{Table, Value};
 
-use crate::plant_file::detection::DisturbanceEntry;
-use crate::plant_file::{Model, PlantFile};
 use crate::report::Report;
 use crate::report::identity::identity;
 use crate::report::robustness::Parameter;
 use crate::solve::solution::Solution;
+use plant_file::detection::DisturbanceEntry;
+use plant_file::{Model, PlantFile};
 
 /// Returns the plant file with the matrices of the worst plant; a plant that is an FMU becomes one
 /// that matrices describe.

@@ -7,9 +7,9 @@ use files::PlaceError;
 use nalgebra::Complex;
 
 use crate::plant::linear::LinearPlant;
-use crate::plant_file::PlantFile;
-use crate::plant_file::requirements::{Bandwidth, Requirement};
 use crate::report::number::rounded;
+use plant_file::PlantFile;
+use plant_file::requirements::{Bandwidth, Requirement};
 
 /// Real parts above this part of the modulus count as positive.
 const RIGHT: f64 = 1e-9;

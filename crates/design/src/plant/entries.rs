@@ -3,7 +3,7 @@
 use control::StateSpace;
 use control::robustness::{PlantEntry, Tolerances};
 
-use crate::plant_file::robustness::RobustnessLimits;
+use plant_file::robustness::RobustnessLimits;
 
 /// Returns the tolerances that a plant file states: those of whole matrices for the entries that are not
 /// structural, and those of named entries.

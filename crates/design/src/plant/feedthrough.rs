@@ -7,8 +7,8 @@ use control::faults::FaultEntry;
 use files::PlaceError;
 
 use crate::plant::linear::LinearPlant;
-use crate::plant_file::PlantFile;
-use crate::plant_file::requirements::Requirement;
+use plant_file::PlantFile;
+use plant_file::requirements::Requirement;
 
 /// Refuses a plant with feedthrough and no filter, a filter that nothing needs, and tables that are for plants
 /// without feedthrough.

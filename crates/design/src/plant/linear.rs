@@ -7,10 +7,10 @@ use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
 
-use crate::plant_file::detection::{Disturbance, DisturbanceEntry};
-use crate::plant_file::signals::{EntryPoint, Fault, FaultDynamics, Signal};
-use crate::plant_file::{self, PlantFile};
 use files::PlaceError;
+use plant_file::PlantFile;
+use plant_file::detection::{Disturbance, DisturbanceEntry};
+use plant_file::signals::{EntryPoint, Fault, FaultDynamics, Signal};
 
 /// Relative distance from an equilibrium below which an operating point counts as an equilibrium.
 pub(crate) const AT_REST: f64 = 1e-6;

@@ -9,9 +9,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::plant::linear;
 use crate::plant::linear::significant;
-use crate::plant_file::parameters::{ParameterTolerance, Tolerance};
-use crate::plant_file::{PlantFile, PlantFmu};
 use crate::report::robustness::Parameter;
+use plant_file::parameters::{ParameterTolerance, Tolerance};
+use plant_file::{PlantFile, PlantFmu};
 
 /// Number of equal steps in which the worst direction is followed to the limits.
 const STEPS: u32 = 20;
@@ -38,7 +38,7 @@ impl<'a> ParameterFamily<'a> {
     /// The family that the plant file asks for, if it does.
     pub(crate) fn of(file: &'a PlantFile<'a>) -> Result<Option<Self>, crate::Error> {
         let tolerances = &file.robustness.parameters;
-        let crate::plant_file::Model::Fmu(table) = &file.model else {
+        let plant_file::Model::Fmu(table) = &file.model else {
             return Ok(None);
         };
         if tolerances.is_empty() {

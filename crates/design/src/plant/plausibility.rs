@@ -5,8 +5,8 @@ use files::PlaceError;
 use nalgebra::{DMatrix, DVector};
 
 use crate::plant::linear::LinearPlant;
-use crate::plant_file::{FAULTS, PlantFile};
 use control::faults::ExtendedPlant;
+use plant_file::{FAULTS, PlantFile};
 
 /// A column counts as a combination of others if they leave less than this of its length; rows and
 /// columns have length one.

@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::plant::fixed_mode::described;
 use crate::plant::linear::LinearPlant;
-use crate::plant_file::signals::Signal;
 use crate::report::robustness::Number;
+use plant_file::signals::Signal;
 
 /// The equilibrium without actuators.
 pub(crate) struct Rest {

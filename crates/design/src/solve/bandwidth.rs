@@ -5,10 +5,10 @@ use control::bandwidth::{ByBandwidth, NaturalUnits, filter, regulator};
 use control::{Domain, StateSpace};
 use nalgebra::DMatrix;
 
-use crate::plant_file::requirements::Bandwidth;
 use crate::report::number::rounded;
 use crate::solve::gain::{FeedbackProblem, GainResult, Refusal, unique};
 use crate::solve::norm_gains::ObserverProblem;
+use plant_file::requirements::Bandwidth;
 
 /// Integral action and the estimates of faults are slower than the loop by this factor.
 const SLOWER: f64 = 8.0;
@@ -21,7 +21,7 @@ impl FeedbackProblem<'_> {
         domain: Domain,
     ) -> Result<GainResult, Refusal> {
         let Self { a, b, c, states, .. } = *self;
-        let rate = bandwidth.rate()?;
+        let rate = self::rate(bandwidth)?;
         // The rows of the integrals are outputs of the plant, too.
         let integrals = a.view((states, 0), (a.nrows() - states, states)).into_owned();
         let outputs = stacked(&c.columns(0, states).into_owned(), &integrals);
@@ -35,7 +35,7 @@ impl FeedbackProblem<'_> {
         }
         let ByBandwidth { result, loop_gain, .. } =
             regulator(a, b, &q, &units.inputs, rate, domain)?;
-        let method = bandwidth.method("Linear-quadratic regulator", loop_gain, result.residual);
+        let method = method(bandwidth, "Linear-quadratic regulator", loop_gain, result.residual);
         Ok(unique(result.gain, method))
     }
 }
@@ -48,7 +48,7 @@ impl ObserverProblem<'_> {
         domain: Domain,
     ) -> Result<GainResult, Refusal> {
         let Self { a_0, c_0, b, channels, faults, estimator, .. } = *self;
-        let rate = bandwidth.rate()?;
+        let rate = self::rate(bandwidth)?;
         let (order, m) = (a_0.nrows(), b.ncols());
         let n = order - faults;
         let mut inputs = b.clone().resize(order, m + channels.len(), 0.0);
@@ -69,38 +69,36 @@ impl ObserverProblem<'_> {
         let ByBandwidth { result, loop_gain, .. } =
             filter(a_0, c_0, &((&w + w.transpose()) / 2.0), &units.outputs, rate, domain)?;
         let current = result.current_gain.filter(|_| estimator == Estimator::Current);
-        let method = bandwidth.method("Kalman filter", loop_gain, result.residual);
+        let method = method(bandwidth, "Kalman filter", loop_gain, result.residual);
         Ok(unique(current.unwrap_or(result.gain), method))
     }
 }
 
-impl Bandwidth {
-    fn rate(&self) -> Result<f64, Refusal> {
-        let open = || Refusal::Conflict("expected a bandwidth or another requirement".to_owned());
-        self.rate.ok_or_else(open)
-    }
+fn rate(bandwidth: &Bandwidth) -> Result<f64, Refusal> {
+    let open = || Refusal::Conflict("expected a bandwidth or another requirement".to_owned());
+    bandwidth.rate.ok_or_else(open)
+}
 
-    fn method(&self, name: &str, loop_gain: f64, residual: f64) -> String {
-        let rate = rounded(self.rate.unwrap_or_default());
-        let chosen = if self.is_stated {
-            ""
-        } else {
-            ", chosen by the verdict as the file states no requirement"
-        };
-        let reached = match loop_gain {
-            gain if gain > 1.1 => {
-                format!("; the unstable modes need more: the loop gain there is {gain:.3}")
-            }
-            gain if gain < 0.9 => {
-                format!("; no weight reaches it: the loop gain there is {gain:.3}")
-            }
-            _ => String::new(),
-        };
-        format!(
-            "{name} with a bandwidth of {rate} rad/s{chosen}{reached}; relative residual of the Riccati equation \
-             {residual:.1e}."
-        )
-    }
+fn method(bandwidth: &Bandwidth, name: &str, loop_gain: f64, residual: f64) -> String {
+    let rate = rounded(bandwidth.rate.unwrap_or_default());
+    let chosen = if bandwidth.is_stated {
+        ""
+    } else {
+        ", chosen by the verdict as the file states no requirement"
+    };
+    let reached = match loop_gain {
+        gain if gain > 1.1 => {
+            format!("; the unstable modes need more: the loop gain there is {gain:.3}")
+        }
+        gain if gain < 0.9 => {
+            format!("; no weight reaches it: the loop gain there is {gain:.3}")
+        }
+        _ => String::new(),
+    };
+    format!(
+        "{name} with a bandwidth of {rate} rad/s{chosen}{reached}; relative residual of the Riccati equation \
+         {residual:.1e}."
+    )
 }
 
 /// The plant from inputs to outputs, the first states of `a`.

@@ -2,12 +2,12 @@
 
 use files::PlaceError;
 
-use crate::plant_file::PlantFile;
-use crate::plant_file::estimation::Law;
 use crate::solve::family::Family;
 use crate::solve::schedule::Scheduled;
 use crate::solve::schedule::references::examine;
 use crate::solve::solution::{Solution, Solved, solve};
+use plant_file::PlantFile;
+use plant_file::estimation::Law;
 
 /// A designed controller.
 pub(crate) struct Designed {

@@ -17,12 +17,12 @@ use control::lmi::{self, CommonFeedback, Outcome, RegionCertificate, Vertex, cer
 use nalgebra::DMatrix;
 
 use crate::plant::rest::unreachable_mode;
-use crate::plant_file::PlantFile;
-use crate::plant_file::fallback::FallbackRequest;
-use crate::plant_file::requirements::Region;
 use crate::report::number::rounded;
 use crate::solve::solution::Solution;
 use crate::solve::tracking::decay;
+use plant_file::PlantFile;
+use plant_file::fallback::FallbackRequest;
+use plant_file::requirements::Region;
 
 /// Largest number of states of plant and controller for which linear matrix inequalities are solved.
 const LARGEST_ORDER: usize = 30;

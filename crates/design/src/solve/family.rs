@@ -6,13 +6,13 @@ use control::{Domain, Error};
 use files::PlaceError;
 
 use crate::plant::linear::{AT_REST, LinearPlant};
-use crate::plant_file::PlantFile;
-use crate::plant_file::references::References;
-use crate::plant_file::requirements::Region;
-use crate::plant_file::signals::Signal;
-use crate::plant_file::variants::Variant;
 use crate::solve::gain::{GainResult, Refusal, unique};
 use crate::solve::tracking::{check_member, feedback_pair};
+use plant_file::PlantFile;
+use plant_file::references::References;
+use plant_file::requirements::Region;
+use plant_file::signals::Signal;
+use plant_file::variants::Variant;
 
 /// The name of the plant of the file among the members.
 pub(crate) const NOMINAL: &str = "nominal";

@@ -1,13 +1,13 @@
 //! A gain with the method that found it, and why there is none.
 
-use control::lmi::{self, Outcome, Synthesis};
+use control::lmi::{Outcome, Synthesis};
 use control::placement::Quality;
 use control::rank::Mode;
 use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
-use crate::plant_file::requirements::Region;
 use crate::report::NormReport;
+use plant_file::requirements::Region;
 
 /// A gain and the method that found it.
 #[derive(Clone)]
@@ -124,32 +124,10 @@ impl GainResult {
     }
 }
 
-impl Region {
-    /// Checks that the eigenvalues of modes that no gain moves are in the region.
-    pub(crate) fn require(self, fixed: &[Mode], domain: Domain) -> Result<(), Refusal> {
-        match fixed.iter().find(|mode| !self.contains(mode.eigenvalue, domain)) {
-            Some(mode) => Err(Refusal::Fixed(mode.clone())),
-            None => Ok(()),
-        }
-    }
-
-    /// Whether an eigenvalue of the loop is in the region; for a sampled loop one in the z-plane.
-    pub(crate) fn contains(self, value: Complex<f64>, domain: Domain) -> bool {
-        let decay = self.decay.unwrap_or(0.0);
-        if let Domain::Sampled { period } = domain {
-            return value.norm() < (-decay * period).exp();
-        }
-        value.re < -decay
-            && self.disc.is_none_or(|(center, radius)| (value - center).norm() < radius)
-            && self.sector.is_none_or(|angle| value.im.atan2(-value.re).abs() < angle.to_radians())
-    }
-
-    /// Converts the region for the linear matrix inequalities; angles in rad.
-    pub(crate) fn stated(self) -> lmi::Region {
-        lmi::Region {
-            decay: self.decay,
-            disc: self.disc.map(|(center, radius)| lmi::Disc { center, radius }),
-            sector: self.sector.map(f64::to_radians),
-        }
+/// Checks that the eigenvalues of modes that no gain moves are in the region.
+pub(crate) fn require(region: Region, fixed: &[Mode], domain: Domain) -> Result<(), Refusal> {
+    match fixed.iter().find(|mode| !region.contains(mode.eigenvalue, domain)) {
+        Some(mode) => Err(Refusal::Fixed(mode.clone())),
+        None => Ok(()),
     }
 }

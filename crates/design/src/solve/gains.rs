@@ -11,9 +11,11 @@ use control::riccati::{Weights, kalman, lqr};
 use control::sampled::{estimator_alternatives, sampled_poles};
 use nalgebra::{Complex, DMatrix};
 
-use crate::plant_file::requirements::Requirement;
-use crate::solve::gain::{FeedbackProblem, GainChoice, GainResult, Refusal, synthesised, unique};
+use crate::solve::gain::{
+    FeedbackProblem, GainChoice, GainResult, Refusal, require, synthesised, unique,
+};
 use crate::solve::norm_gains::{NormRequirement, ObserverProblem};
+use plant_file::requirements::Requirement;
 
 const IN_REGION: &str = "Eigenvalues in the region by linear matrix inequalities";
 /// Relative distance within which a requested eigenvalue is that of a mode that no gain moves.
@@ -48,7 +50,7 @@ pub(crate) fn feedback(
         Requirement::Bandwidth(bandwidth) => problem.by_bandwidth(bandwidth, domain),
         Requirement::Region(region) => {
             let part = controllable_part(a, b)?;
-            region.require(&part.fixed, domain)?;
+            require(*region, &part.fixed, domain)?;
             let outcome = if part.fixed.is_empty() {
                 lmi::state_feedback(a, b, &region.stated(), None, domain)?
             } else {
@@ -58,7 +60,7 @@ pub(crate) fn feedback(
             Ok(if part.fixed.is_empty() { result } else { result.mapped(|gain| part.gain(gain)) })
         }
         Requirement::HInfinity { bound, region, channel } => {
-            region.require(&uncontrollable_modes(a, b)?, domain)?;
+            require(*region, &uncontrollable_modes(a, b)?, domain)?;
             let required = NormRequirement { bound: *bound, region: *region, channel };
             problem.by_norm(required, domain)
         }
@@ -109,7 +111,7 @@ pub(crate) fn observer(
         Requirement::Bandwidth(bandwidth) => problem.by_bandwidth(bandwidth, domain),
         Requirement::Region(region) => {
             let part = controllable_part(&a_dual, &b_dual)?;
-            region.require(&part.fixed, domain)?;
+            require(*region, &part.fixed, domain)?;
             if part.fixed.is_empty() {
                 let outcome = lmi::observer_gain(a_0, &output, &region.stated(), None, domain)?;
                 return synthesised(outcome, IN_REGION);
@@ -120,7 +122,7 @@ pub(crate) fn observer(
             Ok(result.mapped(|gain| part.gain(&gain.transpose()).transpose()))
         }
         Requirement::HInfinity { bound, region, channel } => {
-            region.require(&uncontrollable_modes(&a_dual, &b_dual)?, domain)?;
+            require(*region, &uncontrollable_modes(&a_dual, &b_dual)?, domain)?;
             let required = NormRequirement { bound: *bound, region: *region, channel };
             problem.by_norm(required, domain)
         }

@@ -14,11 +14,11 @@ use control::weight::{Weight, diagonal};
 use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
-use crate::plant_file::channel::{Channel, ChannelWeight};
-use crate::plant_file::requirements::Region;
 use crate::report::LowerBoundFor;
 use crate::solve::gain::{FeedbackProblem, GainResult, Refusal};
 use crate::solve::norm_gains::search::{LARGEST_ORDER, LowerBound, Search, WIDTH};
+use plant_file::channel::{Channel, ChannelWeight};
+use plant_file::requirements::Region;
 
 /// Ratio of the bounds between which the least norm of any filter is searched, and at which the search
 /// ends.

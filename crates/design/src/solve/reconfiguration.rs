@@ -13,10 +13,6 @@ use nalgebra::{DMatrix, DVector};
 use crate::matrix::{pairs, rows};
 use crate::plant::fixed_mode::described;
 use crate::plant::rest::{Rest, beyond_limits, commands, unreachable_mode};
-use crate::plant_file::PlantFile;
-use crate::plant_file::reconfiguration::ReconfigurationRequest;
-use crate::plant_file::requirements::Requirement;
-use crate::plant_file::signals::{EntryPoint, Signal};
 use crate::report::reconfiguration::{
     ReconfigurationReport, Reconfigured, ServedByFallback, WithoutActuator, WithoutSeveral,
 };
@@ -25,6 +21,10 @@ use crate::solve::gain::{FeedbackProblem, GainChoice, Refusal};
 use crate::solve::gains::feedback;
 use crate::solve::solution::Solution;
 use crate::solve::tracking::decay;
+use plant_file::PlantFile;
+use plant_file::reconfiguration::ReconfigurationRequest;
+use plant_file::requirements::Requirement;
+use plant_file::signals::{EntryPoint, Signal};
 
 /// Relative size of the effect that the other actuators cannot produce below which the allocation counts
 /// as exact.

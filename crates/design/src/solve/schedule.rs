@@ -13,12 +13,12 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 use crate::plant::linear::LinearPlant;
-use crate::plant_file::PlantFile;
-use crate::plant_file::estimation::Law;
-use crate::plant_file::signals::Signal;
-use crate::plant_file::variants::Variable;
 use crate::solve::family::check_states;
 use crate::solve::solution::{Solution, solve};
+use plant_file::PlantFile;
+use plant_file::estimation::Law;
+use plant_file::signals::Signal;
+use plant_file::variants::Variable;
 
 /// Degree of the loop of interpolated plant and controller in the scheduling variable: `B_p` K L `C_p` of a
 /// current estimator. The loop of a continuous controller has degree 2, with a direct term 4; its coefficients of

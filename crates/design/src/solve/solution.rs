@@ -4,9 +4,6 @@ use crate::plant::fixed_mode::{described, described_in};
 use crate::plant::linear::LinearPlant;
 use crate::plant::plausibility::{check_faults, check_limits};
 use crate::plant::{attainable, feedthrough};
-use crate::plant_file::estimation::Law;
-use crate::plant_file::requirements::{Request, Requirement};
-use crate::plant_file::{FAULTS, PlantFile};
 use crate::solve::family::{self, Family, Member, common_feedback};
 use crate::solve::gain::{FeedbackProblem, GainResult, Refusal, unique};
 use crate::solve::gains::{feedback, observer};
@@ -28,6 +25,9 @@ use control::stability::{instability, is_clearly_stable};
 use control::{Domain, Error};
 use files::PlaceError;
 use nalgebra::DMatrix;
+use plant_file::estimation::Law;
+use plant_file::requirements::{Request, Requirement};
+use plant_file::{FAULTS, PlantFile};
 
 /// The controller of one plant, with the intermediate results.
 pub(crate) struct Solution {

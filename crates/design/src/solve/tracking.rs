@@ -14,11 +14,11 @@ use files::PlaceError;
 use nalgebra::DMatrix;
 
 use crate::plant::linear::LinearPlant;
-use crate::plant_file::PlantFile;
-use crate::plant_file::references::References;
-use crate::plant_file::requirements::Requirement;
-use crate::plant_file::signals::Signal;
-use crate::plant_file::variants::Variant;
+use plant_file::PlantFile;
+use plant_file::references::References;
+use plant_file::requirements::Requirement;
+use plant_file::signals::Signal;
+use plant_file::variants::Variant;
 
 /// Relative error of a constant reference below which it counts as reached.
 pub(crate) const REACHED: f64 = 1e-9;
@@ -191,7 +191,7 @@ impl TrackingProblem<'_> {
             let k = beside(&k_x, &integral.gain);
             let feedforward = references.feedforward.then(|| {
                 let gain = integral_feedforward(a, b, &output, &k, domain).map_err(refuse)?;
-                gain.map_err(|reason| references.without_feedforward(file, reason))
+                gain.map_err(|reason| without_feedforward(references, file, reason))
             });
             TrackingAction::Integral {
                 windup: ranges.iter().any(Option::is_some).then_some(windup),
@@ -221,15 +221,13 @@ fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
     all
 }
 
-impl References {
-    /// The refusal of a feedforward beside integrals.
-    fn without_feedforward(&self, file: &PlantFile<'_>, reason: &str) -> PlaceError {
-        let message = format!(
-            "no feedforward beside the integrals leaves the slowest modes of the feedback at rest: \
-             {reason}; or `feedforward = false`"
-        );
-        file.error_at(&self.action_places[1], message)
-    }
+/// The refusal of a feedforward beside integrals.
+fn without_feedforward(references: &References, file: &PlantFile<'_>, reason: &str) -> PlaceError {
+    let message = format!(
+        "no feedforward beside the integrals leaves the slowest modes of the feedback at rest: \
+         {reason}; or `feedforward = false`"
+    );
+    file.error_at(&references.action_places[1], message)
 }
 
 impl Tracking {

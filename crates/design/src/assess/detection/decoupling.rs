@@ -8,7 +8,7 @@ use crate::assess::detection::largest;
 use crate::assess::detection::prediction::whole;
 use crate::assess::detection::problem::Problem;
 use crate::plant::fixed_mode::shown;
-use crate::plant_file::PlantFile;
+use plant_file::PlantFile;
 
 /// Time constants of the slowest mode after which a mean has settled.
 const SETTLED: f64 = 15.0;

@@ -16,11 +16,11 @@ use crate::assess::detection::problem::Problem;
 use crate::plant::entries::tolerances;
 use crate::plant::linear::LinearPlant;
 use crate::plant::parameters::ParameterFamily;
-use crate::plant_file::PlantFile;
-use crate::plant_file::detection::ModelError;
-use crate::plant_file::robustness::RobustnessLimits;
-use crate::plant_file::signals::Signal;
 use crate::solve::designed::Designed;
+use plant_file::PlantFile;
+use plant_file::detection::ModelError;
+use plant_file::robustness::RobustnessLimits;
+use plant_file::signals::Signal;
 
 /// A plant, and the bounds of its inputs.
 type Case = Rc<(UncertainPlant, DVector<f64>)>;

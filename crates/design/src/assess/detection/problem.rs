@@ -7,10 +7,10 @@ use control::hold::zero_order_hold;
 use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
-use crate::plant_file::PlantFile;
-use crate::plant_file::detection::DetectionRequest;
 use crate::report::number::round;
 use crate::solve::solution::Solution;
+use plant_file::PlantFile;
+use plant_file::detection::DetectionRequest;
 
 /// The process noise that is chosen makes the filter no faster than this part of what it can.
 const NEARLY: f64 = 0.99;

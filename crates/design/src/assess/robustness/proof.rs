@@ -5,8 +5,8 @@ use control::robustness::{EntryFamily, ProvenTolerance, Unproven, proven_toleran
 use crate::assess::robustness::Physical;
 use crate::budget::Budget;
 use crate::plant::entries::tolerances;
-use crate::plant_file::robustness::RobustnessLimits;
 use crate::report::robustness::{ToleranceProof, ToleranceResult};
+use plant_file::robustness::RobustnessLimits;
 
 /// The largest multiple of the tolerances that is examined, as for the worst case.
 const MOST: f64 = 16.0;

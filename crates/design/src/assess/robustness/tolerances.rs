@@ -10,10 +10,10 @@ use crate::assess::robustness::{Physical, names};
 use crate::matrix::rows;
 use crate::plant::entries::tolerances;
 use crate::plant::parameters::ParameterFamily;
-use crate::plant_file::robustness::{MATRICES, RobustnessLimits};
 use crate::report::Matrix;
 use crate::report::robustness::{ToleranceResult, VaryingEntries};
 use crate::solve::solution::Solution;
+use plant_file::robustness::{MATRICES, RobustnessLimits};
 
 /// Examines the loop for plants whose matrices have other entries, within the tolerances: the part of the
 /// random cases that stays stable, and the worst case found.

@@ -6,11 +6,11 @@ use control::response::h_infinity;
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-use crate::plant_file::channel::Channel;
-use crate::plant_file::requirements::Region;
 use crate::report::{LowerBoundFor, NormReport, NormWeight};
 use crate::solve::gain::{GainResult, Refusal, synthesised, unique};
 use crate::solve::norm_gains::NormRequirement;
+use plant_file::channel::Channel;
+use plant_file::requirements::Region;
 
 /// Relative width of a norm.
 pub(crate) const WIDTH: f64 = 1e-4;

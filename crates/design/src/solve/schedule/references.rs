@@ -5,11 +5,11 @@ use control::{Domain, Error};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
-use crate::plant_file::PlantFile;
-use crate::plant_file::references::References;
 use crate::solve::schedule::{Point, Scheduled};
 use crate::solve::solution::Solution;
 use crate::solve::tracking::REACHED;
+use plant_file::PlantFile;
+use plant_file::references::References;
 
 /// Values of the scheduling variable in each interval, besides its ends.
 const CHECKED: u32 = 19;

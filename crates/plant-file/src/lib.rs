@@ -1,92 +1,115 @@
 //! Reads a plant file: the plant, its faults and the requirements on the controller.
+#![forbid(unsafe_code)]
 
-use crate::plant_file::names::check_names;
-pub(crate) mod channel;
-pub(crate) mod detection;
-pub(crate) mod estimation;
-pub(crate) mod fallback;
+pub mod channel;
+pub mod detection;
+pub mod estimation;
+pub mod fallback;
+mod matrix;
 mod names;
-pub(crate) mod parameters;
-pub(crate) mod reconfiguration;
-pub(crate) mod references;
-pub(crate) mod requirements;
-pub(crate) mod robustness;
+pub mod parameters;
+pub mod reconfiguration;
+pub mod references;
+pub mod requirements;
+pub mod robustness;
 mod sampled_matrices;
-pub(crate) mod signals;
-pub(crate) mod variants;
+pub mod signals;
+pub mod variants;
 
-use crate::matrix::MatrixEntry as _;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
 
-use crate::plant_file::channel::ChannelSignals;
-use crate::plant_file::detection::{DetectionRequest, Disturbance, disturbances};
-use crate::plant_file::estimation::EstimationRequest;
-use crate::plant_file::fallback::FallbackRequest;
-use crate::plant_file::reconfiguration::{ReconfigurationRequest, positions};
-use crate::plant_file::references::References;
-use crate::plant_file::requirements::{Request, request};
-use crate::plant_file::robustness::RobustnessLimits;
-use crate::plant_file::sampled_matrices::SampledMatrices;
-use crate::plant_file::signals::{
+use crate::channel::ChannelSignals;
+use crate::detection::{DetectionRequest, Disturbance, disturbances};
+use crate::estimation::EstimationRequest;
+use crate::fallback::FallbackRequest;
+use crate::matrix::MatrixEntry as _;
+use crate::names::check_names;
+use crate::reconfiguration::{ReconfigurationRequest, positions};
+use crate::references::References;
+use crate::requirements::{Request, request};
+use crate::robustness::RobustnessLimits;
+use crate::sampled_matrices::SampledMatrices;
+use crate::signals::{
     EntryPoint, Fault, Role, Signal, actuator_faults, description, faults, signals,
 };
-use crate::plant_file::variants::{Schedule, Variant, check_action};
+use crate::variants::{Schedule, Variant, check_action};
 use control::Domain;
 use control::aso::Estimator;
 use files::{Entry, Place, PlaceError, Source, Table};
 
 /// A plant file whose entries are valid and consistent.
 #[derive(Clone)]
-pub(crate) struct PlantFile<'a> {
+pub struct PlantFile<'a> {
     source: &'a Source,
     /// The places of entries, for errors of later steps.
     places: BTreeMap<&'static str, Place>,
-    pub(crate) description: Option<String>,
+    /// What the controller is, in a sentence of the user.
+    pub description: Option<String>,
     /// Start time of the compensation, s.
-    pub(crate) t_on: f64,
+    pub t_on: f64,
     /// Whether the faults are also estimated before the compensation starts.
-    pub(crate) monitor: bool,
-    pub(crate) model: Model,
-    pub(crate) actuators: Vec<Signal>,
-    pub(crate) measurements: Vec<Signal>,
-    pub(crate) faults: Vec<Fault>,
+    pub monitor: bool,
+    /// The plant.
+    pub model: Model,
+    /// The commands.
+    pub actuators: Vec<Signal>,
+    /// The measurements.
+    pub measurements: Vec<Signal>,
+    /// The faults that are estimated.
+    pub faults: Vec<Fault>,
     /// Set points of measurements.
-    pub(crate) references: Option<References>,
-    pub(crate) sampling: Option<Sampling>,
+    pub references: Option<References>,
+    /// The sampling of the controller; none in continuous time.
+    pub sampling: Option<Sampling>,
     /// Rates of the measurement filter, 1/s, one per measurement.
-    pub(crate) filter: Option<Vec<f64>>,
-    pub(crate) feedback: Request,
-    pub(crate) observer: Request,
-    pub(crate) estimation: EstimationRequest,
-    pub(crate) stop_time: Option<f64>,
-    pub(crate) step_size: Option<f64>,
-    pub(crate) robustness: RobustnessLimits,
+    pub filter: Option<Vec<f64>>,
+    /// The requirement on the state feedback.
+    pub feedback: Request,
+    /// The requirement on the observer.
+    pub observer: Request,
+    /// The law that estimates the faults.
+    pub estimation: EstimationRequest,
+    /// End of the default experiment, s.
+    pub stop_time: Option<f64>,
+    /// Communication step of the default experiment, s.
+    pub step_size: Option<f64>,
+    /// Limits of the verdict, and the tolerances.
+    pub robustness: RobustnessLimits,
     /// Plants that the same gains serve, besides the one of the file.
-    pub(crate) family: Vec<Variant>,
-    pub(crate) schedule: Option<Schedule>,
+    pub family: Vec<Variant>,
+    /// The points of operation between which gains are interpolated.
+    pub schedule: Option<Schedule>,
     /// Whether the plant is a point of the schedule of another file.
-    pub(crate) is_point: bool,
-    pub(crate) disturbances: Vec<Disturbance>,
-    pub(crate) detection: Option<DetectionRequest>,
+    pub is_point: bool,
+    /// What acts on the plant and is not estimated.
+    pub disturbances: Vec<Disturbance>,
+    /// The detection of faults.
+    pub detection: Option<DetectionRequest>,
     /// What the controller must be able to do without an actuator.
-    pub(crate) reconfiguration: Option<ReconfigurationRequest>,
+    pub reconfiguration: Option<ReconfigurationRequest>,
     /// What one feedback must be able to do without knowing which actuator has failed.
-    pub(crate) fallback: Option<FallbackRequest>,
+    pub fallback: Option<FallbackRequest>,
 }
 
 /// The source of the plant's matrices.
 #[derive(Clone)]
-pub(crate) enum Model {
+pub enum Model {
     /// The file states the matrices.
     Matrices {
+        /// A, n x n.
         a: DMatrix<f64>,
+        /// B, n x m.
         b: DMatrix<f64>,
+        /// C, p x n.
         c: DMatrix<f64>,
+        /// D, p x m.
         d: DMatrix<f64>,
+        /// F_a, n x q, of the faults by column.
         f_a: Option<DMatrix<f64>>,
+        /// The states.
         states: Vec<Signal>,
         /// The sampled matrices of the file, of which `a`, `b` and `f_a` are the continuous plant.
         sampled: Option<Box<SampledMatrices>>,
@@ -97,25 +120,26 @@ pub(crate) enum Model {
 
 /// The FMU of a plant and its operating point.
 #[derive(Clone)]
-pub(crate) struct PlantFmu {
-    pub(crate) path: PathBuf,
+pub struct PlantFmu {
+    /// The file of the FMU.
+    pub path: PathBuf,
     /// Values of variables at the operating point.
-    pub(crate) operating_point: Vec<(String, f64)>,
+    pub operating_point: Vec<(String, f64)>,
     /// Names of the states, for an FMU whose description does not list them.
-    pub(crate) states: Vec<String>,
+    pub states: Vec<String>,
     /// Shared libraries to load before the FMU.
-    pub(crate) preload: Vec<String>,
+    pub preload: Vec<String>,
     /// Communication step, s, of an FMU that is linearised by steps.
-    pub(crate) step: Option<f64>,
+    pub step: Option<f64>,
 }
 
 /// The sampling of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Sampling {
+pub struct Sampling {
     /// Sample time, s.
-    pub(crate) period: f64,
+    pub period: f64,
     /// Whether the command uses the newest measurement (current estimator), or only earlier ones.
-    pub(crate) current: bool,
+    pub current: bool,
 }
 
 const KEYS: [&str; 33] = [
@@ -181,11 +205,15 @@ const PLACES: [&str; 23] = [
 ];
 
 /// The entries that errors about faults point at.
-pub(crate) const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
+pub const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
 
 impl<'a> PlantFile<'a> {
     /// Reads and checks the file.
-    pub(crate) fn read(source: &'a Source, file: &Table<'a>) -> Result<Self, PlaceError> {
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
+    pub fn read(source: &'a Source, file: &Table<'a>) -> Result<Self, PlaceError> {
         file.allow(&KEYS)?;
         let place = |key: &&'static str| Some((*key, file.get(key)?.place));
         let sampling = sampling(file)?;
@@ -257,12 +285,14 @@ impl<'a> PlantFile<'a> {
     }
 
     /// Returns the file name without its folder.
-    pub(crate) fn name(&self) -> String {
+    #[must_use]
+    pub fn name(&self) -> String {
         self.source.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
     /// Returns the path of the plant's FMU, if the plant is one.
-    pub(crate) fn fmu(&self) -> Option<&Path> {
+    #[must_use]
+    pub fn fmu(&self) -> Option<&Path> {
         match &self.model {
             Model::Fmu(fmu) => Some(&fmu.path),
             Model::Matrices { .. } => None,
@@ -270,7 +300,7 @@ impl<'a> PlantFile<'a> {
     }
 
     /// Returns the states that the file states, the actuators and the measurements.
-    pub(crate) fn signals(&self) -> impl Iterator<Item = &Signal> {
+    pub fn signals(&self) -> impl Iterator<Item = &Signal> {
         let states: &[Signal] = match &self.model {
             Model::Matrices { states, .. } => states,
             Model::Fmu(_) => &[],
@@ -279,23 +309,25 @@ impl<'a> PlantFile<'a> {
     }
 
     /// Returns the text of the file.
-    pub(crate) fn text(&self) -> &str {
+    #[must_use]
+    pub fn text(&self) -> &str {
         self.source.text()
     }
 
     /// Returns an error at the first of `keys` that the file has, otherwise at its first line.
-    pub(crate) fn error(&self, keys: &[&str], message: impl Into<String>) -> PlaceError {
+    pub fn error(&self, keys: &[&str], message: impl Into<String>) -> PlaceError {
         let place = keys.iter().find_map(|key| self.places.get(key)).cloned().unwrap_or(0..0);
         self.source.error(&place, message)
     }
 
     /// Returns an error at `place`.
-    pub(crate) fn error_at(&self, place: &Place, message: impl Into<String>) -> PlaceError {
+    pub fn error_at(&self, place: &Place, message: impl Into<String>) -> PlaceError {
         self.source.error(place, message)
     }
 
     /// Whether a measurement has a range or a longest time of a hold.
-    pub(crate) fn checks_measurements(&self) -> bool {
+    #[must_use]
+    pub fn checks_measurements(&self) -> bool {
         let mut all = self.measurements.iter();
         all.any(|signal| signal.limits.is_some() || signal.longest_hold.is_some())
     }
@@ -525,14 +557,15 @@ fn sampling(file: &Table<'_>) -> Result<Option<Sampling>, PlaceError> {
 }
 
 /// Returns the name of an estimator in the plant file.
-pub(crate) fn estimator(estimator: Estimator) -> &'static str {
+#[must_use]
+pub fn estimator(estimator: Estimator) -> &'static str {
     match estimator {
         Estimator::Current => "current",
         Estimator::Prediction => "prediction",
     }
 }
 
-/// Reads the rates of the measurement filter, which sensor faults require; [`crate::plant::feedthrough`] examines whether
+/// Reads the rates of the measurement filter, which sensor faults require; the design examines whether
 /// anything else does.
 fn filter(
     file: &Table<'_>,
@@ -565,3 +598,7 @@ fn filter(
         }
     }
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

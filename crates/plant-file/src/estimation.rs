@@ -4,24 +4,47 @@ use files::{Entry, Place, PlaceError, Table};
 
 /// A law with the parameters that the file states; the others follow from plant and observer.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Law {
+pub enum Law {
+    /// The augmented state observer of the paper.
     Augmented,
-    ProportionalIntegral { proportional: Option<f64> },
-    FastAdaptive { sigma: Option<f64>, gamma: Option<Vec<f64>> },
-    SlidingMode { rho: Option<Vec<f64>>, delta: Option<Vec<f64>> },
-    Learning { kept: Option<f64> },
+    /// A proportional and an integral part.
+    ProportionalIntegral {
+        /// The proportional part relative to the default.
+        proportional: Option<f64>,
+    },
+    /// Fast adaptive estimation.
+    FastAdaptive {
+        /// The weight of the rate of the error, s.
+        sigma: Option<f64>,
+        /// The learning rates, one for each fault.
+        gamma: Option<Vec<f64>>,
+    },
+    /// A bounded injection.
+    SlidingMode {
+        /// The largest estimates, one for each fault.
+        rho: Option<Vec<f64>>,
+        /// The half-widths of the boundary layers, one for each fault.
+        delta: Option<Vec<f64>>,
+    },
+    /// Iterative learning.
+    Learning {
+        /// The part of the last estimate that remains.
+        kept: Option<f64>,
+    },
 }
 
 /// The requested law and its place in the file.
 #[derive(Clone, Debug)]
-pub(crate) struct EstimationRequest {
-    pub(crate) law: Law,
-    pub(crate) place: Place,
+pub struct EstimationRequest {
+    /// The law.
+    pub law: Law,
+    /// Where the file states it.
+    pub place: Place,
 }
 
 impl Law {
     /// All laws, without stated parameters.
-    pub(crate) const ALL: [Self; 5] = [
+    pub const ALL: [Self; 5] = [
         Self::Augmented,
         Self::ProportionalIntegral { proportional: None },
         Self::FastAdaptive { sigma: None, gamma: None },
@@ -30,7 +53,8 @@ impl Law {
     ];
 
     /// The name in the plant file.
-    pub(crate) fn name(&self) -> &'static str {
+    #[must_use]
+    pub fn name(&self) -> &'static str {
         match self {
             Self::Augmented => "augmented",
             Self::ProportionalIntegral { .. } => "proportional-integral",
@@ -52,7 +76,8 @@ impl Law {
     }
 
     /// The authors of the law.
-    pub(crate) fn sources(&self) -> &'static str {
+    #[must_use]
+    pub fn sources(&self) -> &'static str {
         match self {
             Self::Augmented => "Patton and Klinkhieo (2009), (4), (5)",
             Self::ProportionalIntegral { .. } => {
@@ -65,7 +90,8 @@ impl Law {
     }
 
     /// The equations of the law, for a sampled controller or one in continuous time.
-    pub(crate) fn equations(&self, sampled: bool) -> &'static [&'static str] {
+    #[must_use]
+    pub fn equations(&self, sampled: bool) -> &'static [&'static str] {
         match (self, sampled) {
             (Self::Augmented, false) => &["f_hat' = A_f f_hat + L_f (y - C x_hat)"],
             (Self::Augmented, true) => &["f_hat[k+1] = A_f (f_hat[k] + L_f (y[k] - C x_hat[k]))"],
@@ -98,7 +124,8 @@ impl Law {
 
 impl Law {
     /// Whether a plant file with this law may have the table `key`.
-    pub(crate) fn allows(&self, key: &str) -> bool {
+    #[must_use]
+    pub fn allows(&self, key: &str) -> bool {
         match self {
             Self::Augmented => true,
             // Stability between the points is that of linear equations, which a sliding-mode law does not have.
@@ -112,7 +139,11 @@ impl Law {
 
 impl EstimationRequest {
     /// Reads the table; without it the law is the augmented observer. `faults`: their number.
-    pub(crate) fn read(file: &Table<'_>, faults: usize) -> Result<Self, PlaceError> {
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
+    pub fn read(file: &Table<'_>, faults: usize) -> Result<Self, PlaceError> {
         let Some(entry) = file.get("estimation") else {
             return Ok(Self { law: Law::Augmented, place: file.place.clone() });
         };

@@ -7,38 +7,46 @@ use files::{Entry, Place, PlaceError, Table};
 
 /// A state, an actuator or a measurement.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Signal {
-    pub(crate) name: String,
-    pub(crate) unit: Option<String>,
-    pub(crate) description: String,
+pub struct Signal {
+    /// Its name.
+    pub name: String,
+    /// Its unit, as FMI writes it.
+    pub unit: Option<String>,
+    /// What it is, for a reader.
+    pub description: String,
     /// The value at the operating point, if stated.
-    pub(crate) operating: Option<f64>,
+    pub operating: Option<f64>,
     /// The limits of an actuator, the range of a measurement: smallest and largest value.
-    pub(crate) limits: Option<[f64; 2]>,
+    pub limits: Option<[f64; 2]>,
     /// The longest time in s for which the last value of a measurement may replace it.
-    pub(crate) longest_hold: Option<f64>,
+    pub longest_hold: Option<f64>,
     /// The places of name, limits or range, and longest time of a hold, if the file states them.
-    pub(crate) places: [Option<Place>; 3],
+    pub places: [Option<Place>; 3],
 }
 
 /// What a signal is, which decides what may be stated about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Role {
+pub enum Role {
+    /// A state.
     State,
+    /// A command.
     Actuator,
+    /// A measurement.
     Measurement,
 }
 
 impl Signal {
     /// Creates a signal with a name only.
-    pub(crate) fn named(name: String) -> Self {
+    #[must_use]
+    pub fn named(name: String) -> Self {
         let (unit, operating, limits, longest_hold) = (None, None, None, None);
         let (description, places) = (String::new(), [None, None, None]);
         Self { name, unit, description, operating, limits, longest_hold, places }
     }
 
     /// Fills missing fields from `other`.
-    pub(crate) fn or(self, other: Self) -> Self {
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
         Self {
             unit: self.unit.or(other.unit),
             operating: self.operating.or(other.operating),
@@ -49,7 +57,7 @@ impl Signal {
 
 /// The assumed dynamics of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum FaultDynamics {
+pub enum FaultDynamics {
     /// f' = 0.
     Constant,
     /// f'' = 0.
@@ -58,7 +66,7 @@ pub(crate) enum FaultDynamics {
 
 /// The point where a fault enters the plant.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum EntryPoint {
+pub enum EntryPoint {
     /// Column of F_a, from 0.
     Column(usize),
     /// An actuator, from 0: the fault is added to its command.
@@ -67,28 +75,39 @@ pub(crate) enum EntryPoint {
     Sensor(usize),
     /// An actuator, from 0, that loses a fraction of its command. The fraction is estimated while
     /// the command is well above `least_command`.
-    Loss { actuator: usize, least_command: f64 },
+    Loss {
+        /// The actuator, from 0.
+        actuator: usize,
+        /// The command, in its unit, below which no loss is estimated.
+        least_command: f64,
+    },
     /// An input of the plant's FMU.
     Input(String),
 }
 
 /// A fault.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Fault {
-    pub(crate) name: String,
-    pub(crate) unit: Option<String>,
-    pub(crate) description: String,
-    pub(crate) dynamics: FaultDynamics,
-    pub(crate) entry_point: EntryPoint,
+pub struct Fault {
+    /// Its name.
+    pub name: String,
+    /// Its unit, as FMI writes it.
+    pub unit: Option<String>,
+    /// What it is, for a reader.
+    pub description: String,
+    /// Its assumed dynamics.
+    pub dynamics: FaultDynamics,
+    /// Where it enters the plant.
+    pub entry_point: EntryPoint,
     /// Largest absolute value.
-    pub(crate) bound: Option<f64>,
+    pub bound: Option<f64>,
     /// Largest absolute rate, per s.
-    pub(crate) rate_bound: Option<f64>,
+    pub rate_bound: Option<f64>,
     /// Largest step change.
-    pub(crate) step: Option<f64>,
+    pub step: Option<f64>,
     /// The largest fraction of a loss of effectiveness for which the loop must be stable.
-    pub(crate) up_to: Option<f64>,
-    pub(crate) place: Place,
+    pub up_to: Option<f64>,
+    /// Where the file states it.
+    pub place: Place,
 }
 
 /// Largest number of actuators with a stated loss.
@@ -114,7 +133,11 @@ const FAULT: [&str; 13] = [
 ];
 
 /// Reads the signals under `key`: texts (names) or tables.
-pub(crate) fn signals(entry: &Entry<'_>, role: Role) -> Result<Vec<Signal>, PlaceError> {
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn signals(entry: &Entry<'_>, role: Role) -> Result<Vec<Signal>, PlaceError> {
     let members = entry.list()?;
     if members.is_empty() {
         return Err(entry.error("expected at least one"));
@@ -160,7 +183,11 @@ fn signal(entry: &Entry<'_>, role: Role) -> Result<Signal, PlaceError> {
 }
 
 /// Reads a name of one line.
-pub(crate) fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
     match entry.text()? {
         "" => Err(entry.error("expected a name, found an empty text")),
         name => match name.chars().find(|sign| sign.is_control() || !is_character(*sign)) {
@@ -173,7 +200,11 @@ pub(crate) fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
 }
 
 /// Reads the entry `description`, in which XML allows all characters.
-pub(crate) fn description(table: &Table<'_>) -> Result<String, PlaceError> {
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn description(table: &Table<'_>) -> Result<String, PlaceError> {
     let Some(entry) = table.get("description") else {
         return Ok(String::new());
     };
@@ -187,7 +218,12 @@ pub(crate) fn description(table: &Table<'_>) -> Result<String, PlaceError> {
     }
 }
 
-pub(crate) fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
+/// Reads the entry `unit`, which has to be a unit of FMI.
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
     let Some(entry) = table.get("unit") else {
         return Ok(None);
     };
@@ -210,7 +246,11 @@ fn limits(entry: &Entry<'_>) -> Result<[f64; 2], PlaceError> {
 
 /// Reads the faults under `[[faults]]`. Faults without an entry point take the columns of F_a in
 /// turn.
-pub(crate) fn faults(
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn faults(
     entry: &Entry<'_>,
     actuators: &[Signal],
     measurements: &[Signal],
@@ -330,11 +370,11 @@ fn up_to(table: &Table<'_>) -> Result<Option<f64>, PlaceError> {
 }
 
 /// Returns the index of the signal that the entry names.
-pub(crate) fn position(
-    entry: &Entry<'_>,
-    signals: &[Signal],
-    what: &str,
-) -> Result<usize, PlaceError> {
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn position(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<usize, PlaceError> {
     let text = entry.text()?;
     signals.iter().position(|signal| signal.name == text).ok_or_else(|| {
         let names: Vec<_> = signals.iter().map(|signal| signal.name.as_str()).collect();
@@ -343,11 +383,8 @@ pub(crate) fn position(
 }
 
 /// Returns one additive fault for each actuator at `positions`.
-pub(crate) fn actuator_faults(
-    actuators: &[Signal],
-    positions: &[usize],
-    place: &Place,
-) -> Vec<Fault> {
+#[must_use]
+pub fn actuator_faults(actuators: &[Signal], positions: &[usize], place: &Place) -> Vec<Fault> {
     let fault = |&at: &usize| Fault {
         name: format!("f_{}", actuators[at].name),
         unit: actuators[at].unit.clone(),
@@ -360,7 +397,8 @@ pub(crate) fn actuator_faults(
 
 impl Fault {
     /// Returns a constant fault on the first column of F_a with no other data.
-    pub(crate) fn constant(place: &Place) -> Self {
+    #[must_use]
+    pub fn constant(place: &Place) -> Self {
         Self {
             name: String::new(),
             unit: None,

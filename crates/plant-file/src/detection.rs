@@ -3,76 +3,85 @@
 use files::{Entry, Place, PlaceError, Table};
 use nalgebra::{DMatrix, DVector};
 
-use crate::plant_file::Model;
-use crate::plant_file::signals::{Fault, Signal, name, position};
+use crate::Model;
+use crate::signals::{Fault, Signal, name, position};
 
 /// What the detection of faults shall do.
 #[derive(Clone, Debug)]
-pub(crate) struct DetectionRequest {
-    pub(crate) place: Place,
-    pub(crate) method: Method,
+pub struct DetectionRequest {
+    /// Where the file states it.
+    pub place: Place,
+    /// The test of the residuals.
+    pub method: Method,
     /// Mean time between false alarms, s.
-    pub(crate) false_alarm_interval: f64,
+    pub false_alarm_interval: f64,
     /// Whether each test shall react to one fault only, as far as possible.
-    pub(crate) isolation: bool,
+    pub isolation: bool,
     /// Noise of each measurement: the root of its spectral density, or its standard deviation in a
     /// sampled design.
-    pub(crate) noise: Vec<f64>,
+    pub noise: Vec<f64>,
     /// Process noise of each state, in the same sense; None if the file states none.
-    pub(crate) process_noise: Option<ProcessNoise>,
+    pub process_noise: Option<ProcessNoise>,
     /// The size of each fault that shall be detected.
-    pub(crate) sizes: Vec<f64>,
+    pub sizes: Vec<f64>,
     /// Time between two tests of a continuous controller, s.
-    pub(crate) sample_time: Option<f64>,
+    pub sample_time: Option<f64>,
     /// Whether the tests allow for errors of the model.
-    pub(crate) model_error: Option<ModelError>,
+    pub model_error: Option<ModelError>,
     /// Time in s within which the least detectable fault is detected.
-    pub(crate) delay: Option<f64>,
+    pub delay: Option<f64>,
     /// Time in s from the start of a run to the first test.
-    pub(crate) from: Option<f64>,
+    pub from: Option<f64>,
 }
 
 /// The statistic of the tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Method {
+pub enum Method {
+    /// Cumulative sums.
     Cusum,
     /// Chi-square of the mean over a window of this many s, if stated.
     ChiSquare {
+        /// Length of the window, s.
         window: Option<f64>,
     },
 }
 
 /// The errors of the model that give no alarm: those of the tolerances of `[robustness]`.
 #[derive(Clone, Debug)]
-pub(crate) struct ModelError {
+pub struct ModelError {
     /// Factor of the largest residual, at least 1.
-    pub(crate) margin: f64,
+    pub margin: f64,
     /// The largest deviation of each command from its operating point, if stated.
-    pub(crate) commands: Vec<Option<f64>>,
-    pub(crate) place: Place,
+    pub commands: Vec<Option<f64>>,
+    /// Where the file states it.
+    pub place: Place,
 }
 
 /// The process noise of the states.
 #[derive(Clone, Debug)]
-pub(crate) struct ProcessNoise {
+pub struct ProcessNoise {
     /// One number for all states, or one for each.
-    pub(crate) values: Vec<f64>,
-    pub(crate) place: Place,
+    pub values: Vec<f64>,
+    /// Where the file states it.
+    pub place: Place,
 }
 
 /// An unknown input that is no fault.
 #[derive(Clone, Debug)]
-pub(crate) struct Disturbance {
-    pub(crate) name: String,
-    pub(crate) entry_point: DisturbanceEntry,
+pub struct Disturbance {
+    /// Its name.
+    pub name: String,
+    /// Where it enters the plant.
+    pub entry_point: DisturbanceEntry,
     /// Largest absolute value.
-    pub(crate) bound: Option<f64>,
-    pub(crate) place: Place,
+    pub bound: Option<f64>,
+    /// Where the file states it.
+    pub place: Place,
 }
 
 /// Where a disturbance enters the plant.
 #[derive(Clone, Debug)]
-pub(crate) enum DisturbanceEntry {
+pub enum DisturbanceEntry {
     /// The column E of x' = A x + E d.
     Column(DVector<f64>),
     /// It adds to this command.
@@ -102,7 +111,11 @@ const DISTURBANCE: [&str; 6] = ["name", "E", "actuator", "sensor", "input", "bou
 
 impl DetectionRequest {
     /// Reads the table, if the file has one.
-    pub(crate) fn read(
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
+    pub fn read(
         file: &Table<'_>,
         actuators: &[Signal],
         measurements: usize,
@@ -262,7 +275,11 @@ fn model_error(table: &Table<'_>, actuators: &[Signal]) -> Result<Option<ModelEr
 }
 
 /// Reads the list `[[disturbances]]`.
-pub(crate) fn disturbances(
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn disturbances(
     file: &Table<'_>,
     actuators: &[Signal],
     measurements: &[Signal],

@@ -6,16 +6,18 @@ use files::{Entry, PlaceError};
 
 /// A parameter of the plant's FMU, and how far it may be from its value.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct ParameterTolerance {
-    pub(crate) name: String,
-    pub(crate) tolerance: Tolerance,
+pub struct ParameterTolerance {
+    /// The name of the parameter of the FMU.
+    pub name: String,
+    /// How far it varies.
+    pub tolerance: Tolerance,
     /// Where the plant file states it.
-    pub(crate) place: Range<usize>,
+    pub place: Range<usize>,
 }
 
 /// How far a parameter may be from its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Tolerance {
+pub enum Tolerance {
     /// Fraction of the value.
     Relative(f64),
     /// Lowest and highest value.
@@ -23,7 +25,11 @@ pub(crate) enum Tolerance {
 }
 
 /// Reads a table of parameters: `m = 0.1` (relative) or `m = [0.9, 1.1]` (lowest and highest value).
-pub(crate) fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceError> {
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceError> {
     let one = |(name, entry): (&str, Entry<'_>)| {
         let tolerance = if entry.is_list() {
             match entry.list()?.as_slice() {
@@ -48,7 +54,11 @@ pub(crate) fn read(entry: &Entry<'_>) -> Result<Vec<ParameterTolerance>, PlaceEr
 }
 
 /// Reads a fraction from 0 to below 1.
-pub(crate) fn fraction(entry: &Entry<'_>) -> Result<f64, PlaceError> {
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn fraction(entry: &Entry<'_>) -> Result<f64, PlaceError> {
     match entry.number()? {
         number if (0.0..1.0).contains(&number) => Ok(number),
         number => Err(entry.error(format!("expected a number from 0 to below 1, found {number}"))),

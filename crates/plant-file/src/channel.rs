@@ -6,55 +6,63 @@ use control::weight::{Weight, bilinear_frequency};
 use files::{Entry, PlaceError, Table};
 
 /// The entries of a plant file that belong to `h_infinity`.
-pub(crate) const CHANNEL: [&str; 2] = ["weights", "noise"];
+pub const CHANNEL: [&str; 2] = ["weights", "noise"];
 
 /// What the H-infinity norm weights.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Channel {
+pub struct Channel {
     /// Factor of each output of the norm: of the errors of the faults' estimates for the observer, of
     /// measurements, then commands for the feedback. Empty if all are 1.
-    pub(crate) weights: Vec<ChannelWeight>,
+    pub weights: Vec<ChannelWeight>,
     /// Weight of the noise of each measurement, in its unit; empty if the norm has no noise.
-    pub(crate) noise: Vec<ChannelWeight>,
+    pub noise: Vec<ChannelWeight>,
 }
 
 /// The weight of a signal.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct ChannelWeight {
+pub struct ChannelWeight {
     /// The signal, in words.
-    pub(crate) signal: String,
-    pub(crate) weight: Weight,
+    pub signal: String,
+    /// The weight over frequency.
+    pub weight: Weight,
     /// The largest factor between the weight and the table that states it.
-    pub(crate) deviation: Option<f64>,
+    pub deviation: Option<f64>,
 }
 
 /// The signals that the norm of a gain is about.
-pub(crate) struct ChannelSignals<'a> {
+pub struct ChannelSignals<'a> {
     /// Names of its outputs.
-    pub(crate) outputs: Vec<&'a str>,
+    pub outputs: Vec<&'a str>,
     /// Names of the measurements whose noise the norm can have.
-    pub(crate) noises: Option<Vec<&'a str>>,
+    pub noises: Option<Vec<&'a str>>,
 }
 
 impl ChannelWeight {
     /// The factor of a constant weight; 1 for one over frequency, which acts in addition.
-    pub(crate) fn factor(&self) -> f64 {
+    #[must_use]
+    pub fn factor(&self) -> f64 {
         self.weight.as_constant().unwrap_or(1.0)
     }
 }
 
 impl Channel {
     /// Whether a weight depends on the frequency.
-    pub(crate) fn has_states(&self) -> bool {
+    #[must_use]
+    pub fn has_states(&self) -> bool {
         self.all().any(|one| one.weight.as_constant().is_none())
     }
 
-    pub(crate) fn all(&self) -> impl Iterator<Item = &ChannelWeight> {
+    /// The weights of all signals.
+    pub fn all(&self) -> impl Iterator<Item = &ChannelWeight> {
         self.weights.iter().chain(&self.noise)
     }
 
     /// Reads `weights`, a table from names to weights, and `noise`, a weight or one for each measurement.
-    pub(crate) fn read(
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
+    pub fn read(
         table: &Table<'_>,
         signals: &ChannelSignals<'_>,
         domain: Domain,

@@ -5,13 +5,13 @@ use std::f64::consts::PI;
 use crate::matrix::MatrixEntry as _;
 use nalgebra::{Complex, DMatrix};
 
-use crate::plant_file::channel::{CHANNEL, Channel, ChannelSignals};
-use control::Domain;
+use crate::channel::{CHANNEL, Channel, ChannelSignals};
+use control::{Domain, lmi};
 use files::{Entry, Place, PlaceError, Table};
 
 /// A requirement on a gain.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Requirement {
+pub enum Requirement {
     /// These eigenvalues of the continuous loop in 1/s; for a sampled loop they become e^(p T).
     Eigenvalues(Vec<Complex<f64>>),
     /// These eigenvalues of the sampled loop.
@@ -20,51 +20,67 @@ pub(crate) enum Requirement {
     Region(Region),
     /// The least integral of x'Q x + u'R u (LQR), or the least variance for noise of intensity W
     /// and V (Kalman).
-    Weights { states: DMatrix<f64>, channels: DMatrix<f64> },
+    Weights {
+        /// The weight of the states, or the intensity of their noise.
+        states: DMatrix<f64>,
+        /// The weight of the commands, or the intensity of the noise of the measurements.
+        channels: DMatrix<f64>,
+    },
     /// A linear-quadratic regulator, or a Kalman filter, of a bandwidth.
     Bandwidth(Bandwidth),
     /// The least H-infinity norm, or a norm below a bound; the eigenvalues also lie in a region.
-    HInfinity { bound: Option<f64>, region: Region, channel: Channel },
+    HInfinity {
+        /// The largest norm; the least one without it.
+        bound: Option<f64>,
+        /// The region of the eigenvalues.
+        region: Region,
+        /// The weights of inputs and outputs.
+        channel: Channel,
+    },
 }
 
 /// The bandwidth of a loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Bandwidth {
+pub struct Bandwidth {
     /// In rad/s; None until it is chosen.
-    pub(crate) rate: Option<f64>,
+    pub rate: Option<f64>,
     /// Whether the file states it.
-    pub(crate) is_stated: bool,
+    pub is_stated: bool,
 }
 
 /// A region of the left half plane: the intersection of the given parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Region {
+pub struct Region {
     /// Real parts are below the negative of this rate, 1/s.
-    pub(crate) decay: Option<f64>,
+    pub decay: Option<f64>,
     /// Centre and radius, 1/s.
-    pub(crate) disc: Option<(f64, f64)>,
+    pub disc: Option<(f64, f64)>,
     /// Largest angle from the negative real axis, in degrees.
-    pub(crate) sector: Option<f64>,
+    pub sector: Option<f64>,
 }
 
 /// A requirement and its place in the file.
 #[derive(Clone, Debug)]
-pub(crate) struct Request {
-    pub(crate) requirement: Requirement,
-    pub(crate) place: Place,
+pub struct Request {
+    /// What is required.
+    pub requirement: Requirement,
+    /// Where the file states it.
+    pub place: Place,
     /// Name and place of the second weight.
-    pub(crate) other: Option<(String, Place)>,
+    pub other: Option<(String, Place)>,
 }
 
 impl Request {
     /// The request of a file without one, at its place.
-    pub(crate) fn open(place: Place) -> Self {
+    #[must_use]
+    pub fn open(place: Place) -> Self {
         let requirement = Requirement::Bandwidth(Bandwidth { rate: None, is_stated: false });
         Self { requirement, place, other: None }
     }
 
     /// The bandwidth in rad/s, if it is the requirement and is chosen.
-    pub(crate) fn bandwidth(&self) -> Option<f64> {
+    #[must_use]
+    pub fn bandwidth(&self) -> Option<f64> {
         match self.requirement {
             Requirement::Bandwidth(Bandwidth { rate, .. }) => rate,
             _ => None,
@@ -72,14 +88,16 @@ impl Request {
     }
 
     /// Whether the bandwidth is to be chosen.
-    pub(crate) fn is_open(&self) -> bool {
+    #[must_use]
+    pub fn is_open(&self) -> bool {
         matches!(self.requirement, Requirement::Bandwidth(Bandwidth { rate: None, .. }))
     }
 }
 
 impl Requirement {
     /// The eigenvalues that are stated.
-    pub(crate) fn eigenvalues(&self) -> &[Complex<f64>] {
+    #[must_use]
+    pub fn eigenvalues(&self) -> &[Complex<f64>] {
         match self {
             Self::Eigenvalues(all) | Self::SampledEigenvalues(all) => all,
             _ => &[],
@@ -87,7 +105,8 @@ impl Requirement {
     }
 
     /// The index of the first state without noise.
-    pub(crate) fn without_noise(&self) -> Option<usize> {
+    #[must_use]
+    pub fn without_noise(&self) -> Option<usize> {
         match self {
             Self::Weights { states, .. } => {
                 (0..states.nrows()).find(|&row| states.row(row).amax() == 0.0)
@@ -100,7 +119,11 @@ impl Requirement {
 const KEYS: [&str; 5] = ["bandwidth", "eigenvalues", "sampled_eigenvalues", "region", "h_infinity"];
 
 /// Reads `[feedback]` (weights Q, R) or `[observer]` (weights W, V).
-pub(crate) fn request(
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn request(
     table: &Table<'_>,
     weights: [&str; 2],
     signals: &ChannelSignals<'_>,
@@ -236,7 +259,11 @@ fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>, PlaceError> {
 }
 
 /// Reads a region that is stated alone; that of a sampled design has a decay rate only.
-pub(crate) fn stated_region(entry: &Entry<'_>, sampled: bool) -> Result<Region, PlaceError> {
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn stated_region(entry: &Entry<'_>, sampled: bool) -> Result<Region, PlaceError> {
     if sampled {
         refuse_unsampled(entry)?;
     }
@@ -331,4 +358,28 @@ fn weight(entry: &Entry<'_>) -> Result<DMatrix<f64>, PlaceError> {
         }
     }
     Ok(DMatrix::from_diagonal(&diagonal.into()))
+}
+
+impl Region {
+    /// Whether an eigenvalue of the loop is in the region; for a sampled loop one in the z-plane.
+    #[must_use]
+    pub fn contains(self, value: Complex<f64>, domain: Domain) -> bool {
+        let decay = self.decay.unwrap_or(0.0);
+        if let Domain::Sampled { period } = domain {
+            return value.norm() < (-decay * period).exp();
+        }
+        value.re < -decay
+            && self.disc.is_none_or(|(center, radius)| (value - center).norm() < radius)
+            && self.sector.is_none_or(|angle| value.im.atan2(-value.re).abs() < angle.to_radians())
+    }
+
+    /// Converts the region for the linear matrix inequalities; angles in rad.
+    #[must_use]
+    pub fn stated(self) -> lmi::Region {
+        lmi::Region {
+            decay: self.decay,
+            disc: self.disc.map(|(center, radius)| lmi::Disc { center, radius }),
+            sector: self.sector.map(f64::to_radians),
+        }
+    }
 }

@@ -3,10 +3,10 @@
 use files::PlaceError;
 use fmu_description::{array_element, is_structured_name, misplaced_elements};
 
-use crate::plant_file::estimation::Law;
-use crate::plant_file::signals::{EntryPoint, Fault, FaultDynamics, Signal};
-use crate::plant_file::variants::Variable;
-use crate::plant_file::{Model, PlantFile};
+use crate::estimation::Law;
+use crate::signals::{EntryPoint, Fault, FaultDynamics, Signal};
+use crate::variants::Variable;
+use crate::{Model, PlantFile};
 
 /// The parameters of the controller FMU that are matrices.
 const MATRICES: [&str; 8] = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f"];

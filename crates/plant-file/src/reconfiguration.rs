@@ -1,22 +1,23 @@
 //! The table `[reconfiguration]` of a plant file: what happens when an actuator is gone.
 
-use crate::plant_file::signals::{EntryPoint, Fault, Signal};
+use crate::signals::{EntryPoint, Fault, Signal};
 use files::{Entry, Place, PlaceError, Table};
 
 /// What the controller must be able to do without an actuator.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct ReconfigurationRequest {
+pub struct ReconfigurationRequest {
     /// The actuators that may be gone, from 0.
-    pub(crate) actuators: Vec<usize>,
+    pub actuators: Vec<usize>,
     /// How many of them may be gone together.
-    pub(crate) together: usize,
+    pub together: usize,
     /// The command at which each of them is then stuck, in its unit.
     stuck_at: Vec<f64>,
     /// The measurements to keep at the operating point, from 0.
-    pub(crate) keep: Vec<usize>,
+    pub keep: Vec<usize>,
     /// An actuator counts as gone if its estimated loss is above the first number for the second, in s.
-    pub(crate) decision: Option<(f64, f64)>,
-    pub(crate) place: Place,
+    pub decision: Option<(f64, f64)>,
+    /// Where the file states it.
+    pub place: Place,
 }
 
 const KEYS: [&str; 6] = ["actuators", "together", "stuck_at", "keep", "loss", "time"];
@@ -25,7 +26,11 @@ const MOST_SETS: usize = 200;
 
 impl ReconfigurationRequest {
     /// Reads the table, if there is one.
-    pub(crate) fn read(
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
+    pub fn read(
         file: &Table<'_>,
         actuators: &[Signal],
         measurements: &[Signal],
@@ -61,19 +66,22 @@ impl ReconfigurationRequest {
     }
 
     /// The command at which an actuator is stuck; 0 if it is none of those that may be gone.
-    pub(crate) fn stuck_at(&self, actuator: usize) -> f64 {
+    #[must_use]
+    pub fn stuck_at(&self, actuator: usize) -> f64 {
         let position = self.actuators.iter().position(|used| *used == actuator);
         position.map_or(0.0, |at| self.stuck_at[at])
     }
 
     /// The sets of actuators that may be gone, each in ascending order: first each one alone.
-    pub(crate) fn cases(&self) -> Vec<Vec<usize>> {
+    #[must_use]
+    pub fn cases(&self) -> Vec<Vec<usize>> {
         let alone = self.actuators.iter().map(|actuator| vec![*actuator]);
         alone.chain((2..=self.together).flat_map(|size| self.sets(size))).collect()
     }
 
     /// The sets of `size` of the actuators that may be gone, each in ascending order.
-    pub(crate) fn sets(&self, size: usize) -> Vec<Vec<usize>> {
+    #[must_use]
+    pub fn sets(&self, size: usize) -> Vec<Vec<usize>> {
         let mut ordered = self.actuators.clone();
         ordered.sort_unstable();
         let extended = |sets: Vec<Vec<usize>>, _| {
@@ -118,7 +126,11 @@ fn together(table: &Table<'_>, used: usize, all: usize) -> Result<usize, PlaceEr
 }
 
 /// Reads names of signals, or the text "all".
-pub(crate) fn positions(
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn positions(
     entry: &Entry<'_>,
     signals: &[Signal],
     what: &str,

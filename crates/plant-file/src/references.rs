@@ -3,27 +3,27 @@
 use files::{Entry, Place, PlaceError, Table};
 use nalgebra::DMatrix;
 
-use crate::plant_file::signals::{Signal, description, name, unit};
+use crate::signals::{Signal, description, name, unit};
 
 /// The references of a plant file.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct References {
+pub struct References {
     /// Signals of the controller FMU. Their operating points follow from those of the measurements.
-    pub(crate) signals: Vec<Signal>,
+    pub signals: Vec<Signal>,
     /// H, t x p: what each reference is the set point of.
-    pub(crate) h: DMatrix<f64>,
+    pub h: DMatrix<f64>,
     /// The size of the step that the report shows, in the unit of the reference.
-    pub(crate) steps: Vec<Option<f64>>,
+    pub steps: Vec<Option<f64>>,
     /// Where each reference is stated.
-    pub(crate) places: Vec<Place>,
+    pub places: Vec<Place>,
     /// Whether the distance from the references is integrated; otherwise they act by a feedforward.
-    pub(crate) integral: bool,
+    pub integral: bool,
     /// Whether the references act on the commands by a constant gain.
-    pub(crate) feedforward: bool,
+    pub feedforward: bool,
     /// Where `integral` and `feedforward` are stated; the table, where they are not.
-    pub(crate) action_places: [Place; 2],
+    pub action_places: [Place; 2],
     /// Time constant, in s, with which the integrals follow a command at its limit.
-    pub(crate) windup_time: Option<f64>,
+    pub windup_time: Option<f64>,
 }
 
 const KEYS: [&str; 4] = ["track", "integral", "feedforward", "windup_time"];
@@ -31,10 +31,11 @@ const REFERENCE: [&str; 6] = ["measurement", "combination", "name", "unit", "des
 
 impl References {
     /// Reads the table, if there is one.
-    pub(crate) fn read(
-        file: &Table<'_>,
-        measurements: &[Signal],
-    ) -> Result<Option<Self>, PlaceError> {
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
+    pub fn read(file: &Table<'_>, measurements: &[Signal]) -> Result<Option<Self>, PlaceError> {
         let Some(entry) = file.get("reference") else {
             return Ok(None);
         };
@@ -83,7 +84,8 @@ impl References {
     }
 
     /// Returns the references with operating points and units from those of the measurements.
-    pub(crate) fn completed(&self, measurements: &[Signal]) -> Vec<Signal> {
+    #[must_use]
+    pub fn completed(&self, measurements: &[Signal]) -> Vec<Signal> {
         let complete = |(at, signal): (usize, &Signal)| {
             let weights = self.h.row(at);
             let stated = measurements.iter().any(|one| one.operating.is_some());

@@ -3,41 +3,42 @@
 use control::robustness::PlantEntry;
 use files::{Entry, PlaceError, Table};
 
-use crate::plant_file::Model;
-use crate::plant_file::parameters::{self, ParameterTolerance, fraction};
+use crate::Model;
+use crate::parameters::{self, ParameterTolerance, fraction};
 
 /// What the robustness of a design is tested with, and the limits of its verdict.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct RobustnessLimits {
+pub struct RobustnessLimits {
     /// Relative tolerances of the entries of A, B, C and D.
-    pub(crate) tolerance: [f64; 4],
+    pub tolerance: [f64; 4],
     /// Tolerances of single entries, in place of those of their matrices.
-    pub(crate) entries: Vec<EntryTolerance>,
+    pub entries: Vec<EntryTolerance>,
     /// Tolerances of parameters of the plant's FMU; if there are any, the entries are exact.
-    pub(crate) parameters: Vec<ParameterTolerance>,
+    pub parameters: Vec<ParameterTolerance>,
     /// Number of random cases.
-    pub(crate) cases: u32,
+    pub cases: u32,
     /// Seed of the random cases.
-    pub(crate) seed: u32,
+    pub seed: u32,
     /// Noise of each measurement: the root of its spectral density, or its standard deviation in a
     /// sampled design.
-    pub(crate) noise: Vec<f64>,
+    pub noise: Vec<f64>,
     /// Peak of S above which a design is amber.
-    pub(crate) amber: f64,
+    pub amber: f64,
     /// Peak of S above which it is red.
-    pub(crate) red: f64,
+    pub red: f64,
 }
 
 /// A tolerance of entries that change by the same factor.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct EntryTolerance {
-    pub(crate) entries: Vec<PlantEntry>,
+pub struct EntryTolerance {
+    /// The entries that vary.
+    pub entries: Vec<PlantEntry>,
     /// Fraction of their values; 0 for exact entries.
-    pub(crate) relative: f64,
+    pub relative: f64,
 }
 
 /// The names of the matrices that vary.
-pub(crate) const MATRICES: [&str; 4] = ["A", "B", "C", "D"];
+pub const MATRICES: [&str; 4] = ["A", "B", "C", "D"];
 
 const KEYS: [&str; 7] = ["tolerance", "parameters", "cases", "seed", "noise", "amber", "red"];
 const TOLERANCE: f64 = 0.1;
@@ -47,11 +48,11 @@ const RED: f64 = 4.0;
 
 impl RobustnessLimits {
     /// Reads the table, or returns the defaults for a plant with that many measurements.
-    pub(crate) fn read(
-        file: &Table<'_>,
-        model: &Model,
-        measurements: usize,
-    ) -> Result<Self, PlaceError> {
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
+    pub fn read(file: &Table<'_>, model: &Model, measurements: usize) -> Result<Self, PlaceError> {
         let mut limits = Self {
             tolerance: [TOLERANCE; 4],
             entries: Vec::new(),

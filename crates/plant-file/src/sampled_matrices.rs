@@ -4,25 +4,25 @@ use control::hold::{continuous, zero_order_hold};
 use files::{PlaceError, Table};
 use nalgebra::DMatrix;
 
-use crate::plant_file::Sampling;
+use crate::Sampling;
 
 /// Part of the largest entries of row and column below which an entry of the logarithm is rounding.
 const ROUNDING: f64 = 1e-13;
 
 /// The continuous plant x' = A x + B u whose samples are those of the matrices in the file.
 #[derive(Clone)]
-pub(crate) struct SampledMatrices {
+pub struct SampledMatrices {
     /// A, n x n.
-    pub(crate) a: DMatrix<f64>,
+    pub a: DMatrix<f64>,
     /// B, n x m.
-    pub(crate) b: DMatrix<f64>,
+    pub b: DMatrix<f64>,
     /// The integral of e^(A s) over a sample, n x n.
     held: DMatrix<f64>,
 }
 
 impl SampledMatrices {
     /// Reads `matrices`; `pair`: A and B of the file. None if the matrices are continuous.
-    pub(crate) fn read(
+    pub fn read(
         file: &Table<'_>,
         sampling: Option<Sampling>,
         pair: (&DMatrix<f64>, &DMatrix<f64>),
@@ -56,7 +56,7 @@ impl SampledMatrices {
     }
 
     /// The columns of continuous time that are `columns` in the samples.
-    pub(crate) fn held(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+    pub fn held(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         // It has no zero eigenvalue where the logarithm exists.
         let solved = self.held.clone().lu().solve(columns);
         solved.unwrap_or_else(|| columns.map(|_| f64::NAN))

@@ -4,9 +4,9 @@
 use files::{Entry, Place, PlaceError, Table};
 
 use crate::matrix::MatrixEntry as _;
-use crate::plant_file::references::References;
-use crate::plant_file::signals::{Signal, description, name, unit};
-use crate::plant_file::{Model, PlantFile};
+use crate::references::References;
+use crate::signals::{Signal, description, name, unit};
+use crate::{Model, PlantFile};
 
 /// Entries that replace those of the plant of the file.
 const MATRICES: [&str; 4] = ["A", "B", "C", "F_a"];
@@ -16,9 +16,11 @@ const POINT: &str = "operating_point";
 
 /// A plant besides the one of the file.
 #[derive(Clone)]
-pub(crate) struct Variant {
-    pub(crate) name: String,
-    pub(crate) place: Place,
+pub struct Variant {
+    /// Its name.
+    pub name: String,
+    /// Where the file states it.
+    pub place: Place,
     model: Model,
     /// `u_op` and `y_op`.
     operating: [Option<Vec<f64>>; 2],
@@ -26,19 +28,20 @@ pub(crate) struct Variant {
 
 /// The schedule of a controller: the variable that selects the gains, and the plant at each grid point.
 #[derive(Clone)]
-pub(crate) struct Schedule {
-    pub(crate) variable: Variable,
+pub struct Schedule {
+    /// What the gains depend on.
+    pub variable: Variable,
     /// Largest rate of the variable, per s.
-    pub(crate) rate_bound: Option<f64>,
+    pub rate_bound: Option<f64>,
     /// In ascending order; at least two.
-    pub(crate) points: Vec<SchedulePoint>,
+    pub points: Vec<SchedulePoint>,
     /// The position of the point with the plant of the file.
-    pub(crate) nominal: usize,
+    pub nominal: usize,
 }
 
 /// The variable that selects the gains.
 #[derive(Clone)]
-pub(crate) enum Variable {
+pub enum Variable {
     /// A measurement, from 0.
     Measurement(usize),
     /// An input of the controller.
@@ -47,14 +50,17 @@ pub(crate) enum Variable {
 
 /// A plant at a value of the scheduling variable.
 #[derive(Clone)]
-pub(crate) struct SchedulePoint {
-    pub(crate) at: f64,
-    pub(crate) plant: Variant,
+pub struct SchedulePoint {
+    /// The value of the variable.
+    pub at: f64,
+    /// The plant at this value.
+    pub plant: Variant,
 }
 
 impl Schedule {
     /// The name of the variable.
-    pub(crate) fn variable<'a>(&'a self, measurements: &'a [Signal]) -> &'a Signal {
+    #[must_use]
+    pub fn variable<'a>(&'a self, measurements: &'a [Signal]) -> &'a Signal {
         match &self.variable {
             Variable::Measurement(at) => &measurements[*at],
             Variable::Input(signal) => signal,
@@ -64,12 +70,14 @@ impl Schedule {
 
 impl PlantFile<'_> {
     /// Whether the gains are interpolated with those of other points.
-    pub(crate) fn is_scheduled(&self) -> bool {
+    #[must_use]
+    pub fn is_scheduled(&self) -> bool {
         self.schedule.is_some() || self.is_point
     }
 
     /// The file with another plant, without family and schedule.
-    pub(crate) fn with(&self, variant: &Variant) -> Self {
+    #[must_use]
+    pub fn with(&self, variant: &Variant) -> Self {
         let mut file = self.clone();
         file.is_point = self.schedule.is_some();
         (file.family, file.schedule) = (Vec::new(), None);
@@ -90,7 +98,11 @@ impl PlantFile<'_> {
 }
 
 /// Reads `[[family]]`.
-pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, PlaceError> {
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, PlaceError> {
     let Some(entry) = file.get("family") else { return Ok(Vec::new()) };
     if let Some(schedule) = file.get("schedule") {
         return Err(
@@ -125,7 +137,11 @@ pub(crate) fn family(file: &Table<'_>, model: &Model) -> Result<Vec<Variant>, Pl
 }
 
 /// Reads `[schedule]`.
-pub(crate) fn schedule(
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn schedule(
     file: &Table<'_>,
     model: &Model,
     measurements: &[Signal],
@@ -256,7 +272,11 @@ fn numbers(table: &Table<'_>, key: &str, count: usize) -> Result<Option<Vec<f64>
 }
 
 /// Checks that the members of a family reach their references.
-pub(crate) fn check_action(file: &PlantFile<'_>) -> Result<(), PlaceError> {
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn check_action(file: &PlantFile<'_>) -> Result<(), PlaceError> {
     let references = file
         .references
         .as_ref()

@@ -1,27 +1,32 @@
 //! The table `[fallback]` of a plant file: one feedback for the plant and for every actuator that may fail.
 
-use crate::plant_file::reconfiguration::positions;
-use crate::plant_file::requirements::{Region, stated_region};
-use crate::plant_file::signals::Signal;
+use crate::reconfiguration::positions;
+use crate::requirements::{Region, stated_region};
+use crate::signals::Signal;
 use files::{Place, PlaceError, Table};
 
 /// The failures that one feedback must serve without knowing which of them there is.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct FallbackRequest {
+pub struct FallbackRequest {
     /// The actuators that may fail, from 0, one at a time.
-    pub(crate) actuators: Vec<usize>,
+    pub actuators: Vec<usize>,
     /// The largest fraction of its effect that one of them may lose; 1 if it may be gone.
-    pub(crate) loss: f64,
+    pub loss: f64,
     /// The region in which the eigenvalues must be in all cases; None if the file states none.
-    pub(crate) region: Option<Region>,
-    pub(crate) place: Place,
+    pub region: Option<Region>,
+    /// Where the file states it.
+    pub place: Place,
 }
 
 const KEYS: [&str; 3] = ["actuators", "loss", "region"];
 
 impl FallbackRequest {
     /// Reads the table, if there is one.
-    pub(crate) fn read(
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
+    pub fn read(
         file: &Table<'_>,
         actuators: &[Signal],
         sampled: bool,
