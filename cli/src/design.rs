@@ -189,7 +189,7 @@ impl CodeFiles {
     /// Whether at `path` is a file that is the same for each design, and so does not name the `identity` of one: its first
     /// line says what it is.
     fn has_runtime(&self, path: &Path, identity: &str) -> bool {
-        let text = self.files.iter().find(|(_, own, _)| own == path).map(|(.., text)| text);
+        let text = self.files.iter().find(|(_, file, _)| file == path).map(|(.., text)| text);
         let start =
             text.filter(|text| !text.contains(identity)).and_then(|text| text.lines().next());
         start
@@ -232,11 +232,11 @@ fn init(options: &Options) -> anyhow::Result<()> {
         interrupted: interrupt::listen()?,
         ..TimeLimits::default()
     };
-    let made = design::new_plant_file(&options.plant, &out, &limits)?;
+    let draft = design::new_plant_file(&options.plant, &out, &limits)?;
     let mut staged = Outputs::default();
-    staged.stage(&out, |path| fs::write(path, &made.text))?;
+    staged.stage(&out, |path| fs::write(path, &draft.text))?;
     staged.commit()?;
-    if let Some(refusal) = made.refusal {
+    if let Some(refusal) = draft.refusal {
         eprintln!("warning: no controller was found for this plant yet: {refusal}");
     }
     println!("{}", out.display());

@@ -23,8 +23,8 @@ pub(crate) const COLUMNS: [&str; 5] =
 pub(crate) enum PaperFigureError {
     #[error("the results have no column {0:?}, which the figures need")]
     MissingColumn(&'static str),
-    #[error("column {name:?} has {found} values, column \"time\" has {expected}")]
-    UnequalLengths { name: &'static str, expected: usize, found: usize },
+    #[error("column {name:?} has {actual} values, column \"time\" has {expected}")]
+    UnequalLengths { name: &'static str, expected: usize, actual: usize },
     #[error(transparent)]
     Figure(#[from] FigureError),
 }
@@ -75,7 +75,7 @@ impl<'a> Run<'a> {
             if expected == actual {
                 Ok(values)
             } else {
-                Err(PaperFigureError::UnequalLengths { name, expected, found: actual })
+                Err(PaperFigureError::UnequalLengths { name, expected, actual })
             }
         };
         let (x_p, theta) = (column("plant.x_p")?, column("plant.theta")?);

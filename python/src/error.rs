@@ -140,7 +140,7 @@ pub(crate) fn system(error: &SystemError) -> Exception {
         E::UnknownVariable { name, model, variable, .. } => {
             named("UnknownVariable", name).text("model", model).text("variable", variable)
         }
-        E::Role { name, found: actual, expected } => {
+        E::Role { name, actual, expected } => {
             named("Role", name).text("found", actual).text("expected", expected)
         }
         E::Twice { input, first, second } => {
@@ -162,7 +162,7 @@ pub(crate) fn system(error: &SystemError) -> Exception {
             called(named("Setting", name).text("value", value), source)
         }
         E::NotSettable { name, value, .. } => named("NotSettable", name).text("value", value),
-        E::LostSetting { name, value, found: actual } => {
+        E::LostSetting { name, value, actual } => {
             named("LostSetting", name).text("value", value).text("found", actual)
         }
         E::Capability { slave, lacks, required_by } => {

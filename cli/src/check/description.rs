@@ -83,7 +83,7 @@ pub(super) fn check(description: &ModelDescription, warnings: &[Warning]) -> Vec
     let mut findings = Findings::about(Part::Description);
     for warning in warnings {
         let place = format!("{FILE}, {}: {}", warning.at, warning.place);
-        let what = format!("expected {}, found {}", warning.expected, warning.found);
+        let what = format!("expected {}, found {}", warning.expected, warning.actual);
         let (tools, why) = stops(warning);
         let why =
             format!("{why}{}Here {}.", if why.is_empty() { "" } else { " " }, warning.assumed);

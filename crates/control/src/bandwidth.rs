@@ -167,7 +167,7 @@ fn weight(
         let system = StateSpace { a: a.clone(), b: b.clone(), c: c.clone(), d, domain };
         frequency_response(&system, &[bandwidth])
             .or_else(|_| frequency_response(&system, &[BESIDE * bandwidth]))
-            .map(|mut found| found.remove(0))
+            .map(|mut points| points.remove(0))
     };
     let loop_gain = |logarithm: f64| -> Result<f64, Error> {
         let r = DMatrix::from_diagonal_element(m, m, logarithm.exp());
@@ -192,30 +192,30 @@ fn enclosed(start: f64, f: impl Fn(f64) -> Result<f64, Error>) -> Result<(f64, f
         }
         let next = x + direction * STRIDE.ln();
         // A weight that is too extreme for the Riccati equation ends the search.
-        let Ok(found) = f(next) else { break };
-        if (found > 1.0) != (value > 1.0) {
+        let Ok(gain) = f(next) else { break };
+        if (gain > 1.0) != (value > 1.0) {
             other = Some(next);
             break;
         }
         // Unstable modes keep the loop gain above one: a larger weight would slow all others down without end.
-        if value > 1.0 && found > SATURATED * value {
+        if value > 1.0 && gain > SATURATED * value {
             break;
         }
-        (x, value) = (next, found);
+        (x, value) = (next, gain);
     }
     let Some(mut other) = other else { return Ok((x.exp(), value)) };
     // Regula falsi on logarithms, between which f is nearly a line; an end that stays counts half (Illinois).
     let (mut low, mut high) = (value.ln(), f(other)?.ln());
     for _ in 0..STEPS {
         let middle = (x * high - other * low) / (high - low);
-        let found = f(middle)?;
-        if (found - 1.0).abs() <= ACCURACY {
-            return Ok((middle.exp(), found));
+        let gain = f(middle)?;
+        if (gain - 1.0).abs() <= ACCURACY {
+            return Ok((middle.exp(), gain));
         }
-        if (found > 1.0) == (low > 0.0) {
-            (x, low, value, high) = (middle, found.ln(), found, high / 2.0);
+        if (gain > 1.0) == (low > 0.0) {
+            (x, low, value, high) = (middle, gain.ln(), gain, high / 2.0);
         } else {
-            (other, high, low) = (middle, found.ln(), low / 2.0);
+            (other, high, low) = (middle, gain.ln(), low / 2.0);
         }
     }
     Ok((x.exp(), value))

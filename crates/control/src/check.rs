@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 /// Checks that every entry is finite and that there is at least one.
 pub(crate) fn finite(matrix: &'static str, m: &DMatrix<f64>) -> Result<(), Error> {
     if m.is_empty() {
-        return Err(Error::Empty { matrix, found: m.shape() });
+        return Err(Error::Empty { matrix, actual: m.shape() });
     }
     match m.iter().position(|value| !value.is_finite()) {
         None => Ok(()),
@@ -24,7 +24,7 @@ pub(crate) fn shape(
     expected: (usize, usize),
 ) -> Result<(), Error> {
     if m.shape() != expected {
-        return Err(Error::Shape { matrix, expected, found: m.shape() });
+        return Err(Error::Shape { matrix, expected, actual: m.shape() });
     }
     finite(matrix, m)
 }

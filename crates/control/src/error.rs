@@ -19,22 +19,22 @@ pub enum Error {
         value: f64,
     },
     /// A matrix has the wrong number of rows or columns.
-    #[error("{matrix} is {}x{}, expected {}x{}", found.0, found.1, expected.0, expected.1)]
+    #[error("{matrix} is {}x{}, expected {}x{}", actual.0, actual.1, expected.0, expected.1)]
     Shape {
         /// Name of the matrix as in the documentation of the function.
         matrix: &'static str,
         /// Rows and columns it must have.
         expected: (usize, usize),
         /// Rows and columns it has.
-        found: (usize, usize),
+        actual: (usize, usize),
     },
     /// A matrix has no rows or no columns.
-    #[error("{matrix} is {}x{}, expected at least one row and one column", found.0, found.1)]
+    #[error("{matrix} is {}x{}, expected at least one row and one column", actual.0, actual.1)]
     Empty {
         /// Name of the matrix.
         matrix: &'static str,
         /// Rows and columns it has.
-        found: (usize, usize),
+        actual: (usize, usize),
     },
     /// A matrix that must be symmetric is not.
     #[error("{matrix} differs from its transpose at [{row},{col}]")]
@@ -136,12 +136,12 @@ pub enum Error {
         decoupled: Vec<usize>,
     },
     /// The number of eigenvalues differs from the number of states.
-    #[error("{found} eigenvalues are given, expected {expected}, one per state")]
+    #[error("{actual} eigenvalues are given, expected {expected}, one per state")]
     PoleCount {
         /// Number of states.
         expected: usize,
         /// Number of eigenvalues given.
-        found: usize,
+        actual: usize,
     },
     /// An eigenvalue is requested more often than there are independent inputs.
     #[error(

@@ -207,7 +207,7 @@ fn length(name: &'static str, vector: &[f64], expected: usize) -> Result<(), Err
     if vector.len() == expected {
         return Ok(());
     }
-    Err(Error::Shape { matrix: name, expected: (expected, 1), found: (vector.len(), 1) })
+    Err(Error::Shape { matrix: name, expected: (expected, 1), actual: (vector.len(), 1) })
 }
 
 /// Selects a specialised loop for up to eight states, whose columns fit into registers.

@@ -363,7 +363,7 @@ impl Assignment {
 
 fn check_poles(poles: &[Complex<f64>], n: usize) -> Result<(), Error> {
     if poles.len() != n {
-        return Err(Error::PoleCount { expected: n, found: poles.len() });
+        return Err(Error::PoleCount { expected: n, actual: poles.len() });
     }
     let parts = DMatrix::from_fn(n, 2, |i, j| if j == 0 { poles[i].re } else { poles[i].im });
     check::finite("poles", &parts)

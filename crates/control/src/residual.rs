@@ -53,8 +53,8 @@ impl ResidualGenerator {
             if shape.0 > 0 && shape.1 > 0 {
                 check::shape(name, matrix, shape)?;
             } else if matrix.shape() != shape {
-                let (expected, found) = (shape, matrix.shape());
-                return Err(Error::Shape { matrix: name, expected, found });
+                let (expected, actual) = (shape, matrix.shape());
+                return Err(Error::Shape { matrix: name, expected, actual });
             }
         }
         self.domain.check()

@@ -71,8 +71,8 @@ impl TryFrom<Vec<Vec<f64>>> for Matrix {
     fn try_from(lines: Vec<Vec<f64>>) -> Result<Self, String> {
         let columns = lines.first().map_or(0, Vec::len);
         if let Some(row) = lines.iter().position(|line| line.len() != columns) {
-            let found = lines[row].len();
-            return Err(format!("row {} has {found} entries, row 1 has {columns}", row + 1));
+            let length = lines[row].len();
+            return Err(format!("row {} has {length} entries, row 1 has {columns}", row + 1));
         }
         if columns == 0 {
             return Err("a matrix needs at least one row and one column".to_owned());

@@ -29,10 +29,10 @@ impl fmt::Display for Position {
 #[non_exhaustive]
 pub enum ParseError {
     /// The file is not text that the reader can decode.
-    #[error("expected XML in UTF-8, or in the encoding that it declares, found {found}")]
+    #[error("expected XML in UTF-8, or in the encoding that it declares, found {actual}")]
     Encoding {
         /// The encoding, or the position of the first invalid byte.
-        found: String,
+        actual: String,
     },
     /// The file is too long.
     #[error("expected at most {limit} bytes, found more{HELP}")]
@@ -41,12 +41,12 @@ pub enum ParseError {
         limit: usize,
     },
     /// The file is not well-formed XML.
-    #[error("{at}: expected well-formed XML, found: {found}")]
+    #[error("{at}: expected well-formed XML, found: {actual}")]
     Xml {
         /// The position.
         at: Position,
         /// The reason.
-        found: String,
+        actual: String,
     },
     /// The file has a document type declaration, which FMI does not use and which could define
     /// entities.
@@ -68,15 +68,15 @@ pub enum ParseError {
         help: &'static str,
     },
     /// The file is of an unknown version of the standard.
-    #[error("{at}: expected fmiVersion 1.0, 2.0 or 3.0, found {found:?}")]
+    #[error("{at}: expected fmiVersion 1.0, 2.0 or 3.0, found {actual:?}")]
     Version {
         /// The position.
         at: Position,
         /// The version in the file.
-        found: String,
+        actual: String,
     },
     /// An element is missing, or there is one too many.
-    #[error("{at}: in <{element}>: expected {expected}, found {found}")]
+    #[error("{at}: in <{element}>: expected {expected}, found {actual}")]
     Element {
         /// The position of the parent element.
         at: Position,
@@ -85,10 +85,10 @@ pub enum ParseError {
         /// The expected content.
         expected: String,
         /// The actual content.
-        found: String,
+        actual: String,
     },
     /// An attribute is missing or has an invalid value.
-    #[error("{at}: <{element}>, attribute {attribute}: expected {expected}, found {found}")]
+    #[error("{at}: <{element}>, attribute {attribute}: expected {expected}, found {actual}")]
     Attribute {
         /// The position of the element.
         at: Position,
@@ -99,7 +99,7 @@ pub enum ParseError {
         /// The expected value.
         expected: String,
         /// The actual value.
-        found: String,
+        actual: String,
     },
 }
 
@@ -113,7 +113,7 @@ pub struct Warning {
     /// The content that the standard requires.
     pub expected: String,
     /// The content of the file.
-    pub found: String,
+    pub actual: String,
     /// The assumption that the reader made.
     pub assumed: String,
     /// Section of the standard: FMI 2.0.5 or 3.0.2, for FMI 1.0 the document on co-simulation.
@@ -124,7 +124,7 @@ pub struct Warning {
 
 impl fmt::Display for Warning {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Warning { at, place, expected, found: actual, assumed, section, .. } = self;
+        let Warning { at, place, expected, actual, assumed, section, .. } = self;
         write!(
             formatter,
             "{at}: {place}: expected {expected}, found {actual}; {assumed} (section {section})"

@@ -51,12 +51,12 @@ pub enum PackageError {
         expected: &'static str,
     },
     /// The FMU lacks a required part.
-    #[error("expected {expected}, found {found}")]
+    #[error("expected {expected}, found {actual}")]
     Missing {
         /// The missing part.
         expected: String,
         /// The parts that exist instead.
-        found: String,
+        actual: String,
     },
     /// The archive exceeds a limit of this crate.
     #[error("{}: expected at most {limit} {unit}, found more{help}", path.display())]

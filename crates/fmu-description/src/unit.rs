@@ -114,7 +114,7 @@ pub enum UnitError {
         name: String,
     },
     /// A character does not fit the syntax.
-    #[error("unit {expression:?}, column {column}: expected {expected}, found {found}")]
+    #[error("unit {expression:?}, column {column}: expected {expected}, found {actual}")]
     Syntax {
         /// The whole expression.
         expression: String,
@@ -123,7 +123,7 @@ pub enum UnitError {
         /// The allowed symbols.
         expected: &'static str,
         /// The character found.
-        found: String,
+        actual: String,
     },
     /// A unit with an offset (such as degC) is part of a larger expression, where it has no meaning.
     #[error(
@@ -140,13 +140,13 @@ pub enum UnitError {
     },
     /// The conversion factor is too large or too small for a double.
     #[error(
-        "unit {expression:?}: expected a conversion factor from 1e-300 to 1e300, found {found}"
+        "unit {expression:?}: expected a conversion factor from 1e-300 to 1e300, found {actual}"
     )]
     Magnitude {
         /// The whole expression.
         expression: String,
         /// The factor.
-        found: String,
+        actual: String,
     },
 }
 

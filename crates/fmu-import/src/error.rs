@@ -25,14 +25,14 @@ pub enum LoadError {
         function: String,
     },
     /// The library has another version of FMI than its model description.
-    #[error("{path}: {function} gives {found:?}, expected {expected:?}")]
+    #[error("{path}: {function} gives {actual:?}, expected {expected:?}")]
     Version {
         /// The library.
         path: PathBuf,
         /// The function that returned the version, such as `fmi2GetVersion`.
         function: &'static str,
         /// The version that it returned.
-        found: String,
+        actual: String,
         /// The version of the model description.
         expected: &'static str,
     },

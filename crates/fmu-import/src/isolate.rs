@@ -287,10 +287,10 @@ pub enum WorkerError {
         source: io::Error,
     },
     /// The command in shared memory is invalid.
-    #[error("the memory shared with the master is corrupted: found {found}, expected a command")]
+    #[error("the memory shared with the master is corrupted: found {actual}, expected a command")]
     Corrupted {
         /// What was found.
-        found: u64,
+        actual: u64,
     },
     /// This operating system does not support isolation.
     #[error("isolation is available on Linux only")]

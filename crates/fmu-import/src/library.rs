@@ -125,7 +125,7 @@ fn check_version(
     Err(LoadError::Version {
         path: path.to_owned(),
         function,
-        found: version.into_owned(),
+        actual: version.into_owned(),
         expected,
     })
 }

@@ -50,24 +50,30 @@ fn run() -> Result<(), Box<dyn Error>> {
             _ => return Err(format!("{key:?} is no key").into()),
         }
     }
-    let found = linearise(&Fmu::open_any(path.as_ref())?, &request)?;
-    let own = &found.matrices;
-    let matrices =
-        [("A", &own.a), ("B", &own.b), ("F", &own.f), ("C", &own.c), ("D", &own.d), ("G", &own.g)];
+    let linearised = linearise(&Fmu::open_any(path.as_ref())?, &request)?;
+    let system = &linearised.matrices;
+    let matrices = [
+        ("A", &system.a),
+        ("B", &system.b),
+        ("F", &system.f),
+        ("C", &system.c),
+        ("D", &system.d),
+        ("G", &system.g),
+    ];
     for (name, matrix) in matrices {
         let rows: Vec<Vec<f64>> =
             matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
         println!("{name} = {rows:?}");
     }
-    println!("rates = {:?}", found.rates);
-    println!("residual = {:?}", found.residual);
-    println!("method = {:?}", found.method.to_string());
-    if let Some(error) = found.relative_error() {
+    println!("rates = {:?}", linearised.rates);
+    println!("residual = {:?}", linearised.residual);
+    println!("method = {:?}", linearised.method.to_string());
+    if let Some(error) = linearised.relative_error() {
         println!("relative_error = {error:?}");
     }
-    print("x_0", &found.states);
-    print("u_0", &found.inputs);
-    print("f_0", &found.faults);
-    print("y_0", &found.outputs);
+    print("x_0", &linearised.states);
+    print("u_0", &linearised.inputs);
+    print("f_0", &linearised.faults);
+    print("y_0", &linearised.outputs);
     Ok(())
 }

@@ -38,7 +38,7 @@ pub(super) fn reach(part: &Part, value: f64, size: f64) -> Result<(Side, f64), L
     if below.max(above) <= 0.0 {
         return Err(LineariseError::Role {
             name: part.name.clone(),
-            found: format!("{value} between min = {} and max = {}", part.min, part.max),
+            actual: format!("{value} between min = {} and max = {}", part.min, part.max),
             expected: "room for a change",
         });
     }

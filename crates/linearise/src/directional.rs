@@ -58,7 +58,7 @@ fn listed(
     let Some(&row) = missing else { return Ok(()) };
     Err(LineariseError::Role {
         name: row_name(states, parts, row),
-        found: "a variable that ModelStructure does not list: it has no directional derivative"
+        actual: "a variable that ModelStructure does not list: it has no directional derivative"
             .to_owned(),
         expected: "an output, a state or the derivative of one",
     })

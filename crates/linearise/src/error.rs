@@ -21,12 +21,12 @@ pub enum LineariseError {
         nearest: String,
     },
     /// The variable cannot play the requested role (state, input or output).
-    #[error("{name} is {found}, expected {expected}")]
+    #[error("{name} is {actual}, expected {expected}")]
     Role {
         /// The variable.
         name: String,
         /// The property of the variable.
-        found: String,
+        actual: String,
         /// The property that the role requires.
         expected: &'static str,
     },
@@ -77,14 +77,14 @@ pub enum LineariseError {
         source: CallError,
     },
     /// An event changes a state that the operating point prescribes.
-    #[error("{name} cannot be held at {required}: an event of the FMU makes it {found}")]
+    #[error("{name} cannot be held at {required}: an event of the FMU makes it {actual}")]
     Moved {
         /// The state.
         name: String,
         /// The value of the operating point.
         required: f64,
         /// The value after the event.
-        found: f64,
+        actual: f64,
     },
     /// A function of the FMU failed.
     #[error(transparent)]

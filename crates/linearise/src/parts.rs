@@ -162,11 +162,8 @@ fn part(
     expected: &'static str,
 ) -> Result<Part, LineariseError> {
     let name = variable.name.clone();
-    let role = |actual: String, expected| LineariseError::Role {
-        name: name.clone(),
-        found: actual,
-        expected,
-    };
+    let role =
+        |actual: String, expected| LineariseError::Role { name: name.clone(), actual, expected };
     if !allowed.contains(&variable.causality) {
         let actual = format!("a variable of causality {}", variable.causality.as_str());
         return Err(role(actual, expected));

@@ -70,7 +70,7 @@ pub(super) fn all_settable(parts: &Parts, states: &[State]) -> Result<(), Linear
         _ => "a parameter, an input, a start value or a state",
     };
     let actual = format!("a variable of causality {} that cannot be set", causality.as_str());
-    Err(LineariseError::Role { name: setting.name.clone(), found: actual, expected })
+    Err(LineariseError::Role { name: setting.name.clone(), actual, expected })
 }
 
 /// Reads Reals and checks that they are finite.
@@ -137,7 +137,7 @@ impl<'p> Equations<'p> {
             for (state, (&required, &actual)) in states.iter().zip(x.iter().zip(&reached)) {
                 if (required - actual).abs() > 1e-12 * state.part.scale(required) {
                     let name = state.part.name.clone();
-                    return Err(LineariseError::Moved { name, required, found: actual });
+                    return Err(LineariseError::Moved { name, required, actual });
                 }
             }
         }

@@ -331,7 +331,7 @@ fn chosen(
             let known: Vec<_> = raw.states.iter().map(|part| part.name.as_str()).collect();
             LineariseError::Role {
                 name: name.clone(),
-                found: format!("no continuous state, which are {}", known.join(", ")),
+                actual: format!("no continuous state, which are {}", known.join(", ")),
                 expected: "one of them",
             }
         })

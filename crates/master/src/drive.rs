@@ -153,12 +153,12 @@ pub struct DriveState {
 
 /// Error: a checkpoint and a scenario have different numbers of driven variables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the checkpoint is of {found} driven variables, expected {expected} as in the scenario")]
+#[error("the checkpoint is of {actual} driven variables, expected {expected} as in the scenario")]
 pub struct CheckpointError {
     /// Number of driven variables in the scenario.
     pub expected: usize,
     /// Number of driven variables in the checkpoint.
-    pub found: usize,
+    pub actual: usize,
 }
 
 /// All driven variables of a system. Only the constructor allocates.
@@ -396,7 +396,7 @@ impl Drives {
     /// Returns an error if the checkpoint has another number of driven variables.
     pub fn restore(&mut self, state: Vec<DriveState>) -> Result<(), CheckpointError> {
         if state.len() != self.all.len() {
-            return Err(CheckpointError { expected: self.all.len(), found: state.len() });
+            return Err(CheckpointError { expected: self.all.len(), actual: state.len() });
         }
         for (drive, DriveState { faults, accepted }) in self.all.iter_mut().zip(state) {
             drive.faults = faults;

@@ -44,12 +44,12 @@ pub enum SystemError {
         nearest: String,
     },
     /// The variable has the wrong causality or type.
-    #[error("{name} is {found}, expected {expected}")]
+    #[error("{name} is {actual}, expected {expected}")]
     Role {
         /// The variable.
         name: String,
         /// Its causality or type.
-        found: String,
+        actual: String,
         /// The causality or type expected.
         expected: String,
     },
@@ -144,7 +144,7 @@ pub enum SystemError {
     /// An FMU replaced a value that was set.
     #[error(
         "{name}: the value {value} that was set is lost: after the initialization the FMU has \
-         {found}. The FMU ignores or replaces the value; remove the setting"
+         {actual}. The FMU ignores or replaces the value; remove the setting"
     )]
     LostSetting {
         /// The variable.
@@ -152,7 +152,7 @@ pub enum SystemError {
         /// The text.
         value: String,
         /// The value in the FMU.
-        found: String,
+        actual: String,
     },
     /// An FMU refuses to read a variable of the results and cannot be used any more.
     #[error(

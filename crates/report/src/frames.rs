@@ -60,7 +60,7 @@ pub(crate) fn read(path: &Path, (from, to): (f64, f64)) -> Result<Vec<Message>, 
         }
         let (time, bus, identifier) = parse(&line).ok_or_else(|| {
             let file = name(path);
-            Error::Frame { file, line: number + 1, found: line.chars().take(80).collect() }
+            Error::Frame { file, line: number + 1, actual: line.chars().take(80).collect() }
         })?;
         if !(from..=to).contains(&time) {
             continue;

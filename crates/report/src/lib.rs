@@ -195,7 +195,7 @@ pub enum Error {
     /// A line of a bus trace is no frame.
     #[error(
         "{file}: line {line}: expected a frame as candump writes it, such as \
-         `(0.001200) can0 101#0080`, found `{found}`; `--bus-trace NAME.log` writes such a trace"
+         `(0.001200) can0 101#0080`, found `{actual}`; `--bus-trace NAME.log` writes such a trace"
     )]
     Frame {
         /// The file.
@@ -203,7 +203,7 @@ pub enum Error {
         /// The number of the line.
         line: usize,
         /// Its start.
-        found: String,
+        actual: String,
     },
     /// The two files have nothing in common.
     #[error("{file} and {other} have no variable in common")]

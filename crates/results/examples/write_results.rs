@@ -76,11 +76,11 @@ fn write(path: &Path, numbers: bool, interrupt: bool) -> Result<(), ResultsError
 fn main() -> ExitCode {
     let mut paths: Vec<String> = std::env::args().skip(1).collect();
     let mut flag = |name: &str| {
-        let found = paths.first().is_some_and(|first| first == name);
-        if found {
+        let is_flag = paths.first().is_some_and(|first| first == name);
+        if is_flag {
             paths.remove(0);
         }
-        found
+        is_flag
     };
     let (interrupt, numbers) = (flag("--interrupt"), flag("--numbers"));
     for path in &paths {

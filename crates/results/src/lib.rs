@@ -136,14 +136,14 @@ pub enum ResultsError {
         name: String,
     },
     /// The number of values of a row differs from the number of columns.
-    #[error("a row has {found} values of type {kind:?}, expected {expected}")]
+    #[error("a row has {actual} values of type {kind:?}, expected {expected}")]
     Values {
         /// Type of the values.
         kind: ColumnKind,
         /// Number of columns of this type.
         expected: usize,
         /// Number of values of this type in the row.
-        found: usize,
+        actual: usize,
     },
     /// Another process or another sink is writing the file.
     #[error(
@@ -165,7 +165,7 @@ pub enum ResultsError {
     },
     /// The file has another length than the rows that were written.
     #[error(
-        "{}: the file has {found} bytes, expected {expected}: an FMU or another program has changed it \
+        "{}: the file has {actual} bytes, expected {expected}: an FMU or another program has changed it \
          during the run. With --isolate no FMU reaches the files of the command",
         path.display()
     )]
@@ -175,7 +175,7 @@ pub enum ResultsError {
         /// Number of bytes that were written.
         expected: u64,
         /// Number of bytes in the file.
-        found: u64,
+        actual: u64,
     },
     /// The position of the open file was moved, and its content perhaps overwritten.
     #[error(
@@ -336,7 +336,7 @@ impl Widths {
             (ColumnKind::String, self.strings, row.strings.len()),
         ] {
             if expected != actual {
-                return Err(ResultsError::Values { kind, expected, found: actual });
+                return Err(ResultsError::Values { kind, expected, actual });
             }
         }
         Ok(())

@@ -139,7 +139,7 @@ impl OutputFile {
         Err(if size == self.length {
             ResultsError::Overwritten { path: self.path.clone() }
         } else {
-            ResultsError::Length { path: self.path.clone(), expected: self.length, found: size }
+            ResultsError::Length { path: self.path.clone(), expected: self.length, actual: size }
         })
     }
 

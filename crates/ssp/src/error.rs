@@ -14,7 +14,7 @@ pub enum SspError {
     #[error(transparent)]
     Xml(#[from] ParseError),
     /// An element has content that SSP does not allow.
-    #[error("{at}: <{element}>: expected {expected}, found {found}")]
+    #[error("{at}: <{element}>: expected {expected}, found {actual}")]
     Content {
         /// Position of the element.
         at: Position,
@@ -23,7 +23,7 @@ pub enum SspError {
         /// The allowed content.
         expected: String,
         /// The content found.
-        found: String,
+        actual: String,
     },
     /// The content is valid but contradictory or not supported.
     #[error("{at}: {sentence}")]
@@ -65,14 +65,14 @@ pub enum SspError {
         help: &'static str,
     },
     /// A file, element or variable is missing or unsuitable.
-    #[error("{what}: expected {expected}, found {found}")]
+    #[error("{what}: expected {expected}, found {actual}")]
     Missing {
         /// The file, element or variable.
         what: String,
         /// The expected kind or property.
         expected: String,
         /// The kind or property found.
-        found: String,
+        actual: String,
     },
 }
 

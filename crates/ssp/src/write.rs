@@ -247,7 +247,7 @@ impl Exporter {
 
 fn missing(what: &str, expected: &str, actual: &str) -> SspError {
     let (what, expected, actual) = (what.to_owned(), expected.to_owned(), actual.to_owned());
-    SspError::Missing { what, expected, found: actual }
+    SspError::Missing { what, expected, actual }
 }
 
 /// Converts a setting to a value of the type of its variable.

@@ -56,7 +56,7 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<S
     if !is_root || local != root {
         return Err(SspError::Content {
             at: element.at,
-            found: format!("namespace {namespace:?}"),
+            actual: format!("namespace {namespace:?}"),
             element: element.name,
             expected: format!("the root element {root} of the namespace {required:?}"),
         });
@@ -143,7 +143,7 @@ impl Node {
     /// Returns an error about the content of this element.
     pub(super) fn wrong(&self, expected: impl Into<String>, actual: impl Into<String>) -> SspError {
         let (at, element) = (self.at, self.name.clone());
-        SspError::Content { at, element, expected: expected.into(), found: actual.into() }
+        SspError::Content { at, element, expected: expected.into(), actual: actual.into() }
     }
 
     /// Checks that the attributes contain XML characters only, so that they can be written again.

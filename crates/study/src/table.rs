@@ -56,12 +56,12 @@ pub enum TableError {
     #[error("the file is empty, expected a header such as \"time\",\"u\" and rows of numbers")]
     Empty,
     /// The first column is not `time`.
-    #[error("line {line}: the first column is {found:?}, expected \"time\"{hint}")]
+    #[error("line {line}: the first column is {actual:?}, expected \"time\"{hint}")]
     NoTime {
         /// The line.
         line: usize,
         /// Name of the first column.
-        found: String,
+        actual: String,
         /// A hint at the probable cause.
         hint: &'static str,
     },
@@ -95,34 +95,34 @@ pub enum TableError {
     #[error("there is no row after the header")]
     NoRows,
     /// A row has another length than the header.
-    #[error("line {line}: expected {expected} entries as in the header, found {found}")]
+    #[error("line {line}: expected {expected} entries as in the header, found {actual}")]
     Width {
         /// The line.
         line: usize,
         /// Length of the header.
         expected: usize,
         /// Length of the row.
-        found: usize,
+        actual: usize,
     },
     /// An entry is not a finite number.
-    #[error("line {line}, column {column:?}: expected a finite number, found {found:?}")]
+    #[error("line {line}, column {column:?}: expected a finite number, found {actual:?}")]
     Number {
         /// The line.
         line: usize,
         /// Name of the column.
         column: String,
         /// The entry.
-        found: String,
+        actual: String,
     },
     /// A time is less than the time before it.
-    #[error("line {line}: the time {found} s comes after {before} s, expected ascending times")]
+    #[error("line {line}: the time {actual} s comes after {before} s, expected ascending times")]
     Order {
         /// The line.
         line: usize,
         /// The time before.
         before: f64,
         /// The time.
-        found: f64,
+        actual: f64,
     },
 }
 
@@ -163,24 +163,20 @@ pub fn parse(bytes: &[u8]) -> Result<Table, TableError> {
     while advance(&mut reader, &mut record)? {
         if record.len() != names.len() {
             let (expected, actual) = (names.len(), record.len());
-            return Err(TableError::Width {
-                line: line_of(bytes, &record),
-                expected,
-                found: actual,
-            });
+            return Err(TableError::Width { line: line_of(bytes, &record), expected, actual });
         }
         for ((field, column), name) in record.iter().zip(&mut columns).zip(&names) {
             let number = number(field).ok_or_else(|| TableError::Number {
                 line: line_of(bytes, &record),
                 column: name.clone(),
-                found: quotation(field),
+                actual: quotation(field),
             })?;
             column.push(number);
         }
         if let [.., before, time] = columns[0][..]
             && time < before
         {
-            return Err(TableError::Order { line: line_of(bytes, &record), before, found: time });
+            return Err(TableError::Order { line: line_of(bytes, &record), before, actual: time });
         }
     }
     if columns[0].is_empty() {
@@ -205,7 +201,7 @@ fn header(record: &ByteRecord, line: usize) -> Result<Vec<String>, TableError> {
     if first != "time" {
         let semicolons = names.len() == 1 && first.contains(';');
         let hint = if semicolons { "; entries are separated by commas" } else { "" };
-        return Err(TableError::NoTime { line, found: quotation(first.as_bytes()), hint });
+        return Err(TableError::NoTime { line, actual: quotation(first.as_bytes()), hint });
     }
     let mut known = std::collections::HashMap::new();
     for (position, name) in names.iter().enumerate() {

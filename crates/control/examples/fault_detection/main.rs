@@ -22,9 +22,9 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
 }
 
 /// Prints a figure beside the published one; counts it if it is missed.
-fn compare(what: &str, published: &str, found: &str, reached: bool, missed: &mut u32) {
+fn compare(what: &str, published: &str, computed: &str, reached: bool, missed: &mut u32) {
     println!(
-        "{what:<68} {published:>14} {found:>14}  {}",
+        "{what:<68} {published:>14} {computed:>14}  {}",
         if reached { "reached" } else { "MISSED" }
     );
     *missed += u32::from(!reached);
@@ -34,9 +34,9 @@ fn flight_actuators(missed: &mut u32) -> Result<(), Box<dyn Error>> {
     println!("CS1_1: faults of flight actuators{:<34} {:>14} {:>14}", "", "published", "here");
     let nominal = actuators::plant(actuators::NOMINAL)?;
     let residuals = actuators::residuals(&nominal)?;
-    let found = structure(&residuals, 0.0, 1e-3)?;
-    let matched = found.iter().zip(&actuators::PATTERNS).all(|(row, pattern)| {
-        row.iter().zip(pattern).all(|(found, expected)| u8::from(*found) == *expected)
+    let matrix = structure(&residuals, 0.0, 1e-3)?;
+    let matched = matrix.iter().zip(&actuators::PATTERNS).all(|(row, pattern)| {
+        row.iter().zip(pattern).all(|(reacts, expected)| u8::from(*reacts) == *expected)
     });
     let shown = if matched { "matched" } else { "differs" };
     compare("structure matrix, constant faults", "matched", shown, matched, missed);
@@ -49,10 +49,10 @@ fn flight_actuators(missed: &mut u32) -> Result<(), Box<dyn Error>> {
     let strong = patterns.iter().filter(|pattern| pattern.strong).count();
     println!("achievable patterns: {}, for constant faults: {strong}", patterns.len());
     for (residual, pattern) in residuals.iter().zip(&actuators::PATTERNS) {
-        let (order, (kept, dropped)) = (residual.generator.a.nrows(), residual.rank_gap);
+        let (order, (smallest, dropped)) = (residual.generator.a.nrows(), residual.rank_gap);
         let error = residual.decoupling_error;
         println!("pattern {pattern:?}: order {order}, decoupled to {error:.0e}");
-        println!("  ranks decided between {dropped:.0e} and {kept:.0e}");
+        println!("  ranks decided between {dropped:.0e} and {smallest:.0e}");
     }
     println!("other masses, H-infinity norms from commands, winds, faults less the design:");
     for index in 0..actuators::MODELS {

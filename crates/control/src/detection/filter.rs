@@ -261,8 +261,8 @@ impl DetectionFilter {
         for (name, column, rows) in [("e", &input.on_states, n), ("e_s", &input.on_measurements, p)]
         {
             if column.len() != rows {
-                let (expected, found) = ((rows, 1), (column.len(), 1));
-                return Err(Error::Shape { matrix: name, expected, found });
+                let (expected, actual) = ((rows, 1), (column.len(), 1));
+                return Err(Error::Shape { matrix: name, expected, actual });
             }
         }
         let generator = &self.generator;

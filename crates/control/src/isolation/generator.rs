@@ -83,7 +83,7 @@ impl Requirements {
             Some(noise) if noise.len() != measurements => Err(Error::Shape {
                 matrix: "noise",
                 expected: (measurements, 1),
-                found: (noise.len(), 1),
+                actual: (noise.len(), 1),
             }),
             _ => Ok(()),
         }
@@ -220,11 +220,11 @@ fn check_arguments(
     requirements.check(plant.c.nrows(), plant.domain)?;
     let faults = plant.b_f.ncols();
     if pattern.len() != faults {
-        let (expected, found) = ((faults, 1), (pattern.len(), 1));
-        return Err(Error::Shape { matrix: "pattern", expected, found });
+        let (expected, actual) = ((faults, 1), (pattern.len(), 1));
+        return Err(Error::Shape { matrix: "pattern", expected, actual });
     }
     if !pattern.contains(&true) {
-        return Err(Error::Empty { matrix: "pattern", found: (0, 1) });
+        return Err(Error::Empty { matrix: "pattern", actual: (0, 1) });
     }
     Ok(())
 }

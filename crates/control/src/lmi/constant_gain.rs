@@ -57,7 +57,7 @@ pub fn constant_gain(
     fixed: &[(usize, usize, f64)],
     width: f64,
 ) -> Result<ConstantGain, Error> {
-    let first = family.first().ok_or(Error::Empty { matrix: "the family", found: (0, 1) })?;
+    let first = family.first().ok_or(Error::Empty { matrix: "the family", actual: (0, 1) })?;
     let (s, r, m) = (target.nrows(), first.c.nrows(), first.b.ncols());
     check::shape("M", target, (s, m))?;
     check::positive("width", width)?;
@@ -67,8 +67,8 @@ pub fn constant_gain(
         check::shape("B", &system.b, (system.a.nrows(), m))?;
     }
     if let Some(&(row, column, _)) = fixed.iter().find(|entry| entry.0 >= s || entry.1 >= r) {
-        let (expected, found) = ((s, r), (row + 1, column + 1));
-        return Err(Error::Shape { matrix: "fixed", expected, found });
+        let (expected, actual) = ((s, r), (row + 1, column + 1));
+        return Err(Error::Shape { matrix: "fixed", expected, actual });
     }
     let width = width.max(1e-5);
     let mut points = Vec::new();

@@ -185,7 +185,7 @@ fn objective(q: &Affine, outputs: &DMatrix<f64>, of_mean: &DMatrix<f64>) -> Affi
 /// The mean of square matrices of equal size.
 fn mean(matrices: &[DMatrix<f64>]) -> Result<DMatrix<f64>, Error> {
     let Some(first) = matrices.first() else {
-        return Err(Error::Empty { matrix: "the list of vertices", found: (0, 0) });
+        return Err(Error::Empty { matrix: "the list of vertices", actual: (0, 0) });
     };
     let n = check::square("A", first)?;
     let mut sum = DMatrix::zeros(n, n);

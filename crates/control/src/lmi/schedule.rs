@@ -55,7 +55,7 @@ pub struct ScheduleCertificate {
 /// [`Error::Empty`] without values; [`Error::Shape`] for values of different shapes.
 pub fn bernstein(values: &[DMatrix<f64>]) -> Result<Vec<DMatrix<f64>>, Error> {
     let Some(first) = values.first() else {
-        return Err(Error::Empty { matrix: "values", found: (0, 0) });
+        return Err(Error::Empty { matrix: "values", actual: (0, 0) });
     };
     for value in values {
         check::shape("value", value, first.shape())?;
@@ -229,7 +229,7 @@ fn limit(intervals: &[Interval], domain: Domain) -> Result<f64, Error> {
 
 /// The length of the shortest interval of a consistent list.
 fn check(intervals: &[Interval]) -> Result<f64, Error> {
-    let none = Error::Empty { matrix: "A", found: (0, 0) };
+    let none = Error::Empty { matrix: "A", actual: (0, 0) };
     let first = intervals.first().and_then(|interval| interval.coefficients.first());
     let first = first.ok_or(none.clone())?;
     let n = check::square("A", first)?;

@@ -92,7 +92,7 @@ impl Program {
         thread::Builder::new().name("inequalities".to_owned()).spawn(solve).ok()?;
         loop {
             match receiver.recv_timeout(LOOK) {
-                Ok(found) => return found,
+                Ok(solution) => return solution,
                 Err(RecvTimeoutError::Timeout) if !ending() => {}
                 Err(_) => return None,
             }

@@ -57,7 +57,7 @@ pub fn weight_of_table(table: &[(f64, f64)], order: usize) -> Result<TableWeight
         return Err(Error::OutOfRange { name: "frequency", value: pair[1].0, rule });
     }
     let [(first, _), .., (last, _)] = table else {
-        return Err(Error::Empty { matrix: "table", found: (table.len(), 2) });
+        return Err(Error::Empty { matrix: "table", actual: (table.len(), 2) });
     };
     if !(1..=2).contains(&order) {
         let value = f64::from(u32::try_from(order).unwrap_or(u32::MAX));

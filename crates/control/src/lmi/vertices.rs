@@ -136,7 +136,7 @@ pub(crate) fn find_common(
 fn order(first: Option<&DMatrix<f64>>) -> Result<usize, Error> {
     match first {
         Some(a) => check::square("A", a),
-        None => Err(Error::Empty { matrix: "A", found: (0, 0) }),
+        None => Err(Error::Empty { matrix: "A", actual: (0, 0) }),
     }
 }
 

@@ -58,8 +58,8 @@ pub fn fault_bounds(
     let (n, q) = (plant.f_a.nrows(), plant.f_a.ncols());
     for (name, bounds) in [("magnitudes", magnitudes), ("rates", rates)] {
         if bounds.len() != q {
-            let (expected, found) = ((q, 1), (bounds.len(), 1));
-            return Err(Error::Shape { matrix: name, expected, found });
+            let (expected, actual) = ((q, 1), (bounds.len(), 1));
+            return Err(Error::Shape { matrix: name, expected, actual });
         }
     }
     for (&magnitude, &rate) in magnitudes.iter().zip(rates) {

@@ -38,9 +38,10 @@ fn augmented(plant: &FaultyPlant) -> Gains {
 /// The plant every 0.1 s, and gains whose feedback and estimator the laws take over.
 fn sampled() -> (FaultyPlant, Gains, Domain) {
     let plant = plant();
-    let found = sample(&ExtendedPlant::without_filter(plant.clone()), T).expect("a sampled plant");
+    let sampled =
+        sample(&ExtendedPlant::without_filter(plant.clone()), T).expect("a sampled plant");
     let gains = Gains { estimator: Estimator::Current, ..augmented(&plant) };
-    (found, gains, Domain::Sampled { period: T })
+    (sampled, gains, Domain::Sampled { period: T })
 }
 
 fn sorted_real(m: &DMatrix<f64>) -> Vec<f64> {
@@ -50,10 +51,10 @@ fn sorted_real(m: &DMatrix<f64>) -> Vec<f64> {
     all
 }
 
-fn close(found: &[f64], expected: &[f64], tolerance: f64) {
-    assert_eq!(found.len(), expected.len());
-    for (a, b) in found.iter().zip(expected) {
-        assert!((a - b).abs() < tolerance, "{found:?} {expected:?}");
+fn close(actual: &[f64], expected: &[f64], tolerance: f64) {
+    assert_eq!(actual.len(), expected.len());
+    for (a, b) in actual.iter().zip(expected) {
+        assert!((a - b).abs() < tolerance, "{actual:?} {expected:?}");
     }
 }
 

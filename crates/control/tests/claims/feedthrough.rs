@@ -75,8 +75,8 @@ fn points(domain: Domain) -> impl Iterator<Item = Complex<f64>> {
 }
 
 #[track_caller]
-fn assert_same(found: &ComplexMatrix, expected: &ComplexMatrix) {
-    let error = (found - expected).norm() / expected.norm();
+fn assert_same(actual: &ComplexMatrix, expected: &ComplexMatrix) {
+    let error = (actual - expected).norm() / expected.norm();
     assert!(error < 1e-11, "{error:e}");
 }
 
@@ -157,14 +157,16 @@ fn derivatives_of_the_peak_are_differences() {
 
 /// The growth of the states over a run of plant and controller that exchange their signals every `hold`
 /// seconds, with commands that arrive `delay` later; a sample contains the command that is in force.
-fn growth(own: &StateSpace, hold: f64, delay: f64) -> f64 {
+fn growth(controller: &StateSpace, hold: f64, delay: f64) -> f64 {
     const SAMPLES: usize = 20_000;
     const PARTS: f64 = 40.0;
     let plant = plant();
     let (a, b) = zero_order_hold(&plant.a, &plant.b, hold / PARTS).expect("a plant");
-    let (own_a, own_b) = match own.domain {
-        Domain::Continuous => zero_order_hold(&own.a, &own.b, hold).expect("a controller"),
-        Domain::Sampled { .. } => (own.a.clone(), own.b.clone()),
+    let (own_a, own_b) = match controller.domain {
+        Domain::Continuous => {
+            zero_order_hold(&controller.a, &controller.b, hold).expect("a controller")
+        }
+        Domain::Sampled { .. } => (controller.a.clone(), controller.b.clone()),
     };
     let later = (0..1000_u16)
         .find(|parts| f64::from(*parts) >= delay / hold * PARTS - 0.5)
@@ -177,7 +179,7 @@ fn growth(own: &StateSpace, hold: f64, delay: f64) -> f64 {
     for _ in 0..SAMPLES {
         // What the plant received last is in the measurement.
         let y = &plant.c * &x + &plant.d * &queue[0];
-        let u = &own.c * &z + &own.d * &y;
+        let u = &controller.c * &z + &controller.d * &y;
         z = &own_a * z + &own_b * y;
         for _ in 0..40 {
             queue.push_back(u.clone());

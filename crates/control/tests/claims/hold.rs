@@ -17,13 +17,13 @@ fn controller(h: f64) -> FirstOrderHold {
 }
 
 /// Largest distance in natural units, relative to the largest entry of the expected block.
-fn error_in_units(found: &DMatrix<f64>, expected: &DMatrix<f64>, inputs_are_states: bool) -> f64 {
+fn error_in_units(actual: &DMatrix<f64>, expected: &DMatrix<f64>, inputs_are_states: bool) -> f64 {
     let scaled = |m: &DMatrix<f64>| {
         DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| {
             m[(i, j)] / UNITS[i] * if inputs_are_states { UNITS[j] } else { 1.0 }
         })
     };
-    (scaled(found) - scaled(expected)).amax() / scaled(expected).amax()
+    (scaled(actual) - scaled(expected)).amax() / scaled(expected).amax()
 }
 
 fn assert_agrees(hold: &FirstOrderHold, expected: &DMatrix<f64>, allowed: f64) {
@@ -119,7 +119,7 @@ fn a_wrong_length_is_refused_and_leaves_the_output_untouched() {
     let hold = controller(1e-3);
     let mut out = [7.0; 5];
     let wrong = hold.step_into(&[0.0; 5], &[0.0; 2], &[0.0; 3], &mut out);
-    assert_eq!(wrong, Err(Error::Shape { matrix: "w1", expected: (2, 1), found: (3, 1) }));
+    assert_eq!(wrong, Err(Error::Shape { matrix: "w1", expected: (2, 1), actual: (3, 1) }));
     assert_eq!(out.map(f64::to_bits), [7.0_f64.to_bits(); 5]);
 }
 

@@ -27,15 +27,15 @@ fn disc(center: f64, radius: f64) -> Region {
 }
 
 /// Names of the requirements in conflict.
-fn conflict<T: std::fmt::Debug>(found: Result<Outcome<T>, Error>) -> Vec<&'static str> {
-    match found.expect("good arguments") {
+fn conflict<T: std::fmt::Debug>(outcome: Result<Outcome<T>, Error>) -> Vec<&'static str> {
+    match outcome.expect("good arguments") {
         Outcome::Infeasible { conflict } => conflict,
         other => panic!("{other:?}"),
     }
 }
 
-fn optimal<T: std::fmt::Debug>(found: Result<Outcome<T>, Error>) -> T {
-    match found.expect("good arguments") {
+fn optimal<T: std::fmt::Debug>(outcome: Result<Outcome<T>, Error>) -> T {
+    match outcome.expect("good arguments") {
         Outcome::Optimal(answer) => answer,
         other => panic!("{other:?}"),
     }

@@ -85,9 +85,9 @@ fn carts_loop() -> (Loop, LossyLoop) {
     let (a, b) = (reference("loss_a"), reference("loss_b"));
     let plant = FaultyPlant::with_constant_faults(a, b.clone(), DMatrix::identity(2, 4), b);
     let poles = real_poles(&[-6.0, -7.0, -8.0, -9.0, -10.0, -11.0]);
-    let found =
+    let designed =
         design(&plant, &real_poles(&[-1.0, -1.5, -2.0, -2.5]), &poles, None).expect("a design");
-    let controller = controller(&plant, &found.gains, Domain::Continuous).expect("a controller");
+    let controller = controller(&plant, &designed.gains, Domain::Continuous).expect("a controller");
     let lossy = LossyLoop::new(&plant, &controller, &[0, 1]).expect("a loop");
     ((plant, controller), lossy)
 }

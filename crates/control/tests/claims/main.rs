@@ -47,12 +47,12 @@ fn matrix(rows: usize, cols: usize, entries: &[f64]) -> DMatrix<f64> {
 }
 
 /// Largest distance of two matrices, each entry relative to the expected one.
-fn entry_error(found: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
-    assert_eq!(found.shape(), expected.shape());
+fn entry_error(actual: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
+    assert_eq!(actual.shape(), expected.shape());
     let relative = |x: f64, y: f64| {
         if (x - y).abs() > 0.0 { (x - y).abs() / y.abs() } else { 0.0 }
     };
-    found.zip_map(expected, relative).amax()
+    actual.zip_map(expected, relative).amax()
 }
 
 /// Entries in -5 to 5 without a pattern, the same in every run.

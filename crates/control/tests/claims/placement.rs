@@ -21,12 +21,12 @@ fn assert_assigned(
     placement: &Placement,
     poles: &[Complex<f64>],
 ) {
-    let mut wanted = poles.to_vec();
-    wanted.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
-    for (found, wanted) in
-        eigenvalues(&(a + b * &placement.gain)).expect("eigenvalues exist").iter().zip(wanted)
+    let mut required = poles.to_vec();
+    required.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
+    for (eigenvalue, required) in
+        eigenvalues(&(a + b * &placement.gain)).expect("eigenvalues exist").iter().zip(required)
     {
-        assert!((found - wanted).norm() < 1e-6 * wanted.norm(), "{found} {wanted}");
+        assert!((eigenvalue - required).norm() < 1e-6 * required.norm(), "{eigenvalue} {required}");
     }
 }
 

@@ -9,8 +9,8 @@ pub(crate) struct Case {
 
 impl Case {
     pub(crate) fn get(&self, name: &str) -> &DMatrix<f64> {
-        let found = self.matrices.iter().find(|(known, _)| *known == name);
-        &found.unwrap_or_else(|| panic!("{} has no {name}", self.name)).1
+        let matrix = self.matrices.iter().find(|(known, _)| *known == name);
+        &matrix.unwrap_or_else(|| panic!("{} has no {name}", self.name)).1
     }
 
     pub(crate) fn number(&self, name: &str) -> f64 {
@@ -20,20 +20,20 @@ impl Case {
 
 /// The cases of one kind.
 pub(crate) fn cases(text: &'static str, kind: &str) -> Vec<Case> {
-    let mut found = Vec::new();
-    let mut wanted = false;
+    let mut cases = Vec::new();
+    let mut is_of_kind = false;
     for line in text.lines().filter(|line| !line.starts_with('#')) {
         if let Some((found_kind, name)) = line.split_once(": ") {
-            wanted = found_kind == kind;
-            if wanted {
-                found.push(Case { name, matrices: Vec::new() });
+            is_of_kind = found_kind == kind;
+            if is_of_kind {
+                cases.push(Case { name, matrices: Vec::new() });
             }
-        } else if wanted {
-            found.last_mut().expect("a case").matrices.push(named_matrix(line));
+        } else if is_of_kind {
+            cases.last_mut().expect("a case").matrices.push(named_matrix(line));
         }
     }
-    assert!(!found.is_empty(), "no cases of {kind}");
-    found
+    assert!(!cases.is_empty(), "no cases of {kind}");
+    cases
 }
 
 fn named_matrix(line: &'static str) -> (&'static str, DMatrix<f64>) {

@@ -66,10 +66,10 @@ fn a_wrong_shape_is_reported_with_the_expected_one() {
     assert_eq!(name_of(controllability(&good, &tall)), "B");
     assert_eq!(name_of(observability(&good, &wide)), "C");
     let refused = FirstOrderHold::new(&good, &tall, 1.0);
-    assert_eq!(refused, Err(Error::Shape { matrix: "B", expected: (2, 1), found: (3, 1) }));
+    assert_eq!(refused, Err(Error::Shape { matrix: "B", expected: (2, 1), actual: (3, 1) }));
     assert_eq!(name_of(place(&good, &DMatrix::zeros(2, 0), &real_poles(&[-1.0, -2.0]))), "B");
     let refused = place(&good, &good, &real_poles(&[-1.0]));
-    assert_eq!(refused, Err(Error::PoleCount { expected: 2, found: 1 }));
+    assert_eq!(refused, Err(Error::PoleCount { expected: 2, actual: 1 }));
 }
 
 #[test]

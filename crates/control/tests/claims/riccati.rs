@@ -17,10 +17,10 @@ fn weights(case: &Case) -> Weights {
 
 /// Largest distance of the entries relative to sqrt(P[i,i] P[j,j]), which does not depend on units
 /// of states.
-pub(crate) fn distance(found: &DMatrix<f64>, exact: &DMatrix<f64>) -> f64 {
+pub(crate) fn distance(actual: &DMatrix<f64>, exact: &DMatrix<f64>) -> f64 {
     let size = exact.diagonal().map(|x| if x == 0.0 { 1.0 } else { x.abs().sqrt() });
-    let relative = |i: usize, j: usize| (found[(i, j)] - exact[(i, j)]).abs() / size[i] / size[j];
-    DMatrix::from_fn(found.nrows(), found.ncols(), relative).amax()
+    let relative = |i: usize, j: usize| (actual[(i, j)] - exact[(i, j)]).abs() / size[i] / size[j];
+    DMatrix::from_fn(actual.nrows(), actual.ncols(), relative).amax()
 }
 
 /// Compared with 60 digits, entries relative to sqrt(P[i,i] P[j,j]). If the equation is
@@ -29,12 +29,12 @@ fn assert_agrees_with_high_precision(kind: &str, domain: Domain) {
     let recorded = cases(RECORDED, kind);
     assert!(recorded.len() >= 28);
     for case in recorded {
-        let found = lqr(case.get("A"), case.get("B"), &weights(&case), domain);
-        let found = found.unwrap_or_else(|error| panic!("{kind}, {}: {error}", case.name));
-        let error = distance(&found.p, case.get("P"));
+        let regulator = lqr(case.get("A"), case.get("B"), &weights(&case), domain);
+        let regulator = regulator.unwrap_or_else(|error| panic!("{kind}, {}: {error}", case.name));
+        let error = distance(&regulator.p, case.get("P"));
         let allowed = (4.0 * case.number("scipy")).max(2e-11);
         assert!(error < allowed, "{kind}, {}: {error:e}, allowed {allowed:e}", case.name);
-        let gain = (&found.gain - case.get("K")).norm() / case.get("K").norm().max(1e-9);
+        let gain = (&regulator.gain - case.get("K")).norm() / case.get("K").norm().max(1e-9);
         assert!(gain < 1e-6, "{kind}, {}: gain {gain:e}", case.name);
     }
 }
@@ -140,11 +140,11 @@ fn weights_that_are_not_definite_are_refused_by_name() {
 fn bad_shapes_entries_and_periods_are_named() {
     let (a, b) = (-DMatrix::identity(2, 2), DMatrix::identity(2, 1));
     let refused = lqr(&a, &b, &identity_weights(2, 2), Domain::Continuous);
-    assert_eq!(refused, Err(Error::Shape { matrix: "R", expected: (1, 1), found: (2, 2) }));
+    assert_eq!(refused, Err(Error::Shape { matrix: "R", expected: (1, 1), actual: (2, 2) }));
     let mut weights = identity_weights(2, 1);
     weights.n = Some(DMatrix::zeros(1, 2));
     let refused = lqr(&a, &b, &weights, Domain::Continuous);
-    assert_eq!(refused, Err(Error::Shape { matrix: "N", expected: (2, 1), found: (1, 2) }));
+    assert_eq!(refused, Err(Error::Shape { matrix: "N", expected: (2, 1), actual: (1, 2) }));
     let refused = lqr(&a, &b, &identity_weights(2, 1), Domain::Sampled { period: 0.0 });
     assert!(matches!(refused, Err(Error::OutOfRange { name: "period", .. })), "{refused:?}");
     let bad = DMatrix::from_element(2, 2, f64::NAN);

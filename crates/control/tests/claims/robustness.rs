@@ -38,9 +38,10 @@ fn closed(case: &Case) -> Loop {
 }
 
 #[track_caller]
-fn assert_near(found: f64, expected: f64, tolerance: f64, what: &str) {
-    let same = found.to_bits() == expected.to_bits() || (found / expected - 1.0).abs() <= tolerance;
-    assert!(same, "{what}: found {found}, expected {expected}");
+fn assert_near(actual: f64, expected: f64, tolerance: f64, what: &str) {
+    let same =
+        actual.to_bits() == expected.to_bits() || (actual / expected - 1.0).abs() <= tolerance;
+    assert!(same, "{what}: found {actual}, expected {expected}");
 }
 
 /// 1 / (s (s + 1)) with u = -k y.
@@ -96,11 +97,14 @@ fn assert_derivatives(
     peak: impl Fn(&Loop) -> f64,
 ) {
     let (plant, controller) = parts(case);
-    let found = peak_derivatives(&plant, &controller, &at).expect("a peak");
+    let sensitivity = peak_derivatives(&plant, &controller, &at).expect("a peak");
     let reached = peak(&closed(case));
-    assert_near(found.value, reached, 1e-4, case.name);
-    let fields: [(&DMatrix<f64>, Field); 3] =
-        [(&found.a, |own| &mut own.a), (&found.b, |own| &mut own.b), (&found.c, |own| &mut own.c)];
+    assert_near(sensitivity.value, reached, 1e-4, case.name);
+    let fields: [(&DMatrix<f64>, Field); 3] = [
+        (&sensitivity.a, |plant| &mut plant.a),
+        (&sensitivity.b, |plant| &mut plant.b),
+        (&sensitivity.c, |plant| &mut plant.c),
+    ];
     let mut effects = Vec::new();
     for (derivatives, field) in fields {
         let values = field(&mut plant.clone()).clone();
@@ -121,9 +125,9 @@ fn assert_derivatives(
     }
     let largest = effects.iter().map(|(_, expected)| expected.abs()).fold(0.0, f64::max);
     assert!(largest > 0.1, "{} {at:?}: {largest}", case.name);
-    for (found, expected) in effects {
-        let error = (found - expected).abs() / largest;
-        assert!(error < tolerance, "{} {at:?}: {found} {expected}", case.name);
+    for (effect, expected) in effects {
+        let error = (effect - expected).abs() / largest;
+        assert!(error < tolerance, "{} {at:?}: {effect} {expected}", case.name);
     }
 }
 

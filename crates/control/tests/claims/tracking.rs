@@ -78,14 +78,14 @@ fn designed(domain: Domain, estimator: Estimator, sensor: bool) -> Designed {
         ),
     };
     let n = extended.states;
-    let own = (plant.a.view((0, 0), (n, n)).into_owned(), plant.b.rows(0, n).into_owned());
+    let pair = (plant.a.view((0, 0), (n, n)).into_owned(), plant.b.rows(0, n).into_owned());
     let (a_e, b_e) =
-        extended_pair(&own.0, &own.1, &output, domain).expect("the design of the test exists");
+        extended_pair(&pair.0, &pair.1, &output, domain).expect("the design of the test exists");
     let assign = if domain == Domain::Continuous { place } else { place_discrete };
     let k = assign(&a_e, &b_e, &poles).expect("the design of the test exists").gain;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-    let seen = estimator.output_matrix(&a_0, &c_0);
-    let l = -assign(&a_0.transpose(), &seen.transpose(), &observer)
+    let seen_states = estimator.output_matrix(&a_0, &c_0);
+    let l = -assign(&a_0.transpose(), &seen_states.transpose(), &observer)
         .expect("the design of the test exists")
         .gain
         .transpose();
@@ -125,41 +125,41 @@ fn all_designs() -> Vec<Designed> {
 }
 
 /// The plant without filter, from [u; f] to y.
-fn physical(own: &Designed) -> StateSpace {
-    let n = own.extended.states;
-    let (m, q) = (own.plant.b.ncols(), own.plant.f_a.ncols());
+fn physical(designed: &Designed) -> StateSpace {
+    let n = designed.extended.states;
+    let (m, q) = (designed.plant.b.ncols(), designed.plant.f_a.ncols());
     let mut b = DMatrix::zeros(n, m + q);
-    b.columns_mut(0, m).copy_from(&own.plant.b.rows(0, n));
-    b.columns_mut(m, q).copy_from(&own.plant.f_a.rows(0, n));
+    b.columns_mut(0, m).copy_from(&designed.plant.b.rows(0, n));
+    b.columns_mut(m, q).copy_from(&designed.plant.f_a.rows(0, n));
     let c = plant()[2].clone();
     let mut d = DMatrix::zeros(c.nrows(), m + q);
     if q > 1 {
         d[(1, m + 1)] = 1.0;
     }
-    StateSpace { a: own.plant.a.view((0, 0), (n, n)).into(), b, c, d, domain: own.domain }
+    StateSpace { a: designed.plant.a.view((0, 0), (n, n)).into(), b, c, d, domain: designed.domain }
 }
 
 /// The gain for constant signals.
-fn at_constant_signals(own: &StateSpace) -> DMatrix<f64> {
-    let n = own.a.nrows();
-    let kept = match own.domain {
+fn at_constant_signals(system: &StateSpace) -> DMatrix<f64> {
+    let n = system.a.nrows();
+    let held = match system.domain {
         Domain::Continuous => 0.0,
         Domain::Sampled { .. } => 1.0,
     };
-    let states = (DMatrix::identity(n, n) * kept - &own.a)
+    let states = (DMatrix::identity(n, n) * held - &system.a)
         .lu()
-        .solve(&own.b)
+        .solve(&system.b)
         .expect("the design of the test exists");
-    &own.c * states + &own.d
+    &system.c * states + &system.d
 }
 
 /// The largest distance of a number from the nearest one of the other list.
-fn distance(found: &[Complex<f64>], wanted: &[Complex<f64>]) -> f64 {
-    assert_eq!(found.len(), wanted.len());
+fn distance(actual: &[Complex<f64>], expected: &[Complex<f64>]) -> f64 {
+    assert_eq!(actual.len(), expected.len());
     let nearest = |one: &Complex<f64>| {
-        wanted.iter().map(|other| (other - one).norm()).fold(f64::INFINITY, f64::min)
+        expected.iter().map(|other| (other - one).norm()).fold(f64::INFINITY, f64::min)
     };
-    found.iter().map(nearest).fold(0.0, f64::max)
+    actual.iter().map(nearest).fold(0.0, f64::max)
 }
 
 #[test]
@@ -449,8 +449,8 @@ fn calculations(
     let rate = if domain == SAMPLED { -(1.0 - f).ln() } else { f };
     let gain = |k| windup_gain(k, ranges, rate, domain);
     let l = [gain(k[0])?, gain(k[1])?];
-    let found = interpolated_windup(k, [&l[0], &l[1]], ranges, domain)?;
-    Ok((l, found))
+    let windup = interpolated_windup(k, [&l[0], &l[1]], ranges, domain)?;
+    Ok((l, windup))
 }
 
 /// The largest modulus of the eigenvalues of I - L_w S K_i on the way, less 1; in continuous time the largest
@@ -463,13 +463,13 @@ fn excess(
 ) -> f64 {
     let k = (k[0] * (1.0 - s) + k[1] * s).select_rows(set);
     let l = (&l[0] * (1.0 - s) + &l[1] * s).select_columns(set);
-    let own = -(l * k);
+    let dynamics = -(l * k);
     if domain == SAMPLED {
-        let own = DMatrix::identity(own.nrows(), own.nrows()) + own;
-        return own.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max)
+        let dynamics = DMatrix::identity(dynamics.nrows(), dynamics.nrows()) + dynamics;
+        return dynamics.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max)
             - 1.0;
     }
-    own.complex_eigenvalues().iter().map(|value| value.re).fold(f64::NEG_INFINITY, f64::max)
+    dynamics.complex_eigenvalues().iter().map(|value| value.re).fold(f64::NEG_INFINITY, f64::max)
 }
 
 #[test]
@@ -494,9 +494,9 @@ fn stable_where_the_eigenvalues_are(domain: Domain) {
         let ranges: Vec<_> =
             (0..m).map(|_| (numbers.next() < 0.8).then(|| 0.2 + 3.0 * numbers.next())).collect();
         let k = [&k_0, &k_1];
-        let found = calculations(k, &ranges, 0.05 + 0.9 * numbers.next(), domain);
-        let (l, found) = found.expect("gains of small matrices");
-        match found {
+        let outcome = calculations(k, &ranges, 0.05 + 0.9 * numbers.next(), domain);
+        let (l, windup) = outcome.expect("gains of small matrices");
+        match windup {
             InterpolatedWindup::Stable => {
                 let limited: Vec<_> = (0..m).filter(|&j| ranges[j].is_some()).collect();
                 for bits in 1_usize..1 << limited.len() {
@@ -510,8 +510,8 @@ fn stable_where_the_eigenvalues_are(domain: Domain) {
                 counts[0] += 1;
             }
             InterpolatedWindup::Unstable { part, limited, instability } => {
-                let own = excess(k, &l, &limited, (part, domain));
-                assert!((own - instability).abs() < 1e-9 * (1.0 + own) && own > 1e-10);
+                let growth = excess(k, &l, &limited, (part, domain));
+                assert!((growth - instability).abs() < 1e-9 * (1.0 + growth) && growth > 1e-10);
                 counts[1] += 1;
             }
             InterpolatedWindup::Undecided { limited } => {

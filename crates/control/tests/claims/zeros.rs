@@ -15,11 +15,11 @@ pub(crate) fn slicot() -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
     (a, b, matrix(3, 6, &c))
 }
 
-fn assert_zeros(found: &[Complex<f64>], expected: &[Complex<f64>], allowed: f64) {
-    assert_eq!(found.len(), expected.len(), "{found:?}");
+fn assert_zeros(zeros: &[Complex<f64>], expected: &[Complex<f64>], allowed: f64) {
+    assert_eq!(zeros.len(), expected.len(), "{zeros:?}");
     for zero in expected {
-        let nearest = found.iter().map(|x| (x - zero).norm()).fold(f64::INFINITY, f64::min);
-        assert!(nearest < allowed * zero.norm().max(1.0), "{zero}: {found:?}");
+        let nearest = zeros.iter().map(|x| (x - zero).norm()).fold(f64::INFINITY, f64::min);
+        assert!(nearest < allowed * zero.norm().max(1.0), "{zero}: {zeros:?}");
     }
 }
 

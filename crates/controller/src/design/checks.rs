@@ -65,13 +65,13 @@ impl Design {
             "L_w" => (t, m),
             _ => (q, q),
         };
-        for (what, found) in self.matrices() {
+        for (what, matrix) in self.matrices() {
             let (rows, columns) = expected(what);
-            if (found.rows, found.columns) != (rows.1, columns.1) {
+            if (matrix.rows, matrix.columns) != (rows.1, columns.1) {
                 return Err(DesignError::Shape {
                     path: path.to_owned(),
                     what,
-                    found: format!("{} x {}", found.rows, found.columns),
+                    actual: format!("{} x {}", matrix.rows, matrix.columns),
                     expected: format!("{} x {}", rows.1, columns.1),
                     meaning: format!("{} x {}", rows.0, columns.0),
                 });
@@ -81,7 +81,7 @@ impl Design {
             Some(filter) if filter.len() != p.1 => Err(DesignError::Shape {
                 path: path.to_owned(),
                 what: "filter",
-                found: format!("{} numbers", filter.len()),
+                actual: format!("{} numbers", filter.len()),
                 expected: format!("{} numbers", p.1),
                 meaning: p.0.to_owned(),
             }),
@@ -120,11 +120,11 @@ impl Design {
                 all.sort_unstable();
                 all.join(", ")
             };
-            let found = names(&mut point.matrices().map(|(name, _)| name));
+            let stated = names(&mut point.matrices().map(|(name, _)| name));
             let expected = names(&mut self.matrices().map(|(name, _)| name));
-            if found != expected {
+            if stated != expected {
                 return refuse(format!(
-                    "{place}: of P_f, K_i, L_w, N_r it states [{found}], expected [{expected}] as above"
+                    "{place}: of P_f, K_i, L_w, N_r it states [{stated}], expected [{expected}] as above"
                 ));
             }
             for (name, matrix) in point.matrices() {
@@ -221,9 +221,9 @@ impl Design {
         }
         let count = self.faults.len();
         [("rho", rho), ("delta", delta)].into_iter().find_map(|(name, list)| {
-            let found = list.len();
-            let text = format!("{name} has {found} numbers, expected {count}, one for each fault");
-            (found != count).then_some(text)
+            let length = list.len();
+            let text = format!("{name} has {length} numbers, expected {count}, one for each fault");
+            (length != count).then_some(text)
         })
     }
 

@@ -97,26 +97,28 @@ impl DetectionDesign {
         }
         let stated = self.sample_time.is_some();
         if stated == design.sample_time.is_some() {
-            let (found, expected) =
+            let (actual, expected) =
                 if stated { ("is stated", "none") } else { ("is missing", "one") };
             return Some(format!(
-                "detection.sample_time {found}; expected {expected}, as a continuous controller, and no \
+                "detection.sample_time {actual}; expected {expected}, as a continuous controller, and no \
                  sampled one, has its own"
             ));
         }
         let rows = self.c.rows;
-        let taken: usize = self.tests.iter().map(|test| test.residuals).sum();
-        if rows != taken {
-            return Some(format!("the tests take {taken} residuals, detection.C has {rows} rows"));
+        let assigned: usize = self.tests.iter().map(|test| test.residuals).sum();
+        if rows != assigned {
+            return Some(format!(
+                "the tests take {assigned} residuals, detection.C has {rows} rows"
+            ));
         }
         self.tests.iter().find_map(|test| self.contradiction_of(test))
     }
 
     fn contradiction_of(&self, test: &TestDesign) -> Option<String> {
-        let (name, found, expected) = (&test.name, test.reacts.len(), self.faults.len());
-        if found != expected {
+        let (name, length, expected) = (&test.name, test.reacts.len(), self.faults.len());
+        if length != expected {
             return Some(format!(
-                "detection test {name}: reacts has {found} entries, expected {expected}, one for each fault"
+                "detection test {name}: reacts has {length} entries, expected {expected}, one for each fault"
             ));
         }
         match (test.drift, test.window, test.residuals) {

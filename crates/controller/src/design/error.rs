@@ -13,14 +13,14 @@ pub enum DesignError {
         message: String,
     },
     /// A matrix has a wrong number of rows or columns.
-    #[error("{path}: {what} is {found}, expected {expected} ({meaning})")]
+    #[error("{path}: {what} is {actual}, expected {expected} ({meaning})")]
     Shape {
         /// The file.
         path: String,
         /// The matrix.
         what: &'static str,
         /// Its shape.
-        found: String,
+        actual: String,
         /// The shape that it must have.
         expected: String,
         /// What rows and columns stand for.

@@ -200,10 +200,10 @@ impl<N: Number, const TESTS: usize> Outcomes<'_, N, TESTS> {
         drifts: &[N; TESTS],
         sample: u32,
     ) {
-        let taken = tests.iter_mut().zip(residuals).zip(drifts);
+        let times = tests.iter_mut().zip(residuals).zip(drifts);
         self.compare(
             sample,
-            taken.map(|((test, residual), drift)| Some(test.take(residual, drift, sample))),
+            times.map(|((test, residual), drift)| Some(test.take(residual, drift, sample))),
         );
     }
 

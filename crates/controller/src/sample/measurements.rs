@@ -18,14 +18,14 @@ impl<N: Number> Validity<'_, N> {
     /// Takes the measurements that are finite and in their range. The others keep their last value, and `held` counts
     /// the samples for which they do. Returns whether there is one of them.
     #[inline(always)]
-    pub fn take(&self, values: &[N], kept: &mut [N], held: &mut [u32]) -> bool {
+    pub fn take(&self, values: &[N], last_values: &mut [N], held: &mut [u32]) -> bool {
         let mut counters = held.iter_mut();
         let mut is_held = false;
         let ranges = self.low.iter().zip(self.high);
-        for ((kept, value), (low, high)) in kept.iter_mut().zip(values).zip(ranges) {
+        for ((last_value, value), (low, high)) in last_values.iter_mut().zip(values).zip(ranges) {
             let is_used = value.is_finite() && !value.is_below(low) && !value.is_above(high);
             if is_used {
-                *kept = value.clone();
+                *last_value = value.clone();
             }
             if let Some(count) = counters.next() {
                 *count = if is_used { 0 } else { count.saturating_add(1) };

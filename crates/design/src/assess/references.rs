@@ -227,7 +227,7 @@ fn system(
         },
         (None, TrackingAction::Feedforward(n_r)) => Action::Feedforward(n_r),
         (None, TrackingAction::Integral { .. }) => {
-            return Err(Error::Empty { matrix: "K_i", found: (0, 0) });
+            return Err(Error::Empty { matrix: "K_i", actual: (0, 0) });
         }
     };
     let whole = reference_system(&a, &b, &k_x, &action, designed.domain)?;

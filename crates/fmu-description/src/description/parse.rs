@@ -98,7 +98,7 @@ fn version(root: &Element<'_>) -> Result<Version, ParseError> {
             at: root.at,
             element: root.name.to_owned(),
             expected: "the root element fmiModelDescription".to_owned(),
-            found: format!("<{}>", root.name),
+            actual: format!("<{}>", root.name),
         });
     }
     let stated = root.attributes.iter().find(|(name, _)| *name == "fmiVersion");
@@ -108,7 +108,7 @@ fn version(root: &Element<'_>) -> Result<Version, ParseError> {
             element: root.name.to_owned(),
             attribute: "fmiVersion",
             expected: "a value".to_owned(),
-            found: "no such attribute".to_owned(),
+            actual: "no such attribute".to_owned(),
         });
     };
     let trimmed = text.trim_matches(WHITE_SPACE);
@@ -122,7 +122,7 @@ fn version(root: &Element<'_>) -> Result<Version, ParseError> {
         Some(("3.", minor)) if minor.starts_with(|character: char| character.is_ascii_digit()) => {
             Ok(Version::V3)
         }
-        _ => Err(ParseError::Version { at: root.at, found: text.clone().into_owned() }),
+        _ => Err(ParseError::Version { at: root.at, actual: text.clone().into_owned() }),
     }
 }
 

@@ -169,7 +169,7 @@ impl Unpacked {
             }
             PackageError::Missing {
                 expected: format!("the library {}", expected.join(" or ")),
-                found: actual,
+                actual,
             }
         })
     }
@@ -346,8 +346,5 @@ fn missing(names: &[String]) -> PackageError {
         None if tops.is_empty() => "nothing".to_owned(),
         None => tops.join(", "),
     };
-    PackageError::Missing {
-        expected: format!("{DESCRIPTION} at the root of the FMU"),
-        found: actual,
-    }
+    PackageError::Missing { expected: format!("{DESCRIPTION} at the root of the FMU"), actual }
 }

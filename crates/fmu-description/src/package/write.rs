@@ -92,7 +92,7 @@ impl Package {
             let actual = target.display().to_string();
             return Err(PackageError::Missing {
                 expected: "a file name ending in .fmu".into(),
-                found: actual,
+                actual,
             });
         }
         self.check(target)?;
@@ -197,5 +197,5 @@ fn demand(holds: bool, expected: &str, actual: &str) -> Result<(), PackageError>
         return Ok(());
     }
     let (expected, actual) = (expected.to_owned(), actual.to_owned());
-    Err(PackageError::Missing { expected, found: actual })
+    Err(PackageError::Missing { expected, actual })
 }

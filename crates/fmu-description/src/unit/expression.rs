@@ -94,12 +94,7 @@ impl<'a> Cursor<'a> {
     fn syntax(&self, expected: &'static str) -> UnitError {
         let actual = self.peek().map_or("the end".to_owned(), |character| format!("{character:?}"));
         let column = self.column(self.at);
-        UnitError::Syntax {
-            expression: self.expression.to_owned(),
-            column,
-            expected,
-            found: actual,
-        }
+        UnitError::Syntax { expression: self.expression.to_owned(), column, expected, actual }
     }
 
     pub(super) fn unit(&mut self) -> Result<BaseUnit, UnitError> {
@@ -115,7 +110,7 @@ impl<'a> Cursor<'a> {
         let factor = product.factor();
         if !(1e-300..=1e300).contains(&factor) {
             let (expression, actual) = (self.expression.to_owned(), format!("{factor:?}"));
-            return Err(UnitError::Magnitude { expression, found: actual });
+            return Err(UnitError::Magnitude { expression, actual });
         }
         Ok(BaseUnit::from_exponents(product.exponents, factor, 0.0))
     }

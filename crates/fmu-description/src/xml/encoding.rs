@@ -41,7 +41,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Warning>), Pa
         Some(encoding) if encoding != UTF_16LE && encoding != UTF_16BE => {
             converted(bytes, encoding)
         }
-        _ => Err(ParseError::Encoding { found: format!("encoding {declared:?}") }),
+        _ => Err(ParseError::Encoding { actual: format!("encoding {declared:?}") }),
     }
 }
 
@@ -52,7 +52,7 @@ fn converted<'a>(
     let actual = format!("encoding {:?}", encoding.name());
     let text = encoding.decode_without_bom_handling_and_without_replacement(bytes);
     let text = text.ok_or_else(|| ParseError::Encoding {
-        found: format!("{actual} with bytes that it does not have"),
+        actual: format!("{actual} with bytes that it does not have"),
     })?;
     Ok((text, Some(other(actual))))
 }
@@ -62,7 +62,7 @@ fn other(actual: String) -> Warning {
         at: Position::START,
         place: "the file".to_owned(),
         expected: "UTF-8 without a byte order mark".to_owned(),
-        found: actual,
+        actual,
         assumed: "it was read as what it is".to_owned(),
         section: "2.2",
         by_schema: false,
@@ -74,7 +74,7 @@ fn utf8(bytes: &[u8]) -> Result<Cow<'_, str>, ParseError> {
         let at = error.valid_up_to();
         let line = bytes[..at].split(|byte| *byte == b'\n').count();
         let actual = format!("a byte 0x{:02x} that is not UTF-8 in line {line}", bytes[at]);
-        ParseError::Encoding { found: actual }
+        ParseError::Encoding { actual }
     })
 }
 

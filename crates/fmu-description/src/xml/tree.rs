@@ -105,7 +105,7 @@ impl<'a> Tree<'a> {
             self.root = Some(element);
         } else {
             let actual = format!("a second root element <{}>", element.name);
-            return Err(ParseError::Xml { at: element.at, found: actual });
+            return Err(ParseError::Xml { at: element.at, actual });
         }
         Ok(())
     }
@@ -120,9 +120,9 @@ impl<'a> Tree<'a> {
     fn finish(self, at: Position) -> Result<Element<'a>, ParseError> {
         if let Some(element) = self.open.last() {
             let actual = format!("the end of the file inside <{}>", element.name);
-            return Err(ParseError::Xml { at: element.at, found: actual });
+            return Err(ParseError::Xml { at: element.at, actual });
         }
-        let none = || ParseError::Xml { at, found: "a file without an element".to_owned() };
+        let none = || ParseError::Xml { at, actual: "a file without an element".to_owned() };
         self.root.ok_or_else(none)
     }
 
@@ -148,7 +148,7 @@ impl<'a> Tree<'a> {
                 return Err(limit(at, "attributes", ATTRIBUTES));
             }
             let wrong =
-                |what: String| ParseError::Xml { at, found: format!("in <{name}>: {what}") };
+                |what: String| ParseError::Xml { at, actual: format!("in <{name}>: {what}") };
             let attribute = attribute.map_err(|error| wrong(error.to_string()))?;
             let value = attribute
                 .normalized_value(XmlVersion::Explicit1_0)
@@ -186,7 +186,7 @@ pub(super) fn read_but(
         match reader.read_event() {
             Err(error) => {
                 let at = place.advance(reader.error_position());
-                return Err(ParseError::Xml { at, found: error.to_string() });
+                return Err(ParseError::Xml { at, actual: error.to_string() });
             }
             Ok(Event::DocType(_)) => return Err(ParseError::Doctype { at }),
             Ok(Event::Start(tag)) if skipped(&tag) => {
@@ -216,7 +216,7 @@ fn skip(reader: &mut Reader<&[u8]>, tree: &Tree<'_>, at: Position) -> Result<(),
     let mut inner = 1;
     while inner > 0 {
         match reader.read_event() {
-            Err(error) => return Err(ParseError::Xml { at, found: error.to_string() }),
+            Err(error) => return Err(ParseError::Xml { at, actual: error.to_string() }),
             Ok(Event::DocType(_)) => return Err(ParseError::Doctype { at }),
             Ok(Event::Start(_)) => {
                 tree.go_down(at, inner)?;
@@ -226,7 +226,7 @@ fn skip(reader: &mut Reader<&[u8]>, tree: &Tree<'_>, at: Position) -> Result<(),
             Ok(Event::End(_)) => inner -= 1,
             Ok(Event::Eof) => {
                 let actual = "the end of the file inside an annotation".to_owned();
-                return Err(ParseError::Xml { at, found: actual });
+                return Err(ParseError::Xml { at, actual });
             }
             Ok(_) => {}
         }

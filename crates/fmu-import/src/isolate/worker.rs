@@ -128,12 +128,12 @@ fn serve(channel: &mut Channel, integrator: Option<Integrator>) -> Result<(), Wo
     while !worker.freed {
         match channel.wait(turn) {
             WaitResult::Turn(posted) if posted == turn.wrapping_add(1) => {}
-            WaitResult::Turn(word) => return Err(WorkerError::Corrupted { found: word }),
+            WaitResult::Turn(word) => return Err(WorkerError::Corrupted { actual: word }),
             WaitResult::TimedOut => continue,
             WaitResult::Closed => return Ok(()),
         }
         let word = worker.shared.command().load(Ordering::Relaxed);
-        let function = Function::from_word(word).ok_or(WorkerError::Corrupted { found: word })?;
+        let function = Function::from_word(word).ok_or(WorkerError::Corrupted { actual: word })?;
         worker.perform(function);
         turn = turn.wrapping_add(2);
         channel.post(turn);

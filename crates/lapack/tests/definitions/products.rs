@@ -140,14 +140,14 @@ fn symv_reads_one_triangle() {
 /// The target keeps one triangle and gets the other one.
 fn assert_triangle(letter: u8, target: &[f64], before: &DMatrix<f64>, expected: &DMatrix<f64>) {
     let n = before.nrows();
-    let found = matrix(n, n, 1, target);
+    let actual = matrix(n, n, 1, target);
     let strict = |m: &DMatrix<f64>| m.lower_triangle() - DMatrix::from_diagonal(&m.diagonal());
-    let wanted = if letter == b'U' {
+    let exact = if letter == b'U' {
         expected.upper_triangle() + strict(before)
     } else {
         expected.lower_triangle() + strict(&before.transpose()).transpose()
     };
-    assert!((found - wanted).amax() < 1e-14);
+    assert!((actual - exact).amax() < 1e-14);
 }
 
 #[test]

@@ -11,7 +11,7 @@ struct Spectrum {
 /// Requests the size of the workspace, then eigenvalues and eigenvectors.
 fn syevr(job: u8, triangle: u8, a: &DMatrix<f64>) -> Spectrum {
     let n = a.nrows();
-    let mut found =
+    let mut spectrum =
         Spectrum { info: 1, count: 0, values: vec![GUARD; n], vectors: vec![GUARD; (n + 1) * n] };
     let (mut stored, mut support) = (array(a, 2), vec![0; 2 * n]);
     let (mut work, mut iwork) = (vec![0.0], vec![0]);
@@ -31,25 +31,25 @@ fn syevr(job: u8, triangle: u8, a: &DMatrix<f64>) -> Spectrum {
                 0,
                 0,
                 -1.0,
-                &mut found.count,
-                &mut found.values,
-                &mut found.vectors,
+                &mut spectrum.count,
+                &mut spectrum.values,
+                &mut spectrum.vectors,
                 int(n + 1),
                 &mut support,
                 &mut work,
                 lengths.0,
                 &mut iwork,
                 lengths.1,
-                &mut found.info,
+                &mut spectrum.info,
             );
         }
-        assert_eq!(found.info, 0);
+        assert_eq!(spectrum.info, 0);
         lengths = (asked(&work), iwork[0]);
         assert!(lengths.0 >= 1 && lengths.1 >= 1);
         work.resize(usize::try_from(lengths.0).unwrap(), 0.0);
         iwork.resize(usize::try_from(lengths.1).unwrap(), 0);
     }
-    found
+    spectrum
 }
 
 /// Matrices with repeated, zero, tiny and huge eigenvalues, and ordinary ones.

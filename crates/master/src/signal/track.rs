@@ -48,24 +48,24 @@ pub enum TrackError {
     #[error("there are no points, expected at least one")]
     Empty,
     /// A time or a value is not finite, or a time is too large.
-    #[error("point {point}: the {what} is {found}, expected a finite number")]
+    #[error("point {point}: the {what} is {actual}, expected a finite number")]
     Number {
         /// Number of the point.
         point: usize,
         /// "time" or "value".
         what: &'static str,
         /// The number found.
-        found: f64,
+        actual: f64,
     },
     /// A time is less than the time before it.
-    #[error("point {point}: the time {found} s comes after {before} s, expected ascending times")]
+    #[error("point {point}: the time {actual} s comes after {before} s, expected ascending times")]
     Order {
         /// The point.
         point: usize,
         /// The time before.
         before: f64,
         /// The time.
-        found: f64,
+        actual: f64,
     },
     /// Times and values have different lengths.
     #[error("there are {values} values, expected {times}, one for each time")]
@@ -203,13 +203,13 @@ fn check(times: &[f64], values: &[f64]) -> Result<(), TrackError> {
     for (index, (&time, &value)) in times.iter().zip(values).enumerate() {
         let point = index + 1;
         if !time.is_finite() || time.abs() > LARGEST_TIME {
-            return Err(TrackError::Number { point, what: "time", found: time });
+            return Err(TrackError::Number { point, what: "time", actual: time });
         }
         if !value.is_finite() {
-            return Err(TrackError::Number { point, what: "value", found: value });
+            return Err(TrackError::Number { point, what: "value", actual: value });
         }
         if time < before {
-            return Err(TrackError::Order { point, before, found: time });
+            return Err(TrackError::Order { point, before, actual: time });
         }
         before = time;
     }

@@ -70,7 +70,7 @@ impl System {
         }
         Err(SystemError::Role {
             name: self.name(port),
-            found: format!("a variable of causality {}", causality.as_str()),
+            actual: format!("a variable of causality {}", causality.as_str()),
             expected: expected.as_str().to_owned(),
         })
     }
@@ -101,7 +101,7 @@ impl System {
             _ => {
                 return Err(SystemError::Role {
                     name: self.name(to),
-                    found: format!("a variable of type {}", self.type_name(to)),
+                    actual: format!("a variable of type {}", self.type_name(to)),
                     expected: format!("{} as {}", self.type_name(from), self.name(from)),
                 });
             }
@@ -111,7 +111,7 @@ impl System {
         }
         Err(SystemError::Role {
             name: self.name(to),
-            found: format!("a variable of type {}", self.type_name(to)),
+            actual: format!("a variable of type {}", self.type_name(to)),
             expected: format!("the type that its transformation is for: {transformation:?}"),
         })
     }

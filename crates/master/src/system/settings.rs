@@ -149,7 +149,7 @@ impl System {
                 continue;
             }
             let (value, actual) = (setting.text, value.to_string());
-            let error = SystemError::LostSetting { name, value, found: actual };
+            let error = SystemError::LostSetting { name, value, actual };
             if causality == Causality::Parameter {
                 return Err(error);
             }

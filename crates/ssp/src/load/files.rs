@@ -96,7 +96,7 @@ impl Files {
         if name.contains('/') {
             let (expected, actual) = ("the name of an SSD at the root of the SSP", name.to_owned());
             let what = target.shown.display().to_string();
-            return Err(SspError::Missing { what, expected: expected.to_owned(), found: actual });
+            return Err(SspError::Missing { what, expected: expected.to_owned(), actual });
         }
         let inner = Target::new(folder.join(name), target.shown.join(name));
         if !inner.path.is_file() {
@@ -105,7 +105,7 @@ impl Files {
             return Err(SspError::Missing {
                 what,
                 expected: format!("{name} at its root"),
-                found: definitions,
+                actual: definitions,
             });
         }
         self.ssd(&inner, base)

@@ -261,6 +261,6 @@ fn wrong(element: &Element, expected: impl Into<String>, actual: impl Into<Strin
         at: element.at,
         element: local(element).to_owned(),
         expected: expected.into(),
-        found: actual.into(),
+        actual: actual.into(),
     }
 }

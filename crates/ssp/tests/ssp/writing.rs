@@ -88,7 +88,9 @@ fn connectors() -> Vec<Connector> {
         ConnectorKind::Inout,
     ];
     let kinds = kinds.into_iter().zip(dictionary().entries);
-    kinds.map(|(kind, (name, own))| Connector { name, kind, kind_of_value: Some(own) }).collect()
+    kinds
+        .map(|(kind, (name, value))| Connector { name, kind, kind_of_value: Some(value) })
+        .collect()
 }
 
 fn file<T>(uri: &str, in_component: bool) -> Source<T> {

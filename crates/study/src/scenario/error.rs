@@ -31,12 +31,12 @@ pub enum Reason {
     #[error(transparent)]
     Name(#[from] SystemError),
     /// The variable cannot be set during the run.
-    #[error("{name} is {found}, expected an input or a tunable parameter")]
+    #[error("{name} is {actual}, expected an input or a tunable parameter")]
     NotSettable {
         /// The variable.
         name: String,
         /// Its causality and variability.
-        found: String,
+        actual: String,
     },
     /// The input already has a source.
     #[error(
@@ -58,28 +58,28 @@ pub enum Reason {
         first: String,
     },
     /// A fault on a variable without a connection and without a signal.
-    #[error("{name} is {found}, expected a connected input, or one that a signal drives")]
+    #[error("{name} is {actual}, expected a connected input, or one that a signal drives")]
     NoConnection {
         /// The variable.
         name: String,
         /// The kind of the variable.
-        found: &'static str,
+        actual: &'static str,
     },
     /// The input has another source than stated.
-    #[error("{target} is connected to {found}, expected {stated}")]
+    #[error("{target} is connected to {actual}, expected {stated}")]
     OtherSource {
         /// The input.
         target: String,
         /// Its source.
-        found: String,
+        actual: String,
         /// The source stated.
         stated: String,
     },
     /// An entry does not have exactly one kind.
-    #[error("found {}, expected exactly one of {expected}", listed(found))]
+    #[error("found {}, expected exactly one of {expected}", listed(actual))]
     Kinds {
         /// The kinds found.
-        found: Vec<&'static str>,
+        actual: Vec<&'static str>,
         /// The kinds possible.
         expected: &'static str,
     },
@@ -96,12 +96,12 @@ pub enum Reason {
         expected: &'static str,
     },
     /// A number is out of range.
-    #[error("{what} is {found}, expected {expected}")]
+    #[error("{what} is {actual}, expected {expected}")]
     Number {
         /// Name of the number.
         what: &'static str,
         /// The number.
-        found: f64,
+        actual: f64,
         /// The condition it must satisfy.
         expected: &'static str,
     },
@@ -114,12 +114,12 @@ pub enum Reason {
         expected: &'static str,
     },
     /// A value does not fit the type of the variable.
-    #[error("{name} = {found}: expected {expected}")]
+    #[error("{name} = {actual}: expected {expected}")]
     Value {
         /// The variable.
         name: String,
         /// The value.
-        found: String,
+        actual: String,
         /// The values that fit.
         expected: String,
     },

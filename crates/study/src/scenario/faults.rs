@@ -78,7 +78,7 @@ impl<'a> Resolver<'a> {
                 Causality::Output => "an output",
                 _ => "no input",
             };
-            return Err(Reason::NoConnection { name: target.name, found: description });
+            return Err(Reason::NoConnection { name: target.name, actual: description });
         }
         if let Some(source) = source {
             let stated_source = self.names.port(source)?;
@@ -88,7 +88,7 @@ impl<'a> Resolver<'a> {
                 let stated = self.names.name(stated_source);
                 return Err(Reason::OtherSource {
                     target: target.name,
-                    found: description,
+                    actual: description,
                     stated,
                 });
             }
@@ -164,7 +164,7 @@ impl Reader<'_> {
         }
         match entry.inversion.as_ref().map(Spanned::get_ref) {
             Some(inversion) => Ok((inversion.window(start), Fault::Inversion)),
-            None => Err(Reason::Kinds { found: Vec::new(), expected: KINDS }),
+            None => Err(Reason::Kinds { actual: Vec::new(), expected: KINDS }),
         }
     }
 
@@ -199,7 +199,7 @@ impl Reader<'_> {
         let Some(value) = value else { return Ok(None) };
         let refused = |expected| Reason::Value {
             name: self.target.name.clone(),
-            found: value.to_string(),
+            actual: value.to_string(),
             expected,
         };
         let number = value.number(self.target.variable, self.target.description);
@@ -254,7 +254,7 @@ impl Reader<'_> {
                 Err(Reason::Members { what: "saturation", expected: "min or max or both" })
             }
             (Some(min), Some(max)) if min > max => {
-                Err(Reason::Number { what: "max", found: max, expected: "a number not below min" })
+                Err(Reason::Number { what: "max", actual: max, expected: "a number not below min" })
             }
             _ => Ok(Fault::Saturation { lowest, highest }),
         }

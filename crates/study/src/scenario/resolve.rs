@@ -166,14 +166,14 @@ impl<'a> Resolver<'a> {
             let description = format!("{} {}", variability.as_str(), causality.as_str());
             return Err(Reason::NotSettable {
                 name: target.name,
-                found: with_article(&description),
+                actual: with_article(&description),
             });
         }
         if let Kind::Clock(clock) = &target.variable.kind
             && clock.interval_variability != IntervalVariability::Triggered
         {
             let description = "a clock that ticks by itself".to_owned();
-            return Err(Reason::NotSettable { name: target.name, found: description });
+            return Err(Reason::NotSettable { name: target.name, actual: description });
         }
         if let Some(source) = self.names.source(target.port) {
             let source_name = self.names.name(source);
@@ -249,7 +249,7 @@ pub(super) fn require(
     holds: bool,
     expected: &'static str,
 ) -> Result<f64, Reason> {
-    if holds { Ok(number) } else { Err(Reason::Number { what, found: number, expected }) }
+    if holds { Ok(number) } else { Err(Reason::Number { what, actual: number, expected }) }
 }
 
 /// Returns the only kind of an entry, or an error if there are none or several.
@@ -260,6 +260,6 @@ pub(super) fn only(
     let stated: Vec<_> = kinds.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
     match stated[..] {
         [one] => Ok(one),
-        _ => Err(Reason::Kinds { found: stated, expected }),
+        _ => Err(Reason::Kinds { actual: stated, expected }),
     }
 }

@@ -93,7 +93,7 @@ impl<'a> Resolver<'a> {
         } else if let Some(csv) = &entry.csv {
             scaled(self.column(csv.get_ref(), &target)?, conversion)
         } else {
-            return Err(Reason::Kinds { found: Vec::new(), expected: KINDS });
+            return Err(Reason::Kinds { actual: Vec::new(), expected: KINDS });
         };
         self.add(&target, DriveSource { signal, start: f64::NEG_INFINITY, texts }, path)
     }
@@ -189,7 +189,7 @@ fn encode(
 ) -> Result<f64, Reason> {
     let refused = |expected: String| Reason::Value {
         name: target.name.clone(),
-        found: value.to_string(),
+        actual: value.to_string(),
         expected,
     };
     if let Kind::String(_) = target.variable.kind {
@@ -288,7 +288,7 @@ fn column_signal(
             _ if target.is_real() => "a finite number".to_owned(),
             _ => integers(kind, description),
         };
-        return Err(Reason::Value { name: target.name.clone(), found: actual, expected });
+        return Err(Reason::Value { name: target.name.clone(), actual, expected });
     }
     let between = match kind {
         Kind::Clock(_) => Interpolation::Points,

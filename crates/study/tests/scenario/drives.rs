@@ -33,11 +33,11 @@ fn here() -> &'static Path {
 
 const TIMES: [f64; 6] = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5];
 
-fn expect(found: &[(f64, Vec<String>)], expected: &[(f64, &[&str])]) {
-    let found: Vec<(f64, Vec<&str>)> =
-        found.iter().map(|(time, all)| (*time, all.iter().map(String::as_str).collect())).collect();
+fn expect(calls: &[(f64, Vec<String>)], expected: &[(f64, &[&str])]) {
+    let calls: Vec<(f64, Vec<&str>)> =
+        calls.iter().map(|(time, all)| (*time, all.iter().map(String::as_str).collect())).collect();
     let expected: Vec<_> = expected.iter().map(|(time, all)| (*time, all.to_vec())).collect();
-    assert_eq!(found, expected);
+    assert_eq!(calls, expected);
 }
 
 #[test]

@@ -11,8 +11,8 @@ fn refused(text: &str, folder: &Path) -> (String, String) {
 }
 
 fn expect(text: &str, message: &str) {
-    let (found, _) = refused(text, Path::new("."));
-    assert_eq!(found, message, "{text}");
+    let (refusal, _) = refused(text, Path::new("."));
+    assert_eq!(refusal, message, "{text}");
 }
 
 fn set(rest: &str) -> String {

@@ -45,9 +45,9 @@ impl<'a> Barrier<'a> {
 
     /// D = I / 2, G = 0.
     pub(super) fn start(&self) -> Point {
-        let half = |own: &Direction| {
-            let diagonal = own.entries.iter().all(|(row, column, _)| row == column);
-            if diagonal && !own.of_g { 0.5 } else { 0.0 }
+        let half = |direction: &Direction| {
+            let diagonal = direction.entries.iter().all(|(row, column, _)| row == column);
+            if diagonal && !direction.of_g { 0.5 } else { 0.0 }
         };
         self.point(DVector::from_iterator(self.directions.len(), self.directions.iter().map(half)))
     }
@@ -56,9 +56,10 @@ impl<'a> Barrier<'a> {
         let r = self.m.nrows();
         let mut point =
             Point { coefficients, d: ComplexMatrix::zeros(r, r), g: ComplexMatrix::zeros(r, r) };
-        for (own, value) in self.directions.iter().zip(point.coefficients.iter()) {
-            let matrix = if own.of_g { &mut point.g } else { &mut point.d };
-            own.entries
+        for (direction, value) in self.directions.iter().zip(point.coefficients.iter()) {
+            let matrix = if direction.of_g { &mut point.g } else { &mut point.d };
+            direction
+                .entries
                 .iter()
                 .for_each(|(row, column, entry)| matrix[(*row, *column)] += entry * *value);
         }
@@ -106,10 +107,10 @@ impl<'a> Barrier<'a> {
             times(&half.adjoint(), &half)
         };
         let weights = |of_d: f64, of_g: f64| {
-            let one = |own: &Direction| {
-                let factor = if own.of_g { of_g } else { of_d };
+            let one = |direction: &Direction| {
+                let factor = if direction.of_g { of_g } else { of_d };
                 let scaled = |(row, column, entry): &SparseEntry| (*row, *column, entry * factor);
-                let entries = own.entries.iter().filter(|_| factor != 0.0);
+                let entries = direction.entries.iter().filter(|_| factor != 0.0);
                 entries.map(scaled).collect()
             };
             self.directions.iter().map(one).collect::<Vec<Vec<_>>>()
@@ -120,7 +121,8 @@ impl<'a> Barrier<'a> {
             diagonal: true,
             weights,
         };
-        let of_bound = self.directions.iter().map(|own| weight(own, r, bound)).collect();
+        let of_bound =
+            self.directions.iter().map(|direction| weight(direction, r, bound)).collect();
         let [form, above, below, rest] = factors;
         [
             Inequality { k: inverse(form, &both), diagonal: false, weights: of_bound },
@@ -203,15 +205,15 @@ impl<'a> Barrier<'a> {
 }
 
 /// W with [M; I]* W [M; I] = the part of [`form`] that a direction of D or G adds.
-fn weight(own: &Direction, r: usize, bound: f64) -> Vec<SparseEntry> {
+fn weight(direction: &Direction, r: usize, bound: f64) -> Vec<SparseEntry> {
     let turn = Complex::i();
     let of = |(row, column, entry): &SparseEntry| {
         let (row, column) = (*row, *column);
-        if own.of_g {
+        if direction.of_g {
             [(row, r + column, entry * turn), (r + row, column, -entry * turn)]
         } else {
             [(row, column, -*entry), (r + row, r + column, entry * (bound * bound))]
         }
     };
-    own.entries.iter().flat_map(of).collect()
+    direction.entries.iter().flat_map(of).collect()
 }

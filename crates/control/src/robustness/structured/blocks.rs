@@ -86,10 +86,10 @@ pub(super) fn balanced(m: &ComplexMatrix, blocks: &[Block]) -> Vec<f64> {
         .collect();
     for _ in 0..ROUNDS {
         for &(first, size) in &groups {
-            let own = first..first + size;
+            let places = first..first + size;
             let (mut row, mut column) = (0.0, 0.0);
-            for at in own.clone() {
-                for other in (0..m.nrows()).filter(|other| !own.contains(other)) {
+            for at in places.clone() {
+                for other in (0..m.nrows()).filter(|other| !places.contains(other)) {
                     let factor = f64::exp(2.0 * (exponents[at] - exponents[other]));
                     row += m[(at, other)].norm_sqr() * factor;
                     column += m[(other, at)].norm_sqr() / factor;
@@ -97,7 +97,7 @@ pub(super) fn balanced(m: &ComplexMatrix, blocks: &[Block]) -> Vec<f64> {
             }
             let change = 0.25 * (column / row).ln();
             if change.is_finite() {
-                own.for_each(|at| exponents[at] += change);
+                places.for_each(|at| exponents[at] += change);
             }
         }
     }

@@ -114,7 +114,9 @@ impl<'a> Cover<'a> {
                 self.raise(scales.bound, frequency)?;
             }
             let interval = self.response.interval(&scales, frequency)?;
-            let long = |own: &Interval| frequency.is_infinite() || own.to - own.from > shortest;
+            let long = |interval: &Interval| {
+                frequency.is_infinite() || interval.to - interval.from > shortest
+            };
             if let Some(interval) = interval.filter(long) {
                 self.intervals += 1;
                 self.remove(interval);
@@ -133,19 +135,19 @@ impl<'a> Cover<'a> {
         Err(Error::Overflow { what: "the structured singular value" })
     }
 
-    fn remove(&mut self, own: Interval) {
+    fn remove(&mut self, covered: Interval) {
         let rest = |gap: &Interval| {
-            if own.to <= gap.from || own.from >= gap.to {
+            if covered.to <= gap.from || covered.from >= gap.to {
                 // An open interval does not contain its ends.
                 return vec![*gap];
             }
-            let before = Interval { from: gap.from, to: own.from };
-            let after = Interval { from: own.to, to: gap.to };
+            let before = Interval { from: gap.from, to: covered.from };
+            let after = Interval { from: covered.to, to: gap.to };
             let mut parts = Vec::new();
-            if own.from >= gap.from {
+            if covered.from >= gap.from {
                 parts.push(before);
             }
-            if own.to <= gap.to && own.to.is_finite() {
+            if covered.to <= gap.to && covered.to.is_finite() {
                 parts.push(after);
             }
             parts

@@ -65,8 +65,9 @@ pub(super) fn times(a: &ComplexMatrix, b: &ComplexMatrix) -> ComplexMatrix {
 /// The largest eigenvalue of a Hermitian matrix.
 pub(super) fn largest_eigenvalue(h: &ComplexMatrix) -> Result<f64, Error> {
     let h = (h + h.adjoint()).scale(0.5);
-    let found = SymmetricEigen::try_new(h, f64::EPSILON, EIGEN_ITERATIONS);
+    let decomposition = SymmetricEigen::try_new(h, f64::EPSILON, EIGEN_ITERATIONS);
     let what = "the largest eigenvalue";
-    let found = found.ok_or(Error::NotConverged { what, iterations: EIGEN_ITERATIONS })?;
-    Ok(found.eigenvalues.max())
+    let decomposition =
+        decomposition.ok_or(Error::NotConverged { what, iterations: EIGEN_ITERATIONS })?;
+    Ok(decomposition.eigenvalues.max())
 }

@@ -32,9 +32,9 @@ fn designed(fields: &[&str]) -> (FaultyPlant, Gains, Domain) {
     }
     let estimator = if fields[2] == "current" { Estimator::Current } else { Estimator::Prediction };
     let extended = ExtendedPlant::without_filter(plant);
-    let found = sampled::design(&extended, period, estimator, &feedback, &observer, None)
+    let designed = sampled::design(&extended, period, estimator, &feedback, &observer, None)
         .expect("a design");
-    (found.plant, found.gains, Domain::Sampled { period })
+    (designed.plant, designed.gains, Domain::Sampled { period })
 }
 
 /// The pair of feedback and observer is chosen by the peaks of its loop: the lowest product alone is 29 % above scipy

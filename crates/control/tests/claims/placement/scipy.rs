@@ -49,9 +49,9 @@ impl System {
         let (a, d) = (&self.a + b * k, DMatrix::identity(m, m));
         let s = StateSpace { a, b: b.clone(), c: k.clone(), d, domain: self.domain };
         let [condition, norm, peak] = self.figures;
-        let own =
+        let peak_ratio =
             if peak.is_nan() { 0.0 } else { h_infinity(&s, 1e-4).expect("a norm").lower / peak };
-        [placement.quality.condition / condition, gain / norm.max(1e-12), own]
+        [placement.quality.condition / condition, gain / norm.max(1e-12), peak_ratio]
     }
 }
 
@@ -68,12 +68,12 @@ static SYSTEMS: LazyLock<Vec<(System, Alternatives)>> = LazyLock::new(|| {
     let text = include_str!("../placement_reference.txt");
     let systems = text.lines().filter(|line| !line.starts_with('#')).map(read);
     let placed = |system: System| {
-        let found = match system.domain {
+        let placement = match system.domain {
             Domain::Continuous => alternatives(&system.a, &system.b, &system.poles),
             Domain::Sampled { .. } => alternatives_discrete(&system.a, &system.b, &system.poles),
         };
-        let found = found.unwrap_or_else(|error| panic!("{}: {error}", system.kind));
-        (system, found)
+        let placement = placement.unwrap_or_else(|error| panic!("{}: {error}", system.kind));
+        (system, placement)
     };
     systems.map(placed).collect()
 });

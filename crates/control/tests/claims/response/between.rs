@@ -26,8 +26,8 @@ fn sampled(
     let feedback = sampled_poles(&real_poles(&CONTROLLER_POLES), period)?;
     let fast = real_poles(&[-1200.0, -1500.0, -1800.0, -2100.0, -3000.0]);
     let observer = sampled_poles(&fast, period)?;
-    let made = design(&extended, period, estimator, &feedback, &observer, None)?;
-    Ok((extended, made.plant, made.gains))
+    let designed = design(&extended, period, estimator, &feedback, &observer, None)?;
+    Ok((extended, designed.plant, designed.gains))
 }
 
 /// The sums of the moduli of the states' impulse responses, from the impulses of each part of an
@@ -46,11 +46,11 @@ fn simulated(
     let mut sums = DMatrix::<f64>::zeros(n, parts as usize);
     for impulse in 0..parts {
         let mut x = DVector::zeros(n);
-        let mut own = DVector::zeros(controller.a.nrows());
+        let mut z = DVector::zeros(controller.a.nrows());
         for k in 0..samples {
             let y = c * &x;
-            let u = &controller.c * &own + &controller.d * &y;
-            own = &controller.a * own + &controller.b * y;
+            let u = &controller.c * &z + &controller.d * &y;
+            z = &controller.a * z + &controller.b * y;
             for part in 0..parts {
                 let mut sum = sums.column_mut(part as usize);
                 sum += x.abs();

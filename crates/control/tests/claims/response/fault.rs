@@ -27,8 +27,8 @@ const AMPLITUDES: [f64; 4] = [0.9619e-3, 1.754e-3, 9.989e-3, 20.50e-3];
 const STATE_ERRORS: [f64; 4] = [3.437e-8, 7.224e-8, 1.631e-4, 4.603e-4];
 const FAULT_ERROR: f64 = 0.8809;
 
-fn ratios(found: impl Iterator<Item = f64>, simulated: &[f64]) -> Vec<f64> {
-    found.zip(simulated).map(|(found, simulated)| found / simulated).collect()
+fn ratios(bounds: impl Iterator<Item = f64>, simulated: &[f64]) -> Vec<f64> {
+    bounds.zip(simulated).map(|(bound, simulated)| bound / simulated).collect()
 }
 
 fn paper() -> (FaultyPlant, Gains, Case) {
@@ -222,7 +222,7 @@ fn bad_arguments_are_named() {
         fault_bounds(&plant, &gains, CONTINUOUS, magnitudes, rates).unwrap_err()
     };
     let refused = bounds(&[1.0, 2.0], &[1.0]);
-    assert_eq!(refused, Error::Shape { matrix: "magnitudes", expected: (1, 1), found: (2, 1) });
+    assert_eq!(refused, Error::Shape { matrix: "magnitudes", expected: (1, 1), actual: (2, 1) });
     assert!(matches!(bounds(&[0.0], &[1.0]), Error::OutOfRange { name: "magnitude", .. }));
     assert!(matches!(bounds(&[1.0], &[f64::NAN]), Error::OutOfRange { name: "rate", .. }));
     let turn = |fault: usize, change: f64, rate: f64, fraction: f64| {

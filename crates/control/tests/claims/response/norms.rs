@@ -11,9 +11,9 @@ use std::f64::consts::PI;
 
 #[track_caller]
 fn assert_bracketed(system: &StateSpace, expected: &DMatrix<f64>, slack: f64) {
-    let found = peak_gain(system, 1e-3).expect("a gain");
+    let gains = peak_gain(system, 1e-3).expect("a gain");
     for (index, &exact) in expected.iter().enumerate() {
-        let (lower, upper) = (found.lower[index], found.upper[index]);
+        let (lower, upper) = (gains.lower[index], gains.upper[index]);
         assert!(lower <= exact * (1.0 + slack), "{index}: {lower} above {exact}");
         assert!(upper >= exact * (1.0 - slack), "{index}: {upper} below {exact}");
         assert!(upper <= lower * 1.0011, "{index}: {lower} to {upper}");
@@ -97,7 +97,7 @@ fn bad_arguments_are_named() {
     }
     let wrong = StateSpace { d: DMatrix::zeros(2, 1), ..good.clone() };
     let refused = peak_gain(&wrong, 1e-3);
-    assert_eq!(refused, Err(Error::Shape { matrix: "D", expected: (1, 1), found: (2, 1) }));
+    assert_eq!(refused, Err(Error::Shape { matrix: "D", expected: (1, 1), actual: (2, 1) }));
     let refused = frequency_response(&good, &[1.0, f64::NAN]);
     assert!(matches!(refused, Err(Error::OutOfRange { name: "frequency", .. })), "{refused:?}");
     let period = StateSpace { domain: Domain::Sampled { period: -1.0 }, ..good.clone() };

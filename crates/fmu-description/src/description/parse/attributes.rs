@@ -30,7 +30,7 @@ impl<'a> Node<'a> {
     /// Returns the error for a missing or surplus child.
     pub(super) fn misses(&self, expected: impl Into<String>, actual: String) -> ParseError {
         let (at, element) = (self.element.at, self.element.name.to_owned());
-        ParseError::Element { at, element, expected: expected.into(), found: actual }
+        ParseError::Element { at, element, expected: expected.into(), actual }
     }
 
     /// Returns the error for the value `found` of an attribute.
@@ -45,13 +45,7 @@ impl<'a> Node<'a> {
 
     fn fault(&self, attribute: &'static str, expected: &str, actual: String) -> ParseError {
         let (at, element) = (self.element.at, self.element.name.to_owned());
-        ParseError::Attribute {
-            at,
-            element,
-            attribute,
-            expected: expected.to_owned(),
-            found: actual,
-        }
+        ParseError::Attribute { at, element, attribute, expected: expected.to_owned(), actual }
     }
 
     /// Warns about the value `found` of an attribute that the schema does not allow.
@@ -86,7 +80,7 @@ impl<'a> Node<'a> {
             at: self.element.at,
             place,
             expected: expected.to_owned(),
-            found: actual,
+            actual,
             assumed: assumed.to_owned(),
             section: section(self.warnings.version, self.element),
         });

@@ -169,7 +169,7 @@ fn other_versions_are_named() {
     for version in ["0.9", "1.1", "3.", "4.0", "2.1", "2.0.x", "2.0.1.2", ""] {
         let xml = format!(r#"<fmiModelDescription fmiVersion="{version}"/>"#);
         let error = ModelDescription::parse(xml).unwrap_err();
-        assert!(matches!(error, ParseError::Version { ref found, .. } if found == version));
+        assert!(matches!(error, ParseError::Version { ref actual, .. } if actual == version));
     }
     let missing = ModelDescription::parse("<fmiModelDescription/>").unwrap_err().to_string();
     assert!(missing.contains("fmiVersion"), "{missing}");

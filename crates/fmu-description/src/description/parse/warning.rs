@@ -31,7 +31,7 @@ impl Warnings {
             let actual = "more".to_owned();
             let expected = format!("at most {KEPT} warnings");
             let assumed = "the others are not listed".to_owned();
-            list.push(Warning { place, expected, found: actual, assumed, ..warning });
+            list.push(Warning { place, expected, actual, assumed, ..warning });
         }
     }
 

@@ -25,7 +25,7 @@ fn errors_point_at_the_line_and_column_of_the_element() {
 fn named(bytes: &[u8]) -> (String, String) {
     let (description, warnings) = ModelDescription::read(bytes).unwrap();
     let [warning] = warnings.as_slice() else { panic!("{warnings:?}") };
-    (description.model_name, warning.found.clone())
+    (description.model_name, warning.actual.clone())
 }
 
 #[test]

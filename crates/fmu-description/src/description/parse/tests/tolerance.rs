@@ -55,7 +55,7 @@ fn numbers_that_are_infinite_or_empty_count_as_missing() {
         for attribute in ["start", "min", "max", "nominal"] {
             let (kind, warning) = kind(&format!("<Real {attribute}='{text}'/>"));
             assert_eq!(kind, Kind::Real(RealType::default()), "{attribute}={text}");
-            assert_eq!(warning.found, format!("{text:?}"));
+            assert_eq!(warning.actual, format!("{text:?}"));
         }
     }
     let (kind, _) = kind("<Integer start=''/>");
@@ -152,7 +152,7 @@ fn elements_in_another_order_and_empty_lists_are_read() {
     );
     let (description, warning) = warned(&late);
     assert_eq!(description.default_experiment.unwrap().stop_time, Some(2.0));
-    assert!(warning.found.contains("after ModelStructure"), "{warning}");
+    assert!(warning.actual.contains("after ModelStructure"), "{warning}");
     let (description, warning) = warned(&with(X, "<Outputs/>"));
     assert_eq!((description.structure.outputs.len(), warning.place.as_str()), (0, "<Outputs>"));
 }
@@ -171,7 +171,7 @@ fn unlisted_outputs_may_depend_on_anything() {
     let variables = format!("{X}{Y}");
     let (description, warning) = warned(&with(&variables, ""));
     assert_unknown(&description);
-    assert!(warning.found.contains('y'));
+    assert!(warning.actual.contains('y'));
     let without = with(&variables, "").replace("<ModelStructure></ModelStructure>", "");
     assert_unknown(&warned(&without).0);
 }
@@ -215,7 +215,7 @@ fn kinds_of_dependencies_that_do_not_fit_are_ignored() {
 fn a_harmless_duplicate_name_means_the_first_variable() {
     let same = X.to_owned() + X;
     let (description, warning) = warned(&with(&same, ""));
-    assert_eq!((description.variables.len(), warning.found.as_str()), (2, "\"x\""));
+    assert_eq!((description.variables.len(), warning.actual.as_str()), (2, "\"x\""));
     let local = X.to_owned() + &X.replace("\"0\"", "\"1\"");
     assert_eq!(warned(&with(&local, "")).0.variable("x").unwrap().value_reference, 0);
 }
