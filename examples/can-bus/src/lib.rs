@@ -62,26 +62,28 @@ impl CanBus {
 
     /// Whether the frame on the bus ends.
     fn ends(&self, time: f64) -> bool {
-        self.sending.as_ref().is_some_and(|own| self.has_come(own.end, time))
+        self.sending.as_ref().is_some_and(|frame| self.has_come(frame.end, time))
     }
 
     /// Takes what the nodes send. As in a mailbox of a CAN controller, a frame replaces the one with the same identifier
     /// that its node has sent before, unless that one is on the bus.
     fn receive(&mut self) -> Result<(), Failure> {
-        let sending = self.sending.as_ref().map(|own| (own.node, own.index));
-        for (node, own) in self.nodes.iter_mut().enumerate().filter(|(_, own)| own.rx_clock) {
-            let before = own.waiting.len();
-            for operation in Operation::read(&own.rx_data) {
+        let sending = self.sending.as_ref().map(|frame| (frame.node, frame.index));
+        for (node, node_state) in
+            self.nodes.iter_mut().enumerate().filter(|(_, node)| node.rx_clock)
+        {
+            let before = node_state.waiting.len();
+            for operation in Operation::read(&node_state.rx_data) {
                 let number = node + 1;
                 let frame = match operation {
                     Operation::Transmit(frame) => frame,
                     Operation::Configure { bit_rate } => {
-                        let (stated, own) = (f64::from(bit_rate), &mut self.rate);
-                        if *own == 0.0 {
-                            *own = stated;
-                        } else if (stated - *own).abs() > 0.5 {
+                        let (stated, rate) = (f64::from(bit_rate), &mut self.rate);
+                        if *rate == 0.0 {
+                            *rate = stated;
+                        } else if (stated - *rate).abs() > 0.5 {
                             return Err(Failure::Error(format!(
-                                "Node{number} has {stated} bit/s, expected that of the bus, {own} bit/s"
+                                "Node{number} has {stated} bit/s, expected that of the bus, {rate} bit/s"
                             )));
                         }
                         continue;
@@ -98,17 +100,17 @@ impl CanBus {
                         "Node{number} sends a frame of CAN FD; this bus simulates classical CAN"
                     )));
                 }
-                let is_same = |(index, own): (usize, &Frame)| {
-                    own.identifier == frame.identifier
-                        && own.extended == frame.extended
+                let is_same = |(index, waiting): (usize, &Frame)| {
+                    waiting.identifier == frame.identifier
+                        && waiting.extended == frame.extended
                         && sending != Some((node, index))
                 };
-                match own.waiting[..before].iter().enumerate().position(is_same) {
+                match node_state.waiting[..before].iter().enumerate().position(is_same) {
                     Some(index) => {
-                        own.waiting[index] = frame;
+                        node_state.waiting[index] = frame;
                         self.lost = self.lost.saturating_add(1);
                     }
-                    None => own.waiting.push(frame),
+                    None => node_state.waiting.push(frame),
                 }
             }
         }
@@ -119,15 +121,15 @@ impl CanBus {
     fn finish(&mut self) {
         let Some(Sending { node: sender, index, start, end }) = self.sending.take() else { return };
         let frame = self.nodes[sender].waiting.remove(index);
-        for (node, own) in self.nodes.iter_mut().enumerate() {
-            own.tx_data.clear();
+        for (node, member) in self.nodes.iter_mut().enumerate() {
+            member.tx_data.clear();
             let identifier = frame.identifier;
             let operation = if node == sender {
                 Operation::Confirm { identifier }
             } else {
                 Operation::Transmit(frame.clone())
             };
-            operation.append_to(&mut own.tx_data);
+            operation.append_to(&mut member.tx_data);
         }
         self.free = end + self.duration(frame::INTERMISSION);
         self.frames = self.frames.saturating_add(1);
@@ -138,13 +140,13 @@ impl CanBus {
     /// Starts the next frame if the bus is free. Frames that come at the instant at which one has started take part in
     /// its arbitration.
     fn start(&mut self, time: f64) {
-        let starts = self.sending.as_ref().map(|own| own.start.to_bits());
+        let starts = self.sending.as_ref().map(|frame| frame.start.to_bits());
         if starts.is_some_and(|start| start != time.to_bits()) || !self.has_come(self.free, time) {
             return;
         }
-        let of = |(node, own): (usize, &Node)| {
+        let of = |(node, member): (usize, &Node)| {
             let place = |(index, frame)| (frame::arbitration(frame), node, index);
-            own.waiting.iter().enumerate().map(place).min()
+            member.waiting.iter().enumerate().map(place).min()
         };
         let next = self.nodes.iter().enumerate().filter_map(of).min();
         self.sending = next.map(|(_, node, index)| {
@@ -167,24 +169,24 @@ impl Model for CanBus {
 
     fn variables(&self) -> Vec<V<Self>> {
         let mut all = vec![
-            V::real("bit_rate", "Bits in a second; 0: as the nodes state it", |own: &mut Self| {
-                &mut own.bit_rate
+            V::real("bit_rate", "Bits in a second; 0: as the nodes state it", |bus: &mut Self| {
+                &mut bus.bit_rate
             })
             .unit("1/s")
             .range(0.0, 1e6)
             .parameter(),
-            V::integer("frames", "Number of frames", |own: &mut Self| &mut own.frames)
+            V::integer("frames", "Number of frames", |bus: &mut Self| &mut bus.frames)
                 .output(&[])
                 .exact(),
             V::integer(
                 "lost",
                 "Number of frames replaced before they were sent",
-                |own: &mut Self| &mut own.lost,
+                |bus: &mut Self| &mut bus.lost,
             )
             .output(&[])
             .exact(),
-            V::real("load", "Part of the time in which the bus is not free", |own: &mut Self| {
-                &mut own.load
+            V::real("load", "Part of the time in which the bus is not free", |bus: &mut Self| {
+                &mut bus.load
             })
             .discrete()
             .output(&[])
@@ -193,21 +195,21 @@ impl Model for CanBus {
         for node in 0..NODES {
             let name = |member: &str| format!("Node{}.{member}", node + 1);
             let clock = |member: &str, text: &str, field: fn(&mut Node) -> &mut bool| {
-                V::triggered_clock(name(member), text, move |own: &mut Self| {
-                    field(&mut own.nodes[node])
+                V::triggered_clock(name(member), text, move |bus: &mut Self| {
+                    field(&mut bus.nodes[node])
                 })
             };
             let data = |member: &str, text: &str, field: fn(&mut Node) -> &mut Vec<u8>| {
                 let clock = name(&member.replace("Data", "Clock"));
-                V::binary(name(member), text, move |own: &mut Self| field(&mut own.nodes[node]))
+                V::binary(name(member), text, move |bus: &mut Self| field(&mut bus.nodes[node]))
                     .mime_type(MIME_TYPE)
                     .clocked_by(&[&clock])
             };
             all.extend([
-                clock("Tx_Clock", "The bus sends", |own| &mut own.tx_clock).output(&[]),
-                data("Tx_Data", "Operations of the bus", |own| &mut own.tx_data).output(&[]),
-                clock("Rx_Clock", "The node sends", |own| &mut own.rx_clock).input(),
-                data("Rx_Data", "Operations of the node", |own| &mut own.rx_data).input(),
+                clock("Tx_Clock", "The bus sends", |bus| &mut bus.tx_clock).output(&[]),
+                data("Tx_Data", "Operations of the bus", |bus| &mut bus.tx_data).output(&[]),
+                clock("Rx_Clock", "The node sends", |bus| &mut bus.rx_clock).input(),
+                data("Rx_Data", "Operations of the node", |bus| &mut bus.rx_data).input(),
             ]);
         }
         all
@@ -221,7 +223,7 @@ impl Model for CanBus {
 
     fn tick(&mut self, time: f64) {
         let ends = self.ends(time);
-        self.nodes.iter_mut().for_each(|own| own.tx_clock = ends);
+        self.nodes.iter_mut().for_each(|node| node.tx_clock = ends);
     }
 
     fn event(&mut self, time: f64) -> Result<Event, Failure> {
@@ -230,8 +232,8 @@ impl Model for CanBus {
             self.finish();
         }
         self.start(time);
-        let waits = self.nodes.iter().any(|own| !own.waiting.is_empty());
-        let end = self.sending.as_ref().map(|own| own.end);
+        let waits = self.nodes.iter().any(|node| !node.waiting.is_empty());
+        let end = self.sending.as_ref().map(|frame| frame.end);
         Ok(Event { next_event_time: end.or(waits.then_some(self.free)), ..Event::default() })
     }
 

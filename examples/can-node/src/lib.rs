@@ -34,11 +34,13 @@ struct CanNode {
 impl CanNode {
     /// Time at which this node sends a message next, in s; infinite for those of other nodes.
     fn next(&self, message: usize) -> f64 {
-        let own = &self.messages[message];
-        if own.transmitter != self.node {
+        let next_message = &self.messages[message];
+        if next_message.transmitter != self.node {
             return f64::INFINITY;
         }
-        self.start_time + own.start_delay + f64::from(self.count[message]) * own.cycle_time
+        self.start_time
+            + next_message.start_delay
+            + f64::from(self.count[message]) * next_message.cycle_time
     }
 
     fn is_due(&self, message: usize, time: f64) -> bool {
@@ -85,11 +87,11 @@ impl CanNode {
     fn receive(&mut self) {
         for operation in Operation::read(&self.rx_data) {
             let Operation::Transmit(frame) = operation else { continue };
-            let is_its = |own: &Message| {
-                own.identifier == frame.identifier
-                    && own.extended == frame.extended
-                    && own.length <= frame.data.len()
-                    && own.transmitter != self.node
+            let is_its = |message: &Message| {
+                message.identifier == frame.identifier
+                    && message.extended == frame.extended
+                    && message.length <= frame.data.len()
+                    && message.transmitter != self.node
             };
             let Some(index) = self.messages.iter().position(is_its) else { continue };
             let signals = self.messages[index].signals.iter();
@@ -112,7 +114,8 @@ impl Model for CanNode {
         let text = std::fs::read_to_string(resources.join("network.dbc"))
             .map_err(|error| failure(error.to_string()))?;
         let (nodes, messages) = network::read(&text).map_err(failure)?;
-        let zeros: Vec<_> = messages.iter().map(|own| vec![0.0; own.signals.len()]).collect();
+        let zeros: Vec<_> =
+            messages.iter().map(|message| vec![0.0; message.signals.len()]).collect();
         Ok(Self {
             node: nodes.first().cloned().unwrap_or_default(),
             count: vec![0; messages.len()],
@@ -134,8 +137,8 @@ impl Model for CanNode {
         let names = self.nodes.join(", ");
         let text = format!("The node of the network that this FMU is: {names}");
         let mut all = vec![
-            V::string("node", text, |own: &mut Self| &mut own.node).parameter(),
-            V::real("bit_rate", "Number of bits in a second", |own: &mut Self| &mut own.bit_rate)
+            V::string("node", text, |node: &mut Self| &mut node.node).parameter(),
+            V::real("bit_rate", "Number of bits in a second", |node: &mut Self| &mut node.bit_rate)
                 .unit("1/s")
                 .range(1e3, 1e6)
                 .parameter(),
@@ -149,13 +152,14 @@ impl Model for CanNode {
             for (position, signal) in message.signals.iter().enumerate() {
                 let text = |verb| format!("{verb}: {} [{}]", signal.description, signal.unit);
                 let name = format!("{}.{}", message.name, signal.name);
-                let send = V::real(format!("send.{name}"), text("Sent"), move |own: &mut Self| {
-                    &mut own.send[index][position]
+                let send = V::real(format!("send.{name}"), text("Sent"), move |node: &mut Self| {
+                    &mut node.send[index][position]
                 });
-                let received =
-                    V::real(format!("received.{name}"), text("Received"), move |own: &mut Self| {
-                        &mut own.received[index][position]
-                    });
+                let received = V::real(
+                    format!("received.{name}"),
+                    text("Received"),
+                    move |node: &mut Self| &mut node.received[index][position],
+                );
                 all.push(with_unit(send.input(), signal));
                 all.push(with_unit(received.discrete().output(&[]).exact(), signal));
             }
@@ -168,22 +172,23 @@ impl Model for CanNode {
             data.mime_type(MIME_TYPE).clocked_by(&[&format!("CanChannel.{name}_Clock")])
         };
         all.extend([
-            clock("Tx", "The node sends", |own| &mut own.tx_clock).output(&[]),
-            data("Tx", "Operations sent", |own| &mut own.tx_data).output(&[]),
-            clock("Rx", "The node receives", |own| &mut own.rx_clock).input(),
-            data("Rx", "Operations received", |own| &mut own.rx_data).input(),
+            clock("Tx", "The node sends", |node| &mut node.tx_clock).output(&[]),
+            data("Tx", "Operations sent", |node| &mut node.tx_data).output(&[]),
+            clock("Rx", "The node receives", |node| &mut node.rx_clock).input(),
+            data("Rx", "Operations received", |node| &mut node.rx_data).input(),
         ]);
         all
     }
 
     fn check(&self) -> Result<(), Failure> {
         if !self.nodes.contains(&self.node) {
-            let (names, found) = (self.nodes.join(", "), &self.node);
-            return Err(Failure::Error(format!("node: expected one of {names}, found `{found}`")));
+            let (names, name) = (self.nodes.join(", "), &self.node);
+            return Err(Failure::Error(format!("node: expected one of {names}, found `{name}`")));
         }
-        let never = |own: &&Message| own.transmitter == self.node && own.cycle_time <= 0.0;
-        self.messages.iter().find(never).map_or(Ok(()), |own| {
-            let (name, node) = (&own.name, &self.node);
+        let never =
+            |message: &&Message| message.transmitter == self.node && message.cycle_time <= 0.0;
+        self.messages.iter().find(never).map_or(Ok(()), |message| {
+            let (name, node) = (&message.name, &self.node);
             Err(Failure::Error(format!(
                 "network.dbc: message {name} of {node}: expected a GenMsgCycleTime above 0"
             )))

@@ -47,40 +47,41 @@ pub(crate) fn read(text: &str) -> Result<(Vec<String>, Vec<Message>), String> {
     let file = Dbc::try_from(text).map_err(|error| error.to_string())?;
     let nodes = file.nodes.iter().map(|node| node.0.clone()).collect();
     // A message of no bytes holds the signals that are in no message (VECTOR__INDEPENDENT_SIG_MSG).
-    let messages = file.messages.iter().filter(|own| own.size > 0);
-    let messages = messages.map(|own| message(&file, own));
+    let messages = file.messages.iter().filter(|message| message.size > 0);
+    let messages = messages.map(|entry| message(&file, entry));
     Ok((nodes, messages.collect::<Result<_, _>>()?))
 }
 
-fn message(file: &Dbc, own: &can_dbc::Message) -> Result<Message, String> {
-    let milliseconds = |attribute: &str| match file.resolved_message_attribute(own.id, attribute) {
-        None => Ok(0.0),
-        #[expect(clippy::cast_precision_loss, reason = "far below 2^53 ms")]
-        Some(AttributeValue::Uint(number)) => Ok(*number as f64 / 1e3),
-        Some(AttributeValue::Double(number)) if *number >= 0.0 => Ok(number / 1e3),
-        Some(other) => Err(format!(
-            "message {}: {attribute}: expected a time in ms, found {other:?}",
-            own.name
-        )),
-    };
-    let (identifier, extended) = match own.id {
+fn message(file: &Dbc, message: &can_dbc::Message) -> Result<Message, String> {
+    let milliseconds =
+        |attribute: &str| match file.resolved_message_attribute(message.id, attribute) {
+            None => Ok(0.0),
+            #[expect(clippy::cast_precision_loss, reason = "far below 2^53 ms")]
+            Some(AttributeValue::Uint(number)) => Ok(*number as f64 / 1e3),
+            Some(AttributeValue::Double(number)) if *number >= 0.0 => Ok(number / 1e3),
+            Some(other) => Err(format!(
+                "message {}: {attribute}: expected a time in ms, found {other:?}",
+                message.name
+            )),
+        };
+    let (identifier, extended) = match message.id {
         MessageId::Standard(identifier) => (u32::from(identifier), false),
         MessageId::Extended(identifier) => (identifier, true),
     };
-    let length = usize::try_from(own.size).ok().filter(|&length| length <= 8);
+    let length = usize::try_from(message.size).ok().filter(|&length| length <= 8);
     let length = length.ok_or_else(|| {
-        format!("message {}: expected at most 8 bytes, found {}", own.name, own.size)
+        format!("message {}: expected at most 8 bytes, found {}", message.name, message.size)
     })?;
-    let signals = own.signals.iter().map(|signal| {
-        Signal::new(file, own.id, signal, length)
-            .map_err(|error| format!("message {}: signal {}: {error}", own.name, signal.name))
+    let signals = message.signals.iter().map(|signal| {
+        Signal::new(file, message.id, signal, length)
+            .map_err(|error| format!("message {}: signal {}: {error}", message.name, signal.name))
     });
     Ok(Message {
-        name: own.name.clone(),
+        name: message.name.clone(),
         identifier,
         extended,
         length,
-        transmitter: own.transmitter.clone().unwrap_or_default(),
+        transmitter: message.transmitter.clone().unwrap_or_default(),
         cycle_time: milliseconds("GenMsgCycleTime")?,
         start_delay: milliseconds("GenMsgStartDelayTime")?,
         signals: signals.collect::<Result<_, _>>()?,
@@ -91,37 +92,37 @@ impl Signal {
     fn new(
         file: &Dbc,
         message: MessageId,
-        own: &can_dbc::Signal,
+        signal: &can_dbc::Signal,
         length: usize,
     ) -> Result<Self, String> {
-        if own.multiplexer_indicator != MultiplexIndicator::Plain {
+        if signal.multiplexer_indicator != MultiplexIndicator::Plain {
             return Err("multiplexed signals are not supported".to_owned());
         }
-        let float = file.extended_value_type_for_signal(message, &own.name);
-        let (raw, width) = match (float, own.value_type) {
+        let float = file.extended_value_type_for_signal(message, &signal.name);
+        let (raw, width) = match (float, signal.value_type) {
             (Some(Float::IEEEfloat32Bit), _) => (Raw::Float32, Some(32)),
             (Some(Float::IEEEdouble64bit), _) => (Raw::Float64, Some(64)),
             (_, ValueType::Signed) => (Raw::Signed, None),
             (_, ValueType::Unsigned) => (Raw::Unsigned, None),
         };
-        let size = usize::try_from(own.size).unwrap_or(usize::MAX);
+        let size = usize::try_from(signal.size).unwrap_or(usize::MAX);
         if !(1..=64).contains(&size) || width.is_some_and(|width| width != size) {
             return Err(format!("expected 1 to 64 bits (32 or 64 for a float), found {size}"));
         }
-        if own.factor == 0.0 || !own.factor.is_finite() || !own.offset.is_finite() {
-            return Err(format!("expected a finite factor other than 0, found {}", own.factor));
+        if signal.factor == 0.0 || !signal.factor.is_finite() || !signal.offset.is_finite() {
+            return Err(format!("expected a finite factor other than 0, found {}", signal.factor));
         }
-        let start = usize::try_from(own.start_bit).unwrap_or(usize::MAX);
-        let bits = bits(own.byte_order, start, size);
+        let start = usize::try_from(signal.start_bit).unwrap_or(usize::MAX);
+        let bits = bits(signal.byte_order, start, size);
         if bits.iter().any(|&place| place >= 8 * length) {
             return Err(format!("its bits do not fit into {length} bytes"));
         }
         Ok(Self {
-            name: own.name.clone(),
-            unit: own.unit.clone(),
-            description: file.signal_comment(message, &own.name).unwrap_or_default().to_owned(),
-            factor: own.factor,
-            offset: own.offset,
+            name: signal.name.clone(),
+            unit: signal.unit.clone(),
+            description: file.signal_comment(message, &signal.name).unwrap_or_default().to_owned(),
+            factor: signal.factor,
+            offset: signal.offset,
             raw,
             bits,
         })

@@ -60,13 +60,13 @@ impl Law {
         let slope = (self.measurement - self.last_measurement) / self.sample_time;
         let rest = self.gain * (error - self.derivative_time * slope);
         let integral = self.integral + self.gain * error * self.sample_time / self.integral_time;
-        let (wanted, mode) = match self.mode {
+        let (command, mode) = match self.mode {
             1 => (self.manual, "manual"),
             2 => (rest + integral, "automatic"),
             _ => (0.0, "off"),
         };
-        self.u = wanted.clamp(-self.limit, self.limit);
-        let limited = wanted.abs() > self.limit;
+        self.u = command.clamp(-self.limit, self.limit);
+        let limited = command.abs() > self.limit;
         let follow = self.mode != 2 || limited && self.hold;
         self.integral = if follow { self.u - rest } else { integral };
         self.last_measurement = self.measurement;

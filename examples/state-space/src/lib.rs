@@ -42,9 +42,9 @@ impl Model for StateSpace {
         let [n, m, p] = [&self.x, &self.u, &self.y].map(Vec::len);
         let extent = |variable: V<Self>| variable.tunable().max(LARGEST);
         let mut all = vec![
-            extent(V::structural("n", "Number of states", |own: &mut Self| &mut own.n)),
-            extent(V::structural("m", "Number of inputs", |own: &mut Self| &mut own.m)),
-            extent(V::structural("p", "Number of outputs", |own: &mut Self| &mut own.p)),
+            extent(V::structural("n", "Number of states", |system: &mut Self| &mut system.n)),
+            extent(V::structural("m", "Number of inputs", |system: &mut Self| &mut system.m)),
+            extent(V::structural("p", "Number of outputs", |system: &mut Self| &mut system.p)),
         ];
         let matrix = |name,
                       by: [&'static str; 2],
@@ -53,19 +53,20 @@ impl Model for StateSpace {
             let elements = V::real_array(name, "Coefficients", &extents, field);
             elements.map(move |element| element.tunable().sized_by(&by))
         };
-        all.extend(matrix("A", ["n", "n"], [n, n], |own| &mut own.a));
-        all.extend(matrix("B", ["n", "m"], [n, m], |own| &mut own.b));
-        all.extend(matrix("C", ["p", "n"], [p, n], |own| &mut own.c));
-        all.extend(matrix("D", ["p", "m"], [p, m], |own| &mut own.d));
-        let u = V::real_array("u", "Inputs", &[m], |own: &mut Self| &mut own.u[..]);
+        all.extend(matrix("A", ["n", "n"], [n, n], |system| &mut system.a));
+        all.extend(matrix("B", ["n", "m"], [n, m], |system| &mut system.b));
+        all.extend(matrix("C", ["p", "n"], [p, n], |system| &mut system.c));
+        all.extend(matrix("D", ["p", "m"], [p, m], |system| &mut system.d));
+        let u = V::real_array("u", "Inputs", &[m], |system: &mut Self| &mut system.u[..]);
         all.extend(u.map(|element| element.input().sized_by(&["m"])));
-        let x = V::real_array("x", "States", &[n], |own: &mut Self| &mut own.x[..]);
+        let x = V::real_array("x", "States", &[n], |system: &mut Self| &mut system.x[..]);
         all.extend(x.map(|element| element.exact().sized_by(&["n"])));
         let knowns = names("x", n).chain(names("u", m)).collect::<Vec<_>>();
         let knowns: Vec<_> = knowns.iter().map(String::as_str).collect();
-        let y = V::real_array("y", "Outputs", &[p], |own: &mut Self| &mut own.y[..]);
+        let y = V::real_array("y", "Outputs", &[p], |system: &mut Self| &mut system.y[..]);
         all.extend(y.map(|element| element.output(&knowns).sized_by(&["p"])));
-        let rates = V::real_array("der(x)", "Rates", &[n], |own: &mut Self| &mut own.rates[..]);
+        let rates =
+            V::real_array("der(x)", "Rates", &[n], |system: &mut Self| &mut system.rates[..]);
         all.extend(rates.zip(names("x", n)).map(|(element, state)| {
             let kind = fmu::description::DependencyKind::Dependent;
             let element = element.depends(kind, knowns.iter().copied());
@@ -122,8 +123,8 @@ fn names(vector: &str, extent: usize) -> impl Iterator<Item = String> {
 fn resized(matrix: &[f64], columns: usize, [rows, new_columns]: [usize; 2]) -> Vec<f64> {
     let mut new = vec![0.0; rows * new_columns];
     for (to, from) in new.chunks_exact_mut(new_columns).zip(matrix.chunks_exact(columns)) {
-        let kept = columns.min(new_columns);
-        to[..kept].copy_from_slice(&from[..kept]);
+        let common = columns.min(new_columns);
+        to[..common].copy_from_slice(&from[..common]);
     }
     new
 }

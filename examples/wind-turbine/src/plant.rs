@@ -96,7 +96,7 @@ impl State {
                     held.actuators[i]
                         .iter()
                         .zip(PITCH)
-                        .map(|(weight, own)| weight * part(own))
+                        .map(|(weight, mode)| weight * part(mode))
                         .sum()
                 };
                 let (stiffness, damping) = (
