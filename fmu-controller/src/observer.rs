@@ -65,7 +65,7 @@ pub(crate) struct Observer {
     /// Space for [y; r; w] and its slope, for [y; r], and for z before and after a step.
     input: Vec<f64>,
     input_slope: Vec<f64>,
-    given: Vec<f64>,
+    known: Vec<f64>,
     before: Vec<f64>,
     after: Vec<f64>,
 }
@@ -104,15 +104,15 @@ pub(crate) struct Conditions<'a> {
 }
 
 impl Conditions<'_> {
-    /// The mode in which z evolves from here, `time` s after the start of the step; `given` is space for
+    /// The mode in which z evolves from here, `time` s after the start of the step; `inputs` is space for
     /// measurements and references.
-    fn mode_at(&self, time: f64, z: &[f64], given: &mut [f64]) -> Mode {
+    fn mode_at(&self, time: f64, z: &[f64], inputs: &mut [f64]) -> Mode {
         let Self { y, r, .. } = self;
         let known = y[0].iter().zip(y[1]).chain(r[0].iter().zip(r[1]));
-        for (given, (value, slope)) in given.iter_mut().zip(known) {
-            *given = value + slope * time;
+        for (input, (value, slope)) in inputs.iter_mut().zip(known) {
+            *input = value + slope * time;
         }
-        self.mode.limited(self.design, z, given.split_at(y[0].len()).into())
+        self.mode.limited(self.design, z, inputs.split_at(y[0].len()).into())
     }
 }
 
@@ -152,14 +152,14 @@ fn system(design: &Design, mode: Mode) -> (DMatrix<f64>, DMatrix<f64>) {
 impl Observer {
     /// The observer of `design` with an empty cache.
     pub(crate) fn new(design: &Design) -> Self {
-        let given = design.measurements.len() + design.references.len();
-        let inputs = given + design.actuators.len();
+        let known = design.measurements.len() + design.references.len();
+        let inputs = known + design.actuators.len();
         let states = design.order();
         Self {
             propagators: Propagators::default(),
             input: vec![0.0; inputs],
             input_slope: vec![0.0; inputs],
-            given: vec![0.0; given],
+            known: vec![0.0; known],
             before: vec![0.0; states],
             after: vec![0.0; states],
         }
@@ -198,7 +198,7 @@ impl Observer {
         halvings: u32,
         follow: Follow<'_>,
     ) -> Result<(), control::Error> {
-        let mode = conditions.mode_at(part.offset, &self.before, &mut self.given);
+        let mode = conditions.mode_at(part.offset, &self.before, &mut self.known);
         if halvings > 0 {
             let stays = self.keeps_mode(mode, conditions, part.half(0))?
                 && self.keeps_mode(mode, conditions, part)?;
@@ -223,7 +223,7 @@ impl Observer {
     ) -> Result<bool, control::Error> {
         self.propagate(mode, conditions, part)?;
         let end = part.offset + part.size;
-        Ok(conditions.mode_at(end, &self.after, &mut self.given) == mode)
+        Ok(conditions.mode_at(end, &self.after, &mut self.known) == mode)
     }
 
     /// Computes `after` from `before` over `part` in `mode`.
@@ -233,9 +233,9 @@ impl Observer {
         Conditions { design, y, r, .. }: Conditions<'_>,
         part: Part,
     ) -> Result<(), control::Error> {
-        let given = y[0].iter().zip(y[1]).chain(r[0].iter().zip(r[1]));
+        let known = y[0].iter().zip(y[1]).chain(r[0].iter().zip(r[1]));
         let (inputs, held) = self.input.split_at_mut(y[0].len() + r[0].len());
-        for (k, (value, slope)) in given.enumerate() {
+        for (k, (value, slope)) in known.enumerate() {
             inputs[k] = value + slope * part.offset;
             self.input_slope[k] = *slope;
         }

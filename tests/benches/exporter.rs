@@ -59,15 +59,20 @@ struct Running {
 impl Subject {
     /// Starts the host with `library`, the model description `own`, and the Reals that `names` has
     /// too.
-    fn new(host: &Path, library: &Path, own: &ModelDescription, names: &ModelDescription) -> Self {
-        let reals = |wanted: &dyn Fn(Causality) -> bool| {
-            let found = names
+    fn new(
+        host: &Path,
+        library: &Path,
+        description: &ModelDescription,
+        names: &ModelDescription,
+    ) -> Self {
+        let reals = |selects: &dyn Fn(Causality) -> bool| {
+            let variables = names
                 .variables
                 .iter()
                 .filter(|variable| matches!(variable.kind, Kind::Real(_)))
-                .filter(|variable| wanted(variable.causality));
-            let references = found.map(|variable| {
-                let same = own.variables.iter().find(|other| other.name == variable.name);
+                .filter(|variable| selects(variable.causality));
+            let references = variables.map(|variable| {
+                let same = description.variables.iter().find(|other| other.name == variable.name);
                 let same = same.unwrap_or_else(|| panic!("no {} in the other", variable.name));
                 same.value_reference.to_string()
             });
@@ -77,7 +82,7 @@ impl Subject {
         let parameters = reals(&|causality| causality == Causality::Parameter);
         let arguments = vec![
             library.display().to_string(),
-            own.guid.clone(),
+            description.guid.clone(),
             "file:///nowhere".to_owned(),
             STEP.to_owned(),
             reals(&|causality| causality != Causality::Independent),
@@ -257,13 +262,15 @@ fn main() {
         let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
         let library = libraries.join(format!("{prefix}{model}{suffix}"));
         let xml = fmu_import::describe(&library, Path::new("")).unwrap();
-        let own = ModelDescription::parse(xml.as_bytes()).unwrap();
-        let mut subjects = vec![Subject::new(&host, &library, &own, &own)];
-        for fmu in references.iter().filter(|fmu| fmu.description.model_name == own.model_name) {
-            let library = fmu.library(&own.model_name).unwrap();
-            subjects.push(Subject::new(&host, &library, &fmu.description, &own));
+        let description = ModelDescription::parse(xml.as_bytes()).unwrap();
+        let mut subjects = vec![Subject::new(&host, &library, &description, &description)];
+        for fmu in
+            references.iter().filter(|fmu| fmu.description.model_name == description.model_name)
+        {
+            let library = fmu.library(&description.model_name).unwrap();
+            subjects.push(Subject::new(&host, &library, &fmu.description, &description));
         }
-        lines.extend(compare(&mut criterion, &own.model_name, &subjects));
+        lines.extend(compare(&mut criterion, &description.model_name, &subjects));
     }
     criterion.final_summary();
     println!("{}", lines.join("\n"));

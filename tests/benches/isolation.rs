@@ -67,18 +67,18 @@ mod linux {
 
     /// Microseconds per step of each sample, in ascending order.
     fn samples(mut step: impl FnMut(u32)) -> Vec<f64> {
-        let (mut found, mut count) = (Vec::new(), 0);
+        let (mut times, mut count) = (Vec::new(), 0);
         for _ in 0..SAMPLES {
             let begin = Instant::now();
             for _ in 0..STEPS {
                 step(count);
                 count += 1;
             }
-            found.push(begin.elapsed().as_secs_f64() * 1e6 / f64::from(STEPS));
+            times.push(begin.elapsed().as_secs_f64() * 1e6 / f64::from(STEPS));
             std::thread::sleep(Duration::from_millis(1));
         }
-        found.sort_by(f64::total_cmp);
-        found
+        times.sort_by(f64::total_cmp);
+        times
     }
 
     fn one_by_one<S: Slave>(slaves: &mut [(S, Values)], count: u32) {

@@ -136,8 +136,8 @@ impl Run {
         assert!(columns[0].len() >= count, "{} rows: {}", columns[0].len(), self.message);
         let (mut time, mut sum) = (0.0, 0.0);
         for row in 0..count {
-            let found = columns.each_ref().map(|column| column[row].to_bits());
-            assert_eq!(found, [time, time, sum].map(f64::to_bits), "row {row}");
+            let bits = columns.each_ref().map(|column| column[row].to_bits());
+            assert_eq!(bits, [time, time, sum].map(f64::to_bits), "row {row}");
             sum += STEP * time;
             time += STEP;
         }

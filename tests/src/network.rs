@@ -162,8 +162,8 @@ impl Network {
             let exact = &outputs * ((&matrix * time).exp() * &start);
             readout.read(simulation.system(), time)?;
             slow.apply(&simulation, &mut readout);
-            let found = DVector::from_column_slice(&readout.reals);
-            let error = largest(&(found - exact));
+            let readings = DVector::from_column_slice(&readout.reals);
+            let error = largest(&(readings - exact));
             // A slave with a multiple of the step is within its step.
             if !run.points.is_multiple_of(common) {
                 run.between = run.between.max(if time > 0.5 * stop { error } else { 0.0 });

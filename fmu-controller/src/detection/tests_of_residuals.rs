@@ -63,11 +63,12 @@ impl TestState {
     /// Updates the cumulative sums; returns the time since which the larger one is above 0.
     fn add(&mut self, drift: f64, residual: f64, time: f64) -> f64 {
         let signed = [residual, -residual];
-        for ((sum, since), own) in self.sums.iter_mut().zip(&mut self.since).zip(signed) {
+        for ((sum, since), signed_residual) in self.sums.iter_mut().zip(&mut self.since).zip(signed)
+        {
             if *sum <= 0.0 {
                 *since = time;
             }
-            *sum = (*sum + own - drift).max(0.0);
+            *sum = (*sum + signed_residual - drift).max(0.0);
         }
         let larger = usize::from(self.sums[1] > self.sums[0]);
         self.statistic = self.sums[larger];

@@ -66,7 +66,7 @@ impl<'a> Choice<'a> {
 
     /// Chooses a value reference below `count` that `fits`, or any other.
     pub fn reference(&mut self, count: u32, fits: impl Fn(u32) -> bool) -> u32 {
-        let fine: Vec<_> = (0..count).filter(|own| fits(*own)).collect();
+        let fine: Vec<_> = (0..count).filter(|place| fits(*place)).collect();
         let odd: Vec<_> = (0..count).chain([count, 1 << 31, u32::MAX]).collect();
         if fine.is_empty() { self.of(&odd) } else { self.either(&fine, &odd) }
     }

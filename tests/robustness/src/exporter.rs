@@ -80,9 +80,9 @@ pub fn serialized_state(data: &[u8]) {
     );
     assert!(state.is_null());
     assert_eq!(importer.get_fmu_state(Some(&mut state)), OK);
-    let own = serialized(&importer, &state);
+    let bytes = serialized(&importer, &state);
     let (guid, layout) = (16, 8);
-    let mut forged = [&own[.."FMI2ST03".len() + guid + layout], data].concat();
+    let mut forged = [&bytes[.."FMI2ST03".len() + guid + layout], data].concat();
     forged.extend_from_slice(&crc32fast::hash(&forged).to_le_bytes());
     let status = importer.de_serialize_fmu_state(&Array::right(forged), Some(&mut state));
     assert!([OK, ERROR].contains(&status));
@@ -155,7 +155,7 @@ fn size(folder: &std::path::Path) -> u64 {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let sizes = entries.map(|entry| match entry.file_type() {
         Ok(kind) if kind.is_dir() => size(&entry.path()),
-        Ok(kind) if kind.is_file() => entry.metadata().map_or(0, |own| own.len()),
+        Ok(kind) if kind.is_file() => entry.metadata().map_or(0, |metadata| metadata.len()),
         other => panic!("{}: {other:?}", entry.path().display()),
     });
     sizes.sum()

@@ -27,7 +27,7 @@ fn read(text: &str) -> Table {
         let row = text.lines().find(|line| line.split(',').next() == Some(function.name()));
         State::EVERY.map(|state| {
             let name = format!("{state:?}");
-            let column = head.iter().position(|own| *own == name);
+            let column = head.iter().position(|column_name| *column_name == name);
             let cell = column.zip(row).and_then(|(column, row)| row.split(',').nth(column));
             cell.is_some_and(|cell| cell != "-")
         })
@@ -77,7 +77,7 @@ pub struct Values {
 impl Values {
     /// The place at which the Real is kept; not x, because the model changes it.
     pub fn place_of_real(reference: u32) -> Option<usize> {
-        [1, 5, 6, 7].iter().position(|own| *own == reference)
+        [1, 5, 6, 7].iter().position(|known| *known == reference)
     }
 
     fn new() -> Self {

@@ -60,10 +60,10 @@ pub fn run(bytes: &[u8]) -> Result<u32, String> {
 
 impl World {
     fn new() -> Self {
-        let kept = || Kept { saved: Saved::NULL, of: None };
+        let empty = || Kept { saved: Saved::NULL, of: None };
         Self {
             lives: [None, None],
-            stores: Stores { kept: [kept(), kept(), kept()], records: [None, None] },
+            stores: Stores { kept: [empty(), empty(), empty()], records: [None, None] },
             spare: Importer::new(&order(1)),
             null: Importer::new(&Order { guid: None, ..order(1) }),
             reached: 0,
@@ -72,8 +72,8 @@ impl World {
 
     fn close(&mut self) {
         self.lives = [None, None];
-        for kept in &mut self.stores.kept {
-            self.spare.free_fmu_state(Some(&mut kept.saved));
+        for slot in &mut self.stores.kept {
+            self.spare.free_fmu_state(Some(&mut slot.saved));
         }
     }
 
@@ -173,12 +173,12 @@ impl World {
         {
             life.core.time = step.0.max(step.1);
         }
-        for kept in &mut self.stores.kept {
+        for slot in &mut self.stores.kept {
             if plan == Some((Place::Drop, Misbehaviour::Panic)) {
-                self.spare.free_fmu_state(Some(&mut kept.saved));
+                self.spare.free_fmu_state(Some(&mut slot.saved));
             }
-            if kept.saved.is_null() {
-                kept.of = None;
+            if slot.saved.is_null() {
+                slot.of = None;
             }
         }
         Ok(())
@@ -221,14 +221,14 @@ impl Life {
     ) -> Result<(), String> {
         let messages = self.importer.take_messages();
         let category = match status {
-            0 => return silence(messages.iter().filter(|own| own.category != "logEvents")),
+            0 => return silence(messages.iter().filter(|message| message.category != "logEvents")),
             2 => "logStatusDiscard",
             3 => "logStatusError",
             _ => "logStatusFatal",
         };
-        let wanted =
-            self.chosen.as_ref().is_none_or(|names| names.iter().any(|own| own == category));
-        if was_fatal || !wanted || !self.logger || !HEARS {
+        let is_chosen =
+            self.chosen.as_ref().is_none_or(|names| names.iter().any(|chosen| chosen == category));
+        if was_fatal || !is_chosen || !self.logger || !HEARS {
             return silence(&messages);
         }
         match &messages[..] {
@@ -286,8 +286,8 @@ fn instantiate(choice: &mut Choice, plan: Plan) -> Result<Option<Life>, String> 
 fn free(mut life: Life) -> Result<(), String> {
     life.importer.free();
     let heard = life.importer.take_messages();
-    let category = |own: &String| own == "logStatusFatal";
-    let wanted = life.chosen.as_ref().is_none_or(|names| names.iter().any(category));
-    let expected = usize::from(happened() && wanted && life.logger && HEARS);
+    let category = |chosen: &String| chosen == "logStatusFatal";
+    let is_chosen = life.chosen.as_ref().is_none_or(|names| names.iter().any(category));
+    let expected = usize::from(happened() && is_chosen && life.logger && HEARS);
     if heard.len() == expected { Ok(()) } else { Err(format!("fmi2FreeInstance: {heard:?}")) }
 }

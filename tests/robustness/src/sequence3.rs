@@ -95,12 +95,12 @@ unsafe extern "C" fn update(
     assert!(!return_requested.is_null() && !return_time.is_null());
     // SAFETY: the environment of `Sequence::new`, whose instance waits for this callback.
     unsafe {
-        let own = &*environment.cast::<Environment>();
-        let instance = own.instance.get();
-        match own.deed.get() {
+        let shared = &*environment.cast::<Environment>();
+        let instance = shared.instance.get();
+        match shared.deed.get() {
             Deed::Nothing => {}
             Deed::SetInput => {
-                let (input, value) = (own.input, 2.0);
+                let (input, value) = (shared.input, 2.0);
                 let status = fmi3::set_float64::<Machine>(
                     instance,
                     &raw const input,
@@ -108,12 +108,12 @@ unsafe extern "C" fn update(
                     &raw const value,
                     1,
                 );
-                assert_eq!(status == ERROR, own.forbidden.get());
+                assert_eq!(status == ERROR, shared.forbidden.get());
             }
             // Has no effect during a call.
             Deed::Free => fmi3::free_instance::<Machine>(instance),
             Deed::Step => {
-                own.forbidden.set(true);
+                shared.forbidden.set(true);
                 let (mut flags, mut last) = ([0_u8; 3], 0.0);
                 let [event, terminate, early] = &mut flags;
                 let last = &raw mut last;
@@ -272,24 +272,26 @@ impl Sequence {
         let (mut long, mut text, mut bytes) = (0_i64, null(), null());
         let count = choice.either(&[1], &[0, 2]);
         let real = &raw const real;
-        let own = self.instance;
+        let instance = self.instance;
         // SAFETY: each pointer leads to as many elements as the call says; counts above 1 come with a
         // reference count of 1, which the FMU must compare before it reads or writes.
         unsafe {
             match function {
                 Function::EnterInitializationMode => {
                     self.time = 0.0;
-                    fmi3::enter_initialization_mode::<Machine>(own, 0, 0.0, 0.0, 0, 0.0)
+                    fmi3::enter_initialization_mode::<Machine>(instance, 0, 0.0, 0.0, 0, 0.0)
                 }
-                Function::ExitInitializationMode => fmi3::exit_initialization_mode::<Machine>(own),
-                Function::EnterEventMode => fmi3::enter_event_mode::<Machine>(own),
-                Function::EnterStepMode => fmi3::enter_step_mode::<Machine>(own),
+                Function::ExitInitializationMode => {
+                    fmi3::exit_initialization_mode::<Machine>(instance)
+                }
+                Function::EnterEventMode => fmi3::enter_event_mode::<Machine>(instance),
+                Function::EnterStepMode => fmi3::enter_step_mode::<Machine>(instance),
                 Function::EnterContinuousTimeMode => {
-                    fmi3::enter_continuous_time_mode::<Machine>(own)
+                    fmi3::enter_continuous_time_mode::<Machine>(instance)
                 }
                 Function::UpdateDiscreteStates => {
                     let [a, b, c, d, e] = &mut flags;
-                    fmi3::update_discrete_states::<Machine>(own, a, b, c, d, e, &raw mut value)
+                    fmi3::update_discrete_states::<Machine>(instance, a, b, c, d, e, &raw mut value)
                 }
                 Function::DoStep => {
                     let step = choice.either(&[0.125], &[f64::NAN, -1.0, f64::INFINITY, 0.0]);
@@ -297,7 +299,7 @@ impl Sequence {
                     let [event, terminate, early, ..] = &mut flags;
                     let last = &raw mut value;
                     let status = fmi3::do_step::<Machine>(
-                        own, start, step, 1, event, terminate, early, last,
+                        instance, start, step, 1, event, terminate, early, last,
                     );
                     if status < 2 {
                         self.time = value;
@@ -306,69 +308,102 @@ impl Sequence {
                     status
                 }
                 Function::GetFloat64 => {
-                    fmi3::get_float64::<Machine>(own, real, 1, &raw mut value, count)
+                    fmi3::get_float64::<Machine>(instance, real, 1, &raw mut value, count)
                 }
                 Function::SetFloat64 => {
-                    fmi3::set_float64::<Machine>(own, real, 1, &raw const value, count)
+                    fmi3::set_float64::<Machine>(instance, real, 1, &raw const value, count)
                 }
-                Function::GetInt32 => {
-                    fmi3::get_int32::<Machine>(own, &raw const integer, 1, &raw mut whole, count)
-                }
-                Function::SetInt32 => {
-                    fmi3::set_int32::<Machine>(own, &raw const integer, 1, &raw const whole, count)
-                }
-                Function::GetInt64 => {
-                    fmi3::get_int64::<Machine>(own, &raw const integer, 1, &raw mut long, count)
-                }
+                Function::GetInt32 => fmi3::get_int32::<Machine>(
+                    instance,
+                    &raw const integer,
+                    1,
+                    &raw mut whole,
+                    count,
+                ),
+                Function::SetInt32 => fmi3::set_int32::<Machine>(
+                    instance,
+                    &raw const integer,
+                    1,
+                    &raw const whole,
+                    count,
+                ),
+                Function::GetInt64 => fmi3::get_int64::<Machine>(
+                    instance,
+                    &raw const integer,
+                    1,
+                    &raw mut long,
+                    count,
+                ),
                 Function::GetBoolean => fmi3::get_boolean::<Machine>(
-                    own,
+                    instance,
                     &raw const boolean,
                     1,
                     flags.as_mut_ptr(),
                     count,
                 ),
-                Function::SetBoolean => {
-                    fmi3::set_boolean::<Machine>(own, &raw const boolean, 1, flags.as_ptr(), count)
-                }
-                Function::GetString => {
-                    fmi3::get_string::<Machine>(own, &raw const integer, 1, &raw mut text, count)
-                }
-                Function::GetBinary => {
-                    fmi3::get_binary::<Machine>(own, real, 1, &raw mut size, &raw mut bytes, count)
-                }
+                Function::SetBoolean => fmi3::set_boolean::<Machine>(
+                    instance,
+                    &raw const boolean,
+                    1,
+                    flags.as_ptr(),
+                    count,
+                ),
+                Function::GetString => fmi3::get_string::<Machine>(
+                    instance,
+                    &raw const integer,
+                    1,
+                    &raw mut text,
+                    count,
+                ),
+                Function::GetBinary => fmi3::get_binary::<Machine>(
+                    instance,
+                    real,
+                    1,
+                    &raw mut size,
+                    &raw mut bytes,
+                    count,
+                ),
                 Function::SetDebugLogging => {
-                    fmi3::set_debug_logging::<Machine>(own, flags[0], 0, null())
+                    fmi3::set_debug_logging::<Machine>(instance, flags[0], 0, null())
                 }
                 Function::SetTime => {
                     self.time += 0.125;
-                    fmi3::set_time::<Machine>(own, choice.either(&[self.time], &[f64::NAN]))
+                    fmi3::set_time::<Machine>(instance, choice.either(&[self.time], &[f64::NAN]))
                 }
                 Function::SetContinuousStates => {
-                    fmi3::set_continuous_states::<Machine>(own, &raw const value, count)
+                    fmi3::set_continuous_states::<Machine>(instance, &raw const value, count)
                 }
                 Function::GetContinuousStates => {
-                    fmi3::get_continuous_states::<Machine>(own, &raw mut value, count)
+                    fmi3::get_continuous_states::<Machine>(instance, &raw mut value, count)
                 }
                 Function::GetContinuousStateDerivatives => {
-                    fmi3::get_continuous_state_derivatives::<Machine>(own, &raw mut value, count)
+                    fmi3::get_continuous_state_derivatives::<Machine>(
+                        instance,
+                        &raw mut value,
+                        count,
+                    )
                 }
                 Function::GetEventIndicators => {
-                    fmi3::get_event_indicators::<Machine>(own, &raw mut value, count)
+                    fmi3::get_event_indicators::<Machine>(instance, &raw mut value, count)
                 }
                 Function::GetNominalsOfContinuousStates => {
-                    fmi3::get_nominals_of_continuous_states::<Machine>(own, &raw mut value, count)
+                    fmi3::get_nominals_of_continuous_states::<Machine>(
+                        instance,
+                        &raw mut value,
+                        count,
+                    )
                 }
                 Function::GetNumberOfContinuousStates => {
-                    fmi3::get_number_of_continuous_states::<Machine>(own, &raw mut size)
+                    fmi3::get_number_of_continuous_states::<Machine>(instance, &raw mut size)
                 }
                 Function::CompletedIntegratorStep => {
                     let [enter, terminate, ..] = &mut flags;
-                    fmi3::completed_integrator_step::<Machine>(own, 1, enter, terminate)
+                    fmi3::completed_integrator_step::<Machine>(instance, 1, enter, terminate)
                 }
                 Function::GetOutputDerivatives => {
                     let order = choice.either(&[1], &[0, 9]);
                     fmi3::get_output_derivatives::<Machine>(
-                        own,
+                        instance,
                         real,
                         1,
                         &raw const order,
@@ -379,7 +414,7 @@ impl Sequence {
                 Function::GetDirectionalDerivative => {
                     let (seed, mut change) = (1.0, 0.0);
                     fmi3::get_directional_derivative::<Machine>(
-                        own,
+                        instance,
                         real,
                         1,
                         real,
@@ -391,23 +426,27 @@ impl Sequence {
                     )
                 }
                 Function::GetFMUState => {
-                    let status = fmi3::get_fmu_state::<Machine>(own, &raw mut self.saved);
+                    let status = fmi3::get_fmu_state::<Machine>(instance, &raw mut self.saved);
                     if status == 0 {
                         self.known = (self.state, self.time, self.size);
                     }
                     status
                 }
                 Function::SetFMUState => {
-                    let status = fmi3::set_fmu_state::<Machine>(own, self.saved);
+                    let status = fmi3::set_fmu_state::<Machine>(instance, self.saved);
                     if status == 0 {
                         (_, self.time, self.size) = self.known;
                     }
                     status
                 }
-                Function::FreeFMUState => fmi3::free_fmu_state::<Machine>(own, &raw mut self.saved),
-                Function::EnterConfigurationMode => fmi3::enter_configuration_mode::<Machine>(own),
+                Function::FreeFMUState => {
+                    fmi3::free_fmu_state::<Machine>(instance, &raw mut self.saved)
+                }
+                Function::EnterConfigurationMode => {
+                    fmi3::enter_configuration_mode::<Machine>(instance)
+                }
                 Function::ExitConfigurationMode => {
-                    let status = fmi3::exit_configuration_mode::<Machine>(own);
+                    let status = fmi3::exit_configuration_mode::<Machine>(instance);
                     self.assert_size(status);
                     status
                 }
@@ -415,7 +454,7 @@ impl Sequence {
                     let (reference, value) =
                         (sized().0, choice.either(&[1, 2, 3, 5], &[0, 6, u64::MAX]));
                     let status = fmi3::set_uint64::<Machine>(
-                        own,
+                        instance,
                         &raw const reference,
                         1,
                         &raw const value,
@@ -427,10 +466,10 @@ impl Sequence {
                     }
                     status
                 }
-                Function::Terminate => fmi3::terminate::<Machine>(own),
+                Function::Terminate => fmi3::terminate::<Machine>(instance),
                 Function::Reset => {
                     (self.time, self.size) = (0.0, SIZE);
-                    fmi3::reset::<Machine>(own)
+                    fmi3::reset::<Machine>(instance)
                 }
                 _ => ERROR,
             }
@@ -479,7 +518,9 @@ pub fn run(data: &[u8]) {
         choice.hostile = byte.is_multiple_of(4);
         let legal: Vec<Function> = FUNCTIONS
             .into_iter()
-            .filter(|own| choice.hostile || allowed(sequence.interface, *own, sequence.state))
+            .filter(|function| {
+                choice.hostile || allowed(sequence.interface, *function, sequence.state)
+            })
             .collect();
         let function = choice.of(&legal);
         sequence.call(function, &mut choice);

@@ -66,18 +66,18 @@ fn a_model_is_one_file_of_fewer_than_60_lines_and_a_ball_for_both_interfaces_of_
 
 /// All files below `folder`, by their paths in it.
 fn content(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let (mut found, mut open) = (BTreeMap::new(), vec![folder.to_owned()]);
+    let (mut files, mut open) = (BTreeMap::new(), vec![folder.to_owned()]);
     while let Some(next) = open.pop() {
         for path in fs::read_dir(next).unwrap().map(|item| item.unwrap().path()) {
             if path.is_dir() {
                 open.push(path);
             } else {
                 let name = path.strip_prefix(folder).unwrap().to_owned();
-                found.insert(name, fs::read(&path).unwrap());
+                files.insert(name, fs::read(&path).unwrap());
             }
         }
     }
-    found
+    files
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn a_new_crate_with_the_files_of_its_author_is_packed_to_the_same_bytes_in_any_f
 
 /// Packs files of the author unchanged, with the library that is already built.
 fn packs_the_files_of_the_author(place: &Path) {
-    let own = place.join("heat-pump");
+    let folder_of_fmu = place.join("heat-pump");
     let files = [
         "resources/maps/a.csv",
         "documentation/index.html",
@@ -124,28 +124,28 @@ fn packs_the_files_of_the_author(place: &Path) {
         "extra/org.example/c.xml",
     ];
     for path in files {
-        fs::create_dir_all(own.join(path).parent().unwrap()).unwrap();
-        fs::write(own.join(path), path).unwrap();
+        fs::create_dir_all(folder_of_fmu.join(path).parent().unwrap()).unwrap();
+        fs::write(folder_of_fmu.join(path), path).unwrap();
     }
     let picture = b"\x89PNG\r\n\x1a\n and more";
-    fs::write(own.join("model.png"), picture).unwrap();
-    let output = run_in(&own, &["pack", "."]);
+    fs::write(folder_of_fmu.join("model.png"), picture).unwrap();
+    let output = run_in(&folder_of_fmu, &["pack", "."]);
     assert!(output.status.success(), "{}", message(&output));
-    let fmu = Unpacked::open_whole(&own.join("dist/HeatPump.fmu")).unwrap();
+    let fmu = Unpacked::open_whole(&folder_of_fmu.join("dist/HeatPump.fmu")).unwrap();
     for path in files {
         assert_eq!(fs::read_to_string(fmu.folder().join(path)).unwrap(), path);
     }
     assert_eq!(fs::read(fmu.folder().join("model.png")).unwrap(), picture);
-    fs::write(own.join("model.png"), "GIF89a").unwrap();
-    refuses(&own, &["pack", "."], &["model.png", "expected a PNG file"]);
-    fs::write(own.join("model.png"), picture).unwrap();
-    states_the_terminals_of_the_author(&own);
+    fs::write(folder_of_fmu.join("model.png"), "GIF89a").unwrap();
+    refuses(&folder_of_fmu, &["pack", "."], &["model.png", "expected a PNG file"]);
+    fs::write(folder_of_fmu.join("model.png"), picture).unwrap();
+    states_the_terminals_of_the_author(&folder_of_fmu);
 }
 
 /// In FMI 3.0 the terminals are those of the author, whose members are variables.
-fn states_the_terminals_of_the_author(own: &Path) {
+fn states_the_terminals_of_the_author(folder: &Path) {
     let file = "terminalsAndIcons/terminalsAndIcons.xml";
-    fs::create_dir_all(own.join("terminalsAndIcons")).unwrap();
+    fs::create_dir_all(folder.join("terminalsAndIcons")).unwrap();
     let terminals = |variable: &str| {
         format!(
             "<fmiTerminalsAndIcons fmiVersion=\"3.0\"><Terminals><Terminal name=\"air\" \
@@ -154,13 +154,13 @@ fn states_the_terminals_of_the_author(own: &Path) {
              </fmiTerminalsAndIcons>"
         )
     };
-    fs::write(own.join(file), terminals("T_outside")).unwrap();
-    let output = run_in(own, &["pack", ".", "--fmi", "3"]);
+    fs::write(folder.join(file), terminals("T_outside")).unwrap();
+    let output = run_in(folder, &["pack", ".", "--fmi", "3"]);
     assert!(output.status.success(), "{}", message(&output));
-    let fmu = Unpacked::open_whole(&own.join("dist/HeatPump.fmi3.fmu")).unwrap();
+    let fmu = Unpacked::open_whole(&folder.join("dist/HeatPump.fmi3.fmu")).unwrap();
     assert_eq!(fs::read_to_string(fmu.folder().join(file)).unwrap(), terminals("T_outside"));
-    fs::write(own.join(file), terminals("T_inside")).unwrap();
-    refuses(own, &["pack", ".", "--fmi", "3"], &[file, "terminal air", "`T_inside`"]);
+    fs::write(folder.join(file), terminals("T_inside")).unwrap();
+    refuses(folder, &["pack", ".", "--fmi", "3"], &[file, "terminal air", "`T_inside`"]);
 }
 
 #[test]

@@ -32,15 +32,15 @@ fn text<'a>(finding: &'a Value, key: &str) -> &'a str {
 /// The findings on behaviour, without those that a well-behaved FMU has too.
 fn new(behaviour: &str, more: &[&str]) -> (Option<i32>, Vec<Value>) {
     let (_, usual) = check(&fmu("as it should"), &[]);
-    let (status, mut found) = check(&fmu(behaviour), more);
-    let elsewhere = |own: &Value| text(own, "part") != "behaviour";
+    let (status, mut findings) = check(&fmu(behaviour), more);
+    let elsewhere = |finding: &Value| text(finding, "part") != "behaviour";
     assert_eq!(
-        found.iter().filter(|own| elsewhere(own)).count(),
-        usual.iter().filter(|own| elsewhere(own)).count(),
-        "the files are looked at all the same: {found:#?}"
+        findings.iter().filter(|finding| elsewhere(finding)).count(),
+        usual.iter().filter(|finding| elsewhere(finding)).count(),
+        "the files are looked at all the same: {findings:#?}"
     );
-    found.retain(|own| text(own, "part") == "behaviour" && !usual.contains(own));
-    (status, found)
+    findings.retain(|finding| text(finding, "part") == "behaviour" && !usual.contains(finding));
+    (status, findings)
 }
 
 #[test]

@@ -31,8 +31,8 @@ impl Nodes<'_> {
         for &number in order {
             let (name, parameters) = self.nodes[number];
             if isolate {
-                let own = isolate::open(fmu, name, &isolated::options()).unwrap();
-                system.add(name, Box::new(own)).unwrap();
+                let isolated_slave = isolate::open(fmu, name, &isolated::options()).unwrap();
+                system.add(name, Box::new(isolated_slave)).unwrap();
             } else {
                 system
                     .add(name, Box::new(Fmu::open_any(fmu).unwrap().instantiate(name).unwrap()))
@@ -73,13 +73,14 @@ struct Outcome {
 impl Outcome {
     fn last(&self, name: &str) -> f64 {
         let (_, row) = self.rows.last().unwrap();
-        row.iter().find(|(own, _)| own == name).unwrap().1
+        row.iter().find(|(column, _)| column == name).unwrap().1
     }
 
     /// The first time at which the variable has this value.
     fn first(&self, name: &str, value: f64) -> Option<f64> {
-        let has =
-            |row: &[(String, f64)]| row.iter().any(|(own, found)| own == name && *found == value);
+        let has = |row: &[(String, f64)]| {
+            row.iter().any(|(column, number)| column == name && *number == value)
+        };
         self.rows.iter().find(|(_, row)| has(row)).map(|(time, _)| *time)
     }
 }

@@ -27,8 +27,8 @@ fn packed(name: &str) -> PathBuf {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         folder
     });
-    let own = folder.join(name);
-    if own.exists() { own } else { dist().join(name) }
+    let packed_here = folder.join(name);
+    if packed_here.exists() { packed_here } else { dist().join(name) }
 }
 
 /// The FMU with a changed `modelDescription.xml`; the GUID, and therefore the library, stays the
@@ -79,24 +79,24 @@ fn at(list: &[(&str, &str)]) -> Vec<(String, String)> {
 }
 
 /// Each entry is within `relative` of the largest expected entry of its row.
-fn expect_close(found: &Linearisation, expected: &DMatrix<f64>, relative: f64) {
-    let found = found.matrices.joined();
-    assert_eq!(found.shape(), expected.shape());
+fn expect_close(linearised: &Linearisation, expected: &DMatrix<f64>, relative: f64) {
+    let matrix = linearised.matrices.joined();
+    assert_eq!(matrix.shape(), expected.shape());
     for i in 0..expected.nrows() {
         let size = expected.row(i).amax();
         for j in 0..expected.ncols() {
-            let difference = (found[(i, j)] - expected[(i, j)]).abs();
-            assert!(difference <= relative * size, "[{i},{j}]: {found}, expected {expected}");
+            let difference = (matrix[(i, j)] - expected[(i, j)]).abs();
+            assert!(difference <= relative * size, "[{i},{j}]: {matrix}, expected {expected}");
         }
     }
 }
 
 /// Each entry is within its own error estimate, with an allowance for rounding.
-fn expect_within_errors(found: &Linearisation, expected: &DMatrix<f64>) {
-    let Method::FiniteDifferences { errors, .. } = &found.method else {
-        panic!("{}", found.method)
+fn expect_within_errors(linearised: &Linearisation, expected: &DMatrix<f64>) {
+    let Method::FiniteDifferences { errors, .. } = &linearised.method else {
+        panic!("{}", linearised.method)
     };
-    let (values, errors) = (found.matrices.joined(), errors.joined());
+    let (values, errors) = (linearised.matrices.joined(), errors.joined());
     for (k, (value, expected)) in values.iter().zip(expected).enumerate() {
         let allowed = errors[k] + 1e-13 * expected.abs();
         assert!((value - expected).abs() <= allowed, "{k}: {values} {expected} {errors}");

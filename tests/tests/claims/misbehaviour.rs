@@ -149,12 +149,12 @@ fn an_fmu_that_needs_a_tool_runs_if_it_can_and_otherwise_the_error_names_the_too
 
 #[test]
 fn a_library_of_another_fmi_version_is_refused_with_that_version() {
-    let FmuError::Load(LoadError::Version { found, .. }) =
+    let FmuError::Load(LoadError::Version { actual, .. }) =
         refused(&CFmu::well_behaved().version("1.0"))
     else {
         panic!("refused for another reason");
     };
-    assert_eq!(found, "1.0");
+    assert_eq!(actual, "1.0");
     assert!(!open(&CFmu::well_behaved().version("2.0.4")).description().variables.is_empty());
 }
 

@@ -12,11 +12,11 @@ use tests::root;
 type Module = Vec<String>;
 
 /// All modules of a crate that are not tests, with their files.
-fn modules(sources: &Path, folder: &Path, found: &mut BTreeMap<Module, PathBuf>) {
+fn modules(sources: &Path, folder: &Path, files: &mut BTreeMap<Module, PathBuf>) {
     for item in fs::read_dir(folder).unwrap() {
         let path = item.unwrap().path();
         if path.is_dir() {
-            modules(sources, &path, found);
+            modules(sources, &path, files);
         } else if path.extension().is_some_and(|ending| ending == "rs") {
             let inner = path.strip_prefix(sources).unwrap().with_extension("");
             let mut module: Module =
@@ -25,14 +25,14 @@ fn modules(sources: &Path, folder: &Path, found: &mut BTreeMap<Module, PathBuf>)
                 module.pop();
             }
             if !module.iter().any(|part| part == "tests") {
-                found.insert(module, path);
+                files.insert(module, path);
             }
         }
     }
 }
 
 /// The paths that begin with `crate`, `super` or `self`, without those of tests.
-fn paths(tokens: TokenStream, found: &mut Vec<Vec<String>>) {
+fn paths(tokens: TokenStream, paths_of_file: &mut Vec<Vec<String>>) {
     let tokens: Vec<TokenTree> = tokens.into_iter().collect();
     let mut at = 0;
     while at < tokens.len() {
@@ -49,10 +49,10 @@ fn paths(tokens: TokenStream, found: &mut Vec<Vec<String>>) {
             TokenTree::Ident(name)
                 if ["crate", "super", "self"].iter().any(|root| name == root) =>
             {
-                at = tree(&tokens, at, &[], found);
+                at = tree(&tokens, at, &[], paths_of_file);
                 continue;
             }
-            TokenTree::Group(group) => paths(group.stream(), found),
+            TokenTree::Group(group) => paths(group.stream(), paths_of_file),
             _ => {}
         }
         at += 1;
@@ -69,7 +69,7 @@ fn tree(
     tokens: &[TokenTree],
     mut at: usize,
     prefix: &[String],
-    found: &mut Vec<Vec<String>>,
+    paths: &mut Vec<Vec<String>>,
 ) -> usize {
     let mut path = prefix.to_vec();
     loop {
@@ -79,7 +79,7 @@ fn tree(
                 let inner: Vec<TokenTree> = group.stream().into_iter().collect();
                 let is_comma = |token: &TokenTree| matches!(token, TokenTree::Punct(mark) if mark.as_char() == ',');
                 for part in inner.split(is_comma).filter(|part| !part.is_empty()) {
-                    tree(part, 0, &path, found);
+                    tree(part, 0, &path, paths);
                 }
                 return at + 1;
             }
@@ -93,7 +93,7 @@ fn tree(
         at += 2;
     }
     if path.len() > 1 {
-        found.push(path);
+        paths.push(path);
     }
     at
 }
@@ -126,12 +126,12 @@ fn imports(sources: &Path) -> BTreeMap<Module, Imports> {
     let mut folders: BTreeMap<Module, Imports> = BTreeMap::new();
     for (module, file) in &all {
         let text = fs::read_to_string(file).unwrap();
-        let mut found = Vec::new();
+        let mut imported = Vec::new();
         paths(
             text.parse().unwrap_or_else(|error| panic!("{}: {error}", file.display())),
-            &mut found,
+            &mut imported,
         );
-        for path in found {
+        for path in imported {
             let other = resolve(&path, module, &all);
             let shared = module.iter().zip(&other).take_while(|(one, two)| one == two).count();
             if shared < module.len() && shared < other.len() {

@@ -29,10 +29,10 @@ fn increases(folder: &Path, name: &str) -> Vec<f64> {
     (1..values.len()).filter(increases).map(|at| times[at]).collect()
 }
 
-fn near(found: &[f64], expected: &[f64]) {
-    let close = found.len() == expected.len()
-        && found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-9);
-    assert!(close, "{found:?}, expected {expected:?}");
+fn near(actual: &[f64], expected: &[f64]) {
+    let close = actual.len() == expected.len()
+        && actual.iter().zip(expected).all(|(value, expected)| (value - expected).abs() < 1e-9);
+    assert!(close, "{actual:?}, expected {expected:?}");
 }
 
 #[test]

@@ -22,7 +22,7 @@ fn last(file: &Path, name: &str) -> String {
         .next()
         .unwrap()
         .split(',')
-        .position(|own| own.trim_matches('"') == name)
+        .position(|column| column.trim_matches('"') == name)
         .unwrap();
     text.lines().last().unwrap().split(',').nth(column).unwrap().to_owned()
 }

@@ -10,20 +10,20 @@ use tests::root;
 
 /// All files below `folder` with this extension, without build results.
 fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
-    let mut found = Vec::new();
+    let mut paths = Vec::new();
     for item in fs::read_dir(folder).unwrap() {
         let path = item.unwrap().path();
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         if path.is_dir() && !["target", "dist", "results"].contains(&name.as_str()) {
             if !name.starts_with('.') && !path.join("pyvenv.cfg").exists() {
-                found.extend(files(&path, extension));
+                paths.extend(files(&path, extension));
             }
-        } else if path.extension().is_some_and(|found| found == extension) {
-            found.push(path);
+        } else if path.extension().is_some_and(|ending| ending == extension) {
+            paths.push(path);
         }
     }
-    found.sort();
-    found
+    paths.sort();
+    paths
 }
 
 fn name(path: &Path) -> String {
@@ -203,7 +203,7 @@ fn unsafe_code_is_at_foreign_boundaries_only() {
 /// by AND.
 fn is_allowed(expression: &str, allowed: &[&str]) -> bool {
     let plain = expression.replace(['(', ')'], " ").replace('/', " OR ");
-    let known = |own: &str| allowed.contains(&own.trim().split(" WITH ").next().unwrap_or(""));
+    let known = |name: &str| allowed.contains(&name.trim().split(" WITH ").next().unwrap_or(""));
     plain.split(" AND ").all(|part| part.split(" OR ").any(known))
 }
 

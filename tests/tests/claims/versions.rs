@@ -44,8 +44,8 @@ impl Loaded {
     /// Returns the value reference of a variable or of an element of an array.
     fn reference(&self, name: &str) -> u32 {
         let variables = &self.slave.description().variables;
-        let found = variables.iter().find(|own| own.name == name);
-        found.unwrap_or_else(|| panic!("no variable {name}")).value_reference
+        let variable = variables.iter().find(|variable| variable.name == name);
+        variable.unwrap_or_else(|| panic!("no variable {name}")).value_reference
     }
 
     fn real(&mut self, name: &str) -> f64 {

@@ -63,53 +63,54 @@ impl Model for ClockTypes {
             V::integer(name, description, field).output(&[]).exact().clocked_by(&[clock])
         };
         vec![
-            V::periodic_clock("constant", "", 0.1, |own: &mut Self| &mut own.constant.active),
+            V::periodic_clock("constant", "", 0.1, |model: &mut Self| &mut model.constant.active),
             V::timed_clock(
                 "fixed",
                 "",
                 Fixed,
-                |own: &mut Self| &mut own.fixed.active,
-                |own: &mut Self| &mut own.fixed.interval,
+                |model: &mut Self| &mut model.fixed.active,
+                |model: &mut Self| &mut model.fixed.interval,
             ),
             V::timed_clock(
                 "tunable",
                 "",
                 Tunable,
-                |own: &mut Self| &mut own.tunable.active,
-                |own: &mut Self| &mut own.tunable.interval,
+                |model: &mut Self| &mut model.tunable.active,
+                |model: &mut Self| &mut model.tunable.interval,
             ),
             V::timed_clock(
                 "changing",
                 "Each interval is twice the one before",
                 Changing,
-                |own: &mut Self| &mut own.changing.active,
-                |own: &mut Self| &mut own.changing.interval,
+                |model: &mut Self| &mut model.changing.active,
+                |model: &mut Self| &mut model.changing.interval,
             ),
             V::timed_clock(
                 "countdown",
                 "Ticks after each third tick of fixed",
                 Countdown,
-                |own: &mut Self| &mut own.countdown.active,
-                |own: &mut Self| &mut own.countdown.interval,
+                |model: &mut Self| &mut model.countdown.active,
+                |model: &mut Self| &mut model.countdown.interval,
             ),
-            V::triggered_clock("triggered", "", |own: &mut Self| &mut own.triggered.active).input(),
-            V::triggered_clock("echo", "Ticks with countdown", |own: &mut Self| &mut own.echo)
+            V::triggered_clock("triggered", "", |model: &mut Self| &mut model.triggered.active)
+                .input(),
+            V::triggered_clock("echo", "Ticks with countdown", |model: &mut Self| &mut model.echo)
                 .output(&[]),
-            V::real("period", "Interval of fixed", |own: &mut Self| &mut own.fixed.interval)
+            V::real("period", "Interval of fixed", |model: &mut Self| &mut model.fixed.interval)
                 .unit("s")
                 .parameter(),
-            V::real("beat", "Interval of tunable", |own: &mut Self| &mut own.tunable.interval)
+            V::real("beat", "Interval of tunable", |model: &mut Self| &mut model.tunable.interval)
                 .unit("s")
                 .tunable(),
-            V::real("delay", "Delay of countdown", |own: &mut Self| &mut own.delay)
+            V::real("delay", "Delay of countdown", |model: &mut Self| &mut model.delay)
                 .unit("s")
                 .parameter(),
-            count("n_constant", "constant", |own| &mut own.constant.count),
-            count("n_fixed", "fixed", |own| &mut own.fixed.count),
-            count("n_tunable", "tunable", |own| &mut own.tunable.count),
-            count("n_changing", "changing", |own| &mut own.changing.count),
-            count("n_countdown", "countdown", |own| &mut own.countdown.count),
-            count("n_triggered", "triggered", |own| &mut own.triggered.count),
+            count("n_constant", "constant", |model| &mut model.constant.count),
+            count("n_fixed", "fixed", |model| &mut model.fixed.count),
+            count("n_tunable", "tunable", |model| &mut model.tunable.count),
+            count("n_changing", "changing", |model| &mut model.changing.count),
+            count("n_countdown", "countdown", |model| &mut model.countdown.count),
+            count("n_triggered", "triggered", |model| &mut model.triggered.count),
         ]
     }
 

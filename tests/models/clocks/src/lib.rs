@@ -29,15 +29,15 @@ impl Model for Counter {
 
     fn variables(&self) -> Vec<V<Self>> {
         vec![
-            V::periodic_clock("sample", "", 0.1, |own: &mut Self| &mut own.sample),
-            V::triggered_clock("third", "Every third count", |own: &mut Self| &mut own.third)
+            V::periodic_clock("sample", "", 0.1, |model: &mut Self| &mut model.sample),
+            V::triggered_clock("third", "Every third count", |model: &mut Self| &mut model.third)
                 .output(&[]),
-            V::triggered_clock("restart", "", |own: &mut Self| &mut own.restart).input(),
-            V::integer("count", "Counts since the restart", |own: &mut Self| &mut own.count)
+            V::triggered_clock("restart", "", |model: &mut Self| &mut model.restart).input(),
+            V::integer("count", "Counts since the restart", |model: &mut Self| &mut model.count)
                 .output(&[])
                 .exact()
                 .clocked_by(&["sample", "restart"]),
-            V::integer("restarts", "Number of restarts", |own: &mut Self| &mut own.restarts)
+            V::integer("restarts", "Number of restarts", |model: &mut Self| &mut model.restarts)
                 .output(&[])
                 .exact()
                 .clocked_by(&["restart"]),

@@ -27,9 +27,9 @@ impl Model for Dahlquist {
 
     fn variables(&self) -> Vec<Variable<Self>> {
         vec![
-            Variable::real("x", "The state", |own: &mut Self| &mut own.x).output(&[]),
-            Variable::real("der(x)", "Its slope", |own: &mut Self| &mut own.derivative),
-            Variable::real("k", "The rate", |own: &mut Self| &mut own.k).tunable(),
+            Variable::real("x", "The state", |model: &mut Self| &mut model.x).output(&[]),
+            Variable::real("der(x)", "Its slope", |model: &mut Self| &mut model.derivative),
+            Variable::real("k", "The rate", |model: &mut Self| &mut model.k).tunable(),
         ]
     }
 

@@ -45,30 +45,33 @@ impl Model for Feedthrough {
         let [continuous, shown] = ["Float64_continuous_input", "Float64_continuous_output"];
         let [discrete, held] = ["Float64_discrete_input", "Float64_discrete_output"];
         vec![
-            Variable::real(fixed, "", |own: &mut Self| &mut own.fixed).parameter(),
-            Variable::real(tunable, "", |own: &mut Self| &mut own.tunable).tunable(),
-            Variable::real(continuous, "", |own: &mut Self| &mut own.continuous[0]).input(),
-            Variable::real(shown, "", |own: &mut Self| &mut own.continuous[1])
+            Variable::real(fixed, "", |model: &mut Self| &mut model.fixed).parameter(),
+            Variable::real(tunable, "", |model: &mut Self| &mut model.tunable).tunable(),
+            Variable::real(continuous, "", |model: &mut Self| &mut model.continuous[0]).input(),
+            Variable::real(shown, "", |model: &mut Self| &mut model.continuous[1])
                 .output(&[continuous]),
-            Variable::real(discrete, "", |own: &mut Self| &mut own.discrete[0]).input().discrete(),
-            Variable::real(held, "", |own: &mut Self| &mut own.discrete[1])
+            Variable::real(discrete, "", |model: &mut Self| &mut model.discrete[0])
+                .input()
+                .discrete(),
+            Variable::real(held, "", |model: &mut Self| &mut model.discrete[1])
                 .output(&[discrete])
                 .discrete(),
-            Variable::integer("Int32_input", "", |own: &mut Self| &mut own.integer[0]).input(),
-            Variable::integer("Int32_output", "", |own: &mut Self| &mut own.integer[1])
+            Variable::integer("Int32_input", "", |model: &mut Self| &mut model.integer[0]).input(),
+            Variable::integer("Int32_output", "", |model: &mut Self| &mut model.integer[1])
                 .output(&["Int32_input"]),
-            Variable::boolean("Boolean_input", "", |own: &mut Self| &mut own.boolean[0]).input(),
-            Variable::boolean("Boolean_output", "", |own: &mut Self| &mut own.boolean[1])
+            Variable::boolean("Boolean_input", "", |model: &mut Self| &mut model.boolean[0])
+                .input(),
+            Variable::boolean("Boolean_output", "", |model: &mut Self| &mut model.boolean[1])
                 .output(&["Boolean_input"]),
-            Variable::string("String_input", "", |own: &mut Self| &mut own.string[0]).input(),
-            Variable::string("String_output", "", |own: &mut Self| &mut own.string[1])
+            Variable::string("String_input", "", |model: &mut Self| &mut model.string[0]).input(),
+            Variable::string("String_output", "", |model: &mut Self| &mut model.string[1])
                 .output(&["String_input"]),
-            Variable::enumeration("Enumeration_input", "", option.clone(), |own: &mut Self| {
-                &mut own.option[0]
+            Variable::enumeration("Enumeration_input", "", option.clone(), |model: &mut Self| {
+                &mut model.option[0]
             })
             .input(),
-            Variable::enumeration("Enumeration_output", "", option, |own: &mut Self| {
-                &mut own.option[1]
+            Variable::enumeration("Enumeration_output", "", option, |model: &mut Self| {
+                &mut model.option[1]
             })
             .output(&["Enumeration_input"]),
         ]

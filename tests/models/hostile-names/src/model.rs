@@ -26,10 +26,12 @@ impl Model for HostileNames {
 
     fn variables(&self) -> Vec<Variable<Self>> {
         vec![
-            Variable::real("u", "Input", |own: &mut Self| &mut own.u).input(),
-            Variable::real("y", "Twice the input", |own: &mut Self| &mut own.y).output(&["u"]),
-            Variable::boolean("panics", "A step panics", |own: &mut Self| &mut own.panics).input(),
-            Variable::integer("steps", "Steps done", |own: &mut Self| &mut own.steps).output(&[]),
+            Variable::real("u", "Input", |model: &mut Self| &mut model.u).input(),
+            Variable::real("y", "Twice the input", |model: &mut Self| &mut model.y).output(&["u"]),
+            Variable::boolean("panics", "A step panics", |model: &mut Self| &mut model.panics)
+                .input(),
+            Variable::integer("steps", "Steps done", |model: &mut Self| &mut model.steps)
+                .output(&[]),
         ]
     }
 

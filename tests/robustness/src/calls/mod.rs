@@ -83,7 +83,8 @@ impl Outcome {
 
 /// Combines the verdicts on all elements: the union of those that are not `OK`.
 fn together(verdicts: impl IntoIterator<Item = u8>) -> u8 {
-    let bad = verdicts.into_iter().filter(|own| *own != OK).fold(0, |all, own| all | own);
+    let bad =
+        verdicts.into_iter().filter(|verdict| *verdict != OK).fold(0, |all, verdict| all | verdict);
     if bad == 0 { OK } else { bad }
 }
 
@@ -175,8 +176,8 @@ fn set_debug_logging(call: &mut Call) -> Outcome {
     let on = call.choice.byte().is_multiple_of(2);
     let status = call.importer.set_debug_logging(on, &categories);
     let named: Vec<_> =
-        categories.items.iter().flatten().map(|own| own.to_string_lossy()).collect();
-    let known = named.len() == count && named.iter().all(|own| NAMES.contains(&own.as_ref()));
+        categories.items.iter().flatten().map(|category| category.to_string_lossy()).collect();
+    let known = named.len() == count && named.iter().all(|name| NAMES.contains(&name.as_ref()));
     let chosen = named.iter().map(ToString::to_string).collect();
     let outcome = Outcome::if_fine(status, usable(&categories) && (known || count == 0));
     Outcome { chosen: Some(chosen), ..outcome }

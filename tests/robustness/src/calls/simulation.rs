@@ -39,8 +39,8 @@ pub(super) fn set_real_input_derivatives(call: &mut Call) -> Outcome {
     let values = choice.array(count, Choice::real);
     let status = call.importer.set_real_input_derivatives(&vr, &orders, &values);
     let elements =
-        vr.items.iter().zip(&orders.items).zip(&values.items).map(|((own, order), x)| {
-            if *own == 1 && *order >= 1 && x.is_finite() { OK } else { ERROR }
+        vr.items.iter().zip(&orders.items).zip(&values.items).map(|((reference, order), x)| {
+            if *reference == 1 && *order >= 1 && x.is_finite() { OK } else { ERROR }
         });
     let usable = usable(&vr) && usable(&orders) && usable(&values);
     Outcome::new(status, if usable { together(elements) } else { ERROR })
@@ -53,11 +53,9 @@ pub(super) fn get_real_output_derivatives(call: &mut Call) -> Outcome {
     let orders = choice.array(count, |choice| choice.either(&[1], &[2, 0, -1, i32::MAX]));
     let mut values = choice.array(count, |_| 77.0);
     let status = call.importer.get_real_output_derivatives(&vr, &orders, &mut values);
-    let elements = vr
-        .items
-        .iter()
-        .zip(&orders.items)
-        .map(|(own, order)| if [2, 4].contains(own) && *order == 1 { OK } else { ERROR });
+    let elements = vr.items.iter().zip(&orders.items).map(|(reference, order)| {
+        if [2, 4].contains(reference) && *order == 1 { OK } else { ERROR }
+    });
     let usable = usable(&vr) && usable(&orders) && usable(&values);
     Outcome::new(status, if usable { together(elements) } else { ERROR })
 }

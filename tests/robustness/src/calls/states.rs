@@ -12,7 +12,7 @@ fn slot(choice: &mut Choice) -> usize {
 /// Chooses the index of a state that fits, or of any other.
 fn filled(call: &mut Call, fits: impl Fn(&Core) -> bool) -> usize {
     let every: Vec<_> = (0..3).collect();
-    let is_fine = |own: &usize| call.stores.kept[*own].of.as_ref().is_some_and(&fits);
+    let is_fine = |slot: &usize| call.stores.kept[*slot].of.as_ref().is_some_and(&fits);
     let fine: Vec<_> = every.iter().copied().filter(is_fine).collect();
     call.choice.either(if fine.is_empty() { &every } else { &fine }, &every)
 }
@@ -32,13 +32,13 @@ pub(super) fn get(call: &mut Call) -> Outcome {
 
 pub(super) fn set(call: &mut Call) -> Outcome {
     let exchange = call.core.exchange;
-    let slot = filled(call, |own| own.exchange == exchange);
+    let slot = filled(call, |core| core.exchange == exchange);
     let Kept { saved, of } = &call.stores.kept[slot];
     let status = call.importer.set_fmu_state(saved);
-    let fine = of.as_ref().is_some_and(|own| own.exchange == call.core.exchange);
+    let fine = of.as_ref().is_some_and(|core| core.exchange == call.core.exchange);
     Outcome::if_fine(status, fine).with(move |core, stores| {
-        if let Some(own) = &stores.kept[slot].of {
-            *core = own.clone();
+        if let Some(saved_core) = &stores.kept[slot].of {
+            *core = saved_core.clone();
         }
     })
 }
@@ -97,18 +97,18 @@ pub(super) fn de_serialize(call: &mut Call) -> Outcome {
     let shape = choice.shape();
     let damage = if choice.hostile { choice.byte() } else { 0 };
     let at = usize::from(choice.byte()) * 7;
-    let mut given = record.as_ref().map(|own| own.bytes.clone()).unwrap_or_default();
-    let at = at % given.len().max(1);
+    let mut bytes_read = record.as_ref().map(|record| record.bytes.clone()).unwrap_or_default();
+    let at = at % bytes_read.len().max(1);
     let whole = damage < 200 && record.is_some();
     match damage {
         0..=199 => {}
-        200..=219 => given.truncate(at),
-        220..=239 if !given.is_empty() => given[at] ^= damage,
-        _ => given.push(damage),
+        200..=219 => bytes_read.truncate(at),
+        220..=239 if !bytes_read.is_empty() => bytes_read[at] ^= damage,
+        _ => bytes_read.push(damage),
     }
-    let given = bytes(given, shape);
+    let array = bytes(bytes_read, shape);
     let place = (!nowhere).then_some(&mut call.stores.kept[slot].saved);
-    let status = call.importer.de_serialize_fmu_state(&given, place);
-    Outcome::if_fine(status, whole && !nowhere && given.shape == Shape::Right)
-        .with(move |_, stores| stores.kept[slot].of = record.map(|own| own.of))
+    let status = call.importer.de_serialize_fmu_state(&array, place);
+    Outcome::if_fine(status, whole && !nowhere && array.shape == Shape::Right)
+        .with(move |_, stores| stores.kept[slot].of = record.map(|record| record.of))
 }

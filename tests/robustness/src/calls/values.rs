@@ -44,34 +44,34 @@ fn between(core: &Core) -> bool {
 
 /// Whether the stored value differs from the one read.
 fn differs<T: PartialEq>(pairs: impl IntoIterator<Item = (Option<T>, T)>) -> bool {
-    pairs.into_iter().any(|(kept, got)| kept.is_some_and(|kept| kept != got))
+    pairs.into_iter().any(|(stored, got)| stored.is_some_and(|stored| stored != got))
 }
 
 pub(super) fn get_real(call: &mut Call) -> Outcome {
     let vr = references(&mut call.choice, 11, any);
     let mut values = call.choice.array(vr.items.len(), |_| 77.0);
     let status = call.importer.get_real(&vr, &mut values);
-    let elements = vr.items.iter().map(|own| fine(*own < 11));
-    let kept = |own: &u32| match Values::place_of_real(*own) {
-        None => (*own == 0).then_some(call.core.time),
+    let elements = vr.items.iter().map(|reference| fine(*reference < 11));
+    let stored = |reference: &u32| match Values::place_of_real(*reference) {
+        None => (*reference == 0).then_some(call.core.time),
         Some(place) => Some(call.core.values.reals[place]),
     };
-    let wrong = differs(vr.items.iter().map(kept).zip(values.items.iter().copied()));
+    let wrong = differs(vr.items.iter().map(stored).zip(values.items.iter().copied()));
     Outcome::new(status, verdict(&[usable(&vr), usable(&values)], elements))
         .claim(!wrong, || format!("{vr:?} reads {values:?}"))
 }
 
 pub(super) fn set_real(call: &mut Call) -> Outcome {
-    let vr = references(&mut call.choice, 11, |own| call.core.settable_real(own));
+    let vr = references(&mut call.choice, 11, |reference| call.core.settable_real(reference));
     let values = call.choice.array(vr.items.len(), Choice::real);
     let status = call.importer.set_real(&vr, &values);
     let (core, mut set_values) = (call.core, Vec::new());
-    let elements = vr.items.iter().zip(&values.items).map(|(&own, &value)| {
-        if let Some(place) = Values::place_of_real(own) {
+    let elements = vr.items.iter().zip(&values.items).map(|(&reference, &value)| {
+        if let Some(place) = Values::place_of_real(reference) {
             set_values.push((place, value));
         }
-        let in_range = own != 5 || (-10.0..=10.0).contains(&value);
-        set(core.settable_real(own), value.is_finite() && in_range)
+        let in_range = reference != 5 || (-10.0..=10.0).contains(&value);
+        set(core.settable_real(reference), value.is_finite() && in_range)
     });
     let verdict = verdict(&[usable(&vr), usable(&values)], elements);
     Outcome::new(status, verdict).with(move |core, _| {
@@ -85,27 +85,28 @@ pub(super) fn get_integer(call: &mut Call) -> Outcome {
     let vr = references(&mut call.choice, 3, any);
     let mut values = call.choice.array(vr.items.len(), |_| 77);
     let status = call.importer.get_integer(&vr, &mut values);
-    let elements = vr.items.iter().map(|own| fine(*own < 3));
-    let kept = |own: &u32| call.core.values.integers.get(*own as usize).copied();
-    let wrong = differs(vr.items.iter().map(kept).zip(values.items.iter().copied()));
+    let elements = vr.items.iter().map(|reference| fine(*reference < 3));
+    let stored = |reference: &u32| call.core.values.integers.get(*reference as usize).copied();
+    let wrong = differs(vr.items.iter().map(stored).zip(values.items.iter().copied()));
     Outcome::new(status, verdict(&[usable(&vr), usable(&values)], elements))
         .claim(!wrong, || format!("{vr:?} reads {values:?}"))
 }
 
 pub(super) fn set_integer(call: &mut Call) -> Outcome {
-    let vr = references(&mut call.choice, 3, |own| own < 2);
+    let vr = references(&mut call.choice, 3, |reference| reference < 2);
     let values =
         call.choice.array(vr.items.len(), |choice| choice.either(&[1, 2], &[-5, 6, i32::MIN]));
     let status = call.importer.set_integer(&vr, &values);
     let pairs: Vec<_> = vr.items.iter().copied().zip(values.items.iter().copied()).collect();
-    let elements = pairs.iter().map(|(own, value)| {
-        let accepted = if *own == 0 { (-5..=5).contains(value) } else { [1, 2].contains(value) };
-        set(*own < 2 && between(call.core), accepted)
+    let elements = pairs.iter().map(|(reference, value)| {
+        let accepted =
+            if *reference == 0 { (-5..=5).contains(value) } else { [1, 2].contains(value) };
+        set(*reference < 2 && between(call.core), accepted)
     });
     let verdict = verdict(&[usable(&vr), usable(&values)], elements);
     Outcome::new(status, verdict).with(move |core, _| {
-        for (own, value) in pairs {
-            core.values.integers[own as usize] = value;
+        for (reference, value) in pairs {
+            core.values.integers[reference as usize] = value;
         }
     })
 }
@@ -114,19 +115,19 @@ pub(super) fn get_boolean(call: &mut Call) -> Outcome {
     let vr = references(&mut call.choice, 2, any);
     let mut values = call.choice.array(vr.items.len(), |_| 77);
     let status = call.importer.get_boolean(&vr, &mut values);
-    let elements = vr.items.iter().map(|own| fine(*own < 2));
-    let kept = |own: &u32| (*own == 0).then_some(i32::from(call.core.values.on));
-    let wrong = differs(vr.items.iter().map(kept).zip(values.items.iter().copied()));
+    let elements = vr.items.iter().map(|reference| fine(*reference < 2));
+    let stored = |reference: &u32| (*reference == 0).then_some(i32::from(call.core.values.on));
+    let wrong = differs(vr.items.iter().map(stored).zip(values.items.iter().copied()));
     Outcome::new(status, verdict(&[usable(&vr), usable(&values)], elements))
         .claim(!wrong, || format!("{vr:?} reads {values:?}"))
 }
 
 pub(super) fn set_boolean(call: &mut Call) -> Outcome {
-    let vr = references(&mut call.choice, 2, |own| own == 0);
+    let vr = references(&mut call.choice, 2, |reference| reference == 0);
     let values = call.choice.array(vr.items.len(), |choice| choice.of(&[0, 1, 2, -1]));
     let status = call.importer.set_boolean(&vr, &values);
     let last = values.items.last().map(|value| *value != 0);
-    let elements = vr.items.iter().map(|own| fine(*own == 0 && between(call.core)));
+    let elements = vr.items.iter().map(|reference| fine(*reference == 0 && between(call.core)));
     let verdict = verdict(&[usable(&vr), usable(&values)], elements);
     Outcome::new(status, verdict)
         .with(move |core, _| core.values.on = last.unwrap_or(core.values.on))
@@ -136,40 +137,42 @@ pub(super) fn get_string(call: &mut Call) -> Outcome {
     let vr = references(&mut call.choice, 3, any);
     let shape = call.choice.shape();
     let (status, got) = call.importer.get_string(&vr, shape);
-    let elements = vr.items.iter().map(|own| fine(*own < 3));
-    let kept = |own: &u32| call.core.values.strings.get(*own as usize).cloned();
-    let wrong = differs(vr.items.iter().map(kept).zip(got));
+    let elements = vr.items.iter().map(|reference| fine(*reference < 3));
+    let stored = |reference: &u32| call.core.values.strings.get(*reference as usize).cloned();
+    let wrong = differs(vr.items.iter().map(stored).zip(got));
     let values = Array::<u32> { items: vr.items.clone(), shape };
     Outcome::new(status, verdict(&[usable(&vr), usable(&values)], elements))
         .claim(!wrong, || format!("{vr:?} reads something else"))
 }
 
 pub(super) fn set_string(call: &mut Call) -> Outcome {
-    let vr = references(&mut call.choice, 3, |own| own < 2);
+    let vr = references(&mut call.choice, 3, |reference| reference < 2);
     let texts = call.choice.array(vr.items.len(), Choice::text);
     let status = call.importer.set_string(&vr, &texts);
-    let as_text = |own: &Option<std::ffi::CString>| Some(own.as_ref()?.to_str().ok()?.to_owned());
+    let as_text = |text: &Option<std::ffi::CString>| Some(text.as_ref()?.to_str().ok()?.to_owned());
     let read: Vec<_> = texts.items.iter().map(as_text).collect();
     let pairs: Vec<_> = vr.items.iter().copied().zip(read).collect();
-    let elements =
-        pairs.iter().map(|(own, text)| fine(*own < 2 && text.is_some() && between(call.core)));
+    let elements = pairs
+        .iter()
+        .map(|(reference, text)| fine(*reference < 2 && text.is_some() && between(call.core)));
     let verdict = verdict(&[usable(&vr), usable(&texts)], elements);
     Outcome::new(status, verdict).with(move |core, _| {
-        for (own, text) in pairs {
-            core.values.strings[own as usize] = text.unwrap_or_default();
+        for (reference, text) in pairs {
+            core.values.strings[reference as usize] = text.unwrap_or_default();
         }
     })
 }
 
 pub(super) fn get_directional_derivative(call: &mut Call) -> Outcome {
     let choice = &mut call.choice;
-    let unknowns = references(choice, 11, |own| call.core.is_unknown(own));
+    let unknowns = references(choice, 11, |reference| call.core.is_unknown(reference));
     let mut to = choice.array(unknowns.items.len(), |_| 77.0);
-    let knowns = references(choice, 11, |own| call.core.is_known(own));
+    let knowns = references(choice, 11, |reference| call.core.is_known(reference));
     let delta = choice.array(knowns.items.len(), Choice::real);
     let status = call.importer.get_directional_derivative((&unknowns, &mut to), (&knowns, &delta));
-    let elements = unknowns.items.iter().map(|own| fine(call.core.is_unknown(*own)));
-    let elements = elements.chain(knowns.items.iter().map(|own| fine(call.core.is_known(*own))));
+    let elements = unknowns.items.iter().map(|reference| fine(call.core.is_unknown(*reference)));
+    let elements =
+        elements.chain(knowns.items.iter().map(|reference| fine(call.core.is_known(*reference))));
     let arrays = [usable(&unknowns), usable(&to), usable(&knowns), usable(&delta)];
     Outcome::new(status, verdict(&arrays, elements))
 }

@@ -76,7 +76,7 @@ fn instantiate(instance: u8, exchange: bool) -> [u8; LENGTH] {
 
 /// One call of `function` with harmless arguments, legal or not.
 fn plain(instance: u8, function: Function, plan: [u8; 3]) -> [u8; LENGTH] {
-    let which = CALLS.iter().position(|(own, _)| *own == function);
+    let which = CALLS.iter().position(|(known, _)| *known == function);
     call(ILLEGAL | instance, which.map_or(FREE, |which| u8::try_from(which).unwrap()), plan)
 }
 
@@ -84,7 +84,7 @@ fn plain(instance: u8, function: Function, plan: [u8; 3]) -> [u8; LENGTH] {
 fn ways(exchange: bool) -> Vec<Vec<Function>> {
     use Function as F;
     let on = |more: &[F]| [&[F::EnterInitializationMode, F::ExitInitializationMode], more].concat();
-    let own = if exchange {
+    let by_interface = if exchange {
         on(&[F::EnterContinuousTimeMode, F::SetContinuousStates])
     } else {
         on(&[F::SetRealInputDerivatives, F::DoStep, F::GetDirectionalDerivative])
@@ -93,7 +93,7 @@ fn ways(exchange: bool) -> Vec<Vec<Function>> {
         vec![],
         vec![F::EnterInitializationMode],
         on(&[F::GetFMUstate, F::SerializeFMUstate, F::SetReal]),
-        own,
+        by_interface,
         on(&[F::Terminate]),
         on(&[F::CancelStep]),
     ]

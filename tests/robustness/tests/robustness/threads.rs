@@ -35,7 +35,7 @@ fn started() -> Importer {
 fn interleaved(from: usize) -> Vec<[u64; 2]> {
     let importers: Vec<_> = (0..COUNT).map(|_| started()).collect();
     let mut runs: Vec<_> =
-        importers.iter().enumerate().map(|(k, own)| steps(own, from + k)).collect();
+        importers.iter().enumerate().map(|(k, importer)| steps(importer, from + k)).collect();
     (0..20).flat_map(|number| runs.iter_mut().map(|run| run(number)).collect::<Vec<_>>()).collect()
 }
 

@@ -39,8 +39,8 @@ pub(crate) fn ahead(mut system: System, fails: impl Fn(&str) -> Option<Fails>) -
     let slaves = std::mem::take(&mut system.slaves).into_iter();
     let wrapped = slaves.map(|(name, inner)| {
         let Some(fails) = fails(&name) else { return (name, inner) };
-        let (own, record) = (name.clone(), Arc::clone(&record));
-        let slave = Ahead { inner, name: own, fails, record, begun: None, time: 0.0 };
+        let (slave_name, record) = (name.clone(), Arc::clone(&record));
+        let slave = Ahead { inner, name: slave_name, fails, record, begun: None, time: 0.0 };
         (name, Box::new(slave) as Box<dyn Slave>)
     });
     system.slaves = wrapped.collect();

@@ -28,10 +28,10 @@ fn jacobi(jobs: usize) -> Algorithm {
 fn reals() -> System {
     let mut system = typed::ring();
     let to_reals = |port: master::Port| port.variable < 2;
-    let kept: Vec<_> =
-        system.connections.iter().filter(|own| to_reals(own.from)).cloned().collect();
-    assert_eq!(kept.len(), 3);
-    system.connections = kept;
+    let connections: Vec<_> =
+        system.connections.iter().filter(|connection| to_reals(connection.from)).cloned().collect();
+    assert_eq!(connections.len(), 3);
+    system.connections = connections;
     system
 }
 
@@ -70,13 +70,13 @@ fn trajectory(algorithm: &Algorithm, fails: fn(&str) -> Option<Fails>) -> Vec<u6
     let network = problems::coupled_oscillators();
     let (system, _) = ahead(network.system(ABLE, &Arc::default()), fails);
     let mut simulation = Simulation::new(system, algorithm, &until(2.5)).unwrap();
-    let mut found = Vec::new();
+    let mut bits = Vec::new();
     while !simulation.is_finished() {
         simulation.step().unwrap();
-        found.extend(network.outputs(simulation.system()).iter().map(|y| y.to_bits()));
-        found.push(simulation.time().to_bits());
+        bits.extend(network.outputs(simulation.system()).iter().map(|y| y.to_bits()));
+        bits.push(simulation.time().to_bits());
     }
-    found
+    bits
 }
 
 #[test]
@@ -173,12 +173,12 @@ fn failed(jobs: usize, fails: fn(&str) -> Option<Fails>) -> (String, String) {
     }
     record.lock().unwrap().clear();
     let message = simulation.step().unwrap_err().to_string();
-    let found = record.lock().unwrap().join(", ");
+    let calls = record.lock().unwrap().join(", ");
     for (_, slave) in &mut simulation.system().slaves {
         slave.get_real(&[1], &mut [0.0]).unwrap();
     }
     simulation.terminate().unwrap();
-    (message, found)
+    (message, calls)
 }
 
 #[test]

@@ -58,14 +58,14 @@ fn verify(label: &str, able: Abilities, algorithm: &Algorithm, scenario: &str) {
     let (system, scenario) = new();
     let mut whole = Simulation::with_scenario(system, algorithm, &until(100.0), scenario).unwrap();
     bits(&mut whole, &network, 13);
-    let kept = postcard::to_stdvec(&whole.checkpoint().unwrap()).unwrap();
-    let checkpoint: Checkpoint = postcard::from_bytes(&kept).unwrap();
+    let bytes = postcard::to_stdvec(&whole.checkpoint().unwrap()).unwrap();
+    let checkpoint: Checkpoint = postcard::from_bytes(&bytes).unwrap();
     assert_eq!(checkpoint.time(), whole.time());
     let expected = bits(&mut whole, &network, 20);
     let (system, scenario) = new();
     let resumed = Simulation::resume(system, algorithm, &until(100.0), scenario, &checkpoint);
-    let found = bits(&mut resumed.unwrap(), &network, 20);
-    assert_eq!(found, expected, "{label}");
+    let resumed_bits = bits(&mut resumed.unwrap(), &network, 20);
+    assert_eq!(resumed_bits, expected, "{label}");
 }
 
 #[test]

@@ -27,12 +27,12 @@ fn run(network: &Network, algorithm: &Algorithm) -> Run {
 fn fixed_of(network: &Network, error: f64) -> Run {
     let mut steps = 16.0;
     loop {
-        let found = run(
+        let outcome = run(
             network,
             &Algorithm::fixed(Method::GaussSeidel, Extrapolation::Linear, STOP / steps),
         );
-        if found.error <= error {
-            return found;
+        if outcome.error <= error {
+            return outcome;
         }
         steps = f64::ceil(steps * 1.1);
     }

@@ -40,8 +40,8 @@ pub(crate) fn system(outputs: [Output; 2], way: Way) -> (System, Asked) {
         <Unknown index="2" dependencies=""/></Outputs>
         </ModelStructure></fmiModelDescription>"#;
     let description = ModelDescription::parse(xml).unwrap();
-    let (time, kept) = (0.0, [0.0; 3]);
-    let puppet = Puppet { description, time, kept, outputs, way, asked: Arc::clone(&asked) };
+    let (time, slots) = (0.0, [0.0; 3]);
+    let puppet = Puppet { description, time, kept: slots, outputs, way, asked: Arc::clone(&asked) };
     let mut system = System::default();
     system.add("p", Box::new(puppet)).unwrap();
     let lag = Block::new(&[&[-1.0]], &[&[1.0]], &[&[1.0]], &[&[0.0]], &[0.0]);
@@ -67,7 +67,7 @@ pub(crate) fn add_clock(system: &mut System, name: &str) {
 
 /// The same with a puppet that takes equal steps only.
 pub(crate) fn rigid((mut system, asked): (System, Asked)) -> (System, Asked) {
-    let own = Arc::clone(&asked);
+    let shared = Arc::clone(&asked);
     let mut description = system.slaves[0].1.description().clone();
     let flags = description.co_simulation.as_mut().unwrap();
     flags.can_handle_variable_communication_step_size = false;
@@ -77,7 +77,7 @@ pub(crate) fn rigid((mut system, asked): (System, Asked)) -> (System, Asked) {
         kept: [0.0; 3],
         outputs: [f64::sin; 2],
         way: whole,
-        asked: own,
+        asked: shared,
     };
     system.slaves[0].1 = Box::new(puppet);
     (system, asked)

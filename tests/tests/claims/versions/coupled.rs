@@ -54,7 +54,7 @@ fn outcome(
     let names = reader.headers().cloned().unwrap_or_default();
     let last = reader.records().last().and_then(Result::ok).unwrap_or_default();
     let at = move |name: &str| {
-        let column = names.iter().position(|own| own == name);
+        let column = names.iter().position(|column_name| column_name == name);
         let text = &last[column.unwrap_or_else(|| panic!("{name} in {names:?}"))];
         text.parse().unwrap_or_else(|_| panic!("{name} is {text:?}"))
     };

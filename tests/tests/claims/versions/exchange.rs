@@ -25,7 +25,7 @@ fn ready(token: &str, settings: &[(&str, f64)]) -> Integrated {
 
 fn reference(slave: &Integrated, name: &str) -> u32 {
     let variables = &slave.description().variables;
-    variables.iter().find(|own| own.name == name).unwrap().value_reference
+    variables.iter().find(|variable| variable.name == name).unwrap().value_reference
 }
 
 fn real(slave: &mut Integrated, name: &str) -> f64 {
