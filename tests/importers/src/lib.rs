@@ -160,14 +160,15 @@ fn fenced<T>(action: impl FnOnce() -> T) -> Result<T, String> {
 
 /// Methods that read and write values of one type.
 macro_rules! values {
-    ($($get:ident $set:ident $type:ty as $own:ty, $read:literal $write:literal;)*) => {$(
+    ($($get:ident $set:ident $type:ty as $converted:ty, $read:literal $write:literal;)*) => {$(
         fn $get(&mut self, references: &[u32], values: &mut [$type]) -> Result<(), CallError> {
-            let (references, mut found) = (references.to_vec(), vec![<$own>::default(); values.len()]);
-            let found = self.call($read, move |instance| {
-                instance.$get(&references, &mut found).map(|_| found)
+            let (references, mut buffer) =
+                (references.to_vec(), vec![<$converted>::default(); values.len()]);
+            let read = self.call($read, move |instance| {
+                instance.$get(&references, &mut buffer).map(|_| buffer)
             })?;
-            for (value, found) in values.iter_mut().zip(found) {
-                *value = found.into();
+            for (value, converted) in values.iter_mut().zip(read) {
+                *value = converted.into();
             }
             Ok(())
         }
@@ -175,7 +176,7 @@ macro_rules! values {
         fn $set(&mut self, references: &[u32], values: &[$type]) -> Result<(), CallError> {
             let references = references.to_vec();
             // A test sets values of the type of the FMU only.
-            let values: Vec<$own> =
+            let values: Vec<$converted> =
                 values.iter().map(|value| (*value).try_into().unwrap_or_default()).collect();
             self.call($write, move |instance| instance.$set(&references, &values).map(drop))
         }

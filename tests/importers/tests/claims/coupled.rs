@@ -48,20 +48,20 @@ fn values((simulation, probe): &mut (Simulation, Probe)) -> Vec<f64> {
 }
 
 /// Steps both over 2 s and compares all values bit by bit, including the initial ones.
-fn expect_equal_runs(mut own: (Simulation, Probe), mut other: (Simulation, Probe)) {
-    let names = own.1.names().to_vec();
+fn expect_equal_runs(mut one: (Simulation, Probe), mut other: (Simulation, Probe)) {
+    let names = one.1.names().to_vec();
     assert_eq!(names, other.1.names());
     for step in 0..=2000 {
-        let (expected, found) = (values(&mut own), values(&mut other));
-        for ((name, expected), found) in names.iter().zip(&expected).zip(&found) {
-            let same = expected.to_bits() == found.to_bits();
-            assert!(same, "{name} after {step} steps: {expected:e} and {found:e}");
+        let (expected, actual) = (values(&mut one), values(&mut other));
+        for ((name, expected), actual) in names.iter().zip(&expected).zip(&actual) {
+            let same = expected.to_bits() == actual.to_bits();
+            assert!(same, "{name} after {step} steps: {expected:e} and {actual:e}");
         }
-        own.0.step().unwrap();
+        one.0.step().unwrap();
         other.0.step().unwrap();
     }
     let estimate = names.iter().position(|name| name == "controller.f_hat").unwrap();
-    assert!(values(&mut own)[estimate].abs() > 1.0, "the observer estimates the friction");
+    assert!(values(&mut one)[estimate].abs() > 1.0, "the observer estimates the friction");
 }
 
 #[test]

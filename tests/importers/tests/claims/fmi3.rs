@@ -45,7 +45,7 @@ fn without(xml: &str, attribute: &str) -> String {
     let start = format!(" {attribute}=\"");
     let mut parts = xml.split(start.as_str());
     let first = parts.next().unwrap().to_owned();
-    parts.fold(first, |own, part| own + part.split_once('"').unwrap().1)
+    parts.fold(first, |joined, part| joined + part.split_once('"').unwrap().1)
 }
 
 #[test]
@@ -55,11 +55,11 @@ fn the_crate_fmi_refuses_units_of_variables() {
 }
 
 /// The value references of Float64 variables, as the crate reads them from the description.
-fn references<const N: usize>(own: &Fmi3Import, names: [&str; N]) -> [u32; N] {
+fn references<const N: usize>(fmu: &Fmi3Import, names: [&str; N]) -> [u32; N] {
     names.map(|name| {
-        let variables = &own.model_description().model_variables;
-        let found = variables.iter_floating().find(|variable| variable.name() == name);
-        found.unwrap().value_reference()
+        let variables = &fmu.model_description().model_variables;
+        let named = variables.iter_floating().find(|variable| variable.name() == name);
+        named.unwrap().value_reference()
     })
 }
 
@@ -72,10 +72,10 @@ struct Side<const I: usize, const O: usize> {
 
 impl<const I: usize, const O: usize> Side<I, O> {
     fn new(file: &str, inputs: [&str; I], outputs: [&str; O]) -> Self {
-        let own = import(file);
+        let fmu = import(file);
         let [inputs, outputs] =
-            [references(&own, inputs).to_vec(), references(&own, outputs).to_vec()];
-        let instance = own.instantiate_cs(file, false, true, false, false, &[]).unwrap();
+            [references(&fmu, inputs).to_vec(), references(&fmu, outputs).to_vec()];
+        let instance = fmu.instantiate_cs(file, false, true, false, false, &[]).unwrap();
         Self { instance, inputs: inputs.try_into().unwrap(), outputs: outputs.try_into().unwrap() }
     }
 
@@ -149,11 +149,11 @@ fn loop_of_the_master(steps: u32) -> Vec<[f64; 4]> {
 
 #[test]
 fn the_loop_of_fmi_3_through_the_crate_fmi_has_the_bits_of_our_own_loader() {
-    let [expected, found] = [loop_of_the_master(2000), loop_of_the_crate(2000)];
-    for (step, (expected, found)) in expected.iter().zip(&found).enumerate() {
-        assert_eq!(found.map(f64::to_bits), expected.map(f64::to_bits), "step {step}: {found:?}");
+    let [expected, actual] = [loop_of_the_master(2000), loop_of_the_crate(2000)];
+    for (step, (expected, actual)) in expected.iter().zip(&actual).enumerate() {
+        assert_eq!(actual.map(f64::to_bits), expected.map(f64::to_bits), "step {step}: {actual:?}");
     }
-    assert!(found.last().unwrap()[3].abs() > 1.0, "the observer estimates the friction");
+    assert!(actual.last().unwrap()[3].abs() > 1.0, "the observer estimates the friction");
 }
 
 /// Integrates in continuous-time mode by Euler's method to `end`.
@@ -175,8 +175,8 @@ fn euler(instance: &mut InstanceME, end: u32) -> Vec<f64> {
 
 #[test]
 fn the_plant_of_fmi_3_swings_in_model_exchange_through_the_crate_fmi() {
-    let own = import(PLANT);
-    let mut instance = own.instantiate_me("plant", false, true).unwrap();
+    let fmu = import(PLANT);
+    let mut instance = fmu.instantiate_me("plant", false, true).unwrap();
     // Far from upright without an input, the cart sticks and the pendulum swings.
     instance.enter_initialization_mode(None, 0.0, None).unwrap();
     instance.exit_initialization_mode().unwrap();

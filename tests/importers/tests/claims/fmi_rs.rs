@@ -119,32 +119,33 @@ fn fmi_rs_finds_no_fault_in_the_descriptions() {
 #[test]
 fn fmi_rs_reads_the_same_variables_and_dependencies_as_our_parser() {
     for file in FILES {
-        let (theirs, own) = (open(file), Fmu::open(&tests::dist().join(file)).unwrap());
-        let (theirs, own) = (&theirs.model_description, own.description());
-        assert_eq!(theirs.modelVariables.len(), own.variables.len());
-        for (theirs, own) in theirs.modelVariables.iter().zip(&own.variables) {
-            assert_eq!(theirs.name, own.name);
-            assert_eq!(theirs.valueReference, own.value_reference, "{}", own.name);
-            assert_eq!(theirs.variableType.name(), own.kind.element(), "{}", own.name);
+        let (theirs, ours) = (open(file), Fmu::open(&tests::dist().join(file)).unwrap());
+        let (theirs, ours) = (&theirs.model_description, ours.description());
+        assert_eq!(theirs.modelVariables.len(), ours.variables.len());
+        for (theirs, ours) in theirs.modelVariables.iter().zip(&ours.variables) {
+            assert_eq!(theirs.name, ours.name);
+            assert_eq!(theirs.valueReference, ours.value_reference, "{}", ours.name);
+            assert_eq!(theirs.variableType.name(), ours.kind.element(), "{}", ours.name);
             // The crate gives inputs initial = exact, but section 2.2.7 allows no `initial` for
             // them.
-            let input = (own.causality == Causality::Input).then_some(Initial::Exact);
-            let initial = own.initial_in_force().or(input);
+            let input = (ours.causality == Causality::Input).then_some(Initial::Exact);
+            let initial = ours.initial_in_force().or(input);
             let theirs = (theirs.causality, theirs.variability, theirs.initial);
-            let own_text = format!("{:?}", (own.causality, own.variability, initial));
-            assert_eq!(format!("{theirs:?}"), own_text, "{}", own.name);
+            let own_text = format!("{:?}", (ours.causality, ours.variability, initial));
+            assert_eq!(format!("{theirs:?}"), own_text, "{}", ours.name);
         }
         let plain = |list: &[Unknown]| -> Vec<_> {
             list.iter().map(|unknown| (unknown.index, unknown.dependencies.clone())).collect()
         };
-        let own = &own.structure;
-        for (theirs, own) in [
-            (&theirs.outputs, &own.outputs),
-            (&theirs.derivatives, &own.derivatives),
-            (&theirs.initialUnknowns, &own.initial_unknowns),
+        let structure = &ours.structure;
+        for (theirs, ours) in [
+            (&theirs.outputs, &structure.outputs),
+            (&theirs.derivatives, &structure.derivatives),
+            (&theirs.initialUnknowns, &structure.initial_unknowns),
         ] {
-            let own: Vec<_> = own.iter().map(|row| (row.index, row.dependencies.clone())).collect();
-            assert_eq!(plain(theirs), own, "{file}");
+            let rows: Vec<_> =
+                ours.iter().map(|row| (row.index, row.dependencies.clone())).collect();
+            assert_eq!(plain(theirs), rows, "{file}");
         }
     }
 }
@@ -153,10 +154,10 @@ fn fmi_rs_reads_the_same_variables_and_dependencies_as_our_parser() {
 fn the_closed_loop_by_fmi_rs_is_bit_identical_to_that_by_our_master() {
     let settings = [("plant.F_s", "60"), ("plant.linearised", "true"), ("controller.t_on", "0.5")];
     let of = |slave: &str| -> Vec<(&str, &str)> {
-        let own = |(name, value): &(&'static str, &'static str)| {
+        let setting = |(name, value): &(&'static str, &'static str)| {
             Some((name.strip_prefix(slave)?.strip_prefix('.')?, *value))
         };
-        settings.iter().filter_map(own).collect()
+        settings.iter().filter_map(setting).collect()
     };
     let plant = Instance::new(FILES[0], &of("plant"));
     let controller = Instance::new(FILES[1], &of("controller"));
@@ -167,7 +168,7 @@ fn the_closed_loop_by_fmi_rs_is_bit_identical_to_that_by_our_master() {
         .collect();
     let ports: Vec<_> = qualified.iter().map(String::as_str).collect();
     let system = tests::closed_loop(&settings);
-    let (mut own, mut probe) = tests::simulation(
+    let (mut simulation, mut probe) = tests::simulation(
         system,
         &Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, STEP),
         &ports,
@@ -180,16 +181,16 @@ fn the_closed_loop_by_fmi_rs_is_bit_identical_to_that_by_our_master() {
     let mut expected = vec![f64::NAN; ports.len()];
     for step in 0..2000 {
         exchange(&plant, &controller);
-        let time = own.time();
+        let time = simulation.time();
         expect_ok(plant.fmu.doStep(time, STEP, fmi2False));
         expect_ok(controller.fmu.doStep(time, STEP, fmi2False));
-        own.step().unwrap();
-        let end = own.time();
-        probe.read(own.system(), end, &mut expected).unwrap();
-        let found = [plant.get(&names), controller.get(&estimates)].concat();
-        for ((name, expected), found) in ports.iter().zip(&expected).zip(&found) {
-            let same = expected.to_bits() == found.to_bits();
-            assert!(same, "{name} after {step} steps: {expected:e} and {found:e}");
+        simulation.step().unwrap();
+        let end = simulation.time();
+        probe.read(simulation.system(), end, &mut expected).unwrap();
+        let values = [plant.get(&names), controller.get(&estimates)].concat();
+        for ((name, expected), value) in ports.iter().zip(&expected).zip(&values) {
+            let same = expected.to_bits() == value.to_bits();
+            assert!(same, "{name} after {step} steps: {expected:e} and {value:e}");
         }
     }
     let [position, estimate] = ["plant.x_p", "controller.f_hat"]
@@ -261,21 +262,23 @@ fn the_simulator_of_fmi_rs_gives_the_values_of_our_loader_for_each_fmu() {
         (FILES[0], vec![("x_p_0", "0.5"), ("linearised", "false")]),
         (FILES[1], vec![("x_p", "0.02"), ("theta", "-0.01"), ("t_on", "0.25")]),
     ] {
-        let found = simulated(file, &settings, 1.0);
-        assert_eq!(found.time.len(), 1001);
+        let simulated_run = simulated(file, &settings, 1.0);
+        assert_eq!(simulated_run.time.len(), 1001);
         let references: Vec<_> =
-            found.variables().map(|variable| variable.valueReference).collect();
-        let mut own = own_slave(file, &settings);
+            simulated_run.variables().map(|variable| variable.valueReference).collect();
+        let mut slave = own_slave(file, &settings);
         let mut values = vec![f64::NAN; references.len()];
-        for (row, (time, found)) in found.time.iter().zip(&found.rows).enumerate() {
-            own.get_real(&references, &mut values).unwrap();
-            let found: Vec<_> = found.iter().filter_map(VariableValue::to_f64).collect();
+        for (row, (time, simulated_row)) in
+            simulated_run.time.iter().zip(&simulated_run.rows).enumerate()
+        {
+            slave.get_real(&references, &mut values).unwrap();
+            let numbers: Vec<_> = simulated_row.iter().filter_map(VariableValue::to_f64).collect();
             let bits =
                 |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
-            assert_eq!(bits(&found), bits(&values), "{file}, row {row}: {found:?}, {values:?}");
+            assert_eq!(bits(&numbers), bits(&values), "{file}, row {row}: {numbers:?}, {values:?}");
             #[expect(clippy::cast_precision_loss, reason = "a thousand rows")]
             let next = (row + 1) as f64 * STEP;
-            own.do_step(*time, next - time, true).unwrap();
+            slave.do_step(*time, next - time, true).unwrap();
         }
     }
 }
