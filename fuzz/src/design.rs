@@ -85,8 +85,12 @@ fn live(description: &ModelDescription, folder: &Path) {
         component_environment: null_mut(),
     };
     let references = |causality| -> Vec<u32> {
-        let reals = description.variables.iter().filter(|own| matches!(own.kind, Kind::Real(_)));
-        reals.filter(|own| own.causality == causality).map(|own| own.value_reference).collect()
+        let reals =
+            description.variables.iter().filter(|variable| matches!(variable.kind, Kind::Real(_)));
+        reals
+            .filter(|variable| variable.causality == causality)
+            .map(|variable| variable.value_reference)
+            .collect()
     };
     let (inputs, outputs) = (references(Causality::Input), references(Causality::Output));
     let (values, mut results) = (vec![0.5; inputs.len()], vec![0.0; outputs.len()]);
@@ -99,7 +103,8 @@ fn live(description: &ModelDescription, folder: &Path) {
             fmi2EnterInitializationMode(c),
             fmi2ExitInitializationMode(c),
         ];
-        let size = description.default_experiment.as_ref().and_then(|own| own.step_size);
+        let size =
+            description.default_experiment.as_ref().and_then(|experiment| experiment.step_size);
         let size = size.unwrap_or(0.1).clamp(1e-6, 1.0);
         for k in 0..3 {
             statuses.push(fmi2SetReal(c, inputs.as_ptr(), inputs.len(), values.as_ptr()));
