@@ -45,7 +45,7 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
 }
 
 /// The folders of our libraries, each with the libraries that it may use.
-const ARROWS: [(&str, &[&str]); 20] = [
+const ARROWS: [(&str, &[&str]); 24] = [
     ("lapack", &[]),
     ("controller", &[]),
     ("control", &["aso-lapack"]),
@@ -82,13 +82,20 @@ const ARROWS: [(&str, &[&str]); 20] = [
         &[
             "aso-controller",
             "control",
-            "figure",
+            "controller-code",
+            "design-page",
+            "design-report",
             "files",
             "fmu-description",
             "fmu-import",
             "linearise",
+            "plant-file",
         ],
     ),
+    ("controller-code", &["aso-controller", "control"]),
+    ("design-page", &["design-report", "figure"]),
+    ("design-report", &[]),
+    ("plant-file", &["control", "files", "fmu-description"]),
 ];
 
 fn manifest(folder: &Path) -> toml::Table {
