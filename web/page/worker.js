@@ -2,6 +2,8 @@
 // Runs the WebAssembly module. Messages in: {kind: "start" | "run" | "pause" | "step" | "back" | "set" | "until", ..}.
 // Messages out: {kind: "ready" | "started" | "running" | "rows" | "set" | "back" | "refused" | "failed" | "stopped", ..},
 // with the number of the run.
+importScripts("module.js");
+
 const EVERY = 10; // steps between two rows
 const MOST_ROWS = 1e6;
 const COLUMNS = 9; // of a row: time, x_p, ..
@@ -13,38 +15,10 @@ let wasm = null;
 let timer = null;
 let run = null; // {number, step, every, moves, plan, speed, batch, saved, due, spent, last, ended}
 
-const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
-
-// The functions of a module, a file or a compiled one. It reads numbers by the imported one.
-async function load(source) {
-  let memory = null;
-  const number = (place, length) => {
-    const text = new TextDecoder().decode(new Uint8Array(memory.buffer, place, length)).trim();
-    return NUMBER.test(text) ? Number(text) : NaN;
-  };
-  // A server that does not name the type of the file needs the second way.
-  const module = source instanceof WebAssembly.Module ? source : await WebAssembly.compileStreaming(fetch(source))
-    .catch(async () => WebAssembly.compile(await (await fetch(source)).arrayBuffer()));
-  const { exports } = await WebAssembly.instantiate(module, { page: { number } });
-  memory = exports.memory;
-  return { exports, module };
-}
-
 let observer = null; // the module that places eigenvalues, loaded when they are set
 
 function answer(message, transfer = []) {
   postMessage({ ...message, run: run?.number }, transfer);
-}
-
-function write(text, to = wasm) {
-  const bytes = new TextEncoder().encode(text);
-  const place = to.text(bytes.length);
-  new Uint8Array(to.memory.buffer, place, bytes.length).set(bytes);
-}
-
-function read(from = wasm) {
-  const length = from.text_length();
-  return new TextDecoder().decode(new Uint8Array(from.memory.buffer, from.text(length), length));
 }
 
 function pause() {
@@ -54,15 +28,15 @@ function pause() {
 
 // Sends the rows that the module keeps; whether the cart is still near.
 function send() {
-  const rows = new Float64Array(wasm.memory.buffer, wasm.rows(), wasm.rows_length()).slice();
+  const rows = rowsOf(wasm);
   const isNear = rows.length === 0 || Math.abs(rows.at(1 - COLUMNS)) < FARTHEST;
   if (rows.length > 0) answer({ kind: "rows", rows }, [rows.buffer]);
   return isNear;
 }
 
 function change(line) {
-  write(line);
-  if (wasm.set() !== 0) answer({ kind: "refused", text: read(), line });
+  writeText(line, wasm);
+  if (wasm.set() !== 0) answer({ kind: "refused", text: readText(wasm), line });
   else answer({ kind: "set", line, at: wasm.time() });
 }
 
@@ -85,7 +59,7 @@ function advance(count) {
     if (status !== 0 || wasm.is_finished() || !isNear) {
       pause();
       run.ended = true;
-      if (status !== 0) answer({ kind: "failed", text: read() });
+      if (status !== 0) answer({ kind: "failed", text: readText(wasm) });
       else if (wasm.is_finished()) answer({ kind: "stopped", spent: run.spent });
       else answer({ kind: "failed", text: `the cart is ${FARTHEST} m away.` });
     }
@@ -129,7 +103,7 @@ function turn() {
 const actions = {
   // The second worker gets the module that the first one compiled.
   async load({ module }) {
-    const loaded = await load(module ?? "paper.wasm");
+    const loaded = await loadModule(module ?? "paper.wasm");
     wasm = loaded.exports;
     answer({ kind: "ready", module: loaded.module });
   },
@@ -138,18 +112,18 @@ const actions = {
     run = { number, step, every: EVERY * Math.ceil(stop / step / EVERY / MOST_ROWS), moves: plan, plan: [...plan], speed: 1, batch: 500, saved: 0, due: 0, spent: 0, last: 0, ended: true };
     let placed = gains;
     if (eigenvalues !== null) {
-      observer ??= (await load("observer.wasm")).exports;
-      write(eigenvalues, observer);
+      observer ??= (await loadModule("observer.wasm")).exports;
+      writeText(eigenvalues, observer);
       const refused = observer.place() !== 0;
-      placed = read(observer);
+      placed = readText(observer);
       if (refused) {
         answer({ kind: "refused", text: placed, setting: "eigenvalues" });
         return;
       }
     }
-    write(`${settings}\n${placed}`);
+    writeText(`${settings}\n${placed}`, wasm);
     if (wasm.start(step, stop) !== 0) {
-      answer({ kind: "refused", text: read(), setting: "" });
+      answer({ kind: "refused", text: readText(wasm), setting: "" });
       return;
     }
     run.ended = false;
@@ -181,7 +155,7 @@ const actions = {
     pause();
     if (!run) return;
     if (wasm.back() !== 0) {
-      answer({ kind: "refused", text: read() });
+      answer({ kind: "refused", text: readText(wasm) });
       return;
     }
     run.saved = -Infinity;

@@ -3,19 +3,19 @@
 
 use std::cell::RefCell;
 
-use crate::paper::Paper;
+use crate::run::{Run, WIDTH};
 use crate::text::{answer, read};
 
 thread_local! {
-    static RUN: RefCell<Option<Paper>> = const { RefCell::new(None) };
+    static RUN: RefCell<Option<Run>> = const { RefCell::new(None) };
     static ROWS: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
 }
 
-fn keep(row: [f64; 9]) {
+fn keep(row: [f64; WIDTH]) {
     ROWS.with_borrow_mut(|rows| rows.extend(row));
 }
 
-fn with(body: &mut dyn FnMut(&mut Paper) -> Result<(), String>) -> i32 {
+fn with(body: &mut dyn FnMut(&mut Run) -> Result<(), String>) -> i32 {
     let done = RUN.with_borrow_mut(|run| body(run.as_mut().ok_or("no run is started")?));
     answer(done.map(|()| None))
 }
@@ -25,10 +25,10 @@ fn with(body: &mut dyn FnMut(&mut Paper) -> Result<(), String>) -> i32 {
 #[unsafe(no_mangle)]
 pub extern "C" fn start(step: f64, stop: f64) -> i32 {
     ROWS.with_borrow_mut(Vec::clear);
-    let paper = Paper::new(&read(), step, stop).and_then(|mut paper| Ok((paper.row()?, paper)));
-    answer(paper.map(|(row, paper)| {
+    let run = Run::new(&read(), step, stop).and_then(|mut run| Ok((run.row()?, run)));
+    answer(run.map(|(row, run)| {
         keep(row);
-        RUN.with_borrow_mut(|run| *run = Some(paper));
+        RUN.with_borrow_mut(|current| *current = Some(run));
         None
     }))
 }
@@ -64,16 +64,16 @@ pub extern "C" fn advance(steps: u32, every: u32) -> i32 {
 /// The time of the run in s; NaN: no run is started.
 #[unsafe(no_mangle)]
 pub extern "C" fn time() -> f64 {
-    RUN.with_borrow(|run| run.as_ref().map_or(f64::NAN, Paper::time))
+    RUN.with_borrow(|run| run.as_ref().map_or(f64::NAN, Run::time))
 }
 
 /// Whether the stop time is reached: 1, or no run is started.
 #[unsafe(no_mangle)]
 pub extern "C" fn is_finished() -> i32 {
-    RUN.with_borrow(|run| run.as_ref().is_none_or(Paper::is_finished).into())
+    RUN.with_borrow(|run| run.as_ref().is_none_or(Run::is_finished).into())
 }
 
-/// The address of the rows of the last [`start`] or [`advance`]: time and values, nine numbers each.
+/// The address of the rows of the last [`start`] or [`advance`]: time and values, [`WIDTH`] numbers each.
 #[unsafe(no_mangle)]
 pub extern "C" fn rows() -> *const f64 {
     ROWS.with_borrow(|rows| rows.as_ptr())
@@ -88,11 +88,11 @@ pub extern "C" fn rows_length() -> usize {
 /// Saves the state; returns 1 if it cannot be saved.
 #[unsafe(no_mangle)]
 pub extern "C" fn save() -> i32 {
-    with(&mut Paper::save)
+    with(&mut Run::save)
 }
 
 /// Goes back to the state saved last; returns 1 if none is kept.
 #[unsafe(no_mangle)]
 pub extern "C" fn back() -> i32 {
-    with(&mut Paper::back)
+    with(&mut Run::back)
 }

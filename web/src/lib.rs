@@ -3,6 +3,7 @@
 
 mod exports;
 mod linked;
-mod paper;
+mod models;
+mod run;
 mod settings;
 mod text;

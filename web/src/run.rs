@@ -1,44 +1,27 @@
-//! The closed loop of the paper: both models, connected by equal names.
+//! A run of a closed loop: the plant and the controller of `models`, connected by equal names.
 
 use std::collections::VecDeque;
 
-use aso_controller::Design;
 use controller::AsoController;
 use fmu::description::{Experiment, Kind};
 use master::{AlgorithmRequest, KeptState, Port, Probe, Simulation, System, Value, choose};
-use plant::FrictionPendulum;
 
 use crate::linked::LinkedSlave;
+use crate::models::{COLUMNS, Plant, design};
 use crate::settings::{Settings, told};
 use crate::text;
 
-/// The design that the controller FMU contains.
-fn design() -> Design {
-    use aso_controller::Matrix;
-    use aso_controller::design::{Actuator, Defaults, Fault, Measurement, Signal};
-    include!(concat!(env!("OUT_DIR"), "/design.rs"))
-}
-
-/// The variables of a row, after the time.
-pub const COLUMNS: [&str; 8] = [
-    "plant.x_p",
-    "plant.theta",
-    "plant.v_p",
-    "plant.omega",
-    "plant.f_fric",
-    "plant.regime",
-    "controller.u",
-    "controller.f_hat",
-];
+/// Number of values in a row.
+pub const WIDTH: usize = COLUMNS.len() + 1;
 
 /// A run may have fewer steps than this.
 const MOST_STEPS: f64 = 1e8;
 
-/// Number of states that [`Paper::back`] can return to.
+/// Number of states that [`Run::back`] can return to.
 const SAVED: usize = 240;
 
 /// A run of the closed loop.
-pub struct Paper {
+pub struct Run {
     simulation: Simulation,
     probe: Probe,
     /// From the oldest to the newest, in slots that follow one another, modulo [`SAVED`].
@@ -47,7 +30,7 @@ pub struct Paper {
     steps: u64,
 }
 
-impl Paper {
+impl Run {
     /// Starts a run with communication steps of `step` s until `stop` s. `settings` has a setting in each
     /// line, see [`Settings::parse`].
     ///
@@ -62,7 +45,7 @@ impl Paper {
             ));
         }
         let mut system = System::default();
-        let plant = LinkedSlave::new(model::<FrictionPendulum>()?);
+        let plant = LinkedSlave::new(model::<Plant>()?);
         let plant = plant.map_err(|failure| failure.to_string())?;
         let controller = LinkedSlave::new(AsoController::of_design(design()));
         let controller = controller.map_err(|failure| failure.to_string())?;
@@ -128,8 +111,8 @@ impl Paper {
     /// # Errors
     ///
     /// The reason, as a sentence: the failure of a model.
-    pub fn row(&mut self) -> Result<[f64; 9], String> {
-        let mut row = [0.0; 9];
+    pub fn row(&mut self) -> Result<[f64; WIDTH], String> {
+        let mut row = [0.0; WIDTH];
         row[0] = self.simulation.time();
         let values = &mut row[1..];
         let time = self.simulation.time();
@@ -137,7 +120,7 @@ impl Paper {
         read.map(|()| row).map_err(told)
     }
 
-    /// Saves the present state, for [`Paper::back`]; of many, the oldest is dropped.
+    /// Saves the present state, for [`Run::back`]; of many, the oldest is dropped.
     ///
     /// # Errors
     ///
