@@ -43,7 +43,7 @@ def on_post_template(output_content, **_):
 
 
 def on_post_build(config):
-    """Replaces the page that says how to build the page of the pendulum by that page, if it is built."""
+    """Replaces the pages that say how to build the pendulum and the tanks by these, if they are built."""
     page, place = ROOT / "target" / "web" / "page", Path(config.site_dir) / "paper"
     if (page / "paper.wasm").exists():
         shutil.rmtree(place)

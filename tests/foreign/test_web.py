@@ -30,8 +30,8 @@ NEWEST = "window.paper.rows[0].at(-1)"
 
 
 @contextmanager
-def opening(folder, motion="reduce", width=1200, height=900):
-    """A function that opens the page with a link. A reader who wants less motion starts the run himself."""
+def opening(folder, motion="reduce", width=1200, height=900, name="index.html"):
+    """A function that opens a page with a link. A reader who wants less motion starts the run himself."""
     with served(PAGE) as address, browser(folder / "profile", width, height) as page:
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
         page.call("Emulation.setDeviceMetricsOverride", **size)
@@ -39,7 +39,7 @@ def opening(folder, motion="reduce", width=1200, height=900):
 
         def opened(link=""):
             page.open("about:blank")
-            page.open(f"{address}/index.html{link}")
+            page.open(f"{address}/{name}{link}")
             page.until("document.body.dataset.ready === 'true'")
             return page
 
@@ -147,7 +147,7 @@ def test_the_page_loads_at_most_300_kb_at_first(tmp_path):
         assert f"{address}/paper.wasm" in page.requests, "requests of the worker are seen"
         assert page.requests.count(f"{address}/paper.wasm") == 1
     names = {path.removeprefix("/") for path in requested}
-    assert {"index.html", "worker.js", "paper.wasm"} <= names and not names & {"observer.wasm", "file.js", "codecs.min.js"}
+    assert {"index.html", "worker.js", "paper.wasm"} <= names and not names & {"observer.wasm", "tanks.wasm", "file.js", "codecs.min.js"}
     sizes = {name: len(gzip.compress((PAGE / name).read_bytes())) for name in names}
     assert sum(sizes.values()) <= 300_000, sizes
 

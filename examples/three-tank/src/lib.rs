@@ -20,7 +20,7 @@ const SHIFT: f64 = 1e-10;
 
 /// The model; fields without a comment have the name of their variable.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
-struct ThreeTank {
+pub struct ThreeTank {
     h: [f64; 3],
     command: [f64; 2],
     parameters: [f64; COUNT],
@@ -171,6 +171,7 @@ impl Model for ThreeTank {
     }
 }
 
+#[cfg(feature = "export")]
 fmu::export!(ThreeTank);
 #[cfg(test)]
 mod tests;

@@ -123,13 +123,17 @@ fn the_libraries_use_only_those_that_architecture_md_allows() {
 }
 
 #[test]
-fn the_controller_is_built_once_more_with_the_dependencies_that_it_has() {
+fn a_model_is_built_once_more_with_the_dependencies_that_it_has() {
     let dependencies = |folder: &str| -> BTreeSet<String> {
         let manifest = manifest(&root().join(folder));
         manifest["dependencies"].as_table().unwrap().keys().cloned().collect()
     };
-    for folder in ["web/controller", "fuzz/controller"] {
-        assert_eq!(dependencies(folder), dependencies("fmu-controller"), "{folder}");
+    for (folder, model) in [
+        ("web/controller", "fmu-controller"),
+        ("fuzz/controller", "fmu-controller"),
+        ("web/tanks/plant", "examples/three-tank"),
+    ] {
+        assert_eq!(dependencies(folder), dependencies(model), "{folder}");
     }
 }
 
