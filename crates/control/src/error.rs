@@ -64,6 +64,14 @@ pub enum Error {
         /// Number of states.
         n: usize,
     },
+    /// A record has fewer samples than a model needs.
+    #[error("{found} samples, expected at least {expected}")]
+    TooFewSamples {
+        /// The number of samples that is needed.
+        expected: usize,
+        /// The number of samples.
+        found: usize,
+    },
     /// No continuous plant has these samples.
     #[error(
         "no continuous plant has these samples: its A would be the logarithm of the sampled A, which needs \

@@ -10,6 +10,7 @@
 //! | other laws that estimate faults: proportional-integral, fast adaptive, sliding mode, learning | [`estimation`] |
 //! | commands without an actuator: control allocation, equilibrium | [`allocation`] |
 //! | test which faults can be estimated | [`detectability`] |
+//! | a plant from samples of its inputs and outputs: subspace identification | [`identification`] |
 //! | controllability, observability, distance from losing them, zeros | [`rank`], [`distance`], [`zeros`] |
 //! | residual generators | [`residual`] |
 //! | residuals that isolate faults: decoupled from commands, disturbances, other faults | [`isolation`] |
@@ -70,6 +71,8 @@ mod faulty_plant;
 #[cfg(feature = "design")]
 mod gains;
 pub mod hold;
+#[cfg(feature = "design")]
+pub mod identification;
 #[cfg(feature = "design")]
 pub mod isolation;
 #[cfg(feature = "lmi")]

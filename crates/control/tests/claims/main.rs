@@ -15,6 +15,7 @@ mod family;
 mod faults;
 mod feedthrough;
 mod hold;
+mod identification;
 mod isolation;
 #[cfg(feature = "lmi")]
 mod lmi;

@@ -1,0 +1,71 @@
+//! States that have a meaning.
+
+use nalgebra::{DMatrix, RowDVector};
+
+use crate::svd::Svd;
+use crate::{Error, check};
+
+/// The inverse condition number of rows of unit length above which measurements and rates are independent.
+const SMALLEST: f64 = 1e-3;
+
+/// States of a continuous plant that are its measurements and their rates.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct MeasuredStates {
+    /// T, n x n: the new states are z = T x, with C T^-1 = [I, 0].
+    pub change: DMatrix<f64>,
+    /// T^-1.
+    pub inverse: DMatrix<f64>,
+    /// The measurements, from 0, whose rates without the part of the commands, `C[i] A x`, are the states after the p
+    /// measurements.
+    pub rates: Vec<usize>,
+}
+
+impl MeasuredStates {
+    /// Takes the measurements C x and, for further states, the rates that are least dependent on the states before: T = [C; C A]
+    /// for n = 2 p, such as positions and speeds.
+    ///
+    /// `a`: n x n; `c`: p x n. Rows are compared by their directions, so the states should be balanced. None if n is less than
+    /// p or more than 2 p, or if the rows of T, at unit length, have a condition number above 1000.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::NotConverged`].
+    pub fn new(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Option<Self>, Error> {
+        let (n, p) = (check::square("A", a)?, c.nrows());
+        check::shape("C", c, (p, n))?;
+        if n < p || n > 2 * p {
+            return Ok(None);
+        }
+        let all_rates = c * a;
+        let mut rows: Vec<_> = c.row_iter().map(RowDVector::from).collect();
+        let mut rates = Vec::new();
+        while rows.len() < n {
+            let mut independence = Vec::new();
+            for at in (0..p).filter(|at| !rates.contains(at)) {
+                let mut candidate = rows.clone();
+                candidate.push(all_rates.row(at).into());
+                independence.push((inverse_condition(&candidate)?, at));
+            }
+            let most = independence.into_iter().max_by(|one, other| one.0.total_cmp(&other.0));
+            let Some((_, at)) = most else { return Ok(None) };
+            rows.push(all_rates.row(at).into());
+            rates.push(at);
+        }
+        let is_independent = inverse_condition(&rows)? > SMALLEST;
+        let change = DMatrix::from_rows(&rows);
+        let inverse = change.clone().try_inverse().filter(|_| is_independent);
+        Ok(inverse.map(|inverse| Self { change, inverse, rates }))
+    }
+}
+
+/// The smallest singular value over the largest one of the rows at unit length.
+fn inverse_condition(rows: &[RowDVector<f64>]) -> Result<f64, Error> {
+    let columns: Vec<_> = rows.iter().map(|row| row.transpose()).collect();
+    if columns.iter().any(|column| column.norm() <= 0.0) {
+        return Ok(0.0);
+    }
+    let directions: Vec<_> = columns.iter().map(|column| column.normalize()).collect();
+    let values = Svd::new(&DMatrix::from_columns(&directions))?.values;
+    Ok(values[values.len() - 1] / values[0])
+}

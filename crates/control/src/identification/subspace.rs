@@ -1,0 +1,162 @@
+//! The estimates from the compressed samples.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::Error;
+use crate::check::as_number;
+use crate::identification::{IdentifiedModel, Windows};
+use crate::svd::Svd;
+
+/// Singular values below this part of the largest one are rounding.
+const ROUNDING: f64 = 1e-12;
+/// Innovations below this part of the deviation of the outputs are rounding.
+const NO_INNOVATION: f64 = 1e-9;
+
+/// The state sequence that the samples determine, for models of every order.
+///
+/// See [`crate::identification`] for the method.
+///
+/// # Example
+///
+/// ```
+/// use control::identification::{Record, Subspace, Windows};
+/// use nalgebra::DMatrix;
+/// // x[k+1] = 0.9 x[k] + 0.5 u[k], y[k] = x[k]
+/// let u = DMatrix::from_fn(1, 200, |_, k| f64::from(u8::from(k * k % 7 < 3)));
+/// let mut y = DMatrix::zeros(1, 200);
+/// for k in 1..200 {
+///     y[k] = 0.9 * y[k - 1] + 0.5 * u[k - 1];
+/// }
+/// let windows = Windows::new(&Record { inputs: u, outputs: y }, 3, 0..200)?;
+/// let model = Subspace::new(&windows, false)?.model(1)?;
+/// assert!((model.a[(0, 0)] - 0.9).abs() < 1e-12);
+/// assert!((model.c[(0, 0)] * model.b[(0, 0)] - 0.5).abs() < 1e-12);
+/// # Ok::<(), control::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Subspace {
+    windows: Windows,
+    /// The factor of the windows, and the units of the signals in it.
+    factor: DMatrix<f64>,
+    units: Vec<f64>,
+    /// T of the largest order: x[k] = T z.
+    states: DMatrix<f64>,
+    singular_values: Vec<f64>,
+    feedthrough: bool,
+}
+
+impl Subspace {
+    /// Steps 1 to 3 of [`crate::identification`]; D is zero without `feedthrough`.
+    ///
+    /// Cost: singular value decompositions of matrices with 1 + s (m + p) and s p columns.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::TooFewSamples`] unless there are more windows than coefficients of the autoregressive model;
+    /// [`Error::NotConverged`].
+    pub fn new(windows: &Windows, feedthrough: bool) -> Result<Self, Error> {
+        let past = windows.past_columns();
+        let regressors = past.end + if feedthrough { windows.inputs } else { 0 };
+        if windows.count <= regressors {
+            let (expected, found) = (windows.past + regressors + 1, windows.past + windows.count);
+            return Err(Error::TooFewSamples { expected, found });
+        }
+        let (factor, units) = windows.scaled();
+        let outputs = factor.columns(past.end + windows.inputs, windows.outputs).into_owned();
+        let svd = Svd::new(&factor.columns(0, regressors).into_owned())?;
+        let coefficients = svd.least_squares(&outputs, svd.rank(ROUNDING));
+        let product = observability_product(windows, &coefficients);
+        // Without the first row, the factor is that of the deviations from the means.
+        let deviations = factor.view((1, 1), (past.len(), past.len()));
+        let svd = Svd::new(&(deviations * product.transpose()))?;
+        let rank = svd.rank(ROUNDING);
+        let balance = svd.values.rows(0, rank).map(f64::sqrt) * as_number(windows.count).powf(0.25);
+        let balance = DMatrix::from_diagonal(&balance);
+        let states = balance * svd.whitening(rank).transpose() * product;
+        let singular_values = svd.values.iter().copied().take(rank).collect();
+        Ok(Self { windows: windows.clone(), factor, units, states, singular_values, feedthrough })
+    }
+
+    /// The singular values of step 3, descending; a gap after the n-th suggests n states.
+    #[must_use]
+    pub fn singular_values(&self) -> &[f64] {
+        &self.singular_values
+    }
+
+    /// The model of this order, step 4 of [`crate::identification`]. Its states are uncorrelated; each has the
+    /// variance of its effect on the next s measurements, in units of the deviations of the signals.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] unless the order is between 1 and the number of singular values; [`Error::NotConverged`].
+    pub fn model(&self, order: usize) -> Result<IdentifiedModel, Error> {
+        if order == 0 || order > self.states.nrows() {
+            let rule = "at least 1 and at most the number of states that the samples determine";
+            return Err(Error::OutOfRange { name: "order", value: as_number(order), rule });
+        }
+        let past = self.windows.past_columns();
+        let (m, p) = (self.windows.inputs, self.windows.outputs);
+        let states = self.states.rows(0, order).into_owned();
+        let transposed = states.transpose();
+        let now = self.factor.columns(1, past.len()) * &transposed;
+        let next = self.factor.columns(1 + self.windows.signals(), past.len()) * &transposed;
+        let inputs = self.factor.columns(past.end, m).into_owned();
+        let outputs = self.factor.columns(past.end + m, p).into_owned();
+        let constant = self.factor.columns(0, 1).into_owned();
+
+        let no_inputs = inputs.columns(0, 0).into_owned();
+        let direct = if self.feedthrough { &inputs } else { &no_inputs };
+        let (of_outputs, innovations) = regression(&[&now, direct, &constant], &outputs)?;
+        let (of_states, rest) = regression(&[&now, &inputs, &constant], &next)?;
+        let svd = Svd::new(&innovations)?;
+        let rank = svd.rank_above(NO_INNOVATION * outputs.norm());
+        let gain = svd.least_squares(&rest, rank).transpose();
+
+        let mut d = DMatrix::zeros(p, m);
+        d.columns_mut(0, direct.ncols()).copy_from(&of_outputs.columns(order, direct.ncols()));
+        let scaled = IdentifiedModel {
+            a: of_states.columns(0, order).into(),
+            b: of_states.columns(order, m).into(),
+            c: of_outputs.columns(0, order).into(),
+            d,
+            k: gain,
+            state_constant: last_column(&of_states),
+            output_constant: last_column(&of_outputs),
+            past: states,
+        };
+        Ok(scaled.in_units(&self.units))
+    }
+}
+
+/// The Hankel matrix of the predictor's coefficients: block row j are those of y[k+j] by z[k-s] to z[k-1], with zeros for
+/// samples that are more than s back; s p x s (m + p).
+fn observability_product(windows: &Windows, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
+    let (past, signals, outputs) = (windows.past, windows.signals(), windows.outputs);
+    DMatrix::from_fn(past * outputs, past * signals, |row, column| {
+        let (ahead, output) = (row / outputs, row % outputs);
+        match column.checked_sub(ahead * signals) {
+            // The first row of the coefficients is the constant.
+            Some(_) if column / signals >= ahead => {
+                coefficients[(1 + column - ahead * signals, output)]
+            }
+            _ => 0.0,
+        }
+    })
+}
+
+/// The coefficients of least squares, one row for each column of `targets`, and what remains of the targets.
+fn regression(
+    parts: &[&DMatrix<f64>],
+    targets: &DMatrix<f64>,
+) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
+    let columns: Vec<_> = parts.iter().flat_map(|part| part.column_iter()).collect();
+    let all = DMatrix::from_columns(&columns);
+    let svd = Svd::new(&all)?;
+    let coefficients = svd.least_squares(targets, svd.rank(ROUNDING));
+    let rest = targets - &all * &coefficients;
+    Ok((coefficients.transpose(), rest))
+}
+
+fn last_column(matrix: &DMatrix<f64>) -> DVector<f64> {
+    matrix.column(matrix.ncols() - 1).into_owned()
+}

@@ -1,0 +1,186 @@
+//! The samples of records, compressed to one triangular factor.
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
+use crate::check::as_number;
+use crate::svd::Svd;
+use crate::{Error, check};
+
+/// Rows that are factored at once, as a multiple of the columns.
+const ROWS_AT_ONCE: usize = 3;
+
+/// Samples of inputs and outputs at equidistant instants.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// u, m x N: a column for each sample.
+    pub inputs: DMatrix<f64>,
+    /// y, p x N.
+    pub outputs: DMatrix<f64>,
+}
+
+impl Record {
+    /// N, the number of samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.inputs.ncols()
+    }
+
+    /// Whether there are no samples.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Checks that inputs and outputs are finite and have the same number of samples.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        check::finite("u", &self.inputs)?;
+        check::shape("y", &self.outputs, (self.outputs.nrows(), self.len()))
+    }
+
+    /// The signal of this number among [u; y] at sample `at`.
+    fn signal(&self, number: usize, at: usize) -> f64 {
+        let inputs = self.inputs.nrows();
+        if number < inputs {
+            self.inputs[(number, at)]
+        } else {
+            self.outputs[(number - inputs, at)]
+        }
+    }
+}
+
+/// All windows of s + 1 successive samples of a record, as the triangular factor R of the matrix whose rows are
+/// [1, z[k-s]', ..., z[k-1]', u[k]', y[k]'], z = [u; y].
+///
+/// R' R has all sums of products that least squares need. R is c x c, c = 1 + (s + 1) (m + p), for any number of samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Windows {
+    pub(super) past: usize,
+    pub(super) inputs: usize,
+    pub(super) outputs: usize,
+    pub(super) count: usize,
+    pub(super) factor: DMatrix<f64>,
+}
+
+impl Windows {
+    /// Factors the windows whose last sample is in `range`, by Householder reflections: 2 N c^2 multiplications.
+    ///
+    /// `past`: s, one or more. Windows that would start before the record are left out; the factor of a range without
+    /// windows is zero.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad record; [`Error::OutOfRange`] for `past` of zero.
+    pub fn new(record: &Record, past: usize, range: Range<usize>) -> Result<Self, Error> {
+        record.check()?;
+        check::positive("past", as_number(past))?;
+        let (inputs, outputs) = (record.inputs.nrows(), record.outputs.nrows());
+        let signals = inputs + outputs;
+        let columns = 1 + (past + 1) * signals;
+        let range = range.start.max(past)..range.end.min(record.len());
+        let entry = |at: usize, column: usize| {
+            let Some(column) = column.checked_sub(1) else { return 1.0 };
+            record.signal(column % signals, at - past + column / signals)
+        };
+        let mut factor = DMatrix::zeros(columns, columns);
+        for start in range.clone().step_by(ROWS_AT_ONCE * columns) {
+            let rows = (range.end - start).min(ROWS_AT_ONCE * columns);
+            let part = DMatrix::from_fn(rows, columns, |row, column| entry(start + row, column));
+            factor = stacked_factor(&[&factor, &part]);
+        }
+        Ok(Self { past, inputs, outputs, count: range.len(), factor })
+    }
+
+    /// The windows of all parts together.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Empty`] without parts, [`Error::Shape`] for parts of different signals or lengths.
+    pub fn joined(parts: &[&Self]) -> Result<Self, Error> {
+        let first = *parts.first().ok_or(Error::Empty { matrix: "parts", found: (0, 0) })?;
+        let mut all = first.clone();
+        for part in &parts[1..] {
+            check::shape("R", &part.factor, first.factor.shape())?;
+            all.count += part.count;
+        }
+        all.factor = stacked_factor(&parts.iter().map(|part| &part.factor).collect::<Vec<_>>());
+        Ok(all)
+    }
+
+    /// The number of windows.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The mean of each signal, [u; y], at the last sample of the windows.
+    #[must_use]
+    pub fn means(&self) -> Vec<f64> {
+        let first = self.past_columns().end;
+        (0..self.signals()).map(|at| self.factor[(0, first + at)] / self.factor[(0, 0)]).collect()
+    }
+
+    /// The standard deviation of each signal, [u; y], at the last sample of the windows.
+    #[must_use]
+    pub fn deviations(&self) -> Vec<f64> {
+        let first = self.past_columns().end;
+        let rows = self.factor.nrows() - 1;
+        let norm = |at| self.factor.view((1, first + at), (rows, 1)).norm();
+        (0..self.signals()).map(|at| norm(at) / as_number(self.count.max(1)).sqrt()).collect()
+    }
+
+    /// The rank of the input sequences of s + 1 samples, m (s + 1) if they are persistently exciting of
+    /// this order.
+    ///
+    /// Singular values below `tolerance` of the largest count as zero; inputs in units of their deviations.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotConverged`].
+    pub fn excitation(&self, tolerance: f64) -> Result<usize, Error> {
+        let (factor, _) = self.scaled();
+        let signals = self.signals();
+        let is_input = |column: &usize| (column - 1) % signals < self.inputs;
+        let columns: Vec<_> = (1..factor.ncols()).filter(is_input).collect();
+        let sequences = factor.rows(1, factor.nrows() - 1).select_columns(&columns);
+        Ok(Svd::new(&sequences)?.rank(tolerance))
+    }
+
+    /// m + p.
+    pub(super) fn signals(&self) -> usize {
+        self.inputs + self.outputs
+    }
+
+    /// The columns of z[k-s] to z[k-1].
+    pub(super) fn past_columns(&self) -> Range<usize> {
+        1..1 + self.past * self.signals()
+    }
+
+    /// The factor of signals divided by their units, and these units: their deviations, 1 for a constant signal.
+    pub(super) fn scaled(&self) -> (DMatrix<f64>, Vec<f64>) {
+        let mut units = self.deviations();
+        for (unit, mean) in units.iter_mut().zip(self.means()) {
+            if *unit <= f64::EPSILON * mean.abs() {
+                *unit = 1.0;
+            }
+        }
+        let mut factor = self.factor.clone();
+        for column in 1..factor.ncols() {
+            factor.column_mut(column).unscale_mut(units[(column - 1) % units.len()]);
+        }
+        (factor, units)
+    }
+}
+
+/// The triangular factor of matrices below each other.
+fn stacked_factor(parts: &[&DMatrix<f64>]) -> DMatrix<f64> {
+    let rows = parts.iter().map(|part| part.nrows()).sum();
+    let mut all = DMatrix::zeros(rows, parts[0].ncols());
+    let mut first = 0;
+    for part in parts {
+        all.rows_mut(first, part.nrows()).copy_from(*part);
+        first += part.nrows();
+    }
+    all.qr().r()
+}
