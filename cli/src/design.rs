@@ -7,13 +7,14 @@ mod terminal;
 use std::ffi::OsString;
 use std::fs;
 use std::io::Write as _;
+use std::iter;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::models;
 use crate::outputs::{Outputs, check_own};
 use anyhow::Context;
-use design::{Design, Language, Precision, TimeLimits};
+use design::{Design, Language, LogOptions, Precision, TimeLimits};
 use files::check_distinct;
 use progress::Reporter;
 
@@ -27,11 +28,42 @@ pub(crate) struct Options {
     plant: PathBuf,
     /// Write a plant file, no design
     ///
-    /// PLANT is then an FMU, a MAT file with the variables A, B, C and D, or a CSV table of them with the names of
-    /// rows and columns. The plant file is --out [default: NAME.toml]; it has the bandwidths that were found for the plant.
+    /// PLANT is then an FMU, a MAT file with the variables A, B, C and D, a CSV table of them with the names of
+    /// rows and columns, or a log of the plant's signals over time, from which the plant is identified.
+    /// The plant file is --out [default: NAME.toml]; it has the bandwidths that were found for the plant.
     #[arg(long)]
     #[arg(conflicts_with_all = ["report", "fmu", "worst_case", "json", "code", "compare"])]
     init: bool,
+    /// Further logs of the same plant, with --init
+    #[arg(requires = "init", value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// Columns of the log that are commands
+    ///
+    /// Names with commas between them [default: `u`, `u1`, `u2` and so on].
+    #[arg(
+        long,
+        value_name = "NAMES",
+        requires = "init",
+        value_delimiter = ',',
+        help_heading = "Logs"
+    )]
+    inputs: Vec<String>,
+    /// Columns of the log that are measurements
+    ///
+    /// [default: `y`, `y1`, `y2` and so on; beside --inputs all other columns]
+    #[arg(
+        long,
+        value_name = "NAMES",
+        requires = "init",
+        value_delimiter = ',',
+        help_heading = "Logs"
+    )]
+    outputs: Vec<String>,
+    /// Number of states of the identified plant
+    ///
+    /// The default is the order that predicts the last quarter of the log best.
+    #[arg(long, value_name = "N", requires = "init", help_heading = "Logs")]
+    order: Option<usize>,
     /// The design file [default: NAME-design.toml]
     ///
     /// NAME is that of the plant file, NAME.toml. The report goes into the same folder.
@@ -214,11 +246,13 @@ fn code(options: &Options, design: &Design) -> anyhow::Result<CodeFiles> {
     Ok(all)
 }
 
-/// Writes a plant file for an FMU or for matrices.
+/// Writes a plant file for an FMU, for matrices or for logs.
 fn init(options: &Options) -> anyhow::Result<()> {
     let stem = options.plant.file_stem().unwrap_or_default().to_string_lossy();
     let out = options.out.clone().unwrap_or_else(|| format!("{stem}.toml").into());
-    check_distinct(&[("the plant", &options.plant)], &[("--out", &out)])?;
+    let sources: Vec<_> = iter::once(&options.plant).chain(&options.logs).cloned().collect();
+    let inputs: Vec<_> = sources.iter().map(|path| ("the plant", path.as_path())).collect();
+    check_distinct(&inputs, &[("--out", &out)])?;
     anyhow::ensure!(
         options.force || !out.exists(),
         "{} exists; --out names another file, --force overwrites it",
@@ -232,11 +266,19 @@ fn init(options: &Options) -> anyhow::Result<()> {
         interrupted: interrupt::listen()?,
         ..TimeLimits::default()
     };
-    let draft = design::new_plant_file(&options.plant, &out, &limits)?;
+    let log = LogOptions {
+        inputs: options.inputs.clone(),
+        outputs: options.outputs.clone(),
+        order: options.order,
+    };
+    let file = design::new_plant_file(&sources, &log, &out, &limits)?;
     let mut staged = Outputs::default();
-    staged.stage(&out, |path| fs::write(path, &draft.text))?;
+    staged.stage(&out, |path| fs::write(path, &file.text))?;
     staged.commit()?;
-    if let Some(refusal) = draft.refusal {
+    for warning in &file.warnings {
+        eprintln!("warning: {warning}");
+    }
+    if let Some(refusal) = file.refusal {
         eprintln!("warning: no controller was found for this plant yet: {refusal}");
     }
     println!("{}", out.display());

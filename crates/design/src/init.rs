@@ -1,11 +1,12 @@
-//! Writes a plant file for matrices or an FMU, with the bandwidths of a controller.
+//! Writes a plant file for matrices, an FMU or logs, with the bandwidths of a controller.
 
 mod draft;
 mod fmu;
 mod labelled;
+mod log;
 mod mat;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use files::{Source, Table};
 
@@ -14,6 +15,8 @@ use crate::assess::bandwidths;
 use crate::budget::{Budget, TimeLimits};
 use draft::{Draft, Settings};
 use plant_file::PlantFile;
+
+pub use log::LogOptions;
 
 /// Rates of a measurement filter, in 1/s, that are tried for a plant with direct feedthrough.
 const FILTERS: [f64; 4] = [10.0, 100.0, 1000.0, 1.0];
@@ -24,33 +27,28 @@ pub struct NewPlantFile {
     pub text: String,
     /// Why no controller was found for the plant, if there is none.
     pub refusal: Option<String>,
+    /// What may make an identified plant useless.
+    pub warnings: Vec<String>,
 }
 
-/// Writes a plant file for the plant at `source`: an FMU (`.fmu`), MATLAB variables A, B, C, D and Ts (`.mat`), or a table of
-/// them with names (`.csv`, see the book's page on plant files). `out` is where the file will be: its folder is where
-/// the path of an FMU starts.
+/// Writes a plant file for the plant at `sources`: an FMU (`.fmu`), MATLAB variables A, B, C, D and Ts (`.mat`), a table of
+/// them with names (`.csv`, see the book's page on plant files), or logs of its signals over time, which `options` describe
+/// and from which the plant is identified. `out` is where the file will be: its folder is where the path of an FMU starts.
 ///
 /// The faults are those of all actuators, or of as many as the measurements can tell apart. Feedback and observer have the
 /// bandwidths that a design without requirements would have.
 ///
 /// # Errors
 ///
-/// [`Error`]: the source cannot be read, or is no plant.
+/// [`Error`]: a source cannot be read, is no plant, or a log from which none can be identified.
 pub fn new_plant_file(
-    source: &Path,
+    sources: &[PathBuf],
+    options: &LogOptions,
     out: &Path,
     limits: &TimeLimits,
 ) -> Result<NewPlantFile, Error> {
-    let ending = source.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-    let draft = match ending.as_deref() {
-        Some("fmu") => fmu::draft(source, out),
-        Some("mat") => mat::draft(source),
-        Some("csv" | "tsv" | "txt") => labelled::draft(source),
-        _ => Err(Error::Invalid(format!(
-            "{}: expected an FMU (.fmu), a file of MATLAB (.mat), or a table (.csv)",
-            source.display()
-        ))),
-    }?;
+    let draft = draft(sources, options, out)?;
+    let warnings = draft.identification.warnings.clone();
     let budget = limits.of_gains();
     let mut refusal = None;
     for settings in attempts(&draft) {
@@ -58,7 +56,8 @@ pub fn new_plant_file(
         match bandwidths(out, &text, &budget) {
             Ok(bandwidths) => {
                 let settings = Settings { bandwidths, ..settings };
-                return Ok(NewPlantFile { text: draft.text(&settings, &[]), refusal: None });
+                let text = draft.text(&settings, &[]);
+                return Ok(NewPlantFile { text, refusal: None, warnings });
             }
             Err(error) => refusal = refusal.or_else(|| Some(files::sentence(&error))),
         }
@@ -68,7 +67,33 @@ pub fn new_plant_file(
     }
     let refusal = refusal.unwrap_or_default();
     let text = draft.text(&Settings::of_all(&draft), &refusal.lines().collect::<Vec<_>>());
-    Ok(NewPlantFile { text, refusal: Some(refusal) })
+    Ok(NewPlantFile { text, refusal: Some(refusal), warnings })
+}
+
+/// The plant, by the kind of its sources.
+fn draft(sources: &[PathBuf], options: &LogOptions, out: &Path) -> Result<Draft, Error> {
+    let [source, others @ ..] = sources else {
+        return Err(Error::Invalid("expected the file of a plant, found none".to_owned()));
+    };
+    let ending = source.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    if log::is_log(source, &ending) || !options.inputs.is_empty() {
+        return log::draft(sources, options);
+    }
+    if let Some(other) = others.first() {
+        let (source, other) = (source.display(), other.display());
+        return Err(Error::Invalid(format!(
+            "{source} is one plant, expected no further file {other}: several files are several logs, tables with a column `time`"
+        )));
+    }
+    match ending.as_str() {
+        "fmu" => fmu::draft(source, out),
+        "mat" => mat::draft(source),
+        "csv" | "tsv" | "txt" => labelled::draft(source),
+        _ => Err(Error::Invalid(format!(
+            "{}: expected an FMU (.fmu), a file of MATLAB (.mat), or a table (.csv) of matrices or of signals (also .parquet)",
+            source.display()
+        ))),
+    }
 }
 
 /// Faults and filters to try: those of all actuators first, then of fewer.

@@ -36,7 +36,7 @@ pub use controller_fmu::ControllerFmu;
 pub use design_page::comparison as comparison_page;
 pub use design_report as report;
 pub use error::Error;
-pub use init::{NewPlantFile, new_plant_file};
+pub use init::{LogOptions, NewPlantFile, new_plant_file};
 pub use progress::{Observer, Progress};
 pub use report::Report;
 pub use report::comparison::{Comparison, LawFigures, LawResult};

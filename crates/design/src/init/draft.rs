@@ -14,13 +14,29 @@ pub(super) struct Draft {
     /// Outputs that are no measurements, as they contain a command.
     pub(super) left_out: Vec<String>,
     pub(super) has_feedthrough: bool,
+    pub(super) identification: Identification,
+}
+
+/// What is known of a plant that was identified; empty for others.
+#[derive(Default)]
+pub(super) struct Identification {
+    /// Time, s, between the samples of the log.
+    pub(super) sample_time: Option<f64>,
+    /// Relative tolerance of the entries.
+    pub(super) tolerance: Option<f64>,
+    /// How the plant was identified, in lines.
+    pub(super) notes: Vec<String>,
+    pub(super) warnings: Vec<String>,
 }
 
 /// A signal with what is known of it.
+#[derive(Clone, Default)]
 pub(super) struct Named {
     pub(super) name: String,
     pub(super) unit: Option<String>,
     pub(super) description: Option<String>,
+    /// The value at the operating point.
+    pub(super) operating: Option<f64>,
 }
 
 pub(super) enum Model {
@@ -63,6 +79,7 @@ impl Draft {
             "# Plant: {}. Each entry is described in the reference of plant files.\n\n",
             self.origin
         );
+        self.notes(&mut text);
         self.plant(&mut text);
         list(&mut text, "actuators", &self.actuators);
         list(&mut text, "measurements", &self.measurements);
@@ -89,13 +106,37 @@ impl Draft {
             line(&mut text, "feedback.bandwidth", feedback);
             line(&mut text, "observer.bandwidth", observer);
         }
+        if let Some(tolerance) = self.identification.tolerance {
+            text += "\n# Two standard deviations of the identification, as a part of each entry of A, B and C.\n";
+            line(&mut text, "robustness.tolerance", tolerance);
+        }
         text += "\n# Often needed as well:\n";
-        if !matches!(self.model, Model::Matrices { sampled: Some(_), .. }) {
+        let sampled = matches!(self.model, Model::Matrices { sampled: Some(_), .. });
+        if self.identification.sample_time.is_none() && !sampled {
             text += "# sample_time = 0.01                  # s, of a controller that acts at regular times\n";
         }
-        text += "# robustness.tolerance = 0.1          # each entry of A, B and C may differ by 10 %\n\
-                 # In a table of `actuators`, limits = [-10, 10] states what the actuator can do.\n";
+        if self.identification.tolerance.is_none() {
+            text += "# robustness.tolerance = 0.1          # each entry of A, B and C may differ by 10 %\n";
+        }
+        text +=
+            "# In a table of `actuators`, limits = [-10, 10] states what the actuator can do.\n";
         text
+    }
+
+    fn notes(&self, text: &mut String) {
+        for note in &self.identification.notes {
+            let _ = writeln!(text, "# {note}");
+        }
+        for warning in &self.identification.warnings {
+            let _ = writeln!(text, "# Warning: {warning}.");
+        }
+        if !self.identification.notes.is_empty() {
+            *text += "\n";
+        }
+        if let Some(period) = self.identification.sample_time {
+            *text += "# s, the time between the samples of the log.\n";
+            line(text, "sample_time", period);
+        }
     }
 
     fn plant(&self, text: &mut String) {
@@ -157,11 +198,12 @@ fn matrix(text: &mut String, name: &str, matrix: &DMatrix<f64>) {
 
 fn list(text: &mut String, key: &str, signals: &[Named]) {
     let _ = writeln!(text, "{key} = [");
-    for Named { name, unit, description } in signals {
+    for Named { name, unit, description, operating } in signals {
         let mut parts = vec![format!("name = {}", quoted(name))];
         for (key, value) in [("unit", unit), ("description", description)] {
             parts.extend(value.as_ref().map(|value| format!("{key} = {}", quoted(value))));
         }
+        parts.extend(operating.map(|value| format!("operating = {value}")));
         let _ = writeln!(text, "    {{ {} }},", parts.join(", "));
     }
     *text += "]\n";

@@ -8,7 +8,7 @@ use fmu_import::Fmu;
 use linearise::{Linearise, linearise};
 
 use crate::Error;
-use crate::init::draft::{Draft, Model, Named};
+use crate::init::draft::{Draft, Identification, Model, Named};
 use crate::plant::linear::significant;
 
 /// Reads inputs and outputs of the FMU; `out` is the plant file that will name it.
@@ -30,8 +30,8 @@ pub(super) fn draft(path: &Path, out: &Path) -> Result<Draft, Error> {
     let linear = linearise(&fmu, &request).map_err(|error| invalid(files::sentence(&error)))?;
     let named = |signal: &linearise::Signal| Named {
         name: signal.name.clone(),
-        unit: None,
         description: described(&description, &signal.name),
+        ..Named::default()
     };
     // An output that contains a command, a force for example, is rarely what a sensor measures.
     let d = significant(linear.matrices.d.clone(), &linear.matrices.c);
@@ -47,6 +47,7 @@ pub(super) fn draft(path: &Path, out: &Path) -> Result<Draft, Error> {
         has_feedthrough: measured.iter().any(contains),
         measurements: measured.iter().map(|&at| named(&linear.outputs[at])).collect(),
         left_out: left_out.iter().map(|&at| linear.outputs[at].name.clone()).collect(),
+        identification: Identification::default(),
     })
 }
 

@@ -16,7 +16,7 @@ use std::path::Path;
 use nalgebra::DMatrix;
 
 use crate::Error;
-use crate::init::draft::{Draft, Model, Named};
+use crate::init::draft::{Draft, Identification, Model, Named};
 
 /// Reads the table.
 pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
@@ -65,10 +65,8 @@ fn split(rows: &[(Named, Vec<f64>)], columns: &[Named], file: &str) -> Result<Dr
     let of_outputs: Vec<_> = (0..rows.len()).filter(|row| !of_states.contains(row)).collect();
     let (n, m, p) = (of_states.len(), columns.len() - of_states.len(), of_outputs.len());
     if n == 0 || m == 0 || p == 0 {
-        let recorded = columns.len() > 1 && n == 0;
-        let advice = if recorded { "; a recording of signals is no plant" } else { "" };
         return Err(format!(
-            "found {n} states, {m} commands and {p} measurements; {EXPECTED}{advice}"
+            "found {n} states, {m} commands and {p} measurements; {EXPECTED}, or a log of signals with a column `time`"
         ));
     }
     let is_state = |at: &usize| named_by(&columns[*at].name).is_some();
@@ -83,16 +81,17 @@ fn split(rows: &[(Named, Vec<f64>)], columns: &[Named], file: &str) -> Result<Dr
         b: block(&of_states, &commands),
         c: block(&of_outputs, &states),
         d,
-        states: states.iter().map(|&at| columns[at].copied()).collect(),
+        states: states.iter().map(|&at| columns[at].clone()).collect(),
         sampled: None,
     };
     Ok(Draft {
         origin: format!("the matrices of {file}"),
         model,
-        actuators: commands.iter().map(|&at| columns[at].copied()).collect(),
-        measurements: of_outputs.iter().map(|&at| rows[at].0.copied()).collect(),
+        actuators: commands.iter().map(|&at| columns[at].clone()).collect(),
+        measurements: of_outputs.iter().map(|&at| rows[at].0.clone()).collect(),
         left_out: Vec::new(),
         has_feedthrough,
+        identification: Identification::default(),
     })
 }
 
@@ -103,23 +102,13 @@ fn derivative(cell: &str) -> &str {
 }
 
 /// `name [unit]`.
-fn named(cell: &str) -> Named {
+pub(super) fn named(cell: &str) -> Named {
     let parts = cell.strip_suffix(']').and_then(|rest| rest.rsplit_once('['));
     let (name, unit) =
         parts.map_or((cell, None), |(name, unit)| (name, Some(unit.trim().to_owned())));
     Named {
         name: name.trim().to_owned(),
         unit: unit.filter(|unit| !unit.is_empty()),
-        description: None,
-    }
-}
-
-impl Named {
-    fn copied(&self) -> Self {
-        Self {
-            name: self.name.clone(),
-            unit: self.unit.clone(),
-            description: self.description.clone(),
-        }
+        ..Named::default()
     }
 }

@@ -7,7 +7,7 @@ use matfile::{Array, MatFile, NumericData};
 use nalgebra::DMatrix;
 
 use crate::Error;
-use crate::init::draft::{Draft, Model, Named};
+use crate::init::draft::{Draft, Identification, Model, Named};
 
 /// Reads the matrices.
 pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
@@ -43,7 +43,7 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
         return Err(invalid(format!("Ts: expected the time of a sample in s, found {period}")));
     }
     let numbered = |letter: &str, count: usize| {
-        let one = |k| Named { name: format!("{letter}{k}"), unit: None, description: None };
+        let one = |k| Named { name: format!("{letter}{k}"), ..Named::default() };
         (1..=count).map(one).collect()
     };
     Ok(Draft {
@@ -55,6 +55,7 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
         measurements: numbered("y", p),
         left_out: Vec::new(),
         has_feedthrough: d.amax() > 0.0,
+        identification: Identification::default(),
         model: Model::Matrices { a, b, c, d, states: numbered("x", n), sampled },
     })
 }

@@ -1,0 +1,121 @@
+//! A plant that is identified from logs of its commands and measurements.
+
+mod estimate;
+mod fit;
+mod judge;
+mod read;
+
+use std::path::{Path, PathBuf};
+
+use control::StateSpace;
+
+use crate::Error;
+use crate::init::draft::{Draft, Identification, Model, Named};
+use estimate::Estimate;
+use fit::Fit;
+use read::Log;
+
+pub(super) use read::is_log;
+
+/// How a log becomes a plant.
+#[derive(Debug, Clone, Default)]
+pub struct LogOptions {
+    /// The columns that are commands; none if their names, `u`, `u1` and so on, say it.
+    pub inputs: Vec<String>,
+    /// The columns that are measurements; none for `y`, `y1` and so on or, beside stated inputs, all others.
+    pub outputs: Vec<String>,
+    /// The number of states; None for the one that predicts the last quarter of the logs best.
+    pub order: Option<usize>,
+}
+
+/// Identifies the plant. Logs after the first one must have the same columns and sample time.
+pub(super) fn draft(paths: &[PathBuf], options: &LogOptions) -> Result<Draft, Error> {
+    let logs = read::logs(paths, options)?;
+    let names: Vec<_> = paths.iter().map(|path| shown(path)).collect();
+    let invalid = |reason: String| Error::Invalid(format!("{}: {reason}", names.join(", ")));
+    judge::refuse(&logs).map_err(invalid)?;
+    let estimate = Estimate::new(&logs, options.order).map_err(invalid)?;
+    let fits = fit::fits(&logs, &estimate).map_err(|error| invalid(error.to_string()))?;
+    let tolerance = estimate.tolerance(&logs);
+    let notes = notes(&logs, &estimate, &fits);
+    let warnings = judge::warnings(&logs, &estimate, &fits, tolerance.as_ref());
+    let Log { inputs, outputs, .. } = &logs[0];
+    let means = estimate.windows.means();
+    let signals = |names: &[Named], means: &[f64]| -> Vec<Named> {
+        let one = |(name, mean): (&Named, &f64)| Named {
+            operating: Some(rounded(*mean)),
+            ..name.clone()
+        };
+        names.iter().zip(means).map(one).collect()
+    };
+    let StateSpace { a, b, c, d, .. } = estimate.continuous.clone();
+    let states = states(estimate.rates.as_deref(), outputs, a.nrows());
+    Ok(Draft {
+        origin: format!("identified from {}", names.join(", ")),
+        has_feedthrough: d.amax() > 0.0,
+        model: Model::Matrices {
+            a: a.map(rounded),
+            b: b.map(rounded),
+            c: c.map(rounded),
+            d: d.map(rounded),
+            states,
+            sampled: None,
+        },
+        actuators: signals(inputs, &means[..inputs.len()]),
+        measurements: signals(outputs, &means[inputs.len()..]),
+        left_out: Vec::new(),
+        identification: Identification {
+            sample_time: Some(logs[0].period),
+            tolerance: tolerance.ok(),
+            notes,
+            warnings,
+        },
+    })
+}
+
+fn shown(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The states: measurements and rates, if they are the states.
+fn states(rates: Option<&[usize]>, outputs: &[Named], order: usize) -> Vec<Named> {
+    let Some(rates) = rates else {
+        let one = |at| Named { name: format!("x{at}"), ..Named::default() };
+        return (1..=order).map(one).collect();
+    };
+    let rate = |output: &Named| Named {
+        name: format!("{}_rate", output.name),
+        unit: output.unit.as_ref().map(|unit| format!("{unit}/s")),
+        ..Named::default()
+    };
+    outputs.iter().cloned().chain(rates.iter().map(|&at| rate(&outputs[at]))).collect()
+}
+
+/// What the file says about the identification.
+fn notes(logs: &[Log], estimate: &Estimate, fits: &[Fit]) -> Vec<String> {
+    let samples: usize = logs.iter().map(|log| log.record.len()).sum();
+    let order = estimate.continuous.a.nrows();
+    let mut notes = vec![format!(
+        "Subspace identification of {order} states from the first three quarters of {samples} samples."
+    )];
+    notes.push("The fit is that of the last quarter, which was not used to estimate:".to_owned());
+    for (output, fit) in logs[0].outputs.iter().zip(fits) {
+        let simulated = fit.simulated.map(|fit| format!("simulated {fit:.1} %, "));
+        let horizon = fit::SHORT;
+        notes.push(format!(
+            "  {}: {}predicted {horizon} samples ahead {:.1} %",
+            output.name,
+            simulated.unwrap_or_default(),
+            fit.predicted
+        ));
+    }
+    if fits.iter().any(|fit| fit.simulated.is_none()) {
+        notes.push("The plant is not stable, and errors of its simulation grow: the fit is that of predictions.".to_owned());
+    }
+    notes
+}
+
+/// Eight digits, which are more than an identification determines.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.7e}").parse().unwrap_or(value)
+}

@@ -1,0 +1,230 @@
+//! The choice of the order, the estimate, and its tolerance.
+
+use control::hold::continuous;
+use control::identification::{
+    IdentifiedModel, MeasuredStates, ResponseUnits, Subspace, Windows, equivalent_tolerance,
+};
+use control::{Domain, StateSpace};
+use nalgebra::DMatrix;
+
+use crate::init::log::fit::{SHORT, estimation, relative_errors};
+use crate::init::log::read::Log;
+
+/// Numbers of earlier samples that predict the next one, which are tried.
+const PASTS: [usize; 4] = [5, 10, 20, 40];
+/// The largest number of columns of the compressed samples: a bound of the time.
+const COLUMNS: usize = 250;
+/// The largest order that is tried unless it is stated.
+const ORDERS: usize = 10;
+/// An order is chosen if the logarithms of its errors are together at most this above the smallest.
+const MARGIN: f64 = 0.15;
+/// D is assumed if it lowers the logarithms of the errors together by more than this.
+const FEEDTHROUGH: f64 = 1.0;
+/// Errors below this part of the variance are rounding.
+const ROUNDING: f64 = 1e-12;
+/// The number of blocks, each of which is left out once.
+const BLOCKS: usize = 10;
+/// The smallest tolerance that is stated.
+const SMALLEST: f64 = 1e-3;
+
+/// The identified plant.
+pub(super) struct Estimate {
+    pub(super) windows: Windows,
+    pub(super) model: IdentifiedModel,
+    /// The continuous plant with these samples.
+    pub(super) continuous: StateSpace,
+    /// The measurements whose rates are states after the measurements; None if the states have no meaning.
+    pub(super) rates: Option<Vec<usize>>,
+    past: usize,
+    feedthrough: bool,
+    period: f64,
+}
+
+/// What an estimate assumes.
+#[derive(Clone, Copy)]
+struct Assumption {
+    past: usize,
+    order: usize,
+    feedthrough: bool,
+    /// The sum of the logarithms of errors on the samples that were not used.
+    score: f64,
+}
+
+impl Estimate {
+    /// Tries orders and lengths of the past, and estimates with the best.
+    pub(super) fn new(logs: &[Log], order: Option<usize>) -> Result<Self, String> {
+        let assumption = best(logs, order)?;
+        let Assumption { past, order, feedthrough, .. } = assumption;
+        let sentence = |error: control::Error| error.to_string();
+        let windows = windows(logs, past).map_err(sentence)?;
+        let subspace = Subspace::new(&windows, feedthrough).map_err(sentence)?;
+        let model = subspace.model(order).map_err(sentence)?;
+        let period = logs[0].period;
+        let plant = continuous_plant(&model, period).map_err(sentence)?;
+        let states = MeasuredStates::new(&plant.a, &plant.c).map_err(sentence)?;
+        let (continuous, rates) = match states.filter(|_| !feedthrough) {
+            Some(states) => (in_states(&plant, &states), Some(states.rates)),
+            None => (plant, None),
+        };
+        Ok(Self { windows, model, continuous, rates, past, feedthrough, period })
+    }
+
+    /// The tolerance of the entries by the estimates without one block each, or why there is none.
+    pub(super) fn tolerance(&self, logs: &[Log]) -> Result<f64, String> {
+        let sentence = |error: control::Error| error.to_string();
+        let blocks = blocks(logs, self.past).map_err(sentence)?;
+        let without = |left_out: usize| {
+            let others = blocks.iter().enumerate().filter(|(at, _)| *at != left_out);
+            let windows = Windows::joined(&others.map(|(_, block)| block).collect::<Vec<_>>())?;
+            let model = Subspace::new(&windows, self.feedthrough)?;
+            continuous_plant(&model.model(self.continuous.a.nrows())?, self.period)
+        };
+        let parts = (0..blocks.len()).map(without).collect::<Result<Vec<_>, _>>();
+        let parts =
+            parts.map_err(|error| format!("without one of {} parts, {error}", blocks.len()))?;
+        let deviations = self.windows.deviations();
+        let (inputs, outputs) = deviations.split_at(self.continuous.b.ncols());
+        let units = ResponseUnits {
+            frequencies: frequencies(logs, self.period),
+            inputs: inputs.to_vec(),
+            outputs: outputs.to_vec(),
+        };
+        let tolerance = equivalent_tolerance(&self.continuous, &parts, &units).map_err(sentence)?;
+        if !tolerance.is_finite() {
+            return Err("no entry of the matrices varies".to_owned());
+        }
+        Ok(rounded_up(tolerance.max(SMALLEST)))
+    }
+}
+
+/// The plant with measurements and rates as states.
+fn in_states(plant: &StateSpace, states: &MeasuredStates) -> StateSpace {
+    let mut a = &states.change * &plant.a * &states.inverse;
+    let (p, n) = plant.c.shape();
+    let mut c = DMatrix::zeros(p, n);
+    c.fill_with_identity();
+    // Without rounding: the derivative of a measurement is the state of its rate, but for the commands.
+    for (at, rate) in states.rates.iter().enumerate() {
+        a.row_mut(*rate).fill(0.0);
+        a[(*rate, p + at)] = 1.0;
+    }
+    StateSpace { a, b: &states.change * &plant.b, c, d: plant.d.clone(), domain: plant.domain }
+}
+
+/// Two digits, rounded up.
+fn rounded_up(value: f64) -> f64 {
+    let unit = 10.0_f64.powf(value.log10().floor() - 1.0);
+    let digits = (value / unit - 1e-9).ceil();
+    format!("{:.1e}", digits * unit).parse().unwrap_or(value)
+}
+
+/// The continuous plant whose samples the model predicts.
+fn continuous_plant(model: &IdentifiedModel, period: f64) -> Result<StateSpace, control::Error> {
+    let (a, b) = continuous(&model.a, &model.b, period)?;
+    Ok(StateSpace { a, b, c: model.c.clone(), d: model.d.clone(), domain: Domain::Continuous })
+}
+
+/// The windows of the samples that estimate.
+fn windows(logs: &[Log], past: usize) -> Result<Windows, control::Error> {
+    let one = |log: &Log| Windows::new(&log.record, past, estimation(log));
+    let parts = logs.iter().map(one).collect::<Result<Vec<_>, _>>()?;
+    Windows::joined(&parts.iter().collect::<Vec<_>>())
+}
+
+/// About [`BLOCKS`] blocks of these windows, one or more of each log.
+fn blocks(logs: &[Log], past: usize) -> Result<Vec<Windows>, control::Error> {
+    let all: usize = logs.iter().map(|log| estimation(log).len()).sum();
+    let mut blocks = Vec::new();
+    for log in logs {
+        let samples = estimation(log).len();
+        let count = ((samples * BLOCKS + all / 2) / all).max(1);
+        let edge = |at: usize| past + (samples - past) * at / count;
+        for at in 0..count {
+            blocks.push(Windows::new(&log.record, past, edge(at)..edge(at + 1))?);
+        }
+    }
+    Ok(blocks)
+}
+
+/// From one period in the longest log to nearly half of the sample rate, in rad/s.
+fn frequencies(logs: &[Log], period: f64) -> Vec<f64> {
+    let longest = logs.iter().map(|log| estimation(log).len()).max().unwrap_or(2);
+    #[expect(clippy::cast_precision_loss, reason = "a number of rows")]
+    let lowest = std::f64::consts::TAU / (longest as f64 * period);
+    let highest = 0.9 * std::f64::consts::PI / period;
+    (0..=40).map(|k| lowest * (highest / lowest).powf(f64::from(k) / 40.0)).collect()
+}
+
+/// The assumption that predicts best: the smallest order within a margin, without D unless D is needed.
+fn best(logs: &[Log], order: Option<usize>) -> Result<Assumption, String> {
+    let [without, with] = [false, true].map(|feedthrough| candidates(logs, order, feedthrough));
+    let choose = |candidates: &[Assumption]| {
+        let least = candidates.iter().map(|one| one.score).fold(f64::INFINITY, f64::min);
+        let close = candidates.iter().filter(|one| one.score <= least + MARGIN);
+        close
+            .min_by(|one, other| {
+                one.order.cmp(&other.order).then(one.score.total_cmp(&other.score))
+            })
+            .copied()
+    };
+    let refusal = without.as_ref().err().cloned();
+    let [without, with] = [without, with].map(|all| all.ok().and_then(|all| choose(&all)));
+    match (without, with) {
+        (Some(without), Some(with)) if with.score < without.score - FEEDTHROUGH => Ok(with),
+        (Some(without), _) => Ok(without),
+        (None, with) => with.ok_or_else(|| refusal.unwrap_or_default()),
+    }
+}
+
+/// All assumptions for which there is a continuous plant; the reason if there are none.
+fn candidates(
+    logs: &[Log],
+    order: Option<usize>,
+    feedthrough: bool,
+) -> Result<Vec<Assumption>, String> {
+    let signals = logs[0].inputs.len() + logs[0].outputs.len();
+    let mut all = Vec::new();
+    let mut refusal = "expected more samples".to_owned();
+    for (at, past) in PASTS.into_iter().enumerate() {
+        if at > 0 && 1 + (past + 1) * signals > COLUMNS {
+            continue;
+        }
+        let subspace = windows(logs, past).and_then(|windows| Subspace::new(&windows, feedthrough));
+        let subspace = match subspace {
+            Ok(subspace) => subspace,
+            Err(error) => {
+                refusal = if all.is_empty() { error.to_string() } else { refusal };
+                continue;
+            }
+        };
+        let most = subspace.singular_values().len();
+        let orders = order.map_or(1..=most.min(ORDERS), |order| order..=order);
+        for order in orders {
+            let assumption = subspace.model(order).and_then(|model| {
+                continuous_plant(&model, logs[0].period)?;
+                let score = score(logs, &model)?;
+                Ok(Assumption { past, order, feedthrough, score })
+            });
+            match assumption {
+                Ok(assumption) => all.push(assumption),
+                Err(error) => refusal = format!("{order} states: {error}"),
+            }
+        }
+    }
+    if all.is_empty() { Err(refusal) } else { Ok(all) }
+}
+
+/// The logarithms of the errors over a short, a middle and the longest horizon, each relative to the mean as a prediction,
+/// than which none is worse: an unstable plant has no prediction over a long one.
+fn score(logs: &[Log], model: &IdentifiedModel) -> Result<f64, control::Error> {
+    let mut score = 0.0;
+    for horizon in [SHORT / 4, SHORT, usize::MAX] {
+        let errors = relative_errors(logs, model, horizon)?;
+        let bounded = |error: &f64| if *error < 1.0 { *error } else { 1.0 };
+        let outputs = errors.iter().map(bounded).sum::<f64>();
+        #[expect(clippy::cast_precision_loss, reason = "a number of measurements")]
+        let mean = outputs / errors.len() as f64;
+        score += mean.max(ROUNDING).ln();
+    }
+    Ok(score)
+}

@@ -1,0 +1,86 @@
+//! Compares predictions with the part of the logs that was not used to estimate.
+
+use std::ops::Range;
+
+use control::eigen::eigenvalues;
+use control::identification::IdentifiedModel;
+use nalgebra::DMatrix;
+
+use crate::init::log::estimate::Estimate;
+use crate::init::log::read::Log;
+
+/// A horizon, in samples, over which an unstable plant can be predicted, too.
+pub(super) const SHORT: usize = 20;
+
+/// The largest logarithm of the growth of an error over a simulation.
+const GROWTH: f64 = 1.0;
+
+/// The fit of one measurement, 100 % for predictions without error, 0 for those as good as the mean.
+pub(super) struct Fit {
+    /// By a simulation from the inputs; None if its errors grow.
+    pub(super) simulated: Option<f64>,
+    /// By predictions [`SHORT`] samples ahead.
+    pub(super) predicted: f64,
+}
+
+/// The samples of a log that estimate the plant: the first three quarters.
+pub(super) fn estimation(log: &Log) -> Range<usize> {
+    0..log.record.len() / 4 * 3
+}
+
+/// The samples of a log that judge the estimate.
+fn validation(log: &Log) -> Range<usize> {
+    estimation(log).end..log.record.len()
+}
+
+/// The squared errors of predictions over `horizon`, a row for each measurement, relative to the variance of the samples.
+pub(super) fn relative_errors(
+    logs: &[Log],
+    model: &IdentifiedModel,
+    horizon: usize,
+) -> Result<Vec<f64>, control::Error> {
+    let outputs = logs[0].outputs.len();
+    let (mut errors, mut variances) = (vec![0.0; outputs], vec![0.0; outputs]);
+    for log in logs {
+        let range = validation(log);
+        let samples = log.record.outputs.columns(range.start, range.len());
+        let differences = model.predict(&log.record, range, horizon)? - samples;
+        let deviations = centred(&samples.into());
+        for output in 0..outputs {
+            errors[output] += differences.row(output).norm_squared();
+            variances[output] += deviations.row(output).norm_squared();
+        }
+    }
+    let ratio = |(error, variance): (&f64, &f64)| error / variance.max(f64::MIN_POSITIVE);
+    Ok(errors.iter().zip(&variances).map(ratio).collect())
+}
+
+fn centred(samples: &DMatrix<f64>) -> DMatrix<f64> {
+    let means = samples.column_mean();
+    DMatrix::from_fn(samples.nrows(), samples.ncols(), |i, j| samples[(i, j)] - means[i])
+}
+
+/// The fit of each measurement.
+pub(super) fn fits(logs: &[Log], estimate: &Estimate) -> Result<Vec<Fit>, control::Error> {
+    let percent = |error: &f64| 100.0 * (1.0 - error.sqrt());
+    let predicted = relative_errors(logs, &estimate.model, SHORT)?;
+    let simulated = if is_simulated(logs, estimate)? {
+        let errors = relative_errors(logs, &estimate.model, usize::MAX)?;
+        errors.iter().map(|error| Some(percent(error))).collect()
+    } else {
+        vec![None; predicted.len()]
+    };
+    let one =
+        |(error, simulated): (&f64, Option<f64>)| Fit { simulated, predicted: percent(error) };
+    Ok(predicted.iter().zip(simulated).map(one).collect())
+}
+
+/// Whether errors of a state do not grow over the longest simulation.
+fn is_simulated(logs: &[Log], estimate: &Estimate) -> Result<bool, control::Error> {
+    let values = eigenvalues(&estimate.model.a)?;
+    let radius = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    let longest = logs.iter().map(|log| validation(log).len()).max().unwrap_or_default();
+    #[expect(clippy::cast_precision_loss, reason = "a number of rows")]
+    let growth = radius.ln() * longest as f64;
+    Ok(growth < GROWTH)
+}

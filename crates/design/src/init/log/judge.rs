@@ -1,0 +1,139 @@
+//! Judges logs and estimates: what is refused, and of what the user is warned.
+
+use control::eigen::eigenvalues;
+use control::identification::Windows;
+
+use crate::init::log::estimate::Estimate;
+use crate::init::log::fit::{Fit, estimation};
+use crate::init::log::read::Log;
+
+/// The fewest samples of a log.
+const SAMPLES: usize = 100;
+/// Changes below this part of the mean are rounding.
+const CONSTANT: f64 = 1e-12;
+/// Singular values of the inputs below this part of the largest do not excite the plant.
+const EXCITATION: f64 = 1e-4;
+/// A fit, in per cent, below which a model is doubtful.
+const POOR_FIT: f64 = 60.0;
+/// A tolerance above which a model is doubtful.
+const LARGE_TOLERANCE: f64 = 0.3;
+/// |eigenvalue| times sample time above which a mode is too fast for the samples, and below which they are too dense.
+const FAST: f64 = 2.5;
+const SLOW: f64 = 0.02;
+
+/// The reason for which no plant can be identified from these logs.
+pub(super) fn refuse(logs: &[Log]) -> Result<(), String> {
+    for log in logs {
+        let count = log.record.len();
+        if count < SAMPLES {
+            return Err(format!("expected at least {SAMPLES} rows, found {count}"));
+        }
+    }
+    let range = |of: &dyn Fn(&Log) -> (f64, f64)| {
+        let all = logs.iter().map(of);
+        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (l, h)| {
+            (low.min(l), high.max(h))
+        })
+    };
+    for (at, input) in logs[0].inputs.iter().enumerate() {
+        let (low, high) = range(&|log| bounds(log.record.inputs.row(at).iter(), log));
+        if high - low <= CONSTANT * high.abs() {
+            let name = &input.name;
+            return Err(format!(
+                "command {name} is {low} throughout; expected a log in which it changes: its effect cannot be identified"
+            ));
+        }
+    }
+    for (at, output) in logs[0].outputs.iter().enumerate() {
+        let (low, high) = range(&|log| bounds(log.record.outputs.row(at).iter(), log));
+        if high - low <= CONSTANT * high.abs() {
+            let name = &output.name;
+            return Err(format!(
+                "measurement {name} is {low} throughout; expected a log in which it moves, or --outputs without it"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The smallest and the largest value among the samples that estimate.
+fn bounds<'a>(values: impl Iterator<Item = &'a f64>, log: &Log) -> (f64, f64) {
+    let values = values.take(estimation(log).end).copied();
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    })
+}
+
+/// What may make the plant useless.
+pub(super) fn warnings(
+    logs: &[Log],
+    estimate: &Estimate,
+    fits: &[Fit],
+    tolerance: Result<&f64, &String>,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (output, fit) in logs[0].outputs.iter().zip(fits) {
+        let (percent, how) = match fit.simulated {
+            Some(simulated) => (simulated, "a simulation"),
+            None => (fit.predicted, "a prediction"),
+        };
+        if percent < POOR_FIT {
+            warnings.push(format!(
+                "{how} of {} has a fit of {percent:.0} % only: noise, a disturbance or a nonlinearity is large, or a command is missing",
+                output.name
+            ));
+        }
+    }
+    match tolerance {
+        Ok(tolerance) if *tolerance > LARGE_TOLERANCE => warnings.push(format!(
+            "parts of the log give plants that differ much, a tolerance of {:.0} %: a longer log, or one with larger commands, \
+             is needed",
+            100.0 * tolerance
+        )),
+        Ok(_) => {}
+        Err(reason) => warnings.push(format!("the uncertainty of the plant is unknown: {reason}")),
+    }
+    warnings.extend(excitation(logs, estimate));
+    if estimate.continuous.d.amax() > 0.0 {
+        warnings.push(
+            "a measurement follows a command in the same row: if it is no acceleration or current, the commands were logged \
+             after they acted, and belong one row later"
+                .to_owned(),
+        );
+    }
+    warnings.extend(sampling(estimate, logs[0].period));
+    warnings
+}
+
+/// Whether the commands excite as many directions as the order needs.
+fn excitation(logs: &[Log], estimate: &Estimate) -> Option<String> {
+    let order = estimate.continuous.a.nrows();
+    let parts = logs.iter().map(|log| Windows::new(&log.record, 2 * order, estimation(log)));
+    let parts = parts.collect::<Result<Vec<_>, _>>().ok()?;
+    let windows = Windows::joined(&parts.iter().collect::<Vec<_>>()).ok()?;
+    let (rank, full) =
+        (windows.excitation(EXCITATION).ok()?, logs[0].inputs.len() * (2 * order + 1));
+    (rank < full).then(|| {
+        format!(
+            "the commands excite {rank} of {full} directions that {order} states need; a log with steps of irregular lengths in \
+             each command, at different times, excites all"
+        )
+    })
+}
+
+/// Whether the modes are within the range that the samples show.
+fn sampling(estimate: &Estimate, period: f64) -> Option<String> {
+    let values = eigenvalues(&estimate.continuous.a).ok()?;
+    let fastest = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    if fastest * period > FAST {
+        return Some(format!(
+            "a mode of {fastest:.3} rad/s is as fast as the samples, every {period} s: log faster, or state a smaller --order"
+        ));
+    }
+    (fastest * period < SLOW).then(|| {
+        format!(
+            "the fastest mode, {fastest:.3} rad/s, is slow for samples every {period} s: the mean of some rows as one row \
+             would identify it more precisely"
+        )
+    })
+}

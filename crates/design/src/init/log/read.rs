@@ -1,0 +1,196 @@
+//! Reads logs, and decides which columns are commands and measurements.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use control::identification::Record;
+use nalgebra::DMatrix;
+use results::Table;
+
+use crate::Error;
+use crate::init::draft::Named;
+use crate::init::labelled::named;
+use crate::init::log::LogOptions;
+
+/// The largest deviation of a time from its place in the grid, as a part of the sample time.
+const JITTER: f64 = 0.2;
+
+/// A log of commands and measurements at equidistant instants.
+pub(super) struct Log {
+    /// The sample time in s.
+    pub(super) period: f64,
+    pub(super) inputs: Vec<Named>,
+    pub(super) outputs: Vec<Named>,
+    pub(super) record: Record,
+}
+
+/// Whether the file is a table of signals over time: Parquet, results of Dymola or OpenModelica, or CSV with a column `time`
+/// or `t`.
+pub(in crate::init) fn is_log(path: &Path, ending: &str) -> bool {
+    match ending {
+        "parquet" => true,
+        "mat" => Table::open(path).is_ok(),
+        "csv" => {
+            let text = fs::read(path).unwrap_or_default();
+            let text = String::from_utf8_lossy(&text);
+            let header = text.lines().next().unwrap_or_default();
+            header.trim_start_matches('\u{feff}').split([',', ';', '\t']).any(is_time)
+        }
+        _ => false,
+    }
+}
+
+fn is_time(cell: &str) -> bool {
+    let name = named(cell.trim().trim_matches('"')).name;
+    ["time", "t"].iter().any(|time| name.eq_ignore_ascii_case(time))
+}
+
+/// Reads all logs; the first one decides which columns are used.
+pub(super) fn logs(paths: &[PathBuf], options: &LogOptions) -> Result<Vec<Log>, Error> {
+    let mut logs: Vec<Log> = Vec::new();
+    for path in paths {
+        let invalid = |reason: String| Error::Invalid(format!("{}: {reason}", path.display()));
+        let table = Table::open(path).map_err(|error| Error::Invalid(files::sentence(&error)))?;
+        let log = Log::read(&table, options).map_err(invalid)?;
+        if let Some(first) = logs.first()
+            && (log.period / first.period - 1.0).abs() > 1e-3
+        {
+            let (expected, period) = (first.period, log.period);
+            return Err(invalid(format!(
+                "expected samples every {expected} s as in the first log, found every {period} s; resample one of them"
+            )));
+        }
+        logs.push(log);
+    }
+    Ok(logs)
+}
+
+impl Log {
+    fn read(table: &Table, options: &LogOptions) -> Result<Self, String> {
+        let columns = Columns(table);
+        let (inputs, outputs) = columns.choose(options)?;
+        let positions = [&inputs[..], &outputs[..]].concat();
+        let (mut times, mut values) = (Vec::new(), Vec::new());
+        let visited = table.visit(&positions, &mut |time, row| {
+            times.push(time);
+            values.extend_from_slice(row);
+        });
+        visited.map_err(|error| files::sentence(&error))?;
+        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+            let (row, column) = (at / positions.len(), at % positions.len());
+            let name = &columns.name(positions[column]).name;
+            return Err(format!(
+                "row {} ({} s), {name}: expected a number, found {}; cut the log there, into several logs",
+                row + 1,
+                times[row],
+                values[at]
+            ));
+        }
+        let all = DMatrix::from_vec(positions.len(), times.len(), values);
+        Ok(Self {
+            period: period(&times)?,
+            record: Record {
+                inputs: all.rows(0, inputs.len()).into(),
+                outputs: all.rows(inputs.len(), outputs.len()).into(),
+            },
+            inputs: inputs.iter().map(|&at| columns.name(at)).collect(),
+            outputs: outputs.iter().map(|&at| columns.name(at)).collect(),
+        })
+    }
+}
+
+/// The columns of a log but the time.
+struct Columns<'a>(&'a Table);
+
+impl Columns<'_> {
+    fn name(&self, position: usize) -> Named {
+        let column = &self.0.columns()[position];
+        let name = named(&column.name);
+        Named { unit: column.unit.clone().or(name.unit), ..name }
+    }
+
+    fn all(&self) -> impl Iterator<Item = usize> {
+        (0..self.0.columns().len()).filter(|position| *position != self.0.time())
+    }
+
+    /// The positions of commands and measurements.
+    fn choose(&self, options: &LogOptions) -> Result<(Vec<usize>, Vec<usize>), String> {
+        let inputs = if options.inputs.is_empty() {
+            self.numbered("u")
+        } else {
+            self.positions("--inputs", &options.inputs)?
+        };
+        let outputs = if !options.outputs.is_empty() {
+            self.positions("--outputs", &options.outputs)?
+        } else if options.inputs.is_empty() {
+            self.numbered("y")
+        } else {
+            self.all().filter(|position| !inputs.contains(position)).collect()
+        };
+        if inputs.is_empty() || outputs.is_empty() {
+            return Err(format!(
+                "it is a log, and {} says which columns are commands and which measurements; expected --inputs and --outputs, \
+                 names of its columns {}",
+                if inputs.is_empty() { "no name `u`, `u1`, ..." } else { "no name `y`, `y1`, ..." },
+                self.names()
+            ));
+        }
+        if let Some(both) = inputs.iter().find(|position| outputs.contains(position)) {
+            let name = self.name(*both).name;
+            return Err(format!(
+                "{name} is among --inputs and --outputs, expected it in one of them"
+            ));
+        }
+        Ok((inputs, outputs))
+    }
+
+    fn names(&self) -> String {
+        self.all().map(|position| self.name(position).name).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The columns with this name, alone or with a number.
+    fn numbered(&self, letter: &str) -> Vec<usize> {
+        let is_numbered = |position: &usize| {
+            let name = self.name(*position).name;
+            let rest = name.strip_prefix(letter);
+            rest.is_some_and(|rest| rest.chars().all(|sign| sign.is_ascii_digit()))
+        };
+        self.all().filter(is_numbered).collect()
+    }
+
+    fn positions(&self, option: &str, names: &[String]) -> Result<Vec<usize>, String> {
+        let one = |name: &String| {
+            let is_it = |position: &usize| {
+                self.name(*position).name == *name || self.0.columns()[*position].name == *name
+            };
+            let missing =
+                || format!("{option}: there is no column {name}; expected one of {}", self.names());
+            self.all().find(is_it).ok_or_else(missing)
+        };
+        names.iter().map(one).collect()
+    }
+}
+
+/// The sample time, to nine digits.
+fn period(times: &[f64]) -> Result<f64, String> {
+    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let median = steps.get(steps.len() / 2).copied().unwrap_or_default();
+    if median <= 0.0 {
+        return Err(format!("expected many rows with increasing times, found {}", times.len()));
+    }
+    let step = |at: usize| times[at] - times[at - 1];
+    let irregular = |at: &usize| (step(*at) - median).abs() > JITTER * median;
+    if let Some(at) = (1..times.len()).find(irregular) {
+        return Err(format!(
+            "row {} ({} s): expected the next sample after {median:.6} s as elsewhere, found it after {:.6} s; resample the log to \
+             equidistant times, or cut it there, into several logs",
+            at + 1,
+            times[at],
+            step(at)
+        ));
+    }
+    #[expect(clippy::cast_precision_loss, reason = "a number of rows")]
+    let mean = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;
+    Ok(format!("{mean:.8e}").parse().unwrap_or(mean))
+}
