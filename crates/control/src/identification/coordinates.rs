@@ -1,6 +1,6 @@
 //! States that have a meaning.
 
-use nalgebra::{DMatrix, RowDVector};
+use nalgebra::{DMatrix, DVector, RowDVector};
 
 use crate::svd::Svd;
 use crate::{Error, check};
@@ -61,11 +61,11 @@ impl MeasuredStates {
 
 /// The smallest singular value over the largest one of the rows at unit length.
 fn inverse_condition(rows: &[RowDVector<f64>]) -> Result<f64, Error> {
-    let columns: Vec<_> = rows.iter().map(|row| row.transpose()).collect();
+    let columns: Vec<_> = rows.iter().map(RowDVector::transpose).collect();
     if columns.iter().any(|column| column.norm() <= 0.0) {
         return Ok(0.0);
     }
-    let directions: Vec<_> = columns.iter().map(|column| column.normalize()).collect();
+    let directions: Vec<_> = columns.iter().map(DVector::normalize).collect();
     let values = Svd::new(&DMatrix::from_columns(&directions))?.values;
     Ok(values[values.len() - 1] / values[0])
 }

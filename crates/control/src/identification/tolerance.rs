@@ -20,16 +20,17 @@ pub struct ResponseUnits {
     pub outputs: Vec<f64>,
 }
 
-/// The relative tolerance of the entries of `model` that moves its frequency response as far as two standard deviations
+/// The relative tolerance of the entries of `plant` that moves its frequency response as far as two standard deviations
 /// of its estimate do.
 ///
-/// `parts`: the estimates from the same samples without one of g blocks each, the jackknife. With the distance
+/// `estimate`: the same plant, or the sampled one of which `plant` is the continuous one; `parts`: the estimates from the same
+/// samples without one of g blocks each, the jackknife. With the distance
 ///
 /// ```text
 /// d(G, H)^2 = sum over frequencies of |G - H|^2 / ((1 + |G|^2) (1 + |H|^2)),    | | the Frobenius norm,
 /// ```
 ///
-/// of responses in units of the signals, the estimate has the variance (g - 1) / g times the sum of d(G, `G_i`)^2. Independent
+/// of responses in units of the signals, the estimate G has the variance (g - 1) / g times the sum of d(G, `G_i`)^2. Independent
 /// entries of A, B, C and D with relative deviation r give r^2 times the sum of the squared derivatives of d by the logarithm of
 /// each entry. Zeros and rows of C with a single 1 are exact. The result, 2 r, depends neither on units nor on the scales of
 /// the states. For one input and one output d is the chordal distance of the responses, which weighs the frequencies near a gain
@@ -40,22 +41,24 @@ pub struct ResponseUnits {
 ///
 /// # Errors
 ///
-/// Those of [`frequency_response`] for `model` and `parts`.
+/// Those of [`frequency_response`] for `plant`, `estimate` and `parts`.
 pub fn equivalent_tolerance(
-    model: &StateSpace,
+    plant: &StateSpace,
+    estimate: &StateSpace,
     parts: &[StateSpace],
     units: &ResponseUnits,
 ) -> Result<f64, Error> {
-    let nominal = responses(model, units)?;
+    let whole = responses(estimate, units)?;
     let blocks = as_number(parts.len());
     let mut variance = 0.0;
     for part in parts {
-        variance += distance_squared(&nominal, &responses(part, units)?) * (blocks - 1.0) / blocks;
+        variance += distance_squared(&whole, &responses(part, units)?) * (blocks - 1.0) / blocks;
     }
+    let nominal = responses(plant, units)?;
     let mut sensitivity = 0.0;
     for at in 0..4 {
-        for entry in varying(model, at) {
-            let mut changed = model.clone();
+        for entry in varying(plant, at) {
+            let mut changed = plant.clone();
             matrix(&mut changed, at)[entry] *= 1.0 + STEP;
             sensitivity += distance_squared(&nominal, &responses(&changed, units)?) / (STEP * STEP);
         }

@@ -198,10 +198,10 @@ fn the_tolerance_covers_the_plant() {
                 estimate(&others.map(|(_, block)| block).collect::<Vec<_>>())
             })
             .collect();
-        let tolerance = equivalent_tolerance(&model, &parts, &units).unwrap();
+        let tolerance = equivalent_tolerance(&model, &model, &parts, &units).unwrap();
         // Two parts at the plant have the variance of the distance squared.
         let parts = [exact.clone(), exact.clone()];
-        let distance = equivalent_tolerance(&model, &parts, &units).unwrap() / 2.0;
+        let distance = equivalent_tolerance(&model, &model, &parts, &units).unwrap() / 2.0;
         covered += usize::from(distance <= tolerance);
         errors += distance.powi(2);
         stated += (tolerance / 2.0).powi(2);

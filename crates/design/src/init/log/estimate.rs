@@ -11,13 +11,13 @@ use crate::init::log::fit::{SHORT, estimation, relative_errors};
 use crate::init::log::read::Log;
 
 /// Numbers of earlier samples that predict the next one, which are tried.
-const PASTS: [usize; 4] = [5, 10, 20, 40];
+const PASTS: [usize; 5] = [5, 10, 20, 40, 80];
 /// The largest number of columns of the compressed samples: a bound of the time.
 const COLUMNS: usize = 250;
 /// The largest order that is tried unless it is stated.
 const ORDERS: usize = 10;
 /// An order is chosen if the logarithms of its errors are together at most this above the smallest.
-const MARGIN: f64 = 0.15;
+const MARGIN: f64 = 0.2;
 /// D is assumed if it lowers the logarithms of the errors together by more than this.
 const FEEDTHROUGH: f64 = 1.0;
 /// Errors below this part of the variance are rounding.
@@ -76,12 +76,14 @@ impl Estimate {
         let without = |left_out: usize| {
             let others = blocks.iter().enumerate().filter(|(at, _)| *at != left_out);
             let windows = Windows::joined(&others.map(|(_, block)| block).collect::<Vec<_>>())?;
-            let model = Subspace::new(&windows, self.feedthrough)?;
-            continuous_plant(&model.model(self.continuous.a.nrows())?, self.period)
+            let subspace = Subspace::new(&windows, self.feedthrough)?;
+            Ok(sampled_plant(&subspace.model(self.continuous.a.nrows())?, self.period))
         };
         let parts = (0..blocks.len()).map(without).collect::<Result<Vec<_>, _>>();
-        let parts =
-            parts.map_err(|error| format!("without one of {} parts, {error}", blocks.len()))?;
+        let parts = parts.map_err(|error: control::Error| {
+            format!("without one of {} parts, {error}", blocks.len())
+        })?;
+        let estimate = sampled_plant(&self.model, self.period);
         let deviations = self.windows.deviations();
         let (inputs, outputs) = deviations.split_at(self.continuous.b.ncols());
         let units = ResponseUnits {
@@ -89,7 +91,8 @@ impl Estimate {
             inputs: inputs.to_vec(),
             outputs: outputs.to_vec(),
         };
-        let tolerance = equivalent_tolerance(&self.continuous, &parts, &units).map_err(sentence)?;
+        let tolerance =
+            equivalent_tolerance(&self.continuous, &estimate, &parts, &units).map_err(sentence)?;
         if !tolerance.is_finite() {
             return Err("no entry of the matrices varies".to_owned());
         }
@@ -122,6 +125,11 @@ fn rounded_up(value: f64) -> f64 {
 fn continuous_plant(model: &IdentifiedModel, period: f64) -> Result<StateSpace, control::Error> {
     let (a, b) = continuous(&model.a, &model.b, period)?;
     Ok(StateSpace { a, b, c: model.c.clone(), d: model.d.clone(), domain: Domain::Continuous })
+}
+
+fn sampled_plant(model: &IdentifiedModel, period: f64) -> StateSpace {
+    let [a, b, c, d] = [&model.a, &model.b, &model.c, &model.d].map(Clone::clone);
+    StateSpace { a, b, c, d, domain: Domain::Sampled { period } }
 }
 
 /// The windows of the samples that estimate.

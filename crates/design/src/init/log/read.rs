@@ -10,7 +10,7 @@ use results::Table;
 use crate::Error;
 use crate::init::draft::Named;
 use crate::init::labelled::named;
-use crate::init::log::LogOptions;
+use crate::init::log::{LogOptions, rounded};
 
 /// The largest deviation of a time from its place in the grid, as a part of the sample time.
 const JITTER: f64 = 0.2;
@@ -82,7 +82,7 @@ impl Log {
             return Err(format!(
                 "row {} ({} s), {name}: expected a number, found {}; cut the log there, into several logs",
                 row + 1,
-                times[row],
+                rounded(times[row]),
                 values[at]
             ));
         }
@@ -171,7 +171,7 @@ impl Columns<'_> {
     }
 }
 
-/// The sample time, to nine digits.
+/// The sample time.
 fn period(times: &[f64]) -> Result<f64, String> {
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
@@ -186,11 +186,11 @@ fn period(times: &[f64]) -> Result<f64, String> {
             "row {} ({} s): expected the next sample after {median:.6} s as elsewhere, found it after {:.6} s; resample the log to \
              equidistant times, or cut it there, into several logs",
             at + 1,
-            times[at],
+            rounded(times[at]),
             step(at)
         ));
     }
     #[expect(clippy::cast_precision_loss, reason = "a number of rows")]
     let mean = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;
-    Ok(format!("{mean:.8e}").parse().unwrap_or(mean))
+    Ok(rounded(mean))
 }
