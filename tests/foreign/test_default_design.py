@@ -197,7 +197,7 @@ def test_a_file_that_exists_is_not_overwritten(aso_ftc, tmp_path):
 
 
 REFUSED = {
-    "recording.csv": (b"time,x,u\n0,1,2\n1,2,3\n", "a recording of signals is no plant"),
+    "recording.csv": (b"time,x,u\n0,1,2\n1,2,3\n", "expected --inputs and --outputs, names of its columns x, u"),
     "short.csv": (b",x,u\nx,0\n", "line 2: expected 3 cells, found 2"),
     "word.csv": (b",x,u\nx,0,fast\ny,1,0\n", 'line 2, u: expected a number, found "fast"'),
     "no-output.csv": (b",x,u\nx,0,1\n", "found 1 states, 1 commands and 0 measurements"),
