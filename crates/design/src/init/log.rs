@@ -35,7 +35,7 @@ pub(super) fn draft(paths: &[PathBuf], options: &LogOptions) -> Result<Draft, Er
     let invalid = |reason: String| Error::Invalid(format!("{}: {reason}", names.join(", ")));
     judge::refuse(&logs).map_err(invalid)?;
     let estimate = Estimate::new(&logs, options.order).map_err(invalid)?;
-    let fits = fit::fits(&logs, &estimate).map_err(|error| invalid(error.to_string()))?;
+    let fits = fit::fits(&logs, &estimate.model).map_err(|error| invalid(error.to_string()))?;
     let tolerance = estimate.tolerance(&logs);
     let notes = notes(&logs, &estimate, &fits);
     let warnings = judge::warnings(&logs, &estimate, &fits, tolerance.as_ref());

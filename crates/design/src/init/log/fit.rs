@@ -6,7 +6,6 @@ use control::eigen::eigenvalues;
 use control::identification::IdentifiedModel;
 use nalgebra::DMatrix;
 
-use crate::init::log::estimate::Estimate;
 use crate::init::log::read::Log;
 
 /// A horizon, in samples, over which an unstable plant can be predicted, too.
@@ -61,11 +60,11 @@ fn centred(samples: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// The fit of each measurement.
-pub(super) fn fits(logs: &[Log], estimate: &Estimate) -> Result<Vec<Fit>, control::Error> {
+pub(super) fn fits(logs: &[Log], model: &IdentifiedModel) -> Result<Vec<Fit>, control::Error> {
     let percent = |error: &f64| 100.0 * (1.0 - error.sqrt());
-    let predicted = relative_errors(logs, &estimate.model, SHORT)?;
-    let simulated = if is_simulated(logs, estimate)? {
-        let errors = relative_errors(logs, &estimate.model, usize::MAX)?;
+    let predicted = relative_errors(logs, model, SHORT)?;
+    let simulated = if is_simulated(logs, model)? {
+        let errors = relative_errors(logs, model, usize::MAX)?;
         errors.iter().map(|error| Some(percent(error))).collect()
     } else {
         vec![None; predicted.len()]
@@ -76,8 +75,8 @@ pub(super) fn fits(logs: &[Log], estimate: &Estimate) -> Result<Vec<Fit>, contro
 }
 
 /// Whether errors of a state do not grow over the longest simulation.
-fn is_simulated(logs: &[Log], estimate: &Estimate) -> Result<bool, control::Error> {
-    let values = eigenvalues(&estimate.model.a)?;
+fn is_simulated(logs: &[Log], model: &IdentifiedModel) -> Result<bool, control::Error> {
+    let values = eigenvalues(&model.a)?;
     let radius = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
     let longest = logs.iter().map(|log| validation(log).len()).max().unwrap_or_default();
     #[expect(clippy::cast_precision_loss, reason = "a number of rows")]
