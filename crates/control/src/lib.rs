@@ -19,6 +19,7 @@
 //! | margins of a loop: sensitivity, disk, gain, phase, delay, hold time, parameter tolerances | [`robustness`] |
 //! | references: feedforward, integral action, anti-windup | [`tracking`] |
 //! | bound of the estimation error with a proof | [`theorem1`] |
+//! | loop shaping: mixed sensitivity for gains of a given structure | [`tuning`] |
 //! | weights over frequency | [`weight`] |
 //! | loss of effectiveness: its estimate, which losses the loop bears | [`losses`] |
 //! | linear matrix inequalities (feature `lmi`) | `lmi` |
@@ -109,6 +110,8 @@ mod svd;
 pub mod theorem1;
 #[cfg(feature = "design")]
 pub mod tracking;
+#[cfg(feature = "design")]
+pub mod tuning;
 #[cfg(feature = "design")]
 pub mod weight;
 #[cfg(feature = "design")]

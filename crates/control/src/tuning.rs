@@ -1,0 +1,181 @@
+//! Loop shaping (mixed sensitivity) for controllers of a given structure.
+//!
+//! The parameters theta of a controller K(theta), the gains of feedback and observer for example, are
+//! chosen for the least gamma:
+//!
+//! ```text
+//! gamma(theta) = max over terms i and frequencies w of |W_i(j w)| sigma_max(X_i(j w))
+//! ```
+//!
+//! X is S or T at the commands or the measurements, or K S, with the signs of [`crate::robustness`].
+//! Gamma at most 1 means that every X_i is below 1 / |W_i|.
+
+mod descent;
+mod minimax;
+mod objective;
+
+use crate::blocks::block_2x2;
+use crate::response::h_infinity;
+use crate::robustness::{Loop, Point};
+use crate::weight::Weight;
+use crate::{Error, StateSpace};
+use nalgebra::{DMatrix, DVector};
+
+/// Relative width of a verified norm.
+const WIDTH: f64 = 1e-4;
+
+/// A transfer function of the loop y = G u, u = K y.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Transfer {
+    /// S: (I - K G)^-1 at the commands, (I - G K)^-1 at the measurements.
+    Sensitivity(Point),
+    /// T = I - S.
+    Complementary(Point),
+    /// K S: from what is added to the measurements to the commands.
+    Effort,
+}
+
+/// A transfer function with its weight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// X.
+    pub transfer: Transfer,
+    /// W; in sampled time its frequencies are those after [`crate::weight::bilinear_frequency`].
+    pub weight: Weight,
+}
+
+/// A controller of given structure whose parameters are tuned.
+pub struct Tuning<'a> {
+    /// G, with D = 0, in the domain of the controller and in units in which its channels are comparable.
+    pub plant: StateSpace,
+    /// K(theta), in the same units. Derivatives are central differences of its matrices, which are exact
+    /// for entries of second degree in theta.
+    pub controller: &'a (dyn Fn(&DVector<f64>) -> Result<StateSpace, Error> + Sync),
+    /// What is weighted.
+    pub terms: Vec<Term>,
+    /// The largest instability of the loop, negative, see [`crate::stability::instability`].
+    pub instability: f64,
+    /// The bandwidth in rad/s, about which frequencies are examined.
+    pub rate: f64,
+    /// Whether the search must end.
+    pub is_over: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// The largest weighted value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeightedPeak {
+    /// The H-infinity norm of W X, verified with a relative width of 1e-4.
+    pub gamma: f64,
+    /// The index of the term.
+    pub term: usize,
+    /// In rad/s.
+    pub frequency: f64,
+}
+
+/// The tuned parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tuned {
+    /// theta.
+    pub parameters: DVector<f64>,
+    /// The largest weighted value.
+    pub peak: WeightedPeak,
+}
+
+impl Tuning<'_> {
+    /// Returns the H-infinity norm of the terms at `parameters`, by [`h_infinity`].
+    ///
+    /// # Errors
+    ///
+    /// Same as [`h_infinity`] and [`Loop::new`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for a loop that
+    /// is not stable.
+    pub fn peak(&self, parameters: &DVector<f64>) -> Result<WeightedPeak, Error> {
+        let closed = Loop::new(self.plant.clone(), (self.controller)(parameters)?)?;
+        let mut largest = WeightedPeak { gamma: 0.0, term: 0, frequency: 0.0 };
+        for (term, weighted) in self.terms.iter().enumerate() {
+            let system = weighted.system(&closed)?;
+            let norm = h_infinity(&system, WIDTH)?;
+            if norm.upper > largest.gamma {
+                largest = WeightedPeak { gamma: norm.upper, term, frequency: norm.frequency };
+            }
+        }
+        Ok(largest)
+    }
+}
+
+impl Term {
+    /// W X as a system.
+    fn system(&self, closed: &Loop) -> Result<StateSpace, Error> {
+        let x = match self.transfer {
+            Transfer::Sensitivity(at) => closed.sensitivity(at),
+            Transfer::Complementary(at) => closed.complementary(at),
+            Transfer::Effort => {
+                let whole = closed.system();
+                let (p, m) = closed.plant().d.shape();
+                StateSpace {
+                    a: whole.a,
+                    b: whole.b.columns(m, p).into(),
+                    c: whole.c.rows(0, m).into(),
+                    d: closed.controller().d.clone(),
+                    domain: whole.domain,
+                }
+            }
+        };
+        if let Some(magnitude) = self.weight.as_constant() {
+            return Ok(StateSpace { c: x.c * magnitude, d: x.d * magnitude, ..x });
+        }
+        let channels = vec![self.weight.clone(); x.d.nrows()];
+        let weight = crate::weight::diagonal(&channels, x.domain)?;
+        let none = DMatrix::zeros(x.a.nrows(), weight.a.ncols());
+        let n = x.a.nrows();
+        let mut b = x.b.clone().resize_vertically(n + weight.a.nrows(), 0.0);
+        b.rows_mut(n, weight.a.nrows()).copy_from(&(&weight.b * &x.d));
+        let mut c = (&weight.d * &x.c).resize_horizontally(n + weight.a.nrows(), 0.0);
+        c.columns_mut(n, weight.a.nrows()).copy_from(&weight.c);
+        Ok(StateSpace {
+            a: block_2x2([&x.a, &none], [&(&weight.b * &x.c), &weight.a]),
+            b,
+            c,
+            d: &weight.d * &x.d,
+            domain: x.domain,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Domain;
+
+    fn one(value: f64) -> DMatrix<f64> {
+        DMatrix::from_element(1, 1, value)
+    }
+
+    /// G = 1 / (s - 1), K = -k: T = k / (s - 1 + k) has the norm k / (k - 1), K S the norm k.
+    #[test]
+    fn complementary_sensitivity_against_effort_has_the_gain_of_its_closed_form()
+    -> Result<(), Error> {
+        let domain = Domain::Continuous;
+        let plant = StateSpace { a: one(1.0), b: one(1.0), c: one(1.0), d: one(0.0), domain };
+        let controller = |parameters: &DVector<f64>| {
+            let d = one(-parameters[0]);
+            Ok(StateSpace { a: one(-1.0), b: one(0.0), c: one(0.0), d, domain })
+        };
+        let term = |transfer, weight| Term { transfer, weight: Weight::constant(weight) };
+        let tuning = Tuning {
+            plant,
+            controller: &controller,
+            terms: vec![
+                term(Transfer::Complementary(Point::Output), 1.0),
+                term(Transfer::Effort, 0.25),
+            ],
+            instability: -0.01,
+            rate: 1.0,
+            is_over: &|| false,
+        };
+        // k / (k - 1) = k / 4.
+        let tuned = tuning.tuned(&DVector::from_element(1, 2.0), &DVector::from_element(1, 2.0))?;
+        assert!((tuned.parameters[0] - 5.0).abs() < 0.02, "{tuned:?}");
+        assert!((tuned.peak.gamma - 1.25).abs() < 5e-3, "{tuned:?}");
+        Ok(())
+    }
+}

@@ -1,0 +1,273 @@
+//! The weighted singular values of a loop on a grid of frequencies, and their derivatives.
+
+use super::{Transfer, Tuning};
+use crate::blocks::to_complex;
+use crate::response;
+use crate::robustness::{Loop, Point};
+use crate::stability::instability;
+use crate::svd::ComplexSvd;
+use crate::weight::bilinear_frequency;
+use crate::{Domain, Error, StateSpace};
+use nalgebra::{Complex, DMatrix, DVector};
+use std::f64::consts::PI;
+
+type ComplexMatrix = DMatrix<Complex<f64>>;
+
+/// Frequencies of the grid in a decade, and its decades on both sides of the bandwidth.
+const PER_DECADE: i32 = 30;
+const DECADES: i32 = 3;
+
+/// The frequencies that are examined, with what does not depend on the parameters.
+pub(super) struct Grid<'a> {
+    pub(super) tuning: &'a Tuning<'a>,
+    nodes: Vec<Node>,
+}
+
+struct Node {
+    frequency: f64,
+    plant: ComplexMatrix,
+    /// Of each term.
+    weights: Vec<f64>,
+}
+
+/// A term at a frequency of the grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    pub(super) term: usize,
+    pub(super) node: usize,
+}
+
+/// K and S at a frequency.
+struct Closed {
+    k: ComplexMatrix,
+    at_input: ComplexMatrix,
+    at_output: ComplexMatrix,
+}
+
+impl<'a> Grid<'a> {
+    pub(super) fn new(tuning: &'a Tuning<'a>) -> Result<Self, Error> {
+        let mut grid = Self { tuning, nodes: Vec::new() };
+        for step in -DECADES * PER_DECADE..=DECADES * PER_DECADE {
+            grid.add(tuning.rate * 10_f64.powf(f64::from(step) / f64::from(PER_DECADE)))?;
+        }
+        Ok(grid)
+    }
+
+    /// Adds a frequency; one beyond half the sampling rate is the last one below it.
+    pub(super) fn add(&mut self, frequency: f64) -> Result<(), Error> {
+        let Tuning { plant, terms, rate, .. } = self.tuning;
+        let lowest = rate * 10_f64.powi(-2 * DECADES);
+        let highest = match plant.domain {
+            Domain::Continuous => rate * 10_f64.powi(2 * DECADES),
+            Domain::Sampled { period } => (1.0 - 1e-6) * PI / period,
+        };
+        let frequency = frequency.clamp(lowest, highest);
+        let at = self.nodes.partition_point(|node| node.frequency < frequency);
+        if self.nodes.get(at).is_some_and(|node| node.frequency <= frequency) {
+            return Ok(());
+        }
+        let gain = response::Transfer::new(plant).gain(frequency)?;
+        let mapped = bilinear_frequency(frequency, plant.domain);
+        let weights = terms.iter().map(|term| term.weight.magnitude(mapped)).collect();
+        self.nodes.insert(at, Node { frequency, plant: gain, weights });
+        Ok(())
+    }
+
+    /// The weighted singular values of all terms, term by term; None where the loop is not stable enough.
+    pub(super) fn values(&self, controller: &StateSpace) -> Option<Vec<Vec<f64>>> {
+        let Tuning { plant, terms, instability: limit, .. } = self.tuning;
+        let closed = Loop::new(plant.clone(), controller.clone()).ok()?;
+        if instability(&closed.dynamics(), plant.domain).ok()? > *limit {
+            return None;
+        }
+        let transfer = response::Transfer::new(controller);
+        let mut values = vec![Vec::with_capacity(self.nodes.len()); terms.len()];
+        for node in &self.nodes {
+            let closed = Closed::new(transfer.gain(node.frequency).ok()?, &node.plant)?;
+            for (at, term) in terms.iter().enumerate() {
+                let x = closed.transfer(term.transfer);
+                values[at].push(node.weights[at] * norm(&x)?);
+            }
+        }
+        Some(values)
+    }
+
+    /// The value at `place`, and its derivatives with respect to the parameters.
+    ///
+    /// With X v = sigma u: d sigma = Re(l dK r), l = u* `S_i`, and r = G `S_i` v at the commands,
+    /// l = u* `S_o` G, r = `S_o` v at the measurements, l = u* `S_i`, r = `S_o` v for K S.
+    pub(super) fn gradient(
+        &self,
+        controller: &StateSpace,
+        differences: &[StateSpace],
+        place: Place,
+    ) -> Option<(f64, DVector<f64>)> {
+        let Node { frequency, plant, weights } = &self.nodes[place.node];
+        let (weight, transfer) = (weights[place.term], self.tuning.terms[place.term].transfer);
+        let s = match controller.domain {
+            Domain::Continuous => Complex::new(0.0, *frequency),
+            Domain::Sampled { period } => Complex::from_polar(1.0, frequency * period),
+        };
+        let order = controller.a.nrows();
+        let pencil = ComplexMatrix::identity(order, order) * s - to_complex(&controller.a);
+        let (b, c) = (to_complex(&controller.b), to_complex(&controller.c));
+        let (forward, backward) = (pencil.clone().lu(), pencil.transpose().lu());
+        let k = &c * forward.solve(&b)? + to_complex(&controller.d);
+        let closed = Closed::new(k, plant)?;
+        let (sigma, u, v) = largest(&closed.transfer(transfer))?;
+        let (left, right) = match transfer {
+            Transfer::Sensitivity(Point::Input) | Transfer::Complementary(Point::Input) => {
+                (u.adjoint() * &closed.at_input, plant * &closed.at_input * v)
+            }
+            Transfer::Sensitivity(Point::Output) | Transfer::Complementary(Point::Output) => {
+                (u.adjoint() * &closed.at_output * plant, &closed.at_output * v)
+            }
+            Transfer::Effort => (u.adjoint() * &closed.at_input, &closed.at_output * v),
+        };
+        let sign = if matches!(transfer, Transfer::Complementary(_)) { -1.0 } else { 1.0 };
+        let x = forward.solve(&(&b * &right))?;
+        let y = backward.solve(&(&left * &c).transpose())?.transpose();
+        let real = |row: &ComplexMatrix, column: &ComplexMatrix| (column * row).map(|one| one.re);
+        // Re(row M column) is the sum of the entries of M' and Re(column row).
+        let [of_a, of_b, of_c, of_d] =
+            [real(&y, &x), real(&y, &right), real(&left, &x), real(&left, &right)];
+        let along = |one: &StateSpace| {
+            of_a.dot(&one.a.transpose())
+                + of_b.dot(&one.b.transpose())
+                + of_c.dot(&one.c.transpose())
+                + of_d.dot(&one.d.transpose())
+        };
+        let slopes = differences.iter().map(|one| sign * weight * along(one));
+        Some((weight * sigma, DVector::from_iterator(differences.len(), slopes)))
+    }
+}
+
+impl Closed {
+    fn new(k: ComplexMatrix, plant: &ComplexMatrix) -> Option<Self> {
+        let (m, p) = k.shape();
+        let at_input = (ComplexMatrix::identity(m, m) - &k * plant).try_inverse()?;
+        let at_output = (ComplexMatrix::identity(p, p) - plant * &k).try_inverse()?;
+        Some(Self { k, at_input, at_output })
+    }
+
+    fn transfer(&self, transfer: Transfer) -> ComplexMatrix {
+        let complement = |s: &ComplexMatrix| ComplexMatrix::identity(s.nrows(), s.ncols()) - s;
+        match transfer {
+            Transfer::Sensitivity(Point::Input) => self.at_input.clone(),
+            Transfer::Sensitivity(Point::Output) => self.at_output.clone(),
+            Transfer::Complementary(Point::Input) => complement(&self.at_input),
+            Transfer::Complementary(Point::Output) => complement(&self.at_output),
+            Transfer::Effort => &self.k * &self.at_output,
+        }
+    }
+}
+
+/// The largest singular value.
+fn norm(x: &ComplexMatrix) -> Option<f64> {
+    if x.ncols() == 1 || x.nrows() == 1 {
+        return Some(x.norm()).filter(|value| value.is_finite());
+    }
+    let tall = if x.nrows() < x.ncols() { x.transpose() } else { x.clone() };
+    if tall.iter().any(|entry| !(entry.re.is_finite() && entry.im.is_finite())) {
+        return None;
+    }
+    ComplexSvd::new(&tall).ok()?.values().first().copied()
+}
+
+/// The largest singular value with its vectors: X v = sigma u.
+fn largest(x: &ComplexMatrix) -> Option<(f64, ComplexMatrix, ComplexMatrix)> {
+    let sigma = norm(x)?;
+    // The vector by inverse iteration on sigma^2 (1 + eps) I - X* X, whose smallest eigenvalue is near zero.
+    let squares = x.adjoint() * x;
+    let shift = Complex::from(sigma * sigma * (1.0 + 1e-9) + f64::MIN_POSITIVE);
+    let inverse =
+        (ComplexMatrix::identity(x.ncols(), x.ncols()) * shift - &squares).try_inverse()?;
+    let column = (0..x.ncols())
+        .max_by(|&i, &j| inverse.column(i).norm().total_cmp(&inverse.column(j).norm()))?;
+    let mut v: ComplexMatrix = inverse.columns(column, 1).into();
+    for _ in 0..3 {
+        v = &inverse * &v;
+        v /= Complex::from(v.norm());
+    }
+    let u = x * &v / Complex::from(sigma.max(f64::MIN_POSITIVE));
+    Some((sigma, u, v))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tuning::Term;
+    use crate::weight::Weight;
+
+    /// A controller of second order for two channels, whose entries are the parameters.
+    fn controller(parameters: &DVector<f64>, domain: Domain) -> StateSpace {
+        let part = |at: usize| DMatrix::from_row_slice(2, 2, &parameters.as_slice()[at..at + 4]);
+        StateSpace { a: part(0), b: part(4), c: part(8), d: part(12), domain }
+    }
+
+    #[test]
+    fn gradients_are_those_of_central_differences() -> Result<(), Error> {
+        let two = |values: &[f64; 4]| DMatrix::from_row_slice(2, 2, values);
+        let stable = [(Domain::Continuous, -1.0), (Domain::Sampled { period: 0.2 }, 0.5)];
+        for (domain, pole) in stable {
+            let plant = StateSpace {
+                a: two(&[pole, 0.3, -0.2, 0.7 * pole]),
+                b: two(&[1.0, 0.2, -0.4, 0.8]),
+                c: two(&[0.5, 0.1, 0.3, -0.6]),
+                d: DMatrix::zeros(2, 2),
+                domain,
+            };
+            let build = |parameters: &DVector<f64>| Ok(controller(parameters, domain));
+            let transfers = [
+                Transfer::Sensitivity(Point::Input),
+                Transfer::Sensitivity(Point::Output),
+                Transfer::Complementary(Point::Input),
+                Transfer::Complementary(Point::Output),
+                Transfer::Effort,
+            ];
+            let weight = Weight::lead_lag(2.0, 1.0, 0.5, 1)?;
+            let term = |transfer| Term { transfer, weight: weight.clone() };
+            let terms = transfers.map(term).to_vec();
+            let (rate, is_over) = (1.0, &|| false);
+            let tuning =
+                Tuning { plant, controller: &build, terms, instability: 0.0, rate, is_over };
+            let grid = Grid::new(&tuning)?;
+            let start = [pole, 0.1, 0.2, pole / 2.0, 0.4, -0.3, 0.2, 0.5, 0.1, 0.3, -0.2, 0.4];
+            let mut start = start.to_vec();
+            start.extend([-0.1, 0.2, 0.05, -0.15]);
+            let start = DVector::from_vec(start);
+            let moved = |at: usize, by: f64| {
+                let mut parameters = start.clone();
+                parameters[at] += by;
+                controller(&parameters, domain)
+            };
+            let slope = |at: usize| {
+                let (mut above, below) = (moved(at, 0.5), moved(at, -0.5));
+                above.a -= below.a;
+                above.b -= below.b;
+                above.c -= below.c;
+                above.d -= below.d;
+                above
+            };
+            let differences: Vec<_> = (0..start.len()).map(slope).collect();
+            let nominal = controller(&start, domain);
+            let values = |own: &StateSpace| grid.values(own).ok_or(Error::Overflow { what: "S" });
+            for term in 0..transfers.len() {
+                let node = 80;
+                let place = Place { term, node };
+                let (value, gradient) =
+                    grid.gradient(&nominal, &differences, place).expect("a gradient");
+                assert!((value - values(&nominal)?[term][node]).abs() < 1e-8 * value);
+                for at in 0..start.len() {
+                    let step = 1e-5;
+                    let above = values(&moved(at, step))?[term][node];
+                    let below = values(&moved(at, -step))?[term][node];
+                    let expected = (above - below) / (2.0 * step);
+                    let error = (gradient[at] - expected).abs();
+                    assert!(error < 1e-6 * (1.0 + expected.abs()), "{term} {at}: {error}");
+                }
+            }
+        }
+        Ok(())
+    }
+}
