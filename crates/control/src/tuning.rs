@@ -8,7 +8,7 @@
 //! ```
 //!
 //! X is S or T at the commands or the measurements, or K S, with the signs of [`crate::robustness`].
-//! Gamma at most 1 means that every X_i is below 1 / |W_i|.
+//! Gamma at most 1 means that every X is below 1 / |W|.
 
 mod descent;
 mod minimax;

@@ -7,6 +7,7 @@ pub(crate) mod family;
 pub(crate) mod gain;
 pub(crate) mod gains;
 pub(crate) mod law;
+pub(crate) mod loop_shape;
 pub(crate) mod norm_gains;
 pub(crate) mod pairing;
 pub(crate) mod reconfiguration;

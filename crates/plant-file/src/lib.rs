@@ -5,6 +5,7 @@ pub mod channel;
 pub mod detection;
 pub mod estimation;
 pub mod fallback;
+pub mod loop_shape;
 mod matrix;
 mod names;
 pub mod parameters;
@@ -25,6 +26,7 @@ use crate::channel::ChannelSignals;
 use crate::detection::{DetectionRequest, Disturbance, disturbances};
 use crate::estimation::EstimationRequest;
 use crate::fallback::FallbackRequest;
+use crate::loop_shape::LoopShape;
 use crate::matrix::MatrixEntry as _;
 use crate::names::check_names;
 use crate::reconfiguration::{ReconfigurationRequest, positions};
@@ -70,6 +72,8 @@ pub struct PlantFile<'a> {
     pub feedback: Request,
     /// The requirement on the observer.
     pub observer: Request,
+    /// The shape of the loop, from which feedback and observer follow.
+    pub loop_shape: Option<LoopShape>,
     /// The law that estimates the faults.
     pub estimation: EstimationRequest,
     /// End of the default experiment, s.
@@ -142,7 +146,7 @@ pub struct Sampling {
     pub current: bool,
 }
 
-const KEYS: [&str; 33] = [
+const KEYS: [&str; 34] = [
     "description",
     "t_on",
     "monitor",
@@ -165,6 +169,7 @@ const KEYS: [&str; 33] = [
     "filter",
     "feedback",
     "observer",
+    "loop",
     "estimation",
     "experiment",
     "robustness",
@@ -226,6 +231,7 @@ impl<'a> PlantFile<'a> {
         let domain = sampling
             .as_ref()
             .map_or(Domain::Continuous, |sampling| Domain::Sampled { period: sampling.period });
+        let loop_shape = LoopShape::read(file, domain)?;
         let read = |key: &str, weights| {
             let Some(entry) = file.get(key) else { return Ok(Request::open(file.place.clone())) };
             let outputs: Vec<&str> = match key {
@@ -236,6 +242,13 @@ impl<'a> PlantFile<'a> {
             let noises = (key == "observer").then(names);
             let signals = ChannelSignals { outputs, noises };
             request(&entry.table()?, weights, &signals, domain)
+        };
+        let [feedback, observer] = match &loop_shape {
+            Some(shape) => {
+                let [first, ..] = shape.starts(domain);
+                first
+            }
+            None => [read("feedback", ["Q", "R"])?, read("observer", ["W", "V"])?],
         };
         let experiment = file.get("experiment").map(|entry| entry.table()).transpose()?;
         if let Some(table) = &experiment {
@@ -252,8 +265,9 @@ impl<'a> PlantFile<'a> {
             t_on: file.get("t_on").map_or(Ok(0.0), |entry| entry.number())?,
             monitor: file.get("monitor").map_or(Ok(false), |entry| entry.flag())?,
             filter: filter(file, &measurements, &faults)?,
-            feedback: read("feedback", ["Q", "R"])?,
-            observer: read("observer", ["W", "V"])?,
+            feedback,
+            observer,
+            loop_shape,
             estimation: EstimationRequest::read(file, faults.len())?,
             stop_time: time("stop_time")?,
             step_size: time("step_size")?,

@@ -413,3 +413,9 @@ impl Fault {
         }
     }
 }
+
+/// Whether all signals have the same unit, or none.
+#[must_use]
+pub fn same_unit(signals: &[Signal]) -> bool {
+    signals.iter().all(|signal| signal.unit == signals[0].unit)
+}

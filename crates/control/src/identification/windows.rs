@@ -98,7 +98,7 @@ impl Windows {
     ///
     /// [`Error::Empty`] without parts, [`Error::Shape`] for parts of different signals or lengths.
     pub fn joined(parts: &[&Self]) -> Result<Self, Error> {
-        let first = *parts.first().ok_or(Error::Empty { matrix: "parts", found: (0, 0) })?;
+        let first = *parts.first().ok_or(Error::Empty { matrix: "parts", actual: (0, 0) })?;
         let mut all = first.clone();
         for part in &parts[1..] {
             check::shape("R", &part.factor, first.factor.shape())?;

@@ -7,8 +7,8 @@ use crate::{Error, StateSpace, check};
 use nalgebra::{DMatrix, DVector};
 
 /// Largest numbers of steps between two verifications, and of verifications.
-const STEPS: usize = 60;
-const ROUNDS: usize = 6;
+const STEPS: usize = 150;
+const ROUNDS: usize = 12;
 /// Terms and frequencies in a step: with a value above this part of the largest one.
 const ACTIVE: f64 = 0.85;
 const MOST_ACTIVE: usize = 40;
@@ -19,6 +19,8 @@ const HALVINGS: usize = 14;
 const SUFFICIENT: f64 = 1e-2;
 /// A search ends when a step decreases gamma by less than this part.
 const FLAT: f64 = 1e-5;
+/// A round that decreases gamma by less than this part is the last one.
+const PROGRESS: f64 = 1e-3;
 /// A norm that is above the values of the grid by this part adds its frequency.
 const BETWEEN: f64 = 2e-3;
 
@@ -44,10 +46,13 @@ impl Tuning<'_> {
         for _ in 0..ROUNDS {
             let value = search.descend();
             let peak = self.peak(&search.at)?;
-            if peak.gamma < best.peak.gamma {
+            let before = best.peak.gamma;
+            if peak.gamma < before {
                 best = Tuned { parameters: search.at.clone(), peak };
             }
-            if peak.gamma <= (1.0 + BETWEEN) * value || (self.is_over)() {
+            let is_on_grid = peak.gamma <= (1.0 + BETWEEN) * value;
+            let is_flat = peak.gamma >= (1.0 - PROGRESS) * before;
+            if (is_on_grid && is_flat) || (self.is_over)() {
                 break;
             }
             search.grid.add(peak.frequency)?;
@@ -80,7 +85,7 @@ impl Search<'_> {
         let count = self.at.len();
         let Some(mut iterate) = self.iterate(&self.at) else { return f64::INFINITY };
         let mut inverse = DMatrix::identity(count, count);
-        let mut is_fresh = true;
+        let (mut is_fresh, mut was_flat) = (true, false);
         for _ in 0..STEPS {
             let value = iterate.largest();
             let places = active(&iterate.values, ACTIVE * value);
@@ -112,8 +117,15 @@ impl Search<'_> {
             }
             let decrease = value - next.largest();
             (self.at, iterate) = (parameters, next);
-            if decrease <= FLAT * value || (self.grid.tuning.is_over)() {
+            if (self.grid.tuning.is_over)() {
                 break;
+            }
+            // The matrix starts again once; a flat step after that is the last one.
+            if decrease <= FLAT * value {
+                if was_flat {
+                    break;
+                }
+                (is_fresh, was_flat) = (true, true);
             }
         }
         iterate.largest()

@@ -30,7 +30,7 @@ use crate::report::robustness::{
 use crate::report::{Frequency, Matrix};
 use crate::solve::solution::Solution;
 use plant_file::robustness::RobustnessLimits;
-use plant_file::signals::Signal;
+use plant_file::signals::{Signal, same_unit};
 
 const WIDTH: f64 = 1e-4;
 const POINTS_PER_DECADE: u32 = 20;
@@ -256,10 +256,6 @@ fn point(opened: &OpenedLoop, name: &str, signals: &[Signal]) -> Result<LoopPoin
         together: disk(&together?),
         channels: channels?,
     })
-}
-
-fn same_unit(signals: &[Signal]) -> bool {
-    signals.iter().all(|signal| signal.unit == signals[0].unit)
 }
 
 /// Returns the derivatives of the judged peaks with respect to the entries of A, B, C and D.

@@ -8,6 +8,7 @@ use crate::solve::family::{self, Family, Member, common_feedback};
 use crate::solve::gain::{FeedbackProblem, GainResult, Refusal, unique};
 use crate::solve::gains::{feedback, observer};
 use crate::solve::law::{DesignedLaw, LawProblem};
+use crate::solve::loop_shape::{LoopProblem, Shaped};
 use crate::solve::norm_gains::ObserverProblem;
 use crate::solve::pairing::PairProblem;
 use crate::solve::tracking::{
@@ -112,6 +113,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
         domain,
     };
     let (feedback, observer) = problem.solve(common)?;
+    let starts = problem.starts()?;
     let n = plant.a.nrows();
     let k_f = sampled::compensation_gain(&extended, domain)?;
     let with = |feedback: &DMatrix<f64>, observer: &DMatrix<f64>| Gains {
@@ -125,7 +127,14 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     };
     let filter = sampled::filter(&extended, domain);
     // The gains of a schedule are interpolated, so that each point takes the first of its pairs.
-    let (feedback, observer) = if file.is_scheduled() {
+    let (feedback, observer) = if let Some(shape) = &file.loop_shape {
+        let filter = filter.as_deref();
+        let (linear, plant, gains) = (&linear, &plant, with);
+        let problem = LoopProblem { shape, linear, plant, filter, domain, gains };
+        let Shaped { feedback, observer, warning } = problem.tuned(&starts)?;
+        warnings.extend(warning.map(|text| file.error_at(&shape.place, text)));
+        (feedback, observer)
+    } else if file.is_scheduled() {
         (feedback, observer)
     } else {
         let filter = filter.as_deref();
@@ -309,6 +318,18 @@ impl GainProblem<'_> {
             refused(file, domain, &file.observer, refusal, &states)
         })?;
         Ok((feedback, observer))
+    }
+
+    /// The gains with which the search for the shape of the loop starts, if the file states one.
+    fn starts(&self) -> Result<Vec<[DMatrix<f64>; 2]>, PlaceError> {
+        let Some(shape) = &self.file.loop_shape else { return Ok(Vec::new()) };
+        let gains = |[feedback, observer]: [Request; 2]| {
+            let mut file = self.file.clone();
+            (file.feedback, file.observer) = (feedback, observer);
+            let (feedback, observer) = GainProblem { file: &file, ..*self }.solve(None)?;
+            Ok([feedback.gain, observer.gain])
+        };
+        shape.starts(self.domain).into_iter().map(gains).collect()
     }
 }
 

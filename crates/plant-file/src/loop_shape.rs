@@ -1,0 +1,93 @@
+//! The table `[loop]` of a plant file: the shape of S and T, instead of requirements on feedback and observer.
+
+use crate::requirements::{Bandwidth, Request, Requirement};
+use control::Domain;
+use files::{Place, PlaceError, Table};
+
+const KEYS: [&str; 4] = ["bandwidth", "peak", "roll_off", "effort"];
+/// Entries that state the gains in another way, or loops that are not tuned.
+const OTHERS: [&str; 6] = ["feedback", "observer", "schedule", "family", "estimation", "D"];
+/// The peak of S and of T, if none is stated.
+const PEAK: f64 = 1.5;
+/// The frequency from which T falls, relative to the bandwidth, if none is stated.
+const ROLL_OFF: f64 = 10.0;
+/// Bandwidths of feedback and observer with which the search starts, relative to that of the loop.
+const STARTS: [(f64, f64); 6] =
+    [(1.0, 4.0), (0.5, 4.0), (1.0, 8.0), (2.0, 8.0), (0.5, 2.0), (1.0, 1.0)];
+/// Largest bandwidth of the observer in rad per sample.
+const OBSERVER_PER_SAMPLE: f64 = 1.5;
+/// Largest bandwidth in rad per sample.
+const PER_SAMPLE: f64 = 0.5;
+
+/// The shape that a loop should have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoopShape {
+    /// |S| is below w / bandwidth at low frequencies w, rad/s.
+    pub bandwidth: f64,
+    /// |S| and |T| are below it at every frequency.
+    pub peak: f64,
+    /// |T| is below `peak roll_off / w` above it, rad/s.
+    pub roll_off: f64,
+    /// |K S| is below it at every frequency, if it is stated.
+    pub effort: Option<f64>,
+    /// Where the file states it.
+    pub place: Place,
+}
+
+impl LoopShape {
+    /// Reads the table, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
+    pub fn read(file: &Table<'_>, domain: Domain) -> Result<Option<Self>, PlaceError> {
+        let Some(entry) = file.get("loop") else {
+            return Ok(None);
+        };
+        if let Some(other) = OTHERS.iter().find(|key| file.get(key).is_some()) {
+            return Err(entry.error(format!("it is not possible together with `{other}`")));
+        }
+        let table = entry.table()?;
+        table.allow(&KEYS)?;
+        let stated =
+            table.require("bandwidth", "the frequency, in rad/s, below which |S| is small")?;
+        let bandwidth = stated.positive()?;
+        if let Domain::Sampled { period } = domain
+            && bandwidth * period > PER_SAMPLE
+        {
+            let most = PER_SAMPLE / period;
+            return Err(stated.error(format!(
+                "expected at most {most:.3} rad/s for samples every {period} s, found {bandwidth}"
+            )));
+        }
+        let number = |key: &str| table.get(key).map(|entry| entry.positive()).transpose();
+        let peak = number("peak")?.unwrap_or(PEAK);
+        if let Some(entry) = table.get("peak").filter(|_| peak < 1.0) {
+            return Err(entry.error(format!(
+                "expected at least 1, as S is I at high frequencies, found {peak}"
+            )));
+        }
+        let roll_off = number("roll_off")?.unwrap_or(ROLL_OFF * bandwidth);
+        let effort = number("effort")?;
+        Ok(Some(Self { bandwidth, peak, roll_off, effort, place: entry.place }))
+    }
+
+    /// The requests on feedback and observer of the designs with which the search starts.
+    #[must_use]
+    pub fn starts(&self, domain: Domain) -> [[Request; 2]; STARTS.len()] {
+        let most = match domain {
+            Domain::Continuous => f64::INFINITY,
+            Domain::Sampled { period } => OBSERVER_PER_SAMPLE / period,
+        };
+        STARTS.map(|(feedback, observer)| {
+            [feedback, observer].map(|factor| self.request((factor * self.bandwidth).min(most)))
+        })
+    }
+
+    /// A request of a bandwidth in rad/s.
+    fn request(&self, rate: f64) -> Request {
+        let bandwidth = Bandwidth { rate: Some(rate), is_stated: true };
+        let requirement = Requirement::Bandwidth(bandwidth);
+        Request { requirement, place: self.place.clone(), other: None }
+    }
+}

@@ -1,0 +1,137 @@
+"""Compares `[loop]` of plant files with mixsyn of python-control, as a table in Markdown.
+
+    python scripts/study/loop_shaping.py
+
+Both designs have the same weights of S and T, `bandwidth` of the table below and `peak` 1.5. mixsyn minimises the norm of
+[W1 S; W2 K S; W3 T] at the measurements with a small W2, and its controller has the order of plant and weights together.
+gamma is max(|W1 S|, |W3 T|) at the measurements and the commands, and the peaks are those of S, all computed here on a grid
+of 4000 frequencies. Needs target/release/aso-ftc and Python 3.11 with python-control 0.10.2 and slycot 0.7.1.
+"""
+
+import json
+import re
+import subprocess
+import tempfile
+import tomllib
+from pathlib import Path
+
+import control
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+PEAK, FLOOR, ROLL_OFF, EFFORT = 1.5, 0.01, 10.0, 1e-3
+
+# Numerator and denominator of each plant with one command, and the bandwidth in rad/s.
+SINGLE = {
+    "1 / (s + 1)": ([1], [1, 1], 1.0),
+    "1 / (s^2 + 0.5 s)": ([1], [1, 0.5, 0], 0.5),
+    "1 / (s^2 + 0.2 s + 1)": ([1], [1, 0.2, 1], 0.7),
+    "1 / (s + 1)^3": ([1], [1, 3, 3, 1], 0.4),
+    "(2 - s) / (s + 1)^2": ([-1, 2], [1, 2, 1], 0.4),
+    "1 / (s^2 - 1)": ([1], [1, 0, -1], 1.0),
+    "1 / (s - 1)": ([1], [1, -1], 1.5),
+    "(1 - s) / (s^2 + s)": ([-1, 1], [1, 1, 0], 0.2),
+}
+# Plants of examples/plants, and others with several commands.
+SEVERAL = {
+    "airc": 1.0,
+    "distillation": 0.1,
+    "quadruple-tank": 0.02,
+    "unstable-reactor": 3.0,
+}
+COUPLED = {
+    "1 / (s + 1) [1, 0.5; 0.3, 1]": ([[-1, 0], [0, -1]], [[1, 0.5], [0.3, 1]], [[1, 0], [0, 1]], 1.0),
+    "two carts and a spring": (
+        [[0, 1, 0, 0], [-1, -0.1, 1, 0.05], [0, 0, 0, 1], [1, 0.05, -1, -0.1]],
+        [[0, 0], [1, 0], [0, 0], [0, 1]],
+        [[1, 0, 0, 0], [0, 0, 1, 0]],
+        0.7,
+    ),
+}
+
+
+def plants():
+    """The name, A, B and C and the bandwidth of each plant."""
+    for name, (numerator, denominator, bandwidth) in SINGLE.items():
+        n = len(denominator) - 1
+        a = np.eye(n, k=1)
+        a[-1] = -np.array(denominator[:0:-1], float)
+        c = np.zeros((1, n))
+        c[0, : len(numerator)] = numerator[::-1]
+        yield name, a, np.eye(n)[:, -1:], c, bandwidth
+    for name, bandwidth in SEVERAL.items():
+        plant = tomllib.loads((ROOT / f"examples/plants/{name}.toml").read_text())
+        yield name, *(np.array(plant[key], float) for key in "ABC"), bandwidth
+    for name, (a, b, c, bandwidth) in COUPLED.items():
+        yield name, np.array(a, float), np.array(b, float), np.array(c, float), bandwidth
+
+
+def weights(bandwidth):
+    """The weights of S and T, as transfer functions."""
+    s = control.tf("s")
+    corner = ROLL_OFF * bandwidth
+    of_s = (s / PEAK + bandwidth) / (s + FLOOR * bandwidth)
+    of_t = (s / corner + 1) / (s * FLOOR / corner + 1) / PEAK
+    return of_s, of_t
+
+
+def tuned(a, b, c, bandwidth):
+    """Our controller, and the gamma that the command states."""
+    rows = [f"{name} = {matrix.tolist()}" for name, matrix in zip("ABC", (a, b, c), strict=True)]
+    text = "\n".join([*rows, 'actuator_faults = "all"', "[loop]", f"bandwidth = {bandwidth}", f"peak = {PEAK}"])
+    with tempfile.TemporaryDirectory() as folder:
+        file, out = Path(folder, "plant.toml"), Path(folder, "design.toml")
+        file.write_text(text)
+        command = [ROOT / "target/release/aso-ftc", "design", file, "--out", out, "--json", "--certificate-time", "0"]
+        run = subprocess.run(command, capture_output=True, text=True, check=False)
+        if not out.exists():
+            raise RuntimeError(run.stderr)
+        design = tomllib.loads(out.read_text())
+        stated = float(re.search(r"gamma = ([0-9.e+-]+[0-9])", json.dumps(json.loads(run.stdout)))[1])
+    k_x, l_x, l_f = (np.array(design[key], float) for key in ("K_x", "L_x", "L_f"))
+    n, m = b.shape
+    a_0 = np.block([[a, b], [np.zeros((m, n + m))]])
+    c_0 = np.hstack([c, np.zeros((c.shape[0], m))])
+    gain = np.hstack([k_x, -np.eye(m)])
+    observer = np.vstack([l_x, l_f])
+    b_0 = np.vstack([b, np.zeros((m, m))])
+    return control.ss(a_0 + b_0 @ gain - observer @ c_0, observer, gain, np.zeros((m, c.shape[0]))), stated
+
+
+def figures(plant, controller, bandwidth):
+    """gamma, and the peaks of S at the commands and the measurements, of u = K y."""
+    omega = bandwidth * np.logspace(-4, 4, 4000)
+    g, k = (np.moveaxis(one(1j * omega, squeeze=False), -1, 0) for one in (plant, controller))
+    of_s, of_t = (abs(one(1j * omega)) for one in weights(bandwidth))
+    gamma, peaks = 0.0, []
+    for opened in (k @ g, g @ k):
+        unit = np.eye(opened.shape[-1])
+        s = np.linalg.inv(unit - opened)
+        sizes = np.linalg.norm(s, 2, axis=(1, 2))
+        of_complement = np.linalg.norm(unit - s, 2, axis=(1, 2))
+        peaks.append(max(1.0, sizes.max()))
+        gamma = max(gamma, (of_s * sizes).max(), (of_t * of_complement).max())
+    return gamma, *peaks
+
+
+def main():
+    """Prints the table."""
+    print("| plant | bandwidth, rad/s | gamma, ours / mixsyn | S at the commands | S at the measurements |")
+    print("|---|---|---|---|---|")
+    for name, a, b, c, bandwidth in plants():
+        plant = control.ss(a, b, c, np.zeros((c.shape[0], b.shape[1])))
+        ours, stated = tuned(a, b, c, bandwidth)
+        own = figures(plant, ours, bandwidth)
+        if own[0] > 1.01 * stated:
+            raise RuntimeError(f"{name}: gamma {own[0]:.4f}, the command states {stated}")
+        of_s, of_t = weights(bandwidth)
+        # mixsyn has no integrators; eigenvalues on the imaginary axis move a little.
+        shifted = control.ss(a - 1e-4 * bandwidth * np.eye(len(a)), b, c, plant.D)
+        theirs, *_ = control.mixsyn(shifted, of_s, control.tf([EFFORT], [1]), of_t)
+        other = figures(plant, -theirs, bandwidth)
+        pairs = [f"{mine:.2f} / {its:.2f}" for mine, its in zip(own, other, strict=True)]
+        print(f"| {name} | {bandwidth:g} | {' | '.join(pairs)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,88 @@
+"""`[loop]`: the weighted peaks of S and T by numpy, from the gains of the design file."""
+
+import json
+import re
+import tomllib
+
+import numpy as np
+import pytest
+
+PEAK, FLOOR, ROLL_OFF = 1.5, 0.01, 10.0
+PLANTS = {
+    "double integrator with friction": ([[0, 1], [0, -0.5]], [[0], [0.5]], [[1, 0]], 0.5),
+    "unstable": ([[0, 1], [1, 0]], [[0], [1]], [[1, 0]], 1.0),
+    "two channels": ([[-1, 0], [0, -1]], [[1, 0.5], [0.3, 1]], [[1, 0], [0, 1]], 1.0),
+}
+
+
+def designed(aso_ftc, folder, plant, more=""):
+    *matrices, bandwidth = plant
+    rows = [f"{name} = {matrix}" for name, matrix in zip("ABC", matrices, strict=True)]
+    text = "\n".join([*rows, 'actuator_faults = "all"', more, "[loop]", f"bandwidth = {bandwidth}"])
+    (folder / "plant.toml").write_text(text, encoding="utf-8")
+    done = aso_ftc("design", folder / "plant.toml", "--out", folder / "design.toml", "--json")
+    assert (folder / "design.toml").exists(), done.stderr
+    report = json.loads(done.stdout)
+    stated = re.search(r"gamma = ([0-9.e+-]+[0-9])", json.dumps(report))
+    return tomllib.loads((folder / "design.toml").read_text()), report, float(stated[1])
+
+
+def weighted(design, plant, omega):
+    """The largest of |W1 S| and |W3 T| at the commands and the measurements."""
+    a, b, c = (np.array(one, float) for one in plant[:3])
+    bandwidth, (n, m) = plant[3], b.shape
+    k_x, l_x, l_f = (np.array(design[key], float) for key in ("K_x", "L_x", "L_f"))
+    a_0 = np.block([[a, b], [np.zeros((m, n + m))]])
+    b_0 = np.vstack([b, np.zeros((m, m))])
+    c_0 = np.hstack([c, np.zeros((len(c), m))])
+    gain, observer = np.hstack([k_x, -np.eye(m)]), np.vstack([l_x, l_f])
+    a_k = a_0 + b_0 @ gain - observer @ c_0
+    largest = 0.0
+    for w in omega:
+        s = 1j * w
+        g = c @ np.linalg.solve(s * np.eye(n) - a, b)
+        k = gain @ np.linalg.solve(s * np.eye(n + m) - a_k, observer)
+        of_s = abs((s / PEAK + bandwidth) / (s + FLOOR * bandwidth))
+        corner = ROLL_OFF * bandwidth
+        of_t = abs((s / corner + 1) / (s * FLOOR / corner + 1)) / PEAK
+        for opened in (k @ g, g @ k):
+            unit = np.eye(len(opened))
+            sensitivity = np.linalg.inv(unit - opened)
+            largest = max(largest, of_s * np.linalg.norm(sensitivity, 2))
+            largest = max(largest, of_t * np.linalg.norm(unit - sensitivity, 2))
+    return largest
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_gamma_is_the_largest_weighted_peak_and_all_that_is_asked_for_is_met(aso_ftc, tmp_path, name):
+    plant = PLANTS[name]
+    design, _, gamma = designed(aso_ftc, tmp_path, plant)
+    largest = weighted(design, plant, plant[3] * np.logspace(-4, 4, 3000))
+    assert gamma == pytest.approx(largest, rel=2e-3)
+    assert gamma <= 1.0
+
+
+def test_a_sampled_loop_meets_the_peak_that_it_is_tuned_for(aso_ftc, tmp_path):
+    _, report, gamma = designed(aso_ftc, tmp_path, PLANTS["two channels"], "sample_time = 0.05")
+    peaks = [[point["s_peak"], point["t_peak"]] for point in report["robustness"]["points"]]
+    assert gamma <= 1.0
+    assert np.max(peaks) <= 1.001 * gamma * PEAK
+
+
+def test_a_bandwidth_beyond_a_zero_in_the_right_half_plane_is_a_warning_with_gamma(aso_ftc, tmp_path):
+    # (1 - s) / (s^2 + s) with a bandwidth of 1 rad/s.
+    (tmp_path / "plant.toml").write_text(
+        'A = [[0, 1], [0, -1]]\nB = [[0], [1]]\nC = [[1, -1]]\nactuator_faults = "all"\n[loop]\nbandwidth = 1.0\npeak = 1.2\n',
+        encoding="utf-8",
+    )
+    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml")
+    warning = re.search(r"gamma = ([0-9.]+[0-9]), limited by .*expected at most 1", done.stdout)
+    assert warning and float(warning[1]) > 1.2, done.stdout
+
+
+def test_requirements_on_the_gains_are_refused_beside_it(aso_ftc, tmp_path):
+    text = 'A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = "all"\nfeedback.bandwidth = 1\n[loop]\nbandwidth = 1\n'
+    (tmp_path / "plant.toml").write_text(text, encoding="utf-8")
+    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml")
+    assert done.returncode == 2
+    assert "not possible together with `feedback`" in done.stderr
