@@ -103,7 +103,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         };
         let [feedback, observer] = &starts[0];
         let [feedback, observer] = divided(&parameters, feedback.shape(), observer.shape());
-        let summary = self.summary(&terms, &peak);
+        let summary = summary(&terms, &peak);
         let method = format!("Loop shaping: {summary}.");
         Ok(Shaped {
             feedback: unique(feedback, method.clone()),
@@ -191,22 +191,22 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         }
         Ok(terms)
     }
+}
 
-    /// Gamma, with the term and the frequency that limit it.
-    fn summary(&self, terms: &[Term], peak: &WeightedPeak) -> String {
-        let name = match terms[peak.term].transfer {
-            Transfer::Sensitivity(Point::Input) => "S at the input",
-            Transfer::Sensitivity(Point::Output) => "S at the output",
-            Transfer::Complementary(Point::Input) => "T at the input",
-            Transfer::Complementary(Point::Output) => "T at the output",
-            Transfer::Effort => "K S",
-        };
-        let gamma = rounded(peak.gamma);
-        if peak.frequency.is_finite() {
-            format!("gamma = {gamma}, limited by {name} at {} rad/s", rounded(peak.frequency))
-        } else {
-            format!("gamma = {gamma}, limited by {name} at high frequencies")
-        }
+/// Gamma, with the term and the frequency that limit it.
+fn summary(terms: &[Term], peak: &WeightedPeak) -> String {
+    let name = match terms[peak.term].transfer {
+        Transfer::Sensitivity(Point::Input) => "S at the input",
+        Transfer::Sensitivity(Point::Output) => "S at the output",
+        Transfer::Complementary(Point::Input) => "T at the input",
+        Transfer::Complementary(Point::Output) => "T at the output",
+        Transfer::Effort => "K S",
+    };
+    let gamma = rounded(peak.gamma);
+    if peak.frequency.is_finite() {
+        format!("gamma = {gamma}, limited by {name} at {} rad/s", rounded(peak.frequency))
+    } else {
+        format!("gamma = {gamma}, limited by {name} at high frequencies")
     }
 }
 

@@ -112,8 +112,6 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
         pair: &pair,
         domain,
     };
-    let (feedback, observer) = problem.solve(common)?;
-    let starts = problem.starts()?;
     let n = plant.a.nrows();
     let k_f = sampled::compensation_gain(&extended, domain)?;
     let with = |feedback: &DMatrix<f64>, observer: &DMatrix<f64>| Gains {
@@ -126,21 +124,8 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
         integral: integral_action(references, &linear, &extended, feedback),
     };
     let filter = sampled::filter(&extended, domain);
-    // The gains of a schedule are interpolated, so that each point takes the first of its pairs.
-    let (feedback, observer) = if let Some(shape) = &file.loop_shape {
-        let filter = filter.as_deref();
-        let (linear, plant, gains) = (&linear, &plant, with);
-        let problem = LoopProblem { shape, linear, plant, filter, domain, gains };
-        let Shaped { feedback, observer, warning } = problem.tuned(&starts)?;
-        warnings.extend(warning.map(|text| file.error_at(&shape.place, text)));
-        (feedback, observer)
-    } else if file.is_scheduled() {
-        (feedback, observer)
-    } else {
-        let filter = filter.as_deref();
-        PairProblem { linear: &linear, plant: &plant, filter, domain }
-            .chosen(feedback, observer, with)?
-    };
+    let (feedback, observer, warning) = problem.chosen(common, filter.as_deref(), with)?;
+    warnings.extend(warning);
     let gains = with(&feedback.gain, &observer.gain);
     let problem =
         LawProblem { linear: &linear, extended: &extended, plant: &plant, gains: &gains, domain };
@@ -318,6 +303,30 @@ impl GainProblem<'_> {
             refused(file, domain, &file.observer, refusal, &states)
         })?;
         Ok((feedback, observer))
+    }
+
+    /// Returns the gains of feedback and observer together, with a warning if they do not give the loop its shape.
+    /// `gains`: those of the controller.
+    fn chosen(
+        &self,
+        common: Option<GainResult>,
+        filter: Option<&[f64]>,
+        gains: impl Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync,
+    ) -> Result<(GainResult, GainResult, Option<PlaceError>), crate::Error> {
+        let Self { file, linear, plant, domain, .. } = *self;
+        if let Some(shape) = &file.loop_shape {
+            let problem = LoopProblem { shape, linear, plant, filter, domain, gains };
+            let Shaped { feedback, observer, warning } = problem.tuned(&self.starts()?)?;
+            return Ok((feedback, observer, warning.map(|text| file.error_at(&shape.place, text))));
+        }
+        let (feedback, observer) = self.solve(common)?;
+        // The gains of a schedule are interpolated, so that each point takes the first of its pairs.
+        if file.is_scheduled() {
+            return Ok((feedback, observer, None));
+        }
+        let problem = PairProblem { linear, plant, filter, domain };
+        let (feedback, observer) = problem.chosen(feedback, observer, gains)?;
+        Ok((feedback, observer, None))
     }
 
     /// The gains with which the search for the shape of the loop starts, if the file states one.
