@@ -55,7 +55,7 @@ def plants():
     for name, (numerator, denominator, bandwidth) in SINGLE.items():
         n = len(denominator) - 1
         a = np.eye(n, k=1)
-        a[-1] = -np.array(denominator[:0:-1], float)
+        a[-1] = np.negative(denominator[:0:-1])
         c = np.zeros((1, n))
         c[0, : len(numerator)] = numerator[::-1]
         yield name, a, np.eye(n)[:, -1:], c, bandwidth
