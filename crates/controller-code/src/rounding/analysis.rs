@@ -155,7 +155,7 @@ impl<'a> Analysis<'a> {
                 self.controller.a_f.abs() * self.integral_part()
             }
             Vector::StoredFHat | Vector::NextFHat | Vector::FHatI => self.integral_part(),
-            Vector::Y | Vector::StoredYF | Vector::YF | Vector::NextYF => self.given(),
+            Vector::Y | Vector::StoredYF | Vector::YF | Vector::NextYF => self.measured(),
             _ => self.unit(vector.kind()),
         };
         let operating = match vector {
@@ -198,11 +198,11 @@ impl<'a> Analysis<'a> {
 
     /// |e| <= |y - D u| + |C| |x_hat|.
     fn innovation(&self, x_hat: &DMatrix<f64>) -> DMatrix<f64> {
-        self.given() + self.controller.c.abs() * x_hat
+        self.measured() + self.controller.c.abs() * x_hat
     }
 
     /// |y - D u| <= |y| + |D| |u|; y without D.
-    fn given(&self) -> DMatrix<f64> {
+    fn measured(&self) -> DMatrix<f64> {
         let y = self.unit(Kind::Measurement);
         match &self.controller.d {
             None => y,
