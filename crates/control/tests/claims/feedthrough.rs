@@ -162,7 +162,7 @@ fn growth(controller: &StateSpace, hold: f64, delay: f64) -> f64 {
     const PARTS: f64 = 40.0;
     let plant = plant();
     let (a, b) = zero_order_hold(&plant.a, &plant.b, hold / PARTS).expect("a plant");
-    let (own_a, own_b) = match controller.domain {
+    let (phi, gamma) = match controller.domain {
         Domain::Continuous => {
             zero_order_hold(&controller.a, &controller.b, hold).expect("a controller")
         }
@@ -180,7 +180,7 @@ fn growth(controller: &StateSpace, hold: f64, delay: f64) -> f64 {
         // What the plant received last is in the measurement.
         let y = &plant.c * &x + &plant.d * &queue[0];
         let u = &controller.c * &z + &controller.d * &y;
-        z = &own_a * z + &own_b * y;
+        z = &phi * z + &gamma * y;
         for _ in 0..40 {
             queue.push_back(u.clone());
             queue.pop_front();

@@ -23,8 +23,8 @@ pub(crate) fn cases(text: &'static str, kind: &str) -> Vec<Case> {
     let mut cases = Vec::new();
     let mut is_of_kind = false;
     for line in text.lines().filter(|line| !line.starts_with('#')) {
-        if let Some((found_kind, name)) = line.split_once(": ") {
-            is_of_kind = found_kind == kind;
+        if let Some((case_kind, name)) = line.split_once(": ") {
+            is_of_kind = case_kind == kind;
             if is_of_kind {
                 cases.push(Case { name, matrices: Vec::new() });
             }

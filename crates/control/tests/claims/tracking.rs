@@ -84,8 +84,8 @@ fn designed(domain: Domain, estimator: Estimator, sensor: bool) -> Designed {
     let assign = if domain == Domain::Continuous { place } else { place_discrete };
     let k = assign(&a_e, &b_e, &poles).expect("the design of the test exists").gain;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-    let seen_states = estimator.output_matrix(&a_0, &c_0);
-    let l = -assign(&a_0.transpose(), &seen_states.transpose(), &observer)
+    let output_matrix = estimator.output_matrix(&a_0, &c_0);
+    let l = -assign(&a_0.transpose(), &output_matrix.transpose(), &observer)
         .expect("the design of the test exists")
         .gain
         .transpose();
