@@ -56,12 +56,12 @@ fn a_function_may_be_called_exactly_in_the_states_of_sections_3_2_3_and_4_2_4() 
     }
 }
 
-/// A call of each function in each state of `made`: only what may be called reaches the model; all
+/// A call of each function in each state of the instance: only what may be called reaches the model; all
 /// else is an error that leaves the instance in the state error, or as lost as it was.
-fn walk<M: Model>(interface: InterfaceType, made: impl Fn() -> Instance<M>) {
+fn walk<M: Model>(interface: InterfaceType, instantiate: impl Fn() -> Instance<M>) {
     for state in State::EVERY {
         for &function in Function::EVERY {
-            let mut instance = made();
+            let mut instance = instantiate();
             instance.core.state = state;
             let mut reached = false;
             let status = instance.call(function, |_| {

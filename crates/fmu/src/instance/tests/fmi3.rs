@@ -107,13 +107,13 @@ fn reference(name: &str) -> u32 {
     description().variable(name).unwrap().value_reference
 }
 
-pub(super) fn made<M: Model>(
+pub(super) fn instantiate<M: Model>(
     kind: InterfaceType,
     events: bool,
     early: bool,
 ) -> Result<Instance<M>, Failure> {
     let token = describe_3::<M>(Path::new("")).unwrap().guid;
-    let made = Instantiation {
+    let instantiation = Instantiation {
         interface_type: kind,
         token: &token,
         resources: Path::new(""),
@@ -123,11 +123,11 @@ pub(super) fn made<M: Model>(
         intermediate: None,
         required: &[],
     };
-    Instance::new_3(&made, Callbacks::silent())
+    Instance::new_3(&instantiation, Callbacks::silent())
 }
 
 pub(super) fn initialized(kind: InterfaceType, events: bool) -> Instance<Linear> {
-    let mut instance = made(kind, events, events).unwrap();
+    let mut instance = instantiate(kind, events, events).unwrap();
     let done = [
         instance.call(Function::EnterInitializationMode, Instance::enter_initialization_mode),
         instance.call(Function::ExitInitializationMode, Instance::exit_initialization_mode_3),
@@ -177,7 +177,7 @@ fn matrices_and_vectors_are_arrays_in_fmi_3_and_scalars_in_fmi_2() {
 
 #[test]
 fn an_array_is_set_whole_and_read_in_row_major_order() {
-    let mut instance = made(InterfaceType::CoSimulation, false, false).unwrap();
+    let mut instance = instantiate(InterfaceType::CoSimulation, false, false).unwrap();
     assert_eq!(set(&mut instance, "A", &[1.0, 2.0, 3.0, 4.0]), Status::OK);
     assert_eq!(instance.core.model.a, [1.0, 2.0, 3.0, 4.0]);
     let expected = vec![1.0, 2.0, 3.0, 4.0, 0.0];
@@ -187,7 +187,7 @@ fn an_array_is_set_whole_and_read_in_row_major_order() {
 #[test]
 fn a_wrong_number_of_values_is_an_error_before_a_value_is_touched() {
     for count in [0, 1, 3, 5] {
-        let mut instance = made(InterfaceType::CoSimulation, false, false).unwrap();
+        let mut instance = instantiate(InterfaceType::CoSimulation, false, false).unwrap();
         let (status, values) = get(&mut instance, &["A"], count);
         assert_eq!((status, instance.core.state), (Status::Error, State::Terminated));
         assert!(values.iter().all(|value| value.is_nan()));
@@ -196,11 +196,11 @@ fn a_wrong_number_of_values_is_an_error_before_a_value_is_touched() {
 
 #[test]
 fn a_variable_of_another_type_is_an_error() {
-    let mut instance = made::<Linear>(InterfaceType::CoSimulation, false, false).unwrap();
+    let mut instance = instantiate::<Linear>(InterfaceType::CoSimulation, false, false).unwrap();
     let status = instance
         .call(Function::GetInt32, |i| i.located(Type::Int32, &[reference("u")], 1, |_, _| Ok(())));
     assert_eq!(status, Status::Error);
-    let mut instance = made::<Linear>(InterfaceType::CoSimulation, false, false).unwrap();
+    let mut instance = instantiate::<Linear>(InterfaceType::CoSimulation, false, false).unwrap();
     let status =
         instance.call(Function::GetClock, |i| i.located(Type::Clock, &[0], 1, |_, _| Ok(())));
     assert_eq!(status, Status::Error);
@@ -283,8 +283,8 @@ fn an_event_indicator_is_a_variable() {
 
 #[test]
 fn event_mode_of_co_simulation_is_refused_without_has_event_mode() {
-    assert!(made::<super::Decay>(InterfaceType::CoSimulation, true, true).is_err());
-    assert!(made::<super::Decay>(InterfaceType::ModelExchange, false, false).is_err());
+    assert!(instantiate::<super::Decay>(InterfaceType::CoSimulation, true, true).is_err());
+    assert!(instantiate::<super::Decay>(InterfaceType::ModelExchange, false, false).is_err());
 }
 
 #[test]
@@ -292,16 +292,16 @@ fn a_saved_state_keeps_event_mode() {
     let instance = initialized(InterfaceType::CoSimulation, true);
     let bytes = instance.snapshot().to_bytes().unwrap();
     let snapshot = Snapshot::from_bytes(&bytes, instance.guid()).unwrap();
-    let mut other = made::<Linear>(InterfaceType::CoSimulation, true, true).unwrap();
+    let mut other = instantiate::<Linear>(InterfaceType::CoSimulation, true, true).unwrap();
     assert_eq!(other.restore(&snapshot), Ok(()));
     assert_eq!(other.core.state, State::EventMode);
-    let mut without = made::<Linear>(InterfaceType::CoSimulation, false, true).unwrap();
+    let mut without = instantiate::<Linear>(InterfaceType::CoSimulation, false, true).unwrap();
     assert!(without.restore(&snapshot).is_err());
 }
 
 #[test]
 fn categories_are_turned_on_and_off() {
-    let mut instance = made::<Linear>(InterfaceType::CoSimulation, false, false).unwrap();
+    let mut instance = instantiate::<Linear>(InterfaceType::CoSimulation, false, false).unwrap();
     assert_eq!(instance.categories, None);
     instance.set_debug_logging_3(false, &[]).unwrap();
     assert_eq!(instance.categories, Some(Vec::new()));
@@ -331,7 +331,8 @@ fn a_step_with_the_model_s_own_end_of_the_simulation_says_so() {
         }
     }
     for early in [false, true] {
-        let mut instance = made::<Ending>(InterfaceType::CoSimulation, false, early).unwrap();
+        let mut instance =
+            instantiate::<Ending>(InterfaceType::CoSimulation, false, early).unwrap();
         let step = instance.do_step_3(0.0, 1.0).unwrap();
         assert_eq!((step.early_return, step.last_successful_time), (early, 0.25));
         assert!(step.terminate_simulation);
@@ -343,7 +344,7 @@ fn a_call_out_of_order_is_an_error_after_which_the_instance_is_terminated() {
     for kind in [InterfaceType::CoSimulation, InterfaceType::ModelExchange] {
         for state in State::EVERY {
             for &function in Function::EVERY {
-                let mut instance = made::<Linear>(kind, false, false).unwrap();
+                let mut instance = instantiate::<Linear>(kind, false, false).unwrap();
                 instance.core.state = state;
                 let mut reached = false;
                 let status = instance.call(function, |_| {

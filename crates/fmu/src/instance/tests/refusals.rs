@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::Decay;
-use super::fmi3::{initialized, made, set};
+use super::fmi3::{initialized, instantiate, set};
 use super::pendulum::Pendulum;
 use crate::callbacks::{Callbacks, IntermediateUpdate};
 use crate::instance::{Instance, Instantiation};
@@ -51,7 +51,8 @@ fn only_variables_with_intermediate_update_are_required_intermediate_variables()
 #[test]
 fn a_calculated_variable_is_not_set_although_the_variable_with_its_value_is() {
     let set = |name: &str| {
-        let mut instance = made::<Pendulum>(InterfaceType::CoSimulation, false, false).unwrap();
+        let mut instance =
+            instantiate::<Pendulum>(InterfaceType::CoSimulation, false, false).unwrap();
         let status = instance.call(Function::SetFloat64, |own| {
             own.set_located(Type::Float64, &[reference::<Pendulum>(name)], 1, |own, places| {
                 own.set_float64(places, &[0.25])
@@ -83,7 +84,7 @@ fn derivatives_of_a_model_without_them_are_an_error_for_empty_lists_too() {
         (Function::GetAdjointDerivative, adjoint),
         (Function::GetDirectionalDerivative, directional),
     ] {
-        let mut instance = made::<Decay>(InterfaceType::CoSimulation, false, false).unwrap();
+        let mut instance = instantiate::<Decay>(InterfaceType::CoSimulation, false, false).unwrap();
         instance.core.state = State::StepComplete;
         assert_eq!(instance.call(function, body), Status::Error, "{function:?}");
     }

@@ -195,9 +195,9 @@ mod tests {
             .collect()
     }
 
-    fn found(names: &[&str]) -> Vec<(String, usize, Vec<u64>)> {
+    fn blocks_of(names: &[&str]) -> Vec<(String, usize, Vec<u64>)> {
         let blocks = blocks(&variables(names), |_| false);
-        blocks.into_iter().map(|own| (own.name, own.count, own.extents)).collect()
+        blocks.into_iter().map(|block| (block.name, block.count, block.extents)).collect()
     }
 
     #[test]
@@ -205,7 +205,7 @@ mod tests {
         let names = ["x", "A[1,1]", "A[1,2]", "A[2,1]", "A[2,2]", "b[1]", "b[2]", "der(b[1])"];
         let expected =
             [("x", 1, vec![]), ("A", 4, vec![2, 2]), ("b", 2, vec![2]), ("der(b)", 1, vec![1])];
-        assert_eq!(found(&names), expected.map(|(name, n, e)| (name.to_owned(), n, e)));
+        assert_eq!(blocks_of(&names), expected.map(|(name, n, e)| (name.to_owned(), n, e)));
     }
 
     #[test]
@@ -218,7 +218,7 @@ mod tests {
             &["A[0]"],
             &["A[x]"],
         ] {
-            assert!(found(names).iter().all(|own| own.2.is_empty()), "{names:?}");
+            assert!(blocks_of(names).iter().all(|block| block.2.is_empty()), "{names:?}");
         }
     }
 
