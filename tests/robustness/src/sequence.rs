@@ -4,7 +4,7 @@ use std::ffi::c_int;
 
 use fmu::call_order::{Function, State};
 
-use crate::calls::{CALLS, Call, Kept, Outcome, Stores};
+use crate::calls::{CALLS, Call, Outcome, SavedState, Stores};
 use crate::choice::Choice;
 use crate::exporter::{c_text, guid, order};
 use crate::importer::{HEARS, Importer, Message, Order, Saved};
@@ -60,10 +60,10 @@ pub fn run(bytes: &[u8]) -> Result<u32, String> {
 
 impl World {
     fn new() -> Self {
-        let empty = || Kept { saved: Saved::NULL, of: None };
+        let empty = || SavedState { saved: Saved::NULL, of: None };
         Self {
             lives: [None, None],
-            stores: Stores { kept: [empty(), empty(), empty()], records: [None, None] },
+            stores: Stores { saved_states: [empty(), empty(), empty()], records: [None, None] },
             spare: Importer::new(&order(1)),
             null: Importer::new(&Order { guid: None, ..order(1) }),
             reached: 0,
@@ -72,7 +72,7 @@ impl World {
 
     fn close(&mut self) {
         self.lives = [None, None];
-        for slot in &mut self.stores.kept {
+        for slot in &mut self.stores.saved_states {
             self.spare.free_fmu_state(Some(&mut slot.saved));
         }
     }
@@ -173,7 +173,7 @@ impl World {
         {
             life.core.time = step.0.max(step.1);
         }
-        for slot in &mut self.stores.kept {
+        for slot in &mut self.stores.saved_states {
             if plan == Some((Place::Drop, Misbehaviour::Panic)) {
                 self.spare.free_fmu_state(Some(&mut slot.saved));
             }

@@ -15,7 +15,7 @@ use crate::importer::{Importer, Saved};
 use crate::prediction::{Core, ERROR, OK};
 
 /// A state that the importer holds, and its predicted content; `None` for null.
-pub struct Kept {
+pub struct SavedState {
     pub saved: Saved,
     pub of: Option<Core>,
 }
@@ -29,7 +29,7 @@ pub struct Record {
 
 /// The saved and the serialised states that the importer holds.
 pub struct Stores {
-    pub kept: [Kept; 3],
+    pub saved_states: [SavedState; 3],
     pub records: [Option<Record>; 2],
 }
 

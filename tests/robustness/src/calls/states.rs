@@ -1,6 +1,6 @@
 //! FMU states: of this instance or another one, null, freed, serialised, damaged.
 
-use super::{Call, Kept, Outcome, Record};
+use super::{Call, Outcome, Record, SavedState};
 use crate::array::{Array, Shape};
 use crate::choice::{Choice, usable};
 use crate::prediction::{Core, ERROR, OK};
@@ -12,7 +12,7 @@ fn slot(choice: &mut Choice) -> usize {
 /// Chooses the index of a state that fits, or of any other.
 fn filled(call: &mut Call, fits: impl Fn(&Core) -> bool) -> usize {
     let every: Vec<_> = (0..3).collect();
-    let is_fine = |slot: &usize| call.stores.kept[*slot].of.as_ref().is_some_and(&fits);
+    let is_fine = |slot: &usize| call.stores.saved_states[*slot].of.as_ref().is_some_and(&fits);
     let fine: Vec<_> = every.iter().copied().filter(is_fine).collect();
     call.choice.either(if fine.is_empty() { &every } else { &fine }, &every)
 }
@@ -24,20 +24,20 @@ fn bytes(items: Vec<u8>, shape: Shape) -> Array<u8> {
 
 pub(super) fn get(call: &mut Call) -> Outcome {
     let (slot, nowhere) = (slot(&mut call.choice), call.choice.rarely());
-    let place = (!nowhere).then_some(&mut call.stores.kept[slot].saved);
+    let place = (!nowhere).then_some(&mut call.stores.saved_states[slot].saved);
     let status = call.importer.get_fmu_state(place);
     Outcome::if_fine(status, !nowhere)
-        .with(move |core, stores| stores.kept[slot].of = Some(core.clone()))
+        .with(move |core, stores| stores.saved_states[slot].of = Some(core.clone()))
 }
 
 pub(super) fn set(call: &mut Call) -> Outcome {
     let exchange = call.core.exchange;
     let slot = filled(call, |core| core.exchange == exchange);
-    let Kept { saved, of } = &call.stores.kept[slot];
+    let SavedState { saved, of } = &call.stores.saved_states[slot];
     let status = call.importer.set_fmu_state(saved);
     let fine = of.as_ref().is_some_and(|core| core.exchange == call.core.exchange);
     Outcome::if_fine(status, fine).with(move |core, stores| {
-        if let Some(saved_core) = &stores.kept[slot].of {
+        if let Some(saved_core) = &stores.saved_states[slot].of {
             *core = saved_core.clone();
         }
     })
@@ -50,16 +50,16 @@ pub(super) fn free(call: &mut Call) -> Outcome {
         // not say which pointer it means.
         return Outcome::new(call.importer.free_fmu_state(None), OK | ERROR);
     }
-    let Kept { saved, .. } = &mut call.stores.kept[slot];
+    let SavedState { saved, .. } = &mut call.stores.saved_states[slot];
     let status = call.importer.free_fmu_state(Some(saved));
     let is_null = saved.is_null();
     Outcome::new(status, OK)
         .claim(is_null, || "a freed state is not null".to_owned())
-        .with(move |_, stores| stores.kept[slot].of = None)
+        .with(move |_, stores| stores.saved_states[slot].of = None)
 }
 
 pub(super) fn size(call: &mut Call) -> Outcome {
-    let Kept { saved, of } = &call.stores.kept[filled(call, |_| true)];
+    let SavedState { saved, of } = &call.stores.saved_states[filled(call, |_| true)];
     let mut size = call.choice.place(0);
     let status = call.importer.serialized_fmu_state_size(saved, &mut size);
     Outcome::if_fine(status, of.is_some() && usable(&size))
@@ -70,7 +70,7 @@ pub(super) fn size(call: &mut Call) -> Outcome {
 const ROOM: usize = 20_000;
 
 pub(super) fn serialize(call: &mut Call) -> Outcome {
-    let Kept { saved, of } = &call.stores.kept[filled(call, |_| true)];
+    let SavedState { saved, of } = &call.stores.saved_states[filled(call, |_| true)];
     let room = call.choice.either(&[ROOM], &[0, 8, 60]);
     let mut place = bytes(vec![0xee; room], call.choice.shape());
     let status = call.importer.serialize_fmu_state(saved, &mut place);
@@ -107,8 +107,8 @@ pub(super) fn de_serialize(call: &mut Call) -> Outcome {
         _ => bytes_read.push(damage),
     }
     let array = bytes(bytes_read, shape);
-    let place = (!nowhere).then_some(&mut call.stores.kept[slot].saved);
+    let place = (!nowhere).then_some(&mut call.stores.saved_states[slot].saved);
     let status = call.importer.de_serialize_fmu_state(&array, place);
     Outcome::if_fine(status, whole && !nowhere && array.shape == Shape::Right)
-        .with(move |_, stores| stores.kept[slot].of = record.map(|record| record.of))
+        .with(move |_, stores| stores.saved_states[slot].of = record.map(|record| record.of))
 }

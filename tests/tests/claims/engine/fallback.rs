@@ -16,7 +16,7 @@ struct Direct {
     function: fn(f64) -> f64,
     u: f64,
     y: f64,
-    kept: [(f64, f64); 3],
+    slots: [(f64, f64); 3],
 }
 
 impl Direct {
@@ -31,7 +31,7 @@ impl Direct {
             <InitialUnknowns><Unknown index="2" dependencies=""/></InitialUnknowns>
             </ModelStructure></fmiModelDescription>"#;
         let description = ModelDescription::parse(xml).unwrap();
-        Box::new(Self { description, function, u: 0.0, y: 0.0, kept: [(0.0, 0.0); 3] })
+        Box::new(Self { description, function, u: 0.0, y: 0.0, slots: [(0.0, 0.0); 3] })
     }
 }
 
@@ -54,11 +54,11 @@ impl Slave for Direct {
         Ok(StepResult::Whole)
     }
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        self.kept[slot] = (self.u, self.y);
+        self.slots[slot] = (self.u, self.y);
         Ok(())
     }
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        (self.u, self.y) = self.kept[slot];
+        (self.u, self.y) = self.slots[slot];
         Ok(())
     }
 }

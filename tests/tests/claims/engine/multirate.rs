@@ -7,7 +7,7 @@ use crate::engine::until;
 
 /// The input of a, which makes every step, from p, which makes four at once and has the output 1 +
 /// 2 t, over 12 steps of 0.25 s.
-fn seen(sweep: Method) -> Vec<f64> {
+fn inputs(sweep: Method) -> Vec<f64> {
     let (system, _) = system([|time| 1.0 + 2.0 * time; 2], whole);
     let multiples = vec![4, 1];
     let algorithm = Algorithm { multiples, ..Algorithm::fixed(sweep, Extrapolation::Hold, 0.25) };
@@ -27,11 +27,11 @@ fn seen(sweep: Method) -> Vec<f64> {
 #[test]
 fn a_slave_that_steps_first_is_read_at_the_time_of_the_reader_and_not_at_its_own_end() {
     let ends = (1..=12).map(|count| 1.0 + 2.0 * 0.25 * f64::from(count));
-    assert_eq!(seen(Method::GaussSeidel), ends.collect::<Vec<_>>());
+    assert_eq!(inputs(Method::GaussSeidel), ends.collect::<Vec<_>>());
 }
 
 #[test]
 fn a_slave_that_steps_at_the_same_time_is_read_at_the_start_of_its_step() {
     let begins = (0..12).map(|count| 1.0 + 2.0 * f64::from(count / 4));
-    assert_eq!(seen(Method::Jacobi), begins.collect::<Vec<_>>());
+    assert_eq!(inputs(Method::Jacobi), begins.collect::<Vec<_>>());
 }

@@ -18,7 +18,7 @@ pub(crate) type Asked = Arc<Mutex<Vec<(f64, f64)>>>;
 pub(crate) struct Puppet {
     description: ModelDescription,
     time: f64,
-    kept: [f64; 3],
+    slots: [f64; 3],
     outputs: [Output; 2],
     way: Way,
     asked: Asked,
@@ -41,7 +41,7 @@ pub(crate) fn system(outputs: [Output; 2], way: Way) -> (System, Asked) {
         </ModelStructure></fmiModelDescription>"#;
     let description = ModelDescription::parse(xml).unwrap();
     let (time, slots) = (0.0, [0.0; 3]);
-    let puppet = Puppet { description, time, kept: slots, outputs, way, asked: Arc::clone(&asked) };
+    let puppet = Puppet { description, time, slots, outputs, way, asked: Arc::clone(&asked) };
     let mut system = System::default();
     system.add("p", Box::new(puppet)).unwrap();
     let lag = Block::new(&[&[-1.0]], &[&[1.0]], &[&[1.0]], &[&[0.0]], &[0.0]);
@@ -57,7 +57,7 @@ pub(crate) fn add_clock(system: &mut System, name: &str) {
     let clock = Puppet {
         description,
         time: 0.0,
-        kept: [0.0; 3],
+        slots: [0.0; 3],
         outputs: [|time| time; 2],
         way: whole,
         asked: Asked::default(),
@@ -74,7 +74,7 @@ pub(crate) fn rigid((mut system, asked): (System, Asked)) -> (System, Asked) {
     let puppet = Puppet {
         description,
         time: 0.0,
-        kept: [0.0; 3],
+        slots: [0.0; 3],
         outputs: [f64::sin; 2],
         way: whole,
         asked: shared,
@@ -111,11 +111,11 @@ impl Slave for Puppet {
         Ok(stepped)
     }
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        self.kept[slot] = self.time;
+        self.slots[slot] = self.time;
         Ok(())
     }
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        self.time = self.kept[slot];
+        self.time = self.slots[slot];
         Ok(())
     }
     fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
