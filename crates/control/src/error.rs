@@ -65,12 +65,12 @@ pub enum Error {
         n: usize,
     },
     /// A record has fewer samples than a model needs.
-    #[error("{found} samples, expected at least {expected}")]
+    #[error("{actual} samples, expected at least {expected}")]
     TooFewSamples {
         /// The number of samples that is needed.
         expected: usize,
         /// The number of samples.
-        found: usize,
+        actual: usize,
     },
     /// No continuous plant has these samples.
     #[error(

@@ -48,7 +48,7 @@ impl IdentifiedModel {
         let past = self.past.ncols() / signals;
         if range.start < past || range.end > record.len() {
             let expected = range.end.max(past + range.len());
-            return Err(Error::TooFewSamples { expected, found: record.len() });
+            return Err(Error::TooFewSamples { expected, actual: record.len() });
         }
         let mut predictions = DMatrix::zeros(self.c.nrows(), range.len());
         let mut x = DVector::zeros(self.a.nrows());

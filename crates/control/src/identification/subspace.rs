@@ -58,8 +58,8 @@ impl Subspace {
         let past = windows.past_columns();
         let regressors = past.end + if feedthrough { windows.inputs } else { 0 };
         if windows.count <= regressors {
-            let (expected, found) = (windows.past + regressors + 1, windows.past + windows.count);
-            return Err(Error::TooFewSamples { expected, found });
+            let (expected, actual) = (windows.past + regressors + 1, windows.past + windows.count);
+            return Err(Error::TooFewSamples { expected, actual });
         }
         let (factor, units) = windows.scaled();
         let outputs = factor.columns(past.end + windows.inputs, windows.outputs).into_owned();

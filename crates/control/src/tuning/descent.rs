@@ -95,8 +95,8 @@ impl Search<'_> {
                 let size = cuts.iter().map(|(_, gradient)| gradient.norm()).fold(0.0, f64::max);
                 inverse = DMatrix::identity(count, count) * (0.05 / size.max(f64::MIN_POSITIVE));
             }
-            let found = direction(&cuts, &inverse);
-            let next = self.line(&found.step, value, found.decrease);
+            let descent = direction(&cuts, &inverse);
+            let next = self.line(&descent.step, value, descent.decrease);
             let Some((parameters, next)) = next else {
                 if is_fresh || (self.grid.tuning.is_over)() {
                     break;
@@ -106,7 +106,7 @@ impl Search<'_> {
             };
             is_fresh = false;
             let change = self.cuts(&next, &parameters, &places).map(|after| {
-                let each = after.iter().zip(&cuts).zip(&found.multipliers);
+                let each = after.iter().zip(&cuts).zip(&descent.multipliers);
                 each.fold(DVector::zeros(count), |sum, (((_, new), (_, old)), part)| {
                     sum + (new - old) * *part
                 })

@@ -217,7 +217,7 @@ fn records_without_a_plant_are_refused_with_the_reason() {
     let mut record = record(&exact, 0.1, &open(&exact), 6);
     let windows = Windows::new(&record, 6, 0..30).unwrap();
     let error = Subspace::new(&windows, false).unwrap_err();
-    assert_eq!(error, Error::TooFewSamples { expected: 32, found: 30 });
+    assert_eq!(error, Error::TooFewSamples { expected: 32, actual: 30 });
     let windows = Windows::new(&record, 6, 0..800).unwrap();
     assert_eq!(windows.excitation(1e-6).unwrap(), 14);
     let subspace = Subspace::new(&windows, false).unwrap();

@@ -13,10 +13,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::plant::linear::LinearPlant;
-use plant_file::loop_shape::LoopShape;
-use plant_file::signals::same_unit;
 use crate::report::number::rounded;
 use crate::solve::gain::{GainResult, unique};
+use plant_file::loop_shape::LoopShape;
+use plant_file::signals::same_unit;
 
 /// |S| below this is not asked for at low frequencies; |T| below this part of its peak at high ones.
 const FLOOR: f64 = 0.01;
@@ -124,13 +124,14 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         observer: &DMatrix<f64>,
     ) -> Result<StateSpace, Error> {
         let gains = (self.gains)(feedback, observer);
-        let found = complete_controller(self.plant, &gains, self.filter, self.domain)?.commands;
+        let controller =
+            complete_controller(self.plant, &gains, self.filter, self.domain)?.commands;
         let (to, from) = (inverse(&units.commands), inverse(&units.measurements));
         Ok(StateSpace {
-            b: &found.b * &from,
-            c: &to * &found.c,
-            d: &to * &found.d * &from,
-            ..found
+            b: &controller.b * &from,
+            c: &to * &controller.c,
+            d: &to * &controller.d * &from,
+            ..controller
         })
     }
 
