@@ -19,7 +19,7 @@ const STEPS: u32 = 20;
 /// The linearised FMU as a function of its parameters.
 pub(crate) struct ParameterFamily<'a> {
     file: &'a PlantFile<'a>,
-    own: &'a PlantFmu,
+    table: &'a PlantFmu,
     fmu: Fmu,
     request: Linearise,
     parameters: Vec<Varied>,
@@ -51,7 +51,7 @@ impl<'a> ParameterFamily<'a> {
             .collect::<Result<Vec<_>, _>>()?;
         let request = linear::request(file, table);
         let directions = Vec::new();
-        let mut family = Self { file, own: table, fmu, request, parameters, directions };
+        let mut family = Self { file, table, fmu, request, parameters, directions };
         family.directions =
             (0..family.count()).map(|at| family.direction(at)).collect::<Result<_, _>>()?;
         Ok(Some(family))
@@ -83,7 +83,7 @@ impl<'a> ParameterFamily<'a> {
             request.at.push((parameter.name.clone(), value));
         }
         let linearised = linearise(&self.fmu, &request).map_err(|error| {
-            let (path, values) = (self.own.path.display(), values.join(", "));
+            let (path, values) = (self.table.path.display(), values.join(", "));
             let message = format!("{path} with {values}: {error}");
             crate::Error::from(self.file.error(&["robustness"], message))
         })?;

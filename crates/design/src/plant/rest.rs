@@ -17,7 +17,7 @@ pub(crate) struct Rest {
     /// Deviations of the measurements from the operating point.
     pub(crate) measurements: Vec<Number>,
     /// Whether the measurements that must be kept are at the operating point.
-    pub(crate) kept: bool,
+    pub(crate) is_held: bool,
 }
 
 impl Rest {
@@ -33,7 +33,7 @@ impl Rest {
         Self {
             u,
             measurements: measurements.map(|(signal, value)| number(signal, *value)).collect(),
-            kept: is_held,
+            is_held,
         }
     }
 }

@@ -189,7 +189,7 @@ impl Without<'_> {
             beyond_limits: beyond_limits(&linear.actuators, &commands, &self.gone),
             commands,
             measurements: rest.measurements,
-            kept: rest.kept,
+            kept: rest.is_held,
         };
         Ok(Ok((ReconfiguredGains { k_x, k_f, k_s }, report)))
     }
