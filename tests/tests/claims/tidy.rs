@@ -90,6 +90,7 @@ const ARROWS: [(&str, &[&str]); 24] = [
             "fmu-import",
             "linearise",
             "plant-file",
+            "results",
         ],
     ),
     ("controller-code", &["aso-controller", "control"]),
