@@ -150,6 +150,20 @@ def test_matlab_variables_become_a_plant_file_with_the_same_matrices(aso_ftc, tm
     assert file["actuator_faults"] == "all" and file["observer"]["bandwidth"] > file["feedback"]["bandwidth"] > 0
 
 
+def test_arrays_of_one_dimension_and_decimal_commas_are_the_same_plant(aso_ftc, tmp_path):
+    savemat(tmp_path / "array.mat", {"A": [[0.0, 1.0], [0.0, -0.5]], "B": [0.0, 0.5], "C": [1.0, 0.0]})
+    savemat(tmp_path / "column.mat", {"A": [[0.0, 1.0], [0.0, -0.5]], "B": [0.0, 0.5], "C": [1.0, 0.0]}, oned_as="column")
+    (tmp_path / "comma.csv").write_text(";x;v;F\nx;0;1;0\nv;0;-0,5;0,5\ny;1;0;0\n", encoding="utf-8")
+    for name in ("array.mat", "column.mat", "comma.csv"):
+        done = aso_ftc("design", "--init", tmp_path / name, "--out", tmp_path / "plant.toml", "--force")
+        assert done.returncode == 0, done.stderr
+        file = tomllib.loads((tmp_path / "plant.toml").read_text(encoding="utf-8"))
+        assert [file[name] for name in "ABC"] == [[[0, 1], [0, -0.5]], [[0], [0.5]], [[1, 0]]]
+    savemat(tmp_path / "struct.mat", {"plant": {"A": [[1.0]], "B": [[1.0]], "C": [[1.0]]}})
+    done = aso_ftc("design", "--init", tmp_path / "struct.mat", "--out", tmp_path / "other.toml")
+    assert done.returncode == 2 and "not in a struct, found none that is numeric" in done.stderr
+
+
 def test_measurements_that_cannot_tell_all_faults_apart_get_fewer(aso_ftc, tmp_path):
     a, b, c = PLANTS["helicopter"]
     savemat(tmp_path / "plant.mat", {"A": a, "B": b, "C": c[:1]})

@@ -44,7 +44,9 @@ fn table(text: &str, file: &str) -> Result<Draft, String> {
             return Err(format!("line {}: expected {expected} cells, found {count}", at + 1));
         }
         let number = |(cell, column): (&String, &Named)| {
-            let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
+            // A table with other separators may have decimal commas.
+            let digits = if separator == ',' { cell.clone() } else { cell.replace(',', ".") };
+            let value = digits.parse::<f64>().ok().filter(|value| value.is_finite());
             value.ok_or_else(|| {
                 format!("line {}, {}: expected a number, found {cell:?}", at + 1, column.name)
             })

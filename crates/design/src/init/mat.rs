@@ -23,11 +23,22 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
     let matrix = |name: &str| matrix(&content, name).map_err(&invalid);
     let required = |name: &str| {
         let names: Vec<_> = content.arrays().iter().map(Array::name).collect();
-        let missing =
-            || invalid(format!("expected the variables A, B and C, found {}", names.join(", ")));
+        let listed = if names.is_empty() { "none that is numeric" } else { &names.join(", ") };
+        let missing = || {
+            invalid(format!(
+                "expected the variables A, B and C, which are not in a struct, found {listed}"
+            ))
+        };
         matrix(name)?.ok_or_else(missing)
     };
-    let (a, b, c) = (required("A")?, required("B")?, required("C")?);
+    let (a, mut b, mut c) = (required("A")?, required("B")?, required("C")?);
+    // scipy writes an array of one dimension as a row.
+    if b.shape() == (1, a.nrows()) {
+        b = b.transpose();
+    }
+    if c.shape() == (a.nrows(), 1) {
+        c = c.transpose();
+    }
     let d = matrix("D")?.unwrap_or_else(|| DMatrix::zeros(c.nrows(), b.ncols()));
     let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
     for (name, matrix, expected) in
