@@ -61,6 +61,9 @@ def main():
         last = values[-round(20 / STEP) :]
         swing = (max(last) - min(last)) / 2
         print(f"{name}: largest {max(map(abs, values)):.4g}, last 20 s +-{swing:.2g}")
+    for fmu in (plant, controller):
+        fmu.terminate()
+        fmu.freeInstance()
 
 
 if __name__ == "__main__":
