@@ -161,7 +161,7 @@ def test_arrays_of_one_dimension_and_decimal_commas_are_the_same_plant(aso_ftc, 
         assert [file[name] for name in "ABC"] == [[[0, 1], [0, -0.5]], [[0], [0.5]], [[1, 0]]]
     savemat(tmp_path / "struct.mat", {"plant": {"A": [[1.0]], "B": [[1.0]], "C": [[1.0]]}})
     done = aso_ftc("design", "--init", tmp_path / "struct.mat", "--out", tmp_path / "other.toml")
-    assert done.returncode == 2 and "not in a struct, found none that is numeric" in done.stderr
+    assert done.returncode == 2 and "found none; those in a struct are not read" in done.stderr
 
 
 def test_measurements_that_cannot_tell_all_faults_apart_get_fewer(aso_ftc, tmp_path):

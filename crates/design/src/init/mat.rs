@@ -23,12 +23,12 @@ pub(super) fn draft(path: &Path) -> Result<Draft, Error> {
     let matrix = |name: &str| matrix(&content, name).map_err(&invalid);
     let required = |name: &str| {
         let names: Vec<_> = content.arrays().iter().map(Array::name).collect();
-        let listed = if names.is_empty() { "none that is numeric" } else { &names.join(", ") };
-        let missing = || {
-            invalid(format!(
-                "expected the variables A, B and C, which are not in a struct, found {listed}"
-            ))
+        let listed = if names.is_empty() {
+            "none; those in a struct are not read".to_owned()
+        } else {
+            names.join(", ")
         };
+        let missing = || invalid(format!("expected the variables A, B and C, found {listed}"));
         matrix(name)?.ok_or_else(missing)
     };
     let (a, mut b, mut c) = (required("A")?, required("B")?, required("C")?);
