@@ -1,5 +1,6 @@
 """What the tests of the wheel share. They run from the installed wheel: see scripts/wheel."""
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -63,3 +64,11 @@ def packed(tmp_path_factory):
         return fmu
 
     return pack
+
+
+@pytest.fixture
+def interruptible():
+    """Ctrl-C raises KeyboardInterrupt, also in tests started in the background, where SIGINT is ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

@@ -108,6 +108,7 @@ def test_a_message_comes_once_and_in_the_words_of_python(caplog, monkeypatch, tm
     assert len(texts) == 1 and texts[0].endswith("stop_time sets it"), texts
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupted_run_leaves_its_rows(paper):
     import _thread
     import threading

@@ -136,14 +136,6 @@ def test_another_thread_cancels_a_run(paper):
     assert cancel.cancelled
 
 
-@pytest.fixture
-def interruptible():
-    """Ctrl-C raises KeyboardInterrupt, also in tests started in the background, where SIGINT is ignored."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 @pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_ends_a_run_within_a_tenth_of_a_second(paper):
     sent = []
