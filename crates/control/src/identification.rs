@@ -8,11 +8,11 @@
 //! identification, which needs no iteration, estimates K as well, and holds for unstable plants and for samples of a
 //! closed loop:
 //!
-//! 1. A long autoregressive model predicts y[k] from s earlier samples z = [u; y], and u[k] if there is D: least squares.
-//! 2. Its coefficients are the Markov parameters C (A - K C)^i [B - K D, K], so that their Hankel matrix times the s
-//!    earlier samples is the extended observability matrix times x[k], if (A - K C)^s is negligible.
-//! 3. The singular value decomposition of this product gives x[k] = T z, in the order of what the states explain.
-//! 4. y[k] on x[k], u[k] gives C, D, d and e[k]; x[k+1] on x[k], u[k], e[k] gives A, B, K, b: least squares.
+//! 1. A long autoregressive model predicts `y[k]` from s earlier samples `z = [u; y]`, and `u[k]` if there is D: least squares.
+//! 2. Its coefficients are the Markov parameters C (A - K C)^i `[B - K D, K]`, so that their Hankel matrix times the s
+//!    earlier samples is the extended observability matrix times `x[k]`, if (A - K C)^s is negligible.
+//! 3. The singular value decomposition of this product gives `x[k]` = T z, in the order of what the states explain.
+//! 4. `y[k]` on `x[k]`, `u[k]` gives C, D, d and `e[k]`; `x[k+1]` on `x[k]`, `u[k]`, `e[k]` gives A, B, K, b: least squares.
 //!
 //! All of it depends on the samples by one triangular factor of constant size, [`Windows`]; factors of parts of a record,
 //! and of several records, are [joined](Windows::joined).

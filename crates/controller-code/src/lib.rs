@@ -1,8 +1,8 @@
 //! The sampled controller as source code: C99, or a Rust crate without the standard library.
 //!
-//! The design file, which the controller FMU reads, becomes a [`Controller`]. Its equations stand in two files that are the
-//! same for each design: `aso_controller::sample`, which the Rust crate contains, and from which the count of operations
-//! and the bound of rounding errors follow, and `runtime/aso_controller.h`.
+//! The equations of the written controller stand in two files that are the same for each design: `aso_controller::sample`,
+//! which the Rust crate contains, and from which the count of operations and the bound of rounding errors follow, and
+//! `runtime/aso_controller.h`.
 #![forbid(unsafe_code)]
 
 mod arithmetic;

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::Error;
 use crate::identification::Record;
 
-/// x[k+1] = A x[k] + B u[k] + K e[k] + b, y[k] = C x[k] + D u[k] + e[k] + d, see [`crate::identification`].
+/// `x[k+1]` = A `x[k]` + B `u[k]` + K `e[k]` + b, `y[k]` = C `x[k]` + D `u[k]` + `e[k]` + d, see [`crate::identification`].
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct IdentifiedModel {
@@ -25,7 +25,7 @@ pub struct IdentifiedModel {
     pub state_constant: DVector<f64>,
     /// d, p.
     pub output_constant: DVector<f64>,
-    /// T, n x s (m + p): the estimate of x[k] is T [z[k-s]; ...; z[k-1]], z = [u; y].
+    /// T, n x s (m + p): the estimate of `x[k]` is T [`z[k-s]`; ...; `z[k-1]`], z = [u; y].
     pub past: DMatrix<f64>,
 }
 
@@ -84,7 +84,7 @@ impl IdentifiedModel {
     }
 }
 
-/// [z[first]; ...; z[last]].
+/// [`z[first]`; ...; `z[last]`].
 fn window(record: &Record, range: Range<usize>) -> DVector<f64> {
     let samples = range.flat_map(|k| {
         record.inputs.column(k).iter().chain(record.outputs.column(k)).copied().collect::<Vec<_>>()

@@ -39,7 +39,7 @@ pub struct Subspace {
     /// The factor of the windows, and the units of the signals in it.
     factor: DMatrix<f64>,
     units: Vec<f64>,
-    /// T of the largest order: x[k] = T z.
+    /// T of the largest order: `x[k]` = T z.
     states: DMatrix<f64>,
     singular_values: Vec<f64>,
     feedthrough: bool,
@@ -128,7 +128,7 @@ impl Subspace {
     }
 }
 
-/// The Hankel matrix of the predictor's coefficients: block row j are those of y[k+j] by z[k-s] to z[k-1], with zeros for
+/// The Hankel matrix of the predictor's coefficients: block row j are those of `y[k+j]` by `z[k-s]` to `z[k-1]`, with zeros for
 /// samples that are more than s back; s p x s (m + p).
 fn observability_product(windows: &Windows, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
     let (past, signals, outputs) = (windows.past, windows.signals(), windows.outputs);

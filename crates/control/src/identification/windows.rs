@@ -51,7 +51,7 @@ impl Record {
 }
 
 /// All windows of s + 1 successive samples of a record, as the triangular factor R of the matrix whose rows are
-/// [1, z[k-s]', ..., z[k-1]', u[k]', y[k]'], z = [u; y].
+/// [1, `z[k-s]`', ..., `z[k-1]`', `u[k]`', `y[k]`'], z = [u; y].
 ///
 /// R' R has all sums of products that least squares need. R is c x c, c = 1 + (s + 1) (m + p), for any number of samples.
 #[derive(Debug, Clone, PartialEq)]
@@ -152,7 +152,7 @@ impl Windows {
         self.inputs + self.outputs
     }
 
-    /// The columns of z[k-s] to z[k-1].
+    /// The columns of `z[k-s]` to `z[k-1]`.
     pub(super) fn past_columns(&self) -> Range<usize> {
         1..1 + self.past * self.signals()
     }
