@@ -30,7 +30,7 @@ pub(crate) struct Options {
     ///
     /// PLANT is then an FMU, a MAT file with the variables A, B, C and D, a CSV table of them with the names of
     /// rows and columns, or a log of the plant's signals over time, from which the plant is identified.
-    /// The plant file is --out [default: NAME.toml]; it has the bandwidths that were found for the plant.
+    /// Writes --out [default: NAME.toml], with the bandwidths that were chosen for the plant.
     #[arg(long)]
     #[arg(conflicts_with_all = ["report", "fmu", "worst_case", "json", "code", "compare"])]
     init: bool,

@@ -80,6 +80,33 @@ def test_a_bandwidth_beyond_a_zero_in_the_right_half_plane_is_a_warning_with_gam
     assert warning and float(warning[1]) > 1.2, done.stdout
 
 
+# (1 - s) / (s^2 + s), twice; (s - 26) / (s^2 + 14 s - 120), as a forward-swept wing has it; two integrators.
+LIMITED = {
+    "zero": ([[0, 1], [0, -1]], [[0], [1]], [[1, -1]], {"bandwidth": 1.0, "peak": 4.0}),
+    "low peak": ([[0, 1], [0, -1]], [[0], [1]], [[1, -1]], {"bandwidth": 0.25, "peak": 1.1}),
+    "roll-off": ([[0, 1], [120, -14]], [[0], [1]], [[-26, 1]], {"bandwidth": 9.0, "roll_off": 30.0}),
+    "effort": ([[0, 1], [0, 0]], [[0], [1]], [[1, 0]], {"bandwidth": 1.0, "effort": 0.5}),
+}
+
+
+@pytest.mark.parametrize("name", LIMITED)
+def test_the_entry_that_the_warning_names_lowers_gamma(aso_ftc, tmp_path, name):
+    a, b, c, shape = LIMITED[name]
+
+    def printed(shape):
+        rows = "".join(f"{key} = {value}\n" for key, value in shape.items())
+        text = f'A = {a}\nB = {b}\nC = {c}\nactuator_faults = "all"\n[loop]\n{rows}'
+        (tmp_path / "plant.toml").write_text(text, encoding="utf-8")
+        return aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml", "--force").stdout
+
+    before = printed({"peak": 1.5, "roll_off": 10 * shape["bandwidth"], **shape})
+    change, entry = re.search(r"expected at most 1: a (lower|higher) `(\w+)` helps", before).groups()
+    other = {"peak": 1.5, "roll_off": 10 * shape["bandwidth"], **shape}
+    other[entry] *= 0.5 if change == "lower" else 2.0
+    one, other = (float(re.search(r"gamma = ([0-9.e+-]+[0-9])", text)[1]) for text in (before, printed(other)))
+    assert one > 1.0 and other < 0.95 * one, (entry, one, other)
+
+
 def test_requirements_on_the_gains_are_refused_beside_it(aso_ftc, tmp_path):
     text = 'A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = "all"\nfeedback.bandwidth = 1\n[loop]\nbandwidth = 1\n'
     (tmp_path / "plant.toml").write_text(text, encoding="utf-8")

@@ -21,9 +21,9 @@ pub enum Requirement {
     /// The least integral of x'Q x + u'R u (LQR), or the least variance for noise of intensity W
     /// and V (Kalman).
     Weights {
-        /// The weight of the states, or the intensity of their noise.
+        /// Q of a regulator, the weight of the states; W of a filter, the intensity of their noise.
         states: DMatrix<f64>,
-        /// The weight of the commands, or the intensity of the noise of the measurements.
+        /// R of a regulator, the weight of the commands; V of a filter, the intensity of the noise of the measurements.
         channels: DMatrix<f64>,
     },
     /// A linear-quadratic regulator, or a Kalman filter, of a bandwidth.

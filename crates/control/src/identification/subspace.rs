@@ -1,4 +1,4 @@
-//! The estimates from the compressed samples.
+//! Estimates states and matrices from the compressed samples.
 
 use nalgebra::{DMatrix, DVector};
 

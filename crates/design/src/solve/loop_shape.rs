@@ -109,11 +109,20 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             feedback: unique(feedback, method.clone()),
             observer: unique(observer, method),
             warning: (peak.gamma > 1.0).then(|| {
-                format!(
-                    "{summary}; expected at most 1: a lower `bandwidth` or a higher `peak` helps"
-                )
+                let help = self.help(terms[peak.term].transfer, peak.frequency);
+                format!("{summary}; expected at most 1: {help} helps")
             }),
         })
+    }
+
+    /// The entry that allows more of what limits gamma at a frequency in rad/s.
+    fn help(&self, transfer: Transfer, frequency: f64) -> &'static str {
+        match transfer {
+            Transfer::Sensitivity(_) if frequency < self.shape.bandwidth => "a lower `bandwidth`",
+            Transfer::Complementary(_) if frequency > self.shape.roll_off => "a higher `roll_off`",
+            Transfer::Sensitivity(_) | Transfer::Complementary(_) => "a higher `peak`",
+            Transfer::Effort => "a higher `effort`",
+        }
     }
 
     /// The controller with its filter and its integrals, in `units`.

@@ -16,9 +16,9 @@ const GROWTH: f64 = 1.0;
 
 /// The fit of one measurement, 100 % for predictions without error, 0 for those as good as the mean.
 pub(super) struct Fit {
-    /// By a simulation from the inputs; None if its errors grow.
+    /// The fit of a simulation, which has the inputs only; None if its errors grow.
     pub(super) simulated: Option<f64>,
-    /// By predictions [`SHORT`] samples ahead.
+    /// The fit of predictions [`SHORT`] samples ahead.
     pub(super) predicted: f64,
 }
 
