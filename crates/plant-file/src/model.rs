@@ -1,0 +1,157 @@
+//! The plant: its matrices, or its FMU.
+
+use std::path::PathBuf;
+
+use nalgebra::DMatrix;
+
+use crate::Sampling;
+use crate::matrix::MatrixEntry as _;
+use crate::sampled_matrices::SampledMatrices;
+use crate::signals::{Role, Signal, signals};
+use files::{Entry, PlaceError, Source, Table};
+
+/// The source of the plant's matrices.
+#[derive(Clone)]
+pub enum Model {
+    /// The file states the matrices.
+    Matrices {
+        /// A, n x n.
+        a: DMatrix<f64>,
+        /// B, n x m.
+        b: DMatrix<f64>,
+        /// C, p x n.
+        c: DMatrix<f64>,
+        /// D, p x m.
+        d: DMatrix<f64>,
+        /// F_a, n x q, of the faults by column.
+        f_a: Option<DMatrix<f64>>,
+        /// The states.
+        states: Vec<Signal>,
+        /// The sampled matrices of the file, of which `a`, `b` and `f_a` are the continuous plant.
+        sampled: Option<Box<SampledMatrices>>,
+    },
+    /// The matrices are linearised from an FMU.
+    Fmu(PlantFmu),
+}
+
+/// The FMU of a plant and its operating point.
+#[derive(Clone)]
+pub struct PlantFmu {
+    /// The file of the FMU.
+    pub path: PathBuf,
+    /// Values of variables at the operating point.
+    pub operating_point: Vec<(String, f64)>,
+    /// Names of the states, for an FMU whose description does not list them.
+    pub states: Vec<String>,
+    /// Shared libraries to load before the FMU.
+    pub preload: Vec<String>,
+    /// Communication step, s, of an FMU that is linearised by steps.
+    pub step: Option<f64>,
+}
+
+/// Reads a plant that is an FMU.
+pub(crate) fn linearised(
+    source: &Source,
+    file: &Table<'_>,
+    plant: &Entry<'_>,
+) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
+    for key in ["A", "B", "C", "D", "F_a", "matrices"] {
+        if let Some(entry) = file.get(key) {
+            return Err(entry.error("an FMU is the plant; its matrices are not stated"));
+        }
+    }
+    let folder = source.path.parent().map(PathBuf::from).unwrap_or_default();
+    let mut operating_point = Vec::new();
+    if let Some(entry) = file.get("operating_point") {
+        for (name, value) in entry.table()?.entries() {
+            operating_point.push((name.to_owned(), value.number()?));
+        }
+    }
+    let states = file.get("states").map(|entry| signals(&entry, Role::State)).transpose()?;
+    let model = Model::Fmu(PlantFmu {
+        path: folder.join(plant.text()?),
+        operating_point,
+        states: states.unwrap_or_default().into_iter().map(|signal| signal.name).collect(),
+        preload: file.get("preload").map_or(Ok(Vec::new()), |entry| texts(&entry))?,
+        step: file.get("linearisation_step").map(|entry| entry.positive()).transpose()?,
+    });
+    let actuators = file.require("actuators", "the inputs of the FMU that the controller sets")?;
+    let meaning = "the outputs of the FMU that the controller reads";
+    let measurements = file.require("measurements", meaning)?;
+    Ok((model, [signals(&actuators, Role::Actuator)?, signals(&measurements, Role::Measurement)?]))
+}
+
+/// Reads a text, or a list of texts.
+fn texts(entry: &Entry<'_>) -> Result<Vec<String>, PlaceError> {
+    if entry.is_text() {
+        return Ok(vec![entry.text()?.to_owned()]);
+    }
+    entry.list()?.iter().map(|member| member.text().map(str::to_owned)).collect()
+}
+
+/// Reads a plant whose matrices the file states.
+pub(crate) fn stated(
+    file: &Table<'_>,
+    sampling: Option<Sampling>,
+) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
+    for key in ["preload", "linearisation_step"] {
+        if let Some(entry) = file.get(key) {
+            return Err(entry.error("it belongs to `plant`, an FMU"));
+        }
+    }
+    if let Some(entry) = file.get("operating_point") {
+        let advice = "it belongs to `plant`; with matrices, `operating` in each signal states it";
+        return Err(entry.error(advice));
+    }
+    let meaning = "the plant x' = A x + B u + F_a f_a, y = C x + D u; or `plant`, an FMU";
+    let entry = file.require("A", meaning)?;
+    let n = entry.matrix()?.nrows();
+    let a = entry.shaped(n, n, "states x states")?;
+    let b = file.require("B", meaning)?;
+    let b = b.shaped(n, b.matrix()?.ncols(), "states x actuators")?;
+    let c = file.require("C", meaning)?;
+    let c = c.shaped(c.matrix()?.nrows(), n, "measurements x states")?;
+    let d = match file.get("D") {
+        Some(entry) => entry.shaped(c.nrows(), b.ncols(), "measurements x actuators")?,
+        None => DMatrix::zeros(c.nrows(), b.ncols()),
+    };
+    let f_a = file.get("F_a").map(|entry| {
+        let columns = entry.matrix()?.ncols();
+        entry.shaped(n, columns, "states x faults")
+    });
+    let states = counted(file, "states", "x", n, "states, the rows of A")?;
+    let actuators = counted(file, "actuators", "u", b.ncols(), "actuators, the columns of B")?;
+    let measurements =
+        counted(file, "measurements", "y", c.nrows(), "measurements, the rows of C")?;
+    let f_a = f_a.transpose()?;
+    let sampled = SampledMatrices::read(file, sampling, (&a, &b))?;
+    let (a, b, f_a) = match &sampled {
+        None => (a, b, f_a),
+        Some(sampled) => (sampled.a.clone(), sampled.b.clone(), f_a.map(|f_a| sampled.held(&f_a))),
+    };
+    let model = Model::Matrices { a, b, c, d, f_a, states, sampled };
+    Ok((model, [actuators, measurements]))
+}
+
+/// Reads the signals under `key`; unnamed signals are called `letter` and a number.
+fn counted(
+    file: &Table<'_>,
+    key: &str,
+    letter: &str,
+    count: usize,
+    meaning: &str,
+) -> Result<Vec<Signal>, PlaceError> {
+    let Some(entry) = file.get(key) else {
+        return Ok((1..=count).map(|k| Signal::named(format!("{letter}{k}"))).collect());
+    };
+    let role = match key {
+        "actuators" => Role::Actuator,
+        "measurements" => Role::Measurement,
+        _ => Role::State,
+    };
+    let members = signals(&entry, role)?;
+    if members.len() == count {
+        return Ok(members);
+    }
+    Err(entry.error(format!("expected {count} {meaning}, found {}", members.len())))
+}
