@@ -17,6 +17,7 @@
 //! | white residuals, tests with a stated rate of false alarms, predicted delays | [`detection`] |
 //! | norms, step and frequency responses, the effect of faults | [`response`] |
 //! | margins of a loop: sensitivity, disk, gain, phase, delay, hold time, parameter tolerances | [`robustness`] |
+//! | delays of commands and measurements: approximated, and exact | [`delay`] |
 //! | references: feedforward, integral action, anti-windup | [`tracking`] |
 //! | bound of the estimation error with a proof | [`theorem1`] |
 //! | loop shaping: mixed sensitivity for gains of a given structure | [`tuning`] |
@@ -51,6 +52,8 @@ mod blocks;
 mod check;
 #[cfg(feature = "design")]
 pub mod controller;
+#[cfg(feature = "design")]
+pub mod delay;
 #[cfg(feature = "design")]
 pub mod detectability;
 #[cfg(feature = "design")]
