@@ -41,6 +41,13 @@ pub(crate) fn summarise(report: &Report) {
             number(robustness.delay_margin),
             number(robustness.longest_hold)
         );
+        if let Some(delays) = &robustness.delays {
+            let [at_input, at_output] = delays.s_peaks.map(number);
+            println!(
+                "with the delays themselves: peak of S: {at_input} at the input, {at_output} at the output; {}",
+                if delays.difference < 1.0 { "stable" } else { "stability is not shown" }
+            );
+        }
         print_tolerance(&robustness.tolerance);
         print_proof(&robustness.tolerance, &robustness.tolerance_proof);
     }

@@ -19,13 +19,38 @@ pub(crate) struct Balance {
 
 impl Balance {
     pub(crate) fn new(a: &DMatrix<f64>) -> Self {
+        let nothing = || DVector::zeros(a.nrows());
+        Self::with_signals(a, nothing(), nothing())
+    }
+
+    /// Balances [A, B; C, 0]. Of a system whose states do not all act on each other, A alone would be scaled without end,
+    /// and B and C with it.
+    ///
+    /// Source: D. S. Watkins, A case where balancing is harmful, Electronic Trans. Numerical Analysis 23 (2006).
+    pub(crate) fn of_system(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Self {
+        let entering = DVector::from_fn(a.nrows(), |state, _| b.row(state).lp_norm(1));
+        let leaving = DVector::from_fn(a.nrows(), |state, _| c.column(state).lp_norm(1));
+        Self::with_signals(a, entering, leaving)
+    }
+
+    /// `entering`, `leaving`: what belongs to the row and to the column of each state besides A.
+    fn with_signals(
+        a: &DMatrix<f64>,
+        mut entering: DVector<f64>,
+        mut leaving: DVector<f64>,
+    ) -> Self {
         let mut balance = Self { matrix: a.clone(), scale: DVector::from_element(a.nrows(), 1.0) };
         // Its columns are the rows of the matrix, so that their sums read neighbours in memory.
         let mut transposed = a.transpose();
         for _ in 0..SWEEPS {
             let mut changed = false;
             for state in 0..a.nrows() {
-                changed |= balance.level(&mut transposed, state);
+                let beside = [leaving[state], entering[state]];
+                if let Some(factor) = balance.level(&mut transposed, state, beside) {
+                    leaving[state] *= factor;
+                    entering[state] /= factor;
+                    changed = true;
+                }
             }
             if !changed {
                 break;
@@ -34,21 +59,27 @@ impl Balance {
         balance
     }
 
-    fn level(&mut self, transposed: &mut DMatrix<f64>, state: usize) -> bool {
+    /// Scales a state; returns its factor. `beside`: what belongs to its column and to its row.
+    fn level(
+        &mut self,
+        transposed: &mut DMatrix<f64>,
+        state: usize,
+        beside: [f64; 2],
+    ) -> Option<f64> {
         let diagonal = self.matrix[(state, state)].abs();
         let sum =
             |m: &DMatrix<f64>| m.column(state).iter().map(|x| x.abs()).sum::<f64>() - diagonal;
-        let (column, row) = (sum(&self.matrix), sum(transposed));
+        let [column, row] = [sum(&self.matrix) + beside[0], sum(transposed) + beside[1]];
         let factor = power_of_two((row / column).sqrt());
         if !factor.is_normal() || column * factor + row / factor >= WORTHWHILE * (column + row) {
-            return false;
+            return None;
         }
         self.matrix.column_mut(state).scale_mut(factor);
         self.matrix.row_mut(state).unscale_mut(factor);
         transposed.row_mut(state).scale_mut(factor);
         transposed.column_mut(state).unscale_mut(factor);
         self.scale[state] *= factor;
-        true
+        Some(factor)
     }
 
     /// S M S^-1: transforms a function M of the balanced matrix back to the coordinates of A.

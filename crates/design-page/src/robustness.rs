@@ -19,6 +19,28 @@ pub(super) fn robustness<'a>(report: &'a Report, plots: &mut Plots<'a>) -> Marku
     html! { @if let Some(robustness) = &report.robustness { (section(report, robustness, plots)) } }
 }
 
+/// Shows what the delays themselves change.
+fn delays(robustness: &Robustness) -> Markup {
+    let Some(delays) = &robustness.delays else { return Markup::default() };
+    let [at_commands, at_measurements] = delays.s_peaks;
+    html! {
+        p {
+            "The figures are those of a plant whose delays have " (delays.judged_order)
+            " states each; the observer has " (delays.observer_order) ". With the delays themselves, at "
+            (delays.frequencies) " frequencies, the peak of S is " (number(at_commands))
+            " at the commands and " (number(at_measurements)) " at the measurements. "
+            @if delays.difference < 1.0 {
+                "The loop is stable with them: the difference uses up " (number(delays.difference))
+                " of what stability allows."
+            } @else {
+                "Whether the loop is stable with them is not shown: the difference is "
+                (number(delays.difference)) " times what stability allows, at "
+                (number(delays.frequency)) " rad/s."
+            }
+        }
+    }
+}
+
 fn section<'a>(report: &Report, robustness: &'a Robustness, plots: &mut Plots<'a>) -> Markup {
     let limit = report.sampling.as_ref();
     let limit = limit.map(|sampled| std::f64::consts::PI / sampled.sample_time);
@@ -32,7 +54,9 @@ fn section<'a>(report: &Report, robustness: &'a Robustness, plots: &mut Plots<'a
         (channels(robustness))
         (disks(robustness))
         p {
-            "All commands may be delayed by up to " (number(robustness.delay_margin)) " s. "
+            "All commands may be delayed by up to " (number(robustness.delay_margin)) " s"
+            @if robustness.delays.is_some() { " more" }
+            ". "
             @if report.sampling.is_some() {
                 "With the same matrices of the controller the loop is stable up to a sample time of "
                 (number(robustness.longest_hold)) " s."
@@ -42,6 +66,7 @@ fn section<'a>(report: &Report, robustness: &'a Robustness, plots: &mut Plots<'a
                  or a longer sample time of the discretised controller, makes the loop unstable."
             }
         }
+        (delays(robustness))
         h3 id="s-and-t" { "S and T" }
         div.figures {
             @for (index, curve) in robustness.curves.iter().enumerate() {

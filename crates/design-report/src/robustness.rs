@@ -109,6 +109,27 @@ pub struct Robustness {
     pub sensitivity: Vec<PeakSensitivity>,
     /// Singular values of S and T over frequency.
     pub curves: Vec<Frequency>,
+    /// The loop with the delays themselves; none for a plant without delays.
+    pub delays: Option<ExactDelays>,
+}
+
+/// A loop with its delays themselves, beside their approximations.
+#[derive(Serialize, JsonSchema)]
+pub struct ExactDelays {
+    /// Number of states that approximate each delay in the observer.
+    pub observer_order: u32,
+    /// The same in the plant of the other figures.
+    pub judged_order: u32,
+    /// Peaks of the largest singular value of S with the delays themselves, in the units of the plant file: at the
+    /// commands, at the measurements.
+    pub s_peaks: [f64; 2],
+    /// The largest spectral radius of K (G - H) S over the frequencies, with G the plant with the delays themselves and H the
+    /// approximated one. Below 1 the loop is stable with the delays themselves.
+    pub difference: f64,
+    /// Its frequency, rad/s.
+    pub frequency: f64,
+    /// Number of frequencies that were examined.
+    pub frequencies: u32,
 }
 
 /// The margins of the loop opened at one place.

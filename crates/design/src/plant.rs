@@ -1,6 +1,7 @@
 //! The plant: linear, at the operating point, with its faults; and the plants of varied parameters.
 
 pub(crate) mod attainable;
+pub(crate) mod delays;
 pub(crate) mod entries;
 pub(crate) mod feedthrough;
 pub(crate) mod fixed_mode;

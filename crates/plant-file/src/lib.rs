@@ -33,7 +33,9 @@ use crate::reconfiguration::{ReconfigurationRequest, positions};
 use crate::references::References;
 use crate::requirements::{Request, request};
 use crate::robustness::RobustnessLimits;
-use crate::signals::{EntryPoint, Fault, Signal, actuator_faults, description, faults};
+use crate::signals::{
+    EntryPoint, Fault, Signal, actuator_faults, delay_order, description, faults,
+};
 use crate::variants::{Schedule, Variant, check_action};
 use control::Domain;
 use control::aso::Estimator;
@@ -67,6 +69,8 @@ pub struct PlantFile<'a> {
     pub sampling: Option<Sampling>,
     /// Rates of the measurement filter, 1/s, one per measurement.
     pub filter: Option<Vec<f64>>,
+    /// Number of states by which the observer approximates each delay.
+    pub delay_order: usize,
     /// The requirement on the state feedback.
     pub feedback: Request,
     /// The requirement on the observer.
@@ -106,7 +110,7 @@ pub struct Sampling {
     pub current: bool,
 }
 
-const KEYS: [&str; 34] = [
+const KEYS: [&str; 35] = [
     "description",
     "t_on",
     "monitor",
@@ -127,6 +131,7 @@ const KEYS: [&str; 34] = [
     "sample_time",
     "estimator",
     "filter",
+    "delay_order",
     "feedback",
     "observer",
     "loop",
@@ -143,7 +148,7 @@ const KEYS: [&str; 34] = [
     "schedule",
 ];
 /// Entries that errors of later steps point at.
-const PLACES: [&str; 23] = [
+const PLACES: [&str; 24] = [
     "A",
     "B",
     "C",
@@ -160,6 +165,7 @@ const PLACES: [&str; 23] = [
     "faults",
     "sample_time",
     "filter",
+    "delay_order",
     "feedback",
     "observer",
     "reference",
@@ -225,6 +231,7 @@ impl<'a> PlantFile<'a> {
             t_on: file.get("t_on").map_or(Ok(0.0), |entry| entry.number())?,
             monitor: file.get("monitor").map_or(Ok(false), |entry| entry.flag())?,
             filter: filter(file, &measurements, &faults)?,
+            delay_order: delay_order(file, [&actuators, &measurements])?,
             feedback,
             observer,
             loop_shape,

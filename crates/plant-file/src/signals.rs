@@ -20,6 +20,8 @@ pub struct Signal {
     pub limits: Option<[f64; 2]>,
     /// The longest time in s for which the last value of a measurement may replace it.
     pub longest_hold: Option<f64>,
+    /// The time in s after which a command acts or a measurement arrives.
+    pub delay: f64,
     /// The places of name, limits or range, and longest time of a hold, if the file states them.
     pub places: [Option<Place>; 3],
 }
@@ -41,7 +43,7 @@ impl Signal {
     pub fn named(name: String) -> Self {
         let (unit, operating, limits, longest_hold) = (None, None, None, None);
         let (description, places) = (String::new(), [None, None, None]);
-        Self { name, unit, description, operating, limits, longest_hold, places }
+        Self { name, unit, description, operating, limits, longest_hold, delay: 0.0, places }
     }
 
     /// Fills missing fields from `other`.
@@ -110,12 +112,16 @@ pub struct Fault {
     pub place: Place,
 }
 
+/// Number of states of the observer for each delay, unless stated.
+const DELAY_ORDER: usize = 3;
+/// The largest number of them.
+const MOST_DELAY_ORDER: f64 = 8.0;
 /// Largest number of actuators with a stated loss.
 const MOST_LOSSES: usize = 4;
 const SIGNAL: [&str; 4] = ["name", "unit", "description", "operating"];
-const ACTUATOR: [&str; 5] = ["name", "unit", "description", "operating", "limits"];
-const MEASUREMENT: [&str; 6] =
-    ["name", "unit", "description", "operating", "range", "longest_hold"];
+const ACTUATOR: [&str; 6] = ["name", "unit", "description", "operating", "limits", "delay"];
+const MEASUREMENT: [&str; 7] =
+    ["name", "unit", "description", "operating", "range", "longest_hold", "delay"];
 const FAULT: [&str; 13] = [
     "name",
     "unit",
@@ -174,6 +180,7 @@ fn signal(entry: &Entry<'_>, role: Role) -> Result<Signal, PlaceError> {
         operating: table.get("operating").map(|entry| entry.number()).transpose()?,
         limits: limited.as_ref().map(limits).transpose()?,
         longest_hold: longest_hold.as_ref().map(Entry::positive).transpose()?,
+        delay: table.get("delay").map_or(Ok(0.0), |entry| delay(&entry))?,
         places: [
             Some(named.place),
             limited.map(|entry| entry.place),
@@ -231,6 +238,32 @@ pub fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
     match Unit::parse(text) {
         Ok(_) => Ok(Some(text.to_owned())),
         Err(error) => Err(entry.error(error)),
+    }
+}
+
+fn delay(entry: &Entry<'_>) -> Result<f64, PlaceError> {
+    match entry.number()? {
+        seconds if seconds >= 0.0 => Ok(seconds),
+        seconds => Err(entry.error(format!("expected a time in s, 0 or more, found {seconds}"))),
+    }
+}
+
+/// Reads `delay_order`, the number of states by which the observer approximates each delay.
+pub(crate) fn delay_order(file: &Table<'_>, signals: [&[Signal]; 2]) -> Result<usize, PlaceError> {
+    let Some(entry) = file.get("delay_order") else { return Ok(DELAY_ORDER) };
+    if signals.into_iter().flatten().all(|signal| signal.delay <= 0.0) {
+        return Err(entry.error("no actuator and no measurement has a `delay`"));
+    }
+    match entry.number()? {
+        order if order.fract() == 0.0 && (1.0..=MOST_DELAY_ORDER).contains(&order) => {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
+            let order = order as usize;
+            Ok(order)
+        }
+        other => {
+            let most = MOST_DELAY_ORDER;
+            Err(entry.error(format!("expected a whole number from 1 to {most}, found {other}")))
+        }
     }
 }
 

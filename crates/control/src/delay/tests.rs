@@ -170,3 +170,31 @@ fn the_delayed_integrator_is_stable_up_to_a_quarter_turn() {
     assert!(exact(1.5, 4).radius < 1.0);
     assert!(exact(1.6, 1).radius > 1.0);
 }
+
+/// The samples of fast states that follow slow ones and act on nothing but the measurement: A alone can be balanced
+/// without end, and the responses were wrong by 1e3.
+#[test]
+fn a_long_sample_time_spoils_no_response() {
+    let one = |value| DMatrix::from_element(1, 1, value);
+    let plant = StateSpace {
+        a: one(-0.01),
+        b: one(0.02),
+        c: one(1.0),
+        d: one(0.0),
+        domain: Domain::Continuous,
+    };
+    let delays = Delays { inputs: vec![30.0], outputs: vec![5.0] };
+    for order in [3, 10] {
+        let approximated = delays.approximated(&plant, order).unwrap();
+        let held = crate::robustness::held_plant(&approximated, 40.0).unwrap();
+        let n = held.a.nrows();
+        for frequency in [1e-5, 0.02, 0.07] {
+            let z = Complex::from_polar(1.0, frequency * 40.0);
+            let pencil = DMatrix::identity(n, n) * z - to_complex(&held.a);
+            let states = pencil.lu().solve(&to_complex(&held.b)).unwrap();
+            let expected = (to_complex(&held.c) * states)[(0, 0)];
+            let error = response(&held, frequency)[(0, 0)] - expected;
+            assert!(error.norm() < 1e-12, "{order} {frequency}: {error}");
+        }
+    }
+}

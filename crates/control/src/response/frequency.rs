@@ -115,7 +115,7 @@ pub(crate) struct Transfer {
 
 impl Transfer {
     pub(crate) fn new(system: &StateSpace) -> Self {
-        let Balance { matrix, scale } = Balance::new(&system.a);
+        let Balance { matrix, scale } = Balance::of_system(&system.a, &system.b, &system.c);
         let (b, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
         let (q, h) = matrix.hessenberg().unpack();
         Self {

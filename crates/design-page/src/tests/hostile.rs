@@ -18,8 +18,8 @@ use design_report::{
 };
 
 use design_report::robustness::{
-    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Parameter, PeakSensitivity, Remedy,
-    Robustness, ToleranceResult, Verdict,
+    Channel, Compared, Disk, ExactDelays, Level, Limits, LoopPoint, Number, Parameter,
+    PeakSensitivity, Remedy, Robustness, ToleranceResult, Verdict,
 };
 
 pub(super) const MARKUP: &str = "</code></pre><script>alert(1)</script>";
@@ -314,6 +314,14 @@ fn robustness(numbers: &mut Numbers) -> Robustness {
         channels: vec![channel(MARKUP), channel(QUOTES)],
     };
     Robustness {
+        delays: Some(ExactDelays {
+            observer_order: 3,
+            judged_order: 10,
+            s_peaks: [1.5e5, f64::INFINITY],
+            difference: 3.25,
+            frequency: f64::INFINITY,
+            frequencies: 900,
+        }),
         points: vec![point("input"), point("output")],
         delay_margin: f64::INFINITY,
         longest_hold: 0.0,

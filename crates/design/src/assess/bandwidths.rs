@@ -2,7 +2,7 @@
 
 use control::Domain;
 use control::eigen::eigenvalues;
-use nalgebra::{Complex, DMatrix};
+use nalgebra::Complex;
 use rayon::prelude::*;
 
 use crate::Error;
@@ -59,7 +59,7 @@ pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantF
         return Ok(file.clone());
     }
     let plant = LinearPlant::of(file)?;
-    let speed = speed(file, &plant.a)?;
+    let speed = speed(file, &plant)?;
     let large = plant.a.nrows() >= LARGE;
     let candidates = &CANDIDATES[..if large { OF_LARGE } else { CANDIDATES.len() }];
     let examine = |&(of_feedback, of_observer): &(f64, f64)| {
@@ -128,7 +128,7 @@ fn with<'a>(file: &PlantFile<'a>, feedback: f64, observer: f64) -> PlantFile<'a>
 }
 
 /// The speed of the plant, or of the stated feedback, rad/s.
-fn speed(file: &PlantFile<'_>, a: &DMatrix<f64>) -> Result<f64, Error> {
+fn speed(file: &PlantFile<'_>, plant: &LinearPlant) -> Result<f64, Error> {
     let domain = file.sampling.map(|sampling| Domain::Sampled { period: sampling.period });
     let stated: Vec<Complex<f64>> = match (&file.feedback.requirement, domain) {
         (Requirement::Eigenvalues(all), _) => all.clone(),
@@ -138,7 +138,7 @@ fn speed(file: &PlantFile<'_>, a: &DMatrix<f64>) -> Result<f64, Error> {
         (Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }), _) => return Ok(*rate),
         _ => Vec::new(),
     };
-    let all = if stated.is_empty() { eigenvalues(a)? } else { stated };
+    let all = if stated.is_empty() { eigenvalues(&plant.undelayed.a)? } else { stated };
     let mut sizes: Vec<_> =
         all.iter().map(|value| value.norm()).filter(|size| size.is_finite()).collect();
     sizes.sort_by(f64::total_cmp);
@@ -146,6 +146,8 @@ fn speed(file: &PlantFile<'_>, a: &DMatrix<f64>) -> Result<f64, Error> {
     sizes.retain(|&size| size > NO_SPEED * largest);
     let median = sizes.get(sizes.len() / 2).copied().unwrap_or(WITHOUT_SPEED);
     let unstable = all.iter().map(|value| value.re).fold(0.0, f64::max);
-    let most = file.sampling.map_or(f64::INFINITY, |sampling| PER_SAMPLE / sampling.period);
+    let of_samples = file.sampling.map_or(f64::INFINITY, |sampling| PER_SAMPLE / sampling.period);
+    // A loop with a delay is hardly faster than one radian in the delay.
+    let most = of_samples.min(1.0 / plant.delays.longest());
     Ok(median.max(2.0 * unstable).min(most))
 }

@@ -9,7 +9,7 @@ use control::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
 use crate::assess::family::{common, reported};
-use crate::assess::robustness::{Physical, closed, loop_points};
+use crate::assess::robustness::{Physical, loop_points};
 use crate::budget::Budget;
 use crate::matrix::rows;
 use crate::plant::linear::LinearPlant;
@@ -17,7 +17,7 @@ use crate::plant::rest::{Rest, beyond_limits, commands};
 use crate::report::fallback::{FallbackCase, FallbackReport};
 use crate::report::robustness::{Level, LoopPoint, Number};
 use crate::solve::fallback::{Cases, Fallback, SlowCase, remaining};
-use crate::solve::solution::Solution;
+use crate::solve::solution::{Solution, looped};
 use crate::solve::tracking::decay;
 use plant_file::PlantFile;
 use plant_file::signals::Signal;
@@ -150,7 +150,7 @@ impl Examination<'_> {
             controller.c = controller.c.remove_row(gone);
             controller.d = controller.d.remove_row(gone);
         }
-        let closed_loop = closed(&plant, &controller)?;
+        let closed_loop = looped(&plant, &controller)?;
         let delay = match designed.domain {
             Domain::Continuous => delay_margin(&closed_loop),
             Domain::Sampled { .. } => sampled_delay_margin(&plant, &controller),

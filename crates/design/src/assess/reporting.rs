@@ -24,12 +24,13 @@ use crate::assess::reconfiguration::reasons as reconfiguration_reasons;
 use crate::assess::references::{beyond_limits, reached, reference_steps};
 use crate::assess::remedies::remedies;
 use crate::assess::responses::responses;
-use crate::assess::robustness::robustness;
+use crate::assess::robustness::{delay_reasons, robustness};
 use crate::assess::schedule::{self as schedule_report, judge_schedule};
 use crate::assess::slow_estimates;
 use crate::assess::verdict::verdict;
 use crate::budget::TimeLimits;
 use crate::matrix::pairs;
+use crate::plant::delays::JUDGED;
 use crate::plant::fixed_mode::shown;
 use crate::plant::parameters::ParameterFamily;
 use crate::plant::plausibility::line;
@@ -117,7 +118,7 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
     let losses = losses(nominal, &budget)?;
     let of_losses = losses.iter().flat_map(losses::reasons);
     let further = of_losses.chain(reconfiguration.iter().flat_map(reconfiguration_reasons));
-    let mut further: Vec<_> = further.collect();
+    let mut further: Vec<_> = further.chain(robustness.iter().flat_map(delay_reasons)).collect();
     let (responses, frequency) =
         rayon::join(|| steps.run(Step::Responses, || responses(nominal)), || loops.frequency());
     let responses = unless_numerical("the responses to faults", responses, &mut missing)?;
@@ -221,12 +222,20 @@ fn plant(designed: &Solution, names: &Names) -> Result<Plant, Error> {
         unit: signal.unit.clone(),
         description: signal.description.clone(),
         operating: signal.operating.unwrap_or(0.0),
-        notes: signal.limits.map_or(String::new(), |[low, high]| format!("from {low} to {high}")),
+        notes: String::new(),
+    };
+    let delay = |signal: &signals::Signal| {
+        (signal.delay > 0.0).then(|| format!("delayed by {} s", signal.delay))
+    };
+    let actuator = |command: &signals::Signal| {
+        let limits = command.limits.map(|[low, high]| format!("from {low} to {high}"));
+        let notes: Vec<_> = limits.into_iter().chain(delay(command)).collect();
+        Signal { notes: notes.join(", "), ..signal(command) }
     };
     let measurement = |measured: &signals::Signal| {
         let range = measured.limits.map(|[low, high]| format!("used from {low} to {high}"));
         let hold = measured.longest_hold.map(|time| format!("held for {time} s at most"));
-        let notes: Vec<_> = range.into_iter().chain(hold).collect();
+        let notes: Vec<_> = range.into_iter().chain(hold).chain(delay(measured)).collect();
         Signal { notes: notes.join(", "), ..signal(measured) }
     };
     let fault = |fault: &Fault| Signal {
@@ -239,11 +248,11 @@ fn plant(designed: &Solution, names: &Names) -> Result<Plant, Error> {
     Ok(Plant {
         origin: linear.origin.clone(),
         states: linear.states.iter().map(signal).collect(),
-        actuators: linear.actuators.iter().map(signal).collect(),
+        actuators: linear.actuators.iter().map(actuator).collect(),
         measurements: linear.measurements.iter().map(measurement).collect(),
         faults: linear.faults.iter().map(fault).collect(),
         matrices: names.plant_matrices(designed),
-        eigenvalues: pairs(&eigenvalues(&linear.a)?),
+        eigenvalues: pairs(&eigenvalues(&linear.undelayed.a)?),
     })
 }
 
@@ -341,6 +350,14 @@ fn assumptions(designed: &Designed) -> Vec<String> {
             .to_owned(),
         "Bounds and responses start from rest, with the compensation on.".to_owned(),
     ];
+    if nominal.linear.delays.any() {
+        all.push(format!(
+            "Each delay is approximated: by {} states in the observer and in the responses, bounds and norms of errors; \
+             by {JUDGED} states in margins, peaks and tolerances. The margins are followed by what the delays \
+             themselves change.",
+            nominal.linear.delay_order
+        ));
+    }
     all.extend(tracking_assumption(nominal));
     if nominal.linear.faults.iter().any(|fault| fault.dynamics == FaultDynamics::Constant) {
         all.push(

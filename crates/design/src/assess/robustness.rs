@@ -1,18 +1,20 @@
 //! Analyses the robustness of a design and judges it.
 
+mod delays;
 mod noise;
 mod proof;
 mod tolerances;
 
+pub(crate) use delays::reasons as delay_reasons;
 pub(crate) use noise::noise_peaks;
 pub(crate) use tolerances::by_entries;
 
 use control::aso::Gains;
-use control::controller::{CompleteController, complete_controller, with_feedthrough};
+use control::controller::CompleteController;
 use control::response::{frequency_grid, frequency_response, h_infinity};
 use control::robustness::{
-    DiskMargin, Loop, OpenedLoop, Point, SensitivityPeak, Tolerances, held_plant, longest_hold,
-    longest_period, peak_derivatives, regulator_of_same_speed,
+    DiskMargin, Loop, OpenedLoop, Point, SensitivityPeak, Tolerances, longest_hold, longest_period,
+    peak_derivatives, regulator_of_same_speed,
 };
 use control::tracking::IntegralAction;
 use control::{Domain, Error, StateSpace};
@@ -28,7 +30,7 @@ use crate::report::robustness::{
     Channel, Compared, Disk, LoopPoint, Number, PeakSensitivity, Robustness,
 };
 use crate::report::{Frequency, Matrix};
-use crate::solve::solution::Solution;
+use crate::solve::solution::{Solution, looped};
 use plant_file::robustness::RobustnessLimits;
 use plant_file::signals::{Signal, same_unit};
 
@@ -76,13 +78,15 @@ pub(crate) fn robustness(
     );
     let (comparison, curves, tolerance) = (comparison?, curves?, tolerance?);
     let budget = time.of_certificates();
-    let tolerance_proof = proof::of_entries(&physical, limits, &tolerance, &budget);
+    let tolerance_proof =
+        proof::of_entries(&designed.linear, &physical, limits, &tolerance, &budget);
     let robustness = Robustness {
+        delays: delays::exact(designed, &closed_loop)?,
         comparison,
         tolerance,
         tolerance_proof,
         curves,
-        sensitivity: sensitivity(designed, &physical.plant, &slopes),
+        sensitivity: sensitivity(designed, &slopes),
         points,
         delay_margin: delay,
         longest_hold: hold,
@@ -178,8 +182,8 @@ impl Physical {
         linear: &LinearPlant,
         gains: &Gains,
     ) -> Result<Self, Error> {
-        let plant = linear.state_space();
-        let CompleteController { commands, estimates } = complete(designed, gains)?;
+        let plant = linear.judged()?;
+        let CompleteController { commands, estimates } = designed.complete(gains)?;
         let channels: Vec<_> =
             designed.extended.channels.iter().map(|channel| channel.estimate).collect();
         let estimates = StateSpace {
@@ -192,32 +196,8 @@ impl Physical {
 
     /// The loop of the plant and `controller`, in the time domain of the controller.
     pub(crate) fn closed(&self, controller: &StateSpace) -> Result<Loop, Error> {
-        closed(&self.plant, controller)
+        looped(&self.plant, controller)
     }
-}
-
-/// The loop of a continuous plant and a controller, in the time domain of the controller.
-pub(crate) fn closed(plant: &StateSpace, controller: &StateSpace) -> Result<Loop, Error> {
-    let plant = match controller.domain {
-        Domain::Continuous => plant.clone(),
-        Domain::Sampled { period } => held_plant(plant, period)?,
-    };
-    Loop::new(plant, controller.clone())
-}
-
-/// The controller with `gains`, its filter and its integrals, from the measurements as the plant of the design
-/// gives them.
-fn complete(designed: &Solution, gains: &Gains) -> Result<CompleteController, Error> {
-    let filter = designed.filter.as_deref();
-    let controller = complete_controller(&designed.plant, gains, filter, designed.domain)?;
-    if !designed.linear.has_feedthrough() {
-        return Ok(controller);
-    }
-    let complete = |system| with_feedthrough(system, &controller.commands.c, &designed.linear.d);
-    Ok(CompleteController {
-        commands: complete(&controller.commands)?,
-        estimates: complete(&controller.estimates)?,
-    })
 }
 
 fn point(opened: &OpenedLoop, name: &str, signals: &[Signal]) -> Result<LoopPoint, Error> {
@@ -278,13 +258,11 @@ fn slopes(
 }
 
 /// Returns how the judged peaks depend on the entries of the plant.
-fn sensitivity(
-    designed: &Solution,
-    plant: &StateSpace,
-    slopes: &[[DMatrix<f64>; 4]],
-) -> Vec<PeakSensitivity> {
+fn sensitivity(designed: &Solution, slopes: &[[DMatrix<f64>; 4]]) -> Vec<PeakSensitivity> {
     let linear = &designed.linear;
-    let one = |((_, name), [to_a, to_b, to_c, to_d]): ((Point, &str), &[DMatrix<f64>; 4])| {
+    let plant = &linear.undelayed;
+    let one = |((_, name), slopes): ((Point, &str), &[DMatrix<f64>; 4])| {
+        let [to_a, to_b, to_c, to_d] = &linear.of_plant(slopes);
         // One for the entries that are not structural.
         let [in_a, in_b, in_c, in_d] = Tolerances::unless_structural(plant, [1.0; 4]).of;
         let matrix = |name: &str, of: (&[Signal], &[Signal]), effects: &DMatrix<f64>| Matrix {
@@ -297,13 +275,14 @@ fn sensitivity(
         let times = |varied: DMatrix<f64>, values: &DMatrix<f64>, slopes: &DMatrix<f64>| {
             varied.component_mul(values).component_mul(slopes)
         };
-        let LinearPlant { states, actuators, measurements, .. } = linear;
+        let LinearPlant { actuators, measurements, .. } = linear;
+        let states = linear.plant_states();
         let mut matrices = vec![
             matrix("A", (states, states), &times(in_a, &plant.a, to_a)),
             matrix("B", (states, actuators), &times(in_b, &plant.b, to_b)),
             matrix("C", (measurements, states), &times(in_c, &plant.c, to_c)),
         ];
-        if linear.has_feedthrough() {
+        if plant.d.amax() > 0.0 {
             matrices.push(matrix("D", (measurements, actuators), &times(in_d, &plant.d, to_d)));
         }
         PeakSensitivity { point: name.to_owned(), matrices }
@@ -374,7 +353,7 @@ fn comparison(
                 p_f: None,
                 ..gains.clone()
             };
-            Some(physical.closed(&complete(designed, &other)?.commands)?)
+            Some(physical.closed(&designed.complete(&other)?.commands)?)
         }
         _ => None,
     };

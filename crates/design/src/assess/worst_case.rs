@@ -73,11 +73,12 @@ fn without_fmu(table: &mut Table, designed: &Solution) -> bool {
         table.remove(key);
     }
     let linear = &designed.linear;
-    let names = linear.states.iter().map(|signal| Value::String(signal.name.clone()));
+    let names = linear.plant_states().iter().map(|signal| Value::String(signal.name.clone()));
     table.insert("states".to_owned(), Value::Array(names.collect()));
     if let Some(Value::Table(robustness)) = table.get_mut("robustness") {
         robustness.remove("parameters");
     }
+    let n = linear.undelayed.a.nrows();
     let mut columns = Vec::new();
     if let Some(Value::Array(faults)) = table.get_mut("faults") {
         let first = linear.models.len() - faults.len();
@@ -85,7 +86,11 @@ fn without_fmu(table: &mut Table, designed: &Solution) -> bool {
             let input = fault.as_table_mut().and_then(|fault| fault.remove("input"));
             match (input, &model.entry) {
                 (None, _) => {}
-                (Some(_), FaultEntry::Actuator(column)) => columns.push(column.clone()),
+                (Some(_), FaultEntry::Actuator(column))
+                    if column.iter().skip(n).all(|entry| *entry == 0.0) =>
+                {
+                    columns.push(column.clone());
+                }
                 (Some(_), _) => return false,
             }
         }
@@ -94,7 +99,7 @@ fn without_fmu(table: &mut Table, designed: &Solution) -> bool {
         let row = |at: usize| {
             Value::Array(columns.iter().map(|column| Value::Float(column[at])).collect())
         };
-        let rows = (0..linear.a.nrows()).map(row).collect();
+        let rows = (0..n).map(row).collect();
         table.insert("F_a".to_owned(), Value::Array(rows));
     }
     true

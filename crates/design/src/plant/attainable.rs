@@ -1,8 +1,8 @@
 //! What no controller of a plant can reach: the peak of S that unstable modes, zeros and samples force.
 
-use control::Error;
 use control::eigen::eigenvalues;
 use control::zeros::zeros;
+use control::{Error, StateSpace};
 use files::PlaceError;
 use nalgebra::Complex;
 
@@ -33,7 +33,7 @@ pub(crate) fn warnings(
     linear: &LinearPlant,
 ) -> Result<Vec<PlaceError>, Error> {
     let poles: Vec<_> =
-        eigenvalues(&linear.a)?.into_iter().filter(|&value| is_right(value)).collect();
+        eigenvalues(&linear.undelayed.a)?.into_iter().filter(|&value| is_right(value)).collect();
     let limit = file.robustness.amber;
     let mut warnings = Vec::new();
     if let Some(sampling) = file.sampling {
@@ -51,8 +51,9 @@ pub(crate) fn warnings(
             warnings.push(file.error(&["sample_time"], message));
         }
     }
-    if linear.b.ncols() == 1 && linear.c.nrows() == 1 && !linear.has_feedthrough() {
-        let finite = zeros(&linear.a, &linear.b, &linear.c)?.finite;
+    let StateSpace { a, b, c, d, .. } = &linear.undelayed;
+    if b.ncols() == 1 && c.nrows() == 1 && d.amax() <= 0.0 {
+        let finite = zeros(a, b, c)?.finite;
         let of_zeros = finite.into_iter().filter(|&zero| is_right(zero) && zero.im >= 0.0);
         let least = |zero: &Complex<f64>| forced(*zero, &poles);
         if let Some(zero) = of_zeros.max_by(|x, y| least(x).total_cmp(&least(y))) {

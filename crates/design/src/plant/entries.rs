@@ -1,14 +1,15 @@
 //! The tolerances of the entries of a plant's matrices.
 
-use control::StateSpace;
 use control::robustness::{PlantEntry, Tolerances};
 
+use crate::plant::delays::placed;
+use crate::plant::linear::LinearPlant;
 use plant_file::robustness::RobustnessLimits;
 
-/// Returns the tolerances that a plant file states: those of whole matrices for the entries that are not
-/// structural, and those of named entries.
-pub(crate) fn tolerances(plant: &StateSpace, limits: &RobustnessLimits) -> Tolerances {
-    let mut tolerances = Tolerances::unless_structural(plant, limits.tolerance);
+/// Returns the tolerances that a plant file states, for the plant without its delays: those of whole matrices for the
+/// entries that are not structural, and those of named entries.
+fn of_plant(linear: &LinearPlant, limits: &RobustnessLimits) -> Tolerances {
+    let mut tolerances = Tolerances::unless_structural(&linear.undelayed, limits.tolerance);
     for named in &limits.entries {
         for &PlantEntry { matrix, row, column } in &named.entries {
             tolerances.of[matrix][(row, column)] = named.relative;
@@ -16,4 +17,23 @@ pub(crate) fn tolerances(plant: &StateSpace, limits: &RobustnessLimits) -> Toler
         tolerances.common.push(named.entries.clone());
     }
     tolerances
+}
+
+/// The tolerances of a plant file.
+pub(crate) struct EntryTolerances {
+    /// In the plant without its delays.
+    pub(crate) stated: Tolerances,
+    /// In the plant whose delays have `order` states each.
+    pub(crate) placed: Tolerances,
+}
+
+/// Returns the tolerances that a plant file states; `order`: of the approximated delays.
+pub(crate) fn tolerances(
+    linear: &LinearPlant,
+    order: usize,
+    limits: &RobustnessLimits,
+) -> EntryTolerances {
+    let stated = of_plant(linear, limits);
+    let placed = placed(&linear.delays, order, stated.clone());
+    EntryTolerances { stated, placed }
 }

@@ -1,15 +1,20 @@
 //! The plant as a linear system with faults, from the matrices of the plant file or from its FMU.
 
+use std::ops::Range;
+
+use control::delay::Delays;
 use control::detection::UnknownInput;
 use control::faults::{Fault as Model, FaultEntry, FaultKind};
-use control::{Domain, StateSpace};
+use control::{Domain, Error, StateSpace};
 use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
 
+use crate::plant::delays::{self, Delayed, delayed};
 use files::PlaceError;
 use plant_file::PlantFile;
 use plant_file::detection::{Disturbance, DisturbanceEntry};
+use plant_file::requirements::Requirement;
 use plant_file::signals::{EntryPoint, Fault, FaultDynamics, Signal};
 
 /// Relative distance from an equilibrium below which an operating point counts as an equilibrium.
@@ -18,7 +23,8 @@ pub(crate) const AT_REST: f64 = 1e-6;
 /// Part of the largest entry of a row of C below which an entry of D counts as zero.
 const NOTHING: f64 = 1e-9;
 
-/// x' = A x + B u + faults, y = C x + D u + faults, about an operating point.
+/// x' = A x + B u + faults, y = C x + D u + faults, about an operating point. The states of its delays, each approximated,
+/// follow those that the plant file states.
 pub(crate) struct LinearPlant {
     pub(crate) a: DMatrix<f64>,
     pub(crate) b: DMatrix<f64>,
@@ -33,6 +39,12 @@ pub(crate) struct LinearPlant {
     pub(crate) models: Vec<Model>,
     /// The disturbances of the file.
     pub(crate) disturbances: Vec<UnknownInput>,
+    /// The plant without its delays.
+    pub(crate) undelayed: StateSpace,
+    /// The delays of commands and measurements.
+    pub(crate) delays: Delays,
+    /// Number of states of each delay.
+    pub(crate) delay_order: usize,
     /// The source of the matrices, in a sentence.
     pub(crate) origin: String,
     /// For an FMU: the relative distance of the operating point from an equilibrium.
@@ -56,28 +68,67 @@ impl LinearPlant {
         }
     }
 
+    /// The plant from the commands to the measurements for the judgement: with better approximations of its delays.
+    pub(crate) fn judged(&self) -> Result<StateSpace, Error> {
+        delays::judged(&self.delays, &self.undelayed)
+    }
+
+    /// The states without those of delays.
+    pub(crate) fn plant_states(&self) -> &[Signal] {
+        &self.states[..self.undelayed.a.nrows()]
+    }
+
+    /// The positions of the states of delays.
+    pub(crate) fn delay_states(&self) -> Range<usize> {
+        self.undelayed.a.nrows()..self.states.len()
+    }
+
+    /// A requirement on a gain for `order` states: the weights of a plant file, which has no states of delays, with zeros
+    /// for these. They are stable, and the controller knows what enters them.
+    pub(crate) fn with_delays(&self, requirement: &Requirement, order: usize) -> Requirement {
+        let delays = self.delay_states();
+        match requirement {
+            Requirement::Weights { states, channels }
+                if states.is_square() && states.nrows() + delays.len() == order =>
+            {
+                let (first, count) = (delays.start, delays.len());
+                let states = states.clone().insert_rows(first, count, 0.0);
+                let states = states.insert_columns(first, count, 0.0);
+                Requirement::Weights { states, channels: channels.clone() }
+            }
+            _ => requirement.clone(),
+        }
+    }
+
+    /// Of matrices of the form of [`Self::judged`] the entries of the plant without delays.
+    pub(crate) fn of_plant(&self, matrices: &[DMatrix<f64>; 4]) -> [DMatrix<f64>; 4] {
+        self.delays.of_plant(self.undelayed.a.nrows(), delays::JUDGED, matrices)
+    }
+
     /// Takes the matrices of `file`, or linearises its FMU.
     pub(crate) fn of(file: &PlantFile<'_>) -> Result<Self, crate::Error> {
         match &file.model {
             plant_file::Model::Matrices { a, b, c, d, f_a, states, sampled } => {
-                let columns = f_a.clone().unwrap_or_else(|| DMatrix::zeros(a.nrows(), 0));
+                let undelayed = system([a, b, c, d]);
+                let delays = delays::of(file);
+                let f = f_a.clone().unwrap_or_else(|| DMatrix::zeros(a.nrows(), 0));
+                let g = DMatrix::zeros(c.nrows(), f.ncols());
+                let Delayed { a, b, c, d, f, .. } = delayed(file, &undelayed, [&f, &g])?;
                 let model = |fault: &Fault| match fault.entry_point {
-                    EntryPoint::Column(at) => {
-                        modelled(fault, FaultEntry::Actuator(column(&columns, at)))
-                    }
-                    _ => on_signals(fault, b, d),
+                    EntryPoint::Column(at) => modelled(fault, FaultEntry::Actuator(column(&f, at))),
+                    _ => on_signals(fault, &b, &d),
                 };
                 Ok(Self {
-                    a: a.clone(),
-                    b: b.clone(),
-                    c: c.clone(),
-                    d: d.clone(),
-                    states: states.clone(),
+                    states: delays::states(
+                        states,
+                        [&file.actuators, &file.measurements],
+                        file.delay_order,
+                    ),
                     actuators: file.actuators.clone(),
                     measurements: file.measurements.clone(),
                     faults: file.faults.clone(),
                     models: file.faults.iter().map(model).collect(),
-                    disturbances: disturbances(file, b, d, None)?,
+                    disturbances: disturbances(file, &b, &d, None)?,
                     origin: match sampled {
                         None => "The plant file states the matrices.",
                         Some(_) => {
@@ -87,6 +138,13 @@ impl LinearPlant {
                     }
                     .to_owned(),
                     residual: None,
+                    a,
+                    b,
+                    c,
+                    d,
+                    undelayed,
+                    delays,
+                    delay_order: file.delay_order,
                 })
             }
             plant_file::Model::Fmu(fmu) => linearised(file, fmu),
@@ -141,24 +199,46 @@ fn linearised(
             .iter()
             .zip(from_fmu)
             .map(|(signal, known_signal)| signal.clone().or(known(known_signal)))
-            .collect()
+            .collect::<Vec<_>>()
     };
-    let d = significant(linearised.matrices.d.clone(), &linearised.matrices.c);
-    let (faults, models) = faults(file, &linearised, &d)?;
+    let linearise::Matrices { a, b, c, d, f, g } = &linearised.matrices;
+    let d = significant(d.clone(), c);
+    let undelayed = system([a, b, c, &d]);
+    let delays = delays::of(file);
+    let matrices = delayed(file, &undelayed, [f, g])?;
+    let (faults, models) = faults(file, &linearised, &matrices)?;
+    let Delayed { a, b, c, d, .. } = &matrices;
+    let states: Vec<_> = linearised.states.iter().map(known).collect();
+    let actuators = merged(&file.actuators, &linearised.inputs);
+    let measurements = merged(&file.measurements, &linearised.outputs);
+    let signals = [&actuators[..], &measurements[..]];
     Ok(LinearPlant {
-        disturbances: disturbances(file, &linearised.matrices.b, &d, Some(&linearised.matrices))?,
-        states: linearised.states.iter().map(known).collect(),
-        actuators: merged(&file.actuators, &linearised.inputs),
-        measurements: merged(&file.measurements, &linearised.outputs),
+        disturbances: disturbances(file, b, d, Some(&matrices))?,
+        states: delays::states(&states, signals, file.delay_order),
+        actuators,
+        measurements,
         faults,
         models,
         origin: format!("{model}, linearised by {}.", linearised.method),
         residual: Some(linearised.residual),
-        a: linearised.matrices.a,
-        b: linearised.matrices.b,
-        c: linearised.matrices.c,
-        d,
+        a: a.clone(),
+        b: b.clone(),
+        c: c.clone(),
+        d: d.clone(),
+        undelayed,
+        delays,
+        delay_order: file.delay_order,
     })
+}
+
+fn system([a, b, c, d]: [&DMatrix<f64>; 4]) -> StateSpace {
+    StateSpace {
+        a: a.clone(),
+        b: b.clone(),
+        c: c.clone(),
+        d: d.clone(),
+        domain: Domain::Continuous,
+    }
 }
 
 /// Opens the FMU of the file, with the libraries that it needs.
@@ -199,12 +279,12 @@ fn disturbance_inputs<'a>(file: &'a PlantFile<'_>) -> impl Iterator<Item = Strin
 }
 
 /// Returns how the disturbances of the file act on a plant with the input matrices `b` and `d`; those of an
-/// FMU are the last columns of `found`.
+/// FMU are the last columns of `matrices`.
 fn disturbances(
     file: &PlantFile<'_>,
     b: &DMatrix<f64>,
     d: &DMatrix<f64>,
-    matrices: Option<&linearise::Matrices>,
+    matrices: Option<&Delayed>,
 ) -> Result<Vec<UnknownInput>, PlaceError> {
     let columns = matrices.map_or(0, |matrices| matrices.f.ncols());
     let mut next = columns - disturbance_inputs(file).count().min(columns)..;
@@ -212,7 +292,7 @@ fn disturbances(
     let one = |disturbance: &Disturbance| {
         let (mut on_states, mut on_measurements) = (DVector::zeros(n), DVector::zeros(p));
         match (&disturbance.entry_point, matrices) {
-            (DisturbanceEntry::Column(e), _) => on_states.copy_from(e),
+            (DisturbanceEntry::Column(e), _) => on_states.rows_mut(0, e.len()).copy_from(e),
             (DisturbanceEntry::Actuator(at), _) => {
                 (on_states, on_measurements) = (column(b, *at), column(d, *at));
             }
@@ -276,8 +356,9 @@ fn stating(file: &PlantFile<'_>, operating_point: &[(String, f64)], name: &str) 
 fn faults(
     file: &PlantFile<'_>,
     linearised: &Linearisation,
-    d: &DMatrix<f64>,
+    matrices: &Delayed,
 ) -> Result<(Vec<Fault>, Vec<Model>), crate::Error> {
+    let Delayed { b, d, .. } = matrices;
     let mut inputs = 0..;
     let mut faults = file.faults.clone();
     let mut models = Vec::with_capacity(faults.len());
@@ -285,16 +366,11 @@ fn faults(
         let (signal, model) = match fault.entry_point {
             EntryPoint::Input(_) => {
                 let at = inputs.next().unwrap_or_default();
-                (
-                    &linearised.faults[at],
-                    modelled(fault, entry(file, fault, &linearised.matrices, at)?),
-                )
+                (&linearised.faults[at], modelled(fault, entry(file, fault, matrices, at)?))
             }
-            EntryPoint::Sensor(at) => {
-                (&linearised.outputs[at], on_signals(fault, &linearised.matrices.b, d))
-            }
+            EntryPoint::Sensor(at) => (&linearised.outputs[at], on_signals(fault, b, d)),
             EntryPoint::Actuator(at) | EntryPoint::Loss { actuator: at, .. } => {
-                (&linearised.inputs[at], on_signals(fault, &linearised.matrices.b, d))
+                (&linearised.inputs[at], on_signals(fault, b, d))
             }
             EntryPoint::Column(_) => {
                 let message = format!("fault `{}`: an FMU has no F_a", fault.name);
@@ -311,7 +387,7 @@ fn faults(
 fn entry(
     file: &PlantFile<'_>,
     fault: &Fault,
-    matrices: &linearise::Matrices,
+    matrices: &Delayed,
     at: usize,
 ) -> Result<FaultEntry, crate::Error> {
     let (states, measurements) = (column(&matrices.f, at), column(&matrices.g, at));

@@ -7,6 +7,7 @@ use fmu_import::Fmu;
 use linearise::{Linearise, linearise};
 use nalgebra::{DMatrix, DVector};
 
+use crate::plant::delays::{self, JUDGED};
 use crate::plant::linear;
 use crate::plant::linear::significant;
 use crate::report::robustness::Parameter;
@@ -61,11 +62,16 @@ impl<'a> ParameterFamily<'a> {
         let end = |deviation: f64| {
             let mut deviations = vec![0.0; self.count()];
             deviations[at] = deviation;
-            self.plant(&deviations)
+            self.undelayed(&deviations)
         };
         let (high, low) = (end(1.0)?, end(-1.0)?);
         let half = |high, low| (high - low) * 0.5;
         Ok([half(high.a, low.a), half(high.b, low.b), half(high.c, low.c), half(high.d, low.d)])
+    }
+
+    /// The plant without its delays.
+    fn undelayed(&self, deviations: &[f64]) -> Result<StateSpace, crate::Error> {
+        Ok(self.at_operating_point(deviations)?.0)
     }
 
     /// Linearises the FMU at the operating point of the plant file, with other parameters; returns also the
@@ -194,10 +200,13 @@ impl PlantFamily for ParameterFamily<'_> {
 
     /// Linearises the FMU at the operating point of the plant file, with other parameters.
     fn plant(&self, deviations: &[f64]) -> Result<StateSpace, crate::Error> {
-        Ok(self.at_operating_point(deviations)?.0)
+        Ok(delays::judged(&delays::of(self.file), &self.undelayed(deviations)?)?)
     }
 
+    /// `entries`: those of the plant with its delays, as [`Self::plant`] has them.
     fn slopes(&self, entries: &[DMatrix<f64>; 4]) -> Vec<f64> {
+        let n = self.directions.first().map_or(0, |[a, ..]| a.nrows());
+        let entries = &delays::of(self.file).of_plant(n, JUDGED, entries);
         let along = |direction: &[DMatrix<f64>; 4]| {
             direction.iter().zip(entries).map(|(change, slopes)| change.dot(slopes)).sum()
         };

@@ -1,5 +1,7 @@
 //! Computes the gains for the plant of a plant file.
 
+use std::ops::Range;
+
 use crate::plant::fixed_mode::{described, described_in};
 use crate::plant::linear::LinearPlant;
 use crate::plant::plausibility::{check_faults, check_limits};
@@ -15,15 +17,16 @@ use crate::solve::tracking::{
     DesignLoop, Tracking, TrackingProblem, check_references, decay, feedback_pair, integral_action,
 };
 use control::aso::{Estimator, FaultyPlant, Gains};
-use control::controller::closed_loop;
+use control::controller::{CompleteController, closed_loop, complete_controller, with_feedthrough};
 use control::detectability::{Detectability, detectability};
 use control::distance::{Distance, from_uncontrollable};
 use control::faults::ExtendedPlant;
 use control::lmi::{self, RegionCertificate};
 use control::rank::{Mode, Rank, controllability, uncontrollable_modes};
+use control::robustness::{Loop, held_plant};
 use control::sampled;
 use control::stability::{instability, is_clearly_stable};
-use control::{Domain, Error};
+use control::{Domain, Error, StateSpace};
 use files::PlaceError;
 use nalgebra::DMatrix;
 use plant_file::estimation::Law;
@@ -136,7 +139,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let (gains, own_model) = (designed.gains.clone(), designed.a_f.clone());
     plant.a_f = own_model.unwrap_or(plant.a_f);
     let whole = DesignLoop::of(&linear, &plant, &gains, filter.as_deref(), domain)?;
-    let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
+    let instability = instability_of(&linear, &plant, &gains, filter.as_deref(), &whole)?;
     let controlled = &pair.0 + &pair.1 * &feedback.gain;
     let problem = TrackingProblem {
         file,
@@ -151,7 +154,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     let solution = Solution {
         cancellation_residual: cancellation_residual(&extended)?,
         instability_before: instability_before(file, &gains, &plant, domain)?,
-        instability: instability(&dynamics, domain)?,
+        instability,
         monitor: file.monitor,
         filter,
         linear,
@@ -189,6 +192,26 @@ fn feedback_of_family(
         }
         _ => Ok(None),
     }
+}
+
+/// Returns the instability of plant and controller: the larger one of the design and of the judgement, whose delays are
+/// approximated better.
+fn instability_of(
+    linear: &LinearPlant,
+    plant: &FaultyPlant,
+    gains: &Gains,
+    filter: Option<&[f64]>,
+    whole: &DesignLoop,
+) -> Result<f64, Error> {
+    let domain = whole.controller.domain;
+    let dynamics = closed_loop(&whole.plant, &whole.controller, &vec![1.0; plant.b.ncols()])?;
+    let of_design = instability(&dynamics, domain)?;
+    if !linear.delays.any() {
+        return Ok(of_design);
+    }
+    let controller = complete(linear, plant, gains, filter, domain)?.commands;
+    let closed = looped(&linear.judged()?, &controller)?;
+    Ok(of_design.max(instability(&closed.dynamics(), domain)?))
 }
 
 /// Returns the instability of the observer error before `t_on`, if the faults are not estimated then.
@@ -274,11 +297,13 @@ impl GainProblem<'_> {
             states: n,
             f_a: &plant.f_a.rows(0, n).into_owned().resize_vertically(order, 0.0),
         };
+        let of_feedback = linear.with_delays(&file.feedback.requirement, order);
         let feedback = || match common {
             Some(common) => Ok(common),
-            None => feedback(&file.feedback.requirement, &problem, domain),
+            None => feedback(&of_feedback, &problem, domain),
         };
         let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
+        let of_observer = linear.with_delays(&file.observer.requirement, a_0.nrows());
         let filter = sampled::filter(extended, domain);
         let observer_problem = ObserverProblem {
             a_0: &a_0,
@@ -292,14 +317,15 @@ impl GainProblem<'_> {
         // Both run in other threads, which have the same time.
         let ending = lmi::ending();
         let feedback = || lmi::until(ending.clone(), feedback);
-        let observer = || observer(&file.observer.requirement, &observer_problem, domain);
+        let observer = || observer(&of_observer, &observer_problem, domain);
         let observer = || lmi::until(ending.clone(), observer);
         let (feedback, observer) = rayon::join(feedback, observer);
         let feedback =
             feedback.map_err(|refusal| feedback_refused(file, linear, domain, refusal))?;
         let observer = observer.map_err(|refusal| {
             let names = observer_states(linear, extended);
-            let states = States { names, meaning: "states, filters, faults and rates of ramps" };
+            let meaning = "states, filters, faults and rates of ramps";
+            let states = States { names, meaning, of_delays: linear.delay_states() };
             refused(file, domain, &file.observer, refusal, &states)
         })?;
         Ok((feedback, observer))
@@ -351,7 +377,8 @@ fn feedback_refused(
     let names = feedback_states(file, linear);
     let more = names.len() > linear.states.len();
     let meaning = if more { "states and integrals of references" } else { "states" };
-    refused(file, domain, &file.feedback, refusal, &States { names, meaning })
+    let states = States { names, meaning, of_delays: linear.delay_states() };
+    refused(file, domain, &file.feedback, refusal, &states)
 }
 
 /// Returns the part of the faults' effect on the plant's states that the compensation leaves,
@@ -521,6 +548,16 @@ struct States {
     names: Vec<String>,
     /// What they are, in words.
     meaning: &'static str,
+    /// Those of delays, for which a plant file states no weights.
+    of_delays: Range<usize>,
+}
+
+impl States {
+    /// The name of the state of a row of weights.
+    fn weighted(&self, row: usize) -> &str {
+        let later = if row < self.of_delays.start { 0 } else { self.of_delays.len() };
+        self.names.get(row + later).map_or("", String::as_str)
+    }
 }
 
 /// Converts the failure of a gain to an error at the requirement in the file.
@@ -538,14 +575,20 @@ fn refused(
         Refusal::Fixed(mode) => fixed(&request.requirement, &mode, domain, name),
         Refusal::Control(Error::PoleCount { .. }) => {
             let count = request.requirement.eigenvalues().len();
-            format!("expected {order} eigenvalues, one for each of the {meaning}, found {count}")
+            let of_delays = match states.of_delays.len() {
+                0 => String::new(),
+                count => format!(" ({count} of them those of delays)"),
+            };
+            format!(
+                "expected {order} eigenvalues, one for each of the {meaning}{of_delays}, found {count}"
+            )
         }
         Refusal::Control(ref error @ Error::Unweighted { weight: "W", .. }) => {
             match request.requirement.without_noise() {
                 Some(at) => format!(
                     "W states no noise for `{}` (its row {} is zero), so that the observer would not \
                      correct it; expected a number above 0 there",
-                    name(at),
+                    states.weighted(at),
                     at + 1
                 ),
                 None => error.to_string(),
@@ -582,7 +625,41 @@ fn fixed(
     }
 }
 
+/// The controller with `gains`, its filter and its integrals, from the measurements as the plant of the design
+/// gives them.
+fn complete(
+    linear: &LinearPlant,
+    plant: &FaultyPlant,
+    gains: &Gains,
+    filter: Option<&[f64]>,
+    domain: Domain,
+) -> Result<CompleteController, Error> {
+    let controller = complete_controller(plant, gains, filter, domain)?;
+    if !linear.has_feedthrough() {
+        return Ok(controller);
+    }
+    let complete = |system| with_feedthrough(system, &controller.commands.c, &linear.d);
+    Ok(CompleteController {
+        commands: complete(&controller.commands)?,
+        estimates: complete(&controller.estimates)?,
+    })
+}
+
+/// The loop of a continuous plant and a controller, in the time domain of the controller.
+pub(crate) fn looped(plant: &StateSpace, controller: &StateSpace) -> Result<Loop, Error> {
+    let plant = match controller.domain {
+        Domain::Continuous => plant.clone(),
+        Domain::Sampled { period } => held_plant(plant, period)?,
+    };
+    Loop::new(plant, controller.clone())
+}
+
 impl Solution {
+    /// The controller with other gains, its filter and its integrals.
+    pub(crate) fn complete(&self, gains: &Gains) -> Result<CompleteController, Error> {
+        complete(&self.linear, &self.plant, gains, self.filter.as_deref(), self.domain)
+    }
+
     /// Returns A + B K_x, n x n, the dynamics under exact state feedback; with integral action the same of
     /// the plant extended by the integrals, with [K_x, K_i].
     pub(crate) fn feedback_dynamics(&self) -> DMatrix<f64> {

@@ -13,13 +13,13 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::assess::detection::decoupling::Decoupling;
 use crate::assess::detection::problem::Problem;
+use crate::plant::delays::with_delays;
 use crate::plant::entries::tolerances;
 use crate::plant::linear::LinearPlant;
 use crate::plant::parameters::ParameterFamily;
 use crate::solve::designed::Designed;
 use plant_file::PlantFile;
 use plant_file::detection::ModelError;
-use plant_file::robustness::RobustnessLimits;
 use plant_file::signals::Signal;
 
 /// A plant, and the bounds of its inputs.
@@ -82,7 +82,7 @@ impl<'a> ModelErrors<'a> {
         Ok(Self {
             file,
             request,
-            plants: plants.map(|plant| uncertain(plant, &file.robustness)).collect(),
+            plants: plants.map(|plant| uncertain(plant, file)).collect(),
             parameters,
             random: parameters.map_or_else(Vec::new, |family| {
                 let limits = &file.robustness;
@@ -150,12 +150,11 @@ impl<'a> ModelErrors<'a> {
         family: &ParameterFamily<'_>,
         deviations: &[f64],
     ) -> Result<(UncertainPlant, DVector<f64>), crate::Error> {
-        let (mut plant, rates, measured) = family.at_operating_point(deviations)?;
-        let m = plant.b.ncols();
-        plant.b = plant.b.insert_column(m, 0.0);
-        plant.b.set_column(m, &rates);
-        plant.d = plant.d.insert_column(m, 0.0);
-        plant.d.set_column(m, &(measured - &self.measured));
+        let (plant, rates, measured) = family.at_operating_point(deviations)?;
+        // One more command: the rates and measurements at the operating point.
+        let [rates, offsets] =
+            [rates, measured - &self.measured].map(|column| DMatrix::from_columns(&[column]));
+        let plant = with_delays(self.file, &plant, [&rates, &offsets])?;
         let exact = |of: &DMatrix<f64>| DMatrix::zeros(of.nrows(), of.ncols());
         let sizes = [exact(&plant.a), exact(&plant.b), exact(&plant.c)];
         Ok((UncertainPlant { nominal: plant, sizes }, self.bounds.clone().push(1.0)))
@@ -193,9 +192,10 @@ impl<'a> ModelErrors<'a> {
 }
 
 /// The linear plant with errors of its entries within the tolerances.
-fn uncertain(linear: &LinearPlant, limits: &RobustnessLimits) -> UncertainPlant {
+fn uncertain(linear: &LinearPlant, file: &PlantFile<'_>) -> UncertainPlant {
     let mut nominal = linear.state_space();
-    let Tolerances { of: [a, b, c, _], .. } = tolerances(&nominal, limits);
+    let Tolerances { of: [a, b, c, _], .. } =
+        tolerances(linear, file.delay_order, &file.robustness).placed;
     nominal.d.fill(0.0);
     let sizes = [
         a.component_mul(&nominal.a.abs()),

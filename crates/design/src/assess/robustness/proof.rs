@@ -4,7 +4,9 @@ use control::robustness::{EntryFamily, ProvenTolerance, Unproven, proven_toleran
 
 use crate::assess::robustness::Physical;
 use crate::budget::Budget;
+use crate::plant::delays::JUDGED;
 use crate::plant::entries::tolerances;
+use crate::plant::linear::LinearPlant;
 use crate::report::robustness::{ToleranceProof, ToleranceResult};
 use plant_file::robustness::RobustnessLimits;
 
@@ -15,6 +17,7 @@ const PART: f64 = 0.25;
 
 /// Returns the fraction of the tolerances of the entries within which every plant is stable, or why none is proven.
 pub(super) fn of_entries(
+    linear: &LinearPlant,
     physical: &Physical,
     limits: &RobustnessLimits,
     tested: &ToleranceResult,
@@ -33,7 +36,7 @@ pub(super) fn of_entries(
         return Err(budget.reason());
     }
     let most = tested.first_unstable.min(MOST);
-    let tolerances = tolerances(&physical.plant, limits);
+    let tolerances = tolerances(linear, JUDGED, limits).placed;
     let family =
         EntryFamily::new(&physical.plant, &tolerances).map_err(|error| error.to_string())?;
     let proof = proven_tolerance(&family, &physical.controller, most, &|| budget.is_over());

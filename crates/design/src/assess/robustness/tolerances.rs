@@ -1,5 +1,6 @@
 //! Whether a loop stays stable while the plant varies within its tolerances.
 
+use control::StateSpace;
 use control::robustness::{
     EntryFamily, PlantEntry, ToleranceSearch, ToleranceTest, Tolerances, tolerance_test,
 };
@@ -8,7 +9,8 @@ use rayon::prelude::*;
 
 use crate::assess::robustness::{Physical, names};
 use crate::matrix::rows;
-use crate::plant::entries::tolerances;
+use crate::plant::delays::JUDGED;
+use crate::plant::entries::{EntryTolerances, tolerances};
 use crate::plant::parameters::ParameterFamily;
 use crate::report::Matrix;
 use crate::report::robustness::{ToleranceResult, VaryingEntries};
@@ -22,17 +24,17 @@ pub(crate) fn by_entries(
     physical: &Physical,
     limits: &RobustnessLimits,
 ) -> Result<ToleranceResult, crate::Error> {
-    let tolerances = tolerances(&physical.plant, limits);
-    let family = EntryFamily::new(&physical.plant, &tolerances)?;
+    let EntryTolerances { stated, placed } = tolerances(&designed.linear, JUDGED, limits);
+    let family = EntryFamily::new(&physical.plant, &placed)?;
     let search = ToleranceSearch { family: &family, controller: &physical.controller };
     let cases = search.cases(limits.cases, u64::from(limits.seed)).into_par_iter();
     let cases = cases.map(|case| search.evaluate(case));
     let cases = cases.collect::<Result<Vec<_>, _>>()?;
     let climbs = search.starts(&cases)?.into_par_iter().map(|start| search.climb(start));
     let test = search.result(&cases, climbs.collect::<Result<Vec<_>, _>>()?)?;
-    let entries = u32::try_from(tolerances.entries().count()).unwrap_or(u32::MAX);
+    let entries = u32::try_from(stated.entries().count()).unwrap_or(u32::MAX);
     let stable = stable(&test).filter(|_| entries > 0);
-    let varying = varying(&tolerances);
+    let varying = varying(&stated);
     Ok(ToleranceResult { entries, varying, stable, ..tested(designed, limits, &test) })
 }
 
@@ -77,7 +79,7 @@ fn stable(test: &ToleranceTest) -> Option<f64> {
 
 fn tested(designed: &Solution, limits: &RobustnessLimits, test: &ToleranceTest) -> ToleranceResult {
     let linear = &designed.linear;
-    let (states, actuators) = (names(&linear.states), names(&linear.actuators));
+    let (states, actuators) = (names(linear.plant_states()), names(&linear.actuators));
     let matrix = |name: &str, values: &DMatrix<f64>, of: &[String], by: &[String]| Matrix {
         name: name.to_owned(),
         meaning: "worst plant within the tolerances".to_owned(),
@@ -86,13 +88,15 @@ fn tested(designed: &Solution, limits: &RobustnessLimits, test: &ToleranceTest) 
         values: rows(values),
     };
     let measurements = names(&linear.measurements);
+    let StateSpace { a, b, c, d, .. } = test.worst.clone();
+    let [a, b, c, d] = linear.of_plant(&[a, b, c, d]);
     let mut worst = vec![
-        matrix("A", &test.worst.a, &states, &states),
-        matrix("B", &test.worst.b, &states, &actuators),
-        matrix("C", &test.worst.c, &measurements, &states),
+        matrix("A", &a, &states, &states),
+        matrix("B", &b, &states, &actuators),
+        matrix("C", &c, &measurements, &states),
     ];
-    if linear.has_feedthrough() {
-        worst.push(matrix("D", &test.worst.d, &measurements, &actuators));
+    if linear.undelayed.d.amax() > 0.0 {
+        worst.push(matrix("D", &d, &measurements, &actuators));
     }
     ToleranceResult {
         entries: 0,

@@ -1,0 +1,122 @@
+//! The delays of a plant: the states that approximate them, in the observer and for the judgement.
+
+use control::delay::{Delays, pade};
+use control::robustness::Tolerances;
+use control::{Error, StateSpace};
+use files::PlaceError;
+use nalgebra::DMatrix;
+
+use plant_file::PlantFile;
+use plant_file::signals::Signal;
+
+/// Number of states for each delay in the plant of the judgement: its approximation is exact to 1e-6 up to frequencies of
+/// 6 rad in the delay.
+pub(crate) const JUDGED: usize = 10;
+
+/// The delays that the plant file states.
+pub(crate) fn of(file: &PlantFile<'_>) -> Delays {
+    let all = |signals: &[Signal]| signals.iter().map(|signal| signal.delay).collect();
+    Delays { inputs: all(&file.actuators), outputs: all(&file.measurements) }
+}
+
+/// The matrices of a plant with the states of its delays; F and G are those of its fault inputs, which are not delayed.
+pub(crate) struct Delayed {
+    pub(crate) a: DMatrix<f64>,
+    pub(crate) b: DMatrix<f64>,
+    pub(crate) c: DMatrix<f64>,
+    pub(crate) d: DMatrix<f64>,
+    pub(crate) f: DMatrix<f64>,
+    pub(crate) g: DMatrix<f64>,
+}
+
+/// The plant with the states of its delays that the observer has.
+pub(crate) fn delayed(
+    file: &PlantFile<'_>,
+    plant: &StateSpace,
+    [f, g]: [&DMatrix<f64>; 2],
+) -> Result<Delayed, PlaceError> {
+    let (m, q) = (plant.b.ncols(), f.ncols());
+    let StateSpace { a, b, c, d, .. } = with_delays(file, plant, [f, g])?;
+    let part = |both: &DMatrix<f64>| (both.columns(0, m).into_owned(), both.columns(m, q).into());
+    let ((b, f), (d, g)) = (part(&b), part(&d));
+    Ok(Delayed { a, b, c, d, f, g })
+}
+
+/// The same with the fault inputs after the commands.
+pub(crate) fn with_delays(
+    file: &PlantFile<'_>,
+    plant: &StateSpace,
+    [f, g]: [&DMatrix<f64>; 2],
+) -> Result<StateSpace, PlaceError> {
+    let (m, q) = (plant.b.ncols(), f.ncols());
+    let beside = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
+        let mut both = left.clone().resize_horizontally(m + q, 0.0);
+        both.columns_mut(m, q).copy_from(right);
+        both
+    };
+    let inputs = StateSpace { b: beside(&plant.b, f), d: beside(&plant.d, g), ..plant.clone() };
+    let mut delays = of(file);
+    delays.inputs.resize(m + q, 0.0);
+    delays
+        .approximated(&inputs, file.delay_order)
+        .map_err(|error| file.error(&["actuators", "measurements"], error.to_string()))
+}
+
+/// The plant with the approximation of the judgement.
+pub(crate) fn judged(delays: &Delays, plant: &StateSpace) -> Result<StateSpace, Error> {
+    delays.approximated(plant, JUDGED)
+}
+
+/// Places the tolerances of a plant without its delays in the plant with approximations of `order`.
+pub(crate) fn placed(delays: &Delays, order: usize, tolerances: Tolerances) -> Tolerances {
+    if !delays.any() {
+        return tolerances;
+    }
+    let Tolerances { of: [a, b, c, d], common } = &tolerances;
+    let (n, (p, m)) = (a.nrows(), d.shape());
+    let all = n + delays.states(order);
+    let zeros = DMatrix::zeros;
+    let mut of = [zeros(all, all), zeros(all, m), zeros(p, all), zeros(p, m)];
+    for entry in tolerances.entries() {
+        let to = delays.entry(n, order, entry);
+        of[to.matrix][(to.row, to.column)] = [a, b, c, d][entry.matrix][(entry.row, entry.column)];
+    }
+    let placed =
+        |group: &Vec<_>| group.iter().map(|entry| delays.entry(n, order, *entry)).collect();
+    Tolerances { of, common: common.iter().map(placed).collect() }
+}
+
+/// The states of the plant, then those of its delays with their values at the operating point.
+///
+/// A constant command u leads to z = [u, 0, ...], a constant measurement y to z = -d A'^-1 `e_1` y, see
+/// [`Delays::approximated`].
+pub(crate) fn states(
+    plant: &[Signal],
+    [actuators, measurements]: [&[Signal]; 2],
+    order: usize,
+) -> Vec<Signal> {
+    let mut all = plant.to_vec();
+    for actuator in actuators.iter().filter(|actuator| actuator.delay > 0.0) {
+        all.push(Signal {
+            unit: actuator.unit.clone(),
+            operating: actuator.operating,
+            ..Signal::named(format!("delayed {}", actuator.name))
+        });
+        all.extend((2..=order).map(|at| Signal {
+            operating: actuator.operating.map(|_| 0.0),
+            ..Signal::named(format!("delay of {}, {at}", actuator.name))
+        }));
+    }
+    let inverse = pade(order).0.try_inverse();
+    let inverse = inverse.unwrap_or_else(|| DMatrix::zeros(order, order));
+    for measurement in measurements.iter().filter(|measurement| measurement.delay > 0.0) {
+        all.extend((0..order).map(|at| {
+            let of_unit = -measurement.delay * inverse[(0, at)];
+            Signal {
+                operating: measurement.operating.map(|value| value * of_unit),
+                ..Signal::named(format!("delay of {}, {}", measurement.name, at + 1))
+            }
+        }));
+    }
+    all
+}
