@@ -91,7 +91,7 @@ pub fn zeros(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Zer
 /// The system {A, B, C, 0} with balanced states, and inputs and outputs scaled to the norm of A. It
 /// has the same zeros.
 fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
-    let Balance { matrix, scale } = Balance::new(a);
+    let Balance { matrix, scale } = Balance::of_system(a, b, c);
     let size = if matrix.norm().is_normal() { matrix.norm() } else { 1.0 };
     let c = multiply_columns(c, &scale).transpose();
     StateSpace {

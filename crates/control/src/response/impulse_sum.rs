@@ -28,7 +28,7 @@ pub(super) fn impulse_sums(
     eigenvalues: &[Complex<f64>],
     width: f64,
 ) -> Result<Option<Bracket>, Error> {
-    let Balance { matrix: a, scale } = Balance::new(&system.a);
+    let Balance { matrix: a, scale } = Balance::of_system(&system.a, &system.b, &system.c);
     let (mut states, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
     // After `block` samples the state has at most half of its norm.
     let (mut block, mut power) = (1_u32, a.clone());

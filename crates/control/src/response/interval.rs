@@ -76,7 +76,7 @@ pub(super) struct Intervals {
 
 impl Intervals {
     pub(super) fn new(system: &StateSpace) -> Result<Self, Error> {
-        let Balance { matrix, scale } = Balance::new(&system.a);
+        let Balance { matrix, scale } = Balance::of_system(&system.a, &system.b, &system.c);
         let starts = divide_rows(&system.b, &scale);
         let outputs = multiply_columns(&system.c, &scale);
         let (phi, shortest) = Shortest::new(matrix, system.domain)?;

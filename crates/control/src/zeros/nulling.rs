@@ -31,7 +31,7 @@ pub(crate) fn output_nulling(
     output: &DMatrix<f64>,
     direct: &DMatrix<f64>,
 ) -> Result<Option<Nulling>, Error> {
-    let Balance { matrix: a, scale } = Balance::new(&system.a);
+    let Balance { matrix: a, scale } = Balance::of_system(&system.a, &system.b, &system.c);
     let size = if a.norm().is_normal() { a.norm() } else { 1.0 };
     let (b, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
     let columns = lengths(&stacked(&b, &system.d)).map(|length| size / length);

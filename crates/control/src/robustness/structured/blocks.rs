@@ -77,6 +77,8 @@ pub(super) fn directions(blocks: &[Block]) -> Vec<Direction> {
 /// have about equal norms (Osborne 1960).
 pub(super) fn balanced(m: &ComplexMatrix, blocks: &[Block]) -> Vec<f64> {
     const ROUNDS: usize = 20;
+    // Groups that act in one direction only would be scaled without end.
+    const MOST_SCALED: f64 = 100.0;
     let mut exponents = vec![0.0; m.nrows()];
     let groups: Vec<(usize, usize)> = places(blocks)
         .flat_map(|(first, block)| match block {
@@ -97,7 +99,8 @@ pub(super) fn balanced(m: &ComplexMatrix, blocks: &[Block]) -> Vec<f64> {
             }
             let change = 0.25 * (column / row).ln();
             if change.is_finite() {
-                places.for_each(|at| exponents[at] += change);
+                let exponent = (exponents[first] + change).clamp(-MOST_SCALED, MOST_SCALED);
+                places.for_each(|at| exponents[at] = exponent);
             }
         }
     }

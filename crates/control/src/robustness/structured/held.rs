@@ -138,7 +138,9 @@ impl<'a> HeldFamily<'a> {
             let largest = &y * fraction;
             let mut last = None;
             for stages in 1..=MOST_STAGES {
-                let Some(bound) = remainder(&x, &largest, stages) else { continue };
+                let bound = remainder(&x, &largest, stages);
+                let is_finite = |bound: &DMatrix<f64>| bound.iter().all(|entry| entry.is_finite());
+                let Some(bound) = bound.filter(is_finite) else { continue };
                 let precise = bound.norm() <= PRECISE * largest.norm();
                 let bound = bound.rows(0, self.states) / fraction;
                 last = Some(GaussError { stages, fraction, precise, bound });

@@ -25,7 +25,7 @@ pub(super) struct Interval {
 impl Response {
     pub(super) fn new(system: &StateSpace) -> Self {
         let transfer = Transfer::new(system);
-        let Balance { matrix, scale } = Balance::new(&system.a);
+        let Balance { matrix, scale } = Balance::of_system(&system.a, &system.b, &system.c);
         let (b, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
         let system = StateSpace { a: matrix, b, c, ..system.clone() };
         Self { system, transfer }
