@@ -146,7 +146,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
 
     /// The plant of the verdict in units in which its channels are comparable: those of the file where they are equal.
     fn scaled_plant(&self) -> Result<(Units, StateSpace), Error> {
-        let plant = self.linear.state_space();
+        let plant = self.linear.judged()?;
         let LinearPlant { actuators, measurements, .. } = self.linear;
         let (m, p) = (actuators.len(), measurements.len());
         let units = if same_unit(actuators) && same_unit(measurements) {
