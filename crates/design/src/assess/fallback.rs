@@ -139,10 +139,10 @@ impl Examination<'_> {
     /// the plant has no column of it, and the controller no command, although the observer goes on with it.
     fn margins(&self, failed: Option<usize>) -> Result<(Vec<LoopPoint>, f64), Error> {
         let Cases { designed, request } = self.cases;
-        let LinearPlant { actuators, measurements, b, .. } = &designed.linear;
+        let LinearPlant { actuators, measurements, .. } = &designed.linear;
         let Physical { mut plant, mut controller, .. } =
             Physical::of_gains(designed, &designed.linear, &self.gains)?;
-        plant.b = remaining(b, failed, request.loss);
+        plant.b = remaining(&plant.b, failed, request.loss);
         let mut inputs = actuators.clone();
         if let Some(gone) = failed.filter(|_| request.loss >= 1.0) {
             inputs.remove(gone);

@@ -81,7 +81,7 @@ pub(crate) fn robustness(
     let tolerance_proof =
         proof::of_entries(&designed.linear, &physical, limits, &tolerance, &budget);
     let robustness = Robustness {
-        delays: delays::exact(designed, &closed_loop)?,
+        delays: delays::exact(designed, &closed_loop, &points)?,
         comparison,
         tolerance,
         tolerance_proof,

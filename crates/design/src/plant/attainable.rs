@@ -22,6 +22,7 @@ const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// ```text
 /// continuous, one command and one measurement, for a zero z:  max |S| >= M = product over unstable p of |z + p*| / |z - p|
 ///     and, if |S| <= e up to w:                               max |S| >= M^t e^(1 - t),  t = pi / (pi - 2 atan(w / z))
+/// with a delay d:                                         max |S| >= max |T| - 1 >= e^(p d) - 1
 /// sampled every h, m commands:                                max |S| >= e^(h sum of p / m)
 /// ```
 ///
@@ -52,6 +53,20 @@ pub(crate) fn warnings(
         }
     }
     let StateSpace { a, b, c, d, .. } = &linear.undelayed;
+    if b.ncols() == 1 && c.nrows() == 1 {
+        let delay = linear.delays.longest();
+        let grown = poles.iter().map(|pole| (pole.re * delay).exp()).fold(0.0, f64::max);
+        if grown - 1.0 > limit {
+            let message = format!(
+                "no controller has a peak of S below {}: in the delay of {} s the unstable eigenvalues of the plant \
+                 grow to {} times; expected a shorter delay",
+                rounded(grown - 1.0),
+                rounded(delay),
+                rounded(grown)
+            );
+            warnings.push(file.error(&["actuators", "measurements"], message));
+        }
+    }
     if b.ncols() == 1 && c.nrows() == 1 && d.amax() <= 0.0 {
         let finite = zeros(a, b, c)?.finite;
         let of_zeros = finite.into_iter().filter(|&zero| is_right(zero) && zero.im >= 0.0);

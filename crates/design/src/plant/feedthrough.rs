@@ -13,13 +13,19 @@ use plant_file::requirements::Requirement;
 /// Refuses a plant with feedthrough and no filter, a filter that nothing needs, and tables that are for plants
 /// without feedthrough.
 pub(crate) fn check(file: &PlantFile<'_>, linear: &LinearPlant) -> Result<(), PlaceError> {
-    let LinearPlant { d, models, measurements, actuators, .. } = linear;
+    let LinearPlant { d, models, measurements, actuators, undelayed, .. } = linear;
     let entries = || (0..d.nrows()).flat_map(|row| (0..d.ncols()).map(move |column| (row, column)));
     let Some((row, column)) = entries().find(|at| d[*at] != 0.0) else {
         let measured = models.iter().any(|model| model.entry.is_measured());
         return match &file.filter {
             Some(_) if !measured => {
-                let message = "no fault enters a measurement, and D is 0, so none is needed";
+                let why = if undelayed.d.amax() > 0.0 {
+                    "every command that enters one is delayed"
+                } else {
+                    "D is 0"
+                };
+                let message =
+                    format!("no fault enters a measurement, and {why}, so none is needed");
                 Err(file.error(&["filter"], message))
             }
             _ => Ok(()),

@@ -5,6 +5,7 @@ use std::ops::Range;
 use control::delay::Delays;
 use control::detection::UnknownInput;
 use control::faults::{Fault as Model, FaultEntry, FaultKind};
+use control::rank::Mode;
 use control::{Domain, Error, StateSpace};
 use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, linearise};
@@ -81,6 +82,11 @@ impl LinearPlant {
     /// The positions of the states of delays.
     pub(crate) fn delay_states(&self) -> Range<usize> {
         self.undelayed.a.nrows()..self.states.len()
+    }
+
+    /// Whether a mode is one of delays: of equal delays of two signals no gain moves one, and none need be.
+    pub(crate) fn is_of_delays(&self, mode: &Mode) -> bool {
+        mode.dominant.iter().all(|state| self.delay_states().contains(state))
     }
 
     /// A requirement on a gain for `order` states: the weights of a plant file, which has no states of delays, with zeros

@@ -305,6 +305,7 @@ impl Without<'_> {
             states: n,
             f_a: &plant.f_a.rows(0, n).into(),
         };
+        let requirement = linear.with_delays(&requirement, problem.a.nrows());
         match feedback(&requirement, &problem, *domain) {
             Ok(result) => {
                 let with_zeros = |gain: DMatrix<f64>, at: &usize| gain.insert_row(*at, 0.0);

@@ -403,6 +403,9 @@ fn check_controllable(
     for mode in modes.into_iter().filter(above_or_on_the_real_axis) {
         let stable = is_clearly_stable(mode.eigenvalue, &linear.a, Domain::Continuous);
         let stable = stable.map_err(refuse)? && rank.rank > 0;
+        if stable && linear.is_of_delays(&mode) {
+            continue;
+        }
         let message = format!(
             "the commands {} reach {} of {} states only: no feedback moves {}{}",
             names(linear.actuators.iter().map(|signal| signal.name.as_str())),
@@ -444,7 +447,10 @@ fn check_detectable(
 ) -> Result<(), crate::Error> {
     let measurements = names(linear.measurements.iter().map(|signal| signal.name.as_str()));
     let modes = detectability.unobservable.iter();
-    for (mode, stable) in modes.filter(|(mode, _)| above_or_on_the_real_axis(mode)) {
+    let shown = |(mode, stable): &&(Mode, bool)| {
+        above_or_on_the_real_axis(mode) && !(*stable && linear.is_of_delays(mode))
+    };
+    for (mode, stable) in modes.filter(shown) {
         let message = format!(
             "the measurements {measurements} show {} of {} states only: no observer moves {}{}",
             detectability.observability.rank,

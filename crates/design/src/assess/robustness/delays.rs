@@ -5,7 +5,7 @@ use control::robustness::{Loop, Point};
 
 use crate::plant::delays::JUDGED;
 use crate::report::number::rounded;
-use crate::report::robustness::{ExactDelays, Level, Robustness};
+use crate::report::robustness::{ExactDelays, Level, LoopPoint, Robustness};
 use crate::solve::solution::Solution;
 
 /// Frequencies in each decade.
@@ -13,16 +13,20 @@ const PER_DECADE: u32 = 200;
 /// A peak of S that is larger by this factor with the delays themselves is a reason of the verdict.
 const LARGER: f64 = 1.05;
 
-/// Compares the stable loop of the judgement with that of the delays themselves; none without delays.
+/// Compares the stable loop of the judgement, whose peaks are those of `points`, with that of the delays themselves; none
+/// without delays.
 pub(super) fn exact(
     designed: &Solution,
     closed: &Loop,
+    points: &[LoopPoint],
 ) -> Result<Option<ExactDelays>, control::Error> {
     let linear = &designed.linear;
     if !linear.delays.any() {
         return Ok(None);
     }
-    let frequencies = frequency_grid(&closed.sensitivity(Point::Input), PER_DECADE)?;
+    let mut frequencies = frequency_grid(&closed.sensitivity(Point::Input), PER_DECADE)?;
+    let peaks = points.iter().map(|point| point.s_frequency);
+    frequencies.extend(peaks.filter(|frequency| frequency.is_finite()));
     let exact = linear.delays.exact(&linear.undelayed, closed, &frequencies)?;
     let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
     Ok(Some(ExactDelays {
@@ -49,7 +53,7 @@ pub(crate) fn reasons(robustness: &Robustness) -> Vec<(Level, String)> {
     }
     let points = robustness.points.iter().zip(delays.s_peaks);
     let larger = points.filter(|(point, peak)| *peak > LARGER * point.s_peak);
-    let reason = |(point, peak): (&crate::report::robustness::LoopPoint, f64)| {
+    let reason = |(point, peak): (&LoopPoint, f64)| {
         let message = format!(
             "with the delays themselves the peak of S at the {} is {}, in place of {} with delays of {order} states \
              each",
