@@ -26,7 +26,8 @@ pub(super) fn exact(
     }
     let mut frequencies = frequency_grid(&closed.sensitivity(Point::Input), PER_DECADE)?;
     let peaks = points.iter().map(|point| point.s_frequency);
-    frequencies.extend(peaks.filter(|frequency| frequency.is_finite()));
+    // At zero the plant may have a pole.
+    frequencies.extend(peaks.filter(|frequency| frequency.is_finite() && *frequency > 0.0));
     let exact = linear.delays.exact(&linear.undelayed, closed, &frequencies)?;
     let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
     Ok(Some(ExactDelays {
