@@ -25,18 +25,18 @@ fn delays(robustness: &Robustness) -> Markup {
     let [at_commands, at_measurements] = delays.s_peaks;
     html! {
         p {
-            "The figures are those of a plant whose delays have " (delays.judged_order)
-            " states each; the observer has " (delays.observer_order) ". With the delays themselves, at "
-            (delays.frequencies) " frequencies, the peak of S is " (number(at_commands))
-            " at the commands and " (number(at_measurements)) " at the measurements. "
+            "The figures are those of a plant whose delays have " (number(delays.judged_order.into()))
+            " states each; the observer has " (number(delays.observer_order.into()))
+            ". With the delays themselves, at " (number(delays.frequencies.into()))
+            " frequencies, the peak of S is " (number(at_commands)) " at the commands and "
+            (number(at_measurements)) " at the measurements. "
             @if delays.difference < 1.0 {
-                "The loop is stable with them: the difference uses up " (number(delays.difference))
-                " of what stability allows."
+                "The loop is stable with them"
             } @else {
-                "Whether the loop is stable with them is not shown: the difference is "
-                (number(delays.difference)) " times what stability allows, at "
-                (number(delays.frequency)) " rad/s."
+                "Whether the loop is stable with them is not shown"
             }
+            ": the difference is " (number(delays.difference)) " of what stability allows, at "
+            (number(delays.frequency)) " rad/s."
         }
     }
 }
