@@ -23,6 +23,11 @@ impl Balance {
         Self::with_signals(a, nothing(), nothing())
     }
 
+    /// Leaves A as it is.
+    pub(crate) fn none(a: &DMatrix<f64>) -> Self {
+        Self { matrix: a.clone(), scale: DVector::from_element(a.nrows(), 1.0) }
+    }
+
     /// Balances [A, B; C, 0]. Of a system whose states do not all act on each other, A alone would be scaled without end,
     /// and B and C with it.
     ///
@@ -39,7 +44,7 @@ impl Balance {
         mut entering: DVector<f64>,
         mut leaving: DVector<f64>,
     ) -> Self {
-        let mut balance = Self { matrix: a.clone(), scale: DVector::from_element(a.nrows(), 1.0) };
+        let mut balance = Self::none(a);
         // Its columns are the rows of the matrix, so that their sums read neighbours in memory.
         let mut transposed = a.transpose();
         for _ in 0..SWEEPS {

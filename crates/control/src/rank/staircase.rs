@@ -25,9 +25,20 @@ pub(crate) struct Staircase {
 }
 
 impl Staircase {
+    /// In balanced coordinates, or in the given ones if their rank is larger: states that do not act on each other are
+    /// scaled without end.
     pub(crate) fn new(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Self, Error> {
-        let n = a.nrows();
-        let Balance { matrix: balanced, scale } = Balance::new(a);
+        let balanced = Self::with(Balance::new(a), b)?;
+        if balanced.answer.is_full() {
+            return Ok(balanced);
+        }
+        let unscaled = Self::with(Balance::none(a), b)?;
+        Ok(if unscaled.answer.rank > balanced.answer.rank { unscaled } else { balanced })
+    }
+
+    fn with(balance: Balance, b: &DMatrix<f64>) -> Result<Self, Error> {
+        let Balance { matrix: balanced, scale } = balance;
+        let n = balanced.nrows();
         let (mut rest, mut rest_basis) = (balanced.clone(), DMatrix::identity(n, n));
         let mut reached = Vec::with_capacity(n);
         let mut link = unit_columns(&divide_rows(b, &scale));
