@@ -99,3 +99,17 @@ fn two_constant_unmeasured_states_are_two_modes() {
     states.sort_unstable();
     assert_eq!(states, [0, 2]);
 }
+
+/// A slow state, and a sensor whose three states a long sample forgets.
+#[test]
+fn a_slow_state_is_observable_behind_states_that_samples_forget() {
+    let a = DMatrix::from_row_slice(
+        4,
+        4,
+        &[0.975, 0., 0., 0., 2., 1e-40, 3e-41, 0., -3., 0., 2e-42, 1e-41, 1., 2e-41, 0., 1e-43],
+    );
+    // C x and C A x differ by the slow state alone: c A = [5, ...] is far above rounding.
+    let c = DMatrix::from_row_slice(1, 4, &[1., -1., 0., 0.]);
+    let dual = uncontrollable_modes(&a.transpose(), &c.transpose()).unwrap();
+    assert!(dual.iter().all(|mode| mode.eigenvalue.norm() < 0.5), "{dual:?}");
+}

@@ -1,0 +1,106 @@
+"""Designs the test batch of Astrom and Hagglund with delays by default, as a table in Markdown.
+
+    python scripts/study/process_batch.py
+
+The plants are the nine families of K. J. Astrom and T. Hagglund, Revisiting the Ziegler-Nichols step response method for PID
+control, J. Process Control 14 (2004), eq. (1) in its parameters: 133 plants of industrial processes. Each is given to
+`aso-ftc design` without a requirement, with the delay at the command, in continuous and in sampled time; a sample is a 40th
+of the longest time constant or of the delay. The peaks of S are those with the delays themselves. Needs
+target/release/aso-ftc and Python 3.11 with scipy.
+"""
+
+import json
+import subprocess
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import tf2ss
+
+ROOT = Path(__file__).resolve().parents[2]
+SAMPLES = 40
+
+
+def lags(*times):
+    """The product of all 1 + s T, as a polynomial."""
+    product = np.array([1.0])
+    for time in times:
+        product = np.polymul(product, [time, 1.0])
+    return product
+
+
+def batch():
+    """Name of the family, numerator, denominator, delay in s."""
+    times = [0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.3, 1.5, 2, 4, 6, 8, 10, 20, 50, 100, 200, 500]
+    for time in [0.02, *times, 1000]:
+        yield "e^-s / (1 + s T)", [1], lags(time), 1
+    for time in [0.01, 0.02, *times]:
+        yield "e^-s / (1 + s T)^2", [1], lags(time, time), 1
+    for time in [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 2, 5, 10]:
+        yield "1 / ((s + 1) (1 + s T)^2)", [1], lags(1, time, time), 0
+    for order in range(3, 9):
+        yield "1 / (s + 1)^n", [1], lags(*[1] * order), 0
+    for part in np.arange(1, 10) / 10:
+        yield "1 / ((1 + s) (1 + a s) (1 + a^2 s) (1 + a^3 s))", [1], lags(1, part, part**2, part**3), 0
+    delays = [0.01, 0.02, 0.05, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0]
+    for delay in delays:
+        yield "e^-sL / (s (1 + s T)), T + L = 1", [1], np.polymul([1, 0], lags(1 - delay)), delay
+    for time in [1, 2, 5, 10]:
+        for delay in delays:
+            yield "T e^-sL / ((1 + s T) (1 + s T1)), T1 + L = 1", [time], lags(time, 1 - delay), delay
+    for zero in np.arange(1, 12) / 10:
+        yield "(1 - a s) / (s + 1)^3", [-zero, 1], lags(1, 1, 1), 0
+    for time in np.arange(1, 11) / 10:
+        yield "1 / ((s + 1) ((s T)^2 + 1.4 s T + 1))", [1], np.polymul([1, 1], [time**2, 1.4 * time, 1]), 0
+
+
+def plant_file(numerator, denominator, delay, sampled):
+    """The text of the plant file."""
+    a, b, c, _ = (matrix.tolist() for matrix in tf2ss(numerator, np.trim_zeros(denominator, "f")))
+    text = f'A = {a}\nB = {b}\nC = {c}\nactuators = [{{ name = "u", delay = {delay} }}]\nactuator_faults = "all"\n'
+    if sampled:
+        slowest = max([delay, *(1 / abs(pole.real) for pole in np.roots(denominator) if abs(pole.real) > 1e-9)])
+        text += f"sample_time = {slowest / SAMPLES:.2g}\n"
+    return text
+
+
+def designed(text):
+    """Verdict and peak of S; the message of a refusal."""
+    with tempfile.TemporaryDirectory() as folder:
+        plant = Path(folder) / "plant.toml"
+        plant.write_text(text, encoding="utf-8")
+        words = ["design", plant, "--json", "--certificate-time", "1", "--out", Path(folder) / "design.toml"]
+        done = subprocess.run(
+            [ROOT / "target/release/aso-ftc", *words], capture_output=True, text=True, encoding="utf-8", check=False
+        )
+    if done.returncode not in (0, 1):
+        return "refused", done.stderr
+    report = json.loads(done.stdout)
+    robustness = report["robustness"]
+    exact = robustness["delays"] or {"s_peaks": [point["s_peak"] for point in robustness["points"]]}
+    return report["verdict"]["level"], max(exact["s_peaks"])
+
+
+def main():
+    """Prints a row for each family."""
+    plants = list(batch())
+    print("| plant | plants | green, continuous | green, sampled | peak of S |\n|---|---|---|---|---|")
+    with ThreadPoolExecutor() as pool:
+        results = [
+            list(pool.map(lambda one, sampled=sampled: designed(plant_file(*one[1:], sampled)), plants))
+            for sampled in (False, True)
+        ]
+    for family in dict.fromkeys(plant[0] for plant in plants):
+        rows = [at for at, plant in enumerate(plants) if plant[0] == family]
+        green = [sum(results[sampled][at][0] == "green" for at in rows) for sampled in (0, 1)]
+        peaks = [result[at][1] for result in results for at in rows if result[at][0] != "refused"]
+        print(f"| {family} | {len(rows)} | {green[0]} | {green[1]} | {min(peaks):.2f} to {max(peaks):.2f} |")
+    for result in results:
+        for plant, (level, detail) in zip(plants, result, strict=True):
+            if level != "green":
+                print(f"{plant[0]}, {[float(one) for one in plant[2]]}, {plant[3]} s: {level} {detail}")
+
+
+if __name__ == "__main__":
+    main()
