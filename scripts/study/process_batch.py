@@ -55,8 +55,9 @@ def batch():
         yield "1 / ((s + 1) ((s T)^2 + 1.4 s T + 1))", [1], np.polymul([1, 1], [time**2, 1.4 * time, 1]), 0
 
 
-def plant_file(numerator, denominator, delay, sampled):
+def plant_file(plant, sampled):
     """The text of the plant file."""
+    _, numerator, denominator, delay = plant
     a, b, c, _ = (matrix.tolist() for matrix in tf2ss(numerator, np.trim_zeros(denominator, "f")))
     text = f'A = {a}\nB = {b}\nC = {c}\nactuators = [{{ name = "u", delay = {delay} }}]\nactuator_faults = "all"\n'
     if sampled:
@@ -88,7 +89,7 @@ def main():
     print("| plant | plants | green, continuous | green, sampled | peak of S |\n|---|---|---|---|---|")
     with ThreadPoolExecutor() as pool:
         results = [
-            list(pool.map(lambda one, sampled=sampled: designed(plant_file(*one[1:], sampled)), plants))
+            list(pool.map(designed, [plant_file(plant, sampled) for plant in plants]))
             for sampled in (False, True)
         ]
     for family in dict.fromkeys(plant[0] for plant in plants):

@@ -4,8 +4,9 @@ import tomllib
 
 import numpy as np
 import pytest
-from design_oracle import Matrices, made
 from scipy.linalg import expm, solve_continuous_are
+
+from design_oracle import Matrices, made
 
 # A heated tank, a pendulum that falls, a cart with its position and speed.
 TANK = ([[-0.01]], [[0.02]], [[1]])
