@@ -1,5 +1,6 @@
 //! Matrices of a plant in sampled time.
 
+use control::eigen::eigenvalues;
 use control::hold::{continuous, zero_order_hold};
 use files::{PlaceError, Table};
 use nalgebra::DMatrix;
@@ -8,6 +9,9 @@ use crate::Sampling;
 
 /// Part of the largest entries of row and column below which an entry of the logarithm is rounding.
 const ROUNDING: f64 = 1e-13;
+
+/// Modulus below which an eigenvalue of a sampled A counts as zero: those of a chain of three registers are rounded to 1e-5.
+const ZERO: f64 = 1e-4;
 
 /// The continuous plant x' = A x + B u whose samples are those of the matrices in the file.
 #[derive(Clone)]
@@ -48,7 +52,13 @@ impl SampledMatrices {
         }
         let refuse =
             |error: control::Error| entry.error(format!("sampled every {period} s: {error}"));
-        let (a, b) = continuous(pair.0, pair.1, period).map_err(refuse)?;
+        let (a, b) = match continuous(pair.0, pair.1, period) {
+            Err(error @ control::Error::NoContinuousPlant) => {
+                let help = help(pair.0, period);
+                return Err(entry.error(format!("sampled every {period} s: {error}{help}")));
+            }
+            result => result.map_err(refuse)?,
+        };
         let a = without_rounding(&a);
         let identity = DMatrix::identity(a.nrows(), a.nrows());
         let (_, held) = zero_order_hold(&a, &identity, period).map_err(refuse)?;
@@ -60,6 +70,24 @@ impl SampledMatrices {
         // It has no zero eigenvalue where the logarithm exists.
         let solved = self.held.clone().lu().solve(columns);
         solved.unwrap_or_else(|| columns.map(|_| f64::NAN))
+    }
+}
+
+/// What helps where no continuous plant has the samples: zero eigenvalues are mostly those of a delay.
+fn help(a: &DMatrix<f64>, period: f64) -> String {
+    let zeros = eigenvalues(a).map(|all| all.iter().filter(|one| one.norm() < ZERO).count());
+    match zeros {
+        Ok(count @ 1..) => {
+            #[expect(clippy::cast_precision_loss, reason = "a number of states")]
+            let delay = format!("{:.6}", count as f64 * period);
+            let delay = delay.trim_end_matches('0').trim_end_matches('.');
+            format!(
+                "; {count} of them {} zero, as those of a delay of {count} samples are: expected A, B and C without the \
+                 states of the delay, and `delay = {delay}` in the actuator or the measurement",
+                if count == 1 { "is" } else { "are" }
+            )
+        }
+        _ => "; expected a model of lower order, or samples at shorter intervals".to_owned(),
     }
 }
 
