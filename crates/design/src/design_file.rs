@@ -15,12 +15,13 @@ use crate::matrix::matrix;
 use crate::plant::linear::LinearPlant;
 use crate::report::number::round;
 use crate::solve::designed::Designed;
+use crate::solve::names::fault_names;
 use crate::solve::reconfiguration::{
     Combination as DesignedCombination, Reconfiguration as DesignedReconfiguration,
     Reconfigurations,
 };
 use crate::solve::schedule::Scheduled;
-use crate::solve::solution::{Solution, fault_names};
+use crate::solve::solution::Solution;
 use plant_file::PlantFile;
 use plant_file::signals::{EntryPoint, Signal as PlantSignal};
 

@@ -289,6 +289,15 @@ impl<'a> PlantFile<'a> {
         states.iter().chain(&self.actuators).chain(&self.measurements)
     }
 
+    /// The estimator of the observer; in continuous time it predicts.
+    #[must_use]
+    pub fn estimator(&self) -> Estimator {
+        match self.sampling {
+            Some(sampling) if sampling.current => Estimator::Current,
+            _ => Estimator::Prediction,
+        }
+    }
+
     /// Returns the text of the file.
     #[must_use]
     pub fn text(&self) -> &str {

@@ -4,7 +4,8 @@ use control::Domain;
 use nalgebra::DMatrix;
 
 use crate::report::Matrix;
-use crate::solve::solution::{Solution, fault_names};
+use crate::solve::names::fault_names;
+use crate::solve::solution::Solution;
 use plant_file::signals::Signal;
 
 /// Returns the gains of a design.

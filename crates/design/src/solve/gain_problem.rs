@@ -1,0 +1,117 @@
+//! The gains of feedback and observer for one plant.
+
+use control::aso::{FaultyPlant, Gains};
+use control::faults::ExtendedPlant;
+use control::{Domain, lmi, sampled};
+use files::PlaceError;
+use nalgebra::DMatrix;
+use plant_file::PlantFile;
+use plant_file::requirements::Request;
+
+use crate::plant::linear::LinearPlant;
+use crate::solve::gain::{FeedbackProblem, GainResult};
+use crate::solve::gains::{feedback, observer};
+use crate::solve::loop_shape::{LoopProblem, Shaped};
+use crate::solve::names::observer_states;
+use crate::solve::norm_gains::ObserverProblem;
+use crate::solve::pairing::PairProblem;
+use crate::solve::refusal::{States, feedback_refused, refused};
+
+/// What the gains of feedback and observer are computed for.
+pub(crate) struct GainProblem<'a> {
+    pub(crate) file: &'a PlantFile<'a>,
+    pub(crate) linear: &'a LinearPlant,
+    pub(crate) extended: &'a ExtendedPlant,
+    /// The model in the observer.
+    pub(crate) plant: &'a FaultyPlant,
+    /// A and B of the feedback.
+    pub(crate) pair: &'a (DMatrix<f64>, DMatrix<f64>),
+    pub(crate) domain: Domain,
+}
+
+impl GainProblem<'_> {
+    /// Computes the gains of feedback and observer. `common`: the feedback of a family.
+    pub(crate) fn solve(
+        &self,
+        common: Option<GainResult>,
+    ) -> Result<(GainResult, GainResult), PlaceError> {
+        let Self { file, linear, extended, plant, pair: (a, b), domain } = *self;
+        let n = extended.states;
+        let order = a.nrows();
+        let problem = FeedbackProblem {
+            a,
+            b,
+            c: &linear.c.clone().resize_horizontally(order, 0.0),
+            states: n,
+            f_a: &plant.f_a.rows(0, n).into_owned().resize_vertically(order, 0.0),
+        };
+        let of_feedback = linear.with_delays(&file.feedback.requirement, order);
+        let feedback = || match common {
+            Some(common) => Ok(common),
+            None => feedback(&of_feedback, &problem, domain),
+        };
+        let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
+        let of_observer = linear.with_delays(&file.observer.requirement, a_0.nrows());
+        let filter = sampled::filter(extended, domain);
+        let observer_problem = ObserverProblem {
+            a_0: &a_0,
+            c_0: &c_0,
+            b: &plant.b,
+            channels: &extended.channels,
+            faults: plant.f_a.ncols(),
+            filter: filter.as_deref(),
+            estimator: file.estimator(),
+        };
+        // Both run in other threads, which have the same time.
+        let ending = lmi::ending();
+        let feedback = || lmi::until(ending.clone(), feedback);
+        let observer = || observer(&of_observer, &observer_problem, domain);
+        let observer = || lmi::until(ending.clone(), observer);
+        let (feedback, observer) = rayon::join(feedback, observer);
+        let feedback =
+            feedback.map_err(|refusal| feedback_refused(file, linear, domain, refusal))?;
+        let observer = observer.map_err(|refusal| {
+            let names = observer_states(linear, extended);
+            let meaning = "states, filters, faults and rates of ramps";
+            let states = States { names, meaning, of_delays: linear.delay_states() };
+            refused(file, domain, &file.observer, refusal, &states)
+        })?;
+        Ok((feedback, observer))
+    }
+
+    /// Returns the gains of feedback and observer together, with a warning if they do not give the loop its shape.
+    /// `gains`: those of the controller.
+    pub(crate) fn chosen(
+        &self,
+        common: Option<GainResult>,
+        filter: Option<&[f64]>,
+        gains: impl Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync,
+    ) -> Result<(GainResult, GainResult, Option<PlaceError>), crate::Error> {
+        let Self { file, linear, plant, domain, .. } = *self;
+        if let Some(shape) = &file.loop_shape {
+            let problem = LoopProblem { shape, linear, plant, filter, domain, gains };
+            let Shaped { feedback, observer, warning } = problem.tuned(&self.starts()?)?;
+            return Ok((feedback, observer, warning.map(|text| file.error_at(&shape.place, text))));
+        }
+        let (feedback, observer) = self.solve(common)?;
+        // The gains of a schedule are interpolated, so that each point takes the first of its pairs.
+        if file.is_scheduled() {
+            return Ok((feedback, observer, None));
+        }
+        let problem = PairProblem { linear, plant, filter, domain };
+        let (feedback, observer) = problem.chosen(feedback, observer, gains)?;
+        Ok((feedback, observer, None))
+    }
+
+    /// The gains with which the search for the shape of the loop starts, if the file states one.
+    pub(crate) fn starts(&self) -> Result<Vec<[DMatrix<f64>; 2]>, PlaceError> {
+        let Some(shape) = &self.file.loop_shape else { return Ok(Vec::new()) };
+        let gains = |[feedback, observer]: [Request; 2]| {
+            let mut file = self.file.clone();
+            (file.feedback, file.observer) = (feedback, observer);
+            let (feedback, observer) = GainProblem { file: &file, ..*self }.solve(None)?;
+            Ok([feedback.gain, observer.gain])
+        };
+        shape.starts(self.domain).into_iter().map(gains).collect()
+    }
+}

@@ -1,0 +1,109 @@
+//! Requirements on a gain that cannot be met, as errors in the plant file.
+
+use std::ops::Range;
+
+use control::rank::Mode;
+use control::{Domain, Error};
+use files::PlaceError;
+use plant_file::PlantFile;
+use plant_file::requirements::{Request, Requirement};
+
+use crate::plant::fixed_mode::described_in;
+use crate::plant::linear::LinearPlant;
+use crate::solve::gain::Refusal;
+use crate::solve::names::feedback_states;
+
+/// The states that a gain is for.
+pub(crate) struct States {
+    pub(crate) names: Vec<String>,
+    /// What they are, in words.
+    pub(crate) meaning: &'static str,
+    /// Those of delays, for which a plant file states no weights.
+    pub(crate) of_delays: Range<usize>,
+}
+
+impl States {
+    /// The name of the state of a row of weights.
+    pub(crate) fn weighted(&self, row: usize) -> &str {
+        let later = if row < self.of_delays.start { 0 } else { self.of_delays.len() };
+        self.names.get(row + later).map_or("", String::as_str)
+    }
+}
+
+pub(crate) fn feedback_refused(
+    file: &PlantFile<'_>,
+    linear: &LinearPlant,
+    domain: Domain,
+    refusal: Refusal,
+) -> PlaceError {
+    let names = feedback_states(file, linear);
+    let more = names.len() > linear.states.len();
+    let meaning = if more { "states and integrals of references" } else { "states" };
+    let states = States { names, meaning, of_delays: linear.delay_states() };
+    refused(file, domain, &file.feedback, refusal, &states)
+}
+
+/// Converts the failure of a gain to an error at the requirement in the file.
+pub(crate) fn refused(
+    file: &PlantFile<'_>,
+    domain: Domain,
+    request: &Request,
+    refusal: Refusal,
+    states: &States,
+) -> PlaceError {
+    let (order, meaning) = (states.names.len(), states.meaning);
+    let name = |at: usize| states.names[at].clone();
+    let message = match refusal {
+        Refusal::Conflict(message) => message,
+        Refusal::Fixed(mode) => fixed(&request.requirement, &mode, domain, name),
+        Refusal::Control(Error::PoleCount { .. }) => {
+            let count = request.requirement.eigenvalues().len();
+            let of_delays = match states.of_delays.len() {
+                0 => String::new(),
+                count => format!(" ({count} of them those of delays)"),
+            };
+            format!(
+                "expected {order} eigenvalues, one for each of the {meaning}{of_delays}, found {count}"
+            )
+        }
+        Refusal::Control(ref error @ Error::Unweighted { weight: "W", .. }) => {
+            match request.requirement.without_noise() {
+                Some(at) => format!(
+                    "W states no noise for `{}` (its row {} is zero), so that the observer would not \
+                     correct it; expected a number above 0 there",
+                    states.weighted(at),
+                    at + 1
+                ),
+                None => error.to_string(),
+            }
+        }
+        Refusal::Control(error @ Error::Shape { matrix: "Q", .. }) => {
+            format!("{error}, one row for each of the {meaning}")
+        }
+        Refusal::Control(error) => error.to_string(),
+    };
+    match &request.other {
+        Some((name, place)) if message.starts_with(&format!("{name} ")) => {
+            file.error_at(place, message)
+        }
+        _ => file.error_at(&request.place, message),
+    }
+}
+
+/// Says that a requirement excludes the eigenvalue of a mode that no gain moves.
+pub(crate) fn fixed(
+    requirement: &Requirement,
+    mode: &Mode,
+    domain: Domain,
+    name: impl Fn(usize) -> String,
+) -> String {
+    let sampled = matches!(requirement, Requirement::SampledEigenvalues(_));
+    let described = described_in(mode, domain, sampled, name);
+    match requirement {
+        Requirement::Eigenvalues(_) | Requirement::SampledEigenvalues(_) => format!(
+            "no gain moves {described}; expected it among the requested eigenvalues, or `region` or \
+             weights in place of eigenvalues"
+        ),
+        _ => format!("no gain moves {described}, into the region; expected a region around it"),
+    }
+}
