@@ -23,7 +23,8 @@ use crate::solve::reconfiguration::{
 use crate::solve::schedule::Scheduled;
 use crate::solve::solution::Solution;
 use plant_file::PlantFile;
-use plant_file::signals::{EntryPoint, Signal as PlantSignal};
+use plant_file::faults::EntryPoint;
+use plant_file::signals::Signal as PlantSignal;
 
 impl Designed {
     /// Returns the design file.

@@ -15,8 +15,8 @@ use crate::report::robustness::Level;
 use crate::solve::designed::{Designed, design};
 use files::{Source, Table};
 use plant_file::channel::Channel;
+use plant_file::faults::{EntryPoint, FaultDynamics};
 use plant_file::requirements::{Bandwidth, Region, Requirement};
-use plant_file::signals::{EntryPoint, FaultDynamics};
 use plant_file::{Model, PlantFile};
 
 const MASS: &str = r#"A = [[0, 1], [0, 0]]

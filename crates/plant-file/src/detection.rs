@@ -4,7 +4,8 @@ use files::{Entry, Place, PlaceError, Table};
 use nalgebra::{DMatrix, DVector};
 
 use crate::Model;
-use crate::signals::{Fault, Signal, name, position};
+use crate::faults::Fault;
+use crate::signals::{Signal, name, position};
 
 /// What the detection of faults shall do.
 #[derive(Clone, Debug)]

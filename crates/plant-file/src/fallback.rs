@@ -1,8 +1,8 @@
 //! The table `[fallback]` of a plant file: one feedback for the plant and for every actuator that may fail.
 
-use crate::reconfiguration::positions;
 use crate::requirements::{Region, stated_region};
 use crate::signals::Signal;
+use crate::signals::positions;
 use files::{Place, PlaceError, Table};
 
 /// The failures that one feedback must serve without knowing which of them there is.

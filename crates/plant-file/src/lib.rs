@@ -5,6 +5,7 @@ pub mod channel;
 pub mod detection;
 pub mod estimation;
 pub mod fallback;
+pub mod faults;
 pub mod loop_shape;
 mod matrix;
 mod model;
@@ -25,22 +26,22 @@ use crate::channel::ChannelSignals;
 use crate::detection::{DetectionRequest, Disturbance, disturbances};
 use crate::estimation::EstimationRequest;
 use crate::fallback::FallbackRequest;
+use crate::faults::{EntryPoint, Fault, all_faults};
 use crate::loop_shape::LoopShape;
 use crate::matrix::MatrixEntry as _;
 use crate::model::{linearised, stated};
 use crate::names::check_names;
-use crate::reconfiguration::{ReconfigurationRequest, positions};
+use crate::reconfiguration::ReconfigurationRequest;
 use crate::references::References;
 use crate::requirements::{Request, request};
 use crate::robustness::RobustnessLimits;
-use crate::signals::{
-    EntryPoint, Fault, Signal, actuator_faults, delay_order, description, faults,
-};
+use crate::signals::{Signal, delay_order, description};
 use crate::variants::{Schedule, Variant, check_action};
 use control::Domain;
 use control::aso::Estimator;
 use files::{Entry, Place, PlaceError, Source, Table};
 
+pub use faults::FAULTS;
 pub use model::{Model, PlantFmu};
 
 /// A plant file whose entries are valid and consistent.
@@ -174,9 +175,6 @@ const PLACES: [&str; 24] = [
     "reconfiguration",
     "fallback",
 ];
-
-/// The entries that errors about faults point at.
-pub const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
 
 impl<'a> PlantFile<'a> {
     /// Reads and checks the file.
@@ -386,35 +384,6 @@ impl<'a> PlantFile<'a> {
             }
         }
     }
-}
-
-/// Reads `actuator_faults`, "all" or names, and the faults under `[[faults]]`.
-fn all_faults(
-    file: &Table<'_>,
-    actuators: &[Signal],
-    measurements: &[Signal],
-) -> Result<Vec<Fault>, PlaceError> {
-    let mut all = Vec::new();
-    if let Some(entry) = file.get("actuator_faults") {
-        let positions = positions(&entry, actuators, "actuator")?;
-        all.extend(actuator_faults(actuators, &positions, &entry.place));
-    }
-    if let Some(entry) = file.get("faults") {
-        all.extend(faults(&entry, actuators, measurements)?);
-    } else if let Some(entry) = file.get("F_a") {
-        let unnamed = |k: usize| Fault {
-            name: format!("f{k}"),
-            entry_point: EntryPoint::Column(k - 1),
-            ..Fault::constant(&entry.place)
-        };
-        all.extend((1..=entry.matrix()?.ncols()).map(unnamed));
-    }
-    if all.is_empty() {
-        let message =
-            "no fault is stated: expected `F_a`, `actuator_faults = \"all\"` or [[faults]]";
-        return Err(file.source.error(&file.place, message));
-    }
-    Ok(all)
 }
 
 fn sampling(file: &Table<'_>) -> Result<Option<Sampling>, PlaceError> {

@@ -4,7 +4,8 @@ use files::PlaceError;
 use fmu_description::{array_element, is_structured_name, misplaced_elements};
 
 use crate::estimation::Law;
-use crate::signals::{EntryPoint, Fault, FaultDynamics, Signal};
+use crate::faults::{EntryPoint, Fault, FaultDynamics};
+use crate::signals::Signal;
 use crate::variants::Variable;
 use crate::{Model, PlantFile};
 

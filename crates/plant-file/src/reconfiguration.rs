@@ -1,7 +1,8 @@
 //! The table `[reconfiguration]` of a plant file: what happens when an actuator is gone.
 
-use crate::signals::{EntryPoint, Fault, Signal};
-use files::{Entry, Place, PlaceError, Table};
+use crate::faults::{EntryPoint, Fault};
+use crate::signals::{Signal, positions};
+use files::{Place, PlaceError, Table};
 
 /// What the controller must be able to do without an actuator.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,42 +124,6 @@ fn together(table: &Table<'_>, used: usize, all: usize) -> Result<usize, PlaceEr
         }
     }
     Ok(most_together)
-}
-
-/// Reads names of signals, or the text "all".
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn positions(
-    entry: &Entry<'_>,
-    signals: &[Signal],
-    what: &str,
-) -> Result<Vec<usize>, PlaceError> {
-    if entry.is_text() {
-        return match entry.text()? {
-            "all" => Ok((0..signals.len()).collect()),
-            other => {
-                Err(entry.error(format!("expected a list of names or \"all\", found {other:?}")))
-            }
-        };
-    }
-    let mut all = Vec::new();
-    for member in entry.list()? {
-        let name = member.text()?;
-        let at = signals.iter().position(|signal| signal.name == name).ok_or_else(|| {
-            let names: Vec<_> = signals.iter().map(|signal| signal.name.as_str()).collect();
-            member.error(format!("no {what} is named {name:?}; there are {}", names.join(", ")))
-        })?;
-        if all.contains(&at) {
-            return Err(member.error(format!("the {what} `{name}` is there twice")));
-        }
-        all.push(at);
-    }
-    if all.is_empty() {
-        return Err(entry.error("expected at least one name, or \"all\""));
-    }
-    Ok(all)
 }
 
 /// Reads `stuck_at`, a table from actuators to commands; 0 if missing.

@@ -57,87 +57,14 @@ impl Signal {
     }
 }
 
-/// The assumed dynamics of a fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FaultDynamics {
-    /// f' = 0.
-    Constant,
-    /// f'' = 0.
-    Ramp,
-}
-
-/// The point where a fault enters the plant.
-#[derive(Clone, Debug, PartialEq)]
-pub enum EntryPoint {
-    /// Column of F_a, from 0.
-    Column(usize),
-    /// An actuator, from 0: the fault is added to its command.
-    Actuator(usize),
-    /// A measurement, from 0: the fault is added to it.
-    Sensor(usize),
-    /// An actuator, from 0, that loses a fraction of its command. The fraction is estimated while
-    /// the command is well above `least_command`.
-    Loss {
-        /// The actuator, from 0.
-        actuator: usize,
-        /// The command, in its unit, below which no loss is estimated.
-        least_command: f64,
-    },
-    /// An input of the plant's FMU.
-    Input(String),
-}
-
-/// A fault.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Fault {
-    /// Its name.
-    pub name: String,
-    /// Its unit, as FMI writes it.
-    pub unit: Option<String>,
-    /// What it is, for a reader.
-    pub description: String,
-    /// Its assumed dynamics.
-    pub dynamics: FaultDynamics,
-    /// Where it enters the plant.
-    pub entry_point: EntryPoint,
-    /// Largest absolute value.
-    pub bound: Option<f64>,
-    /// Largest absolute rate, per s.
-    pub rate_bound: Option<f64>,
-    /// Largest step change.
-    pub step: Option<f64>,
-    /// The largest fraction of a loss of effectiveness for which the loop must be stable.
-    pub up_to: Option<f64>,
-    /// Where the file states it.
-    pub place: Place,
-}
-
 /// Number of states of the observer for each delay, unless stated.
 const DELAY_ORDER: usize = 3;
 /// The largest number of them.
 const MOST_DELAY_ORDER: f64 = 8.0;
-/// Largest number of actuators with a stated loss.
-const MOST_LOSSES: usize = 4;
 const SIGNAL: [&str; 4] = ["name", "unit", "description", "operating"];
 const ACTUATOR: [&str; 6] = ["name", "unit", "description", "operating", "limits", "delay"];
 const MEASUREMENT: [&str; 7] =
     ["name", "unit", "description", "operating", "range", "longest_hold", "delay"];
-const FAULT: [&str; 13] = [
-    "name",
-    "unit",
-    "description",
-    "kind",
-    "actuator",
-    "sensor",
-    "loss_of",
-    "least_command",
-    "up_to",
-    "input",
-    "bound",
-    "rate_bound",
-    "step",
-];
-
 /// Reads the signals under `key`: texts (names) or tables.
 ///
 /// # Errors
@@ -277,131 +204,6 @@ fn limits(entry: &Entry<'_>) -> Result<[f64; 2], PlaceError> {
     }
 }
 
-/// Reads the faults under `[[faults]]`. Faults without an entry point take the columns of F_a in
-/// turn.
-///
-/// # Errors
-///
-/// Returns a [`PlaceError`] at the entry that is wrong or missing.
-pub fn faults(
-    entry: &Entry<'_>,
-    actuators: &[Signal],
-    measurements: &[Signal],
-) -> Result<Vec<Fault>, PlaceError> {
-    let members = entry.list()?;
-    if members.is_empty() {
-        return Err(entry.error("expected at least one fault"));
-    }
-    let mut all: Vec<Fault> = Vec::with_capacity(members.len());
-    for member in &members {
-        let columns = all.iter().filter(|fault| matches!(fault.entry_point, EntryPoint::Column(_)));
-        let fault = fault(member, actuators, measurements, columns.count())?;
-        if all.iter().any(|other| other.name == fault.name) {
-            return Err(member.error(format!("the name `{}` is there twice", fault.name)));
-        }
-        all.push(fault);
-        if all.iter().filter(|fault| fault.up_to.is_some()).count() > MOST_LOSSES {
-            return Err(member.error(format!(
-                "losses are proven for all combinations: expected `up_to` for at most {MOST_LOSSES} faults"
-            )));
-        }
-    }
-    Ok(all)
-}
-
-fn fault(
-    entry: &Entry<'_>,
-    actuators: &[Signal],
-    measurements: &[Signal],
-    column: usize,
-) -> Result<Fault, PlaceError> {
-    let table = entry.table()?;
-    table.allow(&FAULT)?;
-    let number = |key: &str| table.get(key).map(|entry| entry.positive()).transpose();
-    let entry_point = entry_point(&table, actuators, measurements, column)?;
-    let own_unit = unit(&table)?;
-    let unit = own_unit.or_else(|| match entry_point {
-        EntryPoint::Actuator(at) | EntryPoint::Loss { actuator: at, .. } => {
-            actuators[at].unit.clone()
-        }
-        EntryPoint::Sensor(at) => measurements[at].unit.clone(),
-        EntryPoint::Column(_) | EntryPoint::Input(_) => None,
-    });
-    Ok(Fault {
-        name: name(&table.require("name", "the name of the fault")?)?,
-        unit,
-        description: description(&table)?,
-        dynamics: dynamics(&table)?,
-        entry_point,
-        bound: number("bound")?,
-        rate_bound: number("rate_bound")?,
-        step: number("step")?,
-        up_to: up_to(&table)?,
-        place: entry.place.clone(),
-    })
-}
-
-fn dynamics(table: &Table<'_>) -> Result<FaultDynamics, PlaceError> {
-    let Some(entry) = table.get("kind") else {
-        return Ok(FaultDynamics::Constant);
-    };
-    match entry.text()? {
-        "constant" => Ok(FaultDynamics::Constant),
-        "ramp" => Ok(FaultDynamics::Ramp),
-        other => Err(entry.error(format!("expected \"constant\" or \"ramp\", found {other:?}"))),
-    }
-}
-
-fn entry_point(
-    table: &Table<'_>,
-    actuators: &[Signal],
-    measurements: &[Signal],
-    column: usize,
-) -> Result<EntryPoint, PlaceError> {
-    let keys = ["actuator", "sensor", "loss_of", "input"];
-    let stated: Vec<_> = keys.iter().filter_map(|key| table.get(key)).collect();
-    if let [_, second, ..] = stated.as_slice() {
-        return Err(second.error(format!("a fault has only one of {}", keys.join(", "))));
-    }
-    let least_command = table.get("least_command");
-    if let Some(actuator) = table.get("loss_of") {
-        let at = position(&actuator, actuators, "actuator")?;
-        let meaning = "the command, in its unit, below which no loss of effectiveness is estimated";
-        let least_command = table.require("least_command", meaning)?.positive()?;
-        return Ok(EntryPoint::Loss { actuator: at, least_command });
-    }
-    if let Some(entry) = least_command {
-        return Err(entry.error("this belongs to a fault with `loss_of`"));
-    }
-    if let Some(actuator) = table.get("actuator") {
-        return Ok(EntryPoint::Actuator(position(&actuator, actuators, "actuator")?));
-    }
-    if let Some(sensor) = table.get("sensor") {
-        return Ok(EntryPoint::Sensor(position(&sensor, measurements, "measurement")?));
-    }
-    match table.get("input") {
-        Some(input) => Ok(EntryPoint::Input(name(&input)?)),
-        None => Ok(EntryPoint::Column(column)),
-    }
-}
-
-/// Reads the largest fraction of a loss of effectiveness.
-fn up_to(table: &Table<'_>) -> Result<Option<f64>, PlaceError> {
-    let Some(entry) = table.get("up_to") else {
-        return Ok(None);
-    };
-    if table.get("loss_of").is_none() {
-        return Err(entry.error("this belongs to a fault with `loss_of`"));
-    }
-    match entry.positive()? {
-        fraction if fraction <= 1.0 => Ok(Some(fraction)),
-        other => Err(entry.error(format!(
-            "expected a fraction above 0 and at most 1, the largest part of its effect that the \
-             actuator may lose, found {other}"
-        ))),
-    }
-}
-
 /// Returns the index of the signal that the entry names.
 ///
 /// # Errors
@@ -415,36 +217,37 @@ pub fn position(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<usi
     })
 }
 
-/// Returns one additive fault for each actuator at `positions`.
-#[must_use]
-pub fn actuator_faults(actuators: &[Signal], positions: &[usize], place: &Place) -> Vec<Fault> {
-    let fault = |&at: &usize| Fault {
-        name: format!("f_{}", actuators[at].name),
-        unit: actuators[at].unit.clone(),
-        description: format!("fault of {}", actuators[at].name),
-        entry_point: EntryPoint::Actuator(at),
-        ..Fault::constant(place)
-    };
-    positions.iter().map(fault).collect()
-}
-
-impl Fault {
-    /// Returns a constant fault on the first column of F_a with no other data.
-    #[must_use]
-    pub fn constant(place: &Place) -> Self {
-        Self {
-            name: String::new(),
-            unit: None,
-            description: String::new(),
-            dynamics: FaultDynamics::Constant,
-            entry_point: EntryPoint::Column(0),
-            bound: None,
-            rate_bound: None,
-            step: None,
-            up_to: None,
-            place: place.clone(),
-        }
+/// Reads names of signals, or the text "all".
+///
+/// # Errors
+///
+/// Returns a [`PlaceError`] at the entry that is wrong or missing.
+pub fn positions(
+    entry: &Entry<'_>,
+    signals: &[Signal],
+    what: &str,
+) -> Result<Vec<usize>, PlaceError> {
+    if entry.is_text() {
+        return match entry.text()? {
+            "all" => Ok((0..signals.len()).collect()),
+            other => {
+                Err(entry.error(format!("expected a list of names or \"all\", found {other:?}")))
+            }
+        };
     }
+    let mut all = Vec::new();
+    for member in entry.list()? {
+        let at = position(&member, signals, what)?;
+        if all.contains(&at) {
+            let name = &signals[at].name;
+            return Err(member.error(format!("the {what} `{name}` is there twice")));
+        }
+        all.push(at);
+    }
+    if all.is_empty() {
+        return Err(entry.error("expected at least one name, or \"all\""));
+    }
+    Ok(all)
 }
 
 /// Whether all signals have the same unit, or none.

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::budget::Budget;
 use crate::report::{Bound, Frequency, Norm};
 use crate::solve::solution::Solution;
-use plant_file::signals::Fault;
+use plant_file::faults::Fault;
 
 /// Relative width of the brackets of peak gains and norms.
 const WIDTH: f64 = 1e-3;

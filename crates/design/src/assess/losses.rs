@@ -16,7 +16,7 @@ use crate::report::losses::{
 use crate::report::robustness::{Level, Number};
 use crate::solve::solution::Solution;
 use crate::solve::tracking::DesignLoop;
-use plant_file::signals::EntryPoint;
+use plant_file::faults::EntryPoint;
 
 /// Largest number of states of plant and controller for which linear matrix inequalities are solved.
 const LARGEST_ORDER: usize = 30;
@@ -35,7 +35,7 @@ struct StatedLoss {
 /// Returns the stated losses.
 fn stated(designed: &Solution) -> Vec<StatedLoss> {
     let linear = &designed.linear;
-    let one = |fault: &plant_file::signals::Fault| match (&fault.entry_point, fault.up_to) {
+    let one = |fault: &plant_file::faults::Fault| match (&fault.entry_point, fault.up_to) {
         (EntryPoint::Loss { actuator, .. }, Some(up_to)) => Some(StatedLoss {
             name: linear.actuators[*actuator].name.clone(),
             actuator: *actuator,

@@ -44,8 +44,9 @@ use crate::solve::fallback::Fallback;
 use crate::solve::gain::GainResult;
 use crate::solve::solution::Solution;
 use crate::solve::tracking::{DesignLoop, TrackingAction};
+use plant_file::faults::{EntryPoint, Fault, FaultDynamics};
 use plant_file::requirements::{self, Requirement};
-use plant_file::signals::{self, EntryPoint, Fault, FaultDynamics};
+use plant_file::signals;
 use plant_file::{PlantFile, estimator};
 
 /// A design with all that its report is about.

@@ -10,7 +10,7 @@ use crate::assess::analysis::Outputs;
 use crate::report::robustness::Number;
 use crate::report::{Curve, StepResponse};
 use crate::solve::solution::Solution;
-use plant_file::signals::Fault;
+use plant_file::faults::Fault;
 
 /// Relative band of the settling time: a response has settled when it stays within this fraction of
 /// its largest distance.

@@ -15,8 +15,9 @@ use crate::plant::delays::{self, Delayed, delayed};
 use files::PlaceError;
 use plant_file::PlantFile;
 use plant_file::detection::{Disturbance, DisturbanceEntry};
+use plant_file::faults::{EntryPoint, Fault, FaultDynamics};
 use plant_file::requirements::Requirement;
-use plant_file::signals::{EntryPoint, Fault, FaultDynamics, Signal};
+use plant_file::signals::Signal;
 
 /// Relative distance from an equilibrium below which an operating point counts as an equilibrium.
 pub(crate) const AT_REST: f64 = 1e-6;

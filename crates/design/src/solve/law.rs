@@ -14,7 +14,7 @@ use crate::plant::linear::LinearPlant;
 use crate::report::Check;
 use crate::report::robustness::Number;
 use plant_file::estimation::Law;
-use plant_file::signals::FaultDynamics;
+use plant_file::faults::FaultDynamics;
 
 /// The default of `K_1`.
 const KEPT: f64 = 0.99;
@@ -165,7 +165,7 @@ impl LawProblem<'_> {
 
     /// The coordinates that three of the laws need; adds their conditions.
     fn direct_form(&self, conditions: &mut Vec<Check>) -> Result<DirectForm, String> {
-        let ramp = |fault: &&plant_file::signals::Fault| fault.dynamics == FaultDynamics::Ramp;
+        let ramp = |fault: &&plant_file::faults::Fault| fault.dynamics == FaultDynamics::Ramp;
         if let Some(fault) = self.linear.faults.iter().find(ramp) {
             return Err(format!(
                 "it has its own model of a fault: expected kind = \"constant\" for fault `{}`",
@@ -254,7 +254,7 @@ impl LawProblem<'_> {
     /// A parameter with one number for each fault.
     fn each(&self, name: &str, unit: Option<&str>, values: &[f64]) -> Vec<Number> {
         let faults = self.linear.faults.iter().zip(values);
-        let one = |(fault, value): (&plant_file::signals::Fault, &f64)| Number {
+        let one = |(fault, value): (&plant_file::faults::Fault, &f64)| Number {
             name: format!("{name} of {}", fault.name),
             unit: unit.map(str::to_owned).or_else(|| fault.unit.clone()),
             value: *value,

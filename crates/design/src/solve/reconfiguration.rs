@@ -22,9 +22,10 @@ use crate::solve::gains::feedback;
 use crate::solve::solution::Solution;
 use crate::solve::tracking::decay;
 use plant_file::PlantFile;
+use plant_file::faults::EntryPoint;
 use plant_file::reconfiguration::ReconfigurationRequest;
 use plant_file::requirements::Requirement;
-use plant_file::signals::{EntryPoint, Signal};
+use plant_file::signals::Signal;
 
 /// Relative size of the effect that the other actuators cannot produce below which the allocation counts
 /// as exact.
