@@ -9,6 +9,7 @@
 * :class:`Results` holds the rows of a run for NumPy, Arrow, pandas, polars and xarray.
 * :func:`report` writes the report of a run, as a page with interactive plots.
 * :func:`design` designs a fault-tolerant controller, :func:`trade_off` one for each of several requirements.
+* :func:`identify` makes a plant for it from logs.
 * :func:`check` and :func:`read_model_description` look at an FMU; :func:`compile` builds its library.
 """
 
@@ -35,6 +36,7 @@ from ._errors import (
     RunError,
     TimeLimitError,
 )
+from ._identify import Plant, identify
 from ._paper import fmus, paper, reproduce
 from ._report import report
 from ._results import Results
@@ -61,6 +63,7 @@ __all__ = [
     "FmuError",
     "MissingPackageError",
     "ModelDescription",
+    "Plant",
     "Results",
     "ResultsError",
     "RunError",
@@ -78,6 +81,7 @@ __all__ = [
     "design",
     "fault",
     "fmus",
+    "identify",
     "paper",
     "read_model_description",
     "report",

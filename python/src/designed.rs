@@ -1,10 +1,11 @@
 //! Designs of controllers.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use control::Domain;
 use control::robustness::Point;
+use design::{LogOptions, TimeLimits, new_plant_file};
 use nalgebra::DMatrix;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -39,6 +40,26 @@ pub(crate) fn design_plant(plant: &Bound<'_, PyAny>, path: PathBuf) -> PyResult<
     let result = guarded(py, || design::design_text(&path, text))?;
     let design = result.map_err(|error| error::design(&error).raise(py))?;
     Ok(Designed { design: Mutex::new(design) })
+}
+
+/// What is written for logs: the text of a plant file, why it has no controller, warnings.
+type Identified = (String, Option<String>, Vec<String>);
+
+/// Identifies a plant from the logs at `paths`.
+#[pyfunction]
+pub(crate) fn identify(
+    py: Python<'_>,
+    paths: Vec<PathBuf>,
+    inputs: Vec<String>,
+    outputs: Vec<String>,
+    order: Option<usize>,
+) -> PyResult<Identified> {
+    let options = LogOptions { inputs, outputs, order };
+    let limits = TimeLimits::default();
+    let new =
+        guarded(py, || new_plant_file(&paths, &options, Path::new("plant.toml"), &limits))?;
+    let new = new.map_err(|error| error::design(&error).raise(py))?;
+    Ok((new.text, new.refusal, new.warnings))
 }
 
 /// The rows of a matrix.

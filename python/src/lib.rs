@@ -30,7 +30,7 @@ mod _core {
     #[pymodule_export]
     use super::description::{compile, read_model_description};
     #[pymodule_export]
-    use super::designed::{Designed, design_file, design_plant};
+    use super::designed::{Designed, design_file, design_plant, identify};
     #[pymodule_export]
     use super::live::LiveView;
     #[pymodule_export]
