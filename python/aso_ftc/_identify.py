@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -81,8 +82,9 @@ def identify(
         try:
             return Plant(*_core.identify(paths, list(inputs), list(outputs), order))
         except DesignError as error:
-            # Nobody wrote the file: the message names the log.
-            message = str(error).replace(f"{folder}{os.sep}", "").replace(".csv: ", ": ")
+            # Nobody wrote the file or stated an option of the command: the message names log and argument.
+            message = re.sub(rf"({re.escape(folder + os.sep)})?(log \d+)\.csv", r"\2", str(error))
+            message = re.sub(r"--(inputs|outputs|order)\b", r"`\1`", message)
             raise DesignError(message, error.kind) from None
 
 

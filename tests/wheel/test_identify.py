@@ -42,9 +42,12 @@ def test_several_logs_are_one_estimate_and_results_are_a_log(frame, paper):
     half = len(frame) // 2
     plant = af.identify(frame[:half], {name: frame[name][half:] for name in frame}, inputs=["force"])
     np.testing.assert_allclose(plant["A"][1][1], -0.5, atol=0.02)
-    with pytest.raises(af.DesignError, match="log 1: expected"):
-        # In the paper's loop nothing moves the force.
-        af.identify(paper.run(), inputs=["FrictionPendulum.F_c"], outputs=["FrictionPendulum.x_p"])
+    paper.experiment["stop-time"] = 2.0
+    results = paper.run()
+    pendulum = af.identify(results, inputs=["controller.u"], outputs=["plant.x_p", "plant.theta"])
+    assert np.shape(pendulum["C"])[0] == 2
+    with pytest.raises(af.DesignError, match="log 1: `inputs`: there is no column F_c; expected one of plant.u, "):
+        af.identify(results, inputs=["F_c"])
 
 
 @pytest.mark.parametrize(
