@@ -56,8 +56,7 @@ pub(crate) fn identify(
 ) -> PyResult<Identified> {
     let options = LogOptions { inputs, outputs, order };
     let limits = TimeLimits::default();
-    let new =
-        guarded(py, || new_plant_file(&paths, &options, Path::new("plant.toml"), &limits))?;
+    let new = guarded(py, || new_plant_file(&paths, &options, Path::new("plant.toml"), &limits))?;
     let new = new.map_err(|error| error::design(&error).raise(py))?;
     Ok((new.text, new.refusal, new.warnings))
 }

@@ -353,7 +353,7 @@ fn assumptions(designed: &Designed) -> Vec<String> {
     ];
     if nominal.linear.delays.any() {
         all.push(format!(
-            "Each delay is approximated: by {} states in the observer and in the responses, bounds and norms of errors; \
+            "Each delay is approximated: by {} states in the observer, the residuals, the responses, and the bounds and norms of errors; \
              by {JUDGED} states in margins, peaks and tolerances. The margins are followed by what the delays \
              themselves change.",
             nominal.linear.delay_order
