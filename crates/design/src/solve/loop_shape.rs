@@ -24,6 +24,8 @@ const FLOOR: f64 = 0.01;
 const TUNED: usize = 4;
 /// The tuned loop may decay this part as fast as that of its start.
 const DECAY: f64 = 0.1;
+/// The same with integral action: how slowly a set point is followed, no term shows.
+const DECAY_OF_INTEGRALS: f64 = 0.9;
 /// Smallest size of a gain, relative to the sizes of its row and its column.
 const SMALLEST: f64 = 0.1;
 /// Part of half the sampling rate up to which the roll-off is asked for.
@@ -61,6 +63,10 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         let ending = lmi::ending();
         let is_over = || ending.as_ref().is_some_and(|ending| ending());
         let terms = self.terms()?;
+        let has_integrals = starts
+            .iter()
+            .any(|[feedback, observer]| (self.gains)(feedback, observer).integral.is_some());
+        let decay = if has_integrals { DECAY_OF_INTEGRALS } else { DECAY };
         let tune = |[feedback, observer]: &[DMatrix<f64>; 2], is_start: bool| {
             let (of_feedback, of_observer) = (feedback.shape(), observer.shape());
             let controller = |parameters: &DVector<f64>| {
@@ -74,7 +80,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
                 plant: plant.clone(),
                 controller: &controller,
                 terms: terms.clone(),
-                instability: DECAY * excess.min(0.0),
+                instability: decay * excess.min(0.0),
                 rate: self.shape.bandwidth,
                 is_over: &is_over,
             };
