@@ -2,8 +2,10 @@
 those of the commands.
 
 The blocks marked `sh` of a page run in the order of the page, in a copy of the checkout, with cargo and with the Python
-environment that the commands of README.md make: outside of the checkout, empty at the start. README.md is first. If
-BUILT_PROGRAMS is set, the copy gets what is built here, and cargo does not build it again; else all is built from nothing.
+environment that the commands of README.md make: outside of the checkout, empty at the start. README.md is first.
+Many blocks begin with the same installation or the same packing: such a line runs once, and counts in each of them.
+If BUILT_PROGRAMS is set, the copy gets what is built here, and cargo does not build it again; else all is built from
+nothing.
 A comment on the line before a block may say `<!-- ends with status N -->`, `<!-- runs until interrupted -->`, or
 `<!-- not run: REASON -->` with a reason of NOT_RUN.
 """
@@ -43,6 +45,8 @@ NOT_RUN = {
 }
 REMARK = re.compile(rf"not run: ({'|'.join(NOT_RUN)})|ends with status \d+|runs until interrupted")
 ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+[\w/.-]*")
+# A line that does the same each time and leaves no variable of the shell.
+ONCE = re.compile(r"(python -m pip install|aso-ftc pack)\b[^|>&;\\$]*")
 SECONDS = 1800
 
 
@@ -102,6 +106,13 @@ class Reader:
 
     def run(self, text):
         """Runs the commands once: a later call returns the same exit status and output."""
+        first, _, rest = text.partition("\n")
+        if rest and ONCE.fullmatch(first):
+            done = self.run(f"{first}\n")
+            if done.returncode == 0:
+                after = self.run(rest)
+                return subprocess.CompletedProcess(text, after.returncode, done.stdout + after.stdout)
+            return done
         shell = self.start(text)
         try:
             output, _ = shell.communicate(timeout=SECONDS)
