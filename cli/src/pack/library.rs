@@ -189,7 +189,8 @@ fn compile<'a>(
     let target = metadata.target_directory.join("libraries");
     let mut command = Command::new(program("CARGO", "cargo"));
     let ids: Vec<_> = members.flat_map(|member| ["-p", &member.package.id.repr]).collect();
-    let alone = ids.len() == 2;
+    // Not by what is packed: other flags for a crate alone would build it again after it was packed with others.
+    let alone = metadata.workspace_members.len() == 1;
     command.current_dir(&source.folder).arg(if alone { "rustc" } else { "build" }).args(ids);
     command.args(["--lib", "--profile", "fmu", "--message-format", "json-render-diagnostics"]);
     command.args(locked.then_some("--locked")).arg("--target-dir").arg(&target);
