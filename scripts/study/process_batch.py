@@ -1,9 +1,9 @@
-"""Designs the test batch of Astrom and Hagglund with delays by default, as a table in Markdown.
+"""Designs plants of industrial processes with delays by default, as a table in Markdown.
 
     python scripts/study/process_batch.py
 
-The plants are the nine families of K. J. Astrom and T. Hagglund, Revisiting the Ziegler-Nichols step response method for PID
-control, J. Process Control 14 (2004), eq. (1) in its parameters: 133 plants of industrial processes. Each is given to
+The plants are of the nine families of the test batch of K. J. Astrom and T. Hagglund, Revisiting the Ziegler-Nichols step
+response method for PID control, J. Process Control 14 (2004), with 133 sets of parameters, those of `batch`. Each is given to
 `aso-ftc design` without a requirement, with the delay at the command, in continuous and in sampled time; a sample is a 40th
 of the longest time constant or of the delay. The peaks of S are those with the delays themselves. Needs
 target/release/aso-ftc and Python 3.11 with scipy.

@@ -193,6 +193,8 @@ def test_weights_are_those_of_the_states_of_the_plant(aso_ftc, tmp_path):
     [
         (plant_text(CART, [-0.1], [0, 0]), "expected a time in s, 0 or more, found -0.1"),
         (plant_text(CART, [0], [0, 0], "delay_order = 2"), "no actuator and no measurement has a `delay`"),
+        (plant_text(TANK, [1e-12], [0]), "a delay of 1e-12 s is too short beside the fastest time constant of the plant, 100 s"),
+        (plant_text(TANK, [0], [1e300]), "too long beside the fastest time constant of the plant, 100 s"),
         (plant_text(CART, [0.1], [0, 0], "delay_order = 0"), "expected a whole number from 1 to 8, found 0"),
         (plant_text(CART, [0.1], [0, 0], "delay_order = 2.5"), "expected a whole number from 1 to 8, found 2.5"),
         (

@@ -44,7 +44,8 @@ pub(crate) fn summarise(report: &Report) {
         if let Some(delays) = &robustness.delays {
             let [at_input, at_output] = delays.s_peaks.map(number);
             println!(
-                "with the delays themselves: peak of S: {at_input} at the input, {at_output} at the output; {}",
+                "with the delays themselves, at {} frequencies: peak of S: {at_input} at the input, {at_output} at the output; {}",
+                delays.frequencies,
                 if delays.difference < 1.0 { "stable" } else { "stability is not shown" }
             );
         }

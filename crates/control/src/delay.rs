@@ -30,8 +30,8 @@ const WHOLE: f64 = 1e-9;
 ///
 /// with `z_1` = y in place of `m_0`, all entries of A and b are small whole numbers. A constant u leads to z = [u, 0, ..., 0].
 ///
-/// Sources: M. Vajta, Some remarks on Pade approximations (2000), for the degree of the numerator; A. R. Voelker, C.
-/// Eliasmith, Neural Computation 30 (2018), (11) to (13), for the Legendre form.
+/// Sources: M. Vajta, Some remarks on Pade approximations (2000), for the degree of the numerator; A. R. Voelker, I. Kajic, C.
+/// Eliasmith, Legendre memory units, Advances in Neural Information Processing Systems 32 (2019), (1), for the Legendre form.
 ///
 /// # Example
 ///
@@ -175,8 +175,11 @@ impl Delays {
     /// Where [`Delays::approximated`] has an entry of a plant with n states.
     #[must_use]
     pub fn entry(&self, n: usize, order: usize, entry: PlantEntry) -> PlantEntry {
-        let [inputs, outputs] = self.first_states(order);
         let PlantEntry { matrix, row, column } = entry;
+        if matrix == 0 {
+            return entry;
+        }
+        let [inputs, outputs] = self.first_states(order);
         let (of_measurement, of_command) = (matrix >= 2, matrix % 2 == 1);
         let first = |all: &[Option<usize>], at: usize, is_signal: bool| {
             all.get(at).copied().flatten().filter(|_| is_signal).map(|first| n + first)
@@ -229,8 +232,9 @@ impl Delays {
     /// `plant`: in continuous time, without its delays; `closed`: the loop with an approximation, stable; `frequencies`: in
     /// rad/s, in sampled time up to pi / T. A sample is taken before the command changes.
     ///
-    /// Sources: for the stability G. Zames, IEEE Trans. Autom. Control 11 (1966), on the segment between the two loops; for
-    /// the samples E. I. Jury, Theory and application of the z-transform method (1964), chapter 4.
+    /// Sources: for the stability J. C. Doyle, G. Stein, IEEE Trans. Autom. Control 26 (1981), who follow the poles between
+    /// the two loops; for the samples the modified z-transform, E. I. Jury, Theory and application of the z-transform method
+    /// (1964).
     ///
     /// # Errors
     ///

@@ -82,7 +82,7 @@ pub struct Limits {
 pub struct Robustness {
     /// The loop opened at the commands and at the measurements.
     pub points: Vec<LoopPoint>,
-    /// Largest delay, s, common to all commands.
+    /// Largest delay, s, common to all commands, on top of those of the plant file.
     #[schemars(with = "Option<f64>")]
     pub delay_margin: f64,
     /// The longest time, s, over which the signals may be held; for a sampled design the longest

@@ -1,17 +1,46 @@
 //! The delays of a plant: the states that approximate them, in the observer and for the judgement.
 
 use control::delay::{Delays, pade};
+use control::eigen::eigenvalues;
 use control::robustness::Tolerances;
 use control::{Error, StateSpace};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
+use crate::report::number::rounded;
 use plant_file::PlantFile;
 use plant_file::signals::Signal;
 
 /// Number of states for each delay in the plant of the judgement: the error of its approximation is below 2e-7 up to 7 rad
 /// in the delay.
 pub(crate) const JUDGED: usize = 10;
+
+/// Delays of less than this part of the plant's fastest time constant, or of more than its inverse, are beyond rounding.
+const PART: f64 = 1e-9;
+
+/// Refuses delays that rounding hides beside the plant, or the plant beside them.
+pub(crate) fn check(
+    file: &PlantFile<'_>,
+    delays: &Delays,
+    plant: &StateSpace,
+) -> Result<(), crate::Error> {
+    let fastest = eigenvalues(&plant.a)?.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    let beyond = |delay: f64| delay > 0.0 && !(PART..=1.0 / PART).contains(&(delay * fastest));
+    let signals = [("actuators", &delays.inputs), ("measurements", &delays.outputs)];
+    for (key, all) in signals.into_iter().filter(|_| fastest > 0.0) {
+        let Some(delay) = all.iter().copied().find(|&delay| beyond(delay)) else { continue };
+        let time = 1.0 / fastest;
+        let (relation, advice) =
+            if delay < time { ("short", "the file without it") } else { ("long", "a shorter one") };
+        let message = format!(
+            "a delay of {} s is too {relation} beside the fastest time constant of the plant, {} s; expected {advice}",
+            rounded(delay),
+            rounded(time)
+        );
+        return Err(file.error(&[key], message).into());
+    }
+    Ok(())
+}
 
 /// The delays that the plant file states.
 pub(crate) fn of(file: &PlantFile<'_>) -> Delays {

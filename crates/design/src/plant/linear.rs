@@ -85,7 +85,7 @@ impl LinearPlant {
         self.undelayed.a.nrows()..self.states.len()
     }
 
-    /// Whether a mode is one of delays: of equal delays of two signals no gain moves one, and none need be.
+    /// Whether a mode is one of delays, which is stable. Of equal delays of two signals no gain moves one.
     pub(crate) fn is_of_delays(&self, mode: &Mode) -> bool {
         mode.dominant.iter().all(|state| self.delay_states().contains(state))
     }

@@ -26,7 +26,7 @@ pub(crate) fn check_controllable(
     for mode in modes.into_iter().filter(above_or_on_the_real_axis) {
         let stable = is_clearly_stable(mode.eigenvalue, &linear.a, Domain::Continuous);
         let stable = stable.map_err(refuse)? && rank.rank > 0;
-        if stable && linear.is_of_delays(&mode) {
+        if linear.is_of_delays(&mode) {
             continue;
         }
         let message = format!(
@@ -56,9 +56,8 @@ pub(crate) fn check_detectable(
 ) -> Result<(), crate::Error> {
     let measurements = joined(linear.measurements.iter().map(|signal| signal.name.as_str()));
     let modes = detectability.unobservable.iter();
-    let shown = |(mode, stable): &&(Mode, bool)| {
-        above_or_on_the_real_axis(mode) && !(*stable && linear.is_of_delays(mode))
-    };
+    let shown =
+        |(mode, _): &&(Mode, bool)| above_or_on_the_real_axis(mode) && !linear.is_of_delays(mode);
     for (mode, stable) in modes.filter(shown) {
         let message = format!(
             "the measurements {measurements} show {} of {} states only: no observer moves {}{}",

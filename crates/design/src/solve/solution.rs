@@ -19,7 +19,7 @@ use plant_file::{FAULTS, PlantFile};
 
 use crate::plant::linear::LinearPlant;
 use crate::plant::plausibility::{check_faults, check_limits};
-use crate::plant::{attainable, feedthrough};
+use crate::plant::{attainable, delays, feedthrough};
 use crate::solve::existence::{check_controllable, check_detectable};
 use crate::solve::family::{self, Family, Member, common_feedback};
 use crate::solve::gain::{GainResult, unique};
@@ -81,6 +81,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     crate::threads::start()?;
     let linear = LinearPlant::of(file)?;
     feedthrough::check(file, &linear)?;
+    delays::check(file, &linear.delays, &linear.undelayed)?;
     let mut warnings = check_limits(file, &linear)?;
     warnings.extend(attainable::warnings(file, &linear)?);
     let filter = file.filter.as_deref().unwrap_or_default();
