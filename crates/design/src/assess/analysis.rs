@@ -25,13 +25,13 @@ const OUTPUTS_AT_ONCE: usize = 16;
 pub(crate) struct Outputs {
     pub(crate) names: Vec<String>,
     pub(crate) units: Vec<Option<String>>,
-    /// Positions in [x; e; eps] of quantities known to the user, without filter states and rates.
+    /// Positions in [x; e; eps] of quantities known to the user, without states of filters and delays and rates.
     pub(crate) positions: Vec<usize>,
 }
 
 impl Outputs {
     pub(crate) fn of(designed: &Solution) -> Self {
-        let (all, states) = (designed.plant.a.nrows(), &designed.linear.states);
+        let (all, states) = (designed.plant.a.nrows(), designed.linear.plant_states());
         let (mut names, mut units, mut positions) = (Vec::new(), Vec::new(), Vec::new());
         for (offset, prefix) in [(0, ""), (all, "error of ")] {
             for (at, state) in states.iter().enumerate() {

@@ -153,7 +153,7 @@ impl<'a> ShownLoop<'a> {
         let mut curves = Vec::new();
         for (at, ((name, unit), &row)) in signals.enumerate() {
             let between = |part: usize| first_between + part * extended.states + at;
-            let is_state = at < linear.states.len();
+            let is_state = at < linear.plant_states().len();
             let times = self.times(trace, |k, part| match part {
                 None => Some(trace.output[(row, k)]),
                 Some(part) if is_state => Some(trace.output[(between(part), k)]),
