@@ -115,12 +115,12 @@ def test_requirements_on_the_gains_are_refused_beside_it(aso_ftc, tmp_path):
     assert "not possible together with `feedback`" in done.stderr
 
 
-def test_a_set_point_is_followed_although_no_term_shows_it(aso_ftc, tmp_path):
-    """The integral decays at a tenth of the bandwidth at least; with a tenth of the start's decay it took 390 s."""
+def test_a_set_point_is_followed_with_its_bandwidth(aso_ftc, tmp_path):
+    """A third of the bandwidth; without a term of its own the integral took 390 s."""
     plant = ([[0, 1], [0, -0.5]], [[0], [0.5]], [[1, 0]], 0.8)
     design, _, gamma = designed(aso_ftc, tmp_path, plant, 'reference = { track = ["y1"], integral = true }')
     a, b, c = (np.array(one, float) for one in plant[:3])
     k_x, k_i = np.array(design["K_x"]), np.array(design["K_i"])
     # x_i' = r - y.
     whole = np.block([[a + b @ k_x, b @ k_i], [-c, np.zeros((1, 1))]])
-    assert max(np.linalg.eigvals(whole).real) < -0.1 * plant[3] and gamma <= 1
+    assert max(np.linalg.eigvals(whole).real) < -0.2 * plant[3] and gamma <= 1

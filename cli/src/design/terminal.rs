@@ -7,7 +7,7 @@ use design::report::losses::LossLoop;
 use design::report::reconfiguration::ReconfigurationReport;
 use design::report::robustness::{Number, ToleranceProof, ToleranceResult};
 use design::report::schedule::ScheduleReport;
-use design::report::{CommandPeak, Loop, Matrix, ReferenceStep};
+use design::report::{CommandPeak, Loop, Matrix, PidController, ReferenceStep};
 use design::{Comparison, Report};
 
 /// The most rows or columns of a gain that are printed; the design file has all.
@@ -20,6 +20,9 @@ const ROUNDING: f64 = 1e-14;
 pub(crate) fn summarise(report: &Report) {
     for matrix in &report.gains {
         print_gain(matrix);
+    }
+    for controller in &report.pid {
+        print_pid(controller);
     }
     for feedback_loop in [&report.feedback, &report.observer] {
         print_loop(feedback_loop);
@@ -106,6 +109,28 @@ pub(crate) fn summarise(report: &Report) {
                 println!("        {line}");
             }
         }
+    }
+}
+
+/// Prints the gains of a PI or PID controller; times, where all gains act in the same direction.
+fn print_pid(controller: &PidController) {
+    let PidController { command, measurement, proportional, integral, .. } = controller;
+    let mut gains =
+        vec![format!("K = {}", number(*proportional)), format!("K_i = {} 1/s", number(*integral))];
+    gains.extend(controller.derivative.map(|gain| format!("K_d = {} s", number(gain))));
+    gains.extend(controller.set_point.map(|gain| format!("N_r = {}", number(gain))));
+    let name = if controller.derivative.is_some() { "PID" } else { "PI" };
+    println!(
+        "{name} from {measurement} to {command}: {}, filter at {} rad/s",
+        gains.join(", "),
+        number(controller.corner)
+    );
+    let integral_time = proportional / integral;
+    let derivative_time = controller.derivative.map_or(0.0, |gain| gain / proportional);
+    if integral_time > 0.0 && derivative_time >= 0.0 && integral_time.is_finite() {
+        let derivative = controller.derivative.map(|_| number(derivative_time));
+        let derivative = derivative.map_or(String::new(), |time| format!(", T_d = {time} s"));
+        println!("    T_i = {} s{derivative}", number(integral_time));
     }
 }
 

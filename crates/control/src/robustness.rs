@@ -53,6 +53,7 @@ pub use speed::regulator_of_same_speed;
 pub use structured::{
     Block, ProvenTolerance, StructuredBound, Unproven, proven_tolerance, structured_bound,
 };
+pub(crate) use tolerance::uniform;
 pub use tolerance::{
     EntryFamily, PlantEntry, ToleranceSearch, ToleranceTest, Tolerances, random_deviations,
     tolerance_test,

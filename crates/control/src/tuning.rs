@@ -7,14 +7,18 @@
 //! gamma(theta) = max over terms i and frequencies w of |W_i(j w)| sigma_max(X_i(j w))
 //! ```
 //!
-//! X is S or T at the commands or the measurements, or K S, with the signs of [`crate::robustness`].
+//! X is S or T at the commands or the measurements, K S, or what is left of the references, with the signs of
+//! [`crate::robustness`].
 //! Gamma at most 1 means that every X is below 1 / |W|.
 
 mod descent;
 mod minimax;
 mod objective;
+mod structured;
 
-use crate::blocks::block_2x2;
+pub use structured::Structure;
+
+use crate::blocks::{block_2x2, stacked};
 use crate::response::h_infinity;
 use crate::robustness::{Loop, Point};
 use crate::weight::Weight;
@@ -33,6 +37,8 @@ pub enum Transfer {
     Complementary(Point),
     /// K S: from what is added to the measurements to the commands.
     Effort,
+    /// From references r to r - H y.
+    Tracking,
 }
 
 /// A transfer function with its weight.
@@ -48,13 +54,17 @@ pub struct Term {
 pub struct Tuning<'a> {
     /// G, with D = 0, in the domain of the controller and in units in which its channels are comparable.
     pub plant: StateSpace,
-    /// K(theta), in the same units. Derivatives are central differences of its matrices, which are exact
-    /// for entries of second degree in theta.
+    /// K(theta), in the same units, from the measurements, followed by the references. Derivatives are central
+    /// differences of its matrices, which are exact for entries of second degree in theta.
     pub controller: &'a (dyn Fn(&DVector<f64>) -> Result<StateSpace, Error> + Sync),
+    /// H, t x p: what follows the references; no rows without references.
+    pub references: DMatrix<f64>,
     /// What is weighted.
     pub terms: Vec<Term>,
     /// The largest instability of the loop, negative, see [`crate::stability::instability`].
     pub instability: f64,
+    /// Whether the search may go to these parameters, whatever gamma is there.
+    pub is_allowed: &'a (dyn Fn(&DVector<f64>) -> bool + Sync),
     /// The bandwidth in rad/s, about which frequencies are examined.
     pub rate: f64,
     /// Whether the search must end.
@@ -89,10 +99,11 @@ impl Tuning<'_> {
     /// Same as [`h_infinity`] and [`Loop::new`]; [`Error::NotHurwitz`], [`Error::NotSchur`] for a loop that
     /// is not stable.
     pub fn peak(&self, parameters: &DVector<f64>) -> Result<WeightedPeak, Error> {
-        let closed = Loop::new(self.plant.clone(), (self.controller)(parameters)?)?;
+        let controller = (self.controller)(parameters)?;
+        let closed = Loop::new(self.plant.clone(), self.measured(&controller))?;
         let mut largest = WeightedPeak { gamma: 0.0, term: 0, frequency: 0.0 };
         for (term, weighted) in self.terms.iter().enumerate() {
-            let system = weighted.system(&closed)?;
+            let system = weighted.system(&closed, &self.references, &controller)?;
             let norm = h_infinity(&system, WIDTH)?;
             if norm.upper > largest.gamma {
                 largest = WeightedPeak { gamma: norm.upper, term, frequency: norm.frequency };
@@ -100,11 +111,33 @@ impl Tuning<'_> {
         }
         Ok(largest)
     }
+
+    /// Returns the dynamics of the states of plant and controller together.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`Loop::new`] and the controller.
+    pub fn dynamics(&self, parameters: &DVector<f64>) -> Result<DMatrix<f64>, Error> {
+        let controller = self.measured(&(self.controller)(parameters)?);
+        Ok(Loop::new(self.plant.clone(), controller)?.dynamics())
+    }
+
+    /// The controller from the measurements alone.
+    fn measured(&self, controller: &StateSpace) -> StateSpace {
+        let p = self.plant.c.nrows();
+        let first = |m: &DMatrix<f64>| m.columns(0, p.min(m.ncols())).into_owned();
+        StateSpace { b: first(&controller.b), d: first(&controller.d), ..controller.clone() }
+    }
 }
 
 impl Term {
-    /// W X as a system.
-    fn system(&self, closed: &Loop) -> Result<StateSpace, Error> {
+    /// W X as a system; `references` is H, and `controller` has the inputs of the references.
+    fn system(
+        &self,
+        closed: &Loop,
+        references: &DMatrix<f64>,
+        controller: &StateSpace,
+    ) -> Result<StateSpace, Error> {
         let x = match self.transfer {
             Transfer::Sensitivity(at) => closed.sensitivity(at),
             Transfer::Complementary(at) => closed.complementary(at),
@@ -117,6 +150,20 @@ impl Term {
                     c: whole.c.rows(0, m).into(),
                     d: closed.controller().d.clone(),
                     domain: whole.domain,
+                }
+            }
+            Transfer::Tracking => {
+                let (plant, t) = (closed.plant(), references.nrows());
+                let (n, p) = (plant.a.nrows(), plant.c.nrows());
+                let of_references = |m: &DMatrix<f64>| m.columns(p, t).into_owned();
+                let enters = &plant.b * of_references(&controller.d);
+                let measured = -(references * &plant.c);
+                StateSpace {
+                    a: closed.dynamics(),
+                    b: stacked(&enters, &of_references(&controller.b)),
+                    c: measured.resize_horizontally(n + controller.a.nrows(), 0.0),
+                    d: DMatrix::identity(t, t),
+                    domain: plant.domain,
                 }
             }
         };
@@ -164,11 +211,13 @@ mod tests {
         let tuning = Tuning {
             plant,
             controller: &controller,
+            references: DMatrix::zeros(0, 1),
             terms: vec![
                 term(Transfer::Complementary(Point::Output), 1.0),
                 term(Transfer::Effort, 0.25),
             ],
             instability: -0.01,
+            is_allowed: &|_| true,
             rate: 1.0,
             is_over: &|| false,
         };

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::matrix::{literals, matrices};
 use super::table::{Cell, table};
-use design_report::{Plant, Report, Signal};
+use design_report::{PidController, Plant, Report, Signal};
 
 pub(super) fn plant(plant: &Plant) -> Markup {
     let kinds = [
@@ -57,8 +57,37 @@ pub(super) fn checks(report: &Report) -> Markup {
 pub(super) fn gains(report: &Report) -> Markup {
     let all: Vec<_> = report.plant.matrices.iter().chain(&report.gains).collect();
     html! {
+        (pid(&report.pid))
         (matrices("gains", &report.gains))
         (literals("all", "Plant and gains together", &all))
+    }
+}
+
+/// Shows PI and PID controllers; nothing without them.
+fn pid(controllers: &[PidController]) -> Markup {
+    if controllers.is_empty() {
+        return Markup::default();
+    }
+    let row = |one: &PidController| {
+        vec![
+            one.command.as_str().into(),
+            one.measurement.as_str().into(),
+            Some(one.proportional).into(),
+            Some(one.integral).into(),
+            one.derivative.into(),
+            one.set_point.into(),
+            Some(one.corner).into(),
+        ]
+    };
+    let rows: Vec<Vec<Cell>> = controllers.iter().map(row).collect();
+    let heads = ["command", "measurement", "K", "K_i (1/s)", "K_d (s)", "N_r", "ω (rad/s)"];
+    html! {
+        p {
+            "u = N_r r − K y_f + K_i ∫ (r − y) dt − K_d y_f′ + K_f f_hat, in deviations from the operating point. \
+             y_f is y behind the filter 1 / (1 + s/ω) of a PI controller, 1 / (1 + √2 s/ω + s²/ω²) of a PID controller. \
+             K has the unit of the command per unit of the measurement."
+        }
+        (table("PI and PID controllers", &heads, &rows))
     }
 }
 

@@ -41,6 +41,8 @@ pub struct Report {
     pub checks: Vec<Check>,
     /// K_x, K_f, L_x, L_f and the other matrices of the controller.
     pub gains: Vec<Matrix>,
+    /// PI and PID controllers, in place of a state feedback; empty otherwise.
+    pub pid: Vec<PidController>,
     /// The loop of the state feedback.
     pub feedback: Loop,
     /// The loop of the observer.
@@ -132,6 +134,32 @@ pub struct Matrix {
     /// The values, row by row.
     #[schemars(with = "Vec<Vec<Option<f64>>>")]
     pub values: Vec<Vec<f64>>,
+}
+
+/// A PI or PID controller from one measurement y, with its reference r, to one command.
+///
+/// ```text
+/// u = N_r r - K y_f + K_i integral of (r - y) dt - K_d y_f'
+/// ```
+///
+/// in deviations from the operating point; `y_f`, `y_f`' are the filtered measurement and its rate: 1 / (1 + s / w) of a PI
+/// controller, 1 / (1 + sqrt(2) s / w + s^2 / w^2) of a PID controller.
+#[derive(Clone, Serialize, JsonSchema)]
+pub struct PidController {
+    /// The name of the command.
+    pub command: String,
+    /// The name of the measurement.
+    pub measurement: String,
+    /// K.
+    pub proportional: f64,
+    /// `K_i`, 1/s times the unit of K.
+    pub integral: f64,
+    /// `K_d`, s times the unit of K; none of a PI controller.
+    pub derivative: Option<f64>,
+    /// The entry of `N_r`; none without a feedforward.
+    pub set_point: Option<f64>,
+    /// w of the filter, rad/s.
+    pub corner: f64,
 }
 
 /// A condition that was checked.

@@ -11,6 +11,7 @@ pub(crate) mod family;
 pub(crate) mod judged;
 pub(crate) mod losses;
 pub(crate) mod matrices;
+pub(crate) mod pid;
 pub(crate) mod reconfiguration;
 pub(crate) mod references;
 pub(crate) mod remedies;

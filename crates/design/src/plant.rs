@@ -4,6 +4,7 @@ pub(crate) mod attainable;
 pub(crate) mod delays;
 pub(crate) mod entries;
 pub(crate) mod feedthrough;
+pub(crate) mod filters;
 pub(crate) mod fixed_mode;
 pub(crate) mod linear;
 pub(crate) mod parameters;

@@ -13,6 +13,7 @@ pub(crate) mod loop_shape;
 pub(crate) mod names;
 pub(crate) mod norm_gains;
 pub(crate) mod pairing;
+pub(crate) mod pid;
 pub(crate) mod reconfiguration;
 pub(crate) mod refusal;
 pub(crate) mod schedule;

@@ -11,6 +11,7 @@ mod matrix;
 mod model;
 mod names;
 pub mod parameters;
+pub mod pid;
 pub mod reconfiguration;
 pub mod references;
 pub mod requirements;
@@ -31,6 +32,7 @@ use crate::loop_shape::LoopShape;
 use crate::matrix::MatrixEntry as _;
 use crate::model::{linearised, stated};
 use crate::names::check_names;
+use crate::pid::Pid;
 use crate::reconfiguration::ReconfigurationRequest;
 use crate::references::References;
 use crate::requirements::{Request, request};
@@ -195,7 +197,7 @@ impl<'a> PlantFile<'a> {
         let domain = sampling
             .as_ref()
             .map_or(Domain::Continuous, |sampling| Domain::Sampled { period: sampling.period });
-        let loop_shape = LoopShape::read(file, domain)?;
+        let loop_shape = LoopShape::read(file, [&actuators, &measurements], domain)?;
         let read = |key: &str, weights| {
             let Some(entry) = file.get(key) else { return Ok(Request::open(file.place.clone())) };
             let outputs: Vec<&str> = match key {
@@ -256,6 +258,9 @@ impl<'a> PlantFile<'a> {
             references,
             sampling,
         };
+        if let Some(pid) = plant_file.pid() {
+            pid.check_references(file, plant_file.references.as_ref(), &plant_file.measurements)?;
+        }
         plant_file.check_columns(file)?;
         check_names(&plant_file)?;
         plant_file.check_holds()?;
@@ -287,11 +292,17 @@ impl<'a> PlantFile<'a> {
         states.iter().chain(&self.actuators).chain(&self.measurements)
     }
 
-    /// The estimator of the observer; in continuous time it predicts.
+    /// The PI or PID controllers in place of a state feedback.
+    #[must_use]
+    pub fn pid(&self) -> Option<&Pid> {
+        self.loop_shape.as_ref()?.pid.as_ref()
+    }
+
+    /// The estimator of the observer; in continuous time and beside PI or PID controllers it predicts.
     #[must_use]
     pub fn estimator(&self) -> Estimator {
         match self.sampling {
-            Some(sampling) if sampling.current => Estimator::Current,
+            Some(sampling) if sampling.current && self.pid().is_none() => Estimator::Current,
             _ => Estimator::Prediction,
         }
     }

@@ -1,16 +1,21 @@
 //! The table `[loop]` of a plant file: the shape of S and T, instead of requirements on feedback and observer.
 
+use crate::pid::Pid;
 use crate::requirements::{Bandwidth, Request, Requirement};
+use crate::signals::Signal;
 use control::Domain;
 use files::{Place, PlaceError, Table};
 
-const KEYS: [&str; 4] = ["bandwidth", "peak", "roll_off", "effort"];
+const KEYS: [&str; 7] =
+    ["bandwidth", "set_point", "peak", "roll_off", "effort", "structure", "pairs"];
 /// Entries that state the gains in another way, or loops that are not tuned.
 const OTHERS: [&str; 6] = ["feedback", "observer", "schedule", "family", "estimation", "D"];
 /// The peak of S and of T, if none is stated.
 const PEAK: f64 = 1.5;
 /// The frequency from which T falls, relative to the bandwidth, if none is stated.
 const ROLL_OFF: f64 = 10.0;
+/// The bandwidth of references, relative to that of the loop, if none is stated.
+const SET_POINT: f64 = 0.3;
 /// Bandwidths of feedback and observer with which the search starts, relative to that of the loop.
 const STARTS: [(f64, f64); 6] =
     [(1.0, 4.0), (0.5, 4.0), (1.0, 8.0), (2.0, 8.0), (0.5, 2.0), (1.0, 1.0)];
@@ -24,23 +29,31 @@ const PER_SAMPLE: f64 = 0.5;
 pub struct LoopShape {
     /// |S| is below w / bandwidth at low frequencies w, rad/s.
     pub bandwidth: f64,
+    /// The distance of a measurement from its integrated reference is below w / `set_point` at low frequencies w, rad/s.
+    pub set_point: f64,
     /// |S| and |T| are below it at every frequency.
     pub peak: f64,
     /// |T| is below `peak roll_off / w` above it, rad/s.
     pub roll_off: f64,
     /// |K S| is below it at every frequency, if it is stated.
     pub effort: Option<f64>,
+    /// PI or PID controllers in place of the state feedback.
+    pub pid: Option<Pid>,
     /// Where the file states it.
     pub place: Place,
 }
 
 impl LoopShape {
-    /// Reads the table, if there is one.
+    /// Reads the table, if there is one; `signals` are actuators and measurements.
     ///
     /// # Errors
     ///
     /// Returns a [`PlaceError`] at the entry that is wrong or missing.
-    pub fn read(file: &Table<'_>, domain: Domain) -> Result<Option<Self>, PlaceError> {
+    pub fn read(
+        file: &Table<'_>,
+        signals: [&[Signal]; 2],
+        domain: Domain,
+    ) -> Result<Option<Self>, PlaceError> {
         let Some(entry) = file.get("loop") else {
             return Ok(None);
         };
@@ -69,7 +82,9 @@ impl LoopShape {
         }
         let roll_off = number("roll_off")?.unwrap_or(ROLL_OFF * bandwidth);
         let effort = number("effort")?;
-        Ok(Some(Self { bandwidth, peak, roll_off, effort, place: entry.place }))
+        let set_point = number("set_point")?.unwrap_or(SET_POINT * bandwidth);
+        let pid = Pid::read(file, &table, signals, roll_off)?;
+        Ok(Some(Self { bandwidth, set_point, peak, roll_off, effort, pid, place: entry.place }))
     }
 
     /// The requests on feedback and observer of the designs with which the search starts.

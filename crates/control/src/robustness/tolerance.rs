@@ -225,7 +225,7 @@ pub fn random_deviations(count: usize, cases: u32, seed: u64) -> Vec<Vec<f64>> {
 }
 
 /// The next number of `SplitMix64` (G. L. Steele, D. Lea and C. H. Flood, OOPSLA 2014), in 0 to 1.
-fn uniform(state: &mut u64) -> f64 {
+pub(crate) fn uniform(state: &mut u64) -> f64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut z = *state;
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -132,6 +132,9 @@ impl Search<'_> {
     }
 
     fn iterate(&self, parameters: &DVector<f64>) -> Option<Iterate> {
+        if !(self.grid.tuning.is_allowed)(parameters) {
+            return None;
+        }
         let controller = (self.grid.tuning.controller)(parameters).ok()?;
         let values = self.grid.values(&controller)?;
         Some(Iterate { controller, values })

@@ -39,9 +39,14 @@ pub(super) struct Place {
 
 /// K and S at a frequency.
 struct Closed {
+    /// From the measurements.
     k: ComplexMatrix,
+    /// From the references.
+    k_r: ComplexMatrix,
     at_input: ComplexMatrix,
     at_output: ComplexMatrix,
+    /// H G.
+    followed: ComplexMatrix,
 }
 
 impl<'a> Grid<'a> {
@@ -76,14 +81,15 @@ impl<'a> Grid<'a> {
     /// The weighted singular values of all terms, term by term; None where the loop is not stable enough.
     pub(super) fn values(&self, controller: &StateSpace) -> Option<Vec<Vec<f64>>> {
         let Tuning { plant, terms, instability: limit, .. } = self.tuning;
-        let closed = Loop::new(plant.clone(), controller.clone()).ok()?;
+        let closed = Loop::new(plant.clone(), self.tuning.measured(controller)).ok()?;
         if instability(&closed.dynamics(), plant.domain).ok()? > *limit {
             return None;
         }
         let transfer = response::Transfer::new(controller);
         let mut values = vec![Vec::with_capacity(self.nodes.len()); terms.len()];
         for node in &self.nodes {
-            let closed = Closed::new(transfer.gain(node.frequency).ok()?, &node.plant)?;
+            let gain = transfer.gain(node.frequency).ok()?;
+            let closed = Closed::new(&gain, &node.plant, &self.tuning.references)?;
             for (at, term) in terms.iter().enumerate() {
                 let x = closed.transfer(term.transfer);
                 values[at].push(node.weights[at] * norm(&x)?);
@@ -95,7 +101,8 @@ impl<'a> Grid<'a> {
     /// The value at `place`, and its derivatives with respect to the parameters.
     ///
     /// With X v = sigma u: d sigma = Re(l dK r), l = u* `S_i`, and r = G `S_i` v at the commands,
-    /// l = u* `S_o` G, r = `S_o` v at the measurements, l = u* `S_i`, r = `S_o` v for K S.
+    /// l = u* `S_o` G, r = `S_o` v at the measurements, l = u* `S_i`, r = `S_o` v for K S. Of the references,
+    /// l = -u* H G `S_i`, r = [G `S_i` `K_r` v; v] for [K, `K_r`].
     pub(super) fn gradient(
         &self,
         controller: &StateSpace,
@@ -113,7 +120,8 @@ impl<'a> Grid<'a> {
         let (b, c) = (to_complex(&controller.b), to_complex(&controller.c));
         let (forward, backward) = (pencil.clone().lu(), pencil.transpose().lu());
         let k = &c * forward.solve(&b)? + to_complex(&controller.d);
-        let closed = Closed::new(k, plant)?;
+        let (t, p) = self.tuning.references.shape();
+        let closed = Closed::new(&k, plant, &self.tuning.references)?;
         let (sigma, u, v) = largest(&closed.transfer(transfer))?;
         let (left, right) = match transfer {
             Transfer::Sensitivity(Point::Input) | Transfer::Complementary(Point::Input) => {
@@ -123,7 +131,16 @@ impl<'a> Grid<'a> {
                 (u.adjoint() * &closed.at_output * plant, &closed.at_output * v)
             }
             Transfer::Effort => (u.adjoint() * &closed.at_input, &closed.at_output * v),
+            Transfer::Tracking => {
+                let left = -(u.adjoint() * &closed.followed * &closed.at_input);
+                let measured = plant * &closed.at_input * &closed.k_r * &v;
+                let mut right = measured.resize_vertically(p + t, Complex::from(0.0));
+                right.rows_mut(p, t).copy_from(&v);
+                (left, right)
+            }
         };
+        // The references are zero in the other transfer functions.
+        let right = right.resize_vertically(p + t, Complex::from(0.0));
         let sign = if matches!(transfer, Transfer::Complementary(_)) { -1.0 } else { 1.0 };
         let x = forward.solve(&(&b * &right))?;
         let y = backward.solve(&(&left * &c).transpose())?.transpose();
@@ -143,11 +160,15 @@ impl<'a> Grid<'a> {
 }
 
 impl Closed {
-    fn new(k: ComplexMatrix, plant: &ComplexMatrix) -> Option<Self> {
-        let (m, p) = k.shape();
+    /// `gain`: [K, `K_r`]; `references`: H.
+    fn new(gain: &ComplexMatrix, plant: &ComplexMatrix, references: &DMatrix<f64>) -> Option<Self> {
+        let (p, m) = plant.shape();
+        let k = gain.columns(0, p).into_owned();
+        let k_r = gain.columns(p, references.nrows()).into_owned();
+        let followed = to_complex(references) * plant;
         let at_input = (ComplexMatrix::identity(m, m) - &k * plant).try_inverse()?;
         let at_output = (ComplexMatrix::identity(p, p) - plant * &k).try_inverse()?;
-        Some(Self { k, at_input, at_output })
+        Some(Self { k, k_r, at_input, at_output, followed })
     }
 
     fn transfer(&self, transfer: Transfer) -> ComplexMatrix {
@@ -158,6 +179,7 @@ impl Closed {
             Transfer::Complementary(Point::Input) => complement(&self.at_input),
             Transfer::Complementary(Point::Output) => complement(&self.at_output),
             Transfer::Effort => &self.k * &self.at_output,
+            Transfer::Tracking => complement(&(&self.followed * &self.at_input * &self.k_r)),
         }
     }
 }
@@ -199,10 +221,19 @@ mod tests {
     use crate::tuning::Term;
     use crate::weight::Weight;
 
-    /// A controller of second order for two channels, whose entries are the parameters.
+    /// A controller of second order for two channels and a reference, whose entries are the parameters.
     fn controller(parameters: &DVector<f64>, domain: Domain) -> StateSpace {
         let part = |at: usize| DMatrix::from_row_slice(2, 2, &parameters.as_slice()[at..at + 4]);
-        StateSpace { a: part(0), b: part(4), c: part(8), d: part(12), domain }
+        let with = |m: DMatrix<f64>, at: usize| {
+            let column = [parameters[at], parameters[at + 1]];
+            m.insert_columns(2, 1, 0.0)
+                + DMatrix::from_columns(&[
+                    DVector::zeros(2),
+                    DVector::zeros(2),
+                    DVector::from_column_slice(&column),
+                ])
+        };
+        StateSpace { a: part(0), b: with(part(4), 16), c: part(8), d: with(part(12), 18), domain }
     }
 
     #[test]
@@ -224,17 +255,27 @@ mod tests {
                 Transfer::Complementary(Point::Input),
                 Transfer::Complementary(Point::Output),
                 Transfer::Effort,
+                Transfer::Tracking,
             ];
             let weight = Weight::lead_lag(2.0, 1.0, 0.5, 1)?;
             let term = |transfer| Term { transfer, weight: weight.clone() };
             let terms = transfers.map(term).to_vec();
             let (rate, is_over) = (1.0, &|| false);
-            let tuning =
-                Tuning { plant, controller: &build, terms, instability: 0.0, rate, is_over };
+            let references = DMatrix::from_row_slice(1, 2, &[0.8, -0.3]);
+            let tuning = Tuning {
+                plant,
+                controller: &build,
+                references,
+                terms,
+                instability: 0.0,
+                is_allowed: &|_| true,
+                rate,
+                is_over,
+            };
             let grid = Grid::new(&tuning)?;
             let start = [pole, 0.1, 0.2, pole / 2.0, 0.4, -0.3, 0.2, 0.5, 0.1, 0.3, -0.2, 0.4];
             let mut start = start.to_vec();
-            start.extend([-0.1, 0.2, 0.05, -0.15]);
+            start.extend([-0.1, 0.2, 0.05, -0.15, 0.3, 0.2, -0.1, 0.4]);
             let start = DVector::from_vec(start);
             let moved = |at: usize, by: f64| {
                 let mut parameters = start.clone();

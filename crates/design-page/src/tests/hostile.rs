@@ -430,6 +430,7 @@ pub(super) fn hostile() -> Report {
         robustness: Some(robustness(&mut numbers)),
         checks: vec![check("observable", true, None), check("detectable", false, Some(2.75e-13))],
         gains: vec![numbers.matrix("L_x", 10, 8), numbers.matrix("L_f", 3, 8)],
+        pid: Vec::new(),
         feedback: sampled_loop("Φ + Γ K_x", &rates, Some(region())),
         observer: sampled_loop("Φ_0 - L C_0", &rates[2..], None),
         estimation: Estimation {
@@ -543,6 +544,7 @@ pub(super) fn bare() -> Report {
         checks: Vec::new(),
         robustness: None,
         gains: Vec::new(),
+        pid: Vec::new(),
         feedback: system(-1.5),
         observer: system(-20.25),
         estimation: Estimation::default(),

@@ -287,6 +287,7 @@ pub(super) fn pendulum() -> Report {
         checks: checks(),
         robustness: None,
         gains,
+        pid: Vec::new(),
         feedback: system(
             "A + B K_x",
             &[-4.5, -6.0, -7.5, -9.0],

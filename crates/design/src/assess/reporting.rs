@@ -20,6 +20,7 @@ use crate::assess::fallback;
 use crate::assess::family::{self as family_report, judge, judge_proof};
 use crate::assess::losses::{self, losses};
 use crate::assess::matrices::Names;
+use crate::assess::pid;
 use crate::assess::reconfiguration::reasons as reconfiguration_reasons;
 use crate::assess::references::{beyond_limits, reached, reference_steps};
 use crate::assess::remedies::remedies;
@@ -126,9 +127,8 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
     let frequency =
         unless_numerical("the gains from faults over frequency", frequency, &mut missing)?;
     further.extend(missing.into_iter().map(|reason| (Level::Amber, reason)));
-    let fallback =
-        fallback.map(|fallback_design| fallback::report(file, nominal, fallback_design, &budget));
-    let fallback = fallback.transpose()?.flatten();
+    let of_fallback = |design| fallback::report(file, nominal, design, &budget);
+    let fallback = fallback.map(of_fallback).transpose()?.flatten();
     further
         .extend(fallback.iter().flat_map(|report| fallback::reasons(report, file.robustness.red)));
     let family_report = family_report::family(designed, &file.robustness, &budget)?;
@@ -159,6 +159,7 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
         checks,
         robustness,
         gains: names.gains(nominal),
+        pid: pid::controllers(file, nominal),
         feedback: closed(
             if gains.integral.is_some() { "A_e + B_e [K_x, K_i]" } else { "A + B K_x" },
             &nominal.feedback_dynamics(),

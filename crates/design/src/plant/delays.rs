@@ -7,6 +7,7 @@ use control::{Error, StateSpace};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
+use crate::plant::filters::{self, with_filters};
 use crate::report::number::rounded;
 use plant_file::PlantFile;
 use plant_file::signals::Signal;
@@ -58,7 +59,7 @@ pub(crate) struct Delayed {
     pub(crate) g: DMatrix<f64>,
 }
 
-/// The plant with the states of its delays that the observer has.
+/// The plant with the states of its delays that the observer has, and those of the filters of PI and PID controllers.
 pub(crate) fn delayed(
     file: &PlantFile<'_>,
     plant: &StateSpace,
@@ -86,9 +87,12 @@ pub(crate) fn with_delays(
     let inputs = StateSpace { b: beside(&plant.b, f), d: beside(&plant.d, g), ..plant.clone() };
     let mut delays = of(file);
     delays.inputs.resize(m + q, 0.0);
-    delays
-        .approximated(&inputs, file.delay_order)
-        .map_err(|error| file.error(&["actuators", "measurements"], error.to_string()))
+    let approximated = delays.approximated(&inputs, file.delay_order);
+    let filtered = approximated.and_then(|plant| match file.pid() {
+        Some(pid) => with_filters(pid, &plant),
+        None => Ok(plant),
+    });
+    filtered.map_err(|error| file.error(&["actuators", "measurements"], error.to_string()))
 }
 
 /// The plant with the approximation of the judgement.
@@ -115,15 +119,17 @@ pub(crate) fn placed(delays: &Delays, order: usize, tolerances: Tolerances) -> T
     Tolerances { of, common: common.iter().map(placed).collect() }
 }
 
-/// The states of the plant, then those of its delays with their values at the operating point.
+/// The states of the plant, then those of its delays with their values at the operating point, then those of the filters
+/// of PI and PID controllers.
 ///
 /// A constant command u leads to z = [u, 0, ...], a constant measurement y to z = -d A'^-1 `e_1` y, see
 /// [`Delays::approximated`].
 pub(crate) fn states(
+    file: &PlantFile<'_>,
     plant: &[Signal],
     [actuators, measurements]: [&[Signal]; 2],
-    order: usize,
 ) -> Vec<Signal> {
+    let order = file.delay_order;
     let mut all = plant.to_vec();
     for actuator in actuators.iter().filter(|actuator| actuator.delay > 0.0) {
         all.push(Signal {
@@ -147,5 +153,6 @@ pub(crate) fn states(
             }
         }));
     }
+    all.extend(file.pid().into_iter().flat_map(|pid| filters::states(pid, measurements)));
     all
 }

@@ -26,7 +26,7 @@ pub(crate) const AT_REST: f64 = 1e-6;
 const NOTHING: f64 = 1e-9;
 
 /// x' = A x + B u + faults, y = C x + D u + faults, about an operating point. The states of its delays, each approximated,
-/// follow those that the plant file states.
+/// follow those that the plant file states, then those of the filters of PI and PID controllers.
 pub(crate) struct LinearPlant {
     pub(crate) a: DMatrix<f64>,
     pub(crate) b: DMatrix<f64>,
@@ -80,9 +80,15 @@ impl LinearPlant {
         &self.states[..self.undelayed.a.nrows()]
     }
 
-    /// The positions of the states of delays.
+    /// The positions of the states of delays and filters.
     pub(crate) fn delay_states(&self) -> Range<usize> {
         self.undelayed.a.nrows()..self.states.len()
+    }
+
+    /// The positions of the states of the filters of PI and PID controllers, the last ones.
+    pub(crate) fn filter_states(&self, file: &PlantFile<'_>) -> Range<usize> {
+        let count = file.pid().map_or(0, |pid| pid.order() * pid.measurements().len());
+        self.states.len() - count..self.states.len()
     }
 
     /// Whether a mode is one of delays, which is stable. Of equal delays of two signals no gain moves one.
@@ -126,11 +132,7 @@ impl LinearPlant {
                     _ => on_signals(fault, &b, &d),
                 };
                 Ok(Self {
-                    states: delays::states(
-                        states,
-                        [&file.actuators, &file.measurements],
-                        file.delay_order,
-                    ),
+                    states: delays::states(file, states, [&file.actuators, &file.measurements]),
                     actuators: file.actuators.clone(),
                     measurements: file.measurements.clone(),
                     faults: file.faults.clone(),
@@ -221,7 +223,7 @@ fn linearised(
     let signals = [&actuators[..], &measurements[..]];
     Ok(LinearPlant {
         disturbances: disturbances(file, b, d, Some(&matrices))?,
-        states: delays::states(&states, signals, file.delay_order),
+        states: delays::states(file, &states, signals),
         actuators,
         measurements,
         faults,

@@ -6,6 +6,7 @@ use control::{Domain, lmi, sampled};
 use files::PlaceError;
 use nalgebra::DMatrix;
 use plant_file::PlantFile;
+use plant_file::loop_shape::LoopShape;
 use plant_file::requirements::Request;
 
 use crate::plant::linear::LinearPlant;
@@ -15,6 +16,7 @@ use crate::solve::loop_shape::{LoopProblem, Shaped};
 use crate::solve::names::observer_states;
 use crate::solve::norm_gains::ObserverProblem;
 use crate::solve::pairing::PairProblem;
+use crate::solve::pid::{PidProblem, free_of_observer};
 use crate::solve::refusal::{States, feedback_refused, refused};
 
 /// What the gains of feedback and observer are computed for.
@@ -29,6 +31,14 @@ pub(crate) struct GainProblem<'a> {
     pub(crate) domain: Domain,
 }
 
+/// The search for the shape of a loop.
+struct Search {
+    /// Pairs of feedback and observer.
+    starts: Vec<[DMatrix<f64>; 2]>,
+    /// The rows and columns of their entries that are tuned.
+    free: [Vec<(usize, usize)>; 2],
+}
+
 impl GainProblem<'_> {
     /// Computes the gains of feedback and observer. `common`: the feedback of a family.
     pub(crate) fn solve(
@@ -36,12 +46,20 @@ impl GainProblem<'_> {
         common: Option<GainResult>,
     ) -> Result<(GainResult, GainResult), PlaceError> {
         let Self { file, linear, extended, plant, pair: (a, b), domain } = *self;
-        let n = extended.states;
+        // No command and no state of the plant depends on the filters of PI and PID controllers before those are in the
+        // loop.
+        let filters = linear.filter_states(file);
+        let (first, count) = (filters.start, filters.len());
+        let square =
+            |m: &DMatrix<f64>| m.clone().remove_rows(first, count).remove_columns(first, count);
+        let (a, b) = (&square(a), &b.clone().remove_rows(first, count));
+        let n = extended.states - count;
         let order = a.nrows();
+        let c = linear.c.clone().remove_columns(first, count);
         let problem = FeedbackProblem {
             a,
             b,
-            c: &linear.c.clone().resize_horizontally(order, 0.0),
+            c: &c.resize_horizontally(order, 0.0),
             states: n,
             f_a: &plant.f_a.rows(0, n).into_owned().resize_vertically(order, 0.0),
         };
@@ -50,13 +68,14 @@ impl GainProblem<'_> {
             Some(common) => Ok(common),
             None => feedback(&of_feedback, &problem, domain),
         };
-        let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
+        let a_0 = square(&plant.augmented_dynamics());
+        let c_0 = plant.augmented_output().remove_columns(first, count);
         let of_observer = linear.with_delays(&file.observer.requirement, a_0.nrows());
         let filter = sampled::filter(extended, domain);
         let observer_problem = ObserverProblem {
             a_0: &a_0,
             c_0: &c_0,
-            b: &plant.b,
+            b: &plant.b.clone().remove_rows(first, count),
             channels: &extended.channels,
             faults: plant.f_a.ncols(),
             filter: filter.as_deref(),
@@ -76,7 +95,13 @@ impl GainProblem<'_> {
             let states = States { names, meaning, of_delays: linear.delay_states() };
             refused(file, domain, &file.observer, refusal, &states)
         })?;
-        Ok((feedback, observer))
+        if count == 0 {
+            return Ok((feedback, observer));
+        }
+        Ok((
+            feedback.mapped(|gain| gain.clone().insert_columns(first, count, 0.0)),
+            observer.mapped(|gain| gain.clone().insert_rows(first, count, 0.0)),
+        ))
     }
 
     /// Returns the gains of feedback and observer together, with a warning if they do not give the loop its shape.
@@ -89,8 +114,12 @@ impl GainProblem<'_> {
     ) -> Result<(GainResult, GainResult, Option<PlaceError>), crate::Error> {
         let Self { file, linear, plant, domain, .. } = *self;
         if let Some(shape) = &file.loop_shape {
-            let problem = LoopProblem { shape, linear, plant, filter, domain, gains };
-            let Shaped { feedback, observer, warning } = problem.tuned(&self.starts()?)?;
+            let Search { starts, free } = self.search(shape)?;
+            let references =
+                file.references.as_ref().filter(|one| one.integral && !one.feedforward);
+            let problem =
+                LoopProblem { shape, linear, plant, filter, domain, references, free, gains };
+            let Shaped { feedback, observer, warning } = problem.tuned(&starts)?;
             return Ok((feedback, observer, warning.map(|text| file.error_at(&shape.place, text))));
         }
         let (feedback, observer) = self.solve(common)?;
@@ -103,9 +132,8 @@ impl GainProblem<'_> {
         Ok((feedback, observer, None))
     }
 
-    /// The gains with which the search for the shape of the loop starts, if the file states one.
-    pub(crate) fn starts(&self) -> Result<Vec<[DMatrix<f64>; 2]>, PlaceError> {
-        let Some(shape) = &self.file.loop_shape else { return Ok(Vec::new()) };
+    /// The gains with which the search for the shape of the loop starts, of feedbacks with all their entries.
+    fn starts(&self, shape: &LoopShape) -> Result<Vec<[DMatrix<f64>; 2]>, PlaceError> {
         let gains = |[feedback, observer]: [Request; 2]| {
             let mut file = self.file.clone();
             (file.feedback, file.observer) = (feedback, observer);
@@ -113,5 +141,21 @@ impl GainProblem<'_> {
             Ok([feedback.gain, observer.gain])
         };
         shape.starts(self.domain).into_iter().map(gains).collect()
+    }
+
+    /// The search for the structure of the file.
+    fn search(&self, shape: &LoopShape) -> Result<Search, crate::Error> {
+        let Self { file, linear, pair, domain, .. } = *self;
+        let starts = self.starts(shape)?;
+        let [of_feedback, of_observer] = starts[0].each_ref().map(DMatrix::shape);
+        let free_of_observer = free_of_observer(&linear.filter_states(file), of_observer);
+        let (Some(pid), Some(references)) = (&shape.pid, &file.references) else {
+            let (rows, columns) = of_feedback;
+            let all = (0..columns).flat_map(|column| (0..rows).map(move |row| (row, column)));
+            return Ok(Search { starts, free: [all.collect(), free_of_observer] });
+        };
+        let problem = PidProblem { pid, shape, linear, references, pair, domain };
+        let free = [problem.free(), free_of_observer];
+        Ok(Search { starts: problem.starts(file, &starts)?, free })
     }
 }

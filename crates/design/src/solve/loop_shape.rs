@@ -16,6 +16,7 @@ use crate::plant::linear::LinearPlant;
 use crate::report::number::rounded;
 use crate::solve::gain::{GainResult, unique};
 use plant_file::loop_shape::LoopShape;
+use plant_file::references::References;
 use plant_file::signals::same_unit;
 
 /// |S| below this is not asked for at low frequencies; |T| below this part of its peak at high ones.
@@ -24,8 +25,11 @@ const FLOOR: f64 = 0.01;
 const TUNED: usize = 4;
 /// The tuned loop may decay this part as fast as that of its start.
 const DECAY: f64 = 0.1;
-/// The same with integral action: how slowly a set point is followed, no term shows.
+/// The same with integral action beside a feedforward: how slowly a set point is followed, no term shows.
 const DECAY_OF_INTEGRALS: f64 = 0.9;
+/// The same of the estimates beside integral action: no term shows how slowly they find a fault that the integrals
+/// compensate.
+const DECAY_OF_ESTIMATES: f64 = 0.5;
 /// Smallest size of a gain, relative to the sizes of its row and its column.
 const SMALLEST: f64 = 0.1;
 /// Part of half the sampling rate up to which the roll-off is asked for.
@@ -39,6 +43,10 @@ pub(crate) struct LoopProblem<'a, G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains +
     pub(crate) plant: &'a FaultyPlant,
     pub(crate) filter: Option<&'a [f64]>,
     pub(crate) domain: Domain,
+    /// References that are integrated and do not act on the commands directly.
+    pub(crate) references: Option<&'a References>,
+    /// The rows and columns of the entries of feedback and observer that are tuned.
+    pub(crate) free: [Vec<(usize, usize)>; 2],
     /// The gains of the controller from those of feedback and observer.
     pub(crate) gains: G,
 }
@@ -50,10 +58,11 @@ pub(crate) struct Shaped {
     pub(crate) warning: Option<String>,
 }
 
-/// Units in which the channels are comparable: sizes of commands, inverse sizes of measurements.
+/// Units in which the channels are comparable: sizes of commands, inverse sizes of measurements and references.
 struct Units {
     commands: DMatrix<f64>,
     measurements: DMatrix<f64>,
+    references: DMatrix<f64>,
 }
 
 impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
@@ -63,32 +72,43 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         let ending = lmi::ending();
         let is_over = || ending.as_ref().is_some_and(|ending| ending());
         let terms = self.terms()?;
-        let has_integrals = starts
-            .iter()
-            .any(|[feedback, observer]| (self.gains)(feedback, observer).integral.is_some());
-        let decay = if has_integrals { DECAY_OF_INTEGRALS } else { DECAY };
-        let tune = |[feedback, observer]: &[DMatrix<f64>; 2], is_start: bool| {
-            let (of_feedback, of_observer) = (feedback.shape(), observer.shape());
+        let [feedback, observer] = &starts[0];
+        let has_integrals = (self.gains)(feedback, observer).integral.is_some();
+        let decay =
+            if has_integrals && self.references.is_none() { DECAY_OF_INTEGRALS } else { DECAY };
+        let tune = |start: &[DMatrix<f64>; 2], is_start: bool| {
+            let sizes = start.each_ref().map(sizes);
             let controller = |parameters: &DVector<f64>| {
-                let [feedback, observer] = divided(parameters, of_feedback, of_observer);
+                let [feedback, observer] = self.divided(parameters, start);
                 self.controller(&units, &feedback, &observer)
             };
-            let start = joined(feedback, observer);
-            let closed = control::robustness::Loop::new(plant.clone(), controller(&start)?)?;
-            let excess = instability(&closed.dynamics(), self.domain)?;
-            let tuning = Tuning {
+            let of_estimates = |[feedback, observer]: &[DMatrix<f64>; 2]| {
+                let gains = (self.gains)(feedback, observer);
+                instability(&gains.error_dynamics(self.plant), self.domain)
+            };
+            let slowest = DECAY_OF_ESTIMATES * of_estimates(start)?;
+            let is_allowed = |parameters: &DVector<f64>| {
+                let decays = |excess: Result<f64, Error>| excess.is_ok_and(|one| one <= slowest);
+                !has_integrals || decays(of_estimates(&self.divided(parameters, start)))
+            };
+            let start = &self.joined(start);
+            let mut tuning = Tuning {
                 plant: plant.clone(),
                 controller: &controller,
+                references: self.followed(&units),
                 terms: terms.clone(),
-                instability: decay * excess.min(0.0),
+                instability: 0.0,
+                is_allowed: &is_allowed,
                 rate: self.shape.bandwidth,
                 is_over: &is_over,
             };
+            let excess = instability(&tuning.dynamics(start)?, self.domain)?;
+            tuning.instability = decay * excess.min(0.0);
             if is_start {
-                let peak = tuning.peak(&start)?;
-                return Ok(Tuned { parameters: start, peak });
+                let peak = tuning.peak(start)?;
+                return Ok(Tuned { parameters: start.clone(), peak });
             }
-            tuning.tuned(&start, &joined(&sizes(feedback), &sizes(observer)))
+            tuning.tuned(start, &self.joined(&sizes))
         };
         let mut examined = Vec::new();
         let mut refusal = None;
@@ -107,8 +127,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         let Some(Tuned { parameters, peak }) = best else {
             return Err(refusal.unwrap_or(Error::Overflow { what: "the loop of each start" }));
         };
-        let [feedback, observer] = &starts[0];
-        let [feedback, observer] = divided(&parameters, feedback.shape(), observer.shape());
+        let [feedback, observer] = self.divided(&parameters, &starts[0]);
         let summary = summary(&terms, &peak);
         let method = format!("Loop shaping: {summary}.");
         Ok(Shaped {
@@ -121,13 +140,35 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         })
     }
 
+    /// The parameters of two gains: the entries that are tuned.
+    fn joined(&self, gains: &[DMatrix<f64>; 2]) -> DVector<f64> {
+        let entries = gains.iter().zip(&self.free);
+        let entries = entries.flat_map(|(gain, free)| free.iter().map(|at| gain[*at]));
+        DVector::from_vec(entries.collect())
+    }
+
+    /// The gains with these parameters; their other entries are those of `others`.
+    fn divided(&self, parameters: &DVector<f64>, others: &[DMatrix<f64>; 2]) -> [DMatrix<f64>; 2] {
+        let mut gains = others.clone();
+        let mut parameters = parameters.iter();
+        for (gain, free) in gains.iter_mut().zip(&self.free) {
+            for (at, parameter) in free.iter().zip(parameters.by_ref()) {
+                gain[*at] = *parameter;
+            }
+        }
+        gains
+    }
+
     /// The entry that allows more of what limits gamma at a frequency in rad/s.
     fn help(&self, transfer: Transfer, frequency: f64) -> &'static str {
         match transfer {
             Transfer::Sensitivity(_) if frequency < self.shape.bandwidth => "a lower `bandwidth`",
             Transfer::Complementary(_) if frequency > self.shape.roll_off => "a higher `roll_off`",
-            Transfer::Sensitivity(_) | Transfer::Complementary(_) => "a higher `peak`",
             Transfer::Effort => "a higher `effort`",
+            Transfer::Tracking if frequency < self.shape.set_point => "a lower `set_point`",
+            Transfer::Sensitivity(_) | Transfer::Complementary(_) | Transfer::Tracking => {
+                "a higher `peak`"
+            }
         }
     }
 
@@ -142,12 +183,29 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         let controller =
             complete_controller(self.plant, &gains, self.filter, self.domain)?.commands;
         let (to, from) = (inverse(&units.commands), inverse(&units.measurements));
+        let (p, t) = (from.ncols(), units.references.ncols());
+        // The integrals are the last states: T r enters them.
+        let step = match self.domain {
+            Domain::Continuous => 1.0,
+            Domain::Sampled { period } => period,
+        };
+        let mut b = (&controller.b * &from).resize_horizontally(p + t, 0.0);
+        let first = b.nrows() - t;
+        b.view_mut((first, p), (t, t)).copy_from(&(inverse(&units.references) * step));
         Ok(StateSpace {
-            b: &controller.b * &from,
+            b,
             c: &to * &controller.c,
-            d: &to * &controller.d * &from,
+            d: (&to * &controller.d * &from).resize_horizontally(p + t, 0.0),
             ..controller
         })
+    }
+
+    /// H in `units`.
+    fn followed(&self, units: &Units) -> DMatrix<f64> {
+        match self.references {
+            Some(References { h, .. }) => &units.references * h * inverse(&units.measurements),
+            None => DMatrix::zeros(0, units.measurements.nrows()),
+        }
     }
 
     /// The plant of the verdict in units in which its channels are comparable: those of the file where they are equal.
@@ -155,15 +213,21 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         let plant = self.linear.judged()?;
         let LinearPlant { actuators, measurements, .. } = self.linear;
         let (m, p) = (actuators.len(), measurements.len());
-        let units = if same_unit(actuators) && same_unit(measurements) {
-            Units { commands: DMatrix::identity(m, m), measurements: DMatrix::identity(p, p) }
+        let (commands, measurements) = if same_unit(actuators) && same_unit(measurements) {
+            (DMatrix::identity(m, m), DMatrix::identity(p, p))
         } else {
             let natural = NaturalUnits::new(&plant, self.shape.bandwidth)?;
-            Units {
-                commands: DMatrix::from_diagonal(&natural.inputs),
-                measurements: DMatrix::from_diagonal(&natural.outputs),
-            }
+            (DMatrix::from_diagonal(&natural.inputs), DMatrix::from_diagonal(&natural.outputs))
         };
+        let references = self.references.map_or_else(
+            || DMatrix::zeros(0, 0),
+            |References { h, .. }| {
+                let rows = h * inverse(&measurements);
+                let sizes = rows.row_iter().map(|row| row.norm().recip());
+                DMatrix::from_diagonal(&DVector::from_vec(sizes.collect()))
+            },
+        );
+        let units = Units { commands, measurements, references };
         let plant = match self.domain {
             Domain::Continuous => plant,
             Domain::Sampled { period } => held_plant(&plant, period)?,
@@ -174,7 +238,7 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
 
     /// S and T at commands and measurements, and K S, with their weights.
     fn terms(&self) -> Result<Vec<Term>, Error> {
-        let LoopShape { bandwidth, peak, roll_off, effort, .. } = *self.shape;
+        let LoopShape { bandwidth, set_point, peak, roll_off, effort, .. } = *self.shape;
         let LinearPlant { actuators, measurements, models, .. } = self.linear;
         let (m, p) = (actuators.len(), measurements.len());
         let integrals =
@@ -182,8 +246,9 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
         let flat = Weight::constant(1.0 / peak);
         let mapped = |frequency: f64| bilinear_frequency(frequency, self.domain);
         // (s / peak + w) / (s + FLOOR w), w = bandwidth.
-        let crossing = mapped(bandwidth) * (FLOOR * peak).sqrt();
-        let shaped = Weight::lead_lag(1.0 / FLOOR, crossing, 1.0 / peak, 1)?;
+        let crossing = |bandwidth| mapped(bandwidth) * (FLOOR * peak).sqrt();
+        let shape = |bandwidth| Weight::lead_lag(1.0 / FLOOR, crossing(bandwidth), 1.0 / peak, 1);
+        let shaped = shape(bandwidth)?;
         let nyquist = match self.domain {
             Domain::Continuous => f64::INFINITY,
             Domain::Sampled { period } => std::f64::consts::PI / period,
@@ -205,6 +270,9 @@ impl<G: Fn(&DMatrix<f64>, &DMatrix<f64>) -> Gains + Sync> LoopProblem<'_, G> {
             let weight = Weight::constant(1.0 / effort);
             terms.push(Term { transfer: Transfer::Effort, weight });
         }
+        if self.references.is_some() {
+            terms.push(Term { transfer: Transfer::Tracking, weight: shape(set_point)? });
+        }
         Ok(terms)
     }
 }
@@ -217,6 +285,7 @@ fn summary(terms: &[Term], peak: &WeightedPeak) -> String {
         Transfer::Complementary(Point::Input) => "T at the input",
         Transfer::Complementary(Point::Output) => "T at the output",
         Transfer::Effort => "K S",
+        Transfer::Tracking => "the following of references",
     };
     let gamma = rounded(peak.gamma);
     if peak.frequency.is_finite() {
@@ -228,27 +297,6 @@ fn summary(terms: &[Term], peak: &WeightedPeak) -> String {
 
 fn inverse(units: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_diagonal(&units.diagonal().map(f64::recip))
-}
-
-/// The parameters of two gains.
-fn joined(feedback: &DMatrix<f64>, observer: &DMatrix<f64>) -> DVector<f64> {
-    DVector::from_iterator(
-        feedback.len() + observer.len(),
-        feedback.iter().chain(observer.iter()).copied(),
-    )
-}
-
-/// The gains of two shapes from their parameters.
-fn divided(
-    parameters: &DVector<f64>,
-    feedback: (usize, usize),
-    observer: (usize, usize),
-) -> [DMatrix<f64>; 2] {
-    let (first, second) = parameters.as_slice().split_at(feedback.0 * feedback.1);
-    [
-        DMatrix::from_column_slice(feedback.0, feedback.1, first),
-        DMatrix::from_column_slice(observer.0, observer.1, second),
-    ]
 }
 
 /// The size of each entry, at least a part of that which its row and its column have on average.

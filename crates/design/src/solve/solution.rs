@@ -19,7 +19,7 @@ use plant_file::{FAULTS, PlantFile};
 
 use crate::plant::linear::LinearPlant;
 use crate::plant::plausibility::{check_faults, check_limits};
-use crate::plant::{attainable, delays, feedthrough};
+use crate::plant::{attainable, delays, feedthrough, filters};
 use crate::solve::existence::{check_controllable, check_detectable};
 use crate::solve::family::{self, Family, Member, common_feedback};
 use crate::solve::gain::{GainResult, unique};
@@ -97,7 +97,7 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     check_references(file, &linear)?;
     let detectability = detectability.map_err(|error| file.error(&FAULTS, error.to_string()))?;
     check_detectable(file, &linear, &extended, &detectability, &mut warnings)?;
-    let (domain, mut plant) = in_domain(file, &extended)?;
+    let (domain, mut plant) = in_domain(file, &linear, &extended)?;
     let references = file.references.as_ref();
     let states = extended.states;
     let part =
@@ -249,6 +249,7 @@ fn by_law(law: &DesignedLaw) -> GainResult {
 /// Returns the model in the observer: sampled for a sampled design.
 fn in_domain(
     file: &PlantFile<'_>,
+    linear: &LinearPlant,
     extended: &ExtendedPlant,
 ) -> Result<(Domain, FaultyPlant), PlaceError> {
     let Some(sampling) = file.sampling else {
@@ -257,8 +258,11 @@ fn in_domain(
     let period = sampling.period;
     let refuse =
         |error: Error| file.error(&["sample_time"], format!("sampled every {period} s: {error}"));
-    let plant = sampled::sample(extended, period).map_err(refuse)?;
+    let mut plant = sampled::sample(extended, period).map_err(refuse)?;
     let domain = Domain::Sampled { period };
+    if let Some(pid) = file.pid() {
+        filters::sample(pid, &mut plant, &linear.c, domain).map_err(refuse)?;
+    }
     plant.check_detectable(domain).map_err(refuse)?;
     Ok((domain, plant))
 }

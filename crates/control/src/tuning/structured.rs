@@ -1,0 +1,198 @@
+//! State feedbacks some of whose entries are zero: those of PI and PID controllers, of low order or decentralised.
+
+use crate::lyapunov::{discrete_lyapunov, lyapunov};
+use crate::robustness::uniform;
+use crate::stability::instability;
+use crate::{Domain, Error, check};
+use nalgebra::DMatrix;
+
+/// Steps of the search, and of those without success after which it ends.
+const STEPS: usize = 4000;
+const IDLE: usize = 400;
+/// Factors of the length of a step after success and without: one success in five keeps it.
+const LONGER: f64 = 1.5;
+const SHORTER: f64 = 0.903_602;
+/// Singular values of the signals' correlation below this part of the largest are rounding.
+const ROUNDING: f64 = 1e-10;
+/// Parts of the start that are tried first: a stable plant stays stable with small gains of the right signs.
+const SCALES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
+const SEED: u64 = 1;
+
+/// A plant with the entries of its state feedback that may differ from zero.
+#[derive(Debug, Clone, Copy)]
+pub struct Structure<'a> {
+    /// A, n x n.
+    pub a: &'a DMatrix<f64>,
+    /// B, n x m.
+    pub b: &'a DMatrix<f64>,
+    /// The rows and columns, from zero, of the entries of K, m x n.
+    pub free: &'a [(usize, usize)],
+    /// Of A and B.
+    pub domain: Domain,
+}
+
+impl Structure<'_> {
+    /// The feedback of this structure whose commands are nearest to those of u = K x, while noise enters with the commands:
+    ///
+    /// ```text
+    /// k_s = k X S' (S X S')^+,   (A + B K) X + X (A + B K)' + B B' = 0
+    /// ```
+    ///
+    /// for each row k of K, where S selects the states of its free entries; in sampled time X is the covariance of the
+    /// samples. It is the least mean square of the difference. The loop may be unstable.
+    ///
+    /// `k`: m x n, such that A + B K is stable. Source: W. S. Levine, T. L. Johnson, M. Athans, Optimal limited state
+    /// variable feedback controllers for linear systems, IEEE Trans. Autom. Control 16 (1971), for the covariance.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`] for matrices that do not fit; same as [`lyapunov`] and [`discrete_lyapunov`].
+    pub fn projected(&self, k: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+        let Self { a, b, free, domain } = *self;
+        let n = check::square("A", a)?;
+        check::shape("B", b, (n, b.ncols()))?;
+        check::shape("K", k, (b.ncols(), n))?;
+        let (closed, noise) = ((a + b * k).transpose(), b * b.transpose());
+        let covariance = match domain {
+            Domain::Continuous => lyapunov(&closed, &noise)?.p,
+            Domain::Sampled { .. } => discrete_lyapunov(&closed, &noise)?.p,
+        };
+        let mut projected = DMatrix::zeros(k.nrows(), n);
+        for row in 0..k.nrows() {
+            let columns = free.iter().filter(|entry| entry.0 == row).map(|entry| entry.1);
+            let columns: Vec<_> = columns.collect();
+            if columns.is_empty() {
+                continue;
+            }
+            let size = |at: usize| covariance[(at, at)].sqrt().max(f64::MIN_POSITIVE);
+            let sizes: Vec<_> = columns.iter().map(|at| size(*at)).collect();
+            let count = columns.len();
+            let correlation = DMatrix::from_fn(count, count, |i, j| {
+                covariance[(columns[i], columns[j])] / (sizes[i] * sizes[j])
+            });
+            let of_command = k.row(row) * covariance.select_columns(&columns);
+            let target = DMatrix::from_fn(count, 1, |i, _| of_command[i] / sizes[i]);
+            let svd = correlation.svd(true, true);
+            let least = ROUNDING * svd.singular_values.max();
+            let overflow = |_| Error::Overflow { what: "the correlation of the signals" };
+            let gains = svd.solve(&target, least).map_err(overflow)?;
+            for (i, column) in columns.iter().enumerate() {
+                projected[(row, *column)] = gains[i] / sizes[i];
+            }
+        }
+        Ok(projected)
+    }
+
+    /// A feedback of this structure that decays at least as fast as `decay` asks for, or the best that was found, with its
+    /// instability, see [`instability`]. It is `start` if that decays fast enough.
+    ///
+    /// `decay`: the instability that ends the search, negative. Method: an evolution strategy with one parent and one
+    /// child, whose steps are in the sizes of the entries of `start`, or of the best part of it; the same start gives the same result. The largest real part of
+    /// eigenvalues has no derivative where two of them meet, which minima like; the search needs none. It proves nothing where it
+    /// finds no stable feedback.
+    ///
+    /// Source: H.-G. Beyer, H.-P. Schwefel, Evolution strategies, Natural Computing 1 (2002).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`] for matrices that do not fit; same as [`instability`].
+    pub fn stabilised(
+        &self,
+        start: &DMatrix<f64>,
+        decay: f64,
+    ) -> Result<(DMatrix<f64>, f64), Error> {
+        let Self { a, b, free, domain } = *self;
+        let n = check::square("A", a)?;
+        check::shape("B", b, (n, b.ncols()))?;
+        check::shape("K", start, (b.ncols(), n))?;
+        let of = |k: &DMatrix<f64>| instability(&(a + b * k), domain);
+        let largest = free.iter().map(|at| start[*at].abs()).fold(0.0, f64::max);
+        let least = if largest > 0.0 { 1e-3 * largest } else { 1.0 };
+        let (mut best, mut value) = (start.clone(), of(start)?);
+        for scale in SCALES {
+            let scaled = start * scale;
+            let scaled_value = of(&scaled)?;
+            if value > decay && scaled_value < value {
+                (best, value) = (scaled, scaled_value);
+            }
+        }
+        let (mut random, mut length, mut idle) = (SEED, 0.3, 0);
+        for _ in 0..STEPS {
+            if value <= decay || idle > IDLE {
+                break;
+            }
+            let mut next = best.clone();
+            for at in free {
+                let size = best[*at].abs().max(least);
+                next[*at] += length * size * normal(&mut random);
+            }
+            // An overflow of a long step is no success.
+            let next_value = of(&next).unwrap_or(f64::INFINITY);
+            if next_value < value {
+                (best, value, idle) = (next, next_value, 0);
+                length = (length * LONGER).min(3.0);
+            } else {
+                idle += 1;
+                length = (length * SHORTER).max(1e-6);
+            }
+        }
+        Ok((best, value))
+    }
+}
+
+/// A number that is nearly normally distributed: a sum of twelve uniform ones.
+fn normal(random: &mut u64) -> f64 {
+    (0..12).map(|_| uniform(random)).sum::<f64>() - 6.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn double_integrator() -> (DMatrix<f64>, DMatrix<f64>) {
+        let a = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, 0.0]);
+        (a, DMatrix::from_column_slice(2, 1, &[0.0, 1.0]))
+    }
+
+    #[test]
+    fn the_projection_of_a_feedback_of_the_structure_is_itself() -> Result<(), Error> {
+        let (a, b) = double_integrator();
+        let free = [(0, 0), (0, 1)];
+        let k = DMatrix::from_row_slice(1, 2, &[-2.0, -3.0]);
+        for (a, domain) in [
+            (a.clone(), Domain::Continuous),
+            (&a * 0.1 + DMatrix::identity(2, 2), Domain::Sampled { period: 0.1 }),
+        ] {
+            let b = if domain == Domain::Continuous { b.clone() } else { &b * 0.1 };
+            let structure = Structure { a: &a, b: &b, free: &free, domain };
+            let difference = (structure.projected(&k)? - &k).amax();
+            assert!(difference < 1e-9, "{difference}");
+        }
+        Ok(())
+    }
+
+    /// x'' = u with u = -2 x - 3 x': white noise in u makes position and speed uncorrelated, so that the best use of the
+    /// position alone is its gain.
+    #[test]
+    fn states_that_are_not_correlated_keep_their_gains() -> Result<(), Error> {
+        let (a, b) = double_integrator();
+        let structure = Structure { a: &a, b: &b, free: &[(0, 0)], domain: Domain::Continuous };
+        let k = structure.projected(&DMatrix::from_row_slice(1, 2, &[-2.0, -3.0]))?;
+        assert!((k[0] + 2.0).abs() < 1e-9 && k[1].abs() <= 0.0, "{k}");
+        Ok(())
+    }
+
+    /// 1 / (s^2 (s + 2)) needs the rate; with it and K = (1, 1), s^3 + 2 s^2 + s + 1 is stable.
+    #[test]
+    fn a_stable_feedback_is_found_from_an_unstable_start() -> Result<(), Error> {
+        let a = DMatrix::from_row_slice(3, 3, &[0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -2.0]);
+        let b = DMatrix::from_column_slice(3, 1, &[0.0, 0.0, 1.0]);
+        let domain = Domain::Continuous;
+        let structure = Structure { a: &a, b: &b, free: &[(0, 0), (0, 1)], domain };
+        let start = DMatrix::from_row_slice(1, 3, &[-8.0, -2.0, 0.0]);
+        assert!(instability(&(&a + &b * &start), domain)? > 0.0);
+        let (k, value) = structure.stabilised(&start, -0.05)?;
+        assert!(value <= -0.05 && k[2].abs() <= 0.0, "{k} {value}");
+        Ok(())
+    }
+}

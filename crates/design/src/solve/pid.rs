@@ -1,0 +1,146 @@
+//! PI and PID controllers in place of a state feedback.
+
+use std::ops::Range;
+
+use control::stability::instability;
+use control::tuning::Structure;
+use control::{Domain, Error};
+use files::PlaceError;
+use nalgebra::DMatrix;
+
+use crate::plant::filters;
+use crate::plant::linear::LinearPlant;
+use crate::report::number::rounded;
+use plant_file::PlantFile;
+use plant_file::loop_shape::LoopShape;
+use plant_file::pid::{Pair, Pid};
+use plant_file::references::References;
+
+/// A start decays at this part of the rate of the state feedback beside it, if that can be had.
+const DECAY: f64 = 0.5;
+
+/// The structure of the feedback: which of its entries a PI or PID controller has.
+pub(crate) struct PidProblem<'a> {
+    pub(crate) pid: &'a Pid,
+    pub(crate) shape: &'a LoopShape,
+    pub(crate) linear: &'a LinearPlant,
+    pub(crate) references: &'a References,
+    /// A and B of the feedback.
+    pub(crate) pair: &'a (DMatrix<f64>, DMatrix<f64>),
+    pub(crate) domain: Domain,
+}
+
+/// Where the gains of a controller stand in its row of the feedback, [`K_x`, `K_i`].
+pub(crate) struct Columns {
+    pub(crate) proportional: usize,
+    pub(crate) derivative: Option<usize>,
+    pub(crate) integral: usize,
+}
+
+impl PidProblem<'_> {
+    fn columns(&self, Pair { measurement, .. }: Pair) -> Columns {
+        columns(self.pid, self.references, self.linear.states.len(), measurement)
+    }
+
+    /// The entries of the feedback that are tuned.
+    pub(crate) fn free(&self) -> Vec<(usize, usize)> {
+        let of = |pair: &Pair| {
+            let (pair, columns) = (*pair, self.columns(*pair));
+            let all = [Some(columns.proportional), columns.derivative, Some(columns.integral)];
+            all.into_iter().flatten().map(move |column| (pair.actuator, column))
+        };
+        self.pid.pairs.iter().flat_map(of).collect()
+    }
+
+    /// The controllers nearest to a state feedback, made stable, and the observer with their filters. The second value is
+    /// the instability of the feedback.
+    pub(crate) fn start(
+        &self,
+        [feedback, observer]: &[DMatrix<f64>; 2],
+    ) -> Result<([DMatrix<f64>; 2], f64), Error> {
+        let (a, b) = self.pair;
+        let free = self.free();
+        let structure = Structure { a, b, free: &free, domain: self.domain };
+        let decay = DECAY * instability(&(a + b * feedback), self.domain)?;
+        let (feedback, excess) = structure.stabilised(&structure.projected(feedback)?, decay)?;
+        let mut observer = observer.clone();
+        let rows = filters::gains(self.pid, observer.ncols(), self.domain)?;
+        let first = self.linear.states.len() - rows.nrows();
+        observer.rows_mut(first, rows.nrows()).copy_from(&rows);
+        Ok(([feedback, observer], excess))
+    }
+
+    /// The starts that are stable.
+    pub(crate) fn starts(
+        &self,
+        file: &PlantFile<'_>,
+        state_feedbacks: &[[DMatrix<f64>; 2]],
+    ) -> Result<Vec<[DMatrix<f64>; 2]>, crate::Error> {
+        let mut all = Vec::new();
+        let mut least = f64::INFINITY;
+        for gains in state_feedbacks {
+            let (start, instability) = self.start(gains)?;
+            least = least.min(instability);
+            if instability < 0.0 {
+                all.push(start);
+            }
+        }
+        if all.is_empty() {
+            return Err(self.not_found(file, least).into());
+        }
+        Ok(all)
+    }
+
+    fn not_found(&self, file: &PlantFile<'_>, instability: f64) -> PlaceError {
+        let name = if self.pid.derivative { "PID" } else { "PI" };
+        let measure = match self.domain {
+            Domain::Continuous => "a largest real part of",
+            Domain::Sampled { .. } => "a largest modulus, less 1, of",
+        };
+        let help = if self.pid.derivative {
+            "other `pairs`, another `bandwidth` or a state feedback, which is without `structure`, may help"
+        } else {
+            "`structure = \"PID\"`, other `pairs` or a state feedback, which is without `structure`, may help"
+        };
+        let message = format!(
+            "no stable loop with {name} controllers was found, from {} starts; the best has {measure} {}: {help}",
+            self.shape.starts(self.domain).len(),
+            rounded(instability)
+        );
+        file.error_at(&self.shape.place, message)
+    }
+}
+
+/// The columns of a controller from `measurement`, for a plant whose `states` end with those of the filters.
+pub(crate) fn columns(
+    pid: &Pid,
+    references: &References,
+    states: usize,
+    measurement: usize,
+) -> Columns {
+    let measurements = pid.measurements();
+    let position = measurements.iter().position(|at| *at == measurement).unwrap_or_default();
+    let first = states - pid.order() * (measurements.len() - position);
+    let reference = reference(references, measurement);
+    Columns {
+        proportional: first,
+        derivative: pid.derivative.then_some(first + 1),
+        integral: states + reference,
+    }
+}
+
+/// The position of the reference of `measurement`.
+pub(crate) fn reference(References { h, .. }: &References, measurement: usize) -> usize {
+    h.column(measurement).iter().position(|weight| *weight != 0.0).unwrap_or_default()
+}
+
+/// The entries of an observer gain that are tuned: all but those of the filters, whose states are `filters`.
+pub(crate) fn free_of_observer(
+    filters: &Range<usize>,
+    (rows, columns): (usize, usize),
+) -> Vec<(usize, usize)> {
+    let is_free = |row: &usize| !filters.contains(row);
+    (0..columns)
+        .flat_map(|column| (0..rows).filter(is_free).map(move |row| (row, column)))
+        .collect()
+}

@@ -1,0 +1,173 @@
+//! The entries `structure` and `pairs` of `[loop]`: PI or PID controllers in place of a state feedback.
+
+use crate::references::References;
+use crate::signals::{Signal, position};
+use files::{Place, PlaceError, Table};
+use nalgebra::RowDVector;
+
+/// Entries of the file that need a state feedback, or have a filter beside that of the controllers.
+const OTHERS: [&str; 3] = ["filter", "reconfiguration", "fallback"];
+
+/// PI or PID controllers, each from one measurement to one command.
+///
+/// ```text
+/// u = K (b r - y_f + 1 / T_i integral of (r - y) dt - T_d y_f')
+/// ```
+///
+/// for each command, with the measurement y, its reference r, and the filtered measurement `y_f`: 1 / (1 + s / w) y
+/// of a PI controller, 1 / (1 + sqrt(2) s / w + s^2 / w^2) y of a PID controller.
+///
+/// Source: K. J. Astrom and T. Hagglund, Advanced PID control (2006), sections 3.3 and 3.4.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pid {
+    /// Whether the derivative is used.
+    pub derivative: bool,
+    /// The controllers.
+    pub pairs: Vec<Pair>,
+    /// w, in rad/s.
+    pub corner: f64,
+    /// Where the file states them.
+    pub place: Place,
+}
+
+/// The positions, from 0, of a command and of the measurement that it follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pair {
+    /// Of the command.
+    pub actuator: usize,
+    /// Of the measurement.
+    pub measurement: usize,
+}
+
+impl Pid {
+    /// Reads the entries, if there are any; `corner` is that of the filters, in rad/s.
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`PlaceError`] at the entry that is wrong or missing.
+    pub fn read(
+        file: &Table<'_>,
+        table: &Table<'_>,
+        [actuators, measurements]: [&[Signal]; 2],
+        corner: f64,
+    ) -> Result<Option<Self>, PlaceError> {
+        let Some(entry) = table.get("structure") else {
+            return match table.get("pairs") {
+                Some(entry) => Err(entry.error("it belongs to `structure`, \"PI\" or \"PID\"")),
+                None => Ok(None),
+            };
+        };
+        let derivative = match entry.text()? {
+            "PID" => true,
+            "PI" => false,
+            other => {
+                let message = format!("expected \"PI\" or \"PID\", found {other:?}");
+                return Err(entry.error(message));
+            }
+        };
+        if let Some(other) = OTHERS.iter().find(|key| file.get(key).is_some()) {
+            return Err(entry.error(format!("it is not possible together with `{other}`")));
+        }
+        if let Some(estimator) = file.get("estimator")
+            && estimator.text()? == "current"
+        {
+            let message = "a sampled PI or PID controller uses the measurements of the sample before: \
+                           expected \"prediction\", or no entry";
+            return Err(estimator.error(message));
+        }
+        let mut pairs = Vec::new();
+        match table.get("pairs") {
+            Some(stated) => {
+                for (name, measurement) in stated.table()?.entries() {
+                    let Some(actuator) = actuators.iter().position(|one| one.name == name) else {
+                        let names: Vec<_> = actuators.iter().map(|one| one.name.as_str()).collect();
+                        return Err(measurement.error(format!(
+                            "no actuator is named {name:?}; there are {}",
+                            names.join(", ")
+                        )));
+                    };
+                    let measurement = position(&measurement, measurements, "measurement")?;
+                    pairs.push(Pair { actuator, measurement });
+                }
+                if pairs.is_empty() {
+                    return Err(stated.error("expected at least one `actuator = \"measurement\"`"));
+                }
+                pairs.sort_by_key(|pair| pair.actuator);
+            }
+            None if actuators.len() == measurements.len() => {
+                let all = 0..actuators.len();
+                pairs.extend(all.map(|at| Pair { actuator: at, measurement: at }));
+            }
+            None => {
+                let message = format!(
+                    "there are {} actuators and {} measurements: expected `pairs`, a table from actuators to \
+                     measurements, {{ {} = {:?} }} for example",
+                    actuators.len(),
+                    measurements.len(),
+                    actuators[0].name,
+                    measurements[0].name
+                );
+                return Err(entry.error(message));
+            }
+        }
+        Ok(Some(Self { derivative, pairs, corner, place: entry.place }))
+    }
+
+    /// Checks that the references are those of the measurements that commands follow, and integrated.
+    pub(crate) fn check_references(
+        &self,
+        file: &Table<'_>,
+        references: Option<&References>,
+        measurements: &[Signal],
+    ) -> Result<(), PlaceError> {
+        let names =
+            self.measurements().into_iter().map(|at| format!("{:?}", measurements[at].name));
+        let names: Vec<_> = names.collect();
+        let expected = format!("expected `reference.track = [{}]`", names.join(", "));
+        let Some(references) = references.filter(|references| references.integral) else {
+            let message = format!(
+                "the integrals of PI and PID controllers are those of references: {expected}"
+            );
+            return Err(file.source.error(&self.place, message));
+        };
+        let followed = |row: RowDVector<f64>| {
+            let mut used = row.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
+            used.next().map(|(at, _)| at).filter(|_| used.next().is_none())
+        };
+        let mut all = Vec::new();
+        for ((signal, row), place) in
+            references.signals.iter().zip(references.h.row_iter()).zip(&references.places)
+        {
+            let at = followed(row.into_owned());
+            let Some(at) = at.filter(|at| self.measurements().contains(at)) else {
+                let message =
+                    format!("no controller has the reference `{}`: {expected}", signal.name);
+                return Err(file.source.error(place, message));
+            };
+            all.push(at);
+        }
+        match self.measurements().into_iter().find(|at| !all.contains(at)) {
+            None => Ok(()),
+            Some(at) => {
+                let name = &measurements[at].name;
+                let message = format!("the controller of `{name}` has no reference: {expected}");
+                Err(file.source.error(&self.place, message))
+            }
+        }
+    }
+
+    /// The filtered measurements: their positions, each once, in order.
+    #[must_use]
+    pub fn measurements(&self) -> Vec<usize> {
+        let mut all: Vec<_> = self.pairs.iter().map(|pair| pair.measurement).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// Number of states of each filter.
+    #[must_use]
+    pub const fn order(&self) -> usize {
+        if self.derivative { 2 } else { 1 }
+    }
+}
