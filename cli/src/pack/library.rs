@@ -179,16 +179,54 @@ fn metadata(folder: &Path, host: &str, locked: bool) -> anyhow::Result<Metadata>
 
 /// Builds the libraries of `members`, crates of the workspace of `source`, with the profile `fmu`;
 /// returns all artifacts.
+///
+/// No library has a local path, so that the same sources give the same bytes. Code that a build script wrote stands in the
+/// target folder; only where its path is found in a library the flags name it, from then on. Named always, it would make
+/// cargo build all again in a copy of the folder.
 fn compile<'a>(
     source: &Source,
     members: impl Iterator<Item = &'a Source>,
     locked: bool,
 ) -> anyhow::Result<Vec<Artifact>> {
+    let ids: Vec<_> = members.flat_map(|member| ["-p", &member.package.id.repr]).collect();
+    let target = &source.metadata.target_directory;
+    let marker = target.join("libraries/target-is-remapped");
+    let mut flags = remappings(&source.metadata);
+    if !marker.exists() {
+        let artifacts = call_cargo(source, &ids, locked, &flags)?;
+        if !contain(&artifacts, target.as_str())? {
+            return Ok(artifacts);
+        }
+        std::fs::write(&marker, "").with_context(|| format!("cannot write {marker}"))?;
+    }
+    flags.push(format!("--remap-path-prefix={target}=target"));
+    call_cargo(source, &ids, locked, &flags)
+}
+
+/// Whether a library among the artifacts has this text.
+fn contain(artifacts: &[Artifact], text: &str) -> anyhow::Result<bool> {
+    let is_library =
+        |artifact: &&Artifact| artifact.target.crate_types.contains(&CrateType::CDyLib);
+    for file in artifacts.iter().filter(is_library).flat_map(|artifact| &artifact.filenames) {
+        let bytes = std::fs::read(file).with_context(|| format!("cannot read {file}"))?;
+        if bytes.windows(text.len()).any(|part| part == text.as_bytes()) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Builds the packages `ids` of the workspace of `source` with compiler flags.
+fn call_cargo(
+    source: &Source,
+    ids: &[&str],
+    locked: bool,
+    flags: &[String],
+) -> anyhow::Result<Vec<Artifact>> {
     let metadata = &source.metadata;
     let root = &metadata.workspace_root;
     let target = metadata.target_directory.join("libraries");
     let mut command = Command::new(program("CARGO", "cargo"));
-    let ids: Vec<_> = members.flat_map(|member| ["-p", &member.package.id.repr]).collect();
     // Not by what is packed: other flags for a crate alone would build it again after it was packed with others.
     let alone = metadata.workspace_members.len() == 1;
     command.current_dir(&source.folder).arg(if alone { "rustc" } else { "build" }).args(ids);
@@ -203,7 +241,7 @@ fn compile<'a>(
     if alone {
         command.args(["--", &format!("--remap-path-prefix={root}=.")]);
     }
-    command.env("CARGO_ENCODED_RUSTFLAGS", remappings(metadata).join("\u{1f}"));
+    command.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"));
     let mut cargo = command
         .stdout(Stdio::piped())
         .spawn()
@@ -230,8 +268,7 @@ fn remappings(metadata: &Metadata) -> Vec<String> {
         .map(PathBuf::from)
         .or_else(|| std::env::home_dir().map(|home| home.join(".cargo")));
     let remap = |path: &dyn std::fmt::Display, to: &str| format!("--remap-path-prefix={path}={to}");
-    let mut flags = vec![remap(&metadata.target_directory, "target")];
-    flags.extend(cargo_home.map(|home| remap(&home.display(), "cargo")));
+    let mut flags = Vec::from_iter(cargo_home.map(|home| remap(&home.display(), "cargo")));
     for package in &metadata.packages {
         let folder = package.manifest_path.parent();
         let elsewhere = folder.filter(|folder| !folder.starts_with(&metadata.workspace_root));

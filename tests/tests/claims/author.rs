@@ -80,6 +80,48 @@ fn content(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     files
 }
 
+fn contains(library: &[u8], path: &Path) -> bool {
+    let path = path.display().to_string();
+    library.windows(path.len()).any(|bytes| bytes == path.as_bytes())
+}
+
+/// The message of its panic names the file. Without `fmu` it is not a model, which the packer finds after the library is built.
+#[test]
+fn code_of_a_build_script_leaves_no_local_path_in_the_library() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path().canonicalize().unwrap();
+    fs::create_dir_all(place.join("src")).unwrap();
+    let script = "fn main() {
+    let path = std::path::Path::new(&std::env::var(\"OUT_DIR\").unwrap()).join(\"table.rs\");
+    std::fs::write(path, \"pub fn entry(at: usize) -> f64 { [1.0, 2.0][at] }\").unwrap();
+}
+";
+    let code = "include!(concat!(env!(\"OUT_DIR\"), \"/table.rs\"));
+#[used]
+static USED: fn(usize) -> f64 = entry;
+";
+    let manifest = "[package]
+name = \"generated\"
+version = \"0.1.0\"
+edition = \"2024\"
+[lib]
+crate-type = [\"cdylib\"]
+[workspace]
+";
+    for (file, text) in [("build.rs", script), ("src/lib.rs", code), ("Cargo.toml", manifest)] {
+        fs::write(place.join(file), text).unwrap();
+    }
+    for _ in 0..2 {
+        let mut command = Command::new(command());
+        command.current_dir(&place).env_remove("CARGO_TARGET_DIR").args(["pack", "."]);
+        let output = command.output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{}", message(&output));
+        let library = fs::read(place.join("target/libraries/fmu/libgenerated.so")).unwrap();
+        assert!(contains(&library, Path::new("table.rs")));
+        assert!(!contains(&library, &place), "{}", place.display());
+    }
+}
+
 #[test]
 fn a_new_crate_with_the_files_of_its_author_is_packed_to_the_same_bytes_in_any_folder() {
     let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
@@ -100,9 +142,7 @@ fn a_new_crate_with_the_files_of_its_author_is_packed_to_the_same_bytes_in_any_f
     let library = fs::read(fmu.library("HeatPump").unwrap()).unwrap();
     let home = std::env::var("HOME").unwrap_or_default();
     for path in [folders[0].path(), &root(), Path::new(&home)] {
-        let path = path.display().to_string();
-        let found = library.windows(path.len()).any(|bytes| bytes == path.as_bytes());
-        assert!(!found, "the library contains {path}");
+        assert!(!contains(&library, path), "the library contains {}", path.display());
     }
     let licenses = fmu.folder().join("documentation/licenses");
     let entry = fs::read_to_string(licenses.join("license.txt")).unwrap();
