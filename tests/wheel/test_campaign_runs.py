@@ -18,7 +18,7 @@ import aso_ftc as af
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
-from distributed import LocalCluster
+from distributed import Client, LocalCluster
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -217,6 +217,43 @@ def test_rows_stay_the_same_if_worker_client_and_scheduler_are_killed(campaign, 
     status, out, messages = done(file, "--out", tmp_path / "undisturbed", "--workers", 2)
     assert (status, messages) == (0, "")
     assert rows(folder) == rows(tmp_path / "undisturbed")
+
+
+# A worker that never finishes taking the job of a campaign.
+STUCK = """
+import asyncio, pathlib, sys
+from distributed import Worker
+from distributed.cli.dask_worker import main
+
+add, place = Worker.plugin_add, sys.argv[2]
+
+async def plugin_add(self, plugin, name=None, **words):
+    if str(name).startswith("aso-ftc"):
+        pathlib.Path(place, "asked").touch()
+        await asyncio.sleep(600)
+    return await add(self, plugin, name, **words)
+
+Worker.plugin_add = plugin_add
+sys.argv[2:] = ["--no-nanny", "--nthreads", "1", "--local-directory", place, "--no-dashboard"]
+main()
+"""
+
+
+def test_a_worker_that_leaves_while_it_gets_the_campaign_does_not_end_it(campaign, tmp_path, cluster):
+    place = tmp_path / "stuck"
+    place.mkdir()
+    (place / "worker.py").write_text(STUCK, encoding="utf-8")
+    line = [sys.executable, "-I", place / "worker.py", cluster.address, place]
+    with Client(cluster.address, timeout=60) as client:
+        client.wait_for_workers(2, timeout=60)
+        with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as stuck:
+            client.wait_for_workers(3, timeout=60)
+            process = command(campaign(runs=8), "--out", tmp_path / "out", "--scheduler", cluster.address)
+            wait_for(lambda: (place / "asked").exists() or process.poll() is not None)
+            stuck.kill()
+    out, messages = process.communicate(timeout=120)
+    assert (process.returncode, messages) == (0, ""), out
+    assert rows(tmp_path / "out")["run"] == list(range(8))
 
 
 def test_rows_stay_the_same_if_an_adaptive_cluster_starts_empty_and_shrinks(campaign, tmp_path):

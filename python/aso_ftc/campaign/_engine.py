@@ -38,6 +38,8 @@ _BACKLOG, _MOST_AHEAD = 10.0, 100
 # Seconds after its start before a worker runs anything: Dask does not replace a worker that ends before
 # its nanny has noticed its start (Nanny._on_worker_exit, status "starting").
 _SETTLING = 1.0
+# What a worker without the job says.
+_ABSENT = "it has not got the campaign"
 # Seconds for which the number of threads of a cluster is taken as known.
 _KNOWN = 5.0
 _LOGGERS = [
@@ -223,7 +225,7 @@ class _Plugin:
 def _state(name: str, dask_worker: Any) -> str:
     """Runs on a worker: what is wrong with it."""
     plugin = dask_worker.plugins.get(name)
-    return "it has not got the campaign" if plugin is None else str(plugin.error)
+    return _ABSENT if plugin is None else str(plugin.error)
 
 
 def _do(name: str, *work: Any) -> list[Row]:
@@ -386,7 +388,12 @@ class _Work:
     def prepare(self, client: Any, name: str) -> None:
         """Give the job to all workers, and ask each whether it can run it."""
         plugin = _plugin(name, package("cloudpickle").dumps(Job.of(self.campaign)))
-        client.register_plugin(plugin, name=name)
+        try:
+            client.register_plugin(plugin, name=name)
+        except (package("distributed").comm.CommClosedError, OSError):
+            # A worker left while it got the job. The scheduler has it for the others, which may still be getting it.
+            if client.status != "running":
+                raise
         try:
             # An adaptive cluster starts its first worker for a task.
             client.submit(int, pure=False).result(timeout=_PATIENCE)
@@ -394,7 +401,10 @@ class _Work:
             raise Error(
                 f"the scheduler has no workers within {_PATIENCE:g} s: start some", "Scheduler"
             ) from None
-        for worker, wrong in client.run(_state, name, on_error="ignore").items():
+        end = time.monotonic() + _PATIENCE
+        while _ABSENT in (states := client.run(_state, name, on_error="ignore")).values() and time.monotonic() < end:
+            time.sleep(_PAUSE)
+        for worker, wrong in states.items():
             if wrong:
                 raise Error(f"worker {worker}: {wrong}", "Worker", {"worker": worker})
         # Dask's page needs the package bokeh.
