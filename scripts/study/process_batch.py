@@ -1,16 +1,19 @@
-"""Designs plants of industrial processes with delays by default, as a table in Markdown.
+"""Designs plants of industrial processes with delays, as a table in Markdown.
 
-    python scripts/study/process_batch.py
+    python scripts/study/process_batch.py [PI | PID]
 
 The plants are of the nine families of the test batch of K. J. Astrom and T. Hagglund, Revisiting the Ziegler-Nichols step
 response method for PID control, J. Process Control 14 (2004), with 133 sets of parameters, those of `batch`. Each is given to
-`aso-ftc design` without a requirement, with the delay at the command, in continuous and in sampled time; a sample is a 40th
-of the longest time constant or of the delay. The peaks of S are those with the delays themselves. Needs
+`aso-ftc design` with the delay at the command, in continuous and in sampled time; a sample is a 40th of the longest time
+constant or of the delay. The files state no requirement, or a PI or PID controller whose `bandwidth` is half the frequency at
+which the plant has a phase of -135 degrees; then gamma is in the table, too. The peaks of S are those with the delays themselves. Needs
 target/release/aso-ftc and Python 3.11 with scipy.
 """
 
 import json
+import re
 import subprocess
+import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -55,7 +58,15 @@ def batch():
         yield "1 / ((s + 1) ((s T)^2 + 1.4 s T + 1))", [1], np.polymul([1, 1], [time**2, 1.4 * time, 1]), 0
 
 
-def plant_file(plant, sampled):
+def bandwidth(numerator, denominator, delay):
+    """Half the frequency at which the phase of the plant is -135 degrees."""
+    omega = np.geomspace(1e-5, 1e5, 200_000)
+    response = np.polyval(numerator, 1j * omega) / np.polyval(denominator, 1j * omega)
+    phase = np.unwrap(np.angle(response)) - delay * omega
+    return omega[np.argmax(phase <= -0.75 * np.pi)] / 2
+
+
+def plant_file(plant, sampled, structure):
     """The text of the plant file."""
     _, numerator, denominator, delay = plant
     a, b, c, _ = (matrix.tolist() for matrix in tf2ss(numerator, np.trim_zeros(denominator, "f")))
@@ -63,11 +74,14 @@ def plant_file(plant, sampled):
     if sampled:
         slowest = max([delay, *(1 / abs(pole.real) for pole in np.roots(denominator) if abs(pole.real) > 1e-9)])
         text += f"sample_time = {slowest / SAMPLES:.2g}\n"
+    if structure:
+        rate = bandwidth(numerator, denominator, delay)
+        text += f'reference.track = ["y1"]\n[loop]\nbandwidth = {rate:.3g}\nstructure = "{structure}"\n'
     return text
 
 
 def designed(text):
-    """Verdict and peak of S; the message of a refusal."""
+    """Verdict, peak of S and gamma; the message of a refusal."""
     with tempfile.TemporaryDirectory() as folder:
         plant = Path(folder) / "plant.toml"
         plant.write_text(text, encoding="utf-8")
@@ -76,29 +90,35 @@ def designed(text):
             [ROOT / "target/release/aso-ftc", *words], capture_output=True, text=True, encoding="utf-8", check=False
         )
     if done.returncode not in (0, 1):
-        return "refused", done.stderr
+        return "refused", done.stderr, np.nan
     report = json.loads(done.stdout)
     robustness = report["robustness"]
     exact = robustness["delays"] or {"s_peaks": [point["s_peak"] for point in robustness["points"]]}
-    return report["verdict"]["level"], max(exact["s_peaks"])
+    gamma = re.search(r"gamma = ([0-9.e+-]+[0-9])", report["feedback"]["method"])
+    return report["verdict"]["level"], max(exact["s_peaks"]), float(gamma[1]) if gamma else np.nan
 
 
 def main():
     """Prints a row for each family."""
-    plants = list(batch())
-    print("| plant | plants | green, continuous | green, sampled | peak of S |\n|---|---|---|---|---|")
+    plants, structure = list(batch()), next(iter(sys.argv[1:]), None)
+    heads = ["plant", "plants", "green, continuous", "green, sampled", "peak of S", *(["gamma"] if structure else [])]
+    print(f"| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
     with ThreadPoolExecutor() as pool:
         results = [
-            list(pool.map(designed, [plant_file(plant, sampled) for plant in plants]))
+            list(pool.map(designed, [plant_file(plant, sampled, structure) for plant in plants]))
             for sampled in (False, True)
         ]
     for family in dict.fromkeys(plant[0] for plant in plants):
         rows = [at for at, plant in enumerate(plants) if plant[0] == family]
         green = [sum(results[sampled][at][0] == "green" for at in rows) for sampled in (0, 1)]
         peaks = [result[at][1] for result in results for at in rows if result[at][0] != "refused"]
-        print(f"| {family} | {len(rows)} | {green[0]} | {green[1]} | {min(peaks):.2f} to {max(peaks):.2f} |")
+        cells = [family, len(rows), *green, f"{min(peaks):.2f} to {max(peaks):.2f}"]
+        if structure:
+            gammas = [result[at][2] for result in results for at in rows if result[at][0] != "refused"]
+            cells.append(f"{min(gammas):.2f} to {max(gammas):.2f}")
+        print(f"| {' | '.join(map(str, cells))} |")
     for result in results:
-        for plant, (level, detail) in zip(plants, result, strict=True):
+        for plant, (level, detail, _) in zip(plants, result, strict=True):
             if level != "green":
                 print(f"{plant[0]}, {[float(one) for one in plant[2]]}, {plant[3]} s: {level} {detail}")
 
