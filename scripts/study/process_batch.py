@@ -5,9 +5,9 @@
 The plants are of the nine families of the test batch of K. J. Astrom and T. Hagglund, Revisiting the Ziegler-Nichols step
 response method for PID control, J. Process Control 14 (2004), with 133 sets of parameters, those of `batch`. Each is given to
 `aso-ftc design` with the delay at the command, in continuous and in sampled time; a sample is a 40th of the longest time
-constant or of the delay. The files state no requirement, or a PI or PID controller whose `bandwidth` is half the frequency at
-which the plant has a phase of -135 degrees; then gamma is in the table, too. The peaks of S are those with the delays themselves. Needs
-target/release/aso-ftc and Python 3.11 with scipy.
+constant or of the delay. The files state no requirement, or a PI or PID controller whose `bandwidth` is a third of the
+frequency at which the plant has a phase of -135 degrees, at most half a radian per sample; then gamma is in the table, too.
+The peaks of S are those with the delays themselves. Needs target/release/aso-ftc and Python 3.11 with scipy.
 """
 
 import json
@@ -59,11 +59,11 @@ def batch():
 
 
 def bandwidth(numerator, denominator, delay):
-    """Half the frequency at which the phase of the plant is -135 degrees."""
+    """A third of the frequency at which the phase of the plant is -135 degrees."""
     omega = np.geomspace(1e-5, 1e5, 200_000)
     response = np.polyval(numerator, 1j * omega) / np.polyval(denominator, 1j * omega)
     phase = np.unwrap(np.angle(response)) - delay * omega
-    return omega[np.argmax(phase <= -0.75 * np.pi)] / 2
+    return omega[np.argmax(phase <= -0.75 * np.pi)] / 3
 
 
 def plant_file(plant, sampled, structure):
@@ -71,12 +71,15 @@ def plant_file(plant, sampled, structure):
     _, numerator, denominator, delay = plant
     a, b, c, _ = (matrix.tolist() for matrix in tf2ss(numerator, np.trim_zeros(denominator, "f")))
     text = f'A = {a}\nB = {b}\nC = {c}\nactuators = [{{ name = "u", delay = {delay} }}]\nactuator_faults = "all"\n'
+    fastest = np.inf
     if sampled:
         slowest = max([delay, *(1 / abs(pole.real) for pole in np.roots(denominator) if abs(pole.real) > 1e-9)])
-        text += f"sample_time = {slowest / SAMPLES:.2g}\n"
+        period = float(f"{slowest / SAMPLES:.2g}")
+        text += f"sample_time = {period}\n"
+        fastest = 0.499 / period
     if structure:
-        rate = bandwidth(numerator, denominator, delay)
-        text += f'reference.track = ["y1"]\n[loop]\nbandwidth = {rate:.3g}\nstructure = "{structure}"\n'
+        rate = min(bandwidth(numerator, denominator, delay), fastest)
+        text += f'reference.track = ["y1"]\n[loop]\nbandwidth = {rate:.4g}\nstructure = "{structure}"\n'
     return text
 
 

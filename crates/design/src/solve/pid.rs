@@ -54,7 +54,7 @@ impl PidProblem<'_> {
 
     /// The controllers nearest to a state feedback, made stable, and the observer with their filters. The second value is
     /// the instability of the feedback.
-    pub(crate) fn start(
+    fn start(
         &self,
         [feedback, observer]: &[DMatrix<f64>; 2],
     ) -> Result<([DMatrix<f64>; 2], f64), Error> {
