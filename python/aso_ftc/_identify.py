@@ -27,7 +27,9 @@ class Plant(Mapping[str, Any]):
     """
 
     def __init__(self, text: str, refusal: str | None, warnings: Sequence[str]) -> None:
-        self.text, self.refusal, self.warnings = text, refusal, list(warnings)
+        self.text: str = text
+        self.refusal: str | None = refusal
+        self.warnings: list[str] = list(warnings)
         self._entries: dict[str, Any] = _core.parse_toml(text)
 
     def __getitem__(self, name: str) -> Any:

@@ -3,6 +3,7 @@
 import doctest
 import importlib.metadata
 import inspect
+import os
 import subprocess
 import sys
 import sysconfig
@@ -36,6 +37,15 @@ def test_the_stubs_are_those_of_the_extension_and_types_are_complete(tmp_path):
     run("mypy.stubtest", "--mypy-config-file", config, "aso_ftc._core")
     run("mypy", "--config-file", config, "-p", "aso_ftc")
     assert "dict[str, Any]" in run("mypy", "--config-file", config, user)
+
+
+def test_every_type_of_the_public_interface_is_stated(tmp_path):
+    pytest.importorskip("pyright")
+    # pyright takes the environment whose python is first in the path.
+    here = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}", "VIRTUAL_ENV": sys.prefix}
+    words = [sys.executable, "-I", "-m", "pyright", "--verifytypes", "aso_ftc", "--ignoreexternal"]
+    done = subprocess.run(words, check=False, capture_output=True, text=True, cwd=tmp_path, env=here)
+    assert "Type completeness score: 100%" in done.stdout, done.stdout + done.stderr
 
 
 def test_every_public_name_has_a_docstring():

@@ -105,7 +105,8 @@ class Outcome:
     """
 
     def __init__(self, folder: Path, manifest: dict[str, Any]) -> None:
-        self.folder, self.manifest = folder, manifest
+        self.folder: Path = folder
+        self.manifest: dict[str, Any] = manifest
         self._files = sorted(str(part) for part in (folder / "runs").glob("part-*.parquet"))
         if not self._files:
             raise ResultsError(f"{folder}: no run of this campaign has ended yet", "NoRuns")

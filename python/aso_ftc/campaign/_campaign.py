@@ -143,31 +143,31 @@ class Campaign:
     def _read(self, entries: dict[str, Any], folder: Path) -> None:
         entries = plain(entries)
         only("", entries, sorted(_ENTRIES))
-        self.name = str(entries.get("name", "campaign"))
+        self.name: str = str(entries.get("name", "campaign"))
         if not _NAME.fullmatch(self.name):
             raise fail("name", f"{self.name!r}: expected letters, digits, spaces, dots, - and _")
-        self.seed = whole("seed", entries.get("seed", 0), 0)
-        self.system = _system(entries, folder)
-        self.isolate = bool(entries.get("isolate", False))
+        self.seed: int = whole("seed", entries.get("seed", 0), 0)
+        self.system: System = _system(entries, folder)
+        self.isolate: bool = bool(entries.get("isolate", False))
         limit = entries.get("time-limit")
-        self.time_limit = None if limit is None else positive("time-limit", limit)
-        self.memory_limit = entries.get("memory-limit")
+        self.time_limit: float | None = None if limit is None else positive("time-limit", limit)
+        self.memory_limit: Any = entries.get("memory-limit")
         if self.memory_limit is not None and not self.isolate:
             raise fail("memory-limit", "a limit of memory needs isolate = true")
-        self.record_every = entries.get("record-every", "step")
+        self.record_every: Any = entries.get("record-every", "step")
         self._variables = {variable.name: variable for variable in self.system.variables()}
-        self.disturbances = disturbances(entries.get("disturbances", {}))
-        self.parameters = self._parameters(entries, folder)
-        self.cases = cases(entries.get("faults", []), self._inputs)
+        self.disturbances: dict[str, dict[str, Any]] = disturbances(entries.get("disturbances", {}))
+        self.parameters: list[Parameter] = self._parameters(entries, folder)
+        self.cases: tuple[FaultCase, ...] = cases(entries.get("faults", []), self._inputs)
         self._measures(entries, folder)
         design = table("design", entries.get("design", {"method": "grid"}))
         complete, sampled = sample(design, self.parameters, self.seed)
-        self.plan = Plan(complete, sampled, self.cases or (NO_FAULT,))
-        self.keep = self._keep(entries.get("keep"))
-        self.stop = self._stop(entries.get("stop"))
+        self.plan: Plan = Plan(complete, sampled, self.cases or (NO_FAULT,))
+        self.keep: dict[str, Any] = self._keep(entries.get("keep"))
+        self.stop: dict[str, Any] = self._stop(entries.get("stop"))
         # Independent of the number of workers, so that the parts are.
         share = min(50, max(10, len(self.plan) // 64))
-        self.runs_per_task = whole("runs-per-task", entries.get("runs-per-task", share), 1, 10_000)
+        self.runs_per_task: int = whole("runs-per-task", entries.get("runs-per-task", share), 1, 10_000)
         self.check()
 
     # The parts of a campaign.toml, in the order in which they are read.
@@ -255,7 +255,7 @@ class Campaign:
                 raise fail(
                     f"measures.{name}", 'expected an expression, a function, or { python = "file.py:function" }'
                 )
-        self.limits = table("limits", entries.get("limits", {}))
+        self.limits: dict[str, Any] = table("limits", entries.get("limits", {}))
         for name, limit in self.limits.items():
             if name not in own:
                 hint = similar(name, own)
