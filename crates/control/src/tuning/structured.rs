@@ -86,7 +86,7 @@ impl Structure<'_> {
     /// A feedback of this structure that decays at least as fast as `decay` asks for, or the best that was found, with its
     /// instability, see [`instability`]. It is `start` if that decays fast enough.
     ///
-    /// `decay`: the instability that ends the search, negative. Method: an evolution strategy with one parent and one
+    /// `decay`: the instability that ends the search, negative; `is_over`: whether it must end with what there is. Method: an evolution strategy with one parent and one
     /// child, whose steps are in the sizes of the entries of `start`, or of the best part of it; the same start gives the same result. The largest real part of
     /// eigenvalues has no derivative where two of them meet, which minima like; the search needs none. It proves nothing where it
     /// finds no stable feedback.
@@ -100,6 +100,7 @@ impl Structure<'_> {
         &self,
         start: &DMatrix<f64>,
         decay: f64,
+        is_over: &dyn Fn() -> bool,
     ) -> Result<(DMatrix<f64>, f64), Error> {
         let Self { a, b, free, domain } = *self;
         let n = check::square("A", a)?;
@@ -118,7 +119,7 @@ impl Structure<'_> {
         }
         let (mut random, mut length, mut idle) = (SEED, 0.3, 0);
         for _ in 0..STEPS {
-            if value <= decay || idle > IDLE {
+            if value <= decay || idle > IDLE || is_over() {
                 break;
             }
             let mut next = best.clone();
@@ -191,7 +192,7 @@ mod tests {
         let structure = Structure { a: &a, b: &b, free: &[(0, 0), (0, 1)], domain };
         let start = DMatrix::from_row_slice(1, 3, &[-8.0, -2.0, 0.0]);
         assert!(instability(&(&a + &b * &start), domain)? > 0.0);
-        let (k, value) = structure.stabilised(&start, -0.05)?;
+        let (k, value) = structure.stabilised(&start, -0.05, &|| false)?;
         assert!(value <= -0.05 && k[2].abs() <= 0.0, "{k} {value}");
         Ok(())
     }

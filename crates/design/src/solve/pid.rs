@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use control::stability::instability;
 use control::tuning::Structure;
-use control::{Domain, Error};
+use control::{Domain, Error, lmi};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
@@ -62,7 +62,10 @@ impl PidProblem<'_> {
         let free = self.free();
         let structure = Structure { a, b, free: &free, domain: self.domain };
         let decay = DECAY * instability(&(a + b * feedback), self.domain)?;
-        let (feedback, excess) = structure.stabilised(&structure.projected(feedback)?, decay)?;
+        let ending = lmi::ending();
+        let is_over = || ending.as_ref().is_some_and(|ending| ending());
+        let start = structure.projected(feedback)?;
+        let (feedback, excess) = structure.stabilised(&start, decay, &is_over)?;
         let mut observer = observer.clone();
         let rows = filters::gains(self.pid, observer.ncols(), self.domain)?;
         let first = self.linear.states.len() - rows.nrows();
