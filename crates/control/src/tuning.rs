@@ -7,8 +7,8 @@
 //! gamma(theta) = max over terms i and frequencies w of |W_i(j w)| sigma_max(X_i(j w))
 //! ```
 //!
-//! X is S or T at the commands or the measurements, K S, or what is left of the references, with the signs of
-//! [`crate::robustness`].
+//! X is S or T at the commands or the measurements, K S, or the tracking error of the references, with the signs
+//! of [`crate::robustness`].
 //! Gamma at most 1 means that every X is below 1 / |W|.
 
 mod descent;
@@ -37,7 +37,7 @@ pub enum Transfer {
     Complementary(Point),
     /// K S: from what is added to the measurements to the commands.
     Effort,
-    /// From references r to r - H y.
+    /// The tracking error: from references r to r - H y.
     Tracking,
 }
 

@@ -165,6 +165,12 @@ impl Pid {
         all
     }
 
+    /// Number of states of all filters.
+    #[must_use]
+    pub fn states(&self) -> usize {
+        self.order() * self.measurements().len()
+    }
+
     /// Number of states of each filter.
     #[must_use]
     pub const fn order(&self) -> usize {

@@ -53,7 +53,7 @@ pub(crate) fn states(pid: &Pid, measurements: &[Signal]) -> Vec<Signal> {
 pub(crate) fn with_filters(pid: &Pid, plant: &StateSpace) -> Result<StateSpace, Error> {
     let StateSpace { a, b, c, d, .. } = plant;
     let n = a.nrows();
-    let all = n + pid.order() * pid.measurements().len();
+    let all = n + pid.states();
     let mut extended = StateSpace {
         a: a.clone().resize(all, all, 0.0),
         b: b.clone().resize_vertically(all, 0.0),
@@ -74,7 +74,7 @@ pub(crate) fn sample(
     c: &DMatrix<f64>,
     domain: Domain,
 ) -> Result<(), Error> {
-    let count = pid.order() * pid.measurements().len();
+    let count = pid.states();
     let first = plant.a.nrows() - count;
     plant.b.rows_mut(first, count).fill(0.0);
     plant.f_a.rows_mut(first, count).fill(0.0);

@@ -16,6 +16,7 @@ use files::PlaceError;
 use plant_file::PlantFile;
 use plant_file::detection::{Disturbance, DisturbanceEntry};
 use plant_file::faults::{EntryPoint, Fault, FaultDynamics};
+use plant_file::pid::Pid;
 use plant_file::requirements::Requirement;
 use plant_file::signals::Signal;
 
@@ -87,11 +88,11 @@ impl LinearPlant {
 
     /// The positions of the states of the filters of PI and PID controllers, the last ones.
     pub(crate) fn filter_states(&self, file: &PlantFile<'_>) -> Range<usize> {
-        let count = file.pid().map_or(0, |pid| pid.order() * pid.measurements().len());
+        let count = file.pid().map_or(0, Pid::states);
         self.states.len() - count..self.states.len()
     }
 
-    /// Whether a mode is one of delays, which is stable. Of equal delays of two signals no gain moves one.
+    /// Whether a mode is one of delays or filters, which is stable. Of equal delays of two signals no gain moves one.
     pub(crate) fn is_of_delays(&self, mode: &Mode) -> bool {
         mode.dominant.iter().all(|state| self.delay_states().contains(state))
     }

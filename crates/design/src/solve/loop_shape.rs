@@ -285,7 +285,7 @@ fn summary(terms: &[Term], peak: &WeightedPeak) -> String {
         Transfer::Complementary(Point::Input) => "T at the input",
         Transfer::Complementary(Point::Output) => "T at the output",
         Transfer::Effort => "K S",
-        Transfer::Tracking => "the following of references",
+        Transfer::Tracking => "the tracking error",
     };
     let gamma = rounded(peak.gamma);
     if peak.frequency.is_finite() {

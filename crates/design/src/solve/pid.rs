@@ -97,8 +97,8 @@ impl PidProblem<'_> {
     fn not_found(&self, file: &PlantFile<'_>, instability: f64) -> PlaceError {
         let name = if self.pid.derivative { "PID" } else { "PI" };
         let measure = match self.domain {
-            Domain::Continuous => "a largest real part of",
-            Domain::Sampled { .. } => "a largest modulus, less 1, of",
+            Domain::Continuous => format!("largest real part {}", rounded(instability)),
+            Domain::Sampled { .. } => format!("largest modulus {}", rounded(1.0 + instability)),
         };
         let help = if self.pid.derivative {
             "other `pairs`, another `bandwidth` or a state feedback, which is without `structure`, may help"
@@ -106,9 +106,8 @@ impl PidProblem<'_> {
             "`structure = \"PID\"`, other `pairs` or a state feedback, which is without `structure`, may help"
         };
         let message = format!(
-            "no stable loop with {name} controllers was found, from {} starts; the best has {measure} {}: {help}",
-            self.shape.starts(self.domain).len(),
-            rounded(instability)
+            "no stable loop with {name} controllers was found, from {} starts; the best loop has the {measure}: {help}",
+            self.shape.starts(self.domain).len()
         );
         file.error_at(&self.shape.place, message)
     }
