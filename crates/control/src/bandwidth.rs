@@ -93,6 +93,8 @@ pub struct ByBandwidth<T> {
     /// The largest singular value of the loop at the bandwidth: one within 1e-6; above, if unstable modes need a larger
     /// bandwidth; below, if no weight reaches it.
     pub loop_gain: f64,
+    /// The weight by which this is so: r of [`regulator`], v of [`filter`].
+    pub weight: f64,
 }
 
 /// The regulator u = K x with the cost x' Q x + r u' diag(`units`)^-2 u, where r is such that the largest singular value of
@@ -119,7 +121,7 @@ pub fn regulator(
     let (weight, loop_gain) = weight(a, &scaled, q, bandwidth, domain)?;
     let r = DMatrix::from_diagonal(&units.map(|unit| weight / (unit * unit)));
     let result = lqr(a, b, &Weights { q: q.clone(), r, n: None }, domain)?;
-    Ok(ByBandwidth { result, loop_gain })
+    Ok(ByBandwidth { result, loop_gain, weight })
 }
 
 /// The Kalman filter for the process noise W and the measurement noise v diag(`units`)^-2, where v is such that the largest
@@ -143,7 +145,7 @@ pub fn filter(
     let scaled = c.transpose() * DMatrix::from_diagonal(units);
     let (weight, loop_gain) = weight(&a.transpose(), &scaled, w, bandwidth, domain)?;
     let v = DMatrix::from_diagonal(&units.map(|unit| weight / (unit * unit)));
-    Ok(ByBandwidth { result: kalman(a, c, w, &v, domain)?, loop_gain })
+    Ok(ByBandwidth { result: kalman(a, c, w, &v, domain)?, loop_gain, weight })
 }
 
 /// The weight r of R = r I and the loop gain that it gives.

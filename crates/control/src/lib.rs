@@ -7,6 +7,7 @@
 //! | assign the poles of a state feedback or an observer | [`placement`] |
 //! | linear-quadratic regulator, Kalman filter | [`riccati`], by their bandwidth [`bandwidth`] |
 //! | augmented state observer (ASO): estimate and compensate faults | [`aso`], [`faults`], [`sampled`] |
+//! | extended and unscented Kalman filters for nonlinear plants | [`nonlinear_filter`] |
 //! | other laws that estimate faults: proportional-integral, fast adaptive, sliding mode, learning | [`estimation`] |
 //! | commands without an actuator: control allocation, equilibrium | [`allocation`] |
 //! | test which faults can be estimated | [`detectability`] |
@@ -86,6 +87,7 @@ pub mod logarithm;
 pub mod losses;
 #[cfg(feature = "design")]
 pub mod lyapunov;
+pub mod nonlinear_filter;
 #[cfg(feature = "design")]
 pub mod placement;
 mod product;

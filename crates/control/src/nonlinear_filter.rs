@@ -1,0 +1,326 @@
+//! Kalman filters for nonlinear plants: extended and unscented.
+//!
+//! For a plant in sampled time with white noise w of covariance W and v of covariance V,
+//!
+//! ```text
+//! z[k+1] = g(z[k]) + w[k],    y[k] = h(z[k]) + v[k]
+//! ```
+//!
+//! where faults are part of z, both filters have the mean z and the covariance P of the estimate. They differ in how these
+//! pass g and h:
+//!
+//! * **extended**: g and h are replaced by their tangents at the mean, with the Jacobians G and H:
+//!   P becomes G P G' + W, the gain is P H' (H P H' + V)^-1 (A. H. Jazwinski, Stochastic Processes and Filtering Theory, 1970,
+//!   section 8.3);
+//! * **unscented**: g and h are evaluated at 2 N points, z plus and minus the columns of a square root of N P; means and
+//!   covariances are those of the values (S. J. Julier, J. K. Uhlmann, H. F. Durrant-Whyte, American Control Conference 1995,
+//!   without a point at the mean: then each covariance is that of points, and has no negative variance. I. Arasaratnam and
+//!   S. Haykin, IEEE Trans. Autom. Control 54 (2009), derive the same points from a cubature rule).
+//!
+//! For a linear plant both are the Kalman filter of [`crate::riccati::kalman`], before it is stationary.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+/// Part of its variance below which a pivot of a covariance is rounding, times the order.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// A plant in sampled time, z having N states and faults and y having p measurements.
+pub trait SampledPlant {
+    /// Why the plant cannot be evaluated.
+    type Error;
+
+    /// Replaces z by g(z).
+    ///
+    /// # Errors
+    ///
+    /// The plant has no value there.
+    fn advance(&mut self, z: &mut [f64]) -> Result<(), Self::Error>;
+
+    /// [`Self::advance`], with the Jacobian of g, N x N, at the former z.
+    ///
+    /// # Errors
+    ///
+    /// The plant has no value or no derivative there.
+    fn advance_tangent(&mut self, z: &mut [f64], g: &mut DMatrix<f64>) -> Result<(), Self::Error>;
+
+    /// Sets y to h(z).
+    ///
+    /// # Errors
+    ///
+    /// The plant has no value there.
+    fn measure(&mut self, z: &[f64], y: &mut [f64]) -> Result<(), Self::Error>;
+
+    /// [`Self::measure`], with the Jacobian of h, p x N.
+    ///
+    /// # Errors
+    ///
+    /// The plant has no value or no derivative there.
+    fn measure_tangent(
+        &mut self,
+        z: &[f64],
+        y: &mut [f64],
+        h: &mut DMatrix<f64>,
+    ) -> Result<(), Self::Error>;
+}
+
+/// How mean and covariance pass the equations of the plant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transform {
+    /// By tangents at the mean.
+    Extended,
+    /// By 2 N points.
+    Unscented,
+}
+
+/// Why a filter cannot go on.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FilterError<E> {
+    /// The plant cannot be evaluated.
+    #[error(transparent)]
+    Plant(E),
+    /// H P H' + V is not positive definite.
+    #[error("the covariance of the innovation is not positive definite: V must be")]
+    NotDefinite,
+}
+
+impl<E> From<E> for FilterError<E> {
+    fn from(error: E) -> Self {
+        Self::Plant(error)
+    }
+}
+
+/// The estimate of a nonlinear plant, and space for its equations: a sample allocates nothing.
+#[derive(Clone, Debug)]
+pub struct NonlinearFilter {
+    /// The mean z, N numbers.
+    pub mean: DVector<f64>,
+    /// The covariance P, N x N.
+    pub covariance: DMatrix<f64>,
+    /// The innovation y - h(z) of the last correction, p numbers.
+    pub innovation: DVector<f64>,
+    w: DMatrix<f64>,
+    v: DMatrix<f64>,
+    /// Jacobians, and the transpose of the one of N columns in use.
+    g: DMatrix<f64>,
+    h: DMatrix<f64>,
+    square: DMatrix<f64>,
+    product: DMatrix<f64>,
+    root: DMatrix<f64>,
+    /// Points in z and y, 2 N columns, and their transposes.
+    points: DMatrix<f64>,
+    measured: DMatrix<f64>,
+    /// The covariance of the innovation, that of y and z, the gain.
+    s: DMatrix<f64>,
+    cross: DMatrix<f64>,
+    gain: DMatrix<f64>,
+    gain_v: DMatrix<f64>,
+    solved: DVector<f64>,
+}
+
+impl NonlinearFilter {
+    /// A filter for N = `w` rows and p = `v` rows, with the mean and the covariance zero.
+    #[must_use]
+    pub fn new(w: DMatrix<f64>, v: DMatrix<f64>) -> Self {
+        let (n, p) = (w.nrows(), v.nrows());
+        let zeros = DMatrix::zeros;
+        Self {
+            mean: DVector::zeros(n),
+            covariance: zeros(n, n),
+            innovation: DVector::zeros(p),
+            w,
+            v,
+            g: zeros(n, n),
+            h: zeros(p, n),
+            square: zeros(n, n),
+            product: zeros(n, n),
+            root: zeros(n, n),
+            points: zeros(n, 2 * n),
+            measured: zeros(p, 2 * n),
+            s: zeros(p, p),
+            cross: zeros(p, n),
+            gain: zeros(n, p),
+            gain_v: zeros(n, p),
+            solved: DVector::zeros(p),
+        }
+    }
+
+    /// The estimate one sample later, before its measurement.
+    ///
+    /// # Errors
+    ///
+    /// [`FilterError::Plant`].
+    pub fn predict<M: SampledPlant>(
+        &mut self,
+        plant: &mut M,
+        transform: Transform,
+    ) -> Result<(), FilterError<M::Error>> {
+        match transform {
+            Transform::Extended => {
+                plant.advance_tangent(self.mean.as_mut_slice(), &mut self.g)?;
+                self.product.gemm(1.0, &self.g, &self.covariance, 0.0);
+                self.g.transpose_to(&mut self.square);
+                self.covariance.gemm(1.0, &self.product, &self.square, 0.0);
+            }
+            Transform::Unscented => {
+                self.place_points();
+                for mut point in self.points.column_iter_mut() {
+                    plant.advance(point.as_mut_slice())?;
+                }
+                centre(&mut self.points, &mut self.mean);
+                covariance_of(&self.points, &self.points, &mut self.covariance);
+            }
+        }
+        self.covariance += &self.w;
+        symmetrise(&mut self.covariance);
+        Ok(())
+    }
+
+    /// The estimate with the measurements `y`; returns e' S^-1 e with the innovation e and its covariance S, whose mean is p
+    /// if the filter is consistent.
+    ///
+    /// # Errors
+    ///
+    /// [`FilterError`].
+    pub fn correct<M: SampledPlant>(
+        &mut self,
+        plant: &mut M,
+        y: &[f64],
+        transform: Transform,
+    ) -> Result<f64, FilterError<M::Error>> {
+        let e = self.innovation.as_mut_slice();
+        match transform {
+            Transform::Extended => {
+                plant.measure_tangent(self.mean.as_slice(), e, &mut self.h)?;
+                self.cross.gemm(1.0, &self.h, &self.covariance, 0.0);
+                self.h.transpose_to(&mut self.gain);
+                self.s.gemm(1.0, &self.cross, &self.gain, 0.0);
+            }
+            Transform::Unscented => {
+                self.place_points();
+                let columns = self.points.column_iter().zip(self.measured.column_iter_mut());
+                for (point, mut measured) in columns {
+                    plant.measure(point.as_slice(), measured.as_mut_slice())?;
+                }
+                centre(&mut self.measured, &mut self.innovation);
+                for mut point in self.points.column_iter_mut() {
+                    point -= &self.mean;
+                }
+                covariance_of(&self.measured, &self.measured, &mut self.s);
+                covariance_of(&self.measured, &self.points, &mut self.cross);
+            }
+        }
+        for (e, y) in self.innovation.iter_mut().zip(y) {
+            *e = y - *e;
+        }
+        self.s += &self.v;
+        symmetrise(&mut self.s);
+        let s = std::mem::replace(&mut self.s, DMatrix::zeros(0, 0));
+        let size = s.nrows();
+        let Some(factor) = Cholesky::new(s) else {
+            self.s = DMatrix::zeros(size, size);
+            return Err(FilterError::NotDefinite);
+        };
+        self.solved.copy_from(&self.innovation);
+        factor.solve_mut(&mut self.solved);
+        let squared = self.innovation.dot(&self.solved);
+        self.mean.gemv_tr(1.0, &self.cross, &self.solved, 1.0);
+        // The gain K = cross' S^-1.
+        let cross = std::mem::replace(&mut self.cross, DMatrix::zeros(0, 0));
+        let mut solved = cross;
+        if transform == Transform::Unscented {
+            // P - cross' S^-1 cross, the columns of R^-1 cross having this square, S = R R'.
+            factor.l_dirty().solve_lower_triangular_mut(&mut solved);
+            self.covariance.gemm_tr(-1.0, &solved, &solved, 1.0);
+        } else {
+            factor.solve_mut(&mut solved);
+            solved.transpose_to(&mut self.gain);
+            // (I - K H) P (I - K H)' + K V K' (R. S. Bucy and P. D. Joseph 1968), with no difference of covariances.
+            self.product.fill_with_identity();
+            self.product.gemm(-1.0, &self.gain, &self.h, 1.0);
+            self.square.gemm(1.0, &self.product, &self.covariance, 0.0);
+            self.product.transpose_mut();
+            self.covariance.gemm(1.0, &self.square, &self.product, 0.0);
+            self.gain_v.gemm(1.0, &self.gain, &self.v, 0.0);
+            self.covariance.gemm(1.0, &self.gain_v, &solved, 1.0);
+        }
+        self.cross = solved;
+        self.s = factor.unpack_dirty();
+        symmetrise(&mut self.covariance);
+        Ok(squared)
+    }
+
+    /// Sets the points to the mean plus and minus the columns of a square root of N P.
+    fn place_points(&mut self) {
+        let n = self.mean.len();
+        square_root(&self.covariance, &mut self.root);
+        #[expect(clippy::cast_precision_loss, reason = "a number of states")]
+        let scale = (n as f64).sqrt();
+        for j in 0..n {
+            for (at, sign) in [(j, scale), (n + j, -scale)] {
+                let mut point = self.points.column_mut(at);
+                point.copy_from(&self.mean);
+                point.axpy(sign, &self.root.column(j), 1.0);
+            }
+        }
+    }
+}
+
+/// Takes the mean of the columns off them.
+fn centre(points: &mut DMatrix<f64>, mean: &mut DVector<f64>) {
+    mean.fill(0.0);
+    for point in points.column_iter() {
+        *mean += point;
+    }
+    *mean /= count(points);
+    for mut point in points.column_iter_mut() {
+        point -= &*mean;
+    }
+}
+
+/// Sets `covariance` to the mean of the products of two lists of centred columns.
+fn covariance_of(rows: &DMatrix<f64>, columns: &DMatrix<f64>, covariance: &mut DMatrix<f64>) {
+    covariance.fill(0.0);
+    for (row, column) in rows.column_iter().zip(columns.column_iter()) {
+        covariance.ger(1.0 / count(rows), &row, &column, 1.0);
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "twice a number of states")]
+fn count(points: &DMatrix<f64>) -> f64 {
+    points.ncols() as f64
+}
+
+fn symmetrise(matrix: &mut DMatrix<f64>) {
+    for i in 0..matrix.nrows() {
+        for j in 0..i {
+            let mean = 0.5 * (matrix[(i, j)] + matrix[(j, i)]);
+            (matrix[(i, j)], matrix[(j, i)]) = (mean, mean);
+        }
+    }
+}
+
+/// Sets `root` to the lower triangular R with R R' = `covariance`, which may be singular: a variance that the columns before
+/// explain up to rounding adds none.
+fn square_root(covariance: &DMatrix<f64>, root: &mut DMatrix<f64>) {
+    root.fill(0.0);
+    let n = covariance.nrows();
+    for j in 0..n {
+        let explained: f64 = (0..j).map(|k| root[(j, k)] * root[(j, k)]).sum();
+        let (variance, pivot) = (covariance[(j, j)], covariance[(j, j)] - explained);
+        #[expect(clippy::cast_precision_loss, reason = "a number of states")]
+        let rounding = ROUNDING * n as f64 * variance;
+        if pivot.is_nan() || pivot <= rounding {
+            continue;
+        }
+        let diagonal = pivot.sqrt();
+        root[(j, j)] = diagonal;
+        for i in j + 1..n {
+            let explained: f64 = (0..j).map(|k| root[(i, k)] * root[(j, k)]).sum();
+            root[(i, j)] = (covariance[(i, j)] - explained) / diagonal;
+        }
+    }
+}
+
+#[cfg(all(test, feature = "design"))]
+mod tests;
