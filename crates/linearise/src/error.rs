@@ -114,6 +114,14 @@ pub enum LineariseError {
         /// The contradiction, in a sentence.
         text: String,
     },
+    /// The FMU cannot serve as the plant in an estimator.
+    #[error("{model} lacks {what}, which an estimator that carries it needs")]
+    Unsuited {
+        /// `modelName` of the FMU.
+        model: String,
+        /// What it lacks.
+        what: &'static str,
+    },
     /// The FMU has no continuous state.
     #[error("{model} has no continuous states: there is nothing to control")]
     NoStates {

@@ -15,6 +15,7 @@
 mod bench;
 mod differences;
 mod directional;
+mod equations;
 mod error;
 mod fit;
 mod parts;
@@ -24,6 +25,7 @@ mod steps;
 
 use fmu_description::{Causality, Kind, ModelDescription, Variability};
 
+pub use equations::PlantEquations;
 pub use error::LineariseError;
 pub use result::{Differences, Disagreement, Linearisation, Matrices, Method, Signal};
 

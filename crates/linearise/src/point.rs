@@ -89,7 +89,7 @@ pub(super) fn read<'p>(
     Ok(values)
 }
 
-fn finite(name: &str, value: f64) -> Result<f64, LineariseError> {
+pub(super) fn finite(name: &str, value: f64) -> Result<f64, LineariseError> {
     if value.is_finite() {
         return Ok(value);
     }
@@ -236,8 +236,8 @@ fn set_states(
     })
 }
 
-/// Iterates the event and enters continuous-time mode.
-fn settle(component: &mut dyn ModelExchange) -> Result<(), LineariseError> {
+/// Iterates the event and enters continuous-time mode; returns the time of the next time event.
+pub(super) fn settle(component: &mut dyn ModelExchange) -> Result<Option<f64>, LineariseError> {
     for _ in 0..EVENT_ITERATIONS {
         let info = component.update_discrete_states()?;
         if info.terminate_simulation {
@@ -245,7 +245,7 @@ fn settle(component: &mut dyn ModelExchange) -> Result<(), LineariseError> {
         }
         if !info.discrete_states_need_update {
             component.enter_continuous_time_mode()?;
-            return Ok(());
+            return Ok(info.next_event_time);
         }
     }
     Err(LineariseError::EndlessEvents { iterations: EVENT_ITERATIONS })
