@@ -138,7 +138,7 @@ impl<M: Model> Linked<M> {
     /// `fmi2DeSerializeFMUstate` and `fmi2SetFMUstate`.
     pub fn deserialize_state(&mut self, bytes: &[u8]) -> Status {
         self.instance.call(Function::SetFMUstate, |instance| {
-            let snapshot = Snapshot::from_bytes(bytes, instance.guid())?;
+            let snapshot = instance.read_snapshot(bytes)?;
             instance.restore(&snapshot)
         })
     }

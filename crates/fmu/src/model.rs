@@ -213,6 +213,12 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
         let _ = time;
     }
 
+    /// Takes from `current`, the model of the instance, what a state that was read from bytes lacks: fields that are not
+    /// serialised because they follow from the files of the FMU. The default implementation does nothing.
+    fn complete(&mut self, current: &Self) {
+        let _ = current;
+    }
+
     /// Returns the field with the messages of the model; `None` if it has none. The exporter sends them to
     /// the importer after each call.
     fn log(&mut self) -> Option<&mut Log> {

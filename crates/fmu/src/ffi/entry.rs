@@ -4,7 +4,6 @@ use super::{
     borrow_output, borrow_state, dispatch, free_state, read, snapshot, store, texts, write_one,
 };
 use crate::Experiment;
-use crate::instance::Snapshot;
 use crate::model::{Failure, Model};
 use fmu_description::abi::{
     StatusKind, fmi2Boolean, fmi2Byte, fmi2Component, fmi2EventInfo, fmi2FMUstate, fmi2Integer,
@@ -125,7 +124,7 @@ entry_points! {
     de_serialize_fmu_state = DeSerializeFMUstate(
         bytes: *const fmi2Byte, size: usize, state: *mut fmi2FMUstate
     ), instance => {
-        let snapshot = Snapshot::<M>::from_bytes(read(bytes.cast::<u8>(), size)?, instance.guid())?;
+        let snapshot = instance.read_snapshot(read(bytes.cast::<u8>(), size)?)?;
         store(borrow_state(state)?, snapshot);
         Ok(())
     };

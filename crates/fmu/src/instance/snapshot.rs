@@ -32,6 +32,13 @@ impl<M: Model> Instance<M> {
         Snapshot { none: 0, guid: self.guid(), core: self.core.clone() }
     }
 
+    /// `fmi2DeSerializeFMUstate`.
+    pub(crate) fn read_snapshot(&self, bytes: &[u8]) -> Result<Snapshot<M>, Failure> {
+        let mut snapshot = Snapshot::<M>::from_bytes(bytes, self.guid())?;
+        snapshot.core.model.complete(&self.core.model);
+        Ok(snapshot)
+    }
+
     /// `fmi2SetFMUstate`.
     pub(crate) fn restore(&mut self, snapshot: &Snapshot<M>) -> Result<(), Failure> {
         if snapshot.guid != self.guid() {

@@ -6,7 +6,7 @@ use super::super::{
 };
 use super::{entry_points_3, unavailable};
 use crate::Experiment;
-use crate::instance::{Jacobian, Snapshot};
+use crate::instance::Jacobian;
 use crate::model::{Failure, Model};
 use fmu_description::abi3::{
     DependencyKind, fmi3Boolean, fmi3Byte, fmi3DependencyKind, fmi3FMUState, fmi3Float64,
@@ -75,7 +75,7 @@ entry_points_3! {
     deserialize_fmu_state = DeserializeFMUState(
         bytes: *const fmi3Byte, size: usize, state: *mut fmi3FMUState
     ), instance => {
-        let snapshot = Snapshot::<M>::from_bytes(read(bytes, size)?, instance.guid())?;
+        let snapshot = instance.read_snapshot(read(bytes, size)?)?;
         store(borrow_state(state)?, snapshot);
         Ok(())
     };
