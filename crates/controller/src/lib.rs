@@ -4,6 +4,7 @@
 mod channel;
 pub mod design;
 mod interpolation;
+pub mod kalman;
 mod matrix;
 #[expect(
     clippy::inline_always,

@@ -1,0 +1,142 @@
+//! The file `resources/filter.toml` of a Kalman filter that carries its plant.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::design::Signal;
+use crate::matrix::Matrix;
+
+/// The content of the file: n states, m commands, p measurements, q states of the fault model, N = n + q.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KalmanDesign {
+    /// What the filter is for, in one sentence.
+    pub description: String,
+    /// T in s.
+    pub sample_time: f64,
+    /// Number of integration steps in a sample.
+    pub integration_steps: i32,
+    /// End of the default experiment in s.
+    pub stop_time: f64,
+    /// W, N x N: the covariance of the process noise of one sample.
+    #[serde(rename = "W")]
+    pub w: Matrix,
+    /// V, p x p: the covariance of the noise of one sample of the measurements.
+    #[serde(rename = "V")]
+    pub v: Matrix,
+    /// P, N x N: the covariance of the estimate before the first sample.
+    #[serde(rename = "P")]
+    pub p: Matrix,
+    /// Values of parameters and inputs of the plant's FMU.
+    pub settings: BTreeMap<String, f64>,
+    /// The m commands, inputs of the plant's FMU.
+    pub commands: Vec<Signal>,
+    /// The p measurements, outputs of the plant's FMU.
+    pub measurements: Vec<Signal>,
+    /// The n states of the plant's FMU, with the estimate before the first sample.
+    pub states: Vec<Signal>,
+    /// The faults.
+    pub faults: Vec<CarriedFault>,
+}
+
+/// A fault that is estimated.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CarriedFault {
+    /// Its name.
+    pub name: String,
+    /// Its unit, as FMI writes it.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// What it is, for a reader.
+    #[serde(default)]
+    pub description: String,
+    /// Where it enters.
+    pub enters: Entry,
+    /// The position of its rate among the states of the fault model, of a ramp. The faults are the first of these states, in
+    /// their order.
+    #[serde(default)]
+    pub rate: Option<usize>,
+}
+
+/// Where a fault enters.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Entry {
+    /// It adds to the command at this position.
+    Actuator(usize),
+    /// It adds to the measurement at this position.
+    Sensor(usize),
+    /// It adds to the value of this input of the plant's FMU.
+    Input(String),
+}
+
+impl KalmanDesign {
+    /// Number of states of the fault model.
+    #[must_use]
+    pub fn fault_states(&self) -> usize {
+        self.faults.len() + self.faults.iter().filter(|fault| fault.rate.is_some()).count()
+    }
+
+    /// Reads a file; errors name `path`.
+    ///
+    /// # Errors
+    ///
+    /// A sentence: the text is no such file, or its shapes do not agree.
+    pub fn parse(text: &str, path: &str) -> Result<Self, String> {
+        let design: Self = toml::from_str(text).map_err(|error| format!("{path}: {error}"))?;
+        design.check().map_err(|text| format!("{path}: {text}"))?;
+        Ok(design)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let positive = |name, value: f64| {
+            let is_positive = value.is_finite() && value > 0.0;
+            is_positive.then_some(()).ok_or(format!("{name} = {value}, expected a number above 0"))
+        };
+        positive("sample_time", self.sample_time)?;
+        positive("stop_time", self.stop_time)?;
+        positive("integration_steps", f64::from(self.integration_steps))?;
+        let (q, p) = (self.fault_states(), self.measurements.len());
+        let size = self.states.len() + q;
+        for (name, matrix, expected) in
+            [("W", &self.w, size), ("V", &self.v, p), ("P", &self.p, size)]
+        {
+            let (rows, columns) = (matrix.rows, matrix.columns);
+            if (rows, columns) != (expected, expected) {
+                return Err(format!(
+                    "{name} is {rows} x {columns}, expected {expected} x {expected}"
+                ));
+            }
+            if matrix.values.iter().any(|value| !value.is_finite()) {
+                return Err(format!("{name} has a number that is not finite"));
+            }
+        }
+        let (m, faults) = (self.commands.len(), self.faults.len());
+        let within = |what: &str, at: usize, count: usize| {
+            (at < count).then_some(()).ok_or(format!("a fault names {what} {at} of {count}"))
+        };
+        for fault in &self.faults {
+            match fault.enters {
+                Entry::Actuator(at) => within("command", at, m)?,
+                Entry::Sensor(at) => within("measurement", at, p)?,
+                Entry::Input(_) => {}
+            }
+            if let Some(rate) = fault.rate {
+                within("rate", rate, q)?;
+                (rate >= faults).then_some(()).ok_or("the rate of a fault is a fault")?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The text of the file.
+    ///
+    /// # Errors
+    ///
+    /// An entry that TOML cannot hold.
+    pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
+        toml::to_string(self)
+    }
+}

@@ -1,0 +1,492 @@
+//! The plant that the filter carries, with its faults as states, in sampled time.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use aso_controller::Matrix;
+use aso_controller::kalman::{Entry, KalmanDesign};
+use control::nonlinear_filter::{FilterError, NonlinearFilter, SampledPlant, Transform};
+use fmu::Failure;
+use fmu_import::Fmu;
+use linearise::{Linearise, LineariseError, PlantEquations};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// What follows from the files of the FMU, with an instance of the plant and the filter's space for it.
+///
+/// The instance is evaluated as a function of time, states and inputs. So copies of the filter, as FMU states are, share it.
+pub(crate) struct Carrier {
+    pub(crate) design: KalmanDesign,
+    plant: PathBuf,
+    engine: Mutex<Option<Engine>>,
+}
+
+/// Mean and covariance, the latter column by column.
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct Estimate {
+    pub(crate) mean: Vec<f64>,
+    pub(crate) covariance: Vec<f64>,
+}
+
+/// A prediction from the sample at `time` in s with the commands `u`, in `steps` integration steps.
+pub(crate) struct Prediction<'a> {
+    pub(crate) time: f64,
+    pub(crate) u: &'a [f64],
+    pub(crate) steps: i32,
+    pub(crate) transform: Transform,
+}
+
+/// A sample at `time` in s: the commands `u` until then, and the measurements.
+pub(crate) struct Sample<'a> {
+    pub(crate) time: f64,
+    pub(crate) u: &'a [f64],
+    pub(crate) y: &'a [f64],
+    pub(crate) transform: Transform,
+}
+
+struct Engine {
+    filter: NonlinearFilter,
+    plant: CarriedPlant,
+    start_time: f64,
+}
+
+fn failed(error: &FilterError<LineariseError>) -> Failure {
+    match error {
+        FilterError::Plant(error) => Failure::Error(format!("the plant of the filter: {error}")),
+        error => Failure::Error(error.to_string()),
+    }
+}
+
+fn as_dense(matrix: &Matrix) -> DMatrix<f64> {
+    DMatrix::from_row_slice(matrix.rows, matrix.columns, &matrix.values)
+}
+
+impl Carrier {
+    /// Reads the files in `resources`; none if there is no filter.
+    pub(crate) fn read(resources: &Path) -> Result<Option<Self>, Failure> {
+        let file = resources.join("filter.toml");
+        if !file.exists() {
+            return Ok(None);
+        }
+        let path = file.display().to_string();
+        let text = std::fs::read_to_string(&file);
+        let text = text.map_err(|error| Failure::Error(format!("{path}: {error}")))?;
+        let design = KalmanDesign::parse(&text, &path).map_err(Failure::Error)?;
+        let plant = resources.join("plant.fmu");
+        Ok(Some(Self { design, plant, engine: Mutex::new(None) }))
+    }
+
+    fn engine(&self) -> MutexGuard<'_, Option<Engine>> {
+        self.engine.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Opens the plant, unless an instance for this start time is open.
+    pub(crate) fn start(&self, start_time: f64) -> Result<(), Failure> {
+        let mut engine = self.engine();
+        if engine.as_ref().is_some_and(|engine| engine.start_time.to_bits() == start_time.to_bits())
+        {
+            return Ok(());
+        }
+        let failed = |error: &dyn std::error::Error| {
+            Failure::Error(format!("{}: {error}", self.plant.display()))
+        };
+        let fmu = Fmu::open_quietly(&self.plant).map_err(|error| failed(&error))?;
+        let request = self.request(start_time);
+        let equations = PlantEquations::new(&fmu, &request).map_err(|error| failed(&error))?;
+        let plant = CarriedPlant::new(&self.design, equations)?;
+        let filter = NonlinearFilter::new(as_dense(&self.design.w), as_dense(&self.design.v));
+        *engine = Some(Engine { filter, plant, start_time });
+        Ok(())
+    }
+
+    /// The request for the plant's equations.
+    fn request(&self, start_time: f64) -> Linearise {
+        let design = &self.design;
+        let names = |signals: &[aso_controller::design::Signal]| {
+            signals.iter().map(|signal| signal.name.clone()).collect()
+        };
+        let inputs = design.faults.iter().filter_map(|fault| match &fault.enters {
+            Entry::Input(name) => Some(name.clone()),
+            _ => None,
+        });
+        let at = design.settings.iter().map(|(name, value)| (name.clone(), value.to_string()));
+        Linearise {
+            inputs: names(&design.commands),
+            faults: inputs.collect(),
+            outputs: names(&design.measurements),
+            at: at.collect(),
+            start_time,
+            ..Linearise::default()
+        }
+    }
+
+    /// Calls `call` with the filter at `estimate`, and stores the result there.
+    fn with<T>(
+        &self,
+        estimate: &mut Estimate,
+        call: impl FnOnce(
+            &mut NonlinearFilter,
+            &mut CarriedPlant,
+        ) -> Result<T, FilterError<LineariseError>>,
+    ) -> Result<T, Failure> {
+        let mut engine = self.engine();
+        let Some(Engine { filter, plant, .. }) = &mut *engine else {
+            return Err(Failure::Error("the filter is not initialised".to_owned()));
+        };
+        filter.mean.copy_from_slice(&estimate.mean);
+        filter.covariance.copy_from_slice(&estimate.covariance);
+        let result = call(filter, plant).map_err(|error| failed(&error))?;
+        estimate.mean.copy_from_slice(filter.mean.as_slice());
+        estimate.covariance.copy_from_slice(filter.covariance.as_slice());
+        Ok(result)
+    }
+
+    /// The estimate one sample later, before its measurement.
+    pub(crate) fn predict(
+        &self,
+        estimate: &mut Estimate,
+        prediction: &Prediction<'_>,
+    ) -> Result<(), Failure> {
+        let step = self.design.sample_time / f64::from(prediction.steps);
+        self.with(estimate, |filter, plant| {
+            plant.u.copy_from_slice(prediction.u);
+            (plant.time, plant.step, plant.steps) = (prediction.time, step, prediction.steps);
+            filter.predict(plant, prediction.transform)
+        })
+    }
+
+    /// The estimate with the measurements of a sample; returns the squared innovation relative to its covariance.
+    pub(crate) fn correct(
+        &self,
+        estimate: &mut Estimate,
+        sample: &Sample<'_>,
+    ) -> Result<f64, Failure> {
+        self.with(estimate, |filter, plant| {
+            plant.u.copy_from_slice(sample.u);
+            plant.time = sample.time;
+            filter.correct(plant, sample.y, sample.transform)
+        })
+    }
+}
+
+/// z = [x; faults; their rates] with x' = f(t, x, u + faults), f' = its rate or 0, y = h(t, x, u + faults) + faults.
+struct CarriedPlant {
+    equations: PlantEquations,
+    faults: Vec<Channel>,
+    /// Number of states of the plant.
+    n: usize,
+    /// The commands of the sample.
+    u: Vec<f64>,
+    /// The values of the inputs that are faults, without faults.
+    free_inputs: Vec<f64>,
+    /// All inputs of the plant with the faults.
+    inputs: Vec<f64>,
+    /// The time of the sample before, or of this one, in s; size in s and number of the integration steps.
+    time: f64,
+    step: f64,
+    steps: i32,
+    /// Derivatives at the four points of a step, and the point.
+    slopes: [Vec<f64>; 4],
+    point: Vec<f64>,
+    /// z at the end of a step.
+    ahead: Vec<f64>,
+    /// The derivatives of all this by the first z; those of the plant's equations; those of z' by z.
+    tangents: [DMatrix<f64>; 4],
+    tangent: DMatrix<f64>,
+    tangent_ahead: DMatrix<f64>,
+    jacobian: DMatrix<f64>,
+    dynamics: DMatrix<f64>,
+}
+
+/// A fault: where it enters, and the position of its rate in z.
+struct Channel {
+    enters: Position,
+    rate: Option<usize>,
+}
+
+/// A position among the inputs of the plant or among the measurements.
+#[derive(Clone, Copy)]
+enum Position {
+    Input(usize),
+    Measurement(usize),
+}
+
+/// Runge-Kutta's method of order 4 (W. Kutta 1901): the points of a step, as parts of it, and the weights of their derivatives.
+const POINTS: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
+const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
+/// The part of an integration step to which state events are located.
+const LOCATED: f64 = 1e-9;
+/// Most state events in an integration step.
+const MOST_EVENTS: usize = 1000;
+
+/// target + factor source, element by element.
+fn add_scaled(target: &mut DMatrix<f64>, factor: f64, source: &DMatrix<f64>) {
+    target.zip_apply(source, |target, source| *target += factor * source);
+}
+
+impl CarriedPlant {
+    fn new(design: &KalmanDesign, equations: PlantEquations) -> Result<Self, Failure> {
+        let (n, m, p) = (design.states.len(), design.commands.len(), design.measurements.len());
+        let states = design.states.iter().map(|state| &state.name);
+        if !states.eq(equations.states()) {
+            return Err(Failure::Error(format!(
+                "filter.toml names other states than plant.fmu has: {}",
+                equations.states().join(", ")
+            )));
+        }
+        let mut free_inputs = Vec::new();
+        let mut faults = Vec::new();
+        for fault in &design.faults {
+            let enters = match &fault.enters {
+                Entry::Actuator(at) => Position::Input(*at),
+                Entry::Sensor(at) => Position::Measurement(*at),
+                Entry::Input(name) => {
+                    free_inputs.push(design.settings.get(name).copied().unwrap_or_default());
+                    Position::Input(m + free_inputs.len() - 1)
+                }
+            };
+            faults.push(Channel { enters, rate: fault.rate.map(|rate| n + rate) });
+        }
+        let size = n + design.fault_states();
+        let square = || DMatrix::zeros(size, size);
+        Ok(Self {
+            equations,
+            faults,
+            n,
+            u: vec![0.0; m],
+            inputs: vec![0.0; m + free_inputs.len()],
+            jacobian: DMatrix::zeros(n + p, n + m + free_inputs.len()),
+            free_inputs,
+            time: 0.0,
+            step: 0.0,
+            steps: 1,
+            slopes: std::array::from_fn(|_| vec![0.0; size]),
+            point: vec![0.0; size],
+            ahead: vec![0.0; size],
+            tangents: std::array::from_fn(|_| square()),
+            tangent: square(),
+            tangent_ahead: square(),
+            dynamics: square(),
+        })
+    }
+
+    /// Sets the inputs of the plant for the faults in `z`.
+    fn set_inputs(&mut self, z: &[f64]) {
+        let (commands, others) = self.inputs.split_at_mut(self.u.len());
+        commands.copy_from_slice(&self.u);
+        others.copy_from_slice(&self.free_inputs);
+        for (fault, value) in self.faults.iter().zip(&z[self.n..]) {
+            if let Position::Input(at) = fault.enters {
+                self.inputs[at] += value;
+            }
+        }
+    }
+
+    /// Sets the slope of point `at` of a step, z' at `time` and `point`.
+    fn set_slope(&mut self, at: usize, time: f64) -> Result<(), LineariseError> {
+        let point = std::mem::take(&mut self.point);
+        self.set_inputs(&point);
+        let (rates, of_faults) = self.slopes[at].split_at_mut(self.n);
+        let done = self.equations.rates(time, &point[..self.n], &self.inputs, rates);
+        of_faults.fill(0.0);
+        for (slope, fault) in of_faults.iter_mut().zip(&self.faults) {
+            *slope = fault.rate.map_or(0.0, |rate| point[rate]);
+        }
+        self.point = point;
+        done
+    }
+
+    /// Sets the Jacobian of the plant's equations at `time` and `z`.
+    fn set_jacobian(&mut self, time: f64, z: &[f64]) -> Result<(), LineariseError> {
+        self.set_inputs(z);
+        self.equations.jacobian(time, &z[..self.n], &self.inputs, &mut self.jacobian)
+    }
+
+    /// Sets the derivative of slope `at` by the z at which the prediction began, `tangent` being that of the point.
+    fn set_tangent(&mut self, at: usize, time: f64) -> Result<(), LineariseError> {
+        let point = std::mem::take(&mut self.point);
+        let done = self.set_jacobian(time, &point);
+        self.point = point;
+        done?;
+        let n = self.n;
+        self.dynamics.fill(0.0);
+        self.dynamics.view_mut((0, 0), (n, n)).copy_from(&self.jacobian.view((0, 0), (n, n)));
+        for (position, fault) in self.faults.iter().enumerate() {
+            if let Position::Input(input) = fault.enters {
+                let column = self.jacobian.view((0, n + input), (n, 1));
+                self.dynamics.view_mut((0, n + position), (n, 1)).copy_from(&column);
+            }
+            if let Some(rate) = fault.rate {
+                self.dynamics[(n + position, rate)] = 1.0;
+            }
+        }
+        self.tangents[at].gemm(1.0, &self.dynamics, &self.tangent, 0.0);
+        Ok(())
+    }
+
+    /// Sets `ahead` to z after an integration step of `size` in s from `z` at `start`; with `g`, the derivative of `z` by the z at
+    /// which the prediction began, also that of `ahead`.
+    fn step(
+        &mut self,
+        z: &[f64],
+        [start, size]: [f64; 2],
+        g: Option<&DMatrix<f64>>,
+    ) -> Result<(), LineariseError> {
+        for (at, part) in POINTS.into_iter().enumerate() {
+            let time = start + part * size;
+            self.point.copy_from_slice(z);
+            if at > 0 {
+                let slopes = self.point.iter_mut().zip(&self.slopes[at - 1]);
+                slopes.for_each(|(z, slope)| *z += part * size * slope);
+            }
+            self.set_slope(at, time)?;
+            if let Some(g) = g {
+                self.tangent.copy_from(g);
+                if at > 0 {
+                    add_scaled(&mut self.tangent, part * size, &self.tangents[at - 1]);
+                }
+                self.set_tangent(at, time)?;
+            }
+        }
+        self.ahead.copy_from_slice(z);
+        for (slope, weight) in self.slopes.iter().zip(WEIGHTS) {
+            let ahead = self.ahead.iter_mut().zip(slope);
+            ahead.for_each(|(z, slope)| *z += weight * size * slope);
+        }
+        if let Some(g) = g {
+            self.tangent_ahead.copy_from(g);
+            for (tangent, weight) in self.tangents.iter().zip(WEIGHTS) {
+                add_scaled(&mut self.tangent_ahead, weight * size, tangent);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether an event indicator has another sign at `ahead` and `time` than at the last event or step.
+    fn crosses(&mut self, time: f64) -> Result<bool, LineariseError> {
+        let ahead = std::mem::take(&mut self.ahead);
+        self.set_inputs(&ahead);
+        let crosses = self.equations.crosses(time, &ahead[..self.n], &self.inputs);
+        self.ahead = ahead;
+        crosses
+    }
+
+    /// Makes an integration step of at most `size` in s from `z` at `start`, which ends at the first state event; returns its
+    /// size.
+    fn step_to_event(
+        &mut self,
+        z: &mut [f64],
+        [start, size]: [f64; 2],
+        mut g: Option<&mut DMatrix<f64>>,
+    ) -> Result<f64, LineariseError> {
+        self.step(z, [start, size], g.as_deref())?;
+        let mut reached = size;
+        if self.crosses(start + size)? {
+            let mut before = 0.0;
+            while reached - before > LOCATED * self.step {
+                let middle = 0.5 * (before + reached);
+                self.step(z, [start, middle], None)?;
+                if self.crosses(start + middle)? {
+                    reached = middle;
+                } else {
+                    before = middle;
+                }
+            }
+            self.step(z, [start, reached], g.as_deref())?;
+        }
+        z.copy_from_slice(&self.ahead);
+        if let Some(g) = &mut g {
+            g.copy_from(&self.tangent_ahead);
+        }
+        self.set_inputs(z);
+        self.equations.complete(start + reached, &mut z[..self.n], &self.inputs)?;
+        Ok(reached)
+    }
+
+    /// Integrates z over a sample; with its derivative `g` by the first z, if that is asked for.
+    fn integrate(
+        &mut self,
+        z: &mut [f64],
+        mut g: Option<&mut DMatrix<f64>>,
+    ) -> Result<(), LineariseError> {
+        self.set_inputs(z);
+        self.equations.begin(self.time, &mut z[..self.n], &self.inputs)?;
+        if let Some(g) = &mut g {
+            g.fill_with_identity();
+        }
+        for k in 0..self.steps {
+            let start = self.time + f64::from(k) * self.step;
+            let mut passed = 0.0;
+            for events in 0.. {
+                let rest = self.step - passed;
+                if rest <= LOCATED * self.step {
+                    break;
+                }
+                if events == MOST_EVENTS {
+                    let name = "the number of events in an integration step".to_owned();
+                    return Err(LineariseError::NotFinite { name, value: f64::INFINITY });
+                }
+                passed += self.step_to_event(z, [start + passed, rest], g.as_deref_mut())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the faults of sensors in `z` to `y`.
+    fn add_sensor_faults(&self, z: &[f64], y: &mut [f64]) {
+        for (fault, value) in self.faults.iter().zip(&z[self.n..]) {
+            if let Position::Measurement(at) = fault.enters {
+                y[at] += value;
+            }
+        }
+    }
+}
+
+impl SampledPlant for CarriedPlant {
+    type Error = LineariseError;
+
+    fn advance(&mut self, z: &mut [f64]) -> Result<(), LineariseError> {
+        self.integrate(z, None)
+    }
+
+    fn advance_tangent(
+        &mut self,
+        z: &mut [f64],
+        g: &mut DMatrix<f64>,
+    ) -> Result<(), LineariseError> {
+        self.integrate(z, Some(g))
+    }
+
+    fn measure(&mut self, z: &[f64], y: &mut [f64]) -> Result<(), LineariseError> {
+        self.set_inputs(z);
+        self.point.copy_from_slice(z);
+        let x = &mut self.point[..self.n];
+        self.equations.begin(self.time, x, &self.inputs)?;
+        self.equations.outputs(self.time, x, &self.inputs, y)?;
+        self.add_sensor_faults(z, y);
+        Ok(())
+    }
+
+    fn measure_tangent(
+        &mut self,
+        z: &[f64],
+        y: &mut [f64],
+        h: &mut DMatrix<f64>,
+    ) -> Result<(), LineariseError> {
+        self.measure(z, y)?;
+        self.set_jacobian(self.time, z)?;
+        let (n, p) = (self.n, y.len());
+        h.fill(0.0);
+        h.view_mut((0, 0), (p, n)).copy_from(&self.jacobian.view((n, 0), (p, n)));
+        for (position, fault) in self.faults.iter().enumerate() {
+            match fault.enters {
+                Position::Input(input) => {
+                    let column = self.jacobian.view((n, n + input), (p, 1));
+                    h.view_mut((0, n + position), (p, 1)).copy_from(&column);
+                }
+                Position::Measurement(at) => h[(at, n + position)] = 1.0,
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,196 @@
+//! The Kalman filter FMU: estimates the states and the faults of a plant whose FMU it carries in `resources/plant.fmu`, as
+//! `resources/filter.toml` describes.
+#![forbid(unsafe_code)]
+
+mod carried;
+mod clock;
+mod variables;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use fmu::description::DefaultExperiment;
+use fmu::{About, Experiment, Failure, Model, Step, Variable};
+use serde::{Deserialize, Serialize};
+
+use aso_controller::kalman::KalmanDesign;
+use carried::{Carrier, Estimate};
+use clock::{Clock, HeldMean};
+use control::nonlinear_filter::Transform;
+
+/// `extended` of the parameter `method`.
+const EXTENDED: i32 = 1;
+/// `unscented` of the parameter `method`.
+const UNSCENTED: i32 = 2;
+
+/// The filter; fields without a comment have the name of their variable.
+#[derive(Clone, Serialize, Deserialize)]
+pub struct KalmanFilter {
+    /// What follows from the files of the FMU; `None` in a template, which has none of them, and between the read of a
+    /// state from bytes and [`Model::complete`].
+    #[serde(skip)]
+    carrier: Option<Arc<Carrier>>,
+    method: i32,
+    integration_steps: i32,
+    /// `x_hat_0`, `f_hat_0`.
+    initial: Vec<f64>,
+    /// `x_hat`, `f_hat`, with their covariance.
+    estimate: Estimate,
+    /// `x_deviation`, `f_deviation`.
+    deviations: Vec<f64>,
+    innovation_squared: f64,
+    /// The measurements, and their derivatives with respect to time.
+    y: Vec<f64>,
+    y_slopes: Vec<f64>,
+    /// The measurements of the last sample.
+    sampled: Vec<f64>,
+    /// The commands, and their mean since the last sample.
+    u: Vec<f64>,
+    applied: HeldMean,
+    clock: Clock,
+}
+
+impl KalmanFilter {
+    fn with(carrier: Option<Carrier>) -> Self {
+        let design = carrier.as_ref().map(|carrier| &carrier.design);
+        let of = |signals: &[aso_controller::design::Signal]| -> Vec<f64> {
+            signals.iter().map(|signal| signal.operating.unwrap_or_default()).collect()
+        };
+        let mut initial = design.map_or(Vec::new(), |design| of(&design.states));
+        initial.resize(initial.len() + design.map_or(0, KalmanDesign::fault_states), 0.0);
+        let y = design.map_or(Vec::new(), |design| of(&design.measurements));
+        let u = design.map_or(Vec::new(), |design| of(&design.commands));
+        let mut filter = Self {
+            method: EXTENDED,
+            integration_steps: design.map_or(1, |design| design.integration_steps),
+            estimate: Estimate { mean: initial.clone(), covariance: Vec::new() },
+            deviations: vec![0.0; initial.len()],
+            innovation_squared: 0.0,
+            y_slopes: vec![0.0; y.len()],
+            sampled: y.clone(),
+            applied: HeldMean::of(u.len()),
+            clock: Clock::new(design.map_or(1.0, |design| design.sample_time)),
+            carrier: carrier.map(Arc::new),
+            initial,
+            y,
+            u,
+        };
+        filter.rest();
+        filter
+    }
+
+    /// Sets the estimate to the one before the first sample.
+    fn rest(&mut self) {
+        let Some(carrier) = &self.carrier else { return };
+        self.estimate.mean.copy_from_slice(&self.initial);
+        self.estimate.covariance.clone_from(&carrier.design.p.values);
+        self.set_deviations();
+        self.innovation_squared = 0.0;
+    }
+
+    fn set_deviations(&mut self) {
+        let n = self.deviations.len();
+        let variances = self.estimate.covariance.iter().step_by(n + 1);
+        for (deviation, variance) in self.deviations.iter_mut().zip(variances) {
+            *deviation = variance.max(0.0).sqrt();
+        }
+    }
+
+    fn carrier(&self) -> Result<Arc<Carrier>, Failure> {
+        self.carrier.clone().ok_or_else(|| {
+            Failure::Error(
+                "this FMU is a template without a plant: `aso-ftc design PLANT.toml --kalman-fmu FILTER.fmu` writes a \
+                 Kalman filter that carries one"
+                    .to_owned(),
+            )
+        })
+    }
+
+    /// Takes the sample at `instant` with the measurements extrapolated by `offset`, both in s.
+    fn correct(&mut self, carrier: &Carrier, instant: f64, offset: f64) -> Result<(), Failure> {
+        for (sampled, (y, slope)) in self.sampled.iter_mut().zip(self.y.iter().zip(&self.y_slopes))
+        {
+            *sampled = y + slope * offset;
+        }
+        let transform = self.transform();
+        let u = self.applied.mean(&self.u);
+        let sample = carried::Sample { time: instant, u, y: &self.sampled, transform };
+        self.innovation_squared = carrier.correct(&mut self.estimate, &sample)?;
+        self.set_deviations();
+        Ok(())
+    }
+
+    fn transform(&self) -> Transform {
+        if self.method == UNSCENTED { Transform::Unscented } else { Transform::Extended }
+    }
+}
+
+impl Model for KalmanFilter {
+    const IDENTIFIER: &'static str = "KalmanFilter";
+
+    fn about(&self) -> About {
+        let design = self.carrier.as_ref().map(|carrier| &carrier.design);
+        About {
+            description: design.map_or_else(
+                || "Template of Kalman filters that carry their plant".to_owned(),
+                |design| design.description.clone(),
+            ),
+            author: String::new(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            license: env!("CARGO_PKG_LICENSE").to_owned(),
+            default_experiment: DefaultExperiment {
+                start_time: Some(0.0),
+                stop_time: design.map(|design| design.stop_time),
+                tolerance: None,
+                step_size: design.map(|design| design.sample_time),
+            },
+        }
+    }
+
+    fn new(resources: &Path) -> Result<Self, Failure> {
+        Ok(Self::with(Carrier::read(resources)?))
+    }
+
+    fn variables(&self) -> Vec<Variable<Self>> {
+        self.carrier.as_ref().map_or(Vec::new(), |carrier| variables::list(&carrier.design))
+    }
+
+    fn complete(&mut self, current: &Self) {
+        self.carrier.clone_from(&current.carrier);
+    }
+
+    fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
+        let carrier = self.carrier()?;
+        carrier.start(experiment.start_time)?;
+        self.rest();
+        self.clock.start(experiment.start_time);
+        self.applied.clear();
+        self.correct(&carrier, experiment.start_time, 0.0)
+    }
+
+    fn step(&mut self, step: &Step) -> Result<(), Failure> {
+        let carrier = self.carrier()?;
+        let (mut from, transform) = (step.start, self.transform());
+        while let Some(instant) = self.clock.next_until(step.end()) {
+            self.applied.add(&self.u, instant - from);
+            let prediction = carried::Prediction {
+                time: self.clock.last(),
+                u: self.applied.mean(&self.u),
+                steps: self.integration_steps,
+                transform,
+            };
+            carrier.predict(&mut self.estimate, &prediction)?;
+            self.correct(&carrier, instant, instant - step.start)?;
+            self.applied.clear();
+            self.clock.tick();
+            from = instant;
+        }
+        self.applied.add(&self.u, step.end() - from);
+        Ok(())
+    }
+}
+
+fmu::export!(KalmanFilter);
+
+#[cfg(test)]
+mod tests;

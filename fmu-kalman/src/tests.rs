@@ -1,0 +1,1 @@
+//! Samples, commands between them.

@@ -1,0 +1,131 @@
+//! The variables of the filter, by the dimensions and names of its design.
+
+use aso_controller::design::Signal;
+use aso_controller::kalman::KalmanDesign;
+use aso_controller::{channel, channels};
+use fmu::{Enumeration, Variable as V};
+
+use crate::{EXTENDED, KalmanFilter, UNSCENTED};
+
+type Variable = V<KalmanFilter>;
+
+/// All variables for `design`, in the order of the description.
+pub(crate) fn list(design: &KalmanDesign) -> Vec<Variable> {
+    let mut all = inputs(design);
+    all.extend(estimates(design));
+    all.extend(parameters(design));
+    all
+}
+
+fn with_unit(variable: Variable, unit: Option<&String>) -> Variable {
+    match unit {
+        Some(unit) => variable.unit(unit.clone()),
+        None => variable,
+    }
+}
+
+fn meaning(name: &str, description: &str) -> String {
+    if description.is_empty() { name.to_owned() } else { description.to_owned() }
+}
+
+fn inputs(design: &KalmanDesign) -> Vec<Variable> {
+    let text = |kind: &str, signal: &Signal| {
+        format!("{kind}: {}", meaning(&signal.name, &signal.description))
+    };
+    let measurements = design.measurements.iter().enumerate().map(|(k, signal)| {
+        let variable =
+            V::real(&signal.name, text("Measurement", signal), move |m: &mut KalmanFilter| {
+                &mut m.y[k]
+            });
+        with_unit(variable, signal.unit.as_ref())
+            .input()
+            .derivative(move |m: &mut KalmanFilter| &mut m.y_slopes[k])
+    });
+    let commands = design.commands.iter().enumerate().map(|(j, signal)| {
+        let variable = V::real(
+            &signal.name,
+            text("Command that acts", signal),
+            move |m: &mut KalmanFilter| &mut m.u[j],
+        );
+        with_unit(variable, signal.unit.as_ref()).input()
+    });
+    measurements.chain(commands).collect()
+}
+
+/// Of each element of z: name of its estimate, of its deviation and of its start, meaning, unit.
+fn elements(design: &KalmanDesign) -> Vec<([String; 3], String, Option<String>)> {
+    let (n, q) = (design.states.len(), design.fault_states());
+    let states = design
+        .states
+        .iter()
+        .map(|state| (meaning(&state.name, &state.description), state.unit.clone()));
+    let mut faults: Vec<_> = design
+        .faults
+        .iter()
+        .map(|fault| (meaning(&fault.name, &fault.description), fault.unit.clone()))
+        .collect();
+    faults.resize(q, (String::new(), None));
+    for fault in &design.faults {
+        if let Some(rate) = fault.rate {
+            let unit = fault.unit.as_ref().map(|unit| format!("{unit}/s"));
+            let unit = unit.filter(|unit| fmu::description::unit::Unit::parse(unit).is_ok());
+            faults[rate] = (format!("rate of {}", meaning(&fault.name, &fault.description)), unit);
+        }
+    }
+    let names = ["x", "f"].into_iter().zip([n, q]).flat_map(|(letter, count)| {
+        (0..count).map(move |k| {
+            ["_hat", "_deviation", "_hat_0"]
+                .map(|suffix| channel(&format!("{letter}{suffix}"), k, count))
+        })
+    });
+    names.zip(states.chain(faults)).map(|(names, (text, unit))| (names, text, unit)).collect()
+}
+
+fn estimates(design: &KalmanDesign) -> Vec<Variable> {
+    let (n, q) = (design.states.len(), design.fault_states());
+    let inputs = design.measurements.iter().chain(&design.commands);
+    let known: Vec<String> = inputs
+        .map(|signal| signal.name.clone())
+        .chain(channels("x_hat_0", n))
+        .chain(channels("f_hat_0", q))
+        .collect();
+    let output = |variable: Variable| variable.output(&[]).discrete().initially(known.clone());
+    let mut all = Vec::new();
+    for (k, ([name, ..], text, unit)) in elements(design).into_iter().enumerate() {
+        let text = format!("Estimate of {text}");
+        let variable = V::real(name, text, move |m: &mut KalmanFilter| &mut m.estimate.mean[k]);
+        all.push(output(with_unit(variable, unit.as_ref())));
+    }
+    for (k, ([_, name, _], text, unit)) in elements(design).into_iter().enumerate() {
+        let text = format!("Standard deviation of the estimate of {text}");
+        let variable = V::real(name, text, move |m: &mut KalmanFilter| &mut m.deviations[k]);
+        all.push(output(with_unit(variable, unit.as_ref())));
+    }
+    let text = "Square of the innovation relative to its covariance; on average the number of measurements";
+    all.push(output(
+        V::real("innovation_squared", text, |m: &mut KalmanFilter| &mut m.innovation_squared)
+            .unit("1"),
+    ));
+    all
+}
+
+fn parameters(design: &KalmanDesign) -> Vec<Variable> {
+    let methods = Enumeration::new("Method", [("extended", EXTENDED), ("unscented", UNSCENTED)]);
+    let text = "How the estimate passes the equations of the plant: by tangents or by points";
+    let mut all = vec![
+        V::enumeration("method", text, methods, |m: &mut KalmanFilter| &mut m.method).parameter(),
+        V::integer(
+            "integration_steps",
+            "Number of integration steps in a sample",
+            |m: &mut KalmanFilter| &mut m.integration_steps,
+        )
+        .range(1.0, 1e6)
+        .parameter(),
+    ];
+    for (k, ([.., name], text, unit)) in elements(design).into_iter().enumerate() {
+        let text = format!("Estimate of {text} before the first sample");
+        let variable = V::real(name, text, move |m: &mut KalmanFilter| &mut m.initial[k]);
+        all.push(with_unit(variable, unit.as_ref()).parameter());
+    }
+    all
+}
