@@ -32,7 +32,7 @@ pub(crate) struct Options {
     /// rows and columns, or a log of the plant's signals over time, from which the plant is identified.
     /// Writes --out [default: NAME.toml], with the bandwidths that were chosen for the plant.
     #[arg(long)]
-    #[arg(conflicts_with_all = ["report", "fmu", "worst_case", "json", "code", "compare"])]
+    #[arg(conflicts_with_all = ["report", "fmu", "kalman_fmu", "worst_case", "json", "code", "compare"])]
     init: bool,
     /// Further logs of the same plant, with --init
     #[arg(requires = "init", value_name = "LOG")]
@@ -82,6 +82,12 @@ pub(crate) struct Options {
     /// A packed controller FMU [default: dist/AsoController.fmu, or the one beside the command].
     #[arg(long, value_name = "FMU", requires = "fmu", help_heading = "Results")]
     from: Option<PathBuf>,
+    /// Also make a Kalman filter with the plant inside
+    ///
+    /// An FMU that estimates states and faults by the plant's own FMU, extended or unscented, for the noise of the
+    /// observer. Made from the packed dist/KalmanFilter.fmu, or the one beside the command.
+    #[arg(long, value_name = "FMU", help_heading = "Results")]
+    kalman_fmu: Option<PathBuf>,
     /// Also write the worst plant within tolerances
     ///
     /// As a plant file.
@@ -111,7 +117,7 @@ pub(crate) struct Options {
     /// Compare all laws that estimate faults
     ///
     /// Writes one page, NAME-comparison.html or --report, and no design.
-    #[arg(long, conflicts_with_all = ["out", "fmu", "worst_case", "c_code", "no_std"])]
+    #[arg(long, conflicts_with_all = ["out", "fmu", "kalman_fmu", "worst_case", "c_code", "no_std"])]
     #[arg(help_heading = "Computation")]
     compare: bool,
     /// Time for proofs in s
@@ -147,7 +153,10 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     let from = options.from()?;
     let mut outputs: Vec<(&str, &Path)> = vec![("--out", &out), ("--report", &report)];
     outputs.extend(options.fmu.as_deref().map(|path| ("--fmu", path)));
+    outputs.extend(options.kalman_fmu.as_deref().map(|path| ("--kalman-fmu", path)));
     outputs.extend(options.worst_case.as_deref().map(|path| ("--worst-case", path)));
+    let filter = options.kalman_fmu.as_ref().map(|_| models::default_fmu(models::FILTER));
+    let filter = filter.transpose()?;
     check_distinct(&inputs(options, from.as_deref(), None), &outputs)?;
     for library in &options.preload {
         fmu_import::preload(library)?;
@@ -174,11 +183,15 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         }
     }
     let fmu = from.map(|from| design.fmu(&from)).transpose()?;
+    let filter = filter.map(|base| design.kalman_fmu(&base)).transpose()?;
     let page = design.page();
     let mut staged = Outputs::default();
     staged.stage(&out, |path| fs::write(path, &design.file))?;
     staged.stage(&report, |path| fs::write(path, &page))?;
     if let (Some(fmu), Some(path)) = (fmu, &options.fmu) {
+        staged.stage(path, |path| fmu.write(path, &page))?;
+    }
+    if let (Some(fmu), Some(path)) = (filter, &options.kalman_fmu) {
         staged.stage(path, |path| fmu.write(path, &page))?;
     }
     for (_, path, text) in &code.files {

@@ -8,6 +8,9 @@ use anyhow::{Context as _, bail};
 pub(crate) const FMUS: [(&str, &str); 2] =
     [("plant", "FrictionPendulum.fmu"), ("controller", "AsoController.fmu")];
 
+/// The FMU from which Kalman filters are made, of the crate `fmu-kalman`.
+pub(crate) const FILTER: &str = "KalmanFilter.fmu";
+
 /// The folder into which FMUs are packed if no other is stated.
 const DIST: &str = "dist";
 
@@ -27,7 +30,10 @@ pub(crate) fn default_fmu(name: &str) -> anyhow::Result<PathBuf> {
     let mut paths = std::iter::once(packed.clone()).chain(others);
     paths.find(|path| path.is_file()).with_context(|| {
         let packed = packed.display();
-        format!("there is no {packed}: name another FMU, or write this one by `aso-ftc pack`")
+        let which = if name == FILTER { " fmu-kalman" } else { "" };
+        format!(
+            "there is no {packed}: name another FMU, or write this one by `aso-ftc pack{which}`"
+        )
     })
 }
 

@@ -155,5 +155,6 @@ pub(crate) fn check_own(path: &Path, identity: &str) -> anyhow::Result<()> {
 /// The design in an FMU.
 fn in_archive(path: &Path) -> Option<String> {
     let unpacked = fmu_description::package::Unpacked::open_whole(path).ok()?;
-    fs::read_to_string(unpacked.resources().join("design.toml")).ok()
+    let names = ["design.toml", "filter.toml"];
+    names.iter().find_map(|name| fs::read_to_string(unpacked.resources().join(name)).ok())
 }

@@ -1,5 +1,4 @@
-//! Creates the controller FMU of a design from the packed controller: replaces resources and
-//! description.
+//! Creates the FMUs of a design from packed ones: replaces resources and description.
 
 use std::fs;
 use std::path::Path;
@@ -12,36 +11,42 @@ use fmu_import::described_as;
 
 use crate::Error;
 
-/// The files that turn the packed controller into the controller of a design.
+/// The files that turn a packed FMU into that of a design.
 pub(crate) struct Content<'a> {
-    /// `resources/design.toml`.
-    pub(crate) design: &'a str,
+    /// The model whose packed FMU takes them.
+    pub(crate) model: &'static str,
+    /// The files in `resources`, by name.
+    pub(crate) resources: &'a [(&'static str, &'a [u8])],
     /// The plant file, for the documentation.
     pub(crate) plant: &'a str,
 }
 
-/// A controller FMU that has not been written yet.
-pub struct ControllerFmu {
+/// An FMU of a design that has not been written yet.
+pub struct DesignedFmu {
     pub(crate) description: ModelDescription,
     package: Package,
 }
 
-impl ControllerFmu {
+impl DesignedFmu {
     /// Inserts `content` into the FMU `base` and lets its library generate the model description.
     pub(crate) fn new(base: &Path, content: &Content<'_>) -> Result<Self, Error> {
         let unpacked = Unpacked::open_whole(base).map_err(|error| {
-            let what = format!("cannot open {}, the packed controller", base.display());
+            let what = format!("cannot open {}, the packed FMU", base.display());
             Error::from(error).within(what)
         })?;
-        let design = unpacked.resources().join("design.toml");
-        if !design.is_file() {
+        let (model, expected) = (&unpacked.description.model_name, content.model);
+        if model != expected {
             return Err(Error::Invalid(format!(
-                "{} has no resources/design.toml; expected an AsoController.fmu as `aso-ftc pack` \
-                 makes it",
+                "{} is a {model}; expected a {expected}.fmu as `aso-ftc pack` makes it",
                 base.display()
             )));
         }
-        fs::write(&design, content.design).map_err(Error::file("write", &design))?;
+        for (name, bytes) in content.resources {
+            let path = unpacked.resources().join(name);
+            let written =
+                fs::create_dir_all(unpacked.resources()).and_then(|()| fs::write(&path, bytes));
+            written.map_err(Error::file("write", &path))?;
+        }
         let identifier = unpacked.description.co_simulation.as_ref();
         let identifier = identifier.map(|interface| interface.model_identifier.clone());
         let library = unpacked.library(&identifier.unwrap_or_default())?;

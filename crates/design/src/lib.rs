@@ -12,10 +12,11 @@ mod assess;
 mod budget;
 mod code;
 mod compare;
-mod controller_fmu;
 mod design_file;
+mod designed_fmu;
 mod error;
 mod init;
+mod kalman_fmu;
 mod matrix;
 mod plant;
 mod progress;
@@ -24,17 +25,19 @@ mod solve;
 mod tests;
 mod threads;
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
+use aso_controller::kalman::KalmanDesign;
 use control::robustness::Loop;
-use files::{Source, Table};
+use files::{PlaceError, Source, Table};
 
 pub use budget::TimeLimits;
 pub use compare::compare;
 pub use controller_code::{Code, Language, Precision};
-pub use controller_fmu::ControllerFmu;
 pub use design_page::comparison as comparison_page;
 pub use design_report as report;
+pub use designed_fmu::DesignedFmu;
 pub use error::Error;
 pub use init::{LogOptions, NewPlantFile, new_plant_file};
 pub use progress::{Observer, Progress};
@@ -44,7 +47,7 @@ pub use report::robustness::Level;
 
 use assess::reporting::Assessment;
 use assess::{bandwidths, detection, reporting, worst_case};
-use controller_fmu::Content;
+use designed_fmu::Content;
 use plant::parameters::ParameterFamily;
 use plant_file::PlantFile;
 use progress::{Step, Steps};
@@ -71,6 +74,8 @@ pub struct Design {
     pub model: Option<PathBuf>,
     /// The text of the plant file.
     pub plant: String,
+    /// The Kalman filter with the plant's FMU, or why there is none.
+    kalman: Result<KalmanDesign, PlaceError>,
 }
 
 /// Designs the controller that the plant file at `path` asks for.
@@ -163,6 +168,7 @@ fn design_source(source: &Source, limits: &TimeLimits, steps: &Steps<'_>) -> Res
         worst_case,
         closed_loop: assess::robustness::loop_of(&designed.nominal)?,
         plant: source.text().to_owned(),
+        kalman: kalman_fmu::kalman_design(&file, &designed, controller.experiment.stop_time),
         model: file.fmu().map(Path::to_owned),
     })
 }
@@ -173,11 +179,32 @@ impl Design {
     /// # Errors
     ///
     /// [`Error`]: `base` is no packed ASO controller, or its library refuses the design.
-    pub fn fmu(&mut self, base: &Path) -> Result<ControllerFmu, Error> {
-        let content = Content { design: &self.file, plant: &self.plant };
-        let fmu = ControllerFmu::new(base, &content)?;
+    pub fn fmu(&mut self, base: &Path) -> Result<DesignedFmu, Error> {
+        let resources = [("design.toml", self.file.as_bytes())];
+        let content = Content { model: "AsoController", resources: &resources, plant: &self.plant };
+        let fmu = DesignedFmu::new(base, &content)?;
         self.report.interface = reporting::interface(&fmu.description);
         Ok(fmu)
+    }
+
+    /// Makes the FMU of an extended or unscented Kalman filter, for the noise of the designed observer, that carries the plant's
+    /// FMU; from the packed one at `base`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`]: the plant is no FMU, or has what this filter has not; the gain of the observer follows from no noise; `base`
+    /// is no packed Kalman filter.
+    pub fn kalman_fmu(&self, base: &Path) -> Result<DesignedFmu, Error> {
+        let (Ok(design), Some(model)) = (&self.kalman, &self.model) else {
+            let refusal = self.kalman.as_ref().err().cloned();
+            return Err(refusal.map_or_else(|| Error::Invalid("no plant".to_owned()), Error::from));
+        };
+        let text = design.to_toml().map_err(|error| Error::Invalid(error.to_string()))?;
+        let text = format!("{}\n{text}", identity::heading(&self.identity, &self.report.verdict));
+        let plant = fs::read(model).map_err(Error::file("read", model))?;
+        let resources = [("filter.toml", text.as_bytes()), ("plant.fmu", &plant)];
+        let content = Content { model: "KalmanFilter", resources: &resources, plant: &self.plant };
+        DesignedFmu::new(base, &content)
     }
 
     /// The report as an HTML page that needs no other file.

@@ -22,7 +22,7 @@ pub struct Source {
 pub type Place = Range<usize>;
 
 /// An error that shows the line of the file and underlines the place.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct PlaceError {
     path: PathBuf,
     line: usize,

@@ -22,6 +22,8 @@ pub struct RobustnessLimits {
     /// Noise of each measurement: the root of its spectral density, or its standard deviation in a
     /// sampled design.
     pub noise: Vec<f64>,
+    /// Whether the file states it.
+    pub noise_is_stated: bool,
     /// Peak of S above which a design is amber.
     pub amber: f64,
     /// Peak of S above which it is red.
@@ -60,6 +62,7 @@ impl RobustnessLimits {
             cases: CASES,
             seed: 1,
             noise: vec![1.0; measurements],
+            noise_is_stated: false,
             amber: AMBER,
             red: RED,
         };
@@ -98,6 +101,7 @@ impl RobustnessLimits {
         }
         if let Some(entry) = table.get("noise") {
             limits.noise = noise(&entry, measurements)?;
+            limits.noise_is_stated = true;
         }
         let (amber, red) = (table.get("amber"), table.get("red"));
         for (entry, limit) in [(&amber, &mut limits.amber), (&red, &mut limits.red)] {

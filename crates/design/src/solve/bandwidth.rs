@@ -6,7 +6,7 @@ use control::{Domain, StateSpace};
 use nalgebra::DMatrix;
 
 use crate::report::number::rounded;
-use crate::solve::gain::{FeedbackProblem, GainResult, Refusal, unique};
+use crate::solve::gain::{FeedbackProblem, GainResult, Noise, Refusal, unique};
 use crate::solve::norm_gains::ObserverProblem;
 use plant_file::requirements::Bandwidth;
 
@@ -66,11 +66,20 @@ impl ObserverProblem<'_> {
         let units = NaturalUnits::new(&plant, rate)?;
         let noise = inputs * DMatrix::from_diagonal(&units.inputs);
         let w = &noise * noise.transpose();
-        let ByBandwidth { result, loop_gain, .. } =
-            filter(a_0, c_0, &((&w + w.transpose()) / 2.0), &units.outputs, rate, domain)?;
+        let process = (&w + w.transpose()) / 2.0;
+        let ByBandwidth { result, loop_gain, weight } =
+            filter(a_0, c_0, &process, &units.outputs, rate, domain)?;
+        let measurements = units.outputs.map(|unit| weight / (unit * unit));
+        let noise = Noise {
+            process,
+            measurements: DMatrix::from_diagonal(&measurements),
+            covariance: result.covariance,
+            is_relative: true,
+        };
         let current = result.current_gain.filter(|_| estimator == Estimator::Current);
         let method = method(bandwidth, "Kalman filter", loop_gain, result.residual);
-        Ok(unique(current.unwrap_or(result.gain), method))
+        let choice = unique(current.unwrap_or(result.gain), method);
+        Ok(GainResult { noise: Some(Box::new(noise)), ..choice })
     }
 }
 

@@ -21,8 +21,23 @@ pub(crate) struct GainResult {
     pub(crate) quality: Option<Quality>,
     /// The H-infinity norm, of a design by it.
     pub(crate) norm: Option<NormReport>,
+    /// The noise of a Kalman filter.
+    pub(crate) noise: Option<Box<Noise>>,
     /// Other results of an eigenvalue assignment.
     pub(crate) choice: Option<Box<GainChoice>>,
+}
+
+/// The noise for which a Kalman filter is optimal, and the covariance of its predicted estimate.
+#[derive(Clone)]
+pub(crate) struct Noise {
+    /// W, of the states of the observer.
+    pub(crate) process: DMatrix<f64>,
+    /// V, of the measurements.
+    pub(crate) measurements: DMatrix<f64>,
+    /// P, of the states of the observer.
+    pub(crate) covariance: DMatrix<f64>,
+    /// Whether all three are known up to a common factor only, which the gain does not depend on.
+    pub(crate) is_relative: bool,
 }
 
 /// The results of an eigenvalue assignment among which the loop decides.
@@ -62,7 +77,15 @@ pub(crate) struct FeedbackProblem<'a> {
 
 /// The gain of a method without a choice, without required eigenvalues.
 pub(crate) fn unique(gain: DMatrix<f64>, method: String) -> GainResult {
-    GainResult { gain, method, required: Vec::new(), quality: None, norm: None, choice: None }
+    GainResult {
+        gain,
+        method,
+        required: Vec::new(),
+        quality: None,
+        norm: None,
+        noise: None,
+        choice: None,
+    }
 }
 
 pub(crate) fn synthesised(

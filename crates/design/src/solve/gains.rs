@@ -12,7 +12,7 @@ use control::sampled::{estimator_alternatives, sampled_poles};
 use nalgebra::{Complex, DMatrix};
 
 use crate::solve::gain::{
-    FeedbackProblem, GainChoice, GainResult, Refusal, require, synthesised, unique,
+    FeedbackProblem, GainChoice, GainResult, Noise, Refusal, require, synthesised, unique,
 };
 use crate::solve::norm_gains::{NormRequirement, ObserverProblem};
 use plant_file::requirements::Requirement;
@@ -106,7 +106,14 @@ pub(crate) fn observer(
                 .current_gain
                 .filter(|_| estimator == Estimator::Current)
                 .unwrap_or(filter.gain);
-            Ok(weighted(gain, "Kalman filter", filter.residual))
+            let noise = Noise {
+                process: states.clone(),
+                measurements: channels.clone(),
+                covariance: filter.covariance,
+                is_relative: false,
+            };
+            let result = weighted(gain, "Kalman filter", filter.residual);
+            Ok(GainResult { noise: Some(Box::new(noise)), ..result })
         }
         Requirement::Bandwidth(bandwidth) => problem.by_bandwidth(bandwidth, domain),
         Requirement::Region(region) => {
@@ -171,6 +178,7 @@ fn assigned(alternatives: &Alternatives, required: &[Complex<f64>]) -> GainResul
         required: required.to_vec(),
         quality: Some(placement.quality),
         norm: None,
+        noise: None,
         choice: None,
     };
     let candidates = alternatives.candidates().map(|gains| gains.into_iter().map(result).collect());

@@ -1,0 +1,141 @@
+//! Writes `filter.toml` of the Kalman filter that carries the plant's FMU.
+
+use aso_controller::design::Signal;
+use aso_controller::kalman::{CarriedFault, Entry, KalmanDesign};
+use control::Domain;
+use control::eigen::eigenvalues;
+use files::PlaceError;
+use nalgebra::DMatrix;
+
+use crate::matrix::matrix;
+use crate::solve::designed::Designed;
+use crate::solve::gain::Noise;
+use crate::solve::solution::Solution;
+use plant_file::PlantFile;
+use plant_file::faults::EntryPoint;
+use plant_file::signals::Signal as PlantSignal;
+
+/// Largest modulus of an eigenvalue of A times the integration step: Runge-Kutta's method of order 4 has then an error of
+/// some 1e-6 a step.
+const RESOLUTION: f64 = 0.2;
+/// Most integration steps of a sample that are chosen.
+const MOST_STEPS: f64 = 1e4;
+
+/// The Kalman filter for the plant of `file`, for the noise of the designed observer; `stop_time`: of its default experiment,
+/// in s.
+///
+/// # Errors
+///
+/// The file asks for something that this filter does not have, with its line and what helps.
+pub(crate) fn kalman_design(
+    file: &PlantFile<'_>,
+    designed: &Designed,
+    stop_time: f64,
+) -> Result<KalmanDesign, PlaceError> {
+    let Solution { linear, extended, domain, observer, .. } = &designed.nominal;
+    let refuse = |keys: &[&'static str], text: &str| {
+        Err(file.error(keys, format!("no Kalman filter with the plant's FMU: {text}")))
+    };
+    let plant_file::Model::Fmu(fmu) = &file.model else {
+        return refuse(&["A"], "the plant is a matrix; `plant = \"NAME.fmu\"` states an FMU");
+    };
+    let &Domain::Sampled { period } = domain else {
+        return refuse(&["plant"], "it needs a `sample_time`");
+    };
+    if designed.schedule.is_some() {
+        return refuse(&["schedule"], "it has no schedule, which its plant does not need");
+    }
+    if linear.delays.any() || !linear.filter_states(file).is_empty() {
+        return refuse(
+            &["loop", "plant"],
+            "it has no `delay` and no `structure`; a plant file without them designs the filter",
+        );
+    }
+    let Some(noise) = &observer.noise else {
+        return refuse(
+            &["observer", "loop"],
+            "the gain of the observer follows from no noise; `observer.bandwidth`, or `observer.W` and `observer.V`, does",
+        );
+    };
+    let Some(scale) = scale(file, noise) else {
+        return refuse(
+            &["observer", "plant"],
+            "`observer.bandwidth` gives covariances up to a common factor; `robustness.noise`, the standard deviation of \
+             each measurement, states it",
+        );
+    };
+    let n = linear.states.len();
+    let (of_observer, q) = (extended.plant.a.nrows(), extended.plant.f_a.ncols());
+    // Without the filter of the measurements.
+    let picked: Vec<usize> = (0..n).chain(of_observer..of_observer + q).collect();
+    // The dynamics of the observer's error have the faults with the other sign.
+    let sign = |at: usize| if at < n { 1.0 } else { -1.0 };
+    let part = |m: &DMatrix<f64>| {
+        let picked = m.select_rows(&picked).select_columns(&picked);
+        matrix(&DMatrix::from_fn(n + q, n + q, |i, j| picked[(i, j)] * (scale * sign(i) * sign(j))))
+    };
+    let faults = file.faults.iter().zip(&linear.faults).zip(&extended.channels);
+    let faults = faults.map(|((stated, fault), channel)| CarriedFault {
+        name: fault.name.clone(),
+        unit: fault.unit.clone(),
+        description: fault.description.clone(),
+        enters: match &stated.entry_point {
+            EntryPoint::Actuator(at) | EntryPoint::Loss { actuator: at, .. } => {
+                Entry::Actuator(*at)
+            }
+            EntryPoint::Sensor(at) => Entry::Sensor(*at),
+            EntryPoint::Input(name) => Entry::Input(name.clone()),
+            EntryPoint::Column(at) => Entry::Actuator(*at),
+        },
+        rate: channel.rate,
+    });
+    let signals = |signals: &[PlantSignal]| signals.iter().map(signal).collect::<Vec<_>>();
+    let states = signals(&linear.states);
+    let is_state = |name: &String| states.iter().any(|state| state.name == *name);
+    let settings = fmu.operating_point.iter().filter(|(name, _)| !is_state(name));
+    let names: Vec<_> = linear.faults.iter().map(|fault| fault.name.as_str()).collect();
+    let fastest =
+        eigenvalues(&linear.a).map_or(0.0, |all| all.iter().map(|p| p.norm()).fold(0.0, f64::max));
+    let steps = (period * fastest / RESOLUTION).ceil();
+    #[expect(clippy::cast_possible_truncation, reason = "from 1 to MOST_STEPS")]
+    let integration_steps = steps.clamp(1.0, MOST_STEPS) as i32;
+    Ok(KalmanDesign {
+        description: format!(
+            "Kalman filter that estimates the states of its plant and {}",
+            names.join(", ")
+        ),
+        sample_time: period,
+        integration_steps,
+        stop_time,
+        w: part(&noise.process),
+        v: matrix(&(&noise.measurements * scale)),
+        p: part(&noise.covariance),
+        settings: settings.cloned().collect(),
+        commands: signals(&linear.actuators),
+        measurements: signals(&linear.measurements),
+        faults: faults.collect(),
+        states,
+    })
+}
+
+/// The factor of the covariances: with it the variances of the measurements are those of the file, in the geometric mean.
+fn scale(file: &PlantFile<'_>, noise: &Noise) -> Option<f64> {
+    if !noise.is_relative {
+        return Some(1.0);
+    }
+    let limits = &file.robustness;
+    let variances = noise.measurements.diagonal();
+    let logarithms = limits.noise.iter().zip(&variances).map(|(noise, v)| (noise * noise / v).ln());
+    #[expect(clippy::cast_precision_loss, reason = "a number of measurements")]
+    let count = variances.len() as f64;
+    limits.noise_is_stated.then(|| (logarithms.sum::<f64>() / count).exp())
+}
+
+fn signal(signal: &PlantSignal) -> Signal {
+    Signal {
+        name: signal.name.clone(),
+        unit: signal.unit.clone(),
+        description: signal.description.clone(),
+        operating: signal.operating,
+    }
+}
