@@ -330,6 +330,16 @@ class Controller:
         self._designed.fmu(start, os.fspath(path))
         return os.fspath(path)
 
+    def kalman_fmu(self, path: PathLike, *, base: PathLike) -> str:
+        """Write a Kalman filter that carries the plant's FMU; return its path.
+
+        Args:
+            path: the file to write.
+            base: the packed filter from which it is made, ``KalmanFilter.fmu`` of ``aso-ftc pack fmu-kalman``.
+        """
+        self._designed.kalman_fmu(os.fspath(base), os.fspath(path))
+        return os.fspath(path)
+
     def c_code(self, folder: PathLike, *, single: bool = False) -> list[str]:
         """Write the controller of a sampled design as C99; return the paths: header, source, runtime.
 

@@ -141,6 +141,14 @@ impl Designed {
         Ok((code.files, code.warnings))
     }
 
+    /// Makes the Kalman filter with the plant's FMU from the packed filter at `base`.
+    fn kalman_fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
+        let result = guarded(py, || {
+            self.with(|design| design.kalman_fmu(&base)?.write(&path, &design.page()))
+        })?;
+        result.map_err(|error| error::design(&error).raise(py))
+    }
+
     /// Makes the controller FMU from the packed controller at `base`.
     fn fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
         let result = guarded(py, || {

@@ -15,7 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURE = ROOT / "docs" / "figures" / "crates.svg"
-FACES = {"cli": "cli", "python": "python", "fmu-plant": "fmu-plant", "fmu-controller": "fmu-controller"}
+FACES = {"cli": "cli", "python": "python", "fmu-plant": "fmu-plant", "fmu-controller": "fmu-controller", "fmu-kalman": "fmu-kalman"}
 # The picture is narrow, so that names can be read on a telephone.
 WIDTH, ROW, BOX, MARGIN = 480, 74, 28, 8
 LETTER, PADDING, GAP, LANE = 7.4, 14, 10, 8

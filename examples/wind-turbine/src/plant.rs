@@ -76,7 +76,7 @@ impl State {
     }
 
     /// The derivatives, in the units of the state per second.
-    fn slope(&self, held: &Held) -> Self {
+    pub(crate) fn slope(&self, held: &Held) -> Self {
         let Self { omega_r, omega_g, twist, tau_g, beta, rate } = *self;
         let lambda = (omega_r * RADIUS / held.wind).clamp(0.5, 25.0);
         let pressure = 0.5 * DENSITY * PI * RADIUS.powi(3) * held.wind * held.wind;

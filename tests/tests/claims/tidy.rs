@@ -147,7 +147,9 @@ fn only_tests_use_a_model_or_the_command() {
             let Some(dependencies) = manifest.get(section).and_then(toml::Value::as_table) else {
                 continue;
             };
-            for forbidden in ["fmu-plant", "fmu-controller", "aso-ftc", "aso-ftc-python", "web"] {
+            for forbidden in
+                ["fmu-plant", "fmu-controller", "fmu-kalman", "aso-ftc", "aso-ftc-python", "web"]
+            {
                 assert!(
                     !dependencies.contains_key(forbidden),
                     "{} uses {forbidden}",
@@ -241,6 +243,7 @@ fn the_models_forbid_unsafe_code() {
     for model in [
         "fmu-plant",
         "fmu-controller",
+        "fmu-kalman",
         "crates/control",
         "cli",
         "examples/van-der-pol",

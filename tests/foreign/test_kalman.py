@@ -1,0 +1,331 @@
+"""Kalman filters that carry the plant's FMU, beside those of filterpy with the plant's equations by scipy."""
+
+import json
+import tomllib
+import zipfile
+
+import numpy as np
+import pytest
+from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
+from scipy.integrate import solve_ivp
+
+from any_fmu import instance
+
+METHODS = {"extended": 1, "unscented": 2}
+T = 5.0
+TANKS = """
+plant = "{plant}"
+sample_time = 5.0
+measurements = ["y_1", "y_2", "y_3"]
+actuators = ["Q_1", "Q_2"]
+actuator_faults = "all"
+feedback.bandwidth = 0.012
+observer.bandwidth = 0.1
+"""
+NOISE = "\n[robustness]\nnoise = 0.002\n"
+
+
+@pytest.fixture(scope="module")
+def packed_filter(aso_ftc):
+    """The template, where the command looks for it."""
+    done = aso_ftc("pack", "fmu-kalman")
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture(scope="module")
+def attempt(aso_ftc, packed_filter, tmp_path_factory):
+    """Designs for a plant file; returns what the command did, and the path of the filter."""
+
+    def run(text, *options):
+        folder = tmp_path_factory.mktemp("filter")
+        (folder / "plant.toml").write_text(text, encoding="utf-8")
+        path = folder / "Filter.fmu"
+        done = aso_ftc("design", folder / "plant.toml", "--out", folder / "design.toml", "--kalman-fmu", path, *options)
+        return done, path
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def tanks(attempt, examples):
+    """The filter of the three tanks, and its folder."""
+    done, path = attempt(TANKS.format(plant=examples["ThreeTank"]) + NOISE)
+    assert path.exists(), done.stderr
+    return path
+
+
+def covariances(path):
+    with zipfile.ZipFile(path) as archive:
+        file = tomllib.loads(archive.read("resources/filter.toml").decode())
+    return [np.array(file[name]) for name in "WVP"]
+
+
+def flow(mu, difference):
+    """Torricelli's law for a pipe of 5e-5 m2."""
+    return mu * 5e-5 * np.sign(difference) * np.sqrt(2 * 9.81 * abs(difference))
+
+
+def levels_of(z, u, time):
+    """z after `time` in s: levels of tanks of 0.0154 m2, and faults of the pumps, which stay."""
+
+    def slope(_, h):
+        q_1, q_2 = np.clip(u + z[3:], 0.0, 1.2e-4)
+        q_13, q_32, q_20 = flow(0.5, h[0] - h[2]), flow(0.5, h[2] - h[1]), flow(0.675, h[1])
+        return np.array([q_1 - q_13, q_2 + q_32 - q_20, q_13 - q_32]) / 0.0154
+
+    end = solve_ivp(slope, (0, time), z[:3], rtol=1e-11, atol=1e-13).y[:, -1]
+    return np.concatenate([end, z[3:]])
+
+
+def jacobian(function, z):
+    """By two-sided differences."""
+    columns = []
+    for k, size in enumerate([1e-4] * 3 + [1e-8] * 2):
+        step = np.zeros(5)
+        step[k] = size
+        columns.append((function(z + step) - function(z - step)) / (2 * size))
+    return np.array(columns).T
+
+
+def experiment(count):
+    """Commands that act from each sample on, and noisy levels at the samples, with faults of both pumps."""
+    random = np.random.default_rng(7)
+    z, commands, measured = np.array([0.45, 0.2, 0.25, 0.0, 0.0]), [], []
+    for k in range(count):
+        measured.append(z[:3] + random.normal(0, 0.002, 3))
+        commands.append(np.array([4e-5 + 2e-5 * np.sin(k / 9), 3e-5 if k % 40 < 20 else 6e-5]))
+        if k == 30:
+            z[3:] = [-1e-5, 8e-6]
+        z = levels_of(z, commands[-1], T)
+    return np.array(commands), np.array(measured)
+
+
+def by_filterpy(method, path, commands, measured):
+    w, v, p = covariances(path)
+    initial = np.array([0.4, 0.2, 0.3, 0.0, 0.0])
+    output = np.eye(3, 5)
+    if method == "extended":
+        own = ExtendedKalmanFilter(5, 3)
+    else:
+        points = MerweScaledSigmaPoints(5, alpha=1.0, beta=0.0, kappa=0.0)
+        own = UnscentedKalmanFilter(5, 3, T, lambda z: z[:3], levels_of, points)
+    own.x, own.P, own.Q, own.R = initial, p, w, v
+    results = []
+    for k, y in enumerate(measured):
+        if method == "extended":
+            if k > 0:
+
+                def advance(z, u=commands[k - 1]):
+                    return levels_of(z, u, T)
+
+                own.F = jacobian(advance, own.x)
+                own.predict_x = lambda u, advance=advance: setattr(own, "x", advance(own.x))
+                own.predict()
+            own.update(y, lambda _: output, lambda z: z[:3])
+        else:
+            if k > 0:
+                own.predict(fx=lambda z, time, u=commands[k - 1]: levels_of(z, u, time))
+            # Anew for the predicted estimate, so that they contain the process noise.
+            own.sigmas_f = points.sigma_points(own.x, own.P)
+            own.update(y)
+        squared = own.y @ np.linalg.solve(own.S, own.y)
+        results.append(np.concatenate([own.x, np.sqrt(np.diag(own.P)), [squared]]))
+    return np.array(results)
+
+
+NAMES = [
+    *(f"x_hat[{k}]" for k in (1, 2, 3)),
+    *(f"f_hat[{k}]" for k in (1, 2)),
+    *(f"x_deviation[{k}]" for k in (1, 2, 3)),
+    *(f"f_deviation[{k}]" for k in (1, 2)),
+    "innovation_squared",
+]
+
+
+def by_the_fmu(method, path, folder, commands, measured, parts=1):
+    """The outputs at the samples; each sample is `parts` communication steps."""
+    settings = {"method": METHODS[method], "integration_steps": 20, **{f"x_hat_0[{k + 1}]": x for k, x in enumerate([0.4, 0.2, 0.3])}}
+    with instance(path, folder, settings) as (slave, variables):
+
+        def references(names):
+            return [variables[name].valueReference for name in names]
+
+        inputs, outputs = references(["y_1", "y_2", "y_3", "Q_1", "Q_2"]), references(NAMES)
+        # Sample 0 belongs to the initialisation, whose measurements are those of the operating point.
+        rows = [slave.getReal(outputs)]
+        for k in range(1, len(measured)):
+            slave.setReal(inputs, [*measured[k], *commands[k - 1]])
+            for part in range(parts):
+                step = T / parts
+                slave.doStep(currentCommunicationPoint=(k - 1) * T + part * step, communicationStepSize=step)
+            rows.append(slave.getReal(outputs))
+    return np.array(rows)
+
+
+@pytest.fixture(scope="module")
+def record():
+    commands, measured = experiment(120)
+    measured[0] = [0.4, 0.2, 0.3]
+    return commands, measured
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_estimates_and_their_deviations_are_those_of_filterpy(tanks, tmp_path, record, method):
+    own = by_the_fmu(method, tanks, tmp_path, *record)
+    theirs = by_filterpy(method, tanks, *record)
+    scale = np.abs(theirs).max(axis=0)
+    assert np.abs((own - theirs) / scale).max() < 1e-6
+
+
+def test_communication_steps_within_a_sample_change_nothing(tanks, tmp_path, record):
+    one, several = (by_the_fmu("extended", tanks, tmp_path / str(n), *record, parts=n) for n in (1, 5))
+    assert np.abs((one - several) / np.abs(one).max(axis=0)).max() < 1e-12
+
+
+def test_the_filter_is_consistent_with_its_noise(tanks, tmp_path):
+    """With the noise and the walks of W and V, the mean of the squared innovation is the number of measurements."""
+    w, v, _ = covariances(tanks)
+    random = np.random.default_rng(1)
+    z, commands, measured = np.array([0.4, 0.2, 0.3, 0.0, 0.0]), [], []
+    for _ in range(800):
+        measured.append(z[:3] + random.multivariate_normal(np.zeros(3), v))
+        commands.append(np.array([3.5e-5, 3.2e-5]) - 0.5 * (z[:2] - [0.4, 0.2]) * 1e-3)
+        z = levels_of(z, commands[-1], T) + random.multivariate_normal(np.zeros(5), w)
+    for method in METHODS:
+        squared = by_the_fmu(method, tanks, tmp_path / method, np.array(commands), np.array(measured))[20:, -1]
+        # 780 values of chi-squared with 3 degrees of freedom: the mean has the deviation sqrt(6 / 780) = 0.088.
+        assert abs(squared.mean() - 3) < 4 * 0.088, method
+
+
+SERVO = """
+plant = "{plant}"
+operating_point = {{ friction = 0 }}
+sample_time = 0.001
+actuators = ["u"]
+measurements = ["theta_m"]
+actuator_faults = "all"
+feedback.bandwidth = 30
+observer.bandwidth = 200
+robustness.noise = 1e-4
+"""
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_for_a_linear_plant_the_estimates_are_those_of_the_designed_observer(attempt, aso_ftc, examples, method):
+    """Whose gain is that of the stationary Kalman filter, with which the filter starts."""
+    text = SERVO.format(plant=examples["DcServo"])
+    done, path = attempt(text, "--fmu", (controller := examples["DcServo"].parent / f"{method}.fmu"))
+    assert path.exists(), done.stderr
+    fmus = {"plant": examples["DcServo"], "filter": path, "controller": controller}
+    links = [("plant.theta_m", "filter.theta_m"), ("plant.theta_m", "controller.theta_m")]
+    links += [("controller.u", "plant.u"), ("controller.u", "filter.u")]
+    system = "[fmus]\n" + "".join(f'{name} = "{fmu}"\n' for name, fmu in fmus.items())
+    system += "".join(f'[[connections]]\nfrom = "{start}"\nto = "{end}"\n' for start, end in links)
+    system += f'[settings]\n"plant.friction" = 0\n"plant.theta" = 0.3\n"filter.method" = "{method}"\n'
+    system += '[algorithm]\nstep = 0.001\nextrapolation = "hold"\n[experiment]\nstop-time = 0.3\n'
+    (path.parent / "system.toml").write_text(system, encoding="utf-8")
+    done = aso_ftc("run", path.parent / "system.toml", "--results", path.parent / "results.csv")
+    assert done.returncode == 0, done.stderr
+    table = np.genfromtxt(path.parent / "results.csv", delimiter=",", names=True, dtype=None, encoding=None, deletechars="")
+    for name in ("f_hat", *(f"x_hat[{k}]" for k in (1, 2))):
+        theirs, own = (table[f"{one}.{name}"].astype(float) for one in ("controller", "filter"))
+        assert np.abs(theirs).max() > 0
+        assert np.abs(own - theirs).max() < 1e-6 * np.abs(theirs).max(), name
+
+
+def test_far_from_the_operating_point_the_filters_take_no_nonlinearity_for_a_fault(root, aso_ftc, packed_filter, python):
+    """The table of docs/how-to/nonlinear.md."""
+    done = python(root / "scripts/study/nonlinear_filters.py", "--json")
+    assert done.returncode == 0, done.stderr
+    page = (root / "docs/how-to/nonlinear.md").read_text(encoding="utf-8")
+    rows = json.loads(done.stdout)
+    assert len(rows) == 9
+    for name, _, errors in rows:
+        part = 0.75 if "turbine" in name else 0.02
+        assert max(errors["extended"], errors["unscented"]) < part * errors["observer"], name
+        assert f"| {name} |" in page
+        assert f"| {errors['observer']:.2g} |" in page, name
+
+
+REFUSALS = {
+    "sample_time = 5.0\n": ("", "it needs a `sample_time`"),
+    "observer.bandwidth = 0.1": ("observer.eigenvalues = [-0.1, -0.11, -0.12, -0.13, -0.14]", "follows from no noise"),
+    "noise = 0.002": ("", "`robustness.noise`, the standard deviation of each measurement"),
+    'measurements = ["y_1", "y_2", "y_3"]': (
+        'measurements = [{ name = "y_1", delay = 5 }, "y_2", "y_3"]',
+        "it has no `delay` and no `structure`",
+    ),
+}
+
+
+@pytest.mark.parametrize("entry", REFUSALS)
+def test_what_the_filter_cannot_have_is_refused_with_its_line(attempt, examples, entry):
+    text = TANKS.format(plant=examples["ThreeTank"]) + NOISE
+    other, reason = REFUSALS[entry]
+    done, path = attempt(text.replace(entry, other))
+    assert (done.returncode, path.exists()) == (2, False)
+    assert "no Kalman filter with the plant's FMU: " in done.stderr
+    assert reason in done.stderr
+    assert "plant.toml:" in done.stderr
+
+
+def test_a_plant_of_matrices_is_refused(attempt):
+    done, path = attempt('A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = "all"\nsample_time = 0.1\n')
+    assert (done.returncode, path.exists()) == (2, False)
+    assert '`plant = "NAME.fmu"` states an FMU' in done.stderr
+
+
+def test_the_template_names_the_command_that_gives_it_a_plant(aso_ftc, packed_filter, root):
+    done = aso_ftc("check", root / "dist/KalmanFilter.fmu")
+    assert "aso-ftc design PLANT.toml --kalman-fmu FILTER.fmu" in done.stdout + done.stderr
+
+
+def test_a_saved_state_repeats_the_estimates(tanks, tmp_path, record):
+    """In this instance, and as bytes in another one, which has another instance of the plant."""
+    commands, measured = record
+    settings = {"method": METHODS["unscented"]}
+
+    def samples(slave, variables, numbers):
+        inputs = [variables[name].valueReference for name in ("y_1", "y_2", "y_3", "Q_1", "Q_2")]
+        outputs = [variables[name].valueReference for name in NAMES]
+        rows = []
+        for k in numbers:
+            slave.setReal(inputs, [*measured[k], *commands[k - 1]])
+            slave.doStep(currentCommunicationPoint=(k - 1) * T, communicationStepSize=T)
+            rows.append(slave.getReal(outputs))
+        return rows
+
+    with instance(tanks, tmp_path / "one", settings) as (one, variables):
+        samples(one, variables, range(1, 10))
+        state = one.getFMUstate()
+        data = one.serializeFMUstate(state)
+        expected = samples(one, variables, range(10, 20))
+        one.setFMUstate(state)
+        assert samples(one, variables, range(10, 20)) == expected
+        one.freeFMUstate(state)
+    with instance(tanks, tmp_path / "other", settings) as (other, variables):
+        state = other.deSerializeFMUstate(data)
+        other.setFMUstate(state)
+        assert samples(other, variables, range(10, 20)) == expected
+        other.freeFMUstate(state)
+
+
+def test_a_bias_of_a_sensor_is_estimated(attempt, examples, tmp_path):
+    """Beside a pump that is right: the levels tell a wrong level from water that is missing."""
+    text = TANKS.format(plant=examples["ThreeTank"]).replace('actuator_faults = "all"', "filter = 0.5")
+    text += '\n[[faults]]\nname = "bias"\nsensor = "y_1"\n' + NOISE
+    done, path = attempt(text)
+    assert path.exists(), done.stderr
+    z, measured, commands = np.array([0.55, 0.2, 0.25, 0.0, 0.0]), [], []
+    count = 1200
+    for _ in range(count):
+        measured.append(z[:3] + [0.01, 0.0, 0.0])
+        commands.append(np.array([3.5e-5, 3e-5]))
+        z = levels_of(z, commands[-1], T)
+    with instance(path, tmp_path) as (slave, variables):
+        inputs = [variables[name].valueReference for name in ("y_1", "y_2", "y_3", "Q_1", "Q_2")]
+        for k in range(1, count):
+            slave.setReal(inputs, [*measured[k], *commands[k - 1]])
+            slave.doStep(currentCommunicationPoint=(k - 1) * T, communicationStepSize=T)
+        (bias,) = slave.getReal([variables["f_hat"].valueReference])
+    assert abs(bias - 0.01) < 1e-5
