@@ -423,8 +423,7 @@ impl CarriedPlant {
                     break;
                 }
                 if events == MOST_EVENTS {
-                    let name = "the number of events in an integration step".to_owned();
-                    return Err(LineariseError::NotFinite { name, value: f64::INFINITY });
+                    return Err(LineariseError::EndlessEvents { iterations: MOST_EVENTS });
                 }
                 passed += self.step_to_event(z, [start + passed, rest], g.as_deref_mut())?;
             }

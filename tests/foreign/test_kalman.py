@@ -178,7 +178,8 @@ def test_the_estimates_and_their_deviations_are_those_of_filterpy(tanks, tmp_pat
 
 
 def test_communication_steps_within_a_sample_change_nothing(tanks, tmp_path, record):
-    one, several = (by_the_fmu("extended", tanks, tmp_path / str(n), *record, parts=n) for n in (1, 5))
+    commands, measured = record
+    one, several = (by_the_fmu("extended", tanks, tmp_path / str(n), commands, measured, n) for n in (1, 5))
     assert np.abs((one - several) / np.abs(one).max(axis=0)).max() < 1e-12
 
 

@@ -92,10 +92,8 @@ pub enum LineariseError {
     /// The FMU ends the simulation at the operating point.
     #[error("the FMU ends the simulation at the operating point (terminateSimulation)")]
     Ended,
-    /// The events at the operating point do not end.
-    #[error(
-        "the events at the operating point do not end: {iterations} times fmi2NewDiscreteStates"
-    )]
+    /// Events do not end.
+    #[error("the events do not end: {iterations} times fmi2NewDiscreteStates")]
     EndlessEvents {
         /// Number of calls.
         iterations: usize,
