@@ -181,7 +181,7 @@ const LAYERS: [&[&str]; 6] = [
     &["plant"],
     &["solve"],
     &["assess"],
-    &["code", "compare", "controller_fmu", "design_file"],
+    &["code", "compare", "designed_fmu", "kalman_fmu", "design_file"],
     &["init"],
 ];
 
