@@ -36,11 +36,13 @@ pub(crate) struct Prediction<'a> {
     pub(crate) transform: Transform,
 }
 
-/// A sample at `time` in s: the commands `u` until then, and the measurements.
+/// Sample `number` at `time` in s: the commands `u` until then, and the measurements, each of which is used at one of `every` samples.
 pub(crate) struct Sample<'a> {
+    pub(crate) number: f64,
     pub(crate) time: f64,
     pub(crate) u: &'a [f64],
     pub(crate) y: &'a [f64],
+    pub(crate) every: &'a [i32],
     pub(crate) transform: Transform,
 }
 
@@ -164,7 +166,8 @@ impl Carrier {
         self.with(estimate, |filter, plant| {
             plant.u.copy_from_slice(sample.u);
             plant.time = sample.time;
-            filter.correct(plant, sample.y, sample.transform)
+            let is_due = |k: usize| sample.number % f64::from(sample.every[k]) < 0.5;
+            filter.correct(plant, sample.y, is_due, sample.transform)
         })
     }
 }

@@ -37,6 +37,11 @@ impl Clock {
         self.start + (self.next - 1.0) * self.period
     }
 
+    /// The number of the next sample.
+    pub(crate) fn next_number(&self) -> f64 {
+        self.next
+    }
+
     pub(crate) fn tick(&mut self) {
         self.next += 1.0;
     }

@@ -32,6 +32,7 @@ pub struct KalmanFilter {
     carrier: Option<Arc<Carrier>>,
     method: i32,
     integration_steps: i32,
+    every: Vec<i32>,
     /// `x_hat_0`, `f_hat_0`.
     initial: Vec<f64>,
     /// `x_hat`, `f_hat`, with their covariance.
@@ -67,6 +68,7 @@ impl KalmanFilter {
             deviations: vec![0.0; initial.len()],
             innovation_squared: 0.0,
             y_slopes: vec![0.0; y.len()],
+            every: vec![1; y.len()],
             sampled: y.clone(),
             applied: HeldMean::of(u.len()),
             clock: Clock::new(design.map_or(1.0, |design| design.sample_time)),
@@ -106,15 +108,20 @@ impl KalmanFilter {
         })
     }
 
-    /// Takes the sample at `instant` with the measurements extrapolated by `offset`, both in s.
-    fn correct(&mut self, carrier: &Carrier, instant: f64, offset: f64) -> Result<(), Failure> {
+    /// Takes sample `number` at `time` with the measurements extrapolated by `offset`, both in s.
+    fn correct(
+        &mut self,
+        carrier: &Carrier,
+        [number, time, offset]: [f64; 3],
+    ) -> Result<(), Failure> {
         for (sampled, (y, slope)) in self.sampled.iter_mut().zip(self.y.iter().zip(&self.y_slopes))
         {
             *sampled = y + slope * offset;
         }
         let transform = self.transform();
         let u = self.applied.mean(&self.u);
-        let sample = carried::Sample { time: instant, u, y: &self.sampled, transform };
+        let (y, every) = (&self.sampled, &self.every);
+        let sample = carried::Sample { number, time, u, y, every, transform };
         self.innovation_squared = carrier.correct(&mut self.estimate, &sample)?;
         self.set_deviations();
         Ok(())
@@ -165,7 +172,7 @@ impl Model for KalmanFilter {
         self.rest();
         self.clock.start(experiment.start_time);
         self.applied.clear();
-        self.correct(&carrier, experiment.start_time, 0.0)
+        self.correct(&carrier, [0.0, experiment.start_time, 0.0])
     }
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
@@ -180,7 +187,8 @@ impl Model for KalmanFilter {
                 transform,
             };
             carrier.predict(&mut self.estimate, &prediction)?;
-            self.correct(&carrier, instant, instant - step.start)?;
+            let number = self.clock.next_number();
+            self.correct(&carrier, [number, instant, instant - step.start])?;
             self.applied.clear();
             self.clock.tick();
             from = instant;

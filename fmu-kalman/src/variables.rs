@@ -122,6 +122,16 @@ fn parameters(design: &KalmanDesign) -> Vec<Variable> {
         .range(1.0, 1e6)
         .parameter(),
     ];
+    let p = design.measurements.len();
+    for (k, signal) in design.measurements.iter().enumerate() {
+        let text = format!(
+            "Number of samples between two in which the measurement {} is used",
+            meaning(&signal.name, &signal.description)
+        );
+        let every =
+            V::integer(channel("every", k, p), text, move |m: &mut KalmanFilter| &mut m.every[k]);
+        all.push(every.range(1.0, 1e6).parameter());
+    }
     for (k, ([.., name], text, unit)) in elements(design).into_iter().enumerate() {
         let text = format!("Estimate of {text} before the first sample");
         let variable = V::real(name, text, move |m: &mut KalmanFilter| &mut m.initial[k]);

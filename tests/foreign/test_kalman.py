@@ -100,7 +100,8 @@ def experiment(count):
     return np.array(commands), np.array(measured)
 
 
-def by_filterpy(method, path, commands, measured):
+def by_filterpy(method, path, commands, measured, every=1):
+    """With the third level at one of `every` samples."""
     w, v, p = covariances(path)
     initial = np.array([0.4, 0.2, 0.3, 0.0, 0.0])
     output = np.eye(3, 5)
@@ -121,13 +122,15 @@ def by_filterpy(method, path, commands, measured):
                 own.F = jacobian(advance, own.x)
                 own.predict_x = lambda u, advance=advance: setattr(own, "x", advance(own.x))
                 own.predict()
-            own.update(y, lambda _: output, lambda z: z[:3])
+            due = slice(None) if k % every == 0 else slice(2)
+            own.update(y[due], lambda _, due=due: output[due], lambda z, due=due: z[:3][due], R=v[due, due])
         else:
             if k > 0:
                 own.predict(fx=lambda z, time, u=commands[k - 1]: levels_of(z, u, time))
             # Anew for the predicted estimate, so that they contain the process noise.
             own.sigmas_f = points.sigma_points(own.x, own.P)
-            own.update(y)
+            due = slice(None) if k % every == 0 else slice(2)
+            own.update(y[due], R=v[due, due], hx=lambda z, due=due: z[:3][due])
         squared = own.y @ np.linalg.solve(own.S, own.y)
         results.append(np.concatenate([own.x, np.sqrt(np.diag(own.P)), [squared]]))
     return np.array(results)
@@ -142,9 +145,9 @@ NAMES = [
 ]
 
 
-def by_the_fmu(method, path, folder, commands, measured, parts=1):
+def by_the_fmu(method, path, folder, commands, measured, parts=1, every=1):
     """The outputs at the samples; each sample is `parts` communication steps."""
-    settings = {"method": METHODS[method], "integration_steps": 20, **{f"x_hat_0[{k + 1}]": x for k, x in enumerate([0.4, 0.2, 0.3])}}
+    settings = {"method": METHODS[method], "integration_steps": 20, "every[3]": every, **{f"x_hat_0[{k + 1}]": x for k, x in enumerate([0.4, 0.2, 0.3])}}
     with instance(path, folder, settings) as (slave, variables):
 
         def references(names):
@@ -169,10 +172,12 @@ def record():
     return commands, measured
 
 
+@pytest.mark.parametrize("every", [1, 4])
 @pytest.mark.parametrize("method", METHODS)
-def test_the_estimates_and_their_deviations_are_those_of_filterpy(tanks, tmp_path, record, method):
-    own = by_the_fmu(method, tanks, tmp_path, *record)
-    theirs = by_filterpy(method, tanks, *record)
+def test_the_estimates_and_their_deviations_are_those_of_filterpy(tanks, tmp_path, record, method, every):
+    """Also if one of the levels is measured at one of four samples only."""
+    own = by_the_fmu(method, tanks, tmp_path, *record, every=every)
+    theirs = by_filterpy(method, tanks, *record, every=every)
     scale = np.abs(theirs).max(axis=0)
     assert np.abs((own - theirs) / scale).max() < 1e-6
 
@@ -274,6 +279,38 @@ def test_a_plant_of_matrices_is_refused(attempt):
     done, path = attempt('A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = "all"\nsample_time = 0.1\n')
     assert (done.returncode, path.exists()) == (2, False)
     assert '`plant = "NAME.fmu"` states an FMU' in done.stderr
+
+
+def test_a_plant_that_cannot_save_its_state_gives_the_same_estimates(attempt, aso_ftc, root, tmp_path):
+    """If it has no events."""
+    done = aso_ftc("pack", root / "tests/models/rotor", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    plain = tmp_path / "Plain.fmu"
+    with zipfile.ZipFile(tmp_path / "Rotor.fmu") as archive, zipfile.ZipFile(plain, "w") as other:
+        for name in archive.namelist():
+            content = archive.read(name)
+            if name == "modelDescription.xml":
+                content = content.replace(b'canGetAndSetFMUstate="true"', b'canGetAndSetFMUstate="false"')
+                content = content.replace(b'canSerializeFMUstate="true"', b'canSerializeFMUstate="false"')
+            other.writestr(name, content)
+    text = (
+        'plant = "{}"\noperating_point = {{ v = 12, omega_r = 1.67, omega_g = 158.6, tau_g = 30527, twist = 1.3e-3 }}\n'
+        'sample_time = 0.05\nactuators = ["tau_g", "beta"]\nmeasurements = ["omega_r", "omega_g"]\n'
+        "feedback.bandwidth = 0.1\nobserver.bandwidth = 1\nrobustness.noise = [0.025, 0.05]\n"
+        '[[faults]]\nname = "wind"\ninput = "v"\n'
+    )
+    rows = []
+    for plant in (tmp_path / "Rotor.fmu", plain):
+        done, path = attempt(text.format(plant))
+        assert path.exists(), done.stderr
+        with instance(path, tmp_path / plant.stem, {"method": METHODS["unscented"]}) as (slave, variables):
+            inputs = [variables[name].valueReference for name in ("omega_r", "omega_g", "tau_g", "beta")]
+            outputs = [variables[name].valueReference for name in ("x_hat[1]", "x_hat[3]", "f_hat", "innovation_squared")]
+            for k in range(50):
+                slave.setReal(inputs, [1.67 + 1e-3 * k, 158.6 + 0.095 * k, 3e4, 0.0])
+                slave.doStep(currentCommunicationPoint=k * 0.05, communicationStepSize=0.05)
+            rows.append(slave.getReal(outputs))
+    assert rows[0] == rows[1]
 
 
 def test_the_template_names_the_command_that_gives_it_a_plant(aso_ftc, packed_filter, root):

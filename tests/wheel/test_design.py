@@ -95,6 +95,12 @@ def test_the_source_code_of_a_sampled_controller_is_written(tmp_path):
         af.design(own).controller.c_code(tmp_path / "none")
 
 
+def test_a_kalman_filter_needs_the_fmu_of_the_plant(made, tmp_path):
+    with pytest.raises(af.DesignError, match="states an FMU"):
+        made.controller.kalman_fmu(tmp_path / "Filter.fmu", base=af.fmus()["AsoController"])
+    assert not (tmp_path / "Filter.fmu").exists()
+
+
 def test_a_wrong_plant_is_a_design_error(tmp_path):
     own, _ = matrices()
     with pytest.raises(af.DesignError) as caught:

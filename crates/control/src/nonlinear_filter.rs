@@ -176,8 +176,8 @@ impl NonlinearFilter {
         Ok(())
     }
 
-    /// The estimate with the measurements `y`; returns e' S^-1 e with the innovation e and its covariance S, whose mean is p
-    /// if the filter is consistent.
+    /// The estimate with the measurements `y` of which `is_due` is true; returns e' S^-1 e with the innovation e and its
+    /// covariance S, whose mean is their number if the filter is consistent.
     ///
     /// # Errors
     ///
@@ -186,6 +186,7 @@ impl NonlinearFilter {
         &mut self,
         plant: &mut M,
         y: &[f64],
+        is_due: impl Fn(usize) -> bool,
         transform: Transform,
     ) -> Result<f64, FilterError<M::Error>> {
         let e = self.innovation.as_mut_slice();
@@ -215,6 +216,14 @@ impl NonlinearFilter {
         }
         self.s += &self.v;
         symmetrise(&mut self.s);
+        // Without correlation and innovation a measurement changes nothing.
+        for k in (0..y.len()).filter(|&k| !is_due(k)) {
+            self.innovation[k] = 0.0;
+            self.cross.row_mut(k).fill(0.0);
+            self.s.row_mut(k).fill(0.0);
+            self.s.column_mut(k).fill(0.0);
+            self.s[(k, k)] = 1.0;
+        }
         let s = std::mem::replace(&mut self.s, DMatrix::zeros(0, 0));
         let size = s.nrows();
         let Some(factor) = Cholesky::new(s) else {

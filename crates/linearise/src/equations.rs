@@ -34,6 +34,8 @@ pub struct PlantEquations {
     equal: Vec<(usize, usize)>,
     scales: Vec<f64>,
     differentiates: bool,
+    /// Whether the FMU can save its state, so that a trajectory begins from that of the start.
+    restores: bool,
     indicators: [Vec<f64>; 2],
     /// Rows at two points, of finite differences.
     values: [Vec<f64>; 2],
@@ -53,7 +55,7 @@ impl PlantEquations {
     /// # Errors
     ///
     /// [`LineariseError`]: a name or value of the request is wrong, a function of the FMU fails, or the FMU has no
-    /// continuous states, no model exchange, or states that it cannot save.
+    /// continuous states, no model exchange, or events and no way to save its state.
     pub fn new(fmu: &Fmu, request: &Linearise) -> Result<Self, LineariseError> {
         let description = &fmu.elements()?;
         let model = description.model_name.clone();
@@ -61,9 +63,6 @@ impl PlantEquations {
         let Some(flags) = &description.model_exchange else {
             return Err(lacks("model exchange"));
         };
-        if !flags.can_get_and_set_fmu_state {
-            return Err(lacks("states that it can save and restore (canGetAndSetFMUstate)"));
-        }
         let parts = Parts::of(description, request)?;
         let states = parts.states(request)?;
         if states.is_empty() {
@@ -73,17 +72,22 @@ impl PlantEquations {
         let mut component = fmu.instantiate_equations(NAME)?;
         initialise(&mut *component, &parts, request)?;
         settle(&mut *component)?;
-        component.save_state(0)?;
+        let restores = flags.can_get_and_set_fmu_state;
+        if restores {
+            component.save_state(0)?;
+        } else if component.number_of_event_indicators()? > 0 {
+            return Err(lacks("canGetAndSetFMUstate, without which its events cannot be undone"));
+        }
         let differentiates = flags.provides_directional_derivative
             && directional::jacobian(&mut *component, &parts, &states).is_ok();
-        Self::of(component, &parts, &states, differentiates)
+        Self::of(component, &parts, &states, [differentiates, restores])
     }
 
     fn of(
         mut component: Box<dyn ModelExchange>,
         parts: &Parts<'_>,
         states: &[State],
-        differentiates: bool,
+        [differentiates, restores]: [bool; 2],
     ) -> Result<Self, LineariseError> {
         let references = |parts: &[Part]| parts.iter().map(|part| part.reference).collect();
         let mut start = vec![0.0; states.len()];
@@ -124,6 +128,7 @@ impl PlantEquations {
             knowns,
             scales,
             differentiates,
+            restores,
             indicators: [indicators.clone(), indicators],
             values: [vec![0.0; count], vec![0.0; count]],
             column: vec![0.0; count],
@@ -156,7 +161,9 @@ impl PlantEquations {
     ///
     /// [`LineariseError`]: a function of the FMU fails.
     pub fn begin(&mut self, time: f64, x: &mut [f64], u: &[f64]) -> Result<(), LineariseError> {
-        self.component.restore_state(0)?;
+        if self.restores {
+            self.component.restore_state(0)?;
+        }
         self.set(time, x, u)?;
         self.event(x)?;
         self.component.get_event_indicators(&mut self.indicators[0])?;

@@ -92,7 +92,7 @@ fn for_a_linear_plant_the_covariance_converges_to_the_riccati_solution() {
         let mut filter = NonlinearFilter::new(w.clone(), v.clone());
         let mut plant = Linear { a: a.clone(), c: c.clone() };
         for _ in 0..2000 {
-            filter.correct(&mut plant, &[0.0], transform).unwrap();
+            filter.correct(&mut plant, &[0.0], |_| true, transform).unwrap();
             filter.predict(&mut plant, transform).unwrap();
         }
         let difference = (&filter.covariance - &stationary.covariance).norm();
@@ -110,7 +110,7 @@ fn for_a_linear_plant_both_transforms_give_the_same_estimate() {
         filter.covariance.fill_with_identity();
         let mut squared = 0.0;
         for y in [[1.0, -2.0], [0.3, 0.4], [5.0, 1.0]] {
-            squared += filter.correct(&mut plant(), &y, transform).unwrap();
+            squared += filter.correct(&mut plant(), &y, |_| true, transform).unwrap();
             filter.predict(&mut plant(), transform).unwrap();
         }
         (filter.mean, filter.covariance, squared)
@@ -132,7 +132,7 @@ fn the_unscented_transform_knows_the_mean_of_a_square() {
         let mut filter = NonlinearFilter::new(matrix([[0.0]]), matrix([[v]]));
         filter.mean[0] = mean;
         filter.covariance[(0, 0)] = variance;
-        let squared = filter.correct(&mut Square, &[y], transform).unwrap();
+        let squared = filter.correct(&mut Square, &[y], |_| true, transform).unwrap();
         let (s, e) = (own_variance + v, y - expected);
         let cross = 2.0 * mean * variance;
         assert!((filter.innovation[0] - e).abs() < 1e-14);
@@ -149,7 +149,7 @@ fn a_state_that_is_known_exactly_stays_so() {
         filter.mean.copy_from_slice(&[1.0, 2.0]);
         filter.covariance[(0, 0)] = 1.0;
         let mut plant = Linear { a: DMatrix::identity(2, 2), c: matrix([[1.0, 1.0]]) };
-        filter.correct(&mut plant, &[5.0], transform).unwrap();
+        filter.correct(&mut plant, &[5.0], |_| true, transform).unwrap();
         filter.predict(&mut plant, transform).unwrap();
         assert_eq!(filter.mean.as_slice(), [2.0, 2.0], "{transform:?}");
         let expected = matrix([[0.5, 0.0], [0.0, 0.0]]);
@@ -158,15 +158,40 @@ fn a_state_that_is_known_exactly_stays_so() {
 }
 
 #[test]
+fn a_measurement_that_is_not_due_is_as_none() {
+    let (a, w) = (matrix([[0.9, 0.2], [-0.1, 0.8]]), matrix([[0.1, 0.02], [0.02, 0.05]]));
+    for transform in BOTH {
+        let c = matrix([[1.0, 0.5], [0.3, -1.0]]);
+        let v = matrix([[0.2, 0.1], [0.1, 0.4]]);
+        let mut both = NonlinearFilter::new(w.clone(), v.clone());
+        let mut alone = NonlinearFilter::new(w.clone(), matrix([[v[(1, 1)]]]));
+        let mut plant = Linear { a: a.clone(), c: c.clone() };
+        let mut plant_of_one = Linear { a: a.clone(), c: c.rows(1, 1).into_owned() };
+        both.covariance.fill_with_identity();
+        alone.covariance.fill_with_identity();
+        for y in [2.0, -1.0, 0.5] {
+            let due = |k| k == 1;
+            let one = both.correct(&mut plant, &[f64::NAN, y], due, transform).unwrap();
+            let other = alone.correct(&mut plant_of_one, &[y], |_| true, transform).unwrap();
+            assert!((one - other).abs() < 1e-13);
+            assert!((&both.mean - &alone.mean).amax() < 1e-14);
+            assert!((&both.covariance - &alone.covariance).amax() < 1e-14);
+            both.predict(&mut plant, transform).unwrap();
+            alone.predict(&mut plant_of_one, transform).unwrap();
+        }
+    }
+}
+
+#[test]
 fn a_measurement_without_noise_of_a_known_state_is_refused() {
     for transform in BOTH {
         let mut filter = NonlinearFilter::new(matrix([[0.0]]), matrix([[0.0]]));
         let mut plant = Linear { a: matrix([[1.0]]), c: matrix([[1.0]]) };
-        let refused = filter.correct(&mut plant, &[1.0], transform);
+        let refused = filter.correct(&mut plant, &[1.0], |_| true, transform);
         assert_eq!(refused, Err(FilterError::NotDefinite));
         // The filter can be used afterwards.
         filter.covariance[(0, 0)] = 1.0;
-        assert!(filter.correct(&mut plant, &[1.0], transform).is_ok());
+        assert!(filter.correct(&mut plant, &[1.0], |_| true, transform).is_ok());
     }
 }
 
