@@ -133,7 +133,7 @@ def test_a_plant_file_that_cannot_be_designed_is_refused_at_the_faulty_entry(ref
     [
         (None, "Other.fmu"),
         ("text", "Other.fmu is no ZIP archive that can be used"),
-        ("DcServo", "Other.fmu has no resources/design.toml; expected an AsoController.fmu"),
+        ("DcServo", "Other.fmu is the FMU of DcServo; expected AsoController.fmu"),
     ],
 )
 def test_a_controller_can_be_made_from_a_packed_controller_only(aso_ftc, refusal, tmp_path, source, expected):

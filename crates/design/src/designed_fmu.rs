@@ -37,7 +37,7 @@ impl DesignedFmu {
         let (model, expected) = (&unpacked.description.model_name, content.model);
         if model != expected {
             return Err(Error::Invalid(format!(
-                "{} is a {model}; expected a {expected}.fmu as `aso-ftc pack` makes it",
+                "{} is the FMU of {model}; expected {expected}.fmu as `aso-ftc pack` makes it",
                 base.display()
             )));
         }
