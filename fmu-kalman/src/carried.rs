@@ -12,7 +12,7 @@ use linearise::{Linearise, LineariseError, PlantEquations};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// What follows from the files of the FMU, with an instance of the plant and the filter's space for it.
+/// The design and the plant in the files of the FMU, with an instance of the plant and the memory of the filter.
 ///
 /// The instance is evaluated as a function of time, states and inputs. So copies of the filter, as FMU states are, share it.
 pub(crate) struct Carrier {
@@ -36,7 +36,8 @@ pub(crate) struct Prediction<'a> {
     pub(crate) transform: Transform,
 }
 
-/// Sample `number` at `time` in s: the commands `u` until then, and the measurements, each of which is used at one of `every` samples.
+/// Sample `number` at `time` in s: the commands `u` until then, and the measurements. Measurement k is used at one of
+/// `every[k]` samples.
 pub(crate) struct Sample<'a> {
     pub(crate) number: f64,
     pub(crate) time: f64,
@@ -217,7 +218,7 @@ enum Position {
 /// Runge-Kutta's method of order 4 (W. Kutta 1901): the points of a step, as parts of it, and the weights of their derivatives.
 const POINTS: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
 const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
-/// The part of an integration step to which state events are located.
+/// State events are located to this fraction of an integration step.
 const LOCATED: f64 = 1e-9;
 /// Most state events in an integration step.
 const MOST_EVENTS: usize = 1000;
@@ -237,16 +238,14 @@ impl CarriedPlant {
                 equations.states().join(", ")
             )));
         }
-        let mut free_inputs = Vec::new();
+        let free_inputs = equations.start_inputs()[m..].to_vec();
+        let mut faults_at_inputs = m..;
         let mut faults = Vec::new();
         for fault in &design.faults {
             let enters = match &fault.enters {
                 Entry::Actuator(at) => Position::Input(*at),
                 Entry::Sensor(at) => Position::Measurement(*at),
-                Entry::Input(name) => {
-                    free_inputs.push(design.settings.get(name).copied().unwrap_or_default());
-                    Position::Input(m + free_inputs.len() - 1)
-                }
+                Entry::Input(_) => Position::Input(faults_at_inputs.next().unwrap_or(m)),
             };
             faults.push(Channel { enters, rate: fault.rate.map(|rate| n + rate) });
         }

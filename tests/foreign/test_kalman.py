@@ -275,6 +275,16 @@ def test_what_the_filter_cannot_have_is_refused_with_its_line(attempt, examples,
     assert "plant.toml:" in done.stderr
 
 
+def test_a_plant_with_events_that_cannot_save_its_state_is_refused(attempt, examples, tmp_path):
+    plain = tmp_path / "Plain.fmu"
+    with zipfile.ZipFile(examples["DcServo"]) as archive, zipfile.ZipFile(plain, "w") as other:
+        for name in archive.namelist():
+            other.writestr(name, archive.read(name).replace(b'canGetAndSetFMUstate="true"', b""))
+    done, path = attempt(SERVO.format(plant=plain))
+    assert (done.returncode, path.exists()) == (2, False)
+    assert "no estimator can carry DcServo: it lacks canGetAndSetFMUstate" in done.stderr
+
+
 def test_a_plant_of_matrices_is_refused(attempt):
     done, path = attempt('A = [[-1]]\nB = [[1]]\nC = [[1]]\nactuator_faults = "all"\nsample_time = 0.1\n')
     assert (done.returncode, path.exists()) == (2, False)
@@ -294,7 +304,7 @@ def test_a_plant_that_cannot_save_its_state_gives_the_same_estimates(attempt, as
                 content = content.replace(b'canSerializeFMUstate="true"', b'canSerializeFMUstate="false"')
             other.writestr(name, content)
     text = (
-        'plant = "{}"\noperating_point = {{ v = 12, omega_r = 1.67, omega_g = 158.6, tau_g = 30527, twist = 1.3e-3 }}\n'
+        'plant = "{}"\noperating_point = {{ omega_r = 1.67, omega_g = 158.6, tau_g = 30527, twist = 1.3e-3 }}\n'
         'sample_time = 0.05\nactuators = ["tau_g", "beta"]\nmeasurements = ["omega_r", "omega_g"]\n'
         "feedback.bandwidth = 0.1\nobserver.bandwidth = 1\nrobustness.noise = [0.025, 0.05]\n"
         '[[faults]]\nname = "wind"\ninput = "v"\n'

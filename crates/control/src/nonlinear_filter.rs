@@ -101,18 +101,22 @@ pub struct NonlinearFilter {
     pub innovation: DVector<f64>,
     w: DMatrix<f64>,
     v: DMatrix<f64>,
-    /// Jacobians, and the transpose of the one of N columns in use.
+    /// The Jacobians G and H.
     g: DMatrix<f64>,
     h: DMatrix<f64>,
+    /// Space for products, N x N.
     square: DMatrix<f64>,
     product: DMatrix<f64>,
+    /// A square root of P.
     root: DMatrix<f64>,
-    /// Points in z and y, 2 N columns, and their transposes.
+    /// The 2 N points in z, and their values in y, as columns.
     points: DMatrix<f64>,
     measured: DMatrix<f64>,
-    /// The covariance of the innovation, that of y and z, the gain.
+    /// S, the covariance of the innovation.
     s: DMatrix<f64>,
+    /// The covariance of y and z, p x N.
     cross: DMatrix<f64>,
+    /// The gain K, and K V; before, `gain` has the transpose of H.
     gain: DMatrix<f64>,
     gain_v: DMatrix<f64>,
     solved: DVector<f64>,
@@ -235,8 +239,7 @@ impl NonlinearFilter {
         let squared = self.innovation.dot(&self.solved);
         self.mean.gemv_tr(1.0, &self.cross, &self.solved, 1.0);
         // The gain K = cross' S^-1.
-        let cross = std::mem::replace(&mut self.cross, DMatrix::zeros(0, 0));
-        let mut solved = cross;
+        let mut solved = std::mem::replace(&mut self.cross, DMatrix::zeros(0, 0));
         if transform == Transform::Unscented {
             // P - cross' S^-1 cross, the columns of R^-1 cross having this square, S = R R'.
             factor.l_dirty().solve_lower_triangular_mut(&mut solved);

@@ -5,9 +5,11 @@ use aso_controller::kalman::{CarriedFault, Entry, KalmanDesign};
 use control::Domain;
 use control::eigen::eigenvalues;
 use files::PlaceError;
+use linearise::PlantEquations;
 use nalgebra::DMatrix;
 
 use crate::matrix::matrix;
+use crate::plant::linear::request;
 use crate::solve::designed::Designed;
 use crate::solve::gain::Noise;
 use crate::solve::solution::Solution;
@@ -57,6 +59,12 @@ pub(crate) fn kalman_design(
             "the gain of the observer follows from no noise; `observer.bandwidth`, or `observer.W` and `observer.V`, does",
         );
     };
+    let equations = fmu_import::Fmu::open_quietly(&fmu.path)
+        .map_err(linearise::LineariseError::from)
+        .and_then(|opened| PlantEquations::new(&opened, &request(file, fmu)));
+    if let Err(error) = equations {
+        return refuse(&["plant"], &error.to_string());
+    }
     let Some(scale) = scale(file, noise) else {
         return refuse(
             &["observer", "plant"],

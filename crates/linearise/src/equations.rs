@@ -40,7 +40,8 @@ pub struct PlantEquations {
     /// Rows at two points, of finite differences.
     values: [Vec<f64>; 2],
     column: Vec<f64>,
-    start: Vec<f64>,
+    /// The inputs after initialisation.
+    start_inputs: Vec<f64>,
 }
 
 /// The names of states and outputs.
@@ -90,6 +91,11 @@ impl PlantEquations {
         [differentiates, restores]: [bool; 2],
     ) -> Result<Self, LineariseError> {
         let references = |parts: &[Part]| parts.iter().map(|part| part.reference).collect();
+        let inputs: Vec<u32> = references(&parts.inputs);
+        let mut start_inputs = vec![0.0; inputs.len()];
+        if !inputs.is_empty() {
+            component.get_real(&inputs, &mut start_inputs)?;
+        }
         let mut start = vec![0.0; states.len()];
         component.get_continuous_states(&mut start)?;
         let mut nominals = vec![1.0; states.len()];
@@ -119,7 +125,7 @@ impl PlantEquations {
             component,
             names,
             next_event: None,
-            inputs: references(&parts.inputs),
+            inputs,
             outputs: references(&parts.outputs),
             asked: asked_rows.iter().map(|&row| rows[row]).collect(),
             changes: vec![0.0; asked_rows.len()],
@@ -132,7 +138,7 @@ impl PlantEquations {
             indicators: [indicators.clone(), indicators],
             values: [vec![0.0; count], vec![0.0; count]],
             column: vec![0.0; count],
-            start,
+            start_inputs,
         })
     }
 
@@ -142,16 +148,10 @@ impl PlantEquations {
         &self.names.states
     }
 
-    /// The states after initialisation.
+    /// The inputs after initialisation: those that the request states, else their start values.
     #[must_use]
-    pub fn start(&self) -> &[f64] {
-        &self.start
-    }
-
-    /// Whether the Jacobian is made of the directional derivatives of the FMU; else of two-sided differences.
-    #[must_use]
-    pub fn differentiates(&self) -> bool {
-        self.differentiates
+    pub fn start_inputs(&self) -> &[f64] {
+        &self.start_inputs
     }
 
     /// Begins a trajectory at `time` in s with the states `x` and the inputs `u`: an event makes the discrete variables

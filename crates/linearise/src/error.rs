@@ -113,7 +113,7 @@ pub enum LineariseError {
         text: String,
     },
     /// The FMU cannot serve as the plant in an estimator.
-    #[error("{model} lacks {what}, which an estimator that carries it needs")]
+    #[error("no estimator can carry {model}: it lacks {what}")]
     Unsuited {
         /// `modelName` of the FMU.
         model: String,
