@@ -147,7 +147,8 @@ NAMES = [
 
 def by_the_fmu(method, path, folder, commands, measured, parts=1, every=1):
     """The outputs at the samples; each sample is `parts` communication steps."""
-    settings = {"method": METHODS[method], "integration_steps": 20, "every[3]": every, **{f"x_hat_0[{k + 1}]": x for k, x in enumerate([0.4, 0.2, 0.3])}}
+    start = {f"x_hat_0[{k + 1}]": x for k, x in enumerate([0.4, 0.2, 0.3])}
+    settings = {"method": METHODS[method], "integration_steps": 20, "every[3]": every, **start}
     with instance(path, folder, settings) as (slave, variables):
 
         def references(names):
@@ -176,8 +177,9 @@ def record():
 @pytest.mark.parametrize("method", METHODS)
 def test_the_estimates_and_their_deviations_are_those_of_filterpy(tanks, tmp_path, record, method, every):
     """Also if one of the levels is measured at one of four samples only."""
-    own = by_the_fmu(method, tanks, tmp_path, *record, every=every)
-    theirs = by_filterpy(method, tanks, *record, every=every)
+    commands, measured = record
+    own = by_the_fmu(method, tanks, tmp_path, commands, measured, every=every)
+    theirs = by_filterpy(method, tanks, commands, measured, every=every)
     scale = np.abs(theirs).max(axis=0)
     assert np.abs((own - theirs) / scale).max() < 1e-6
 
