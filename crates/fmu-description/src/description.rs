@@ -6,6 +6,7 @@ mod guid;
 mod interface;
 mod kind;
 mod model_structure;
+mod native_type;
 mod parse;
 mod render;
 mod rules;
@@ -22,6 +23,7 @@ pub use kind::{
     BinaryType, ClockType, IntegerType, IntervalVariability, Kind, RealType, SimpleType,
 };
 pub use model_structure::{ModelStructure, Unknown};
+pub use native_type::NativeType;
 pub use rules::{Problem, array_element, is_structured_name, misplaced_elements};
 pub use variable::{Dimension, Elements, ScalarVariable};
 pub use version::Version;

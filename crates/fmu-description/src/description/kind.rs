@@ -59,6 +59,21 @@ pub enum Kind {
     Clock(ClockType),
 }
 
+/// The pattern of the types whose values are integers.
+macro_rules! integers {
+    ($attributes:ident) => {
+        Kind::Integer($attributes)
+            | Kind::Enumeration($attributes)
+            | Kind::Int8($attributes)
+            | Kind::UInt8($attributes)
+            | Kind::Int16($attributes)
+            | Kind::UInt16($attributes)
+            | Kind::UInt32($attributes)
+            | Kind::Int64($attributes)
+            | Kind::UInt64($attributes)
+    };
+}
+
 impl Kind {
     /// Returns the name of the XML element, with the names of FMI 2.0 for the types that it has:
     /// `Real`, `Integer`.
@@ -106,37 +121,23 @@ impl Kind {
     #[must_use]
     pub fn as_integer(&self) -> Option<&IntegerType> {
         match self {
-            Kind::Integer(integer)
-            | Kind::Enumeration(integer)
-            | Kind::Int8(integer)
-            | Kind::UInt8(integer)
-            | Kind::Int16(integer)
-            | Kind::UInt16(integer)
-            | Kind::UInt32(integer)
-            | Kind::Int64(integer)
-            | Kind::UInt64(integer) => Some(integer),
+            integers!(integer) => Some(integer),
             _ => None,
         }
     }
 
-    pub(super) fn as_real_mut(&mut self) -> Option<&mut RealType> {
+    /// As [`Kind::as_real`], to change them.
+    pub fn as_real_mut(&mut self) -> Option<&mut RealType> {
         match self {
             Kind::Real(real) | Kind::Float32(real) => Some(real),
             _ => None,
         }
     }
 
-    pub(super) fn as_integer_mut(&mut self) -> Option<&mut IntegerType> {
+    /// As [`Kind::as_integer`], to change them.
+    pub fn as_integer_mut(&mut self) -> Option<&mut IntegerType> {
         match self {
-            Kind::Integer(integer)
-            | Kind::Enumeration(integer)
-            | Kind::Int8(integer)
-            | Kind::UInt8(integer)
-            | Kind::Int16(integer)
-            | Kind::UInt16(integer)
-            | Kind::UInt32(integer)
-            | Kind::Int64(integer)
-            | Kind::UInt64(integer) => Some(integer),
+            integers!(integer) => Some(integer),
             _ => None,
         }
     }

@@ -2,10 +2,11 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+use fmu_description::NativeType;
+
 use super::Instance;
 use super::buffer::Buffer;
 use super::clocked::Listed;
-use super::elements::NativeType;
 use super::mode::Mode;
 use super::plan::Run;
 use super::refusal::refused;

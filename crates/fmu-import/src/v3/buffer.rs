@@ -1,6 +1,7 @@
 //! The values of one C call, in the type of the FMU.
 
-use super::elements::NativeType;
+use fmu_description::NativeType;
+
 use crate::library::v3::Component;
 use slave::CallError;
 

@@ -4,11 +4,11 @@
 
 use std::collections::BTreeMap;
 
-use fmu_description::Causality;
+use fmu_description::{Causality, NativeType};
 use serde::{Deserialize, Serialize};
 
 use super::Instance;
-use super::elements::{ElementView, NativeType};
+use super::elements::ElementView;
 use super::mode::Mode;
 use super::plan::Run;
 use slave::CallError;

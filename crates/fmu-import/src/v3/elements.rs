@@ -7,93 +7,14 @@
 use std::collections::{HashMap, HashSet};
 
 use fmu_description::{
-    Causality, Dimension, Elements, Kind, ModelDescription, ScalarVariable, Unknown, Variability,
+    Causality, Dimension, Elements, Kind, ModelDescription, NativeType, ScalarVariable, Unknown,
+    Variability,
 };
 
 /// Largest number of elements of all arrays together.
 const MOST_ELEMENTS: usize = 1 << 24;
 /// Largest number of dependencies between elements; beyond it an unknown depends on all knowns.
 const MOST_DEPENDENCIES: usize = 1 << 22;
-
-/// The C types of FMI 3.0: each has its own functions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum NativeType {
-    Float32,
-    Float64,
-    Int8,
-    UInt8,
-    Int16,
-    UInt16,
-    Int32,
-    UInt32,
-    Int64,
-    UInt64,
-    Boolean,
-    String,
-    Binary,
-    Clock,
-}
-
-impl NativeType {
-    fn of(kind: &Kind) -> Self {
-        match kind {
-            Kind::Float32(_) => Self::Float32,
-            Kind::Real(_) => Self::Float64,
-            Kind::Int8(_) => Self::Int8,
-            Kind::UInt8(_) => Self::UInt8,
-            Kind::Int16(_) => Self::Int16,
-            Kind::UInt16(_) => Self::UInt16,
-            Kind::Integer(_) => Self::Int32,
-            Kind::UInt32(_) => Self::UInt32,
-            Kind::Int64(_) | Kind::Enumeration(_) => Self::Int64,
-            Kind::UInt64(_) => Self::UInt64,
-            Kind::Boolean(_) => Self::Boolean,
-            Kind::String(_) => Self::String,
-            Kind::Binary(_) => Self::Binary,
-            Kind::Clock(_) => Self::Clock,
-        }
-    }
-
-    /// Returns the name of the function that sets variables of the type.
-    pub(super) fn setter(self) -> &'static str {
-        match self {
-            Self::Float32 => "fmi3SetFloat32",
-            Self::Float64 => "fmi3SetFloat64",
-            Self::Int8 => "fmi3SetInt8",
-            Self::UInt8 => "fmi3SetUInt8",
-            Self::Int16 => "fmi3SetInt16",
-            Self::UInt16 => "fmi3SetUInt16",
-            Self::Int32 => "fmi3SetInt32",
-            Self::UInt32 => "fmi3SetUInt32",
-            Self::Int64 => "fmi3SetInt64",
-            Self::UInt64 => "fmi3SetUInt64",
-            Self::Boolean => "fmi3SetBoolean",
-            Self::String => "fmi3SetString",
-            Self::Binary => "fmi3SetBinary",
-            Self::Clock => "fmi3SetClock",
-        }
-    }
-
-    /// Returns the name of the type in FMI 3.0.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Float32 => "Float32",
-            Self::Float64 => "Float64",
-            Self::Int8 => "Int8",
-            Self::UInt8 => "UInt8",
-            Self::Int16 => "Int16",
-            Self::UInt16 => "UInt16",
-            Self::Int32 => "Int32",
-            Self::UInt32 => "UInt32",
-            Self::Int64 => "Int64",
-            Self::UInt64 => "UInt64",
-            Self::Boolean => "Boolean",
-            Self::String => "String",
-            Self::Binary => "Binary",
-            Self::Clock => "Clock",
-        }
-    }
-}
 
 /// A variable of the FMU: a scalar or an array.
 #[derive(Clone, Debug)]
@@ -275,16 +196,6 @@ fn with_start(kind: &Kind, values: Option<&Elements>, position: usize) -> Kind {
         _ => None,
     };
     match &mut kind {
-        Kind::Real(attributes) | Kind::Float32(attributes) => attributes.start = real(),
-        Kind::Integer(attributes)
-        | Kind::Enumeration(attributes)
-        | Kind::Int8(attributes)
-        | Kind::UInt8(attributes)
-        | Kind::Int16(attributes)
-        | Kind::UInt16(attributes)
-        | Kind::UInt32(attributes)
-        | Kind::Int64(attributes)
-        | Kind::UInt64(attributes) => attributes.start = integer(),
         Kind::Boolean(start) => {
             *start = match values {
                 Some(Elements::Boolean(values)) => values.get(position).copied(),
@@ -304,6 +215,13 @@ fn with_start(kind: &Kind, values: Option<&Elements>, position: usize) -> Kind {
             }
         }
         Kind::Clock(_) => {}
+        number => {
+            if let Some(attributes) = number.as_real_mut() {
+                attributes.start = real();
+            } else if let Some(attributes) = number.as_integer_mut() {
+                attributes.start = integer();
+            }
+        }
     }
     kind
 }
@@ -370,7 +288,7 @@ impl Builder {
             self.first_cell.insert(variable.value_reference, view.cells.len());
             view.cells.extend((0..size).map(|element| (number, element)));
         }
-        let kind = NativeType::of(&variable.kind);
+        let kind = variable.kind.native_type();
         let is_plain = !is_array && variable.clocks.is_empty();
         view.plain &= kind != NativeType::Float32 && (kind != NativeType::Float64 || is_plain);
         let event = !(variable.causality == Causality::Input

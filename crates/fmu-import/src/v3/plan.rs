@@ -2,8 +2,10 @@
 
 use std::collections::HashMap;
 
+use fmu_description::NativeType;
+
 use super::buffer::Buffer;
-use super::elements::{ElementView, NativeType, Variable};
+use super::elements::{ElementView, Variable};
 
 /// Largest number of lists whose plans are kept.
 const KEPT: usize = 32;

@@ -12,10 +12,10 @@ use std::path::Path;
 
 use super::{Instance, check_guid};
 use crate::callbacks::{Callbacks, IntermediateUpdate};
-use crate::interface::fmi3::{Dependency, Table, Type};
+use crate::interface::fmi3::{Dependency, Table};
 use crate::model::{Event, Failure, Model};
-use fmu_description::ModelDescription;
 use fmu_description::call_order::{InterfaceType, State};
+use fmu_description::{ModelDescription, NativeType};
 
 pub(crate) use derivatives::Jacobian;
 use intermediate::Intermediate;
@@ -220,7 +220,7 @@ impl<M: Model> Instance<M> {
     /// Finds the places of variables of one type, in row-major order, and runs `body` with them.
     pub(crate) fn located(
         &mut self,
-        kind: Type,
+        kind: NativeType,
         references: &[u32],
         count: usize,
         body: impl FnOnce(&mut Self, &[u32]) -> Result<(), Failure>,
@@ -237,7 +237,7 @@ impl<M: Model> Instance<M> {
     /// [`Instance::located`] for a function that sets.
     pub(crate) fn set_located(
         &mut self,
-        kind: Type,
+        kind: NativeType,
         references: &[u32],
         count: usize,
         set: impl FnOnce(&mut Self, &[u32]) -> Result<(), Failure>,
@@ -249,7 +249,7 @@ impl<M: Model> Instance<M> {
     /// [`Instance::located`] for a function that reads.
     pub(crate) fn read_located(
         &mut self,
-        kind: Type,
+        kind: NativeType,
         references: &[u32],
         count: usize,
         read: impl FnOnce(&mut Self, &[u32]) -> Result<(), Failure>,
@@ -264,7 +264,7 @@ impl<M: Model> Instance<M> {
     #[inline(never)]
     fn located_in_arrays(
         &mut self,
-        kind: Type,
+        kind: NativeType,
         references: &[u32],
         count: usize,
         body: impl FnOnce(&mut Self, &[u32]) -> Result<(), Failure>,

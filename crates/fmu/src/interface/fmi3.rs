@@ -5,7 +5,7 @@ mod arrays;
 mod describe;
 
 use crate::model::Failure;
-use fmu_description::{DependencyKind, ModelStructure};
+use fmu_description::{DependencyKind, ModelStructure, NativeType};
 
 pub(crate) use describe::describe;
 
@@ -15,53 +15,11 @@ pub(crate) const INDICATOR: u32 = 1 << 31;
 /// Marks the place of an `Int64`, to tell it from that of an enumeration.
 pub(crate) const INT64: u32 = 1 << 31;
 
-/// The types of FMI 3.0 that an exported model can have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Type {
-    Float32,
-    Float64,
-    Int8,
-    UInt8,
-    Int16,
-    UInt16,
-    Int32,
-    UInt32,
-    /// An `Int64`, or an `Enumeration`, which `fmi3GetInt64` reads as well.
-    Int64,
-    UInt64,
-    Boolean,
-    String,
-    Binary,
-    Clock,
-}
-
-impl Type {
-    /// Returns the name in the functions `fmi3Get{VariableType}`.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Type::Float32 => "Float32",
-            Type::Float64 => "Float64",
-            Type::Int8 => "Int8",
-            Type::UInt8 => "UInt8",
-            Type::Int16 => "Int16",
-            Type::UInt16 => "UInt16",
-            Type::Int32 => "Int32",
-            Type::UInt32 => "UInt32",
-            Type::Int64 => "Int64",
-            Type::UInt64 => "UInt64",
-            Type::Boolean => "Boolean",
-            Type::String => "String",
-            Type::Binary => "Binary",
-            Type::Clock => "Clock",
-        }
-    }
-}
-
 /// A variable of FMI 3.0: a scalar or an array.
 #[derive(Debug)]
 pub(crate) struct Entry {
     pub(crate) name: String,
-    pub(crate) kind: Type,
+    pub(crate) kind: NativeType,
     /// The value reference of FMI 2.0 of the first element; the others follow.
     first: u32,
     /// Number of elements.
@@ -101,7 +59,7 @@ impl Table {
 
     /// Whether the variables have the same names and types as those of `other`, in the same order.
     pub(crate) fn has_variables_of(&self, other: &Self) -> bool {
-        let variables = |table: &Self| -> Vec<(String, Type)> {
+        let variables = |table: &Self| -> Vec<(String, NativeType)> {
             table.entries.iter().map(|entry| (entry.name.clone(), entry.kind)).collect()
         };
         variables(self) == variables(other)
@@ -132,7 +90,7 @@ impl Table {
     /// variables have not `count` elements together (section 2.2.7.1).
     pub(crate) fn locate(
         &self,
-        kind: Type,
+        kind: NativeType,
         references: &[u32],
         count: usize,
         places: &mut Vec<u32>,
@@ -160,7 +118,7 @@ impl Table {
     /// there are not as many references as places.
     pub(crate) fn locate_scalars(
         &self,
-        kind: Type,
+        kind: NativeType,
         references: &[u32],
         places: &mut [u32],
     ) -> bool {

@@ -2,15 +2,16 @@
 
 use std::ops::RangeInclusive;
 
-use super::fmi3::Type;
 use super::slot::{Slot, SlotBuilder};
 use crate::variable::{Number, TypedField, for_types};
-use fmu_description::{BinaryType, ClockType, IntegerType, IntervalVariability, Kind, RealType};
+use fmu_description::{
+    BinaryType, ClockType, IntegerType, IntervalVariability, Kind, NativeType, RealType,
+};
 
 /// The Rust type of the field of such a variable.
 pub(crate) trait Native: Clone + Sized + 'static {
     /// The type of FMI 3.0.
-    const TYPE: Type;
+    const TYPE: NativeType;
 
     /// Returns the variables of this type.
     fn slots<M>(all: &Slots<M>) -> &[Slot<M, Self>];
@@ -73,7 +74,7 @@ for_types!(slots);
 
 /// A clock: true where it ticks.
 impl Native for bool {
-    const TYPE: Type = Type::Clock;
+    const TYPE: NativeType = NativeType::Clock;
 
     fn slots<M>(all: &Slots<M>) -> &[Slot<M, Self>] {
         &all.clock
@@ -104,7 +105,7 @@ impl Native for bool {
 }
 
 impl Native for f32 {
-    const TYPE: Type = Type::Float32;
+    const TYPE: NativeType = NativeType::Float32;
 
     fn slots<M>(all: &Slots<M>) -> &[Slot<M, Self>] {
         &all.float32
@@ -121,7 +122,7 @@ impl Native for f32 {
 }
 
 impl Native for Vec<u8> {
-    const TYPE: Type = Type::Binary;
+    const TYPE: NativeType = NativeType::Binary;
 
     fn slots<M>(all: &Slots<M>) -> &[Slot<M, Self>] {
         &all.binary
@@ -137,7 +138,7 @@ impl Native for Vec<u8> {
 macro_rules! integers {
     ($($native:ty, $variant:ident, $list:ident;)*) => {
         $(impl Native for $native {
-            const TYPE: Type = Type::$variant;
+            const TYPE: NativeType = NativeType::$variant;
 
             fn slots<M>(all: &Slots<M>) -> &[Slot<M, Self>] {
                 &all.$list

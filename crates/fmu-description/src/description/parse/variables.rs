@@ -6,7 +6,7 @@ use super::attributes::Node;
 use super::structure::{index, indices};
 use crate::defect::ParseError;
 use crate::description::{
-    Causality, IntegerType, Kind, RealType, ScalarVariable, SimpleType, Variability,
+    Causality, IntegerType, Kind, RealType, ScalarVariable, SimpleType, Variability, Version,
 };
 use crate::limits::{HELP, exceeds};
 
@@ -54,20 +54,32 @@ pub(super) fn variables(
     list: Node<'_>,
     types: &[SimpleType],
 ) -> Result<Vec<ScalarVariable>, ParseError> {
-    let types: Types<'_> =
-        types.iter().map(|declared| (declared.name.as_str(), declared)).collect();
-    let elements: Vec<Node<'_>> = list.children_named("ScalarVariable").collect();
+    let (elements, variables) = scalar_variables(list, types, variable)?;
+    check_names(&elements, &variables)?;
+    check_references(&elements, &variables)?;
+    Ok(variables)
+}
+
+/// The types by name.
+pub(super) fn by_name(types: &[SimpleType]) -> Types<'_> {
+    types.iter().map(|declared| (declared.name.as_str(), declared)).collect()
+}
+
+/// Reads each `ScalarVariable` by `variable`, which gets the types and the number of variables.
+pub(super) fn scalar_variables<'a>(
+    list: Node<'a>,
+    types: &[SimpleType],
+    variable: fn(Node<'_>, &Types<'_>, usize) -> Result<ScalarVariable, ParseError>,
+) -> Result<(Vec<Node<'a>>, Vec<ScalarVariable>), ParseError> {
+    let elements: Vec<Node<'a>> = list.children_named("ScalarVariable").collect();
     if exceeds(elements.len(), VARIABLES) {
         let at = list.element.at;
         return Err(ParseError::Limit { at, what: "variables", limit: VARIABLES, help: HELP });
     }
-    let mut variables = Vec::with_capacity(elements.len());
-    for element in &elements {
-        variables.push(variable(*element, &types, elements.len())?);
-    }
-    check_names(&elements, &variables)?;
-    check_references(&elements, &variables)?;
-    Ok(variables)
+    let types = by_name(types);
+    let variables = elements.iter().map(|element| variable(*element, &types, elements.len()));
+    let variables = variables.collect::<Result<_, _>>()?;
+    Ok((elements, variables))
 }
 
 /// Refuses a name that two variables have, unless it does not matter which one is meant.
@@ -239,9 +251,9 @@ fn derivative(element: Node<'_>, count: usize) -> Result<Option<u32>, ParseError
 }
 
 /// Returns the declared type of a variable, if it exists and has the kind of the variable.
-fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kind)> {
+pub(super) fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kind)> {
     const NAME: &str = "declaredType";
-    let kind = element.element.name;
+    let (kind, version) = (element.element.name, element.warnings.version);
     let Some(name) = element.attribute(NAME) else {
         if kind == "Enumeration" {
             let (expected, actual) = ("the name of an enumeration", "no such attribute".to_owned());
@@ -251,11 +263,14 @@ fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kin
         return None;
     };
     match types.get(name) {
-        Some(declared_type) if declared_type.kind.element() == kind => {
+        Some(declared_type) if declared_type.kind.element_in(version) == kind => {
             Some((name.to_owned(), &declared_type.kind))
         }
         _ => {
-            let expected = format!("the name of a SimpleType that is {kind}");
+            let expected = match version {
+                Version::V3 => format!("the name of a {kind}Type"),
+                _ => format!("the name of a SimpleType that is {kind}"),
+            };
             element.warn_text(NAME, &expected, name, "read without declared type");
             None
         }

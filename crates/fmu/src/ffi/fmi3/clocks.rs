@@ -3,8 +3,8 @@
 
 use super::super::{borrow_output, read};
 use super::entry_points_3;
-use crate::interface::fmi3::Type;
 use crate::model::Failure;
+use fmu_description::NativeType;
 use fmu_description::abi3::{
     fmi3Clock, fmi3Float64, fmi3IntervalQualifier, fmi3UInt64, fmi3ValueReference,
 };
@@ -13,7 +13,7 @@ entry_points_3! {
     get_clock = GetClock(vr: *const fmi3ValueReference, n: usize, values: *mut fmi3Clock),
         instance => {
             let to = borrow_output(values, n)?;
-            instance.located(Type::Clock, read(vr, n)?, n, |instance, places| {
+            instance.located(NativeType::Clock, read(vr, n)?, n, |instance, places| {
                 instance.get_clock(places, to);
                 Ok(())
             })
@@ -22,14 +22,14 @@ entry_points_3! {
         instance => {
             let values = read(values, n)?;
             instance
-                .located(Type::Clock, read(vr, n)?, n, |instance, places| instance.set_clock(places, values))
+                .located(NativeType::Clock, read(vr, n)?, n, |instance, places| instance.set_clock(places, values))
         };
     get_interval_decimal = GetIntervalDecimal(
         vr: *const fmi3ValueReference, n: usize, intervals: *mut fmi3Float64,
         qualifiers: *mut fmi3IntervalQualifier
     ), instance => {
         let (intervals, qualifiers) = (borrow_output(intervals, n)?, borrow_output(qualifiers, n)?);
-        instance.located(Type::Clock, read(vr, n)?, n, |instance, places| {
+        instance.located(NativeType::Clock, read(vr, n)?, n, |instance, places| {
             instance.get_intervals(places, intervals, qualifiers)
         })
     };
@@ -37,7 +37,7 @@ entry_points_3! {
         vr: *const fmi3ValueReference, n: usize, shifts: *mut fmi3Float64
     ), instance => {
         let shifts = borrow_output(shifts, n)?;
-        instance.located(Type::Clock, read(vr, n)?, n, |instance, places| instance.get_shifts(places, shifts))
+        instance.located(NativeType::Clock, read(vr, n)?, n, |instance, places| instance.get_shifts(places, shifts))
     };
 }
 
@@ -48,7 +48,7 @@ macro_rules! refused {
             $($name = $function(
                 vr: *const fmi3ValueReference, n: usize, $($argument: $type),*
             ), instance => {
-                instance.located(Type::Clock, read(vr, n)?, n, |_, places| match places {
+                instance.located(NativeType::Clock, read(vr, n)?, n, |_, places| match places {
                     [] => Ok(()),
                     _ => Err(Failure::Error($reason.to_owned())),
                 })

@@ -5,8 +5,8 @@
 
 use super::super::{borrow_output, read, texts};
 use super::entry_points_3;
-use crate::interface::fmi3::Type;
 use crate::model::Failure;
+use fmu_description::NativeType;
 use fmu_description::abi3::{
     fmi3Binary, fmi3Boolean, fmi3Float32, fmi3Float64, fmi3Int8, fmi3Int16, fmi3Int32, fmi3Int64,
     fmi3String, fmi3UInt8, fmi3UInt16, fmi3UInt32, fmi3UInt64, fmi3ValueReference,
@@ -19,12 +19,12 @@ macro_rules! values {
         entry_points_3! {
             $($get = $getter(
                 vr: *const fmi3ValueReference, n: usize, values: *mut $c, n_values: usize
-            ), instance => instance.read_located(Type::$type, read(vr, n)?, n_values, |instance, places| {
+            ), instance => instance.read_located(NativeType::$type, read(vr, n)?, n_values, |instance, places| {
                 instance.$read(places, borrow_output(values, n_values)?)
             });
             $set = $setter(
                 vr: *const fmi3ValueReference, n: usize, values: *const $c, n_values: usize
-            ), instance => instance.set_located(Type::$type, read(vr, n)?, n_values, |instance, places| {
+            ), instance => instance.set_located(NativeType::$type, read(vr, n)?, n_values, |instance, places| {
                 instance.$write(places, read(values, n_values)?)
             });)*
         }
@@ -52,18 +52,18 @@ values! {
 entry_points_3! {
     get_string = GetString(
         vr: *const fmi3ValueReference, n: usize, values: *mut fmi3String, n_values: usize
-    ), instance => instance.read_located(Type::String, read(vr, n)?, n_values, |instance, places| {
+    ), instance => instance.read_located(NativeType::String, read(vr, n)?, n_values, |instance, places| {
         instance.get_string(places, borrow_output(values, n_values)?)
     });
     set_string = SetString(
         vr: *const fmi3ValueReference, n: usize, values: *const fmi3String, n_values: usize
-    ), instance => instance.set_located(Type::String, read(vr, n)?, n_values, |instance, places| {
+    ), instance => instance.set_located(NativeType::String, read(vr, n)?, n_values, |instance, places| {
         instance.set_string(places, &texts(values, n_values)?)
     });
     get_binary = GetBinary(
         vr: *const fmi3ValueReference, n: usize, sizes: *mut usize, values: *mut fmi3Binary,
         n_values: usize
-    ), instance => instance.read_located(Type::Binary, read(vr, n)?, n_values, |instance, places| {
+    ), instance => instance.read_located(NativeType::Binary, read(vr, n)?, n_values, |instance, places| {
         let (sizes, values) = (borrow_output(sizes, n_values)?, borrow_output(values, n_values)?);
         instance.get_binary(places, |position, value| {
             sizes[position].write(value.len());
@@ -73,7 +73,7 @@ entry_points_3! {
     set_binary = SetBinary(
         vr: *const fmi3ValueReference, n: usize, sizes: *const usize, values: *const fmi3Binary,
         n_values: usize
-    ), instance => instance.set_located(Type::Binary, read(vr, n)?, n_values, |instance, places| {
+    ), instance => instance.set_located(NativeType::Binary, read(vr, n)?, n_values, |instance, places| {
         let arrays = read(sizes, n_values)?.iter().zip(read(values, n_values)?);
         let values = arrays.map(|(&size, &bytes)| Ok(read(bytes, size)?.to_vec()));
         instance.set_typed(places, &values.collect::<Result<Vec<Vec<u8>>, Failure>>()?)

@@ -3,8 +3,8 @@
 use std::mem::MaybeUninit;
 
 use super::super::Instance;
-use crate::interface::fmi3::Type;
 use crate::model::{Failure, Model};
+use fmu_description::NativeType;
 
 /// Unknowns, knowns and the lengths of both vectors of a partial derivative.
 pub(crate) struct Jacobian<'a> {
@@ -24,9 +24,9 @@ impl<M: Model> Instance<M> {
     ) -> Result<(), Failure> {
         let mut knowns = Vec::new();
         let table = &self.session()?.table;
-        table.locate(Type::Float64, jacobian.knowns, jacobian.known_count, &mut knowns)?;
+        table.locate(NativeType::Float64, jacobian.knowns, jacobian.known_count, &mut knowns)?;
         self.located(
-            Type::Float64,
+            NativeType::Float64,
             jacobian.unknowns,
             jacobian.unknown_count,
             |instance, unknowns| body(instance, unknowns, &knowns),
@@ -66,7 +66,7 @@ impl<M: Model> Instance<M> {
         for (size, &order) in session.table.sizes(references).zip(orders) {
             expanded.extend((0..size).map(|_| order));
         }
-        let done = self.located(Type::Float64, references, to.len(), |instance, places| {
+        let done = self.located(NativeType::Float64, references, to.len(), |instance, places| {
             instance.get_real_output_derivatives(places, &expanded, to)
         });
         self.session_mut()?.integers = expanded;

@@ -8,7 +8,6 @@ use super::super::{Instantiation, Jacobian, Snapshot};
 use super::pendulum::Pendulum;
 use crate::callbacks::Callbacks;
 use crate::instance::Instance;
-use crate::interface::fmi3::Type;
 use crate::model::{Failure, Model, Step};
 use crate::room::room_of;
 use crate::variable::Variable;
@@ -16,7 +15,7 @@ use crate::{About, Event, ModelExchange, describe, describe_3};
 use fmu_description::abi::Status;
 use fmu_description::call_order::{InterfaceType, State};
 use fmu_description::call_order3::{Function, allowed};
-use fmu_description::{Dimension, Elements, ModelDescription};
+use fmu_description::{Dimension, Elements, ModelDescription, NativeType};
 
 /// x' = A x + u with a 2 x 2 matrix A, as a model without a step; the event at x[1] = 2 ends nothing.
 #[derive(Clone, Serialize, Deserialize)]
@@ -140,7 +139,7 @@ fn get(instance: &mut Instance<Linear>, names: &[&str], count: usize) -> (Status
     let references: Vec<_> = names.iter().map(|name| reference(name)).collect();
     let mut values = vec![f64::NAN; count];
     let status = instance.call(Function::GetFloat64, |i| {
-        i.located(Type::Float64, &references, count, |i, places| {
+        i.located(NativeType::Float64, &references, count, |i, places| {
             i.get_float64(places, room_of(&mut values))
         })
     });
@@ -149,7 +148,7 @@ fn get(instance: &mut Instance<Linear>, names: &[&str], count: usize) -> (Status
 
 pub(super) fn set(instance: &mut Instance<Linear>, name: &str, values: &[f64]) -> Status {
     instance.call(Function::SetFloat64, |i| {
-        i.located(Type::Float64, &[reference(name)], values.len(), |i, places| {
+        i.located(NativeType::Float64, &[reference(name)], values.len(), |i, places| {
             i.set_float64(places, values)
         })
     })
@@ -197,12 +196,13 @@ fn a_wrong_number_of_values_is_an_error_before_a_value_is_touched() {
 #[test]
 fn a_variable_of_another_type_is_an_error() {
     let mut instance = instantiate::<Linear>(InterfaceType::CoSimulation, false, false).unwrap();
-    let status = instance
-        .call(Function::GetInt32, |i| i.located(Type::Int32, &[reference("u")], 1, |_, _| Ok(())));
+    let status = instance.call(Function::GetInt32, |i| {
+        i.located(NativeType::Int32, &[reference("u")], 1, |_, _| Ok(()))
+    });
     assert_eq!(status, Status::Error);
     let mut instance = instantiate::<Linear>(InterfaceType::CoSimulation, false, false).unwrap();
     let status =
-        instance.call(Function::GetClock, |i| i.located(Type::Clock, &[0], 1, |_, _| Ok(())));
+        instance.call(Function::GetClock, |i| i.located(NativeType::Clock, &[0], 1, |_, _| Ok(())));
     assert_eq!(status, Status::Error);
 }
 

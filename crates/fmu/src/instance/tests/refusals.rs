@@ -7,10 +7,10 @@ use super::fmi3::{initialized, instantiate, set};
 use super::pendulum::Pendulum;
 use crate::callbacks::{Callbacks, IntermediateUpdate};
 use crate::instance::{Instance, Instantiation};
-use crate::interface::fmi3::Type;
 use crate::model::Model;
 use crate::room::room_of;
 use crate::{Failure, describe_3};
+use fmu_description::NativeType;
 use fmu_description::abi::Status;
 use fmu_description::call_order::{InterfaceType, State};
 use fmu_description::call_order3::Function;
@@ -54,9 +54,12 @@ fn a_calculated_variable_is_not_set_although_the_variable_with_its_value_is() {
         let mut instance =
             instantiate::<Pendulum>(InterfaceType::CoSimulation, false, false).unwrap();
         let status = instance.call(Function::SetFloat64, |own| {
-            own.set_located(Type::Float64, &[reference::<Pendulum>(name)], 1, |own, places| {
-                own.set_float64(places, &[0.25])
-            })
+            own.set_located(
+                NativeType::Float64,
+                &[reference::<Pendulum>(name)],
+                1,
+                |own, places| own.set_float64(places, &[0.25]),
+            )
         });
         (status, instance.core.state)
     };

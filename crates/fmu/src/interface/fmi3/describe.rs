@@ -3,10 +3,10 @@
 use std::collections::HashMap;
 
 use super::arrays::{Block, blocks, starts};
-use super::{Entry, INDICATOR, INT64, Table, Type};
+use super::{Entry, INDICATOR, INT64, Table};
 use fmu_description::{
     Causality, CoSimulation, DependencyKind, Dimension, Initial, IntegerType, Kind,
-    ModelDescription, ModelExchange, ModelStructure, RealType, ScalarVariable, Unknown,
+    ModelDescription, ModelExchange, ModelStructure, NativeType, RealType, ScalarVariable, Unknown,
     Variability,
 };
 
@@ -65,26 +65,6 @@ fn simulation(flags: &CoSimulation, old: &ModelDescription) -> CoSimulation {
         provides_adjoint_derivatives: flags.provides_directional_derivative,
         provides_per_element_dependencies: true,
         ..flags.clone()
-    }
-}
-
-/// Returns the type of FMI 3.0 in the names of functions.
-fn kind_of(kind: &Kind) -> Type {
-    match kind {
-        Kind::Integer(_) => Type::Int32,
-        Kind::Enumeration(_) | Kind::Int64(_) => Type::Int64,
-        Kind::Float32(_) => Type::Float32,
-        Kind::Int8(_) => Type::Int8,
-        Kind::UInt8(_) => Type::UInt8,
-        Kind::Int16(_) => Type::Int16,
-        Kind::UInt16(_) => Type::UInt16,
-        Kind::UInt32(_) => Type::UInt32,
-        Kind::UInt64(_) => Type::UInt64,
-        Kind::Binary(_) => Type::Binary,
-        Kind::Clock(_) => Type::Clock,
-        Kind::Boolean(_) => Type::Boolean,
-        Kind::String(_) => Type::String,
-        Kind::Real(_) => Type::Float64,
     }
 }
 
@@ -186,7 +166,7 @@ impl Builder {
         }
         self.entries.push(Entry {
             name: block.name.clone(),
-            kind: kind_of(&first.kind),
+            kind: first.kind.native_type(),
             first: place(first),
             count: u32::try_from(block.count).unwrap_or(u32::MAX),
             is_calculated,
@@ -409,7 +389,7 @@ fn add_indicators(
         let reference = u32::try_from(table.entries.len()).unwrap_or(u32::MAX);
         table.entries.push(Entry {
             name: name.clone(),
-            kind: Type::Float64,
+            kind: NativeType::Float64,
             first: place,
             count: 1,
             is_calculated: false,

@@ -6,12 +6,11 @@ use crate::defect::ParseError;
 use crate::description::parse::attributes::{Node, WHITE_SPACE};
 use crate::description::parse::structure::ANYTHING;
 use crate::description::parse::variables::{
-    Types, VARIABLES, base, check_names, check_references, kind, typed,
+    Types, base, check_names, check_references, kind, scalar_variables, typed,
 };
 use crate::description::{
     Causality, Initial, ModelStructure, ScalarVariable, SimpleType, Unknown, Variability,
 };
-use crate::limits::{HELP, exceeds};
 
 const VARIABILITIES: [&str; 4] = ["constant", "parameter", "discrete", "continuous"];
 const CAUSALITIES: [&str; 4] = ["input", "output", "internal", "none"];
@@ -21,17 +20,7 @@ pub(super) fn read(
     list: Node<'_>,
     types: &[SimpleType],
 ) -> Result<(Vec<ScalarVariable>, ModelStructure), ParseError> {
-    let types: Types<'_> =
-        types.iter().map(|declared| (declared.name.as_str(), declared)).collect();
-    let elements: Vec<Node<'_>> = list.children_named("ScalarVariable").collect();
-    if exceeds(elements.len(), VARIABLES) {
-        let at = list.element.at;
-        return Err(ParseError::Limit { at, what: "variables", limit: VARIABLES, help: HELP });
-    }
-    let mut variables = Vec::with_capacity(elements.len());
-    for element in &elements {
-        variables.push(variable(*element, &types, elements.len())?);
-    }
+    let (elements, mut variables) = scalar_variables(list, types, variable)?;
     set_aliases(&elements, &mut variables);
     check_names(&elements, &variables)?;
     check_references(&elements, &variables)?;

@@ -2,16 +2,11 @@
 
 use std::ops::RangeInclusive;
 
-use std::collections::HashMap;
-
 use crate::defect::ParseError;
 use crate::description::parse::attributes::Node;
 use crate::description::{
     BinaryType, ClockType, IntegerType, IntervalVariability, Kind, RealType, SimpleType, Version,
 };
-
-/// The types of `TypeDefinitions`, by name.
-pub(super) type Types<'a> = HashMap<&'a str, &'a SimpleType>;
 
 const INTERVALS: [&str; 6] = ["constant", "fixed", "tunable", "changing", "countdown", "triggered"];
 
@@ -67,30 +62,6 @@ fn item(element: Node<'_>) -> Result<(String, i64), ParseError> {
     let value = value.and_then(|value| i64::try_from(value).ok());
     let value = value.ok_or_else(|| element.wrong("value", "an integer", text))?;
     Ok((element.required("name")?.to_owned(), value))
-}
-
-/// Returns the declared type of a variable, if it exists and has the kind of the variable.
-pub(super) fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kind)> {
-    const NAME: &str = "declaredType";
-    let kind = element.element.name;
-    let Some(name) = element.attribute(NAME) else {
-        if kind == "Enumeration" {
-            let (expected, actual) = ("the name of an enumeration", "no such attribute".to_owned());
-            let assumed = "read without names of its items";
-            element.warn_of(true, element.place(NAME), expected, actual, assumed);
-        }
-        return None;
-    };
-    match types.get(name) {
-        Some(declared_type) if declared_type.kind.element_in(Version::V3) == kind => {
-            Some((name.to_owned(), &declared_type.kind))
-        }
-        _ => {
-            let expected = format!("the name of a {kind}Type");
-            element.warn_text(NAME, &expected, name, "read without declared type");
-            None
-        }
-    }
 }
 
 /// Reads the attributes that a type and a variable have in common; `defaults` has those of the

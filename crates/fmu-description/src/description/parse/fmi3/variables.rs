@@ -2,12 +2,12 @@
 
 use std::collections::HashMap;
 
-use super::kinds::{Types, attributes, blank, declared};
+use super::kinds::{attributes, blank};
 use super::start;
 use crate::defect::ParseError;
 use crate::description::parse::attributes::{Node, WHITE_SPACE};
 use crate::description::parse::variables::{
-    VARIABILITIES, VARIABLES, check_names, check_references,
+    Types, VARIABILITIES, VARIABLES, by_name, check_names, check_references, declared,
 };
 use crate::description::{
     Causality, Dimension, Elements, Kind, ScalarVariable, SimpleType, Variability,
@@ -36,8 +36,7 @@ pub(super) fn read(
     list: Node<'_>,
     types: &[SimpleType],
 ) -> Result<(Vec<ScalarVariable>, References), ParseError> {
-    let types: Types<'_> =
-        types.iter().map(|declared| (declared.name.as_str(), declared)).collect();
+    let types = by_name(types);
     let (mut elements, mut variables) = (Vec::new(), Vec::new());
     // A few bytes of the file may name an alias of a variable with long texts and lists.
     let mut inherited = 0;

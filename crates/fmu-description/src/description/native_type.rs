@@ -1,0 +1,59 @@
+//! The types of FMI 3.0 as its functions tell them apart.
+
+use super::Kind;
+
+macro_rules! native_types {
+    ($($name:ident)*) => {
+        /// The C types of FMI 3.0 (FMI 3.0.2, section 2.2.6.2): each has its own functions.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[expect(missing_docs, reason = "the names are those of the standard")]
+        pub enum NativeType {
+            $($name,)*
+        }
+
+        impl NativeType {
+            /// Returns the name in the functions `fmi3Get{VariableType}`.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => stringify!($name),)*
+                }
+            }
+
+            /// Returns the name of the function that sets variables of the type.
+            #[must_use]
+            pub const fn setter(self) -> &'static str {
+                match self {
+                    $(Self::$name => concat!("fmi3Set", stringify!($name)),)*
+                }
+            }
+        }
+    };
+}
+
+native_types! {
+    Float32 Float64 Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Boolean String Binary Clock
+}
+
+impl Kind {
+    /// Returns the C type in FMI 3.0. An `Enumeration` is read and set as `Int64`.
+    #[must_use]
+    pub fn native_type(&self) -> NativeType {
+        match self {
+            Kind::Float32(_) => NativeType::Float32,
+            Kind::Real(_) => NativeType::Float64,
+            Kind::Int8(_) => NativeType::Int8,
+            Kind::UInt8(_) => NativeType::UInt8,
+            Kind::Int16(_) => NativeType::Int16,
+            Kind::UInt16(_) => NativeType::UInt16,
+            Kind::Integer(_) => NativeType::Int32,
+            Kind::UInt32(_) => NativeType::UInt32,
+            Kind::Int64(_) | Kind::Enumeration(_) => NativeType::Int64,
+            Kind::UInt64(_) => NativeType::UInt64,
+            Kind::Boolean(_) => NativeType::Boolean,
+            Kind::String(_) => NativeType::String,
+            Kind::Binary(_) => NativeType::Binary,
+            Kind::Clock(_) => NativeType::Clock,
+        }
+    }
+}
