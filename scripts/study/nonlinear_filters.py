@@ -2,13 +2,15 @@
 """What the nonlinearity of a plant does to estimates of its faults: the augmented observer beside extended and unscented
 Kalman filters that carry the plant's FMU, for the same noise. Makes the table of docs/how-to/nonlinear.md.
 
-    python scripts/study/nonlinear_filters.py [--json]
+    python scripts/study/nonlinear_filters.py [--json] [--last]
 
 Three plants: the pendulum and the three tanks, started away from the operating point without a fault and without noise, so
 that each estimate of a fault is an error; the wind turbine of the benchmark with its noise, whose wind is estimated as a fault of
-the rotor. Needs target/release/aso-ftc, dist/FrictionPendulum.fmu and dist/KalmanFilter.fmu.
+the rotor. --last takes the last start of each plant only. Needs target/release/aso-ftc, dist/FrictionPendulum.fmu and
+dist/KalmanFilter.fmu.
 """
 
+import argparse
 import csv
 import json
 import subprocess
@@ -131,11 +133,11 @@ def beside_the_controller(folder, plant, names, start, faults, step, stop):
     return errors
 
 
-def pendulum(folder):
+def pendulum(folder, chosen):
     """The loop without friction, from three angles in rad."""
     designed(folder, PENDULUM)
     plant = ROOT / "dist/FrictionPendulum.fmu"
-    for angle in (0.1, 0.5, 0.9):
+    for angle in (0.1, 0.5, 0.9)[chosen]:
         start = {"plant.F_c": 0, "plant.F_s": 0, "plant.x_p_0": 0, "plant.theta_0": angle}
         start |= {f"{one}.x_hat_0[2]": angle for one in ("filter", "controller")}
         names = (["x_p", "theta"], ["u"])
@@ -144,11 +146,11 @@ def pendulum(folder):
         )
 
 
-def tanks(folder):
+def tanks(folder, chosen):
     """The loop from three differences of the first level from the operating point in m."""
     call("pack", ROOT / "examples/three-tank", "--out", folder)
     designed(folder, TANKS)
-    for difference in (0.02, 0.1, 0.2):
+    for difference in (0.02, 0.1, 0.2)[chosen]:
         start = {"plant.h_1": 0.4 + difference, "plant.h_2": 0.2 - difference / 2}
         for one in ("filter", "controller"):
             start |= {f"{one}.x_hat_0[1]": 0.4 + difference, f"{one}.x_hat_0[2]": 0.2 - difference / 2}
@@ -182,14 +184,14 @@ def observed(design, start, inputs, measured):
     return np.array(estimates)
 
 
-def turbine(folder):
+def turbine(folder, chosen):
     """The wind of the benchmark, which is estimated from the speeds of rotor and generator, for mean winds in m/s."""
     call("pack", ROOT / "examples/wind-turbine", ROOT / "tests/models/rotor", "--out", folder)
     design = designed(folder, ROTOR)
     fmus = {"turbine": folder / "WindTurbine.fmu", "filter": folder / "Filter.fmu"}
     links = [("turbine.omega_r_m[1]", "filter.omega_r"), ("turbine.omega_g_m[1]", "filter.omega_g")]
     links += [("turbine.tau_g_m", "filter.tau_g"), ("turbine.beta_m1[1]", "filter.beta")]
-    for wind in (12, 9, 7):
+    for wind in (12, 9, 7)[chosen]:
         start = {"turbine.v_mean": wind}
         errors = {}
         for method in METHODS:
@@ -206,11 +208,16 @@ def turbine(folder):
 
 
 def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--json", action="store_true", help="print the rows as JSON")
+    parser.add_argument("--last", action="store_true", help="the last start of each plant only")
+    options = parser.parse_args()
+    chosen = slice(-1, None) if options.last else slice(None)
     rows = []
     for study in (pendulum, tanks, turbine):
         with tempfile.TemporaryDirectory() as folder:
-            rows += study(Path(folder))
-    if sys.argv[1:] == ["--json"]:
+            rows += study(Path(folder), chosen)
+    if options.json:
         print(json.dumps(rows))
         return
     print("| plant | unit | observer | extended | unscented |\n|---|---|---|---|---|")

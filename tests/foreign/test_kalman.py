@@ -242,12 +242,12 @@ def test_for_a_linear_plant_the_estimates_are_those_of_the_designed_observer(att
 
 
 def test_far_from_the_operating_point_the_filters_take_no_nonlinearity_for_a_fault(root, aso_ftc, packed_filter, python):
-    """The table of docs/how-to/nonlinear.md."""
-    done = python(root / "scripts/study/nonlinear_filters.py", "--json")
+    """The last row of each plant in the table of docs/how-to/nonlinear.md."""
+    done = python(root / "scripts/study/nonlinear_filters.py", "--json", "--last")
     assert done.returncode == 0, done.stderr
     page = (root / "docs/how-to/nonlinear.md").read_text(encoding="utf-8")
     rows = json.loads(done.stdout)
-    assert len(rows) == 9
+    assert len(rows) == 3
     for name, _, errors in rows:
         part = 0.75 if "turbine" in name else 0.02
         assert max(errors["extended"], errors["unscented"]) < part * errors["observer"], name
