@@ -137,7 +137,7 @@ def pendulum(folder, chosen):
     """The loop without friction, from three angles in rad."""
     designed(folder, PENDULUM)
     plant = ROOT / "dist/FrictionPendulum.fmu"
-    for angle in (0.1, 0.5, 0.9)[chosen]:
+    for angle in [0.1, 0.5, 0.9][chosen]:
         start = {"plant.F_c": 0, "plant.F_s": 0, "plant.x_p_0": 0, "plant.theta_0": angle}
         start |= {f"{one}.x_hat_0[2]": angle for one in ("filter", "controller")}
         names = (["x_p", "theta"], ["u"])
@@ -150,7 +150,7 @@ def tanks(folder, chosen):
     """The loop from three differences of the first level from the operating point in m."""
     call("pack", ROOT / "examples/three-tank", "--out", folder)
     designed(folder, TANKS)
-    for difference in (0.02, 0.1, 0.2)[chosen]:
+    for difference in [0.02, 0.1, 0.2][chosen]:
         start = {"plant.h_1": 0.4 + difference, "plant.h_2": 0.2 - difference / 2}
         for one in ("filter", "controller"):
             start |= {f"{one}.x_hat_0[1]": 0.4 + difference, f"{one}.x_hat_0[2]": 0.2 - difference / 2}
@@ -191,7 +191,7 @@ def turbine(folder, chosen):
     fmus = {"turbine": folder / "WindTurbine.fmu", "filter": folder / "Filter.fmu"}
     links = [("turbine.omega_r_m[1]", "filter.omega_r"), ("turbine.omega_g_m[1]", "filter.omega_g")]
     links += [("turbine.tau_g_m", "filter.tau_g"), ("turbine.beta_m1[1]", "filter.beta")]
-    for wind in (12, 9, 7)[chosen]:
+    for wind in [12, 9, 7][chosen]:
         start = {"turbine.v_mean": wind}
         errors = {}
         for method in METHODS:
