@@ -126,7 +126,7 @@ impl Kind {
         }
     }
 
-    /// As [`Kind::as_real`], to change them.
+    /// Returns the attributes that [`Kind::as_real`] returns, to change them.
     pub fn as_real_mut(&mut self) -> Option<&mut RealType> {
         match self {
             Kind::Real(real) | Kind::Float32(real) => Some(real),
@@ -134,7 +134,7 @@ impl Kind {
         }
     }
 
-    /// As [`Kind::as_integer`], to change them.
+    /// Returns the attributes that [`Kind::as_integer`] returns, to change them.
     pub fn as_integer_mut(&mut self) -> Option<&mut IntegerType> {
         match self {
             integers!(integer) => Some(integer),

@@ -1,10 +1,11 @@
-//! The types of FMI 3.0 as its functions tell them apart.
+//! The types of values for which FMI 3.0 has functions of their own.
 
 use super::Kind;
 
 macro_rules! native_types {
     ($($name:ident)*) => {
-        /// The C types of FMI 3.0 (FMI 3.0.2, section 2.2.6.2): each has its own functions.
+        /// The types of values in the C interface of FMI 3.0 (`fmi3FunctionTypes.h`). Each has two functions,
+        /// `fmi3Get{VariableType}` and `fmi3Set{VariableType}`.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[expect(missing_docs, reason = "the names are those of the standard")]
         pub enum NativeType {
@@ -12,7 +13,7 @@ macro_rules! native_types {
         }
 
         impl NativeType {
-            /// Returns the name in the functions `fmi3Get{VariableType}`.
+            /// Returns the `{VariableType}` in the names of its functions.
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
@@ -36,7 +37,7 @@ native_types! {
 }
 
 impl Kind {
-    /// Returns the C type in FMI 3.0. An `Enumeration` is read and set as `Int64`.
+    /// Returns the type of the values in the C interface of FMI 3.0. Those of an `Enumeration` are `Int64`.
     #[must_use]
     pub fn native_type(&self) -> NativeType {
         match self {
