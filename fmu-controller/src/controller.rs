@@ -216,6 +216,7 @@ impl Model for AsoController {
             return Ok(());
         }
         self.mode = self.free_mode(self.is_compensating(time));
+        self.values.law = Some(self.mode.law(&self.design));
         self.evaluate(time, 0.0);
         Ok(())
     }
@@ -342,8 +343,8 @@ impl Model for AsoController {
         for (j, actuator) in design.actuators.iter().enumerate() {
             let Some([low, high]) = actuator.range() else { continue };
             let Signals { z, y, r, .. } = &self.deviations;
-            let command = equations.free_command(j, equations.estimate(z), [y, r])
-                + self.mode.stuck_part(design, j);
+            let stuck = self.mode.stuck_part(design, j);
+            let command = equations.free_command(j, equations.estimate(z), [y, r], stuck);
             let distances = [command - low, high - command];
             for (side, indicator) in pairs.next().into_iter().flatten().enumerate() {
                 let beyond = if self.mode.is_at(side, j) { -HYSTERESIS } else { HYSTERESIS };
@@ -364,10 +365,11 @@ impl Model for AsoController {
         }
         // In an integrated step a limit is reached and left where it is, and events only separate the parts.
         self.frozen = !self.is_integrated;
-        let values_of_continuous_states_changed = self.reconfigure(time, None);
+        let restarted = self.reconfigure(time, None);
         self.interpolate(0.0, time);
         self.deviations.set(&self.values, &self.operating_point, 0.0);
         let mode = self.free_mode(self.is_compensating(time));
+        let transferred = self.transfer(mode);
         let Signals { z, y, r, .. } = &self.deviations;
         self.mode = mode.limited(self.design_in_force(), z, [y, r]);
         let waiting = self.compensate && !self.mode.compensating;
@@ -375,7 +377,7 @@ impl Model for AsoController {
         let next_event_time = waiting.then_some(self.design.t_on).into_iter().chain(decision);
         Ok(Event {
             next_event_time: next_event_time.reduce(f64::min),
-            values_of_continuous_states_changed,
+            values_of_continuous_states_changed: restarted || transferred,
             ..Event::default()
         })
     }

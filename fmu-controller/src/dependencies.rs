@@ -60,12 +60,36 @@ fn kinds_of_feedback(design: &Design, limited: bool) -> [DependencyKind; 2] {
 
 /// x_hat, f_hat, x_i and r, from which commands are computed; with a direct term also what the innovation
 /// is computed from, and then the factor of x_hat changes with the compensation, too.
-fn of_feedback(design: &Design, [state, fault]: [DependencyKind; 2]) -> Vec<Group> {
+fn of_law(design: &Design, [state, fault]: [DependencyKind; 2]) -> Vec<Group> {
     let estimate = if design.p_f.is_some() { fault } else { state };
     let mut groups = vec![(estimate, x_hat(design)), (fault, f_hat(design))];
     groups.extend(direct(design, fault));
     let others = [names::integrals(design).collect(), fed_forward(design)];
     groups.extend(others.into_iter().filter(|names| !names.is_empty()).map(|names| (state, names)));
+    groups
+}
+
+/// What all commands are computed from: the same and u_t.
+fn of_feedback(design: &Design, kinds: [DependencyKind; 2]) -> Vec<Group> {
+    let mut groups = of_law(design, kinds);
+    groups.extend(transfers(design, true));
+    groups.extend(transfers(design, false));
+    groups
+}
+
+/// u_t of the commands with limits, or of those without.
+fn transfers(design: &Design, limited: bool) -> Option<Group> {
+    let names = names::transfers(design).zip(&design.actuators);
+    let names = names.filter(|(_, actuator)| actuator.limits.is_some() == limited);
+    let names: Vec<_> = names.map(|(name, _)| name).collect();
+    (!names.is_empty()).then(|| (kinds_of_feedback(design, limited)[0], names))
+}
+
+/// What command `j` is computed from: of u_t only its own.
+fn of_feedback_of(design: &Design, j: usize, kinds: [DependencyKind; 2]) -> Vec<Group> {
+    let mut groups = of_law(design, kinds);
+    let kind = if kinds[0] == Fixed { Constant } else { kinds[0] };
+    groups.extend(design.transfer.map(|_| (kind, transfer(design, j))));
     groups
 }
 
@@ -89,19 +113,24 @@ fn has_limits(design: &Design) -> bool {
 /// The dependencies of command `j`.
 pub(crate) fn of_command(design: &Design, j: usize) -> Vec<Group> {
     let kinds = kinds_of_feedback(design, design.actuators[j].limits.is_some());
-    groups_by_schedule(design, of_feedback(design, kinds))
+    groups_by_schedule(design, of_feedback_of(design, j, kinds))
 }
 
-/// The dependencies of each loss of effectiveness.
-pub(crate) fn of_loss(design: &Design) -> Vec<Group> {
-    groups_by_schedule(design, of_feedback(design, [Dependent, Dependent]))
+/// The dependencies of a loss of effectiveness.
+pub(crate) fn of_loss(design: &Design, loss: &Loss) -> Vec<Group> {
+    groups_by_schedule(design, of_feedback_of(design, loss.actuator, [Dependent, Dependent]))
+}
+
+/// The name of u_t of command `j`.
+fn transfer(design: &Design, j: usize) -> Vec<String> {
+    names::transfers(design).skip(j).take(1).collect()
 }
 
 /// The dependencies of element `i` of z'.
 pub(crate) fn of_slope(design: &Design, i: usize) -> Vec<Group> {
     let groups = of_constant_slope(design, i);
     let filtered = design.filtered_at(0)..design.integral_at(0);
-    if filtered.contains(&i) {
+    if filtered.contains(&i) || i >= design.transfer_at(0) {
         groups_by_validity(design, groups)
     } else {
         groups_by_schedule(design, groups)
@@ -133,6 +162,8 @@ fn of_constant_slope(design: &Design, i: usize) -> Vec<Group> {
         let mut groups = vec![(Discrete, observed(design)), (Discrete, x_hat(design))];
         groups.extend(design.a_f.as_ref().map(|_| (Discrete, f_hat(design))));
         groups
+    } else if i >= design.transfer_at(0) {
+        vec![(Fixed, transfer(design, i - design.transfer_at(0)))]
     } else if i >= design.integral_at(0) {
         of_integral_slope(design, i - design.integral_at(0))
     } else {
@@ -163,7 +194,8 @@ fn of_integral_slope(design: &Design, k: usize) -> Vec<Group> {
         groups.extend(direct(design, Discrete));
     }
     if conditioned {
-        groups.extend(of_feedback(design, [Dependent, Dependent]));
+        groups.extend(of_law(design, [Dependent, Dependent]));
+        groups.extend(transfers(design, true));
     }
     groups
 }
@@ -305,6 +337,9 @@ pub(crate) fn of_initial_fault(design: &Design, i: usize) -> Vec<String> {
 /// The dependencies of the initial value of element `i` of z.
 pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
     let (n, q) = (design.states.len(), design.faults.len());
+    if i >= design.transfer_at(0) {
+        return Vec::new();
+    }
     if i >= design.integral_at(0) {
         return names::starts(design).nth(n + q + i - design.integral_at(0)).into_iter().collect();
     }
@@ -330,7 +365,9 @@ pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
 /// The dependencies of the initial value of element `i` of z'.
 pub(crate) fn of_initial_slope(design: &Design, i: usize) -> Vec<String> {
     let (n, q) = (design.states.len(), design.faults.len());
-    let names = if i < n {
+    let names = if i >= design.transfer_at(0) {
+        return Vec::new();
+    } else if i < n {
         of_initial_state_slope(design, i)
     } else if i < n + q {
         of_initial_fault_slope(design, i - n)

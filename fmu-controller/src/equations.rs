@@ -1,6 +1,6 @@
 //! The equations of the controller, written once for plain and for dual numbers.
 //!
-//! With z = [x_hat; f_hat; y_f; x_i], measurements y, references r and the command u that is really applied (equations
+//! With z = [x_hat; f_hat; y_f; x_i; u_t], measurements y, references r and the command u that is really applied (equations
 //! (1), (2), (4), (5), (18) of Patton and Klinkhieo (2009) in the general form)
 //!
 //! ```text
@@ -38,6 +38,15 @@
 //! (American Control Conference 1989): it is not zero while a command is at a limit, and then lets x_i
 //! follow the command that is really applied. Each term is there where the design states its matrix.
 //!
+//! A design with a transfer adds u_t to u, also to the commands in x_i':
+//!
+//! ```text
+//! u_t' = -w u_t
+//! ```
+//!
+//! When the law changes (compensation, actuators that are gone, fall-back), u_t becomes the distance of the last commands
+//! from those of the new law, so that they start where they are.
+//!
 //! All signals, limits included, are deviations from the operating point, which is
 //! zero where the design states none. A sampled controller has the same terms (`sampled.rs`).
 //!
@@ -56,10 +65,11 @@ use aso_controller::design::{Design, SlidingMode};
 pub(crate) struct Equations<'a, D: Number> {
     design: D::In<'a, Design>,
     mode: Mode,
-    /// Numbers of states, faults and filters: the lengths of the first three parts of z.
+    /// Numbers of states, faults, filters and integrals: the lengths of the first four parts of z.
     states: usize,
     faults: usize,
     filters: usize,
+    integrals: usize,
 }
 
 /// The parts of z; `f_hat` is f_hat_i in a design with a direct term.
@@ -69,6 +79,7 @@ pub(crate) struct Estimate<'a, D: Number> {
     f_hat: D::In<'a, [f64]>,
     y_f: D::In<'a, [f64]>,
     x_i: D::In<'a, [f64]>,
+    u_t: D::In<'a, [f64]>,
 }
 
 /// The signals on the right-hand sides.
@@ -92,18 +103,21 @@ impl<'a, D: Number> Equations<'a, D> {
     pub(crate) fn new(design: D::In<'a, Design>, mode: Mode) -> Self {
         let Design { states, faults, filter, .. } = D::values(design);
         let filters = filter.as_ref().map_or(0, Vec::len);
-        Self { design, mode, states: states.len(), faults: faults.len(), filters }
+        let integrals = D::values(design).integrals();
+        Self { design, mode, states: states.len(), faults: faults.len(), filters, integrals }
     }
 
     /// z as its parts.
     #[inline]
     pub(crate) fn estimate(self, z: D::In<'_, [f64]>) -> Estimate<'_, D> {
         let faults = self.states..self.states + self.faults;
+        let integrals = faults.end + self.filters..faults.end + self.filters + self.integrals;
         Estimate {
             x_hat: D::part(z, |z| &z[..faults.start]),
             f_hat: D::part(z, |z| &z[faults.clone()]),
-            y_f: D::part(z, |z| &z[faults.end..faults.end + self.filters]),
-            x_i: D::part(z, |z| &z[faults.end + self.filters..]),
+            y_f: D::part(z, |z| &z[faults.end..integrals.start]),
+            x_i: D::part(z, |z| &z[integrals.clone()]),
+            u_t: D::part(z, |z| &z[integrals.end..]),
         }
     }
 
@@ -151,7 +165,7 @@ impl<'a, D: Number> Equations<'a, D> {
         for j in 0..D::values(D::read(signals)).u.len() {
             if !self.mode.is_limited(j) {
                 let Knowns { z, y, r, u, .. } = self.knowns(signals);
-                let u = self.free_command(j, z, [y, r]) + self.stuck_part(j, u);
+                let u = self.free_command(j, z, [y, r], self.stuck_part(j, u));
                 D::write(signals, |signals| &mut signals.u[j], u);
             }
         }
@@ -170,7 +184,7 @@ impl<'a, D: Number> Equations<'a, D> {
         observed - self.product(|design| design.c.row(k), x_hat)
     }
 
-    /// Element `j` of K_x x_hat + K_f f_hat + K_i x_i + N_r r, the second term while compensating; limits
+    /// Element `j` of K_x x_hat + K_f f_hat + K_i x_i + N_r r + `stuck` + u_t, the second term while compensating; limits
     /// ignored.
     #[inline]
     pub(crate) fn free_command(
@@ -178,6 +192,7 @@ impl<'a, D: Number> Equations<'a, D> {
         j: usize,
         z: Estimate<'_, D>,
         [y, r]: [D::In<'_, [f64]>; 2],
+        stuck: D,
     ) -> D {
         let gains = |design: &'a Design| self.mode.gains(design);
         let k_x = |design| gains(design).map_or_else(|| design.k_x.row(j), |gains| gains.k_x(j));
@@ -193,6 +208,10 @@ impl<'a, D: Number> Equations<'a, D> {
         }
         if n_r.is_some() {
             command += self.product(|design| row(design.n_r.as_ref(), j), r);
+        }
+        command += stuck;
+        if D::values(self.design).transfer.is_some() {
+            command += D::at(z.u_t, j);
         }
         command
     }
@@ -233,10 +252,10 @@ impl<'a, D: Number> Equations<'a, D> {
         k_s.fold(-D::zero(), |sum, (k_s, gone)| sum + k_s * D::at(u, gone))
     }
 
-    /// Computes z' = [A x_hat + B u + F_a f_hat + L_x e; A_f f_hat + L_f e; W (y - D u - y_f); x_i'], the second
-    /// part 0 unless estimating.
+    /// Computes z' = [A x_hat + B u + F_a f_hat + L_x e; A_f f_hat + L_f e; W (y - D u - y_f); x_i'; -w u_t], the
+    /// second part 0 unless estimating.
     pub(crate) fn set_slopes(self, knowns: Knowns<'_, D>, z_slopes: &mut D::Out<'_, [f64]>) {
-        let Knowns { z: Estimate { x_hat, f_hat, y_f, .. }, y, e, u, .. } = knowns;
+        let Knowns { z: Estimate { x_hat, f_hat, y_f, u_t, .. }, y, e, u, .. } = knowns;
         let design = |matrix: fn(&Design) -> &Matrix| D::part(self.design, matrix);
         for i in 0..self.states {
             // -0 + x has the bits of x.
@@ -270,9 +289,14 @@ impl<'a, D: Number> Equations<'a, D> {
             D::write(z_slopes, |z_slopes| &mut z_slopes[self.states + self.faults + k], slope);
         }
         let first = self.states + self.faults + self.filters;
-        for i in 0..D::values(self.design).integrals() {
+        for i in 0..self.integrals {
             let slope = self.integral_slope(i, knowns);
             D::write(z_slopes, |z_slopes| &mut z_slopes[first + i], slope);
+        }
+        let decay = D::values(self.design).transfer.unwrap_or_default();
+        for (j, u_t) in D::list(u_t).enumerate() {
+            let slope = -(u_t * decay);
+            D::write(z_slopes, |z_slopes| &mut z_slopes[first + self.integrals + j], slope);
         }
     }
 
@@ -288,7 +312,8 @@ impl<'a, D: Number> Equations<'a, D> {
         if l_w.is_some() {
             let gains = D::part(self.design, |design| row(design.l_w.as_ref(), i));
             for j in (0..actuators.len()).filter(|j| self.mode.is_limited(*j)) {
-                slope += D::at(gains, j) * (D::at(u, j) - self.free_command(j, z, [y, r]));
+                let free = self.free_command(j, z, [y, r], -D::zero());
+                slope += D::at(gains, j) * (D::at(u, j) - free);
             }
         }
         slope
@@ -355,10 +380,8 @@ impl Mode {
         let equations = Equations::<f64>::new(design, mode);
         for (j, actuator) in design.actuators.iter().enumerate() {
             if let Some([low, high]) = actuator.range().filter(|_| !self.is_gone(j)) {
-                let mut command = equations.free_command(j, equations.estimate(z), inputs);
-                if self.gone != 0 {
-                    command += self.stuck_part(design, j);
-                }
+                let stuck = if self.gone != 0 { self.stuck_part(design, j) } else { -0.0 };
+                let command = equations.free_command(j, equations.estimate(z), inputs, stuck);
                 mode.lower |= u64::from(command < low) << j;
                 mode.upper |= u64::from(command > high) << j;
             }

@@ -16,6 +16,7 @@ mod reconfiguration;
 mod sampled;
 mod shared;
 mod signals;
+mod transfer;
 mod validity;
 
 pub use controller::AsoController;

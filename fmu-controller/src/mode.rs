@@ -21,7 +21,22 @@ pub(crate) struct Mode {
     fallen_back: bool,
 }
 
+/// Which law the commands follow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Law {
+    compensating: bool,
+    gone: u64,
+    fallen_back: bool,
+}
+
 impl Mode {
+    /// The law of the commands that are not at a limit.
+    pub(crate) fn law(self, design: &Design) -> Law {
+        let Self { compensating, gone, fallen_back, .. } = self;
+        let compensates = design.fallback.as_ref().is_none_or(|fallback| fallback.k_f.is_some());
+        Law { compensating: compensating && (compensates || !fallen_back), gone, fallen_back }
+    }
+
     /// The mode with no channel at a limit.
     pub(crate) fn free(compensating: bool, estimating: bool) -> Self {
         Self { compensating, estimating, lower: 0, upper: 0, gone: 0, fallen_back: false }

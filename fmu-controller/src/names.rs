@@ -16,16 +16,22 @@ pub(crate) fn integrals(design: &Design) -> std::vec::IntoIter<String> {
     channels("x_i", design.integrals())
 }
 
+/// `u_t`, what is left in the commands since their law changed, where the design has a transfer.
+pub(crate) fn transfers(design: &Design) -> std::vec::IntoIter<String> {
+    channels("u_t", design.transfers())
+}
+
 /// `f_hat`, or `f_hat_i` in a design with a direct term: the part of z that estimates the faults.
 pub(crate) fn fault_states(design: &Design) -> std::vec::IntoIter<String> {
     let name = if design.p_f.is_some() { "f_hat_i" } else { "f_hat" };
     channels(name, design.faults.len())
 }
 
-/// `x_hat`, `f_hat` (or `f_hat_i`), `y_f` and `x_i`: the continuous states, in the order of z.
+/// `x_hat`, `f_hat` (or `f_hat_i`), `y_f`, `x_i` and `u_t`: the continuous states, in the order of z.
 pub(crate) fn estimates(design: &Design) -> std::vec::IntoIter<String> {
     let x_hat = channels("x_hat", design.states.len());
-    let parts = [x_hat, fault_states(design), filtered(design), integrals(design)];
+    let parts =
+        [x_hat, fault_states(design), filtered(design), integrals(design), transfers(design)];
     parts.into_iter().flatten().collect::<Vec<_>>().into_iter()
 }
 

@@ -1,6 +1,6 @@
 //! The observer of a sampled controller, which acts at t_k = t_start + k T and holds u in between.
 //!
-//! With z = [x_hat; f_hat; y_f; x_i], e = y - C x_hat (with a filter, y_f - C x_hat), z[k|k-1] estimated
+//! With z = [x_hat; f_hat; y_f; x_i; u_t], e = y - C x_hat (with a filter, y_f - C x_hat), z[k|k-1] estimated
 //! from the measurements before sample k, and the matrices of the sampled plant,
 //!
 //! ```text
@@ -13,9 +13,10 @@
 //!              f_hat[k+1|k] = A_f f_hat[k|k-1] + L_f e[k]
 //! both:        y_f[k+1] = y_f[k] + W (y[k] - y_f[k])
 //!              x_i[k+1] = x_i[k] + T (r[k] - H y[k] + F_i f_hat) + L_w (u[k] - free command)
+//!              u_t[k+1] = u_t[k] - w u_t[k]
 //! ```
 //!
-//! with K_i x_i[k] + N_r r[k] in u[k], and f_hat in x_i[k+1] the one that u[k] uses: the terms of
+//! with K_i x_i[k] + N_r r[k] + u_t[k] in u[k], and f_hat in x_i[k+1] the one that u[k] uses: the terms of
 //! `equations.rs` for references. f_hat only while estimating, K_f f_hat only while compensating, u within its limits. A design
 //! without A_f has A_f = I. In a design with a direct term P_f, z has f_hat_i in place of f_hat, and
 //! f_hat[k] = f_hat_i + P_f (y[k] - C x_hat) with the estimates that u[k] uses. A sliding-mode law has
@@ -128,6 +129,7 @@ impl Sampler {
         if self.estimator == Estimator::Current {
             values.set_estimate(&signals.z[..design.filtered_at(0)], point);
         }
+        values.transfer(design, mode, point, signals);
         let mode = mode.limited(design, &signals.z, [&signals.y, &signals.r]);
         mode.set_limited(design, &mut signals.u);
         let equations = Equations::<f64>::new(design, mode);

@@ -2,13 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::mode::Mode;
+use crate::mode::{Law, Mode};
 use aso_controller::design::{Design, Signal};
 
 /// The signals as the importer sees them.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Values {
-    /// z = [x_hat; f_hat; y_f; x_i].
+    /// z = [x_hat; f_hat; y_f; x_i; u_t].
     pub(crate) z: Vec<f64>,
     /// The measurements, and their derivatives with respect to time.
     pub(crate) y: Vec<f64>,
@@ -18,22 +18,24 @@ pub(crate) struct Values {
     pub(crate) r_slopes: Vec<f64>,
     /// The commands.
     pub(crate) u: Vec<f64>,
+    /// The law that they follow; `None` before the first ones and at rest.
+    pub(crate) law: Option<Law>,
 }
 
 /// The operating point: zero where the design states none.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct OperatingPoint {
-    /// [x_op; 0; y_op; 0], the last parts where the design has a filter and integrals.
+    /// [x_op; 0; y_op; 0; 0], the last parts where the design has a filter, integrals and a transfer.
     pub(crate) z: Vec<f64>,
     y: Vec<f64>,
     pub(crate) r: Vec<f64>,
-    u: Vec<f64>,
+    pub(crate) u: Vec<f64>,
 }
 
 /// The signals of the equations: deviations from the operating point, or a direction in them.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Signals {
-    /// z = [x_hat; f_hat; y_f; x_i].
+    /// z = [x_hat; f_hat; y_f; x_i; u_t].
     pub(crate) z: Vec<f64>,
     /// The measurements.
     pub(crate) y: Vec<f64>,
@@ -73,7 +75,7 @@ impl OperatingPoint {
                 *to = value;
             }
         };
-        let [x, _, y_f, _] = design.parts_mut(&mut self.z);
+        let [x, _, y_f, ..] = design.parts_mut(&mut self.z);
         read(x, &mut operating(&design.states));
         read(y_f, &mut measured(design));
         read(&mut self.y, &mut measured(design));
@@ -122,7 +124,7 @@ impl Signals {
                 *slope -= value;
             }
         };
-        let [x, _, y_f, _] = design.parts_mut(&mut self.z);
+        let [x, _, y_f, ..] = design.parts_mut(&mut self.z);
         less(x, &mut operating(&design.states));
         less(y_f, &mut measured(design));
         less(&mut self.y, &mut measured(design));
@@ -144,7 +146,7 @@ impl Values {
     /// All signals of `design`, zero.
     pub(crate) fn zero(design: &Design) -> Self {
         let Signals { z, y, r, u, .. } = Signals::zero(design);
-        Self { z, y_slopes: y.clone(), y, r_slopes: r.clone(), r, u }
+        Self { z, y_slopes: y.clone(), y, r_slopes: r.clone(), r, u, law: None }
     }
 
     /// Sets z, or its first parts, to the operating point plus the deviations `z`.
@@ -156,6 +158,7 @@ impl Values {
 
     /// Sets z to the operating point.
     pub(crate) fn rest(&mut self, point: &OperatingPoint) {
+        self.law = None;
         for (value, point) in self.z.iter_mut().zip(&point.z) {
             // As the sum of a deviation and the operating point.
             *value = 0.0 + point;

@@ -182,12 +182,18 @@ CASES = {
     "feedthrough-integral": Case(
         law(FEEDTHROUGH.replace("0.01\nfilter", "0.01\nestimator = 'current'\nfilter"), "proportional-integral"), 0.5, 1e-2
     ),
+    "transfer-reference": Case("transfer_time = 20.0\n" + TANKS["reference"], 6e-5, 1e-3),
+    "transfer-reconfiguration": Case(
+        vehicle('transfer_time = 0.5\nt_on = 3.0\nestimator = "prediction"\n') + VEHICLE_DETECTION, 20.0, 1e-3
+    ),
+    "transfer-schedule": Case("transfer_time = 0.7\nsample_time = 0.1\nt_on = 2.0\n" + DRIVE, 0.3, 1e-3),
     "constant-prediction": Case("sample_time = 1.0\nestimator = 'prediction'\n" + QUADRUPLE, 0.3, 1e-2),
 }
 HELD = {
     "held-detection": Case(held(TANKS["detection"]), 6e-5, 2e-3),
     "held-window": Case(held(windows("true")), 0.2, 2e-2),
     "held-reconfiguration": Case(held(vehicle("estimator = \"prediction\"\nmonitor = true\n") + VEHICLE_DETECTION), 1.0, 1e-3),
+    "held-transfer": Case(held(vehicle("transfer_time = 0.5\nt_on = 3.0\n")), 1.0, 1e-3),
     "held-schedule": Case(held("sample_time = 0.1\nt_on = 2.0\n" + DRIVE), 0.3, 1e-3),
     "held-schedule-by-measurement": Case(held(measured(TANKS["schedule"])), 6e-5, 1e-3),
     "held-feedthrough": Case(held(CASES["feedthrough-integral"].text), 0.5, 1e-2),

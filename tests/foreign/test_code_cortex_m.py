@@ -75,7 +75,7 @@ def test_the_crate_is_built_for_a_cortex_m_and_nothing_in_it_panics(aso_ftc, tmp
 @pytest.mark.skipif(not all(TOOLS), reason="no Cortex-M: gcc-arm-none-eabi, qemu-system-arm")
 @pytest.mark.parametrize(
     "name",
-    ["reference", "scheduled-drive", "scheduled-by-measurement", "detection-cusum", "fall-back-alone", "reconfiguration-detection",
+    ["reference", "scheduled-drive", "scheduled-by-measurement", "detection-cusum", "fall-back-alone", "transfer-reconfiguration",
      "proportional-integral-sensor", "fast-adaptive-schedule", "sliding-mode-detection", "feedthrough"],
 )  # fmt: skip
 def test_no_sample_has_more_operations_than_the_header_states(aso_ftc, packed, tmp_path, name):

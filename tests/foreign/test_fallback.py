@@ -62,8 +62,9 @@ def masses(aso_ftc, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def sampled(aso_ftc, tmp_path_factory):
-    return with_fmu(aso_ftc, tmp_path_factory.mktemp("sampled"), SAMPLED)
+def sampled(aso_ftc, tmp_path_factory, transfer_time):
+    text = SAMPLED if transfer_time is None else f"transfer_time = {transfer_time}\n{SAMPLED}"
+    return with_fmu(aso_ftc, tmp_path_factory.mktemp("sampled"), text)
 
 
 def matrix(design, name):
@@ -314,8 +315,10 @@ def test_without_two_forces_the_others_have_the_effect_of_all(masses, tmp_path, 
 
 
 @pytest.mark.parametrize("case", ["single", "several", "fall-back"])
-def test_a_sampled_controller_has_the_gains_of_its_case(sampled, tmp_path, case):
-    """u[k] = K_x x_hat + K_f f_hat + K_s u_s with the current estimator of the design file, sample by sample."""
+@pytest.mark.parametrize("transfer_time", [None, 0.4], scope="module")
+def test_a_sampled_controller_has_the_gains_of_its_case(sampled, transfer_time, tmp_path, case):
+    """u[k] = K_x x_hat + K_f f_hat + K_s u_s with the current estimator of the design file, sample by sample. With a
+    transfer the free commands stay at the switch, and their distance from the law decays with its time constant."""
     design, _, fmu = sampled
     run = Run(design, fmu, tmp_path, 0.05)
     a, b, c, f_a = (matrix(design, name) for name in ("A", "B", "C", "F_a"))
@@ -327,6 +330,7 @@ def test_a_sampled_controller_has_the_gains_of_its_case(sampled, tmp_path, case)
         assert gains["gone"] == ["a", "c"]
     held = np.array([0.5, 0, -0.3, 0])[stuck] - run.operating[stuck]
     x, x_hat, f_hat, u = np.array([0.2, -0.1, 0.0, 0.0]), np.zeros(4), np.zeros(1), np.zeros(4)
+    last, left = np.zeros(4), np.zeros(4)
     for k in range(120):
         switched = k >= 20
         if k == 20:
@@ -345,6 +349,10 @@ def test_a_sampled_controller_has_the_gains_of_its_case(sampled, tmp_path, case)
         u = matrix(own, "K_x") @ x_hat + k_f @ f_hat
         if switched and stuck:
             u += np.reshape(matrix(own, "K_s"), (4, -1)) @ held
+        if transfer_time is not None:
+            left = last - u if k == 20 else np.exp(-0.05 / transfer_time) * left
+            u, last = u + left, u + left
+        if switched and stuck:
             u[stuck] = held
         assert abs(run.get(*run.actuators) - run.operating - u).max() < 1e-9, k
         x = a @ x + b @ u

@@ -8,11 +8,12 @@
  * sample k is
  *
  *     e      = y - C x_hat                                 the innovation; with a filter y_f - C x_hat
- *     u      = K_x x_hat + K_f f_hat + K_i x_i + N_r r     K_f f_hat while compensating
+ *     u      = K_x x_hat + K_f f_hat + K_i x_i + N_r r + u_t     K_f f_hat while compensating
  *     x_hat' = A x_hat + B u + F_a f_hat + L_x e           the estimate for sample k + 1
  *     f_hat' = A_f f_hat + L_f e                           while estimating, else f_hat
  *     y_f'   = y_f + W (y - y_f)
  *     x_i'   = x_i + T (r - H y + F_i f_hat) + L_w (u - v) v is u without limits
+ *     u_t'   = u_t - w u_t                                 when the law changes, u_t = u before - u
  *
  * (R. J. Patton and S. Klinkhieo, An Adaptive Approach to Active Fault-Tolerant Control, 2009, equations (2), (4), (5),
  * (18), in their general form.)
@@ -26,8 +27,9 @@
  *
  * Macros that a design defines, sizes: ASO_STATES, ASO_FAULTS, ASO_ACTUATORS, ASO_MEASUREMENTS, and with the part that
  * has them ASO_REFERENCES, ASO_POINTS, ASO_RESIDUAL_STATES, ASO_RESIDUALS, ASO_TESTS, ASO_SUSPECTS, ASO_GAIN_SETS,
- * ASO_CASES, ASO_LOSSES. Numbers: ASO_SAMPLE_TIME, ASO_LARGEST (the largest number of aso_real), ASO_FIRST_COMPENSATED,
- * ASO_FIRST_TESTED, ASO_LAST_COUNTED, ASO_REGULAR_SETS. ASO_THETA is the member of aso_State with the scheduling variable.
+ * ASO_CASES, ASO_LOSSES. Numbers: ASO_SAMPLE_TIME, ASO_TRANSFER (w), ASO_LARGEST (the largest number of aso_real),
+ * ASO_FIRST_COMPENSATED, ASO_FIRST_TESTED, ASO_LAST_COUNTED, ASO_REGULAR_SETS. ASO_THETA is the member of aso_State with the
+ * scheduling variable.
  * Switches, 1 or 0: those after #if below. Types: aso_real, aso_State.
  */
 
@@ -96,6 +98,9 @@ typedef struct
 #endif
 #if ASO_HAS_BACK_CALCULATION
     aso_real v[ASO_ACTUATORS]; /* u without limits */
+#endif
+#if ASO_HAS_TRANSFER
+    aso_real next_u_t[ASO_ACTUATORS];
 #endif
 #if ASO_HAS_DETECTION
     aso_real next_residual[ASO_RESIDUALS];
@@ -796,6 +801,87 @@ static void clear_holds(aso_State *state)
 }
 #endif
 
+#if ASO_HAS_TRANSFER
+/* Nothing is left in the commands, and the next ones have no law before them. */
+static void forget_law(aso_State *state)
+{
+    clear(state->u_t, ASO_ACTUATORS);
+    state->law = 0U;
+}
+
+/* The number of the law of the commands. */
+static uint32_t law_of(bool compensating)
+{
+    return compensating ? 2U : 1U;
+}
+
+/* Whether the commands of this sample follow another law than those before. */
+static bool is_other_law(const aso_State *state, bool compensating)
+{
+    bool other = state->law != law_of(compensating);
+#if ASO_HAS_RECONFIGURATION
+    uint32_t i;
+
+    other = other || (state->last_set != state->set);
+    for (i = 0U; i < ASO_ACTUATORS; i++)
+    {
+        if (state->was_gone[i] != state->gone[i])
+        {
+            other = true;
+        }
+    }
+#endif
+    return other && (state->law != 0U);
+}
+
+/* Keeps the law of the commands of this sample. */
+static void keep_law(aso_State *state, bool compensating)
+{
+    state->law = law_of(compensating);
+#if ASO_HAS_RECONFIGURATION
+    {
+        uint32_t i;
+
+        state->last_set = state->set;
+        for (i = 0U; i < ASO_ACTUATORS; i++)
+        {
+            state->was_gone[i] = state->gone[i];
+        }
+    }
+#endif
+}
+
+/* u = u + u_t, u_t' = u_t - w u_t. When the law changes, u_t is the distance of the command from that of the last sample. An
+ * actuator that is gone has none. */
+static void transfer_commands(const aso_State *state, aso_Sample *sample, bool compensating)
+{
+    const bool other = is_other_law(state, compensating);
+    uint32_t i;
+
+    for (i = 0U; i < ASO_ACTUATORS; i++)
+    {
+#if ASO_HAS_RECONFIGURATION
+        const bool is_free = !state->gone[i];
+#else
+        const bool is_free = true;
+#endif
+
+        sample->next_u_t[i] = ASO_ZERO;
+        if (is_free)
+        {
+            const aso_real u_t = other ? (state->u[i] - sample->command[i]) : state->u_t[i];
+
+            sample->u[i] = sample->u[i] + u_t;
+            sample->command[i] = sample->u[i] + ASO_FOLLOWING(sample, u_op)[i];
+            sample->next_u_t[i] = (-(ASO_TRANSFER * u_t)) + u_t;
+        }
+#if ASO_HAS_BACK_CALCULATION
+        sample->v[i] = sample->u[i];
+#endif
+    }
+}
+#endif
+
 /* Starts at these estimates of states and faults. */
 static void aso_start(aso_State *state, const aso_real x_hat_0[ASO_STATES], const aso_real f_hat_0[ASO_FAULTS])
 {
@@ -815,6 +901,9 @@ static void aso_start(aso_State *state, const aso_real x_hat_0[ASO_STATES], cons
 #endif
 #if ASO_HAS_INTEGRALS
     clear(state->x_i, ASO_REFERENCES);
+#endif
+#if ASO_HAS_TRANSFER
+    forget_law(state);
 #endif
 #if ASO_HAS_SCHEDULE_INPUT
     state->theta = theta_start;
@@ -1185,6 +1274,9 @@ static bool predict(const aso_State *state, aso_Sample *sample, bool estimating)
 #if ASO_HAS_FEEDTHROUGH
     finite = are_finite(sample->u, ASO_ACTUATORS) && finite;
 #endif
+#if ASO_HAS_TRANSFER
+    finite = are_finite(sample->next_u_t, ASO_ACTUATORS) && finite;
+#endif
 #if ASO_HAS_DETECTION
     finite = compute_residuals(state, sample) && finite;
 #endif
@@ -1209,6 +1301,9 @@ static void keep(aso_State *state, const aso_Sample *sample, bool detection_rese
         state->u[i] = sample->command[i];
 #if ASO_HAS_FEEDTHROUGH
         state->u_before[i] = sample->u[i];
+#endif
+#if ASO_HAS_TRANSFER
+        state->u_t[i] = sample->next_u_t[i];
 #endif
     }
 #if ASO_HAS_FILTER
@@ -1320,6 +1415,9 @@ static void rest(aso_State *state, aso_Sample *sample)
     clear(sample->x_i_value, ASO_REFERENCES);
     clear(state->x_i, ASO_REFERENCES);
 #endif
+#if ASO_HAS_TRANSFER
+    forget_law(state);
+#endif
 #if ASO_HAS_DETECTION
     clear(state->x_r, ASO_RESIDUAL_STATES);
     clear(state->residual, ASO_RESIDUALS);
@@ -1360,6 +1458,9 @@ static uint32_t control(aso_State *state, aso_Sample *sample, bool compensate, b
     compute_deviations(state, sample);
     finite = estimate(state, sample, estimating);
     compute_commands(state, sample, compensating);
+#if ASO_HAS_TRANSFER
+    transfer_commands(state, sample, compensating);
+#endif
     finite = are_finite(sample->command, ASO_ACTUATORS) && finite;
 #if ASO_HAS_LIMITS
     if (limit_commands(state, sample))
@@ -1371,6 +1472,9 @@ static uint32_t control(aso_State *state, aso_Sample *sample, bool compensate, b
     if (finite)
     {
         keep(state, sample, detection_reset);
+#if ASO_HAS_TRANSFER
+        keep_law(state, compensating);
+#endif
     }
     else
     {

@@ -172,6 +172,7 @@ fn take_sample(controller: &Controller) {
             Counted.is_above(&Counted);
         }
     }
+    signals.transfer(&design, &state, true, &[]);
     let is_finite = signals.are_values_finite();
     signals.limit(&design, &[]);
     signals.predict(&design, &state, true);
@@ -243,6 +244,12 @@ impl Memory {
             stored += cases;
             counters += cases + 2;
             flags += Kind::Actuator.count(controller) + 2 * cases;
+        }
+        if controller.transfer.is_some() {
+            // The last law: whether it compensates, its set of gains, the actuators that are gone.
+            let is_reconfigurable = controller.reconfiguration.is_some();
+            counters += 1 + usize::from(is_reconfigurable);
+            flags += if is_reconfigurable { Kind::Actuator.count(controller) } else { 0 };
         }
         let losses = controller.losses.len();
         let detection = [Kind::ResidualState, Kind::Residual].map(|kind| kind.count(controller));

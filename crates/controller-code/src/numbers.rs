@@ -13,6 +13,8 @@ pub(super) struct Numbers<N> {
     /// The matrices that the controller states.
     matrices: Vec<Entries<N>>,
     filter: Vec<N>,
+    /// w of `u_t`.
+    transfer: Vec<N>,
     /// rho and delta.
     bounds: [Vec<N>; 2],
     /// The operating point: states, commands, measurements, references.
@@ -59,6 +61,7 @@ impl<N: Number> Numbers<N> {
             sample_time: constant(controller.sample_time),
             matrices: Matrix::ALL.into_iter().filter_map(entries).collect(),
             filter: list(controller.filter.as_deref().unwrap_or_default()),
+            transfer: list(controller.transfer.as_slice()),
             bounds: [bounds.map(|law| &law.rho), bounds.map(|law| &law.delta)]
                 .map(|values| values.map_or_else(Vec::new, |values| list(values))),
             point: signals
@@ -104,6 +107,7 @@ impl<N: Number> Numbers<N> {
             l_w: self.matrix(Matrix::LW),
             n_r: self.matrix(Matrix::NR),
             filter: &self.filter,
+            transfer: &self.transfer,
             rho,
             delta,
             x_op,
@@ -126,7 +130,7 @@ impl<N: Number> Numbers<N> {
 }
 
 /// The vectors of `sample::Signals` in their order.
-pub(super) const SIGNALS: [Vector; 16] = [
+pub(super) const SIGNALS: [Vector; 17] = [
     Vector::Y,
     Vector::YF,
     Vector::R,
@@ -143,10 +147,11 @@ pub(super) const SIGNALS: [Vector; 16] = [
     Vector::NextFHat,
     Vector::NextYF,
     Vector::NextXI,
+    Vector::NextUT,
 ];
 
 /// The vectors of a sample.
-pub(super) struct Vectors<N>([Vec<N>; 16]);
+pub(super) struct Vectors<N>([Vec<N>; 17]);
 
 impl<N: Number> Vectors<N> {
     /// All of them zero.
@@ -172,6 +177,7 @@ impl<N: Number> Vectors<N> {
             next_f_hat,
             next_y_f,
             next_x_i,
+            next_u_t,
         ] = &mut self.0;
         Signals {
             y,
@@ -190,6 +196,7 @@ impl<N: Number> Vectors<N> {
             next_f_hat,
             next_y_f,
             next_x_i,
+            next_u_t,
         }
     }
 
@@ -202,8 +209,8 @@ impl<N: Number> Vectors<N> {
 
 /// What a sample knows from those before it, and its inputs.
 pub(super) struct Memory<N> {
-    /// `x_hat`, `f_hat`, `y_f`, `x_i`, `u_before`, u.
-    stored: [Vec<N>; 6],
+    /// `x_hat`, `f_hat`, `y_f`, `x_i`, `u_t`, `u_before`, u.
+    stored: [Vec<N>; 7],
     /// y and r.
     inputs: [Vec<N>; 2],
 }
@@ -212,16 +219,17 @@ impl<N: Number> Memory<N> {
     /// The numbers of each vector.
     pub(super) fn of(mut numbers: impl FnMut(Vector) -> Vec<N>) -> Self {
         use Vector::{
-            Command, Measured, Referred, StoredFHat, StoredU, StoredXHat, StoredXI, StoredYF,
+            Command, Measured, Referred, StoredFHat, StoredU, StoredUT, StoredXHat, StoredXI,
+            StoredYF,
         };
-        let stored = [StoredXHat, StoredFHat, StoredYF, StoredXI, StoredU, Command];
+        let stored = [StoredXHat, StoredFHat, StoredYF, StoredXI, StoredUT, StoredU, Command];
         Self { stored: stored.map(&mut numbers), inputs: [Measured, Referred].map(numbers) }
     }
 
     pub(super) fn state(&mut self) -> State<'_, N> {
-        let [x_hat, f_hat, y_f, x_i, u_before, u] = &mut self.stored;
+        let [x_hat, f_hat, y_f, x_i, u_t, u_before, u] = &mut self.stored;
         let [y, r] = &self.inputs;
-        State { x_hat, f_hat, y_f, x_i, u_before, u, y, r }
+        State { x_hat, f_hat, y_f, x_i, u_t, u_before, u, y, r }
     }
 }
 
@@ -232,6 +240,7 @@ impl Vector {
             Self::YF | Self::NextYF | Self::StoredYF => controller.filter.is_some(),
             Self::Excess => controller.l_w.is_some(),
             Self::StoredU => controller.d.is_some(),
+            Self::StoredUT | Self::NextUT => controller.transfer.is_some(),
             _ => true,
         };
         if is_stated { self.kind().count(controller) } else { 0 }

@@ -129,6 +129,10 @@ impl Source<'_> {
             let first = controller.first_compensated;
             lines.push(format!("const FIRST_COMPENSATED: u32 = {first};"));
         }
+        if let Some(transfer) = controller.transfer {
+            lines.push("/// The part of what a change of the law left in the commands that goes in a sample.".to_owned());
+            lines.push(format!("const TRANSFER: {real} = {};", self.literal(transfer)));
+        }
         if let Some(detection) = &controller.detection {
             lines.push("/// The first sample whose residuals are tested.".to_owned());
             lines.push(format!("const FIRST_TESTED: u32 = {};", detection.first_tested));

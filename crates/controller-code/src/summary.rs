@@ -192,6 +192,12 @@ fn modes(controller: &Controller) -> Vec<String> {
                     that no estimate winds up.";
         all.push(text.to_owned());
     }
+    if let Some(transfer) = controller.transfer {
+        all.push(format!(
+            "When the law of the commands changes (compensation, gains), each command stays where it is and approaches \
+             the new law: the distance u_t at this sample is added to it, and u_t := u_t - {transfer:?} u_t."
+        ));
+    }
     if controller.h.is_some() {
         let text = "The integrals x_i of the distances of the measurements from their references start at 0; \
                     while a command is at a limit, they follow the limited command (L_w).";

@@ -18,6 +18,8 @@ pub(super) enum Vector {
     StoredResidual,
     /// The commands of the sample before as deviations, for measurements that contain them.
     StoredU,
+    /// What is left in the commands since their law changed.
+    StoredUT,
     /// The operating point.
     XOp,
     UOp,
@@ -46,6 +48,7 @@ pub(super) enum Vector {
     NextFHat,
     NextYF,
     NextXI,
+    NextUT,
     /// The residuals of this sample, and the state of their filter for the next one.
     Residual,
     NextXR,
@@ -145,6 +148,7 @@ impl Vector {
             Self::StoredYF | Self::YF => "y_f",
             Self::Measured | Self::Y => "y",
             Self::StoredU => "u_before",
+            Self::StoredUT => "u_t",
             Self::XOp => "x_op",
             Self::UOp => "u_op",
             Self::YOp => "y_op",
@@ -161,6 +165,7 @@ impl Vector {
             Self::ROp => "r_op",
             Self::Excess => "excess",
             Self::NextXI => "next_x_i",
+            Self::NextUT => "next_u_t",
             Self::StoredXR => "x_r",
             Self::StoredResidual => "residual",
             Self::Residual => "next_residual",
@@ -180,7 +185,13 @@ impl Vector {
             | Self::S
             | Self::FValue
             | Self::NextFHat => Kind::Fault,
-            Self::StoredU | Self::UOp | Self::U | Self::Excess | Self::Command => Kind::Actuator,
+            Self::StoredU
+            | Self::StoredUT
+            | Self::UOp
+            | Self::U
+            | Self::Excess
+            | Self::Command
+            | Self::NextUT => Kind::Actuator,
             Self::Referred | Self::ROp | Self::R => Kind::Reference,
             Self::StoredXI | Self::NextXI => Kind::Integral,
             Self::StoredXR | Self::NextXR => Kind::ResidualState,

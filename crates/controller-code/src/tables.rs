@@ -16,6 +16,7 @@ pub(super) fn stored(controller: &Controller) -> Vec<Vector> {
     all.extend((!controller.references.is_empty()).then_some(Vector::Referred));
     all.extend(controller.h.is_some().then_some(Vector::StoredXI));
     all.extend(controller.d.is_some().then_some(Vector::StoredU));
+    all.extend(controller.transfer.is_some().then_some(Vector::StoredUT));
     if controller.detection.is_some() {
         all.extend(detection::STORED);
     }

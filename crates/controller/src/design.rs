@@ -91,6 +91,10 @@ pub struct Design {
     /// N_r, m x t: the feedforward of the references.
     #[serde(rename = "N_r", default)]
     pub n_r: Option<Matrix>,
+    /// The decay of u_t, which keeps the commands where they are when the law changes: u_t' = -transfer u_t, in 1/s; of
+    /// a sampled controller the part that goes in a sample. Without it the commands jump.
+    #[serde(default)]
+    pub transfer: Option<f64>,
     /// The n states.
     pub states: Vec<Signal>,
     /// The m actuators.
@@ -314,18 +318,31 @@ impl Design {
         self.k_i.as_ref().map_or(0, |k_i| k_i.columns)
     }
 
+    /// The position of u_t of command `j` in z.
+    #[must_use]
+    pub fn transfer_at(&self, j: usize) -> usize {
+        self.integral_at(self.integrals()) + j
+    }
+
+    /// The number of elements of u_t: one for each actuator, or none.
+    #[must_use]
+    pub fn transfers(&self) -> usize {
+        self.transfer.map_or(0, |_| self.actuators.len())
+    }
+
     /// The length of z.
     #[must_use]
     pub fn order(&self) -> usize {
-        self.integral_at(self.integrals())
+        self.transfer_at(self.transfers())
     }
 
-    /// x_hat, f_hat, y_f and x_i of z.
-    pub fn parts_mut<'a>(&self, z: &'a mut [f64]) -> [&'a mut [f64]; 4] {
+    /// x_hat, f_hat, y_f, x_i and u_t of z.
+    pub fn parts_mut<'a>(&self, z: &'a mut [f64]) -> [&'a mut [f64]; 5] {
+        let (z, u_t) = z.split_at_mut(self.transfer_at(0));
         let (z, x_i) = z.split_at_mut(self.integral_at(0));
         let (x_hat, rest) = z.split_at_mut(self.states.len());
         let (f_hat, y_f) = rest.split_at_mut(self.faults.len());
-        [x_hat, f_hat, y_f, x_i]
+        [x_hat, f_hat, y_f, x_i, u_t]
     }
 
     /// The matrices by the name that the file and the variables have; those from A_f on only where they

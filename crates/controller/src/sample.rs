@@ -6,11 +6,12 @@
 //! ```text
 //! e      = y - C x_hat                                 the innovation; with a filter y_f - C x_hat
 //! f_hat  = f_hat_i + P_f e                             while estimating, else f_hat_i
-//! u      = K_x x_hat + K_f f_hat + K_i x_i + N_r r     K_f f_hat while compensating
+//! u      = K_x x_hat + K_f f_hat + K_i x_i + N_r r + u_t     K_f f_hat while compensating
 //! x_hat' = A x_hat + B u + F_a f_hat_i + L_x e         the estimate for sample k + 1
 //! f_hat_i' = A_f f_hat_i + L_f e                       while estimating, else f_hat_i
 //! y_f'   = W (y - y_f) + y_f
 //! x_i'   = T (r - H y + F_i f_hat) + L_w (u - v) + x_i v is u without limits
+//! u_t'   = u_t - w u_t                                 when the law changes, u_t = u before - u
 //! ```
 //!
 //! (R. J. Patton and S. Klinkhieo, An Adaptive Approach to Active Fault-Tolerant Control, 2009, equations (2), (4), (5),
@@ -72,6 +73,8 @@ pub struct Design<'a, N> {
     pub n_r: Matrix<'a, N>,
     /// The diagonal of W, p numbers.
     pub filter: &'a [N],
+    /// w, one number.
+    pub transfer: &'a [N],
     /// The bounds of a sliding-mode law, q numbers.
     pub rho: &'a [N],
     /// The half-widths of its boundary layer, q numbers.
@@ -100,6 +103,8 @@ pub struct State<'a, N> {
     pub y_f: &'a mut [N],
     /// The integrals.
     pub x_i: &'a mut [N],
+    /// What is left in the commands since the law changed.
+    pub u_t: &'a mut [N],
     /// The commands of the sample before as deviations, of a design with D.
     pub u_before: &'a mut [N],
     /// The commands of the last sample.
@@ -144,6 +149,8 @@ pub struct Signals<'a, N> {
     pub next_y_f: &'a mut [N],
     /// The next integrals.
     pub next_x_i: &'a mut [N],
+    /// The next `u_t`.
+    pub next_u_t: &'a mut [N],
 }
 
 /// `target[i]` = `values[i]` - `points[i]`
@@ -273,6 +280,34 @@ impl<N: Number> Signals<'_, N> {
     pub fn set_command_values(&mut self, design: &Design<'_, N>) {
         copy(self.u, self.command);
         add(design.u_op, self.command);
+    }
+
+    /// u = u + `u_t`, `u_t`' = `u_t` - w `u_t`. When the law changes, `u_t` is the distance of the command from that of
+    /// the last sample. An actuator that is gone has none.
+    #[inline(always)]
+    pub fn transfer(
+        &mut self,
+        design: &Design<'_, N>,
+        state: &State<'_, N>,
+        is_other_law: bool,
+        gone: &[bool],
+    ) {
+        let Some(decay) = design.transfer.first() else { return };
+        let gone = gone.iter().copied().chain(core::iter::repeat(false));
+        let commands = self.u.iter_mut().zip(self.command.iter_mut());
+        let transfers = self.next_u_t.iter_mut().zip(state.u_t.iter()).zip(state.u.iter());
+        let transfers = transfers.zip(design.u_op).zip(gone);
+        for ((u, command), ((((next, u_t), before), u_op), gone)) in commands.zip(transfers) {
+            if gone {
+                *next = N::zero();
+                continue;
+            }
+            let u_t = if is_other_law { before.clone() - command.clone() } else { u_t.clone() };
+            *u = u.clone() + u_t.clone();
+            *command = u.clone() + u_op.clone();
+            *next = -(decay.clone() * u_t.clone()) + u_t;
+        }
+        copy(self.u, self.excess);
     }
 
     /// Keeps the commands within their limits; an actuator that is gone has none. Returns whether one is at a limit.
@@ -408,6 +443,7 @@ impl<N: Number> Signals<'_, N> {
         self.next_y_f.fill(N::zero());
         add(design.y_op, self.next_y_f);
         self.next_x_i.fill(N::zero());
+        self.next_u_t.fill(N::zero());
     }
 
     /// Whether commands and estimates are numbers.
@@ -424,6 +460,7 @@ impl<N: Number> Signals<'_, N> {
         let next = [&*self.next_x_hat, &*self.next_f_hat, &*self.next_y_f, &*self.next_x_i];
         let has_deviations = !state.u_before.is_empty();
         let is_finite = is_finite
+            && all_finite(self.next_u_t)
             && next.into_iter().all(all_finite)
             && (!has_deviations || all_finite(self.u));
         if is_finite {
@@ -431,6 +468,7 @@ impl<N: Number> Signals<'_, N> {
             copy(self.next_f_hat, state.f_hat);
             copy(self.next_y_f, state.y_f);
             copy(self.next_x_i, state.x_i);
+            copy(self.next_u_t, state.u_t);
             copy(self.u, state.u_before);
             copy(self.command, state.u);
         } else {

@@ -105,6 +105,7 @@ impl Designed {
                 .map(|action| matrix(&action.faults)),
             l_w: tracking.and_then(|tracking| tracking.windup()).map(matrix),
             n_r: tracking.and_then(|tracking| tracking.feedforward()).map(matrix),
+            transfer: file.transfer_time.map(|time| decay(time, sampled)),
             states,
             actuators: linear.actuators.iter().map(actuator).collect(),
             measurements: linear.measurements.iter().map(measurement).collect(),
@@ -129,6 +130,11 @@ impl Designed {
             detection: detection.cloned(),
         })
     }
+}
+
+/// The decay with a time constant, both in s: a rate in 1/s, in a sampled controller the part that goes in a sample.
+fn decay(time: f64, sample_time: Option<f64>) -> f64 {
+    sample_time.map_or(1.0 / time, |period| -(-period / time).exp_m1())
 }
 
 impl Solution {

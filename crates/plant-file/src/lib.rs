@@ -58,6 +58,8 @@ pub struct PlantFile<'a> {
     pub t_on: f64,
     /// Whether the faults are also estimated before the compensation starts.
     pub monitor: bool,
+    /// The time constant, s, with which commands approach a new law; without it they jump.
+    pub transfer_time: Option<f64>,
     /// The plant.
     pub model: Model,
     /// The commands.
@@ -113,10 +115,11 @@ pub struct Sampling {
     pub current: bool,
 }
 
-const KEYS: [&str; 35] = [
+const KEYS: [&str; 36] = [
     "description",
     "t_on",
     "monitor",
+    "transfer_time",
     "plant",
     "operating_point",
     "preload",
@@ -230,6 +233,7 @@ impl<'a> PlantFile<'a> {
             description: Some(description(file)?).filter(|text| !text.is_empty()),
             t_on: file.get("t_on").map_or(Ok(0.0), |entry| entry.number())?,
             monitor: file.get("monitor").map_or(Ok(false), |entry| entry.flag())?,
+            transfer_time: file.get("transfer_time").map(|entry| entry.positive()).transpose()?,
             filter: filter(file, &measurements, &faults)?,
             delay_order: delay_order(file, [&actuators, &measurements])?,
             feedback,

@@ -208,6 +208,7 @@ impl OwnVariables {
             &[("residual", None), ("statistic", None), ("threshold", None)],
         );
         add(file.faults.iter().any(lossy), &[("E_hat", q)]);
+        add(file.transfer_time.is_some(), &[("u_t", m)]);
         add(file.filter.is_some(), &[("y_f", p), ("filter", p)]);
         add(stated, &[("x_op", states), ("u_op", m), ("y_op", p)]);
         add(t.is_some(), &[("x_i", t), ("x_i_0", t), ("r_op", t)]);

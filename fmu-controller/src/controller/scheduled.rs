@@ -31,7 +31,7 @@ impl AsoController {
         );
         for (j, slope) in u_slopes.iter_mut().enumerate().filter(|(j, _)| !mode.is_limited(*j)) {
             let point = rates.actuators[j].operating.unwrap_or_default();
-            *slope = point + equations.free_command(j, z, inputs).eps;
+            *slope = point + equations.free_command(j, z, inputs, Dual64::from_re(-0.0)).eps;
         }
         for (i, slope) in f_slopes.iter_mut().enumerate() {
             *slope = equations.fault(i, z, inputs[0]).eps;

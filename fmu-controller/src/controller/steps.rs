@@ -44,13 +44,39 @@ impl AsoController {
         restarted
     }
 
+    /// Sets u_t if `mode` has another law than the last commands; see [`Values::transfer`].
+    pub(super) fn transfer(&mut self, mode: Mode) -> bool {
+        let Self { design, current, values, operating_point, deviations, .. } = self;
+        let design = current.as_deref().unwrap_or(design);
+        values.transfer(design, mode, operating_point, deviations)
+    }
+
+    /// The same within a step, for a law that compensates from `offset` s after its start on, or no longer: the last commands
+    /// are those of the deviations z by the law before.
+    fn transfer_at(&mut self, compensating: bool, offset: f64) {
+        let [before, after] = [!compensating, compensating].map(|on| self.free_mode(on));
+        let Self { design, values, operating_point, deviations, .. } = self;
+        if design.transfer.is_none() || values.law == Some(after.law(design)) {
+            return;
+        }
+        deviations.set_inputs(values, operating_point, offset);
+        let mode = before.limited(design, &deviations.z, [&deviations.y, &deviations.r]);
+        mode.set_limited(design, &mut deviations.u);
+        Equations::<f64>::new(design, mode).set_signals(&mut &mut *deviations);
+        values.set_commands(&deviations.u, design, mode, operating_point);
+        values.transfer(design, after, operating_point, deviations);
+        deviations.set_inputs(values, operating_point, 0.0);
+    }
+
     /// Sets the estimate to its initial value.
     pub(super) fn start(&mut self) {
-        let [x_hat, f_hat, y_f, x_i] = self.design.parts_mut(&mut self.values.z);
+        let [x_hat, f_hat, y_f, x_i, u_t] = self.design.parts_mut(&mut self.values.z);
         x_hat.copy_from_slice(&self.x_hat_0);
         f_hat.copy_from_slice(&self.f_hat_0);
         y_f.iter_mut().zip(&self.values.y).for_each(|(y_f, y)| *y_f = *y);
         x_i.copy_from_slice(&self.x_i_0);
+        u_t.fill(0.0);
+        self.values.law = None;
         self.deviations.u.fill(0.0);
         self.operating_point.read(&self.design);
     }
@@ -170,16 +196,20 @@ impl AsoController {
         }
         // z has its deviations from the step before, or from the start.
         self.deviations.set_inputs(&self.values, &self.operating_point, 0.0);
+        self.transfer(self.free_mode(!inside && self.is_compensating(step.start)));
         if inside {
             self.advance(false, step.start, Part { offset: 0.0, size: until_on })?;
+            self.transfer_at(true, until_on);
             let rest = Part { offset: until_on, size: step.size - until_on };
             self.advance(true, step.start, rest)?;
         } else {
             let whole = Part { offset: 0.0, size: step.size };
             self.advance(self.is_compensating(step.start), step.start, whole)?;
         }
+        let is_compensating = self.is_compensating(step.end());
+        self.transfer_at(is_compensating, step.size);
         self.values.set_estimate(&self.deviations.z, &self.operating_point);
-        self.mode = self.free_mode(self.is_compensating(step.end()));
+        self.mode = self.free_mode(is_compensating);
         self.evaluate(step.end(), step.size);
         Ok(())
     }
@@ -228,7 +258,8 @@ impl AsoController {
         let equations = Equations::<f64>::new(design, *mode);
         equations.set_slopes(equations.knowns(&deviations), &mut &mut z_slopes[..]);
         for (j, slope) in u_slopes.iter_mut().enumerate() {
-            let free = equations.free_command(j, equations.estimate(z_slopes), input_slopes);
+            let rates = equations.estimate(z_slopes);
+            let free = equations.free_command(j, rates, input_slopes, -0.0);
             *slope = if mode.is_limited(j) { 0.0 } else { free };
         }
         for (i, slope) in f_slopes.iter_mut().enumerate() {

@@ -13,6 +13,7 @@ mod oracle;
 mod refusals;
 mod sampled;
 mod sized;
+mod transfer;
 mod validity;
 
 /// The folder with the shipped design.

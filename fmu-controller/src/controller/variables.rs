@@ -254,8 +254,10 @@ fn states(design: &Design) -> Vec<State> {
     let filtered = filtered.map(|signal| ("Filtered value", signal.label()));
     let integrals = if design.k_i.is_some() { &design.references[..] } else { &[] };
     let integrals = integrals.iter().map(|signal| ("Integral", signal.label()));
+    let transfers = design.actuators.iter().take(design.transfers());
+    let transfers = transfers.map(|actuator| ("Bumpless transfer", actuator.label()));
     names::estimates(design)
-        .zip(estimates.chain(filtered).chain(integrals))
+        .zip(estimates.chain(filtered).chain(integrals).chain(transfers))
         .enumerate()
         .map(|(position, (name, (kind, Label { unit, meaning })))| {
             let derivative =
@@ -315,7 +317,7 @@ fn losses(controller: &AsoController) -> Vec<Variable<AsoController>> {
             let variable = Variable::real(name, text, move |model: &mut AsoController| {
                 &mut model.losses[position].estimate
             });
-            output(design, variable.unit("1"), dependencies::of_loss(design))
+            output(design, variable.unit("1"), dependencies::of_loss(design, loss))
                 .initially(dependencies::of_initial_loss(design, loss))
                 .derivative(move |model| &mut model.with_slopes().losses[position].slope)
         })

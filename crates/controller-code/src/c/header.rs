@@ -61,7 +61,18 @@ impl Source<'_> {
         if controller.counts_since_rest() {
             lines.push("    uint32_t running;".to_owned());
         }
+        let is_transferred = controller.transfer.is_some();
+        let is_reconfigurable = controller.reconfiguration.is_some();
+        if is_transferred {
+            lines.push("    uint32_t law;".to_owned());
+        }
+        if is_transferred && is_reconfigurable {
+            lines.push("    uint32_t last_set;".to_owned());
+        }
         self.reconfiguration_state(&mut lines, false);
+        if is_transferred && is_reconfigurable {
+            lines.push(format!("    bool was_gone[{}];", self.count(Kind::Actuator)));
+        }
         self.detection_state(&mut lines, false);
         if controller.filter.is_some() {
             lines.push("    bool started;".to_owned());

@@ -32,6 +32,9 @@ impl Source<'_> {
             set("LOSSES", format!("{losses}U"));
         }
         set("SAMPLE_TIME", format!("{capital}_SAMPLE_TIME"));
+        if let Some(transfer) = controller.transfer {
+            set("TRANSFER", self.literal(transfer));
+        }
         set("LARGEST", largest.to_owned());
         let first_compensated = controller.first_compensated;
         set("FIRST_COMPENSATED", format!("{first_compensated}U"));
@@ -62,7 +65,7 @@ impl Source<'_> {
         }
     }
 
-    fn switches(&self) -> [(&'static str, bool); 25] {
+    fn switches(&self) -> [(&'static str, bool); 26] {
         let controller = self.controller;
         let fallback = controller
             .reconfiguration
@@ -87,6 +90,7 @@ impl Source<'_> {
             ("HAS_SENSOR_FAULTS_IN_INTEGRALS", controller.f_i.is_some()),
             ("HAS_BACK_CALCULATION", controller.l_w.is_some()),
             ("HAS_FEEDFORWARD", controller.n_r.is_some()),
+            ("HAS_TRANSFER", controller.transfer.is_some()),
             ("HAS_LIMITS", controller.is_limited()),
             ("HAS_LOSSES", !controller.losses.is_empty()),
             ("HAS_SCHEDULE", controller.schedule.is_some()),

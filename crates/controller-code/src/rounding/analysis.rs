@@ -72,6 +72,7 @@ impl<'a> Analysis<'a> {
         // The measurements contain D times the commands of the sample before, which the controller takes off again:
         // what remains is D times the rounding of these commands as values.
         analysis.start(Vector::StoredU, |_| {});
+        analysis.start(Vector::StoredUT, |_| {});
         if controller.d.is_some() {
             let deviations = analysis.get(Vector::StoredU).numbers();
             let sums = deviations.into_iter().zip(analysis.get(Vector::UOp).numbers());

@@ -50,7 +50,17 @@ impl Source<'_> {
     /// All of these fields.
     pub(super) fn other_fields(&self) -> impl Iterator<Item = Field> {
         let of_tests = self.fields_of_tests().into_iter().chain(self.fields_of_reconfiguration());
-        of_tests.chain(self.fields_of_measurements())
+        of_tests.chain(self.fields_of_measurements()).chain(self.field_of_law())
+    }
+
+    /// The law of the last commands: whether it compensates, the actuators that are gone, the set of gains. `None` before the
+    /// first commands and at rest.
+    fn field_of_law(&self) -> Option<Field> {
+        let kind = match self.controller.reconfiguration {
+            None => "Option<bool>",
+            Some(_) => "Option<(bool, [bool; ACTUATORS], u32)>",
+        };
+        self.controller.transfer.map(|_| field("law", kind, "None"))
     }
 
     /// The fields of the choice of gains.

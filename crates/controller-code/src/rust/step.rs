@@ -143,6 +143,9 @@ impl Controller {{
             );
         }
         lines.push("            signals.keep(&mut state, true);".to_owned());
+        if controller.transfer.is_some() {
+            lines.push("            self.law = None;".to_owned());
+        }
         if controller.filter.is_some() {
             lines.push("            self.started = false;".to_owned());
         }
@@ -273,6 +276,7 @@ impl Controller {{
         let has_bounds = controller.sliding_mode.is_some();
         let mut vectors = vec![
             ("filter", stated("FILTER", controller.filter.is_some())),
+            ("transfer", stated("[TRANSFER]", controller.transfer.is_some())),
             ("rho", stated("RHO", has_bounds)),
             ("delta", stated("DELTA", has_bounds)),
         ];
@@ -316,6 +320,7 @@ impl Controller {{
             ("f_hat", true),
             ("y_f", controller.filter.is_some()),
             ("x_i", controller.h.is_some()),
+            ("u_t", controller.transfer.is_some()),
             ("u_before", controller.d.is_some()),
             ("u", true),
         ] {
@@ -350,6 +355,17 @@ impl Controller {{
         } else {
             "&[]"
         };
+        if controller.transfer.is_some() {
+            let law = match controller.reconfiguration {
+                None => "compensating",
+                Some(_) => "(compensating, self.gone, self.choice.set)",
+            };
+            lines.push(format!(
+                "        let law = Some({law});
+        let is_other_law = self.law.is_some() && self.law != law;
+        signals.transfer(&design, &state, is_other_law, {gone});"
+            ));
+        }
         lines.push(format!(
             "        let is_finite = signals.are_values_finite();
         status.at_limit = signals.limit(&design, {gone});
@@ -364,6 +380,9 @@ impl Controller {{
             ));
         }
         lines.push("        if signals.keep(&mut state, is_finite) {".to_owned());
+        if controller.transfer.is_some() {
+            lines.push("            self.law = law;".to_owned());
+        }
         if controller.detection.is_some() {
             lines.push(format!(
                 "            (self.x_r, self.residual) = (x_r, residual);

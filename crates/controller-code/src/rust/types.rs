@@ -201,6 +201,9 @@ impl Controller {{
         if controller.d.is_some() {
             lines.push("            u_before: [0.0; ACTUATORS],".to_owned());
         }
+        if controller.transfer.is_some() {
+            lines.push("            u_t: [0.0; ACTUATORS],".to_owned());
+        }
         if let [input] = controller.schedule_inputs() {
             lines.push(format!("            theta: [{}],", self.literal(input.operating)));
         }

@@ -367,6 +367,7 @@ impl Design {
             }
         }
         let of_laws = self.refused_filter().or_else(|| self.refused_sliding_mode());
+        let of_laws = of_laws.or_else(|| self.refused_transfer());
         of_laws.or_else(|| self.detection.as_ref()?.refused_number(self))
     }
 
@@ -386,13 +387,25 @@ impl Design {
     /// The first element of `filter` that breaks its rule.
     #[must_use]
     pub fn refused_filter(&self) -> Option<Refusal> {
-        let (most, rule) = match self.sample_time {
-            None => (f64::MAX, "more than 0 1/s"),
-            Some(_) => (1.0, "more than 0 and at most 1"),
-        };
+        let (most, rule) = self.rates();
         let filter = self.filter.as_ref()?;
         let k = filter.iter().position(|value| !(*value > 0.0 && *value <= most))?;
         Some(Refusal::new(channel("filter", k, filter.len()), filter[k], rule))
+    }
+
+    /// The decay of the transfer, if it breaks its rule.
+    fn refused_transfer(&self) -> Option<Refusal> {
+        let (most, rule) = self.rates();
+        let value = self.transfer.filter(|value| !(*value > 0.0 && *value <= most))?;
+        Some(Refusal::new("transfer".to_owned(), value, rule))
+    }
+
+    /// The largest decay of a filter, and the rule in words: a rate, in a sampled controller a part in a sample.
+    fn rates(&self) -> (f64, &'static str) {
+        match self.sample_time {
+            None => (f64::MAX, "more than 0 1/s"),
+            Some(_) => (1.0, "more than 0 and at most 1"),
+        }
     }
 
     fn refused_signal(&self) -> Option<Refusal> {

@@ -187,7 +187,7 @@ fn at_a_point_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed
         }
         for loss in &controller.losses {
             let name = channel("E_hat", loss.fault, of.0[3]);
-            list(&name, &dependencies::of_loss(design));
+            list(&name, &dependencies::of_loss(design, loss));
         }
         let found: BTreeMap<_, _> = factors(of)
             .into_iter()

@@ -30,7 +30,7 @@ fn each_mode(designs: &[Shape], check: impl Fn(&AsoController, f64)) {
                 let inputs = [&model.deviations.y[..], &model.deviations.r];
                 let free = |j: usize| {
                     let operating = model.design.actuators[j].operating.unwrap_or_default();
-                    equations.free_command(j, estimate, inputs) + operating
+                    equations.free_command(j, estimate, inputs, -0.0) + operating
                 };
                 let middle: Vec<_> = (0..model.values.u.len()).map(free).collect();
                 for (actuator, middle) in model.design.actuators.iter_mut().zip(middle) {

@@ -24,6 +24,7 @@ pub(super) struct Oracle {
     l_f: DMatrix<f64>,
     filter: Option<Vector>,
     tracking: Tracking,
+    transfer: Option<f64>,
     r_op: Vector,
     period: Option<f64>,
     x_op: Vector,
@@ -41,19 +42,20 @@ struct Tracking {
     n_r: DMatrix<f64>,
 }
 
-/// x_hat, f_hat, y_f, x_i.
+/// x_hat, f_hat, y_f, x_i, u_t.
 #[derive(Clone)]
 pub(super) struct Estimate {
     pub(super) x: Vector,
     pub(super) f: Vector,
     pub(super) y_f: Vector,
     pub(super) x_i: Vector,
+    pub(super) u_t: Vector,
 }
 
 impl Estimate {
     /// All numbers.
     pub(super) fn all(&self) -> Vec<f64> {
-        [&self.x, &self.f, &self.y_f, &self.x_i].map(Vector::as_slice).concat()
+        [&self.x, &self.f, &self.y_f, &self.x_i, &self.u_t].map(Vector::as_slice).concat()
     }
 
     fn along(&self, slope: &Self, h: f64) -> Self {
@@ -62,6 +64,7 @@ impl Estimate {
             f: &self.f + &slope.f * h,
             y_f: &self.y_f + &slope.y_f * h,
             x_i: &self.x_i + &slope.x_i * h,
+            u_t: &self.u_t + &slope.u_t * h,
         }
     }
 }
@@ -83,6 +86,7 @@ impl Oracle {
                 l_w: stated(&design.l_w, integrals, m),
                 n_r: stated(&design.n_r, m, t),
             },
+            transfer: design.transfer,
             r_op: all(design.references.iter().map(|own| operating(own.operating)).collect()),
             period: design.sample_time,
             a: dense(&design.a),
@@ -116,7 +120,8 @@ impl Oracle {
         let starts = [&controller.x_hat_0, &controller.f_hat_0, &controller.x_i_0];
         let [x, f, x_i] = starts.map(|values| Vector::from_column_slice(values));
         let inputs = [y.as_slice(), &controller.values.r].concat();
-        (Estimate { x, f, y_f: filtered, x_i }, Vector::from_vec(inputs))
+        let u_t = Vector::zeros(self.transfer.map_or(0, |_| self.u_op.len()));
+        (Estimate { x, f, y_f: filtered, x_i, u_t }, Vector::from_vec(inputs))
     }
 
     /// y, and r as deviation, of inputs [y; r].
@@ -138,7 +143,8 @@ impl Oracle {
         let fault = &self.k_f * self.fault(z, inputs) * f64::from(u8::from(on));
         let Tracking { k_i, n_r, .. } = &self.tracking;
         let reference = k_i * &z.x_i + n_r * self.inputs(inputs).1;
-        &self.u_op + &self.k_x * (&z.x - &self.x_op) + fault + reference
+        let left = if self.transfer.is_some() { z.u_t.clone() } else { &self.u_op * 0.0 };
+        &self.u_op + &self.k_x * (&z.x - &self.x_op) + fault + reference + left
     }
 
     /// x_i', without the back-calculation and with it.
@@ -181,6 +187,7 @@ impl Oracle {
             f: (fault + &self.l_f * e) * f64::from(u8::from(on)),
             y_f: self.filter.as_ref().map_or(z.y_f.clone(), |w| w.component_mul(&(given - &z.y_f))),
             x_i: x_i + back,
+            u_t: &z.u_t * -self.transfer.unwrap_or_default(),
         }
     }
 
@@ -206,20 +213,20 @@ impl Oracle {
     }
 
     /// A sample at z[k|k-1] with the inputs [y; r] and the command before: the estimate that is used, u,
-    /// z[k+1|k].
+    /// z[k+1|k]. It compensates if the last switch is on; the sample before did if the second one is.
     pub(super) fn sample(
         &self,
         z: &Estimate,
-        (inputs, before): (&Vector, &Vector),
-        (current, on): (bool, bool),
+        (inputs, previous): (&Vector, &Vector),
+        [current, was_on, on]: [bool; 3],
     ) -> (Estimate, Vector, Estimate) {
-        let y = self.inputs(inputs).0 - &self.d * (before - &self.u_op);
+        let y = self.inputs(inputs).0 - &self.d * (previous - &self.u_op);
         let e = self.innovation(z, &y);
         let gain = |wanted: bool| if wanted { &e * 1.0 } else { &e * 0.0 };
         let (before, after) = (gain(current), gain(!current));
         let on_number = f64::from(u8::from(on));
         let seen = &self.l_f * &before;
-        let used = Estimate {
+        let mut used = Estimate {
             x: &z.x + &self.l_x * &before,
             f: match &self.sliding_mode {
                 Some(own) if on => Vector::from_fn(seen.len(), |i, _| {
@@ -229,6 +236,10 @@ impl Oracle {
             },
             ..z.clone()
         };
+        if self.transfer.is_some() && was_on != on {
+            used.u_t.fill(0.0);
+            used.u_t = previous - self.free(&used, inputs, on);
+        }
         let u = self.command(&used, inputs, on);
         let x = &self.a * (&used.x - &self.x_op)
             + &self.b * (&u - &self.u_op)
@@ -244,7 +255,8 @@ impl Oracle {
         let y_f = self.filter.as_ref().map_or(z.y_f.clone(), moved);
         let [x_i, back] = self.integral(&used, inputs, on);
         let x_i = &z.x_i + x_i * self.period.unwrap_or(f64::NAN) + back;
-        (used, u, Estimate { x, f, y_f, x_i })
+        let u_t = &used.u_t * (1.0 - self.transfer.unwrap_or_default());
+        (used, u, Estimate { x, f, y_f, x_i, u_t })
     }
 }
 

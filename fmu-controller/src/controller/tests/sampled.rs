@@ -22,8 +22,9 @@ fn samples(
     let mut before = oracle.operating_command();
     for k in 0..=last {
         let at = &y + &slope * (f64::from(k) * T);
-        let (used, u, next) =
-            oracle.sample(&z, (&at, &before), (current, f64::from(k) * T >= 0.35));
+        let is_on = |k: u32| f64::from(k) * T >= 0.35;
+        let switches = [current, is_on(k.saturating_sub(1)), is_on(k)];
+        let (used, u, next) = oracle.sample(&z, (&at, &before), switches);
         before.clone_from(&u);
         all.push((used.all(), u));
         z = next;

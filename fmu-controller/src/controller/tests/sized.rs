@@ -12,10 +12,10 @@ pub(super) type Sizes = [usize; 4];
 /// Sizes; an `l` for each actuator with limits; what else the design has: `a` a fault model A_f, `w`
 /// a filter, `o` an operating point, `e` losses of effectiveness, `i` references with integral action,
 /// `n` references with a feedforward, `c` or `p` samples, with a current or a prediction estimator, `d` a
-/// direct term, `s` a sliding-mode law, `u` a feedthrough D.
+/// direct term, `s` a sliding-mode law, `u` a feedthrough D, `t` a transfer.
 pub(super) type Shape = (Sizes, &'static str, &'static str);
 
-pub(super) const LIMITED: [Shape; 12] = [
+pub(super) const LIMITED: [Shape; 13] = [
     ([1, 1, 1, 1], "l", ""),
     ([2, 2, 2, 2], "ll", ""),
     ([3, 2, 1, 1], "l-", ""),
@@ -28,8 +28,9 @@ pub(super) const LIMITED: [Shape; 12] = [
     ([3, 2, 2, 2], "-l", "dawoe"),
     ([2, 2, 2, 1], "l-", "din"),
     ([3, 2, 2, 2], "-l", "wuo"),
+    ([2, 2, 2, 1], "l-", "teoi"),
 ];
-pub(super) const FREE: [Shape; 18] = [
+pub(super) const FREE: [Shape; 20] = [
     ([1, 1, 1, 1], "-", ""),
     ([2, 2, 2, 2], "--", ""),
     ([3, 1, 1, 2], "-", ""),
@@ -48,8 +49,10 @@ pub(super) const FREE: [Shape; 18] = [
     ([2, 1, 2, 2], "-", "dwi"),
     ([2, 2, 2, 1], "--", "wu"),
     ([3, 1, 2, 2], "-", "dwuae"),
+    ([2, 2, 1, 1], "--", "te"),
+    ([2, 1, 2, 1], "-", "tdwuin"),
 ];
-pub(super) const SAMPLED: [Shape; 18] = [
+pub(super) const SAMPLED: [Shape; 21] = [
     ([1, 1, 1, 1], "l", "c"),
     ([2, 2, 2, 2], "--", "c"),
     ([3, 2, 1, 2], "l-", "cao"),
@@ -68,6 +71,9 @@ pub(super) const SAMPLED: [Shape; 18] = [
     ([2, 1, 2, 1], "l", "cwid"),
     ([3, 2, 2, 2], "-l", "cawuoe"),
     ([2, 2, 2, 1], "--", "pwu"),
+    ([2, 2, 1, 1], "l-", "ctoe"),
+    ([3, 2, 2, 2], "-l", "ptawoein"),
+    ([2, 2, 2, 1], "-l", "ctwud"),
 ];
 
 /// Numbers between -1 and 1, none of them zero, that follow no line.
@@ -128,6 +134,9 @@ pub(super) fn sized(of: Shape) -> AsoController {
     if features.contains('w') {
         let filter = (0..p).map(|k| 0.5 + 0.4 * number(k + 90)).collect::<Vec<_>>();
         lines.push(format!("filter = {filter:?}"));
+    }
+    if features.contains('t') {
+        lines.push("transfer = 0.3".to_owned());
     }
     for (letter, estimator) in [('c', "current"), ('p', "prediction")] {
         if features.contains(letter) {

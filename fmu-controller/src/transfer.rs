@@ -1,0 +1,45 @@
+//! Bumpless transfer: commands that stay where they are when their law changes.
+
+use crate::equations::Equations;
+use crate::mode::Mode;
+use crate::signals::{OperatingPoint, Signals, Values};
+use aso_controller::Design;
+
+impl Values {
+    /// If the law of `mode` is not that of the last commands, u_t becomes the distance of those from the
+    /// commands of the new law at z, y and r of `signals`, so that the commands stay where they are,
+    ///
+    /// ```text
+    /// u_t = u before - (K_x x_hat + K_f f_hat + K_i x_i + N_r r + K_s u_stuck)
+    /// ```
+    ///
+    /// and 0 for an actuator that is gone. Returns whether that is so. A design without a transfer has no u_t.
+    pub(crate) fn transfer(
+        &mut self,
+        design: &Design,
+        mode: Mode,
+        point: &OperatingPoint,
+        signals: &mut Signals,
+    ) -> bool {
+        if design.transfer.is_none() {
+            return false;
+        }
+        let law = mode.law(design);
+        if self.law.replace(law).is_none_or(|before| before == law) {
+            return false;
+        }
+        let equations = Equations::<f64>::new(design, mode);
+        for (j, (before, point)) in self.u.iter().zip(&point.u).enumerate() {
+            let at = design.transfer_at(j);
+            signals.z[at] = 0.0;
+            if !mode.is_gone(j) {
+                let Signals { z, y, r, .. } = &*signals;
+                let stuck = mode.stuck_part(design, j);
+                let command = equations.free_command(j, equations.estimate(z), [y, r], stuck);
+                signals.z[at] = before - (command + point);
+            }
+            self.z[at] = signals.z[at];
+        }
+        true
+    }
+}
