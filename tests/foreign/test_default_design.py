@@ -112,6 +112,21 @@ def test_units_of_states_and_measurements_do_not_change_the_loop(designed):
         np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
+@pytest.mark.parametrize("head", ["", "sample_time = 0.1\n"])
+def test_integrators_in_other_coordinates_get_the_loop_of_the_integrators(designed, head):
+    """Rounding gives the zero eigenvalues of the second A some 1e-7 1/s, which are no speed of the plant. The tolerances, whose
+    entries differ, are too small to decide."""
+    a, b, c = (np.array(matrix, float) for matrix in PLANTS["double integrator"])
+    turned = np.array([[3.0, -1.9], [5.5, -4.0]])
+    other = [(turned @ a @ np.linalg.inv(turned)).tolist(), (turned @ b).tolist(), (c @ np.linalg.inv(turned)).tolist()]
+    assert np.abs(np.linalg.eigvals(other[0])).max() > 1e-9
+    tail = 'actuator_faults = "all"\nrobustness.cases = 0\nrobustness.tolerance = 1e-6\n'
+    one, other = (designed(head + written(plant) + tail) for plant in (PLANTS["double integrator"], other))
+    for part in ("feedback", "observer"):
+        found, expected = (np.sort_complex([complex(*value) for value in report[part]["eigenvalues"]]) for report in (one, other))
+        np.testing.assert_allclose(found, expected, rtol=1e-5)
+
+
 def test_a_sampled_design_without_requirements_is_slower_than_its_samples(designed):
     report = designed(written(PLANTS["unstable"]) + 'actuator_faults = "all"\nsample_time = 0.002\n')
     assert report["verdict"]["level"] == "green"

@@ -59,6 +59,13 @@ impl PlaceError {
         &self.shown
     }
 
+    /// The error of `cause` at this place: both messages.
+    #[must_use]
+    pub fn after(mut self, cause: &str) -> Self {
+        self.message = format!("{cause}; {}", self.message);
+        self
+    }
+
     /// Returns the message without the place.
     #[must_use]
     pub fn message(&self) -> &str {

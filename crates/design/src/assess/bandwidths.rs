@@ -2,12 +2,14 @@
 
 use control::Domain;
 use control::eigen::eigenvalues;
-use nalgebra::Complex;
+use files::PlaceError;
+use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
 use crate::Error;
 use crate::assess::judged::Judged;
 use crate::budget::Budget;
+use crate::plant::attainable;
 use crate::plant::linear::LinearPlant;
 use crate::solve::designed::design;
 use plant_file::PlantFile;
@@ -42,6 +44,9 @@ const OF_LARGE: usize = 3;
 const TOGETHER: usize = 3;
 /// Eigenvalues smaller than this part of the largest one have no speed.
 const NO_SPEED: f64 = 1e-9;
+/// Relative change of the entries of A that leaves the speed of an eigenvalue as it is. What it changes are the zeros of a
+/// chain of integrators in other coordinates, for example.
+const LAST_DIGITS: f64 = 1e-9;
 /// Largest bandwidth of the feedback in rad per sample.
 const PER_SAMPLE: f64 = 0.2;
 /// Largest bandwidth of the observer in rad per sample.
@@ -53,7 +58,8 @@ const WITHOUT_SPEED: f64 = 1.0;
 ///
 /// The speed of the plant is the median of the moduli of its eigenvalues, at least twice the largest real part; of a
 /// loop whose feedback is stated by eigenvalues, the median of these. Of the candidates the first with a green verdict is
-/// taken, otherwise that with the lowest peak of S.
+/// taken, otherwise that with the lowest peak of S. If gains cannot be computed, the error also says what no controller of the
+/// plant reaches.
 pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantFile<'a>, Error> {
     if !file.feedback.is_open() && !file.observer.is_open() {
         return Ok(file.clone());
@@ -93,7 +99,15 @@ pub(crate) fn chosen<'a>(file: &PlantFile<'a>, budget: &Budget) -> Result<PlantF
     }
     match (best, refusal) {
         (Some((other, _)), _) => Ok(other),
-        (None, Some(error)) => Err(error),
+        (None, Some(error)) => {
+            let limit = attainable::warnings(file, &plant)?.into_iter().next();
+            Err(match (error, limit) {
+                (Error::Entry(error), Some(limit)) if is_at_request(file, &error) => {
+                    limit.after(error.message()).into()
+                }
+                (error, _) => error,
+            })
+        }
         (None, None) => {
             let message = "no bandwidth was found whose loop is stable; expected a requirement, \
                            `feedback.eigenvalues` and `observer.eigenvalues` for example";
@@ -138,16 +152,46 @@ fn speed(file: &PlantFile<'_>, plant: &LinearPlant) -> Result<f64, Error> {
         (Requirement::Bandwidth(Bandwidth { rate: Some(rate), .. }), _) => return Ok(*rate),
         _ => Vec::new(),
     };
-    let all = if stated.is_empty() { eigenvalues(&plant.undelayed.a)? } else { stated };
-    let mut sizes: Vec<_> =
-        all.iter().map(|value| value.norm()).filter(|size| size.is_finite()).collect();
-    sizes.sort_by(f64::total_cmp);
+    let a = &plant.undelayed.a;
+    let (all, changed) = if stated.is_empty() {
+        (eigenvalues(a)?, eigenvalues(&with_other_digits(a))?)
+    } else {
+        (stated.clone(), stated)
+    };
+    let (sizes, changed) = (moduli(&all), moduli(&changed));
     let largest = sizes.last().copied().unwrap_or_default();
-    sizes.retain(|&size| size > NO_SPEED * largest);
+    let speeds = sizes.into_iter().zip(changed);
+    let speeds = speeds.filter(|&(size, changed)| {
+        size > NO_SPEED * largest && (changed - size).abs() < 0.5 * size
+    });
+    let sizes: Vec<_> = speeds.map(|(size, _)| size).collect();
     let median = sizes.get(sizes.len() / 2).copied().unwrap_or(WITHOUT_SPEED);
     let unstable = all.iter().map(|value| value.re).fold(0.0, f64::max);
     let of_samples = file.sampling.map_or(f64::INFINITY, |sampling| PER_SAMPLE / sampling.period);
     // A loop with a delay is hardly faster than one radian in the delay.
     let most = of_samples.min(1.0 / plant.delays.longest());
     Ok(median.max(2.0 * unstable).min(most))
+}
+
+/// Whether an error is that of gains, for which the file states no requirement.
+fn is_at_request(file: &PlantFile<'_>, error: &PlaceError) -> bool {
+    let place = |error: &PlaceError| (error.line(), error.column());
+    let requests = [&file.feedback, &file.observer].into_iter().filter(|request| request.is_open());
+    let mut errors = requests.map(|request| file.error_at(&request.place, ""));
+    errors.any(|other| place(&other) == place(error))
+}
+
+/// A with other last digits.
+fn with_other_digits(a: &DMatrix<f64>) -> DMatrix<f64> {
+    a.map_with_location(|row, column, entry| {
+        let sign = if (row * row + 3 * column + row * column) % 4 < 2 { 1.0 } else { -1.0 };
+        entry * (1.0 + sign * LAST_DIGITS)
+    })
+}
+
+/// The moduli in ascending order.
+fn moduli(eigenvalues: &[Complex<f64>]) -> Vec<f64> {
+    let mut sizes: Vec<_> = eigenvalues.iter().map(|value| value.norm()).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes
 }
