@@ -67,3 +67,34 @@ def test_samples_too_far_apart_for_an_unstable_plant_are_named_with_the_time_tha
     assert float(warning.split("at most ")[1].split()[0]) == pytest.approx(np.log(2) / 10, rel=1e-3)
     assert min(peaks(found)) >= np.e
     assert not said(report([1], np.poly([10, -1]), "sample_time = 0.01\n"), "no controller")
+
+
+def refused(aso_ftc, tmp_path, text):
+    (tmp_path / "plant.toml").write_text(text, encoding="utf-8")
+    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml")
+    assert done.returncode == 2 and not (tmp_path / "design.toml").exists()
+    return done.stderr
+
+
+def test_samples_between_which_the_plant_grows_beyond_any_loop_are_refused_with_a_time_that_is_short_enough(aso_ftc, tmp_path):
+    text = "sample_time = {}\nA = [[300, 0], [0, -1]]\nB = [[1], [1]]\nC = [[1, 1]]\nactuator_faults = 'all'\n"
+    error = refused(aso_ftc, tmp_path, text.format(0.1))
+    assert "no controller has a peak of S below 1.0686e13" in error and "plant.toml:1:15" in error
+    allowed = float(error.split("at most ")[1].split()[0])
+    assert allowed == pytest.approx(np.log(2) / 300, rel=1e-3)
+    (tmp_path / "plant.toml").write_text(text.format(allowed), encoding="utf-8")
+    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml")
+    assert done.returncode in (0, 1), done.stderr
+
+
+def test_a_case_that_grows_beyond_the_numbers_within_a_sample_is_unstable(aso_ftc, tmp_path):
+    """A in coordinates in which a tenth of its entries makes eigenvalues of 1e4 1/s: e^(1e4 s^-1 0.1 s) is no number."""
+    turned = np.array([[1, 1], [1, 1 + 1e-5]])
+    a = turned @ np.diag([1.0, -2.0]) @ np.linalg.inv(turned)
+    b, c = turned @ [[1.0], [1.0]], [[1.0, 0.5]] @ np.linalg.inv(turned)
+    text = f"sample_time = 0.1\nA = {a.tolist()}\nB = {b.tolist()}\nC = {c.tolist()}\nactuator_faults = 'all'\n"
+    (tmp_path / "plant.toml").write_text(text, encoding="utf-8")
+    done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml", "--json")
+    assert done.returncode == 1, done.stderr
+    stable = json.loads(done.stdout)["robustness"]["tolerance"]["stable"]
+    assert stable < 0.1, stable

@@ -67,7 +67,13 @@ impl<F: PlantFamily> Loops<'_, F> {
 
     pub(super) fn instability(&self, deviations: &[f64]) -> Result<f64, F::Error> {
         let plant = self.family.plant(deviations)?;
-        Ok(instability(&self.dynamics(plant)?, self.controller.domain)?)
+        match self.dynamics(plant) {
+            // The plant leaves the range of the numbers within a sample.
+            Err(Error::Overflow { .. }) if self.controller.domain != Domain::Continuous => {
+                Ok(f64::INFINITY)
+            }
+            dynamics => Ok(instability(&dynamics?, self.controller.domain)?),
+        }
     }
 
     /// The multiple of the deviations below which the loop is stable, if it is unstable at one of

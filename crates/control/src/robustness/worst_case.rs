@@ -28,6 +28,10 @@ pub(super) fn climb<F: PlantFamily>(
     let mut worst = start;
     let large = loops.controller.a.nrows() > LARGE;
     for round in 0..ROUNDS {
+        // A plant beyond the range of the numbers has no gradient, and nothing is worse.
+        if worst.instability.is_infinite() {
+            break;
+        }
         let count = if round == 0 { MODES } else { 1 };
         let mut improved = false;
         for gradient in gradients(loops, &worst.deviations, count)? {

@@ -1,11 +1,12 @@
 //! What no controller of a plant can reach: the peak of S that unstable modes, zeros and samples force.
 
+use control::StateSpace;
 use control::eigen::eigenvalues;
 use control::zeros::zeros;
-use control::{Error, StateSpace};
 use files::PlaceError;
 use nalgebra::Complex;
 
+use crate::Error;
 use crate::plant::linear::LinearPlant;
 use crate::report::number::rounded;
 use plant_file::PlantFile;
@@ -13,6 +14,8 @@ use plant_file::requirements::{Bandwidth, Requirement};
 
 /// Real parts above this part of the modulus count as positive.
 const RIGHT: f64 = 1e-9;
+/// With a larger peak of S no loop exists outside of a calculation, and rounding decides about its gains.
+const NO_LOOP: f64 = 1e6;
 /// |S| is at most this up to the bandwidth.
 const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
@@ -29,6 +32,10 @@ const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Sources: J. S. Freudenberg, D. P. Looze, Right half plane poles and zeros and design tradeoffs in feedback systems, IEEE
 /// Trans. Autom. Control 30 (1985), theorem 2; for samples the sum of log |S| over the unit circle: H.-K. Sung, S. Hara, Int. J.
 /// Control 48 (1988).
+///
+/// # Errors
+///
+/// The first of these for samples with a peak of S above 1e6.
 pub(crate) fn warnings(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
@@ -49,7 +56,11 @@ pub(crate) fn warnings(
                 rounded(least),
                 rounded(limit.ln() / rate)
             );
-            warnings.push(file.error(&["sample_time"], message));
+            let warning = file.error(&["sample_time"], message);
+            if least > NO_LOOP {
+                return Err(warning.into());
+            }
+            warnings.push(warning);
         }
     }
     let StateSpace { a, b, c, d, .. } = &linear.undelayed;
