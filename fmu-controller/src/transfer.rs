@@ -4,6 +4,12 @@ use crate::equations::Equations;
 use crate::mode::Mode;
 use crate::signals::{OperatingPoint, Signals, Values};
 use aso_controller::Design;
+use aso_controller::design::Actuator;
+
+/// The part of the range of an actuator by which a continuous command starts beyond the limit at which it is: it stays at
+/// this limit, and no event indicator changes its sign at the event. FMPy's Euler method misses one that changes it again
+/// in the next step.
+const BEYOND_LIMIT: f64 = 2e-9;
 
 impl Values {
     /// If the law of `mode` is not that of the last commands, u_t becomes the distance of those from the
@@ -29,17 +35,28 @@ impl Values {
             return false;
         }
         let equations = Equations::<f64>::new(design, mode);
-        for (j, (before, point)) in self.u.iter().zip(&point.u).enumerate() {
+        let margin = if design.sample_time.is_some() { 0.0 } else { BEYOND_LIMIT };
+        let commands = self.u.iter().zip(&point.u).zip(&design.actuators);
+        for (j, ((before, point), actuator)) in commands.enumerate() {
             let at = design.transfer_at(j);
             signals.z[at] = 0.0;
             if !mode.is_gone(j) {
                 let Signals { z, y, r, .. } = &*signals;
                 let stuck = mode.stuck_part(design, j);
                 let command = equations.free_command(j, equations.estimate(z), [y, r], stuck);
-                signals.z[at] = before - (command + point);
+                signals.z[at] = start(*before, actuator, margin) - (command + point);
             }
             self.z[at] = signals.z[at];
         }
         true
+    }
+}
+
+/// The command from which the transfer starts: at a limit, this part of the range beyond it.
+fn start(command: f64, actuator: &Actuator, margin: f64) -> f64 {
+    match actuator.limits {
+        Some([low, high]) if command <= low => low - margin * (high - low),
+        Some([low, high]) if command >= high => high + margin * (high - low),
+        _ => command,
     }
 }

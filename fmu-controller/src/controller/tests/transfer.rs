@@ -114,6 +114,28 @@ fn in_model_exchange_the_change_is_a_new_value_of_a_state() {
 }
 
 #[test]
+fn a_command_at_a_limit_stays_there_without_a_change_of_sign_of_its_indicators() {
+    let mut controller = transferred("limits = [-1.5, 0.3]");
+    controller.event(0.0).unwrap();
+    // The free command is 0.6 without f_hat and -2.4 with it.
+    controller.values.z.copy_from_slice(&[-0.2, 0.0, -3.0, 0.0]);
+    controller.update(0.2).unwrap();
+    controller.event(0.2).unwrap();
+    controller.update(0.35).unwrap();
+    let signs = |controller: &AsoController| {
+        let mut values = [f64::NAN; 2];
+        controller.event_indicators(0.0, &mut values);
+        values.map(|value| value > 0.0)
+    };
+    let before = signs(&controller);
+    assert_eq!((before, controller.values.u[0]), ([true, false], 0.3));
+    assert!(controller.event(0.35).unwrap().values_of_continuous_states_changed);
+    controller.update(0.35).unwrap();
+    assert_eq!((signs(&controller), controller.values.u[0]), (before, 0.3));
+    assert!((controller.values.z[3] - 2.7).abs() < 1e-8);
+}
+
+#[test]
 fn a_decay_that_is_no_rate_is_refused() {
     for (value, sampled, rule) in [
         (0.0, "", "more than 0 1/s"),
