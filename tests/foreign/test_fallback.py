@@ -319,7 +319,9 @@ def test_without_two_forces_the_others_have_the_effect_of_all(masses, tmp_path, 
 def test_a_sampled_controller_has_the_gains_of_its_case(sampled, transfer_time, tmp_path, case):
     """u[k] = K_x x_hat + K_f f_hat + K_s u_s with the current estimator of the design file, sample by sample. With a
     transfer the free commands stay at the switch, and their distance from the law decays with its time constant."""
-    design, _, fmu = sampled
+    design, report, fmu = sampled
+    said = any("a transfer time of 0.4 s" in text for text in report["assumptions"])
+    assert said == (transfer_time is not None)
     run = Run(design, fmu, tmp_path, 0.05)
     a, b, c, f_a = (matrix(design, name) for name in ("A", "B", "C", "F_a"))
     l_x, l_f = matrix(design, "L_x"), matrix(design, "L_f")

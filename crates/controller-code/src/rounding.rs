@@ -163,8 +163,9 @@ impl RoundingBound {
             Some(_) => " and no actuator gone",
         };
         let used = if controller.checks_measurements() { " and no measurement held" } else { "" };
+        let settled = if controller.transfer.is_some() { " and u_t = 0" } else { "" };
         let mut lines = filled(&format!(
-            "In the loop with the plant of the design, while compensating and with no command at a limit{intact}{used}, \
+            "In the loop with the plant of the design, while compensating and with no command at a limit{intact}{used}{settled}, \
              an output differs by at most the sum over the signals of coefficient times largest \
              deviation from the operating point (last row: a constant):"
         ));

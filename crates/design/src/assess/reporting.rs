@@ -186,7 +186,7 @@ pub(crate) fn report(assessment: Assessment<'_>) -> Result<Report, crate::Error>
         losses,
         reconfiguration,
         fallback,
-        assumptions: assumptions(designed),
+        assumptions: assumptions(file, designed),
         interface: Vec::new(),
     })
 }
@@ -342,7 +342,7 @@ fn effectiveness(designed: &Solution) -> Result<Vec<Effectiveness>, Error> {
     Ok(inputs.iter().zip(&limits.single).map(one).collect())
 }
 
-fn assumptions(designed: &Designed) -> Vec<String> {
+fn assumptions(file: &PlantFile<'_>, designed: &Designed) -> Vec<String> {
     let Designed { nominal, family, schedule, .. } = designed;
     let mut all = vec![
         "The plant is linear, as stated under Plant; the neglected nonlinear terms act as a fault."
@@ -352,6 +352,13 @@ fn assumptions(designed: &Designed) -> Vec<String> {
             .to_owned(),
         "Bounds and responses start from rest, with the compensation on.".to_owned(),
     ];
+    all.extend(file.transfer_time.map(|time| {
+        format!(
+            "The law of the commands has been in force for long: with a transfer time of {} s the compensation, a \
+             reconfiguration and the fall-back take effect with this time constant, which no figure contains.",
+            rounded(time)
+        )
+    }));
     if nominal.linear.delays.any() {
         all.push(format!(
             "Each delay is approximated: by {} states in the observer, the residuals, the responses, and the bounds and norms of errors; \
