@@ -377,6 +377,7 @@ fn put<T>(value: &mut Option<T>, over: Option<T>) {
 
 impl Options {
     /// Whether the run shall have no supervising process.
+    #[cfg(target_os = "linux")]
     pub(crate) fn is_in_process(&self) -> bool {
         self.safety.in_process
     }

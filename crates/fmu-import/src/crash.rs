@@ -11,7 +11,9 @@ mod place;
 #[cfg(unix)]
 mod signals;
 
-use std::fmt::{self, Write as _};
+use std::fmt;
+#[cfg(unix)]
+use std::fmt::Write as _;
 use std::io;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -235,17 +237,20 @@ fn cause() -> Cause {
 }
 
 /// A line for standard error, built without heap allocation and cut at its capacity.
+#[cfg(unix)]
 struct Line {
     bytes: [u8; 1024],
     length: usize,
 }
 
+#[cfg(unix)]
 impl Line {
     const fn new() -> Self {
         Self { bytes: [b'\n'; 1024], length: 0 }
     }
 }
 
+#[cfg(unix)]
 impl fmt::Write for Line {
     fn write_str(&mut self, part: &str) -> fmt::Result {
         for byte in part.bytes() {
@@ -257,6 +262,7 @@ impl fmt::Write for Line {
 }
 
 /// Returns the message for a crash function that crashes or does not return.
+#[cfg(unix)]
 fn fallback_message() -> Line {
     let mut line = Line::new();
     // A line that is too long is cut.
@@ -276,6 +282,7 @@ fn write_crash(line: &mut Line, signal: i32, place: usize) -> fmt::Result {
     line.write_str("; isolate=True runs each FMU in a process of its own")
 }
 
+#[cfg(unix)]
 fn write_fallback(line: &mut Line) -> fmt::Result {
     line.write_str("error: ")?;
     write_ending(line, place::calls(PLACE.load(Ordering::Relaxed)), cause())?;

@@ -48,6 +48,7 @@ fn key(kind: ValueType) -> u8 {
 }
 
 /// Returns the description of an instance, in which negated aliases have value references of their own.
+#[cfg(target_os = "linux")]
 pub(crate) fn scalar_description(description: &ModelDescription) -> ModelDescription {
     let mut scalars = description.clone();
     separate_negated(&mut scalars);

@@ -31,6 +31,10 @@ pub(crate) struct Loading<'a> {
     pub(crate) path: &'a Path,
     /// The name of the FMU for messages.
     pub(crate) fmu: &'a str,
+    #[cfg_attr(
+        not(all(target_os = "linux", target_env = "gnu", target_pointer_width = "64")),
+        expect(dead_code, reason = "other linkers bind all functions at once")
+    )]
     pub(crate) binding: Binding,
 }
 

@@ -1,5 +1,5 @@
 //! The shared library of Python, which FMUs of PythonFMU expect in their process.
-#![expect(unsafe_code, reason = "the symbols of the process")]
+#![cfg_attr(unix, expect(unsafe_code, reason = "the symbols of the process"))]
 
 use std::path::PathBuf;
 use std::process::Command;
