@@ -106,11 +106,7 @@ impl Controller {
             detection,
         } = file;
         let (Some(sample_time), Some(estimator)) = (sample_time, estimator) else {
-            return Err(Error(
-                "there is code for sampled designs only, and this one is continuous; state \
-                 `sample_time` in the plant file"
-                    .to_owned(),
-            ));
+            return Err(continuous());
         };
         let first_compensated = first_compensated(t_on, sample_time)?;
         let detection =
@@ -286,6 +282,11 @@ fn too_large(name: &str, value: f64) -> Error {
     Error(format!(
         "{name} has the number {value:?}; `float` code has constants up to {LARGEST_SINGLE:?} only"
     ))
+}
+
+fn continuous() -> Error {
+    let text = "there is code for sampled designs only, and this one is continuous; state `sample_time` in the plant file";
+    Error(text.to_owned())
 }
 
 /// The number of the first sample at which faults are compensated.
