@@ -492,4 +492,4 @@ def test_a_loop_that_the_observer_makes_unstable_is_said_to_grow(aso_ftc, tmp_pa
     )
     done = aso_ftc("design", plant, "--out", tmp_path / "design.toml")
     assert done.returncode == 2
-    assert "the loop with u1 with a loss of 0.5 is unstable and grows with " in done.stderr, done.stderr
+    assert 'the loop of the case "u1 with a loss of 0.5" is unstable and grows with ' in done.stderr, done.stderr

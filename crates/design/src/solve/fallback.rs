@@ -261,9 +261,15 @@ impl Search<'_> {
         let mut design = Fallback { k_x, k_f: None, region, certificate, method };
         if let Some(SlowCase { name, rate }) = (self.judge)(&self.cases, &design)? {
             let slowest = if rate < 0.0 {
-                format!("the loop with {name} is unstable and grows with {} 1/s", rounded(-rate))
+                format!(
+                    "the loop of the case \"{name}\" is unstable and grows with {} 1/s",
+                    rounded(-rate)
+                )
             } else {
-                format!("the slowest eigenvalue with {name} decays with {} 1/s", rounded(rate))
+                format!(
+                    "the slowest eigenvalue of the case \"{name}\" decays with {} 1/s",
+                    rounded(rate)
+                )
             };
             return Ok(Err(format!(
                 "a state feedback meets the region in all cases, but together with the observer, which \
