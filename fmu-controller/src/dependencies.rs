@@ -16,8 +16,8 @@ use fmu::description::DependencyKind::{self, Constant, Dependent, Discrete, Fixe
 use crate::loss::Loss;
 use crate::names;
 use aso_controller::Matrix;
-use aso_controller::channels;
 use aso_controller::design::{Design, Estimator};
+use aso_controller::{channel, channels};
 
 /// Names of variables that an unknown depends on, with the kind of that dependency.
 pub(crate) type Group = (DependencyKind, Vec<String>);
@@ -79,9 +79,12 @@ fn of_feedback(design: &Design, kinds: [DependencyKind; 2]) -> Vec<Group> {
 
 /// u_t of the commands with limits, or of those without.
 fn transfers(design: &Design, limited: bool) -> Option<Group> {
-    let names = names::transfers(design).zip(&design.actuators);
-    let names = names.filter(|(_, actuator)| actuator.limits.is_some() == limited);
-    let names: Vec<_> = names.map(|(name, _)| name).collect();
+    let mut names = Vec::new();
+    for (j, name) in names::transfers(design).enumerate() {
+        if design.actuators[j].limits.is_some() == limited {
+            names.push(name);
+        }
+    }
     (!names.is_empty()).then(|| (kinds_of_feedback(design, limited)[0], names))
 }
 
@@ -123,7 +126,7 @@ pub(crate) fn of_loss(design: &Design, loss: &Loss) -> Vec<Group> {
 
 /// The name of u_t of command `j`.
 fn transfer(design: &Design, j: usize) -> Vec<String> {
-    names::transfers(design).skip(j).take(1).collect()
+    vec![channel("u_t", j, design.transfers())]
 }
 
 /// The dependencies of element `i` of z'.

@@ -36,15 +36,14 @@ impl Values {
         }
         let equations = Equations::<f64>::new(design, mode);
         let margin = if design.sample_time.is_some() { 0.0 } else { BEYOND_LIMIT };
-        let commands = self.u.iter().zip(&point.u).zip(&design.actuators);
-        for (j, ((before, point), actuator)) in commands.enumerate() {
+        for (j, actuator) in design.actuators.iter().enumerate() {
             let at = design.transfer_at(j);
             signals.z[at] = 0.0;
             if !mode.is_gone(j) {
                 let Signals { z, y, r, .. } = &*signals;
                 let stuck = mode.stuck_part(design, j);
                 let command = equations.free_command(j, equations.estimate(z), [y, r], stuck);
-                signals.z[at] = start(*before, actuator, margin) - (command + point);
+                signals.z[at] = start(self.u[j], actuator, margin) - (command + point.u[j]);
             }
             self.z[at] = signals.z[at];
         }

@@ -51,21 +51,18 @@ impl AsoController {
         values.transfer(design, mode, operating_point, deviations)
     }
 
-    /// The same within a step, for a law that compensates from `offset` s after its start on, or no longer: the last commands
-    /// are those of the deviations z by the law before.
-    fn transfer_at(&mut self, compensating: bool, offset: f64) {
-        let [before, after] = [!compensating, compensating].map(|on| self.free_mode(on));
-        let Self { design, values, operating_point, deviations, .. } = self;
-        if design.transfer.is_none() || values.law == Some(after.law(design)) {
+    /// The same within a step, at `time` and `offset` s after its start, if the law compensates from there on, or no longer:
+    /// the last commands are those of the deviations z by the law before.
+    fn transfer_at(&mut self, compensating: bool, time: f64, offset: f64) {
+        let after = self.free_mode(compensating);
+        if self.design.transfer.is_none() || self.values.law == Some(after.law(&self.design)) {
             return;
         }
-        deviations.set_inputs(values, operating_point, offset);
-        let mode = before.limited(design, &deviations.z, [&deviations.y, &deviations.r]);
-        mode.set_limited(design, &mut deviations.u);
-        Equations::<f64>::new(design, mode).set_signals(&mut &mut *deviations);
-        values.set_commands(&deviations.u, design, mode, operating_point);
-        values.transfer(design, after, operating_point, deviations);
-        deviations.set_inputs(values, operating_point, 0.0);
+        self.values.set_estimate(&self.deviations.z, &self.operating_point);
+        self.mode = self.free_mode(!compensating);
+        self.evaluate(time, offset);
+        self.transfer(after);
+        self.deviations.set_inputs(&self.values, &self.operating_point, 0.0);
     }
 
     /// Sets the estimate to its initial value.
@@ -199,7 +196,7 @@ impl AsoController {
         self.transfer(self.free_mode(!inside && self.is_compensating(step.start)));
         if inside {
             self.advance(false, step.start, Part { offset: 0.0, size: until_on })?;
-            self.transfer_at(true, until_on);
+            self.transfer_at(true, step.start + until_on, until_on);
             let rest = Part { offset: until_on, size: step.size - until_on };
             self.advance(true, step.start, rest)?;
         } else {
@@ -207,7 +204,7 @@ impl AsoController {
             self.advance(self.is_compensating(step.start), step.start, whole)?;
         }
         let is_compensating = self.is_compensating(step.end());
-        self.transfer_at(is_compensating, step.size);
+        self.transfer_at(is_compensating, step.end(), step.size);
         self.values.set_estimate(&self.deviations.z, &self.operating_point);
         self.mode = self.free_mode(is_compensating);
         self.evaluate(step.end(), step.size);

@@ -10,7 +10,7 @@ use crate::controller::AsoController;
 use crate::dependencies::Group;
 use crate::{dependencies, names};
 use aso_controller::channel;
-use aso_controller::design::{Design, Fault, Label, Measurement, Signal};
+use aso_controller::design::{Design, Label, Measurement};
 
 /// All variables of `controller`, in the order of the description.
 pub(crate) fn list(controller: &AsoController) -> Vec<Variable<AsoController>> {
@@ -244,20 +244,21 @@ struct State {
 }
 
 fn states(design: &Design) -> Vec<State> {
-    let estimates = design.states.iter().map(Signal::label);
-    let estimates = estimates.map(|label| ("Estimate", label));
     let kind = if design.p_f.is_some() { "Integral part of the estimate" } else { "Estimate" };
-    let faults = design.faults.iter().map(Fault::label);
-    let estimates = estimates.chain(faults.map(move |label| (kind, label)));
-    let filters = design.filter.as_ref().map_or(0, Vec::len);
-    let filtered = design.measurements.iter().take(filters);
-    let filtered = filtered.map(|signal| ("Filtered value", signal.label()));
-    let integrals = if design.k_i.is_some() { &design.references[..] } else { &[] };
-    let integrals = integrals.iter().map(|signal| ("Integral", signal.label()));
-    let transfers = design.actuators.iter().take(design.transfers());
-    let transfers = transfers.map(|actuator| ("Bumpless transfer", actuator.label()));
+    let mut labels = Vec::new();
+    labels.extend(design.states.iter().map(|signal| ("Estimate", signal.label())));
+    labels.extend(design.faults.iter().map(|fault| (kind, fault.label())));
+    if design.filter.is_some() {
+        labels.extend(design.measurements.iter().map(|signal| ("Filtered value", signal.label())));
+    }
+    if design.k_i.is_some() {
+        labels.extend(design.references.iter().map(|signal| ("Integral", signal.label())));
+    }
+    if design.transfer.is_some() {
+        labels.extend(design.actuators.iter().map(|signal| ("Bumpless transfer", signal.label())));
+    }
     names::estimates(design)
-        .zip(estimates.chain(filtered).chain(integrals).chain(transfers))
+        .zip(labels)
         .enumerate()
         .map(|(position, (name, (kind, Label { unit, meaning })))| {
             let derivative =
