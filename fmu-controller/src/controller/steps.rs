@@ -172,6 +172,8 @@ impl AsoController {
             let message = format!("too many samples are due from {start} to {end} s");
             return Err(Failure::Error(message));
         }
+        // An event before the step froze the limits, as events of model exchange do.
+        self.frozen = false;
         let resolution = clock_rounding(step.end());
         let until_on = self.design.t_on - step.start;
         let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;

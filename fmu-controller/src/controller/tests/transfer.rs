@@ -148,3 +148,22 @@ fn a_decay_that_is_no_rate_is_refused() {
         assert!(message.contains(rule), "{message}");
     }
 }
+
+#[test]
+fn events_of_co_simulation_change_no_course() {
+    for transfer in ["", "monitor = true\ntransfer = 4.0\n"] {
+        let text = format!("{transfer}{}", small("limits = [-1.5, 0.3]"));
+        let [mut with, mut without] = [(); 2].map(|()| ready(with_design(&text).unwrap()));
+        for k in 0..100_u32 {
+            let start = 0.01 * f64::from(k);
+            with.event(start).unwrap();
+            with.update(start).unwrap();
+            for controller in [&mut with, &mut without] {
+                step(controller, start, 0.01, &[0.4 + 0.5 * start], &[0.5]);
+            }
+            assert!((-1.5..=0.3).contains(&with.values.u[0]), "{k}: {}", with.values.u[0]);
+            let difference = (with.values.u[0] - without.values.u[0]).abs();
+            assert!(difference < 1e-6, "{transfer} {k}: {difference}");
+        }
+    }
+}
