@@ -112,6 +112,15 @@ def test_units_of_states_and_measurements_do_not_change_the_loop(designed):
         np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
+def test_a_sampled_eigenvalue_of_zero_leaves_the_observer_the_same_in_other_units_of_time(designed):
+    rates = []
+    for period in (1.0, 0.01):
+        head = f"sample_time = {period}\nfeedback.sampled_eigenvalues = [0, 0.5]\n"
+        report = designed(f'{head}{written(PLANTS["double integrator"])}actuator_faults = "all"\n')
+        rates.append(period * float(report["observer"]["method"].split("bandwidth of ")[1].split()[0]))
+    assert rates[1] == pytest.approx(rates[0], rel=0.05)
+
+
 @pytest.mark.parametrize("head", ["", "sample_time = 0.1\n"])
 def test_integrators_in_other_coordinates_get_the_loop_of_the_integrators(designed, head):
     """Rounding gives the zero eigenvalues of the second A some 1e-7 1/s, which are no speed of the plant. The tolerances, whose

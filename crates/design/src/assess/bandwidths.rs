@@ -44,8 +44,8 @@ const OF_LARGE: usize = 3;
 const TOGETHER: usize = 3;
 /// Eigenvalues smaller than this part of the largest one have no speed.
 const NO_SPEED: f64 = 1e-9;
-/// Relative change of the entries of A that leaves the speed of an eigenvalue as it is. What it changes are the zeros of a
-/// chain of integrators in other coordinates, for example.
+/// Relative change of the entries of A. An eigenvalue that it changes by half is rounding and has no speed, as those of
+/// integrators in other coordinates.
 const LAST_DIGITS: f64 = 1e-9;
 /// Largest bandwidth of the feedback in rad per sample.
 const PER_SAMPLE: f64 = 0.2;
@@ -189,9 +189,10 @@ fn with_other_digits(a: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// The moduli in ascending order.
+/// The finite moduli in ascending order; a sampled eigenvalue of 0 has none.
 fn moduli(eigenvalues: &[Complex<f64>]) -> Vec<f64> {
-    let mut sizes: Vec<_> = eigenvalues.iter().map(|value| value.norm()).collect();
+    let sizes = eigenvalues.iter().map(|value| value.norm());
+    let mut sizes: Vec<_> = sizes.filter(|size| size.is_finite()).collect();
     sizes.sort_by(f64::total_cmp);
     sizes
 }
