@@ -6,9 +6,9 @@ use crate::signals::{OperatingPoint, Signals, Values};
 use aso_controller::Design;
 use aso_controller::design::Actuator;
 
-/// The part of the range of an actuator by which a continuous command starts beyond the limit at which it is: it stays at
-/// this limit, and no event indicator changes its sign at the event. FMPy's Euler method misses one that changes it again
-/// in the next step.
+/// A continuous command that is at a limit when its law changes starts this part of the range beyond the limit. So it stays
+/// there, and no event indicator changes its sign at the event: FMPy's Euler method would miss the change back in the next
+/// step.
 const BEYOND_LIMIT: f64 = 2e-9;
 
 impl Values {
@@ -51,7 +51,7 @@ impl Values {
     }
 }
 
-/// The command from which the transfer starts: at a limit, this part of the range beyond it.
+/// The command from which the transfer starts; at a limit, `margin` of the range beyond it.
 fn start(command: f64, actuator: &Actuator, margin: f64) -> f64 {
     match actuator.limits {
         Some([low, high]) if command <= low => low - margin * (high - low),

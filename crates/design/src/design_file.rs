@@ -132,7 +132,8 @@ impl Designed {
     }
 }
 
-/// The decay with a time constant, both in s: a rate in 1/s, in a sampled controller the part that goes in a sample.
+/// `transfer` of the design file for a time constant in s: the rate in 1/s, in a sampled controller the part of u_t that a
+/// sample removes.
 fn decay(time: f64, sample_time: Option<f64>) -> f64 {
     sample_time.map_or(1.0 / time, |period| -(-period / time).exp_m1())
 }

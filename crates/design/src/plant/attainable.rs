@@ -14,7 +14,7 @@ use plant_file::requirements::{Bandwidth, Requirement};
 
 /// Real parts above this part of the modulus count as positive.
 const RIGHT: f64 = 1e-9;
-/// With a larger peak of S no loop exists outside of a calculation, and rounding decides about its gains.
+/// Above this peak of S a loop exists on paper only, and its gains are rounding.
 const NO_LOOP: f64 = 1e6;
 /// |S| is at most this up to the bandwidth.
 const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -35,7 +35,7 @@ const AT_BANDWIDTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 ///
 /// # Errors
 ///
-/// The first of these for samples with a peak of S above 1e6.
+/// A sample time with which every controller has a peak of S above 1e6.
 pub(crate) fn warnings(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
