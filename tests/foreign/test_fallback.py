@@ -476,6 +476,15 @@ def test_a_bad_entry_is_refused(aso_ftc, tmp_path, old, new, message):
     assert done.returncode == 2 and message in done.stderr, done.stderr
 
 
+def test_without_its_only_actuator_a_plant_has_no_fallback_but_with_a_part_of_it(aso_ftc, tmp_path):
+    text = 'A = [[-0.5]]\nB = [[1]]\nC = [[1]]\nactuator_faults = "all"\n[fallback]\nactuators = "all"\n'
+    done = designed(aso_ftc, tmp_path, text)
+    assert done.returncode == 2 and "5:1: fallback: without its only actuator" in done.stderr, done.stderr
+    assert "expected a `loss` below 1" in done.stderr
+    done = designed(aso_ftc, tmp_path, text + "loss = 0.5\n")
+    assert done.returncode == 0, done.stderr
+
+
 def test_a_family_is_refused(aso_ftc, tmp_path):
     alone = SAMPLED[: SAMPLED.index("[reconfiguration]")] + SAMPLED[SAMPLED.index("[fallback]") :]
     member = '[[family]]\nname = "other"\nA = [[0, 0, 1, 0], [0, 0, 0, 1], [-1, 0, 0, 0], [0, -1, 0, 0]]\n'

@@ -53,6 +53,11 @@ impl FallbackRequest {
                 }
             },
         };
+        if actuators.len() < 2 && loss >= 1.0 {
+            let message =
+                "without its only actuator a plant is not controlled; expected a `loss` below 1";
+            return Err(entry.error(message));
+        }
         let region = table.get("region").map(|entry| stated_region(&entry, sampled)).transpose()?;
         Ok(Some(Self { actuators: used, loss, region, place: entry.place }))
     }
