@@ -21,7 +21,7 @@
 
 use crate::blocks::{block_2x2, stacked};
 use crate::faulty_plant::FaultyPlant;
-use crate::{Error, check};
+use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};
 
 /// The model by which a fault develops.
@@ -84,8 +84,10 @@ pub struct FaultChannel {
 /// user.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtendedPlant {
-    /// The plant, in continuous time, with the filter's states after its own.
+    /// The plant, with the filter's states after its own.
     pub plant: FaultyPlant,
+    /// The time domain of the plant.
+    pub domain: Domain,
     /// Diagonal of W, in 1/s, p entries. None if y is not filtered.
     pub filter: Option<Vec<f64>>,
     /// Number of states of the plant itself.
@@ -95,15 +97,15 @@ pub struct ExtendedPlant {
 }
 
 impl ExtendedPlant {
-    /// Wraps a plant whose faults all act on its states; no filter is needed.
+    /// Wraps a continuous plant whose faults all act on its states; no filter is needed.
     #[must_use]
     pub fn without_filter(plant: FaultyPlant) -> Self {
         let channel = |estimate| FaultChannel { estimate, rate: None };
         let channels = (0..plant.f_a.ncols()).map(channel).collect();
-        Self { states: plant.a.nrows(), plant, filter: None, channels }
+        Self { states: plant.a.nrows(), plant, domain: Domain::Continuous, filter: None, channels }
     }
 
-    /// Builds the plant with the given faults.
+    /// Builds the continuous plant with the given faults.
     ///
     /// `a`: n x n; `b`: n x m; `c`: p x n; `faults`: at least one; `filter`: the diagonal of W, p
     /// rates above zero in 1/s, or none, which is possible if no fault enters the measurements.
@@ -143,27 +145,54 @@ impl ExtendedPlant {
         faults: &[Fault],
         filter: &[f64],
     ) -> Result<Self, Error> {
+        Self::in_domain([a, b, c], faults, filter, Domain::Continuous)
+    }
+
+    /// The same with A, B, C in continuous or sampled time.
+    ///
+    /// In sampled time the plant is known at its samples only: a fault acts on x\[k+1\] through `F_a`, as it is at
+    /// sample k. A ramp has `A_f` = [I, T I; 0, I], and the filter has 1 - e^(-w T) in place of W.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`Self::new`]; [`Error::OutOfRange`] for the period.
+    pub fn in_domain(
+        [a, b, c]: [&DMatrix<f64>; 3],
+        faults: &[Fault],
+        filter: &[f64],
+        domain: Domain,
+    ) -> Result<Self, Error> {
+        domain.check()?;
         let n = check::square("A", a)?;
         check::shape("B", b, (n, b.ncols()))?;
         check::shape("C", c, (c.nrows(), n))?;
         let (f_a, f_s) = columns(b, c.nrows(), faults)?;
-        let (a_f, channels) = models(faults);
+        let (mut a_f, channels) = models(faults);
+        if let Domain::Sampled { period } = domain {
+            a_f = DMatrix::identity(a_f.nrows(), a_f.nrows()) + a_f * period;
+        }
         let width = a_f.nrows();
         let f_a = f_a.resize_horizontally(width, 0.0);
         if filter.is_empty() && !faults.iter().any(|fault| fault.entry.is_measured()) {
             let plant = FaultyPlant { a: a.clone(), b: b.clone(), c: c.clone(), f_a, a_f };
-            return Ok(Self { plant, filter: None, states: n, channels });
+            return Ok(Self { plant, domain, filter: None, states: n, channels });
         }
-        let rates = checked_filter(filter, c.nrows())?;
+        checked_filter(filter, c.nrows())?;
+        let coefficients = coefficients(filter, domain);
+        let rates = DMatrix::from_diagonal(&DVector::from_column_slice(&coefficients));
+        let decay = match domain {
+            Domain::Continuous => -&rates,
+            Domain::Sampled { .. } => DMatrix::identity(c.nrows(), c.nrows()) - &rates,
+        };
         let f_s = f_s.resize_horizontally(width, 0.0);
         let plant = FaultyPlant {
-            a: block_2x2([a, &DMatrix::zeros(n, c.nrows())], [&(&rates * c), &-&rates]),
+            a: block_2x2([a, &DMatrix::zeros(n, c.nrows())], [&(&rates * c), &decay]),
             b: b.clone().resize_vertically(n + c.nrows(), 0.0),
             c: DMatrix::identity(c.nrows(), c.nrows()).insert_columns(0, n, 0.0),
             f_a: stacked(&f_a, &(&rates * f_s)),
             a_f,
         };
-        Ok(Self { plant, filter: Some(filter.to_vec()), states: n, channels })
+        Ok(Self { plant, domain, filter: Some(filter.to_vec()), states: n, channels })
     }
 }
 
@@ -224,12 +253,18 @@ fn models(faults: &[Fault]) -> (DMatrix<f64>, Vec<FaultChannel>) {
     (a_f, channels)
 }
 
-/// W as a matrix.
-fn checked_filter(filter: &[f64], p: usize) -> Result<DMatrix<f64>, Error> {
-    let rates = DVector::from_column_slice(filter);
+/// The coefficients of the measurement filter with these rates w: w, in sampled time 1 - e^(-w T).
+pub(crate) fn coefficients(rates: &[f64], domain: Domain) -> Vec<f64> {
+    match domain {
+        Domain::Continuous => rates.to_vec(),
+        Domain::Sampled { period } => rates.iter().map(|rate| -(-rate * period).exp_m1()).collect(),
+    }
+}
+
+fn checked_filter(filter: &[f64], p: usize) -> Result<(), Error> {
     check::shape("W", &DMatrix::from_column_slice(filter.len(), 1, filter), (p, 1))?;
     for &rate in filter {
         check::positive("a rate of the filter W", rate)?;
     }
-    Ok(DMatrix::from_diagonal(&rates))
+    Ok(())
 }

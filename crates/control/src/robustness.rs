@@ -72,16 +72,24 @@ pub enum Point {
     Output,
 }
 
-/// The continuous `plant` under a zero-order hold of its inputs, in samples of `period` seconds.
+/// The `plant` under a zero-order hold of its inputs, in samples of `period` seconds: those of a continuous plant, and a
+/// sampled plant as it is.
 ///
 /// With y = C x + D u a sample contains the command that was held until then: `y[k] = C x[k] + D v[k]`,
 /// `v[k+1] = u[k]`; the state is [x; v], and D of the result is zero.
 ///
 /// # Errors
 ///
-/// Same as [`crate::hold::zero_order_hold`].
+/// Same as [`crate::hold::zero_order_hold`]; [`Error::OutOfRange`] for a sampled plant with another period.
 pub fn held_plant(plant: &StateSpace, period: f64) -> Result<StateSpace, Error> {
-    let (a, b) = held::hold_inputs(&plant.a, &plant.b, period)?;
+    let (a, b) = match plant.domain {
+        Domain::Continuous => held::hold_inputs(&plant.a, &plant.b, period)?,
+        Domain::Sampled { period: stated } if stated.total_cmp(&period).is_ne() => {
+            let rule = "that of the sampled plant";
+            return Err(Error::OutOfRange { name: "the sample time", value: period, rule });
+        }
+        Domain::Sampled { .. } => (plant.a.clone(), plant.b.clone()),
+    };
     let domain = Domain::Sampled { period };
     if plant.d.amax() <= 0.0 {
         return Ok(StateSpace { a, b, domain, ..plant.clone() });

@@ -8,7 +8,7 @@ use crate::aso::{GainCandidates, place_controller};
 use crate::balance::power_of_two;
 use crate::blocks::{block_2x2, stacked};
 use crate::controller::{closed_loop, controller};
-use crate::faults::ExtendedPlant;
+use crate::faults::{ExtendedPlant, coefficients};
 use crate::faulty_plant::FaultyPlant;
 use crate::gains::{Estimator, Gains};
 use crate::hold::FirstOrderHold;
@@ -106,8 +106,8 @@ pub fn sampled_poles(continuous: &[Complex<f64>], period: f64) -> Result<Vec<Com
 /// y_f[k+1]  = y_f[k] + (I - e^(-W T)) (y[k] - y_f[k])
 /// ```
 ///
-/// `extended`: in continuous time; `period`: T in s, above zero. Exact for a held u and faults that
-/// follow their model, a ramp within the interval included; the measurement filter operates on
+/// `extended`: in continuous time; one in sampled time is returned as it is; `period`: T in s, above zero. Exact for a held
+/// u and faults that follow their model, a ramp within the interval included; the measurement filter operates on
 /// samples. Method and precision: see [`FirstOrderHold`].
 ///
 /// # Errors
@@ -115,9 +115,12 @@ pub fn sampled_poles(continuous: &[Complex<f64>], period: f64) -> Result<Vec<Com
 /// Same as [`FaultyPlant::check`] and [`FirstOrderHold::new`]; [`Error::Shape`] when the filter
 /// does not fit the plant.
 pub fn sample(extended: &ExtendedPlant, period: f64) -> Result<FaultyPlant, Error> {
-    let ExtendedPlant { plant, filter, states, .. } = extended;
+    let ExtendedPlant { plant, filter, states, domain, .. } = extended;
     plant.check()?;
     check::positive("the sample time", period)?;
+    if *domain == (Domain::Sampled { period }) {
+        return Ok(plant.clone());
+    }
     let (all, q) = plant.f_a.shape();
     let filters = filter.as_ref().map_or(0, Vec::len);
     check::shape("A", &plant.a, (states + filters, states + filters))?;
@@ -135,7 +138,8 @@ pub fn sample(extended: &ExtendedPlant, period: f64) -> Result<FaultyPlant, Erro
     let Some(rates) = filter else {
         return Ok(FaultyPlant { a, b, c: plant.c.clone(), f_a, a_f });
     };
-    let gain = rates.iter().map(|rate| filter_gain(*rate, period) / rate);
+    let gains = coefficients(rates, Domain::Sampled { period });
+    let gain = gains.iter().zip(rates).map(|(gain, rate)| gain / rate);
     let gain = DMatrix::from_diagonal(&DVector::from_vec(gain.collect()));
     let decay = DVector::from_vec(rates.iter().map(|rate| (-rate * period).exp()).collect());
     Ok(FaultyPlant {
@@ -148,11 +152,6 @@ pub fn sample(extended: &ExtendedPlant, period: f64) -> Result<FaultyPlant, Erro
         f_a: stacked(&f_a, &(&gain * plant.f_a.rows(n, filters))),
         a_f,
     })
-}
-
-/// 1 - e^(-rate T).
-fn filter_gain(rate: f64, period: f64) -> f64 {
-    -(-rate * period).exp_m1()
 }
 
 /// Designs the controller for its sample time.
@@ -308,22 +307,18 @@ fn place_dual(
 /// - e^(-w T). None without a filter.
 #[must_use]
 pub fn filter(extended: &ExtendedPlant, domain: Domain) -> Option<Vec<f64>> {
-    let rates = extended.filter.as_ref()?.iter();
-    Some(match domain {
-        Domain::Continuous => rates.copied().collect(),
-        Domain::Sampled { period } => rates.map(|&rate| filter_gain(rate, period)).collect(),
-    })
+    extended.filter.as_ref().map(|rates| coefficients(rates, domain))
 }
 
-/// `K_f` in `domain`: [`FaultyPlant::compensation_gain`] of the continuous plant, in sampled time
-/// multiplied by the mean of the modelled fault over the interval.
+/// `K_f` in `domain`: [`FaultyPlant::compensation_gain`], for a continuous plant in sampled time multiplied by the mean of
+/// the modelled fault over the interval.
 ///
 /// # Errors
 ///
 /// Same as [`FaultyPlant::compensation_gain`] and [`FirstOrderHold::new`].
 pub fn compensation_gain(extended: &ExtendedPlant, domain: Domain) -> Result<DMatrix<f64>, Error> {
     let gain = extended.plant.compensation_gain()?;
-    let Domain::Sampled { period } = domain else {
+    let (Domain::Continuous, Domain::Sampled { period }) = (extended.domain, domain) else {
         return Ok(gain);
     };
     let q = extended.plant.a_f.nrows();

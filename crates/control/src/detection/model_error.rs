@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 /// Relative width of the bracket of a peak gain.
 const WIDTH: f64 = 1e-2;
 
-/// A stable plant, in continuous time, whose entries are not known exactly.
+/// A stable plant, in continuous time or in the samples of the filter, whose entries are not known exactly.
 ///
 /// ```text
 /// x' = (A + dA) x + (B + dB) u,  y = (C + dC) x + D u,   |dA| <= sizes[0], |dB| <= sizes[1], |dC| <= sizes[2]
@@ -69,9 +69,9 @@ impl UncertainPlant {
         let Some([w, z]) = self.errors(bounds)? else { return Ok(None) };
         let n = a.nrows();
         let unit = DMatrix::identity(n, n);
-        let (phi, gamma, w) = match filter.domain {
-            Domain::Continuous => (a.clone(), b.clone(), w),
-            Domain::Sampled { period } => {
+        let (phi, gamma, w) = match (filter.domain, self.nominal.domain) {
+            (Domain::Continuous, _) | (_, Domain::Sampled { .. }) => (a.clone(), b.clone(), w),
+            (Domain::Sampled { period }, Domain::Continuous) => {
                 let (phi, gamma) = zero_order_hold(a, b, period)?;
                 let (_, integral) = zero_order_hold(&comparison(a), &unit, period)?;
                 (phi, gamma, integral * w)
@@ -107,14 +107,14 @@ impl UncertainPlant {
 
     /// Bounds of w = dA x + dB u and of z = dC x.
     fn errors(&self, bounds: &DVector<f64>) -> Result<Option<[DVector<f64>; 2]>, Error> {
-        let StateSpace { a, b, .. } = &self.nominal;
+        let StateSpace { a, b, domain, .. } = &self.nominal;
         let [of_a, of_b, of_c] = &self.sizes;
         let (n, m) = b.shape();
         let unit = DMatrix::identity(n, n);
         let mut inputs = b.clone().resize_horizontally(m + n, 0.0);
         inputs.columns_mut(m, n).copy_from(&unit);
         let d = DMatrix::zeros(n, m + n);
-        let states = StateSpace { a: a.clone(), b: inputs, c: unit, d, domain: Domain::Continuous };
+        let states = StateSpace { a: a.clone(), b: inputs, c: unit, d, domain: *domain };
         let gains = peak_gain(&states, WIDTH)?.upper;
         let (from_u, from_w) = (gains.columns(0, m), gains.columns(m, n));
         let feedback = from_w * of_a;

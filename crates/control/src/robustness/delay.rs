@@ -24,8 +24,7 @@ const REFINED_SAMPLES: f64 = 20.0;
 ///
 /// has a solution where an eigenvalue of L(j w) has the modulus 1. Method: the moduli of the
 /// eigenvalues on 60 frequencies for each decade and at the resonances, located by bisection. In
-/// sampled time the result is exact for whole samples; [`sampled_delay_margin`] is exact for the
-/// others.
+/// sampled time the result is exact for whole samples; [`sampled_delay_margin`] is exact for the others.
 ///
 /// # Errors
 ///
@@ -72,7 +71,8 @@ fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Locus>, Error> {
 /// Computes the delay margin of a sampled controller: the smallest delay of its held commands at
 /// which the loop with the continuous plant becomes unstable.
 ///
-/// `plant`: continuous; `controller`: sampled. Over an interval the plant receives first the command
+/// `plant`: continuous, or in the samples of the controller, where the result is the largest number of whole samples;
+/// `controller`: sampled. Over an interval the plant receives first the command
 /// of the sample before, then the new one, so that every delay gives a sampled loop whose
 /// eigenvalues decide. Method: the whole samples by [`delay_margin`], the rest by bisection; above
 /// 20 samples without the rest.
@@ -104,6 +104,9 @@ pub(super) fn refined(
 ) -> Result<f64, Error> {
     let period = period_of(controller)?;
     let whole = (estimate / period).floor();
+    if plant.domain != Domain::Continuous {
+        return Ok(period * whole);
+    }
     if whole.is_nan() || whole > REFINED_SAMPLES {
         return Ok(estimate);
     }

@@ -11,7 +11,7 @@ use nalgebra::{Complex, DMatrix};
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
 /// The largest singular value of S at a frequency, and its derivatives with respect to the entries
-/// of A, B, C and D of the continuous plant.
+/// of A, B, C and D of the plant.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PeakDerivatives {
@@ -46,8 +46,8 @@ pub struct SensitivityPeak {
 /// d sigma / d theta = Re(u* dS/d theta v),   S v = sigma u
 /// ```
 ///
-/// `plant`: in continuous time; `controller`: in its own domain, a sampled one with the plant under
-/// a zero-order hold. At the frequency of the peak the derivative of sigma with respect to the frequency
+/// `plant`: in continuous time, or in the samples of the controller; `controller`: in its own domain, a sampled one with a
+/// continuous plant under a zero-order hold. At the frequency of the peak the derivative of sigma with respect to the frequency
 /// is zero, so that a move of the peak has an effect of second order only. The derivative exists if the largest singular value is simple. For a
 /// sampled loop the derivatives with respect to A and B follow from those of the sampled plant by
 /// the adjoint of the derivative of the matrix exponential, L(M', G) for the gradient G. Cost: about
@@ -78,14 +78,16 @@ pub fn peak_derivatives(
         let [a, b, c, d] = [&plant.a, &plant.b, &plant.c, &plant.d].map(zero);
         return Ok(PeakDerivatives { value: 1.0, a, b, c, d });
     };
-    if let Domain::Sampled { period } = controller.domain {
+    let (n, m) = plant.b.shape();
+    derivatives.a = derivatives.a.view((0, 0), (n, n)).into();
+    derivatives.b = derivatives.b.rows(0, n).into();
+    if derivatives.c.ncols() > n {
+        // The command before is a state of the held plant, and D a part of its C.
+        derivatives.d = derivatives.c.columns(n, m).into();
+        derivatives.c = derivatives.c.columns(0, n).into();
+    }
+    if let (Domain::Continuous, Domain::Sampled { period }) = (plant.domain, controller.domain) {
         (derivatives.a, derivatives.b) = through_hold(plant, period, &derivatives)?;
-        let (n, m) = plant.b.shape();
-        if derivatives.c.ncols() > n {
-            // The command before is a state of the held plant, and D a part of its C.
-            derivatives.d = derivatives.c.columns(n, m).into();
-            derivatives.c = derivatives.c.columns(0, n).into();
-        }
     }
     Ok(derivatives)
 }
@@ -173,8 +175,8 @@ fn through_hold(
     both.view_mut((0, 0), (n, n)).copy_from(&plant.a);
     both.view_mut((0, n), (n, m)).copy_from(&plant.b);
     let mut gradient = DMatrix::zeros(order, order);
-    gradient.view_mut((0, 0), (n, n)).copy_from(&sampled.a.view((0, 0), (n, n)));
-    gradient.view_mut((0, n), (n, m)).copy_from(&sampled.b.rows(0, n));
+    gradient.view_mut((0, 0), (n, n)).copy_from(&sampled.a);
+    gradient.view_mut((0, n), (n, m)).copy_from(&sampled.b);
     let adjoint = both.transpose() * period;
     // The derivative is linear in the gradient: with one of the size of the matrix the exponential
     // needs no further squarings.

@@ -86,8 +86,8 @@ impl OpenedLoop {
         delay_of(&self.complementary)
     }
 
-    /// [`super::sampled_delay_margin`] of a loop opened at its input; `plant`: the continuous plant,
-    /// whose sampled one is in the loop, as `controller` is.
+    /// [`super::sampled_delay_margin`] of a loop opened at its input; `plant`: that of
+    /// the loop, in continuous time or sampled, as `controller` is.
     ///
     /// # Errors
     ///

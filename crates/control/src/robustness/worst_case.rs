@@ -74,9 +74,9 @@ fn gradients<F: PlantFamily>(
     let mut modes: Vec<_> =
         eigenvalues(&dynamics)?.into_iter().filter(|mode| mode.im >= 0.0).collect();
     modes.sort_by(|x, y| domain.excess(*y).total_cmp(&domain.excess(*x)));
-    let half = match domain {
-        Domain::Continuous => None,
-        Domain::Sampled { period } => {
+    let half = match (plant.domain, domain) {
+        (Domain::Sampled { .. }, _) | (_, Domain::Continuous) => None,
+        (Domain::Continuous, Domain::Sampled { period }) => {
             let mut block = DMatrix::zeros(n + m, n + m);
             block.view_mut((0, 0), (n, n)).copy_from(&(&plant.a * (0.5 * period)));
             block.view_mut((0, n), (n, m)).copy_from(&(&plant.b * (0.5 * period)));

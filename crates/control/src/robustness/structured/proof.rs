@@ -4,8 +4,8 @@ use super::blocks::Block;
 use super::held::HeldFamily;
 use super::opened::{Channels, Opened};
 use super::{StructuredBound, structured_bound};
-use crate::robustness::Loop;
 use crate::robustness::tolerance::EntryFamily;
+use crate::robustness::{Loop, held_plant};
 use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
@@ -59,7 +59,7 @@ pub enum Unproven {
 /// deviations, exact for products of B, C and the controller's D too; the fraction is 1 / [`structured_bound`] of M.
 /// `most`: the largest fraction of interest; one at which instability was found ends the search.
 ///
-/// For a sampled controller the deviations act on the exponential of [A, B; 0, 0] h. It is that of the nominal plant
+/// For a sampled controller and a continuous plant the deviations act on the exponential of [A, B; 0, 0] h. It is that of the nominal plant
 /// plus the change of a step of the Gauss method, linear fractional in the deviations with 1 to 3
 /// channels for each, plus the change of the error of that method. The last part is bounded entry by entry by its
 /// power series and is one more block, of any matrix. It is small if the sample time is short against the time
@@ -76,14 +76,36 @@ pub fn proven_tolerance(
 ) -> Result<Result<ProvenTolerance, Unproven>, Error> {
     let changes = family.changes();
     let perturbed = Perturbed { plant: family.nominal(), changes, controller };
-    match controller.domain {
-        Domain::Continuous => {
-            Loop::new(perturbed.plant.clone(), controller.clone())?;
-            let (system, blocks) = perturbed.continuous();
-            perturbed.bounded(&system, &blocks, most, ending)
+    match (controller.domain, perturbed.plant.domain) {
+        (Domain::Sampled { period }, Domain::Continuous) => {
+            perturbed.sampled_fraction(period, most, ending)
         }
-        Domain::Sampled { period } => perturbed.sampled_fraction(period, most, ending),
+        (Domain::Sampled { period }, Domain::Sampled { .. }) => {
+            let held = held_plant(perturbed.plant, period)?;
+            let changes = perturbed.changes.iter().map(|change| held_change(change, &held));
+            let changes = changes.collect();
+            Perturbed { plant: &held, changes, ..perturbed }.fraction(most, ending)
+        }
+        (Domain::Continuous, _) => perturbed.fraction(most, ending),
     }
+}
+
+/// The change of [A, B; C, D] of a sampled plant in its `held` form, see [`held_plant`].
+fn held_change(change: &DMatrix<f64>, held: &StateSpace) -> DMatrix<f64> {
+    let (n, (p, m)) = (held.a.nrows(), held.d.shape());
+    let states = change.nrows() - p;
+    if states == n {
+        return change.clone();
+    }
+    // The states are [x; v], and D is the part of C of the command before, v.
+    let mut held_change = DMatrix::zeros(n + p, n + m);
+    let mut copy = |to: (usize, usize), from: (usize, usize), size: (usize, usize)| {
+        held_change.view_mut(to, size).copy_from(&change.view(from, size));
+    };
+    copy((0, 0), (0, 0), (states, states));
+    copy((0, n), (0, states), (states, m));
+    copy((n, 0), (states, 0), (p, states + m));
+    held_change
 }
 
 struct Perturbed<'a> {
@@ -129,7 +151,19 @@ impl Perturbed<'_> {
         }))
     }
 
-    fn continuous(&self) -> (StateSpace, Vec<Block>) {
+    /// The fraction for a plant in the time domain of the controller.
+    fn fraction(
+        &self,
+        most: f64,
+        ending: &dyn Fn() -> bool,
+    ) -> Result<Result<ProvenTolerance, Unproven>, Error> {
+        Loop::new(self.plant.clone(), self.controller.clone())?;
+        let (system, blocks) = self.system();
+        self.bounded(&system, &blocks, most, ending)
+    }
+
+    /// M and its blocks for a plant in the time domain of the controller.
+    fn system(&self) -> (StateSpace, Vec<Block>) {
         let StateSpace { a, b, c, d, domain } = self.plant;
         let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
         let Channels { left, right, ranks } = Channels::of(&self.changes, (n + p, n + m));
