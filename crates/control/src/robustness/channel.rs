@@ -9,7 +9,7 @@ use crate::response::KnownResponse;
 use crate::stability::largest_excess;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// Gains beyond which no limit is searched, and the number of gains at which stability is tested on
 /// each side.
@@ -34,7 +34,7 @@ pub struct ChannelMargins {
     /// The frequency of `phase`, in rad per unit of time; zero if |L| is never 1.
     pub phase_frequency: f64,
     /// The delay, in the unit of time, below which the loop is stable. In sampled time it is exact
-    /// for whole samples.
+    /// for whole samples, see [`super::delay_margin`].
     pub delay: f64,
 }
 
@@ -77,6 +77,12 @@ pub(super) fn margins_of(complementary: &KnownResponse) -> Result<ChannelMargins
             (phase, phase_frequency) = (lag.abs(), frequency);
         }
         delay = delay.min(lag.rem_euclid(TAU) / frequency);
+    }
+    if let Domain::Sampled { period } = complementary.system.domain
+        && delay >= period
+        && transfer(&sweep.at(PI / period)?).norm() > 1.0
+    {
+        delay = 0.0;
     }
     Ok(ChannelMargins { gain, phase, phase_frequency, delay })
 }

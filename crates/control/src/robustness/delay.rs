@@ -10,7 +10,7 @@ use crate::response::KnownResponse;
 use crate::stability::instability;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// Number of whole samples up to which the delay of a sampled loop is refined.
 const REFINED_SAMPLES: f64 = 20.0;
@@ -24,7 +24,9 @@ const REFINED_SAMPLES: f64 = 20.0;
 ///
 /// has a solution where an eigenvalue of L(j w) has the modulus 1. Method: the moduli of the
 /// eigenvalues on 60 frequencies for each decade and at the resonances, located by bisection. In
-/// sampled time the result is exact for whole samples; [`sampled_delay_margin`] is exact for the others.
+/// sampled time the result is exact for whole samples; [`sampled_delay_margin`] is exact for the others. It is below one
+/// sample, zero if the moduli do not tell it, where an eigenvalue of L at z = -1 has a modulus above 1: each sample of
+/// delay turns it by half a turn around -1, which adds an unstable eigenvalue of the loop.
 ///
 /// # Errors
 ///
@@ -46,6 +48,12 @@ pub(super) fn delay_of(complementary: &KnownResponse) -> Result<f64, Error> {
             let at = loci(&sweep.at(frequency)?)?[rank].value;
             delay = delay.min((-at).arg().rem_euclid(TAU) / frequency);
         }
+    }
+    if let Domain::Sampled { period } = complementary.system.domain
+        && delay >= period
+        && loci(&sweep.at(PI / period)?)?.iter().any(|locus| locus.excess > 0.0)
+    {
+        delay = 0.0;
     }
     Ok(delay)
 }

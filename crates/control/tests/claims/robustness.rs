@@ -215,6 +215,29 @@ fn the_margins_of_a_servo_are_the_closed_form() {
     }
 }
 
+/// y[k+1] = -0.5 y[k] + u[k], u = 1.2 y: the eigenvalue 0.7. |L| = 2.4 at z = -1, and with one sample of delay an
+/// eigenvalue is (-0.5 - sqrt(5.05)) / 2 = -1.37, while |L| = 1 at 1.38 rad per sample asks for 3.9 samples.
+#[test]
+fn a_loop_of_more_than_one_at_half_of_the_sample_rate_bears_no_delay() {
+    let one = |value| DMatrix::from_element(1, 1, value);
+    let domain = Domain::Sampled { period: 0.1 };
+    let plant = StateSpace { a: one(-0.5), b: one(1.0), c: one(1.0), d: one(0.0), domain };
+    let gain = |gain| StateSpace { a: one(0.0), b: one(0.0), c: one(0.0), d: one(gain), domain };
+    for (k, delay) in [(1.2, 0.0), (0.2, f64::INFINITY), (-0.45, f64::INFINITY)] {
+        let closed = Loop::new(plant.clone(), gain(k)).unwrap();
+        let found = [
+            delay_margin(&closed).unwrap(),
+            channel_margins(&closed, Point::Output, 0).unwrap().delay,
+            sampled_delay_margin(&plant, &gain(k)).unwrap(),
+        ];
+        assert_eq!(
+            found.map(|found| found.total_cmp(&delay)),
+            [std::cmp::Ordering::Equal; 3],
+            "{found:?}"
+        );
+    }
+}
+
 /// An integrator with u = -k y, held over h, has the eigenvalue 1 - k h.
 #[test]
 fn an_integrator_may_be_held_for_two_time_constants() {
