@@ -6,7 +6,11 @@ import tomllib
 import numpy as np
 import pytest
 from scipy.io import savemat
+from scipy.linalg import solve_discrete_are
 from scipy.signal import cont2discrete
+
+from design_oracle import closed_loop, commands, made, responses
+from test_delays import response
 
 PERIOD = 0.05
 # A motor with a flexible shaft: angle and speed of both ends.
@@ -79,13 +83,151 @@ SCALAR = 'B = [[1]]\nC = [[1]]\nactuator_faults = "all"\n'
 @pytest.mark.parametrize(
     "text, message",
     [
-        (f'matrices = "sampled"\nsample_time = 0.1\nA = [[-0.3]]\n{SCALAR}', "1:12: matrices: sampled every 0.1 s: no continuous"),
-        (f'matrices = "sampled"\nsample_time = 0.1\nA = [[0]]\n{SCALAR}', "1:12: matrices: sampled every 0.1 s: no continuous"),
         (f'matrices = "sampled"\nA = [[0.5]]\n{SCALAR}', "1:12: matrices: expected `sample_time`, too"),
         (f'matrices = "discrete"\nA = [[0.5]]\n{SCALAR}', 'expected "continuous" or "sampled", found "discrete"'),
         (PLANT + "[[family]]\nA = [[1]]\n", "expected continuous matrices"),
+        (
+            f'matrices = "sampled"\nsample_time = 0.1\nA = [[-0.5]]\nactuators = [{{ name = "u", delay = 0.1 }}]\n{SCALAR}',
+            "4:13: a delay needs a continuous plant with the samples of A and B, and there is none; expected states of the delay",
+        ),
     ],
 )
-def test_samples_of_no_continuous_plant_are_refused_with_the_reason(design, text, message):
+def test_sampled_matrices_that_cannot_be_used_are_refused_with_the_reason(design, text, message):
     done = design(text)
     assert done.returncode == 2 and message in done.stderr, done.stderr
+
+
+def test_a_state_apart_that_no_continuous_plant_has_changes_no_gain_and_no_threshold(design, tmp_path):
+    """The plant above with x5[k+1] = -0.5 x5[k], which nothing acts on and nothing shows."""
+    apart = np.zeros((5, 5))
+    apart[:4, :4], apart[4, 4] = SAMPLED, -0.5
+    more = lambda rows: np.vstack([rows, np.zeros((1, rows.shape[1]))]).tolist()
+    rest = REST.replace(str(C.tolist()), str(np.hstack([C, np.zeros((2, 1))]).tolist()))
+    # Weights that do not look at the fifth state; a bound, so that the residuals are bounded.
+    rest = rest.replace("1, 0.1, 1, 0.1]", "1, 0.1, 1, 0.1, 1]").replace("0.1, 0.01, 0.1, 1]", "0.1, 0.01, 0.1, 1, 1]")
+    texts = (
+        f'matrices = "sampled"\nA = {SAMPLED.tolist()}\nB = {INPUTS[:, :1].tolist()}\n{REST}',
+        f'matrices = "sampled"\nA = {apart.tolist()}\nB = {more(INPUTS[:, :1])}\n{rest}',
+    )
+    tables = """faults = [{ name = "f", actuator = "u1", bound = 1 }]
+[robustness]
+tolerance = { C = 0.1 }
+[detection]
+method = "cusum"
+noise = 0.001
+process_noise = 0.001
+false_alarm_interval = 1000
+"""
+    reports, files = [], []
+    for text in texts:
+        done = design(text + tables, "--json")
+        assert done.returncode in (0, 1), done.stderr
+        reports.append(json.loads(done.stdout))
+        files.append(tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8")))
+    assert [report["plant"]["sample_time"] for report in reports] == [None, PERIOD]
+    for name in ("K_x", "K_f", "L_x", "L_f"):
+        one, two = (np.array(file[name]) for file in files)
+        rows, columns = one.shape
+        np.testing.assert_allclose(two[:rows, :columns], one, rtol=1e-7, atol=1e-9)
+    peaks = [[point["s_peak"] for point in report["robustness"]["points"]] for report in reports]
+    np.testing.assert_allclose(peaks[1], peaks[0], rtol=1e-6)
+    tests = [report["detection"]["tests"] for report in reports]
+    for one, two in zip(*tests, strict=True):
+        np.testing.assert_allclose(two["threshold"], one["threshold"], rtol=1e-6)
+
+
+# A, B, C, T. The first three: examples 1.1, 1.4 and 1.5 of P. Benner, A. Laub and V. Mehrmann, A collection of benchmark
+# examples for the numerical solution of algebraic Riccati equations II: discrete-time case (1995).
+BENCHMARKS = [
+    ([[4, 3], [-4.5, -3.5]], [[1], [-1]], [[3, 2]], 1.0),
+    ([[0, 1], [0, -1]], [[1, 0], [2, 1]], [[1, 0], [0, 1]], 1.0),
+    ([[0, 1], [0, 0]], [[0], [1]], [[1, 2]], 1.0),
+]
+UNSTABLE = ([[0.9, 0.2, 0], [0, -1.1, 0.3], [0, 0, 0.7]], [[0.1], [1.0], [0.5]], [[1, 0, 0.3], [0, 1, 0]], 0.05)
+REGISTERS = ([[0.99, 0, 0.1], [0, 0, 0], [0, 1, 0]], [[0], [1], [0]], [[1, 0, 0]], 0.1)
+
+
+def only_samples(plant, more='actuator_faults = "all"\n'):
+    a, b, c, period = plant
+    return f'matrices = "sampled"\nsample_time = {period}\nA = {a}\nB = {b}\nC = {c}\n{more}'
+
+
+@pytest.mark.parametrize("plant", BENCHMARKS)
+def test_gains_of_published_plants_without_a_continuous_one_solve_scipys_riccati_equation(aso_ftc, tmp_path, plant):
+    a, b, c, _ = (np.array(part, dtype=float) for part in plant)
+    n, m, p = len(a), b.shape[1], len(c)
+    weights = f"feedback = {{ Q = {[1] * n}, R = {[1] * m} }}\nobserver = {{ W = {[1] * (n + m)}, V = {[1] * p} }}\n"
+    own, report = made(aso_ftc, tmp_path, only_samples(plant, weights + 'actuator_faults = "all"\n'))
+    np.testing.assert_array_equal(own.A, a)
+    x = solve_discrete_are(a, b, np.eye(n), np.eye(m))
+    expected = -np.linalg.solve(np.eye(m) + b.T @ x @ b, b.T @ x @ a)
+    np.testing.assert_allclose(own.K_x, expected, rtol=1e-8, atol=1e-9)
+    a_0, c_0, gain = own.augmented
+    x = solve_discrete_are(a_0.T, c_0.T, np.eye(n + m), np.eye(p))
+    np.testing.assert_allclose(gain, x @ c_0.T @ np.linalg.inv(np.eye(p) + c_0 @ x @ c_0.T), rtol=1e-7, atol=1e-8)
+    assert any("no continuous plant has these samples" in warning for warning in report["warnings"])
+
+
+def radius_of(own, a, b, c):
+    """The largest modulus of the eigenvalues of the loop of another plant and the controller of a design."""
+    n, q = own.n, own.q
+    x, x_hat, f_hat = np.split(np.eye(2 * n + q), [n, 2 * n])
+    innovation = c @ x - own.C @ x_hat
+    corrected, faults = x_hat + own.L_x @ innovation, f_hat + own.L_f @ innovation
+    if not own.current:
+        corrected, faults = x_hat, f_hat
+    command = own.K_x @ corrected + own.K_f @ faults
+    rest = (0 if own.current else 1) * innovation
+    model = own.A @ corrected + own.B @ command + own.F_a @ faults + own.L_x @ rest
+    return max(abs(np.linalg.eigvals(np.vstack([a @ x + b @ command, model, faults + own.L_f @ rest]))))
+
+
+@pytest.mark.parametrize("estimator", ["current", "prediction"])
+@pytest.mark.parametrize("plant", [UNSTABLE, REGISTERS])
+def test_peak_delay_margin_bounds_and_worst_plant_of_samples_alone_are_those_of_numpy(aso_ftc, tmp_path, plant, estimator):
+    faults = 'faults = [{ name = "f", actuator = "u1", bound = 2, rate_bound = 0.5 }]\n'
+    tolerance = "robustness.tolerance = 0.05\n"
+    text = only_samples(plant, f'estimator = "{estimator}"\n{faults}{tolerance}')
+    own, report = made(aso_ftc, tmp_path, text)
+    a, b, c, period = map(np.array, plant)
+    n = len(a)
+    loop, entry, _, direct = closed_loop(own)
+    to_command = commands(own)
+    added = np.vstack([b, np.zeros((n + 1, 1))])
+    frequencies = np.linspace(0, np.pi, 20_001)[1:]
+    sums = [1 + response(loop, added, to_command, np.exp(1j * angle))[0, 0] for angle in frequencies]
+    robustness = report["robustness"]
+    np.testing.assert_allclose(robustness["points"][0]["s_peak"], np.max(np.abs(sums)), rtol=1e-4)
+    # The largest delay in whole samples.
+    whole = round(robustness["delay_margin"] / period)
+    np.testing.assert_allclose(robustness["delay_margin"], whole * period)
+
+    def delayed(samples):
+        size = len(loop)
+        all_states = np.zeros((size + samples, size + samples))
+        all_states[:size, :size] = loop
+        if samples:
+            all_states[:n, :size] -= b @ to_command
+            all_states[:n, -1:] = b
+            all_states[size, :size] = to_command
+            all_states[size + 1 :, size:-1] = np.eye(samples - 1)
+        return max(abs(np.linalg.eigvals(all_states)))
+
+    assert delayed(whole) < 1 <= delayed(whole + 1)
+    # |f| <= 2, and |f'| <= 0.5: the sums of the moduli of the responses.
+    system = (loop, entry, np.vstack([np.eye(n, len(loop)), closed_loop(own)[2][n:]]), direct)
+    _, impulse, step = responses(system, period, 4000)
+    of_fault = np.abs(impulse).sum(axis=0)[:, 0] + np.abs(direct[:, 0])
+    of_rate = np.abs(step).sum(axis=0)[:, 0] * period
+    for bound, fault, rate in zip(report["bounds"], of_fault, of_rate, strict=True):
+        np.testing.assert_allclose(bound["gain_of_fault"], fault, rtol=2e-3, atol=1e-9)
+        np.testing.assert_allclose(bound["gain_of_rate"], rate, rtol=2e-3, atol=1e-6)
+        assert bound["largest"] <= 2 * fault * 1.002
+    # The worst plant is on the limit of stability at the stated multiple of the tolerances.
+    worst = {matrix["name"]: np.array(matrix["values"]) for matrix in robustness["tolerance"]["worst"]}
+    nominal = {"A": a, "B": b, "C": c}
+
+    limit = robustness["tolerance"]["first_unstable"]
+    changed = [nominal[name] + limit * (worst[name] - nominal[name]) for name in "ABC"]
+    np.testing.assert_allclose(radius_of(own, *changed), 1, rtol=1e-6)
+    assert 0.9 * limit < robustness["tolerance_proof"]["fraction"] <= limit

@@ -38,12 +38,13 @@ pub(crate) fn summarise(report: &Report) {
             .map(|point| format!("{} at the {}", number(point.judged), point.point))
             .collect();
         println!("peak of S: {}", peaks.join(", "));
-        let hold = if report.sampling.is_some() { "longest sample time" } else { "longest hold" };
-        println!(
-            "delay margin: {} s; {hold}: {} s",
-            number(robustness.delay_margin),
-            number(robustness.longest_hold)
-        );
+        let delay = number(robustness.delay_margin);
+        let hold = number(robustness.longest_hold);
+        match (&report.plant.sample_time, &report.sampling) {
+            (Some(_), _) => println!("delay margin: {delay} s, in whole samples"),
+            (None, Some(_)) => println!("delay margin: {delay} s; longest sample time: {hold} s"),
+            (None, None) => println!("delay margin: {delay} s; longest hold: {hold} s"),
+        }
         if let Some(delays) = &robustness.delays {
             let [at_input, at_output] = delays.s_peaks.map(number);
             println!(

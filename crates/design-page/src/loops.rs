@@ -7,7 +7,7 @@ use super::plane::{Plane, Pole, pairs};
 use super::pole_map::{Group, Map, Sign};
 use super::table::{Cell, table};
 use design_report::number::rounded;
-use design_report::{Loop, LowerBoundFor, Region, Report};
+use design_report::{Loop, LowerBoundFor, Plant, Region, Report};
 
 /// Returns the required and the actual eigenvalues of a loop, mapped by `place`.
 fn groups(system: &Loop, place: impl Fn(Pole) -> Pole) -> Vec<Group> {
@@ -28,8 +28,10 @@ fn maps(report: &Report, plane: Plane) -> Markup {
     let (feedback, observer) = (&report.feedback, &report.observer);
     let (slow, fast) = (feedback.region.as_ref(), observer.region.as_ref());
     let rate = |pole| plane.rate(pole);
+    let of_plant = Plane::of_plant(&report.plant);
     let open = |place: fn(Plane, Pole) -> Pole| {
-        group("open loop", Sign::Diamond, &report.plant.eigenvalues, |pole| place(plane, pole))
+        let place = |pole| place(plane, of_plant.rate(pole));
+        group("open loop", Sign::Diamond, &report.plant.eigenvalues, place)
     };
     let with_open = |open, mut groups: Vec<Group>| {
         groups.insert(0, open);
@@ -80,7 +82,7 @@ pub(super) fn poles(report: &Report) -> Markup {
         div.side {
             (eigenvalues("Feedback loop", feedback, plane))
             (eigenvalues("Observer", observer, plane))
-            (open_loop(&report.plant.eigenvalues))
+            (open_loop(&report.plant))
         }
     }
 }
@@ -137,13 +139,14 @@ fn eigenvalues(name: &str, system: &Loop, plane: Plane) -> Markup {
     table(&format!("{name}, {}", system.matrix), &heads, &rows)
 }
 
-fn open_loop(eigenvalues: &[Pole]) -> Markup {
+fn open_loop(plant: &Plant) -> Markup {
+    let plane = Plane::of_plant(plant);
     let row = |(index, pole): (usize, &Pole)| {
-        let stable = if pole[0] < 0.0 { "stable" } else { "not stable" };
+        let stable = if plane.is_stable(*pole) { "stable" } else { "not stable" };
         vec![Cell::Text((index + 1).to_string()), Some(*pole).into(), stable.into()]
     };
-    let rows: Vec<_> = eigenvalues.iter().enumerate().map(row).collect();
-    table("Open loop, A", &["no.", "eigenvalue (1/s)", "on its own"], &rows)
+    let rows: Vec<_> = plant.eigenvalues.iter().enumerate().map(row).collect();
+    table("Open loop, A", &["no.", &format!("eigenvalue{}", plane.unit()), "on its own"], &rows)
 }
 
 /// Shows how the gains were found and how well conditioned the loops are.

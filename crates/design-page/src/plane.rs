@@ -1,6 +1,6 @@
 //! The s-plane or z-plane of the eigenvalues.
 
-use design_report::{Loop, Report};
+use design_report::{Loop, Plant, Report};
 
 /// An eigenvalue: real and imaginary part.
 pub(super) type Pole = [f64; 2];
@@ -16,6 +16,11 @@ impl Plane {
     pub(super) fn of(report: &Report) -> Self {
         let sampled = report.sampling.as_ref();
         sampled.map_or(Self::Continuous, |sampled| Self::Sampled(sampled.sample_time))
+    }
+
+    /// The plane of the eigenvalues of the plant.
+    pub(super) fn of_plant(plant: &Plant) -> Self {
+        plant.sample_time.map_or(Self::Continuous, Self::Sampled)
     }
 
     pub(super) fn unit(self) -> &'static str {

@@ -57,7 +57,9 @@ fn section<'a>(report: &Report, robustness: &'a Robustness, plots: &mut Plots<'a
             "All commands may be delayed by up to " (number(robustness.delay_margin)) " s"
             @if robustness.delays.is_some() { " more" }
             ". "
-            @if report.sampling.is_some() {
+            @if report.plant.sample_time.is_some() {
+                "This is in whole samples."
+            } @else if report.sampling.is_some() {
                 "With the same matrices of the controller the loop is stable up to a sample time of "
                 (number(robustness.longest_hold)) " s."
             } @else {

@@ -103,6 +103,9 @@ pub struct Plant {
     pub matrices: Vec<Matrix>,
     /// Eigenvalues of A.
     pub eigenvalues: Vec<[f64; 2]>,
+    /// The sample time, s, if no continuous plant has the sampled matrices of the plant file: the matrices and their
+    /// eigenvalues are those of the samples.
+    pub sample_time: Option<f64>,
 }
 
 /// A signal.

@@ -86,7 +86,7 @@ pub struct Robustness {
     #[schemars(with = "Option<f64>")]
     pub delay_margin: f64,
     /// The longest time, s, over which the signals may be held; for a sampled design the longest
-    /// sample time with the same matrices of the controller.
+    /// sample time with the same matrices of the controller, not a number if the plant is known in its samples only.
     #[schemars(with = "Option<f64>")]
     pub longest_hold: f64,
     /// The noise of each measurement that `noise` assumes, in the order of its columns.

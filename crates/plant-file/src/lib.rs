@@ -154,7 +154,8 @@ const KEYS: [&str; 36] = [
     "schedule",
 ];
 /// Entries that errors of later steps point at.
-const PLACES: [&str; 24] = [
+const PLACES: [&str; 25] = [
+    "matrices",
     "A",
     "B",
     "C",

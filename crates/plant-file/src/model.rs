@@ -27,11 +27,22 @@ pub enum Model {
         f_a: Option<DMatrix<f64>>,
         /// The states.
         states: Vec<Signal>,
-        /// The sampled matrices of the file, of which `a`, `b` and `f_a` are the continuous plant.
+        /// The sampled matrices of the file, of which `a`, `b` and `f_a` are the continuous plant if there is one.
         sampled: Option<Box<SampledMatrices>>,
     },
     /// The matrices are linearised from an FMU.
     Fmu(PlantFmu),
+}
+
+impl Model {
+    /// Why the plant is known in its samples only; None if it is a continuous one.
+    #[must_use]
+    pub fn only_samples(&self) -> Option<&str> {
+        match self {
+            Self::Matrices { sampled: Some(sampled), .. } => sampled.only_samples.as_deref(),
+            _ => None,
+        }
+    }
 }
 
 /// The FMU of a plant and its operating point.

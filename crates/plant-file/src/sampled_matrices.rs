@@ -1,5 +1,6 @@
 //! Matrices of a plant in sampled time.
 
+use control::Domain;
 use control::eigen::eigenvalues;
 use control::hold::{continuous, zero_order_hold};
 use files::{PlaceError, Table};
@@ -13,14 +14,19 @@ const ROUNDING: f64 = 1e-13;
 /// Modulus below which an eigenvalue of a sampled A counts as zero: those of a chain of three registers are rounded to 1e-5.
 const ZERO: f64 = 1e-4;
 
-/// The continuous plant x' = A x + B u whose samples are those of the matrices in the file.
+/// The plant of sampled matrices: the continuous plant x' = A x + B u with these samples if there is one, otherwise the
+/// plant in sampled time.
 #[derive(Clone)]
 pub struct SampledMatrices {
     /// A, n x n.
     pub a: DMatrix<f64>,
     /// B, n x m.
     pub b: DMatrix<f64>,
-    /// The integral of e^(A s) over a sample, n x n.
+    /// The time domain of A and B.
+    pub domain: Domain,
+    /// Why no continuous plant has the samples, in a sentence.
+    pub only_samples: Option<String>,
+    /// The integral of e^(A s) over a sample, n x n; in sampled time the identity.
     held: DMatrix<f64>,
 }
 
@@ -52,20 +58,25 @@ impl SampledMatrices {
         }
         let refuse =
             |error: control::Error| entry.error(format!("sampled every {period} s: {error}"));
+        let identity = DMatrix::identity(pair.0.nrows(), pair.0.nrows());
         let (a, b) = match continuous(pair.0, pair.1, period) {
-            Err(error @ control::Error::NoContinuousPlant) => {
-                let help = help(pair.0, period);
-                return Err(entry.error(format!("sampled every {period} s: {error}{help}")));
+            Err(control::Error::NoContinuousPlant) => {
+                return Ok(Some(Box::new(Self {
+                    a: pair.0.clone(),
+                    b: pair.1.clone(),
+                    domain: Domain::Sampled { period },
+                    only_samples: Some(only_samples(pair.0, period)),
+                    held: identity,
+                })));
             }
             result => result.map_err(refuse)?,
         };
         let a = without_rounding(&a);
-        let identity = DMatrix::identity(a.nrows(), a.nrows());
         let (_, held) = zero_order_hold(&a, &identity, period).map_err(refuse)?;
-        Ok(Some(Box::new(Self { a, b, held })))
+        Ok(Some(Box::new(Self { a, b, domain: Domain::Continuous, only_samples: None, held })))
     }
 
-    /// The columns of continuous time that are `columns` in the samples.
+    /// The columns in the time of `a` and `b` that are `columns` in the samples.
     pub fn held(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         // It has no zero eigenvalue where the logarithm exists.
         let solved = self.held.clone().lu().solve(columns);
@@ -73,22 +84,25 @@ impl SampledMatrices {
     }
 }
 
-/// What helps where no continuous plant has the samples: zero eigenvalues are mostly those of a delay.
-fn help(a: &DMatrix<f64>, period: f64) -> String {
-    let zeros = eigenvalues(a).map(|all| all.iter().filter(|one| one.norm() < ZERO).count());
-    match zeros {
-        Ok(count @ 1..) => {
-            #[expect(clippy::cast_precision_loss, reason = "a number of states")]
-            let delay = format!("{:.6}", count as f64 * period);
-            let delay = delay.trim_end_matches('0').trim_end_matches('.');
-            format!(
-                "; {count} of them {} zero, as those of a delay of {count} samples are: expected A, B and C without the \
-                 states of the delay, and `delay = {delay}` in the actuator or the measurement",
-                if count == 1 { "is" } else { "are" }
-            )
-        }
-        _ => "; expected a model of lower order, or samples at shorter intervals".to_owned(),
+/// What follows where no continuous plant has the samples; zero eigenvalues are mostly those of a delay.
+fn only_samples(a: &DMatrix<f64>, period: f64) -> String {
+    let zeros = eigenvalues(a).map_or(0, |all| all.iter().filter(|one| one.norm() < ZERO).count());
+    let fact = format!(
+        "no continuous plant has these samples every {period} s, as A has an eigenvalue that is {}: nothing is said about \
+         the time between the samples",
+        if zeros > 0 { "zero" } else { "negative" }
+    );
+    if zeros == 0 {
+        return fact;
     }
+    #[expect(clippy::cast_precision_loss, reason = "a number of states")]
+    let delay = format!("{:.6}", zeros as f64 * period);
+    let delay = delay.trim_end_matches('0').trim_end_matches('.');
+    format!(
+        "{fact}. If {zeros} of them {} of a delay: A, B and C without the states of the delay, and `delay = {delay}` in the \
+         actuator or the measurement, are examined between the samples, too",
+        if zeros == 1 { "is" } else { "are" }
+    )
 }
 
 /// A without the entries that are rounding of the logarithm: beside the largest ones of their row and column.

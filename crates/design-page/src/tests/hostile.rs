@@ -263,6 +263,7 @@ fn plant(numbers: &mut Numbers) -> Plant {
             extremes,
         ],
         eigenvalues: vec![[1e-17, 0.0], [0.5, 2.0], [0.5, -2.0], [-3.0, 0.0]],
+        sample_time: None,
     }
 }
 
@@ -282,6 +283,7 @@ fn bare_plant() -> Plant {
         faults: vec![signal("f1")],
         matrices: Vec::new(),
         eigenvalues: vec![[0.0, 0.0]],
+        sample_time: None,
     }
 }
 

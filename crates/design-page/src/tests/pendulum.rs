@@ -265,6 +265,7 @@ fn plant(design: &Design, matrices: Vec<Matrix>) -> Plant {
             "constant; enters by F_a; at most 30 N",
         )],
         eigenvalues: pairs(&control::eigen::eigenvalues(&design.plant.a).unwrap()),
+        sample_time: None,
         matrices,
     }
 }

@@ -103,7 +103,8 @@ impl<'a> Loops<'a> {
     }
 
     /// Returns the peak-to-peak gains of the outputs from faults, from their rates, and from the part of
-    /// them that the compensation leaves. Those of a sampled loop hold between its samples, too. The errors of
+    /// them that the compensation leaves. Those of a sampled loop hold between its samples, too, if its plant is known
+    /// there. The errors of
     /// the faults come first, as long as the time of `budget` allows.
     fn peak_gains(&self, budget: &Budget) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
         let positions = &self.outputs.positions;
@@ -130,12 +131,17 @@ impl<'a> Loops<'a> {
     /// Returns the gains of some outputs. If those of one do not converge, each is computed alone.
     fn gains_of(&self, rows: &[usize]) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
         let Solution { extended, plant, gains, domain, .. } = self.designed;
-        let peaks = match *domain {
-            Domain::Continuous => fault_gains(plant, gains, *domain, rows, WIDTH),
-            Domain::Sampled { period } => {
+        let peaks = match (extended.domain, *domain) {
+            (Domain::Continuous, Domain::Sampled { period }) => {
                 let sampled = SampledLoop { extended, plant, gains, period };
                 gains_between_samples(&sampled, PARTS, rows, WIDTH)
             }
+            (Domain::Continuous, Domain::Continuous) => {
+                fault_gains(plant, gains, *domain, rows, WIDTH)
+            }
+            // The change of a fault per sample is its rate times the sample time.
+            (Domain::Sampled { period }, _) => fault_gains(plant, gains, *domain, rows, WIDTH)
+                .map(|[of_faults, of_rates, left]| [of_faults, of_rates * period, left]),
         };
         match peaks {
             Ok(all) => {

@@ -1,7 +1,6 @@
 //! Chooses the bandwidths that a plant file leaves open.
 
 use control::Domain;
-use control::eigen::eigenvalues;
 use files::PlaceError;
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -56,7 +55,7 @@ const WITHOUT_SPEED: f64 = 1.0;
 
 /// Returns `file` with the bandwidths that it leaves open.
 ///
-/// The speed of the plant is the median of the moduli of its eigenvalues, at least twice the largest real part; of a
+/// The speed of the plant is the median of the moduli of its eigenvalues in 1/s, at least twice the largest real part; of a
 /// loop whose feedback is stated by eigenvalues, the median of these. Of the candidates the first with a green verdict is
 /// taken, otherwise that with the lowest peak of S. If gains cannot be computed, the error also says what no controller of the
 /// plant reaches.
@@ -154,7 +153,8 @@ fn speed(file: &PlantFile<'_>, plant: &LinearPlant) -> Result<f64, Error> {
     };
     let a = &plant.undelayed.a;
     let (all, changed) = if stated.is_empty() {
-        (eigenvalues(a)?, eigenvalues(&with_other_digits(a))?)
+        let of = |a: &DMatrix<f64>| attainable::rates(a, plant.domain);
+        (of(a)?, of(&with_other_digits(a))?)
     } else {
         (stated.clone(), stated)
     };

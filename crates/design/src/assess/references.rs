@@ -1,12 +1,11 @@
 //! The responses of the loop to steps of the references, within the limits of the commands.
 
-use control::hold::zero_order_hold;
 use control::response::{TimeResponse, step_response};
 use control::tracking::{Action, reference_system};
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-use crate::assess::responses::{BETWEEN, SETTLED, add_outputs};
+use crate::assess::responses::{PARTS, SETTLED, add_outputs};
 use crate::report::robustness::Number;
 use crate::report::{Check, CommandPeak, Curve, ReferenceStep};
 use crate::solve::solution::Solution;
@@ -115,10 +114,11 @@ impl<'a> ReferenceLoop<'a> {
             if trace.time.get(k + 1).is_none_or(|next| next - time > 1.5 * period) {
                 continue;
             }
-            for part in 0..BETWEEN as usize {
+            for (part, between) in
+                self.designed.linear.times_between(period, PARTS).iter().enumerate()
+            {
                 let row = first + part * self.outputs.len() + output;
-                let later = time + time_between(period, part);
-                points.push((later, trace.output[(row, k)]));
+                points.push((time + between, trace.output[(row, k)]));
             }
         }
         points
@@ -203,12 +203,6 @@ impl<'a> ReferenceLoop<'a> {
     }
 }
 
-/// The time after a sample of one of the points between samples.
-fn time_between(period: f64, part: usize) -> f64 {
-    let part = u32::try_from(part).unwrap_or(BETWEEN);
-    period * f64::from(part + 1) / f64::from(BETWEEN + 1)
-}
-
 /// The loop from the references to `rows` times the states and the commands, and the same between samples.
 fn system(
     designed: &Solution,
@@ -237,9 +231,9 @@ fn system(
         StateSpace { c: rows * &states, d: DMatrix::zeros(rows.nrows(), direct.ncols()), ..whole };
     add_outputs(&mut system, &commands, &direct);
     if let Domain::Sampled { period } = designed.domain {
-        for part in 0..BETWEEN as usize {
-            let time = time_between(period, part);
-            let (phi, gamma) = zero_order_hold(&designed.linear.a, &designed.linear.b, time)?;
+        let linear = &designed.linear;
+        for time in linear.times_between(period, PARTS) {
+            let (phi, gamma) = linear.held(&linear.b, time)?;
             let later = rows * (phi * &states + &gamma * &commands);
             add_outputs(&mut system, &later, &(rows * gamma * &direct));
         }

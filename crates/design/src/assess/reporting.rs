@@ -255,6 +255,10 @@ fn plant(designed: &Solution, names: &Names) -> Result<Plant, Error> {
         faults: linear.faults.iter().map(fault).collect(),
         matrices: names.plant_matrices(designed),
         eigenvalues: pairs(&eigenvalues(&linear.undelayed.a)?),
+        sample_time: match linear.domain {
+            Domain::Continuous => None,
+            Domain::Sampled { period } => Some(period),
+        },
     })
 }
 
@@ -384,10 +388,18 @@ fn assumptions(file: &PlantFile<'_>, designed: &Designed) -> Vec<String> {
         );
     }
     if let Domain::Sampled { period } = nominal.domain {
-        all.push(format!(
-            "Commands are constant over a sample time of {period} s; in the responses a \
-             fault changes at samples; states and commands are shown between them, too."
-        ));
+        all.push(if file.model.only_samples().is_some() {
+            format!(
+                "The plant is known at its samples, every {period} s, and faults change there: bounds and responses are those \
+                 of the samples, which the curves join by lines, and the delay margin is in whole samples. A is exact unless `robustness.tolerance` \
+                 states how far it may be off."
+            )
+        } else {
+            format!(
+                "Commands are constant over a sample time of {period} s; in the responses a \
+                 fault changes at samples; states and commands are shown between them, too."
+            )
+        });
     }
     if family.is_some() {
         all.push(

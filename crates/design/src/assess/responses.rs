@@ -1,6 +1,5 @@
 //! The responses of the compensated loop to changes of the faults.
 
-use control::hold::zero_order_hold;
 use control::response::{TimeResponse, fault_system, ramp_response, step_response};
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
@@ -15,11 +14,11 @@ use plant_file::faults::Fault;
 /// Relative band of the settling time: a response has settled when it stays within this fraction of
 /// its largest distance.
 pub(crate) const SETTLED: f64 = 0.02;
-/// Points shown within a sample time, besides the samples.
-pub(crate) const BETWEEN: u32 = 4;
+/// Parts of a sample time, between which points are shown besides the samples.
+pub(crate) const PARTS: u32 = 5;
 /// A curve has at most four points for each of so many parts of the logarithmic time axis; the second
 /// number for loops from `LARGE` states on.
-const PARTS: [usize; 2] = [1000, 250];
+const MOST: [usize; 2] = [1000, 250];
 const LARGE: usize = 48;
 
 /// Returns the responses to a change of each fault, as a step and as a ramp at the bound of its rate,
@@ -115,14 +114,12 @@ impl<'a> ShownLoop<'a> {
         if let Domain::Sampled { period } = *domain {
             let n = designed.extended.states;
             let model = &designed.extended.plant;
-            let a = model.a.view((0, 0), (n, n)).into_owned();
             let mut b = DMatrix::zeros(n, m + q);
             b.columns_mut(0, m).copy_from(&model.b.rows(0, n));
             b.columns_mut(m, q).copy_from(&model.f_a.rows(0, n));
-            for part in 1..=BETWEEN {
-                let time = period * f64::from(part) / f64::from(BETWEEN + 1);
+            for time in designed.linear.times_between(period, PARTS) {
                 // x(t_k + time) from x(t_k), with command and fault constant since t_k.
-                let (phi, gamma) = zero_order_hold(&a, &b, time)?;
+                let (phi, gamma) = designed.linear.held(&b, time)?;
                 let mut states = gamma.columns(0, m) * &commands;
                 let mut own_states = states.columns_mut(0, n);
                 own_states += phi;
@@ -186,15 +183,15 @@ impl<'a> ShownLoop<'a> {
             Domain::Continuous => 0.0,
             Domain::Sampled { period } => period,
         };
+        let between = self.designed.linear.times_between(period, PARTS);
         for (k, &time) in trace.time.iter().enumerate() {
             points.extend(value(k, None).map(|value| (time, value)));
             let next = trace.time.get(k + 1).filter(|next| **next - time < 1.5 * period);
             if next.is_none() {
                 continue;
             }
-            for part in 0..BETWEEN {
-                let later = time + period * f64::from(part + 1) / f64::from(BETWEEN + 1);
-                points.extend(value(k, Some(part as usize)).map(|value| (later, value)));
+            for (part, later) in between.iter().enumerate() {
+                points.extend(value(k, Some(part)).map(|value| (time + later, value)));
             }
         }
         points
@@ -213,7 +210,7 @@ impl<'a> ShownLoop<'a> {
             Domain::Continuous => (at_points.peak, at_points.peak_time, at_points.settling_time),
             Domain::Sampled { .. } => transient(points, trace.final_value[row]),
         };
-        let shown = thinned(points, PARTS[usize::from(self.system.a.nrows() >= LARGE)]);
+        let shown = thinned(points, MOST[usize::from(self.system.a.nrows() >= LARGE)]);
         Curve {
             name,
             unit,

@@ -100,7 +100,7 @@ pub(crate) fn robustness(
 /// The margins of a loop, and what the noise of the measurements does in it.
 pub(crate) struct Margins {
     pub(crate) points: Vec<LoopPoint>,
-    /// Delay margin and longest hold, s.
+    /// Delay margin and longest hold, s; the latter is NaN for a plant that is known in its samples only.
     pub(crate) delay: f64,
     pub(crate) hold: f64,
     pub(crate) noise: Matrix,
@@ -133,7 +133,10 @@ pub(crate) fn margins(
             }
             Domain::Sampled { .. } => rayon::join(
                 || at_input.sampled_delay_margin(plant, controller),
-                || longest_period(plant, controller),
+                || match plant.domain {
+                    Domain::Continuous => longest_period(plant, controller),
+                    Domain::Sampled { .. } => Ok(f64::NAN),
+                },
             ),
         },
     );

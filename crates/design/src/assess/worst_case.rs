@@ -28,7 +28,9 @@ pub(crate) fn plant_file(
         let rows = matrix.values.iter().map(row).collect();
         table.insert(matrix.name.clone(), Value::Array(rows));
     }
-    if let Model::Matrices { f_a, sampled: Some(_), .. } = &file.model {
+    if let Model::Matrices { f_a, sampled: Some(sampled), .. } = &file.model
+        && sampled.only_samples.is_none()
+    {
         without_samples(&mut table, file, f_a.as_ref());
     }
     if file.fmu().is_some() && !without_fmu(&mut table, designed) {

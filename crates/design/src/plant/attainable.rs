@@ -1,10 +1,10 @@
 //! What no controller of a plant can reach: the peak of S that unstable modes, zeros and samples force.
 
-use control::StateSpace;
 use control::eigen::eigenvalues;
 use control::zeros::zeros;
+use control::{Domain, StateSpace};
 use files::PlaceError;
-use nalgebra::Complex;
+use nalgebra::{Complex, DMatrix};
 
 use crate::Error;
 use crate::plant::linear::LinearPlant;
@@ -40,8 +40,8 @@ pub(crate) fn warnings(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
 ) -> Result<Vec<PlaceError>, Error> {
-    let poles: Vec<_> =
-        eigenvalues(&linear.undelayed.a)?.into_iter().filter(|&value| is_right(value)).collect();
+    let poles = rates(&linear.undelayed.a, linear.domain)?;
+    let poles: Vec<_> = poles.into_iter().filter(|&value| is_right(value)).collect();
     let limit = file.robustness.amber;
     let mut warnings = Vec::new();
     if let Some(sampling) = file.sampling {
@@ -78,7 +78,7 @@ pub(crate) fn warnings(
             warnings.push(file.error(&["actuators", "measurements"], message));
         }
     }
-    if b.ncols() == 1 && c.nrows() == 1 && d.amax() <= 0.0 {
+    if b.ncols() == 1 && c.nrows() == 1 && d.amax() <= 0.0 && linear.domain == Domain::Continuous {
         let finite = zeros(a, b, c)?.finite;
         let of_zeros = finite.into_iter().filter(|&zero| is_right(zero) && zero.im >= 0.0);
         let least = |zero: &Complex<f64>| forced(*zero, &poles);
@@ -87,6 +87,15 @@ pub(crate) fn warnings(
         }
     }
     Ok(warnings)
+}
+
+/// The eigenvalues of A in 1/s; of a plant in sampled time ln z / T.
+pub(crate) fn rates(a: &DMatrix<f64>, domain: Domain) -> Result<Vec<Complex<f64>>, control::Error> {
+    let values = eigenvalues(a)?.into_iter();
+    Ok(match domain {
+        Domain::Continuous => values.collect(),
+        Domain::Sampled { period } => values.map(|value| value.ln() / period).collect(),
+    })
 }
 
 fn of_zero(

@@ -5,6 +5,7 @@ use std::ops::Range;
 use control::delay::Delays;
 use control::detection::UnknownInput;
 use control::faults::{Fault as Model, FaultEntry, FaultKind};
+use control::hold::zero_order_hold;
 use control::rank::Mode;
 use control::{Domain, Error, StateSpace};
 use fmu_import::Fmu;
@@ -26,7 +27,8 @@ pub(crate) const AT_REST: f64 = 1e-6;
 /// Part of the largest entry of a row of C below which an entry of D counts as zero.
 const NOTHING: f64 = 1e-9;
 
-/// x' = A x + B u + faults, y = C x + D u + faults, about an operating point. The states of its delays, each approximated,
+/// x' = A x + B u + faults, y = C x + D u + faults, about an operating point; x\[k+1\] in place of x' where the plant is
+/// known in its samples only. The states of its delays, each approximated,
 /// follow those that the plant file states, then those of the filters of PI and PID controllers.
 pub(crate) struct LinearPlant {
     pub(crate) a: DMatrix<f64>,
@@ -38,6 +40,8 @@ pub(crate) struct LinearPlant {
     pub(crate) measurements: Vec<Signal>,
     /// The faults as named in the file, with their units.
     pub(crate) faults: Vec<Fault>,
+    /// The time domain of the matrices.
+    pub(crate) domain: Domain,
     /// The fault models, in the same order.
     pub(crate) models: Vec<Model>,
     /// The disturbances of the file.
@@ -67,7 +71,37 @@ impl LinearPlant {
             b: self.b.clone(),
             c: self.c.clone(),
             d: self.d.clone(),
-            domain: Domain::Continuous,
+            domain: self.domain,
+        }
+    }
+
+    /// A of A x + B u = 0, the condition of rest.
+    pub(crate) fn a_at_rest(&self) -> DMatrix<f64> {
+        match self.domain {
+            Domain::Continuous => self.a.clone(),
+            Domain::Sampled { .. } => &self.a - DMatrix::identity(self.a.nrows(), self.a.nrows()),
+        }
+    }
+
+    /// The states after `time` under held `inputs`, columns like those of B: Phi and Gamma. In sampled time those after a sample.
+    pub(crate) fn held(
+        &self,
+        inputs: &DMatrix<f64>,
+        time: f64,
+    ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
+        match self.domain {
+            Domain::Continuous => zero_order_hold(&self.a, inputs, time),
+            Domain::Sampled { .. } => Ok((self.a.clone(), inputs.clone())),
+        }
+    }
+
+    /// The times between two samples of `period` at which the plant is known: fractions of it in `parts` equal parts.
+    pub(crate) fn times_between(&self, period: f64, parts: u32) -> Vec<f64> {
+        match self.domain {
+            Domain::Continuous => {
+                (1..parts).map(|part| period * f64::from(part) / f64::from(parts)).collect()
+            }
+            Domain::Sampled { .. } => Vec::new(),
         }
     }
 
@@ -123,8 +157,14 @@ impl LinearPlant {
     pub(crate) fn of(file: &PlantFile<'_>) -> Result<Self, crate::Error> {
         match &file.model {
             plant_file::Model::Matrices { a, b, c, d, f_a, states, sampled } => {
-                let undelayed = system([a, b, c, d]);
+                let domain = sampled.as_ref().map_or(Domain::Continuous, |sampled| sampled.domain);
+                let undelayed = system([a, b, c, d], domain);
                 let delays = delays::of(file);
+                if domain != Domain::Continuous && delays.any() {
+                    let message = "a delay needs a continuous plant with the samples of A and B, and there is none; expected \
+                                   states of the delay in A, B and C, one for each sample of it";
+                    return Err(file.error(&["actuators", "measurements"], message).into());
+                }
                 let f = f_a.clone().unwrap_or_else(|| DMatrix::zeros(a.nrows(), 0));
                 let g = DMatrix::zeros(c.nrows(), f.ncols());
                 let Delayed { a, b, c, d, f, .. } = delayed(file, &undelayed, [&f, &g])?;
@@ -141,6 +181,9 @@ impl LinearPlant {
                     disturbances: disturbances(file, &b, &d, None)?,
                     origin: match sampled {
                         None => "The plant file states the matrices.",
+                        Some(sampled) if sampled.only_samples.is_some() => {
+                            "The plant file states sampled matrices, which no continuous plant has: x[k+1] = A x[k] + B u[k]."
+                        }
                         Some(_) => {
                             "The plant file states sampled matrices; these are of the continuous plant with the \
                              same samples."
@@ -148,6 +191,7 @@ impl LinearPlant {
                     }
                     .to_owned(),
                     residual: None,
+                    domain,
                     a,
                     b,
                     c,
@@ -213,7 +257,7 @@ fn linearised(
     };
     let linearise::Matrices { a, b, c, d, f, g } = &linearised.matrices;
     let d = significant(d.clone(), c);
-    let undelayed = system([a, b, c, &d]);
+    let undelayed = system([a, b, c, &d], Domain::Continuous);
     let delays = delays::of(file);
     let matrices = delayed(file, &undelayed, [f, g])?;
     let (faults, models) = faults(file, &linearised, &matrices)?;
@@ -231,6 +275,7 @@ fn linearised(
         models,
         origin: format!("{model}, linearised by {}.", linearised.method),
         residual: Some(linearised.residual),
+        domain: Domain::Continuous,
         a: a.clone(),
         b: b.clone(),
         c: c.clone(),
@@ -241,14 +286,8 @@ fn linearised(
     })
 }
 
-fn system([a, b, c, d]: [&DMatrix<f64>; 4]) -> StateSpace {
-    StateSpace {
-        a: a.clone(),
-        b: b.clone(),
-        c: c.clone(),
-        d: d.clone(),
-        domain: Domain::Continuous,
-    }
+fn system([a, b, c, d]: [&DMatrix<f64>; 4], domain: Domain) -> StateSpace {
+    StateSpace { a: a.clone(), b: b.clone(), c: c.clone(), d: d.clone(), domain }
 }
 
 /// Opens the FMU of the file, with the libraries that it needs.

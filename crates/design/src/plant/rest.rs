@@ -1,11 +1,11 @@
 //! The equilibrium of a loop in which actuators are gone.
 
+use control::Error;
 use control::rank::uncontrollable_modes;
 use control::stability::is_clearly_stable;
-use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
-use crate::plant::fixed_mode::described;
+use crate::plant::fixed_mode::described_in;
 use crate::plant::linear::LinearPlant;
 use crate::report::robustness::Number;
 use plant_file::signals::Signal;
@@ -76,8 +76,9 @@ pub(crate) fn unreachable_mode(
     b: &DMatrix<f64>,
 ) -> Result<Option<String>, Error> {
     for mode in uncontrollable_modes(&linear.a, b)? {
-        if !is_clearly_stable(mode.eigenvalue, &linear.a, Domain::Continuous)? {
-            return Ok(Some(described(&mode, |at| linear.states[at].name.clone())));
+        if !is_clearly_stable(mode.eigenvalue, &linear.a, linear.domain)? {
+            let name = |at: usize| linear.states[at].name.clone();
+            return Ok(Some(described_in(&mode, linear.domain, true, name)));
         }
     }
     Ok(None)

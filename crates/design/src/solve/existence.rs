@@ -7,9 +7,10 @@ use control::rank::{Mode, Rank, controllability, uncontrollable_modes};
 use control::stability::is_clearly_stable;
 use control::{Domain, Error};
 use files::PlaceError;
+use nalgebra::Complex;
 use plant_file::{FAULTS, PlantFile};
 
-use crate::plant::fixed_mode::described;
+use crate::plant::fixed_mode::described_in;
 use crate::plant::linear::LinearPlant;
 use crate::solve::names::{fault_names, joined, state_name};
 
@@ -24,7 +25,7 @@ pub(crate) fn check_controllable(
     let state = |at: usize| linear.states[at].name.clone();
     let modes = uncontrollable_modes(&linear.a, &linear.b).map_err(refuse)?;
     for mode in modes.into_iter().filter(above_or_on_the_real_axis) {
-        let stable = is_clearly_stable(mode.eigenvalue, &linear.a, Domain::Continuous);
+        let stable = is_clearly_stable(mode.eigenvalue, &linear.a, linear.domain);
         let stable = stable.map_err(refuse)? && rank.rank > 0;
         if linear.is_of_delays(&mode) {
             continue;
@@ -34,8 +35,8 @@ pub(crate) fn check_controllable(
             joined(linear.actuators.iter().map(|signal| signal.name.as_str())),
             rank.rank,
             rank.n,
-            described(&mode, state),
-            consequence(stable, &mode),
+            described_in(&mode, linear.domain, true, state),
+            consequence(stable, &mode, linear.domain),
         );
         let error = file.error(&["B", "actuators"], message);
         if !stable {
@@ -63,8 +64,8 @@ pub(crate) fn check_detectable(
             "the measurements {measurements} show {} of {} states only: no observer moves {}{}",
             detectability.observability.rank,
             detectability.observability.n,
-            described(mode, |at| state_name(linear, at).to_owned()),
-            consequence(*stable, mode),
+            described_in(mode, linear.domain, true, |at| state_name(linear, at).to_owned()),
+            consequence(*stable, mode, linear.domain),
         );
         let error = file.error(&["C", "measurements"], message);
         if !stable {
@@ -80,6 +81,11 @@ pub(crate) fn check_detectable(
         );
         return Err(at_fault(file, linear, unseen, message).into());
     }
+    // The eigenvalue of a constant signal.
+    let constant = match linear.domain {
+        Domain::Continuous => Complex::ZERO,
+        Domain::Sampled { .. } => Complex::ONE,
+    };
     if let Some(hidden) = detectability.hidden.first() {
         let faults = hidden.faults();
         let states: Vec<_> = hidden.states().iter().map(|&at| state_name(linear, at)).collect();
@@ -94,7 +100,7 @@ pub(crate) fn check_detectable(
              {measurements} cannot tell a {} of {} from {}",
             hidden.rank,
             hidden.expected,
-            if hidden.at.norm() > 0.0 { "change" } else { "constant value" },
+            if hidden.at == constant { "constant value" } else { "change" },
             distinguished.join(", "),
             from,
         );
@@ -102,7 +108,7 @@ pub(crate) fn check_detectable(
     }
     extended
         .plant
-        .check_detectable(Domain::Continuous)
+        .check_detectable(linear.domain)
         .map_err(|error| file.error(&FAULTS, error.to_string()))?;
     Ok(())
 }
@@ -113,10 +119,10 @@ pub(crate) fn above_or_on_the_real_axis(mode: &Mode) -> bool {
 }
 
 /// What follows from a mode that no gain moves.
-pub(crate) fn consequence(stable: bool, mode: &Mode) -> &'static str {
+pub(crate) fn consequence(stable: bool, mode: &Mode, domain: Domain) -> &'static str {
     match stable {
         true => "; it is stable and keeps its eigenvalue",
-        false if mode.eigenvalue.re < 0.0 => "",
+        false if domain.excess(mode.eigenvalue) < 0.0 => "",
         false => "; expected that only stable modes are out of reach",
     }
 }

@@ -172,7 +172,7 @@ impl LawProblem<'_> {
                 fault.name
             ));
         }
-        let form = DirectForm::new(&self.extended.plant, Domain::Continuous).map_err(text)?;
+        let form = DirectForm::new(&self.extended.plant, self.extended.domain).map_err(text)?;
         let q = self.linear.faults.len();
         #[expect(clippy::cast_precision_loss, reason = "a number of faults is far below 2^52")]
         let rank = q as f64;
@@ -183,8 +183,10 @@ impl LawProblem<'_> {
                 "rank {q} of {q}; the faults act on the derivatives of the measurements directly"
             ),
         ));
-        conditions
-            .push(zeros(&form, "the invariant zeros of (A, F_a, C) are in the left half plane"));
+        if self.extended.domain == Domain::Continuous {
+            let name = "the invariant zeros of (A, F_a, C) are in the left half plane";
+            conditions.push(zeros(&form, name));
+        }
         if self.domain == Domain::Continuous {
             return Ok(form);
         }

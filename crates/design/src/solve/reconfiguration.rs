@@ -11,7 +11,7 @@ use control::{Error, StateSpace, sampled};
 use nalgebra::{DMatrix, DVector};
 
 use crate::matrix::{pairs, rows};
-use crate::plant::fixed_mode::described;
+use crate::plant::fixed_mode::described_in;
 use crate::plant::rest::{Rest, beyond_limits, commands, unreachable_mode};
 use crate::report::reconfiguration::{
     ReconfigurationReport, Reconfigured, ServedByFallback, WithoutActuator, WithoutSeveral,
@@ -322,7 +322,9 @@ impl Without<'_> {
             Err(Refusal::Control(error)) => Err(not_met(&error.to_string())),
             Err(Refusal::Conflict(message)) => Err(not_met(&message)),
             Err(Refusal::Fixed(mode)) => {
-                let mode = described(&mode, |at| linear.states[at].name.clone());
+                let sampled = linear.domain == *domain;
+                let name = |at: usize| linear.states[at].name.clone();
+                let mode = described_in(&mode, *domain, sampled, name);
                 Err(not_met(&format!("no feedback of the other actuators moves {mode}")))
             }
         }
@@ -344,12 +346,13 @@ impl Without<'_> {
         let mut k_f = sampled::compensation_gain(&reduced, *domain)?;
         let modelled = sampled::compensation_gain(extended, *domain)?;
         let (n, m) = linear.b.shape();
-        let actuators = Actuators { b: &linear.b, gone: &self.gone, authority };
+        let (at_rest, gone) = (linear.a_at_rest(), &self.gone);
+        let actuators = Actuators { b: &linear.b, gone, authority };
         let mut k_s = DMatrix::zeros(m, self.gone.len());
         let (mut x, mut u, mut is_kept) = (DVector::zeros(n), DVector::zeros(m), true);
         for (position, (actuator, stuck_at)) in self.stuck().into_iter().enumerate() {
             let b_g: DVector<f64> = linear.b.column(actuator).into();
-            let unit = equilibrium(&linear.a, &actuators, &output, &b_g)?;
+            let unit = equilibrium(&at_rest, &actuators, &output, &b_g)?;
             let answer = &unit.u - k_x * &unit.x;
             for (at, channel) in self.faults_of(actuator) {
                 // The intact gain has the mean of the modelled fault over a sample.

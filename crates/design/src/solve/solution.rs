@@ -33,7 +33,7 @@ use crate::solve::tracking::{
 /// The controller of one plant, with the intermediate results.
 pub(crate) struct Solution {
     pub(crate) linear: LinearPlant,
-    /// The plant with fault models and measurement filter, in continuous time.
+    /// The plant with fault models and measurement filter, in the time domain of `linear`.
     pub(crate) extended: ExtendedPlant,
     pub(crate) domain: Domain,
     /// The model in the observer: the extended plant, sampled for a sampled design.
@@ -83,14 +83,15 @@ pub(crate) fn solve(file: &PlantFile<'_>, law: &Law) -> Result<Solved, crate::Er
     feedthrough::check(file, &linear)?;
     delays::check(file, &linear.delays, &linear.undelayed)?;
     let mut warnings = check_limits(file, &linear)?;
+    warnings.extend(file.model.only_samples().map(|reason| file.error(&["matrices", "A"], reason)));
     warnings.extend(attainable::warnings(file, &linear)?);
     let filter = file.filter.as_deref().unwrap_or_default();
     let LinearPlant { a, b, c, models, .. } = &linear;
-    let extended = ExtendedPlant::new(a, b, c, models, filter)
+    let extended = ExtendedPlant::in_domain([a, b, c], models, filter, linear.domain)
         .map_err(|error| file.error(&["A"], error.to_string()))?;
     let (controllable, detectability) = rayon::join(
         || check_controllable(file, &linear, &mut warnings),
-        || detectability(&extended.plant, Domain::Continuous),
+        || detectability(&extended.plant, extended.domain),
     );
     let (controllability, distance) = controllable?;
     check_faults(file, &linear, &extended)?;
@@ -296,7 +297,7 @@ fn complete(
     })
 }
 
-/// The loop of a continuous plant and a controller, in the time domain of the controller.
+/// The loop of a plant and a controller, in the time domain of the controller.
 pub(crate) fn looped(plant: &StateSpace, controller: &StateSpace) -> Result<Loop, Error> {
     let plant = match controller.domain {
         Domain::Continuous => plant.clone(),

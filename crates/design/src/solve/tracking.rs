@@ -70,7 +70,7 @@ pub(crate) fn check_references(
         return Err(file.error_at(&places[commands], message));
     }
     let TrackingRank { rank, expected, outputs, .. } =
-        tracking_rank(&linear.a, &linear.b, &(h * &linear.c))
+        tracking_rank(&linear.a_at_rest(), &linear.b, &(h * &linear.c))
             .map_err(|error| file.error(&["reference"], error.to_string()))?;
     if outputs < count {
         let message = format!(
@@ -82,10 +82,14 @@ pub(crate) fn check_references(
     }
     if rank < expected {
         let action = if *integral { "integral action" } else { "feedforward" };
+        let (matrix, zero) = match linear.domain {
+            Domain::Continuous => ("A", "s = 0"),
+            Domain::Sampled { .. } => ("A - I", "z = 1"),
+        };
         let message = format!(
             "no {action} exists for {names}: the commands cannot hold every constant value of what is to \
-             follow (rank [A, B; H C, 0] is {rank}, expected {expected}: the plant has a zero at s = \
-             0, or its commands act on these outputs in one direction); expected other measurements, a \
+             follow (rank [{matrix}, B; H C, 0] is {rank}, expected {expected}: the plant has a zero at {zero}, \
+             or its commands act on these outputs in one direction); expected other measurements, a \
              position in place of its speed for example"
         );
         return Err(file.error(&["reference"], message));
@@ -109,7 +113,7 @@ pub(crate) fn check_member(
     let Some(References { h, .. }) = &file.references else {
         return Ok(());
     };
-    let rank = tracking_rank(&linear.a, &linear.b, &(h * &linear.c))
+    let rank = tracking_rank(&linear.a_at_rest(), &linear.b, &(h * &linear.c))
         .map_err(|error| file.error_at(&variant.place, error.to_string()))?;
     if rank.is_full() {
         return Ok(());

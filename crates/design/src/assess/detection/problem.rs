@@ -3,7 +3,6 @@
 use control::detection::{NoisyPlant, UnknownInput, detection_filter};
 use control::eigen::eigenvalues;
 use control::faults::{Fault, FaultEntry};
-use control::hold::zero_order_hold;
 use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
@@ -55,7 +54,7 @@ impl Problem {
                 .chain(inputs.iter().map(|input| input.on_states.clone()))
                 .collect();
             let (phi, gamma) =
-                zero_order_hold(&a, &DMatrix::from_columns(&columns), period).map_err(refuse)?;
+                linear.held(&DMatrix::from_columns(&columns), period).map_err(refuse)?;
             let m = b.ncols();
             (a, b) = (phi, gamma.columns(0, m).into_owned());
             for (input, column) in inputs.iter_mut().zip(gamma.column_iter().skip(m)) {
