@@ -27,7 +27,7 @@ fn the_short_help_has_a_line_of_80_columns_for_each_option() {
             assert!(line.chars().count() <= COLUMNS, "{line:?}");
             assert!(!line.starts_with("       "), "{line:?} continues a line");
         }
-        for argument in command.get_arguments().filter(|own| is_documented(own)) {
+        for argument in command.get_arguments().filter(|argument| is_documented(argument)) {
             let help = help.clone();
             let sentence = argument.get_help().unwrap().to_string();
             let line = help.lines().find(|line| line.contains(&sentence));
@@ -43,13 +43,14 @@ fn the_options_of_a_run_are_in_six_groups() {
     let run = verbs().into_iter().find(|verb| verb.get_name() == "run").unwrap();
     let options = run.get_arguments().filter(|argument| !argument.is_positional());
     let headings: Vec<_> =
-        options.filter(|own| is_documented(own)).map(clap::Arg::get_help_heading).collect();
+        options.filter(|option| is_documented(option)).map(clap::Arg::get_help_heading).collect();
     let mut groups = headings.clone();
     groups.sort_unstable();
     groups.dedup();
     let expected = ["Algorithm", "Faults and safety", "Results", "System", "Time", "Watching"];
     assert_eq!(groups, expected.map(Some));
-    let largest = expected.map(|name| headings.iter().filter(|own| **own == Some(name)).count());
+    let largest =
+        expected.map(|name| headings.iter().filter(|option| **option == Some(name)).count());
     assert!(largest.iter().all(|count| (3..=13).contains(count)), "{largest:?}");
 }
 

@@ -117,7 +117,7 @@ mod tests {
             }
         }
         let again: Vec<_> =
-            all.windows(3).flat_map(|own| [own[0], own[1], own[0], own[2]]).collect();
+            all.windows(3).flat_map(|three| [three[0], three[1], three[0], three[2]]).collect();
         [all, again].concat()
     }
 
@@ -125,14 +125,14 @@ mod tests {
     fn what_is_remembered_has_the_bits_of_what_is_computed() {
         let memory = Memory::default();
         for argument in arguments() {
-            let found = memory.sine_and_cosine(argument);
+            let actual = memory.sine_and_cosine(argument);
             let computed = Direct.sine_and_cosine(argument);
             assert_eq!(
-                [found.0, found.1].map(f64::to_bits),
+                [actual.0, actual.1].map(f64::to_bits),
                 [computed.0, computed.1].map(f64::to_bits)
             );
-            let [found, computed] = [memory.exponential(argument), Direct.exponential(argument)];
-            assert_eq!(found.to_bits(), computed.to_bits());
+            let [actual, computed] = [memory.exponential(argument), Direct.exponential(argument)];
+            assert_eq!(actual.to_bits(), computed.to_bits());
         }
     }
 

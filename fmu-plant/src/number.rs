@@ -119,8 +119,8 @@ mod tests {
     #[test]
     fn at_zero_the_derivative_is_the_one_from_the_right() {
         let slope = |exponent: f64| Dual64::new(0.0, 1.0).power(Dual64::new(exponent, 5.0)).eps;
-        let found = [0.5, 1.0, 1.5, 2.0].map(|exponent| slope(exponent).to_bits());
-        assert_eq!(found, [f64::INFINITY, 1.0, 0.0, 0.0].map(f64::to_bits));
+        let actual = [0.5, 1.0, 1.5, 2.0].map(|exponent| slope(exponent).to_bits());
+        assert_eq!(actual, [f64::INFINITY, 1.0, 0.0, 0.0].map(f64::to_bits));
         assert_eq!(Dual64::new(0.0, 0.0).power(Dual64::new(0.5, 5.0)).eps.to_bits(), 0);
     }
 }

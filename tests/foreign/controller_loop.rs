@@ -17,7 +17,7 @@ const SWITCHES: usize = 0;
 fn main() {
     let mut input = Vec::new();
     std::io::stdin().read_to_end(&mut input).unwrap();
-    let values: Vec<f64> = input.chunks_exact(8).map(|own| f64::from_le_bytes(own.try_into().unwrap())).collect();
+    let values: Vec<f64> = input.chunks_exact(8).map(|bytes| f64::from_le_bytes(bytes.try_into().unwrap())).collect();
     let mut controller = Controller::new();
     eprintln!("{}", size_of_val(&controller));
     let mut output = Vec::new();
@@ -27,33 +27,33 @@ fn main() {
         let compensate = sample[MEASUREMENTS + REFERENCES + SCHEDULED] > 0.5;
         let scheduled = [sample[MEASUREMENTS + REFERENCES] as Real];
         #[cfg(all(references, schedule))]
-        let found = controller.step(&measured.into(), &referred.into(), &scheduled.into(), compensate);
+        let actual = controller.step(&measured.into(), &referred.into(), &scheduled.into(), compensate);
         #[cfg(all(references, not(schedule)))]
-        let (found, _) = (controller.step(&measured.into(), &referred.into(), compensate), scheduled);
+        let (actual, _) = (controller.step(&measured.into(), &referred.into(), compensate), scheduled);
         #[cfg(all(not(references), schedule))]
-        let (found, _) = (controller.step(&measured.into(), &scheduled.into(), compensate), referred);
+        let (actual, _) = (controller.step(&measured.into(), &scheduled.into(), compensate), referred);
         let first = MEASUREMENTS + REFERENCES + SCHEDULED + FLAGS;
         let switches: [bool; SWITCHES] = core::array::from_fn(|k| sample[first + k] > 0.5);
         #[cfg(all(reconfigurations, not(detection)))]
-        let found = controller.step(&measured.into(), &switches.into(), compensate);
+        let actual = controller.step(&measured.into(), &switches.into(), compensate);
         #[cfg(all(reconfigurations, detection))]
-        let found = controller.step(&measured.into(), &switches.into(), compensate, sample[first - 1] > 0.5);
+        let actual = controller.step(&measured.into(), &switches.into(), compensate, sample[first - 1] > 0.5);
         let _ = (referred, scheduled, switches);
         #[cfg(not(any(references, schedule, detection, reconfigurations)))]
-        let (found, _) = (controller.step(&measured.into(), compensate), (referred, scheduled));
+        let (actual, _) = (controller.step(&measured.into(), compensate), (referred, scheduled));
         #[cfg(all(detection, not(reconfigurations)))]
         let reset = sample[MEASUREMENTS + REFERENCES + SCHEDULED + 1] > 0.5;
         #[cfg(all(detection, not(reconfigurations)))]
-        let (found, _) = (controller.step(&measured.into(), compensate, reset), (referred, scheduled));
-        let commands: [Real; ACTUATORS] = found.commands.into();
-        let estimates: [Real; ESTIMATES] = found.estimates.into();
-        let Status { held, at_limit, overflow, .. } = found.status;
+        let (actual, _) = (controller.step(&measured.into(), compensate, reset), (referred, scheduled));
+        let commands: [Real; ACTUATORS] = actual.commands.into();
+        let estimates: [Real; ESTIMATES] = actual.estimates.into();
+        let Status { held, at_limit, overflow, .. } = actual.status;
         #[cfg(outside)]
-        let outside = found.status.outside;
+        let outside = actual.status.outside;
         #[cfg(not(outside))]
         let outside = false;
         #[cfg(lost)]
-        let lost = found.status.lost;
+        let lost = actual.status.lost;
         #[cfg(not(lost))]
         let lost = false;
         let bits = [held, at_limit, overflow, outside, lost];
@@ -61,12 +61,12 @@ fn main() {
         let mut all: Vec<f64> = commands.iter().chain(&estimates).map(|value| f64::from(*value)).collect();
         #[cfg(detection)]
         {
-            let Detection { detected, isolated, t_detected, t_onset, residual, statistic } = found.detection;
+            let Detection { detected, isolated, t_detected, t_onset, residual, statistic } = actual.detection;
             all.extend([f64::from(u8::from(detected)), f64::from(isolated)]);
             all.extend([t_detected, t_onset].iter().chain(&residual).chain(&statistic).map(|value| f64::from(*value)));
         }
         #[cfg(reconfigurations)]
-        all.push(f64::from(found.reconfiguration));
+        all.push(f64::from(actual.reconfiguration));
         all.push(f64::from(status));
         all.iter().for_each(|value| output.extend(value.to_le_bytes()));
     }

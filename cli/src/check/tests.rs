@@ -180,9 +180,10 @@ fn each_fault_is_found_with_its_section() {
         (Fault::Step, Error, "fmi2DoStep", "at t = 0.625 s", "4.2.2"),
     ] {
         let all = findings(fault);
-        let found = all.iter().find(|own| own.place == place && own.what.contains(words));
-        let found = found.unwrap_or_else(|| panic!("{fault:?}: {all:#?}"));
-        assert_eq!((found.severity, found.section), (severity, Some(section)), "{found}");
+        let actual =
+            all.iter().find(|finding| finding.place == place && finding.what.contains(words));
+        let actual = actual.unwrap_or_else(|| panic!("{fault:?}: {all:#?}"));
+        assert_eq!((actual.severity, actual.section), (severity, Some(section)), "{actual}");
     }
 }
 
@@ -214,6 +215,9 @@ fn a_failed_instantiation_is_one_finding() {
     let mut make = |_: &str, _: Option<Sum>| -> anyhow::Result<Sum> { anyhow::bail!("no licence") };
     let (here, all) = behaviour::check(&description, false, &mut make);
     assert_eq!(here, TrialResult::No { reason: "fmi2Instantiate: no licence".to_owned() });
-    assert!(all.iter().all(|own| own.place == "fmi2Instantiate" && own.what == "no licence"));
+    assert!(
+        all.iter()
+            .all(|finding| finding.place == "fmi2Instantiate" && finding.what == "no licence")
+    );
     assert_eq!(all.len(), 1, "{all:#?}");
 }

@@ -66,14 +66,14 @@ fn a_cart_or_a_pendulum_that_moves_too_far_breaks_its_own_claim_only() {
 
 #[test]
 fn a_difference_that_peaks_away_from_the_transitions_is_no_spike_of_theirs() {
-    let found = verdicts(&run(0.9e-3, 1.9e-3, 1.0, 0.1), false);
-    assert_eq!(found, [YES, YES, YES, YES, YES, YES, NO]);
+    let actual = verdicts(&run(0.9e-3, 1.9e-3, 1.0, 0.1), false);
+    assert_eq!(actual, [YES, YES, YES, YES, YES, YES, NO]);
 }
 
 #[test]
 fn an_estimate_far_from_the_friction_is_not_accurate() {
-    let found = verdicts(&run(0.9e-3, 1.9e-3, 200.0, 0.001), false);
-    assert_eq!(found, [YES, YES, YES, YES, YES, NO, YES]);
+    let actual = verdicts(&run(0.9e-3, 1.9e-3, 200.0, 0.001), false);
+    assert_eq!(actual, [YES, YES, YES, YES, YES, NO, YES]);
 }
 
 #[test]

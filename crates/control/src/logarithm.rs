@@ -103,8 +103,8 @@ mod tests {
         ] {
             let a = DMatrix::from_row_slice(n, n, entries);
             let e = a.exp() - DMatrix::identity(n, n);
-            let found = logarithm_of_one_plus(&e).unwrap();
-            assert!((&found - &a).norm() <= tolerance * a.norm(), "{found} {a}");
+            let actual = logarithm_of_one_plus(&e).unwrap();
+            assert!((&actual - &a).norm() <= tolerance * a.norm(), "{actual} {a}");
         }
     }
 
@@ -120,9 +120,9 @@ mod tests {
     #[test]
     fn a_small_matrix_keeps_its_relative_precision() {
         let e = DMatrix::from_row_slice(2, 2, &[1e-9, 2e-9, -3e-9, 0.0]);
-        let found = logarithm_of_one_plus(&e).unwrap();
+        let actual = logarithm_of_one_plus(&e).unwrap();
         let second = &e - &e * &e * 0.5;
-        assert!((found - second).norm() < 1e-15 * e.norm());
+        assert!((actual - second).norm() < 1e-15 * e.norm());
     }
 
     #[test]

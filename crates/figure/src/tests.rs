@@ -33,7 +33,7 @@ fn texts(svg: &str) -> Vec<String> {
 fn the_svg_is_well_formed_and_contains_title_axes_units_legend_and_marks() {
     let svg = example(&TIME, &VALUES).svg().unwrap();
     let texts = texts(&svg);
-    let count = |wanted: &str| texts.iter().filter(|text| *text == wanted).count();
+    let count = |required: &str| texts.iter().filter(|text| *text == required).count();
     assert_eq!(count("Motion of the \"cart\" <2>"), 1);
     for twice in ["time in s", "x_p in m", "a < b & c", "second", "switched on", "claim"] {
         assert_eq!(count(twice), 2, "{twice} in {texts:?}");
@@ -122,9 +122,9 @@ fn the_png_shows_curve_and_title_on_white() {
     let mut figure = example(&TIME, &VALUES);
     figure.panels.truncate(1);
     let pixels = Pixmap::decode_png(&rasterise(&figure.svg().unwrap()).unwrap()).unwrap();
-    let count = |rows: std::ops::Range<usize>, wanted: [u8; 3]| {
+    let count = |rows: std::ops::Range<usize>, required: [u8; 3]| {
         let part = &pixels.pixels()[2000 * rows.start..2000 * rows.end];
-        part.iter().filter(|pixel| [pixel.red(), pixel.green(), pixel.blue()] == wanted).count()
+        part.iter().filter(|pixel| [pixel.red(), pixel.green(), pixel.blue()] == required).count()
     };
     let (title, all) = (0..80, 0..pixels.pixels().len() / 2000);
     assert!(pixels.pixels().iter().all(|pixel| pixel.alpha() == 255));
@@ -210,7 +210,7 @@ fn a_text_is_drawn_where_its_anchor_and_its_size_say() {
         let width = pixels.width() as usize;
         let inked = pixels.pixels().iter().enumerate().filter(|(_, pixel)| pixel.alpha() > 128);
         let columns: Vec<usize> = inked.map(|(at, _)| at % width).collect();
-        let column = |found: Option<&usize>| f64::from(u32::try_from(*found.unwrap()).unwrap());
+        let column = |actual: Option<&usize>| f64::from(u32::try_from(*actual.unwrap()).unwrap());
         (column(columns.iter().min()), column(columns.iter().max()))
     };
     // DejaVu Sans: the advance of a capital H is 1540 of 2048 units, its left side bearing 201.

@@ -104,8 +104,8 @@ mod tests {
         for column in [0.0, 17.0, 450.0, 899.0] {
             let mut all = time.iter().zip(&values).map(|(t, v)| (9.0 * t, 100.0 - 10.0 * v));
             let expected = top(&mut all, column);
-            let found = top(&mut drawn.iter().copied(), column);
-            assert!((found - expected).abs() < 0.5, "column {column}: {found}, {expected}");
+            let actual = top(&mut drawn.iter().copied(), column);
+            assert!((actual - expected).abs() < 0.5, "column {column}: {actual}, {expected}");
         }
     }
 

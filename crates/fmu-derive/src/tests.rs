@@ -56,17 +56,17 @@ fn each_mistake_has_its_message() {
         ("a: Log, b: fmu::Log", "one field of the type Log"),
     ];
     for (fields, expected) in cases {
-        let found = refusal(fields);
-        assert!(found.contains(expected), "{fields}: {found}");
+        let actual = refusal(fields);
+        assert!(actual.contains(expected), "{fields}: {actual}");
     }
 }
 
 #[test]
 fn all_mistakes_are_reported_at_once() {
-    let found = refusal("#[fmu(derivative_of = x)] a: f64, #[fmu(derivative_of = y)] b: f64");
-    assert!(found.contains("`x`") && found.contains("`y`"), "{found}");
-    let found = refusal("a: f64, b: f64");
-    assert!(found.contains("field `a`") && found.contains("field `b`"), "{found}");
+    let actual = refusal("#[fmu(derivative_of = x)] a: f64, #[fmu(derivative_of = y)] b: f64");
+    assert!(actual.contains("`x`") && actual.contains("`y`"), "{actual}");
+    let actual = refusal("a: f64, b: f64");
+    assert!(actual.contains("field `a`") && actual.contains("field `b`"), "{actual}");
 }
 
 #[test]

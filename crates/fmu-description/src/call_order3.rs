@@ -228,11 +228,11 @@ mod tests {
     /// The states that a name of the standard means, for an interface.
     fn states(name: &str, interface: InterfaceType) -> Vec<State> {
         use State as S;
-        let own = match interface {
+        let own_states = match interface {
             InterfaceType::ModelExchange => S::ContinuousTimeMode,
             InterfaceType::CoSimulation => S::StepComplete,
         };
-        let initialized = [S::EventMode, own, S::ReconfigurationMode];
+        let initialized = [S::EventMode, own_states, S::ReconfigurationMode];
         match name {
             "FMUStateSettable" => {
                 let others =
@@ -258,15 +258,18 @@ mod tests {
                 let states = states(state, interface);
                 assert!(!states.is_empty(), "{line}");
                 for name in functions.split(' ').flat_map(named) {
-                    assert!(Function::EVERY.iter().any(|own| own.name() == name), "{name}");
+                    assert!(
+                        Function::EVERY.iter().any(|own_states| own_states.name() == name),
+                        "{name}"
+                    );
                     listed.extend(states.iter().map(|state| (name.clone(), *state)));
                 }
             }
             for &function in Function::EVERY {
                 for state in State::EVERY {
                     let expected = listed.contains(&(function.name().to_owned(), state));
-                    let found = allowed(interface, function, state);
-                    assert_eq!(found, expected, "{function:?} in {state:?}, {interface:?}");
+                    let actual = allowed(interface, function, state);
+                    assert_eq!(actual, expected, "{function:?} in {state:?}, {interface:?}");
                 }
             }
         }

@@ -157,10 +157,10 @@ mod tests {
 
     #[test]
     fn the_local_error_is_of_order_six_and_its_estimate_of_order_five() {
-        let found = order(|h| distance(&step(h).end, &exact(0.3 + h)));
-        assert!((found - 6.0).abs() < 0.3, "{found}");
-        let found = order(|h| distance(&step(h).error, &[0.0; 2]));
-        assert!((found - 5.0).abs() < 0.3, "{found}");
+        let actual = order(|h| distance(&step(h).end, &exact(0.3 + h)));
+        assert!((actual - 6.0).abs() < 0.3, "{actual}");
+        let actual = order(|h| distance(&step(h).error, &[0.0; 2]));
+        assert!((actual - 5.0).abs() < 0.3, "{actual}");
         assert!(distance(&step(0.2).error, &[0.0; 2]) > distance(&step(0.2).end, &exact(0.5)));
     }
 
@@ -190,7 +190,7 @@ mod tests {
         let mut method = Explicit::new(1);
         let start = StepStart { time: 0.0, states: &[1.0], slope: &[-1000.0] };
         let Ok(()) = method.attempt(&mut decay, start, 0.004);
-        let found = method.stiffness(0.004, |_| 1.0);
-        assert!((found - 4.0).abs() < 1e-9, "{found}");
+        let actual = method.stiffness(0.004, |_| 1.0);
+        assert!((actual - 4.0).abs() < 1e-9, "{actual}");
     }
 }

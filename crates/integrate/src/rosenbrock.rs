@@ -245,10 +245,10 @@ mod tests {
 
     #[test]
     fn the_local_error_is_of_order_five_and_its_estimate_of_order_four() {
-        let found = order(|h| distance(&step(h).end, &exact(0.5 + h)));
-        assert!((found - 5.0).abs() < 0.5, "{found}");
-        let found = order(|h| distance(step(h).error(), &[0.0; 2]));
-        assert!((found - 4.0).abs() < 0.5, "{found}");
+        let actual = order(|h| distance(&step(h).end, &exact(0.5 + h)));
+        assert!((actual - 5.0).abs() < 0.5, "{actual}");
+        let actual = order(|h| distance(step(h).error(), &[0.0; 2]));
+        assert!((actual - 4.0).abs() < 0.5, "{actual}");
     }
 
     #[test]

@@ -95,9 +95,9 @@ mod tests {
         let token = Token::random().unwrap();
         let path = format!("/{}/state", token.text());
         let guard = Guard::new(token, 81);
-        let own = Some("127.0.0.1:81");
+        let host = Some("127.0.0.1:81");
         let status = |request: &Parsed| guard.admit(request).err().map(|(status, _)| status);
-        assert_eq!(guard.admit(&request(&path, own, None)), Ok("state"));
+        assert_eq!(guard.admit(&request(&path, host, None)), Ok("state"));
         assert_eq!(
             status(&request(&path, Some("LOCALHOST:81"), Some("http://localhost:81"))),
             None
@@ -110,13 +110,13 @@ mod tests {
         for origin in
             ["null", "https://127.0.0.1:81", "http://evil.example", "http://127.0.0.1:82", ""]
         {
-            assert_eq!(status(&request(&path, own, Some(origin))), Some(403), "{origin}");
+            assert_eq!(status(&request(&path, host, Some(origin))), Some(403), "{origin}");
         }
         let cut = &path[..path.len() - "x/state".len()];
         for wrong in ["/", "", "/state", "//state", cut, "/../", &format!("/x{path}")] {
-            assert_eq!(status(&request(wrong, own, None)), Some(404), "{wrong}");
+            assert_eq!(status(&request(wrong, host, None)), Some(404), "{wrong}");
         }
-        let mut other = request(&path, own, None);
+        let mut other = request(&path, host, None);
         other.site = Some("cross-site".to_owned());
         assert_eq!(status(&other), Some(403));
         other.mode = Some("navigate".to_owned());

@@ -127,17 +127,17 @@ mod tests {
 
     fn status(text: &str) -> u16 {
         head(text.as_bytes())
-            .map_or_else(|(status, _)| status, |found| if found.is_some() { 200 } else { 0 })
+            .map_or_else(|(status, _)| status, |actual| if actual.is_some() { 200 } else { 0 })
     }
 
     #[test]
     fn a_head_is_read_whole_and_only_once_it_is_complete() {
         let text = "POST /t/scenario?a=b HTTP/1.1\r\nHost: 127.0.0.1:1\r\nORIGIN: http://x\r\nContent-Length: 3\r\n\r\nabc";
-        let (found, size, length) = head(text.as_bytes()).unwrap().unwrap();
-        assert_eq!((found.method.as_str(), found.path.as_str()), ("POST", "/t/scenario"));
-        assert_eq!((found.query.as_str(), length, size), ("a=b", 3, text.len() - 3));
+        let (actual, size, length) = head(text.as_bytes()).unwrap().unwrap();
+        assert_eq!((actual.method.as_str(), actual.path.as_str()), ("POST", "/t/scenario"));
+        assert_eq!((actual.query.as_str(), length, size), ("a=b", 3, text.len() - 3));
         assert_eq!(
-            (found.host.as_deref(), found.origin.as_deref()),
+            (actual.host.as_deref(), actual.origin.as_deref()),
             (Some("127.0.0.1:1"), Some("http://x"))
         );
         for end in 0..size {

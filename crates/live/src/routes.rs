@@ -147,8 +147,8 @@ mod tests {
 
     #[test]
     fn a_query_is_three_lists_of_numbers() {
-        let found = query("rows=3&messages=4&show=1,2").unwrap();
-        assert_eq!(found, Query { rows_after: 3, messages_after: 4, shown: vec![1, 2] });
+        let actual = query("rows=3&messages=4&show=1,2").unwrap();
+        assert_eq!(actual, Query { rows_after: 3, messages_after: 4, shown: vec![1, 2] });
         assert_eq!(query(""), Some(Query::default()));
         assert_eq!(query("show=").unwrap().shown, Vec::<usize>::new());
         for wrong in [

@@ -131,17 +131,17 @@ mod tests {
         let gap = f64::NAN;
         let values = [10.0, gap, 20.0, gap, 30.0, gap, 40.0];
         for kind in [ColumnKind::Real, ColumnKind::Integer] {
-            let found = statistics(kind, &values);
-            assert_eq!((found.mean, found.rms), (25.0, 750.0_f64.sqrt()));
-            assert_eq!((found.basis, found.not_finite), (Basis::Values(4), 3));
+            let actual = statistics(kind, &values);
+            assert_eq!((actual.mean, actual.rms), (25.0, 750.0_f64.sqrt()));
+            assert_eq!((actual.basis, actual.not_finite), (Basis::Values(4), 3));
         }
         assert!(statistics(ColumnKind::Real, &[gap]).mean.is_nan());
     }
 
     #[test]
     fn without_empty_cells_the_mean_is_over_time() {
-        let found = statistics(ColumnKind::Real, &[0.0, 3.0, 3.0]);
-        assert_eq!((found.mean, found.basis), (2.25, Basis::Time(2.0)));
+        let actual = statistics(ColumnKind::Real, &[0.0, 3.0, 3.0]);
+        assert_eq!((actual.mean, actual.basis), (2.25, Basis::Time(2.0)));
         let held = statistics(ColumnKind::Integer, &[0.0, 3.0, 3.0]);
         assert_eq!((held.mean, held.basis), (1.5, Basis::Time(2.0)));
         let single = statistics(ColumnKind::Real, &[-2.0]);

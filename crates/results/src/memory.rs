@@ -255,9 +255,9 @@ mod tests {
         assert_eq!(kept.columns[2].1, Values::Integer(vec![i32::MAX; 3]));
         assert_eq!(kept.present, [[true, false, true]]);
         assert_eq!(kept.columns[3].1, Values::Boolean(vec![false, true, false]));
-        let Values::String(own) = &kept.columns[1].1 else { panic!("no texts") };
+        let Values::String(column) = &kept.columns[1].1 else { panic!("no texts") };
         assert_eq!(
-            (0..4).map(|row| own.get(row)).collect::<Vec<_>>(),
+            (0..4).map(|row| column.get(row)).collect::<Vec<_>>(),
             [Some(texts[0].as_str()), Some(""), Some(texts[2].as_str()), None]
         );
         kept.write(&later).unwrap();

@@ -125,12 +125,12 @@ mod tests {
             let right = scattered(n).column(0).into_owned();
             let mut factors = Factors::new(n);
             let condition = factors.factor(matrix.as_slice()) * norm_1(matrix.as_slice(), n);
-            let mut found = right.clone();
-            factors.solve(found.as_mut_slice());
+            let mut actual = right.clone();
+            factors.solve(actual.as_mut_slice());
             let expected = matrix.clone().lu().solve(&right).unwrap();
             let bound = 1e-14 * condition;
-            assert!((&matrix * &found - &right).amax() <= bound, "{n}");
-            assert!((&found - &expected).amax() <= bound * expected.amax(), "{n}");
+            assert!((&matrix * &actual - &right).amax() <= bound, "{n}");
+            assert!((&actual - &expected).amax() <= bound * expected.amax(), "{n}");
         }
     }
 

@@ -134,10 +134,10 @@ mod tests {
             (|t| if t < 0.3 { 1.0 } else { -5.0 }, 0.0, 1.0, 0.3),
         ];
         for (number, (function, a, b, root)) in cases.into_iter().enumerate() {
-            let (found, _) = locate(function, a, b, 1e-12);
-            let range = found.before() - 1e-15..=found.after() + 1e-15;
-            assert!(range.contains(&root), "{number}: {found:?}");
-            assert!(found.after() - found.before() <= 1e-12);
+            let (actual, _) = locate(function, a, b, 1e-12);
+            let range = actual.before() - 1e-15..=actual.after() + 1e-15;
+            assert!(range.contains(&root), "{number}: {actual:?}");
+            assert!(actual.after() - actual.before() <= 1e-12);
         }
     }
 
@@ -164,8 +164,8 @@ mod tests {
     #[test]
     fn a_value_of_zero_is_not_above_zero() {
         // From above to exactly zero is a change, from zero to below is none.
-        let found = Bracket::new((0.0, 1.0), (1.0, 0.0), 1e-3).unwrap();
-        assert_eq!(found.after().to_bits(), 1.0_f64.to_bits());
+        let actual = Bracket::new((0.0, 1.0), (1.0, 0.0), 1e-3).unwrap();
+        assert_eq!(actual.after().to_bits(), 1.0_f64.to_bits());
         assert!(Bracket::new((0.0, 0.0), (1.0, -1.0), 1e-3).is_none());
         assert!(Bracket::new((0.0, 0.0), (1.0, 1.0), 1e-3).is_some());
     }
@@ -180,8 +180,8 @@ mod tests {
 
     #[test]
     fn a_width_that_doubles_cannot_resolve_ends_too() {
-        let (found, count) = locate(|t| t - 1000.5, 1000.0, 1001.0, 0.0);
-        assert!(found.after() - found.before() < 1e-12 && count < 60);
+        let (actual, count) = locate(|t| t - 1000.5, 1000.0, 1001.0, 0.0);
+        assert!(actual.after() - actual.before() < 1e-12 && count < 60);
     }
 
     /// Returns a function that is NaN between two times, and otherwise 1 before `root` and -1 after it.
@@ -197,9 +197,9 @@ mod tests {
         for (from, to, root) in
             [(0.4, 0.6, 0.3), (0.4, 0.6, 0.7), (0.1, 0.9, 0.95), (0.499, 0.501, 0.4985)]
         {
-            let (found, count) = locate(broken(from, to, root), 0.0, 1.0, 1e-9);
-            assert!(found.before() < root && root <= found.after(), "{found:?}");
-            assert!(found.after() - found.before() <= 1e-9, "{found:?}");
+            let (actual, count) = locate(broken(from, to, root), 0.0, 1.0, 1e-9);
+            assert!(actual.before() < root && root <= actual.after(), "{actual:?}");
+            assert!(actual.after() - actual.before() <= 1e-9, "{actual:?}");
             assert!(count <= 3 * 31, "{count}");
         }
     }
@@ -207,10 +207,10 @@ mod tests {
     #[test]
     fn a_root_within_a_gap_of_nan_is_known_to_the_gap() {
         let function = broken(0.4, 0.6, 0.5);
-        let (found, count) = locate(&function, 0.0, 1.0, 1e-9);
-        assert!((found.before() - 0.4).abs() <= 1e-9, "{found:?}");
-        assert!((found.after() - 0.6).abs() <= 1e-9, "{found:?}");
-        assert!(function(found.before()) > 0.0 && function(found.after()) < 0.0);
+        let (actual, count) = locate(&function, 0.0, 1.0, 1e-9);
+        assert!((actual.before() - 0.4).abs() <= 1e-9, "{actual:?}");
+        assert!((actual.after() - 0.6).abs() <= 1e-9, "{actual:?}");
+        assert!(function(actual.before()) > 0.0 && function(actual.after()) < 0.0);
         assert!(count <= 3 * 31, "{count}");
     }
 

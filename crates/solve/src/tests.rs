@@ -43,9 +43,9 @@ fn all(n: usize, limit: u32) -> [(&'static str, Box<dyn Solver>); 3] {
     ]
 }
 
-fn assert_near(name: &str, found: &[f64], expected: &[f64], bound: f64) {
-    for (found, expected) in found.iter().zip(expected) {
-        assert!((found - expected).abs() <= bound, "{name}: {found} for {expected}");
+fn assert_near(name: &str, actual: &[f64], expected: &[f64], bound: f64) {
+    for (actual, expected) in actual.iter().zip(expected) {
+        assert!((actual - expected).abs() <= bound, "{name}: {actual} for {expected}");
     }
 }
 

@@ -178,16 +178,16 @@ mod tests {
             ("../e.ssv", "/tmp/x/e.ssv", "a.ssp/e.ssv"),
             ("f:g.fmu/../h.fmu", "", ""),
         ] {
-            let found = archive().resolve(uri);
+            let actual = archive().resolve(uri);
             if path.is_empty() {
-                assert!(found.unwrap_err().contains("the scheme f"), "{uri}");
+                assert!(actual.unwrap_err().contains("the scheme f"), "{uri}");
                 continue;
             }
             let expected = Target::new(path.into(), shown.into());
-            assert_eq!(found, Ok(expected), "{uri}");
+            assert_eq!(actual, Ok(expected), "{uri}");
         }
-        let found = archive().resolve("sub.ssp#Variant%20B.ssd").unwrap();
-        assert_eq!(found.fragment.as_deref(), Some("Variant B.ssd"));
+        let actual = archive().resolve("sub.ssp#Variant%20B.ssd").unwrap();
+        assert_eq!(actual.fragment.as_deref(), Some("Variant B.ssd"));
     }
 
     #[test]
@@ -204,20 +204,20 @@ mod tests {
 
     #[test]
     fn the_file_of_a_proxy_is_used_itself_with_a_warning() {
-        let found = disk().resolve("proxyfmu://localhost?file=../f%20g/a.fmu").unwrap();
-        assert_eq!(found.path, Path::new("/data/s/../f g/a.fmu"));
-        assert!(found.warning.unwrap().ends_with("which runs here without proxyfmu"));
-        let found = disk().resolve("proxyfmu://h:9090?a=b&file=file:///a.fmu").unwrap();
-        assert_eq!(found.path, Path::new("/a.fmu"));
+        let actual = disk().resolve("proxyfmu://localhost?file=../f%20g/a.fmu").unwrap();
+        assert_eq!(actual.path, Path::new("/data/s/../f g/a.fmu"));
+        assert!(actual.warning.unwrap().ends_with("which runs here without proxyfmu"));
+        let actual = disk().resolve("proxyfmu://h:9090?a=b&file=file:///a.fmu").unwrap();
+        assert_eq!(actual.path, Path::new("/a.fmu"));
         let sentence = archive().resolve("proxyfmu://localhost?file=../../a").unwrap_err();
         assert!(sentence.ends_with("leads out of the archive"), "{sentence}");
     }
 
     #[test]
     fn backslashes_are_taken_for_slashes_with_a_warning() {
-        let found = archive().resolve("..\\b c\\d.fmu").unwrap();
-        assert_eq!(found.path, Path::new("/tmp/x/b c/d.fmu"));
-        assert!(found.warning.unwrap().ends_with("has backslashes, which are taken for slashes"));
+        let actual = archive().resolve("..\\b c\\d.fmu").unwrap();
+        assert_eq!(actual.path, Path::new("/tmp/x/b c/d.fmu"));
+        assert!(actual.warning.unwrap().ends_with("has backslashes, which are taken for slashes"));
         for uri in ["..\\..\\a", "..%5c..%5Ca", "b\\../..\\../a"] {
             let sentence = archive().resolve(uri).unwrap_err();
             assert!(sentence.ends_with("leads out of the archive"), "{sentence}");

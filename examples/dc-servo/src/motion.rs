@@ -162,11 +162,11 @@ mod tests {
     #[test]
     fn the_phi_functions_are_their_integrals() {
         for z in [0.0, -1e-9, -0.01, -0.5, -0.999_999, -1.000_001, -3.0, -20.0] {
-            let found = phi(z);
-            assert!((found[0] - z.exp()).abs() < 1e-15);
+            let actual = phi(z);
+            assert!((actual[0] - z.exp()).abs() < 1e-15);
             for k in 1..4 {
-                let found = found[usize::try_from(k).unwrap()];
-                assert!((found - integral(k, z)).abs() < 1e-12, "phi_{k}({z}) = {found}");
+                let actual = actual[usize::try_from(k).unwrap()];
+                assert!((actual - integral(k, z)).abs() < 1e-12, "phi_{k}({z}) = {actual}");
             }
         }
     }

@@ -38,8 +38,8 @@ fn decay() -> f64 {
     (parameter("F_v") + k * k / parameter("R")) / parameter("J")
 }
 
-fn close(found: f64, expected: f64, bound: f64) {
-    assert!((found - expected).abs() <= bound * expected.abs().max(1.0), "{found} {expected}");
+fn close(actual: f64, expected: f64, bound: f64) {
+    assert!((actual - expected).abs() <= bound * expected.abs().max(1.0), "{actual} {expected}");
 }
 
 #[test]
@@ -158,9 +158,9 @@ fn the_result_does_not_depend_on_how_an_interval_with_held_input_is_divided_into
     };
     let whole = follow(1);
     for cuts in [2, 3, 17] {
-        let found = follow(cuts);
-        close(found[0], whole[0], 1e-10);
-        close(found[1], whole[1], 1e-9);
+        let actual = follow(cuts);
+        close(actual[0], whole[0], 1e-10);
+        close(actual[1], whole[1], 1e-9);
     }
 }
 
@@ -230,11 +230,11 @@ fn directional_derivatives_are_difference_quotients_in_every_regime() {
                 model.update(time).unwrap();
                 [model.acceleration, model.dry_friction, model.measured]
             };
-            let found = along(&model, name, if name.is_empty() { 1.0 } else { 0.0 });
-            for ((found, ahead), back) in found.iter().zip(moved(size)).zip(moved(-size)) {
+            let actual = along(&model, name, if name.is_empty() { 1.0 } else { 0.0 });
+            for ((actual, ahead), back) in actual.iter().zip(moved(size)).zip(moved(-size)) {
                 let expected = (ahead - back) / (2.0 * size);
                 let bound = 1e-8 * (expected.abs() + (ahead.abs() + 1e-3) * 1e-3 / size);
-                assert!((found - expected).abs() <= bound, "{name}: {found} {expected}");
+                assert!((actual - expected).abs() <= bound, "{name}: {actual} {expected}");
             }
         }
     }

@@ -10,7 +10,8 @@ use super::StateSpace;
 #[test]
 fn the_structural_parameters_precede_the_arrays_that_they_size() {
     let description = fmu::describe_3::<StateSpace>(Path::new("resources")).unwrap();
-    let names: Vec<_> = description.variables.iter().map(|own| own.name.as_str()).collect();
+    let names: Vec<_> =
+        description.variables.iter().map(|variable| variable.name.as_str()).collect();
     assert_eq!(names[..5], ["time", "n", "m", "p", "A"]);
 }
 

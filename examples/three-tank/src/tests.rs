@@ -29,9 +29,9 @@ fn follow(model: &mut ThreeTank, sizes: impl IntoIterator<Item = f64>) {
     }
 }
 
-fn assert_close(found: [f64; 3], expected: [f64; 3], bound: f64) {
-    for (found, expected) in found.iter().zip(expected) {
-        assert!((found - expected).abs() <= bound, "{found} {expected}");
+fn assert_close(actual: [f64; 3], expected: [f64; 3], bound: f64) {
+    for (actual, expected) in actual.iter().zip(expected) {
+        assert!((actual - expected).abs() <= bound, "{actual} {expected}");
     }
 }
 
@@ -193,11 +193,11 @@ fn directional_derivatives_by_every_known_are_difference_quotients() {
                 from_fn(|k| if k < 3 { model.slope[k] } else { model.measured[k - 3] })
             };
             let (ahead, back) = (moved(size), moved(-size));
-            for (k, found) in along(&model, name).unwrap().into_iter().enumerate() {
+            for (k, actual) in along(&model, name).unwrap().into_iter().enumerate() {
                 let expected = (ahead[k] - back[k]) / (2.0 * size);
                 let bound = 1e-6 * expected.abs().max(1e-3);
-                assert!((found - expected).abs() < bound, "{name} {k}: {found} {expected}");
-                assert!(!times.contains(&name) || found == 0.0);
+                assert!((actual - expected).abs() < bound, "{name} {k}: {actual} {expected}");
+                assert!(!times.contains(&name) || actual == 0.0);
             }
         }
     }
@@ -226,8 +226,8 @@ fn the_sampled_linear_model_is_the_published_one() {
     let columns = ["h_1", "h_2", "h_3", "Q_1", "Q_2"].map(|name| along(&model, name).unwrap());
     for (column, start) in (0..5).map(|k| (k, from_fn(|i| if i == k { 1.0 } else { 0.0 }))) {
         let sampled = held(&columns, start);
-        for (row, found) in published.iter().zip(sampled) {
-            assert!((found - row[column]).abs() < 5e-5, "{found} {}", row[column]);
+        for (row, actual) in published.iter().zip(sampled) {
+            assert!((actual - row[column]).abs() < 5e-5, "{actual} {}", row[column]);
         }
     }
 }

@@ -187,9 +187,9 @@ impl Drop for Importer {
 
 /// Calls an entry point with the component and these arguments.
 macro_rules! call {
-    ($own:ident.$name:ident($($argument:expr),*)) => {
+    ($importer:ident.$name:ident($($argument:expr),*)) => {
         // SAFETY: the component is null or not yet freed; pointers are as `Array` has them.
-        unsafe { ffi::$name::<Machine>($own.component, $($argument),*) }
+        unsafe { ffi::$name::<Machine>($importer.component, $($argument),*) }
     };
 }
 

@@ -290,25 +290,26 @@ fn warnings_of_a_model_reach_the_user_of_its_fmu() {
 fn folders_without_a_crate_with_a_model_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let refuses = |parts: &[&str]| refuses(folder.path(), &["pack", "own"], parts);
-    let own = folder.path().join("own");
-    fs::create_dir_all(own.join("src")).unwrap();
+    let crate_path = folder.path().join("own");
+    fs::create_dir_all(crate_path.join("src")).unwrap();
     refuses(&["own", "there is no", "Cargo.toml"]);
-    fs::write(own.join("Cargo.toml"), "[workspace]\nmembers = []\n").unwrap();
+    fs::write(crate_path.join("Cargo.toml"), "[workspace]\nmembers = []\n").unwrap();
     refuses(&["own", "no members"]);
-    fs::create_dir_all(own.join("member/src")).unwrap();
-    fs::write(own.join("member/Cargo.toml"), "[package]\nname = \"member\"\n").unwrap();
-    fs::write(own.join("member/src/lib.rs"), "").unwrap();
-    fs::write(own.join("Cargo.toml"), "[workspace]\nmembers = [\"member\"]\n").unwrap();
+    fs::create_dir_all(crate_path.join("member/src")).unwrap();
+    fs::write(crate_path.join("member/Cargo.toml"), "[package]\nname = \"member\"\n").unwrap();
+    fs::write(crate_path.join("member/src/lib.rs"), "").unwrap();
+    fs::write(crate_path.join("Cargo.toml"), "[workspace]\nmembers = [\"member\"]\n").unwrap();
     refuses(&["Cargo.toml is a workspace", "one of its crates"]);
     let manifest = "[package]\nname = \"own\"\nedition = \"2024\"\n[workspace]\n[lib]\n";
-    fs::write(own.join("Cargo.toml"), manifest).unwrap();
-    fs::write(own.join("src/lib.rs"), "pub fn nothing() {}\n").unwrap();
+    fs::write(crate_path.join("Cargo.toml"), manifest).unwrap();
+    fs::write(crate_path.join("src/lib.rs"), "pub fn nothing() {}\n").unwrap();
     refuses(&["Cargo.toml", "crate-type = [\"cdylib\"]"]);
-    fs::write(own.join("Cargo.toml"), format!("{manifest}crate-type = [\"cdylib\"]\n")).unwrap();
+    fs::write(crate_path.join("Cargo.toml"), format!("{manifest}crate-type = [\"cdylib\"]\n"))
+        .unwrap();
     refuses(&["does not describe itself", "fmuDescribe"]);
-    fs::write(own.join("src/lib.rs"), "pub fn nothing() {\n").unwrap();
+    fs::write(crate_path.join("src/lib.rs"), "pub fn nothing() {\n").unwrap();
     refuses(&["unclosed delimiter", "could not build"]);
-    fs::write(own.join("Cargo.toml"), "[package\n").unwrap();
+    fs::write(crate_path.join("Cargo.toml"), "[package\n").unwrap();
     refuses(&["cannot pack own", "Cargo.toml"]);
     assert!(!folder.path().join("dist").exists());
 }
@@ -339,9 +340,9 @@ fn bad_names_and_existing_folders_are_refused_and_no_files_are_left() {
 #[test]
 fn a_new_crate_depends_on_the_stated_version_of_fmu() {
     let folder = tempfile::tempdir().unwrap();
-    let own = root().join("crates/fmu").display().to_string();
+    let crate_path = root().join("crates/fmu").display().to_string();
     let url = "https://example.org/fmu.git";
-    let kinds = [("a", None, "path", own.as_str()), ("b", Some(url), "git", url)];
+    let kinds = [("a", None, "path", crate_path.as_str()), ("b", Some(url), "git", url)];
     let mut files = BTreeSet::new();
     for (name, source, key, expected) in kinds {
         let mut arguments = vec!["new", name, "--path"];

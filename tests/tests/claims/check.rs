@@ -61,12 +61,12 @@ fn an_fmu_that_ends_its_process_is_one_finding_with_function_and_reason() {
             "fmi2Terminate",
             "fmi2FreeInstance",
         ] {
-            let (status, found) = new(&format!("{deed} in {function}"), &[]);
-            assert_eq!((status, found.len()), (Some(1), 1), "{deed} in {function}: {found:#?}");
-            assert_eq!(text(&found[0], "severity"), "error");
-            assert_eq!(text(&found[0], "where"), function);
-            assert!(text(&found[0], "what").starts_with(reason), "{found:#?}");
-            assert!(text(&found[0], "why").contains("ends with it"), "{found:#?}");
+            let (status, actual) = new(&format!("{deed} in {function}"), &[]);
+            assert_eq!((status, actual.len()), (Some(1), 1), "{deed} in {function}: {actual:#?}");
+            assert_eq!(text(&actual[0], "severity"), "error");
+            assert_eq!(text(&actual[0], "where"), function);
+            assert!(text(&actual[0], "what").starts_with(reason), "{actual:#?}");
+            assert!(text(&actual[0], "why").contains("ends with it"), "{actual:#?}");
         }
     }
 }
@@ -75,19 +75,19 @@ fn an_fmu_that_ends_its_process_is_one_finding_with_function_and_reason() {
 fn an_fmu_that_hangs_is_a_finding_after_the_time_limit() {
     for function in ["fmi2Instantiate", "fmi2DoStep", "fmi2FreeInstance"] {
         let begin = Instant::now();
-        let (status, found) = new(&format!("hang in {function}"), &["--time-limit", "0.5"]);
+        let (status, actual) = new(&format!("hang in {function}"), &["--time-limit", "0.5"]);
         assert!(begin.elapsed() < Duration::from_secs(60));
-        assert_eq!((status, found.len()), (Some(1), 1), "{found:#?}");
-        assert_eq!(text(&found[0], "where"), function);
-        assert!(text(&found[0], "what").starts_with("did not return within 0.5 s"), "{found:#?}");
+        assert_eq!((status, actual.len()), (Some(1), 1), "{actual:#?}");
+        assert_eq!(text(&actual[0], "where"), function);
+        assert!(text(&actual[0], "what").starts_with("did not return within 0.5 s"), "{actual:#?}");
     }
 }
 
 #[test]
 fn a_flood_of_messages_is_a_warning_with_their_number() {
-    let (status, found) = new("flood in fmi2SetupExperiment", &[]);
+    let (status, actual) = new("flood in fmi2SetupExperiment", &[]);
     assert_eq!(status, check(&fmu("as it should"), &[]).0);
-    let flood = found.iter().find(|own| text(own, "what").starts_with("sends")).unwrap();
+    let flood = actual.iter().find(|finding| text(finding, "what").starts_with("sends")).unwrap();
     let number = text(flood, "what").split(' ').nth(1).unwrap().parse::<u64>().unwrap();
     // A million for each instance.
     assert!(number >= 1_000_000 && number % 1_000_000 < 1000, "{flood}");
@@ -109,8 +109,11 @@ fn the_report_in_text_names_function_and_reason() {
 #[test]
 fn an_fmu_with_one_instance_per_process_gets_no_finding_for_that() {
     let one = CFmu::that("one instance only").flag("canBeInstantiatedOnlyOncePerProcess", true);
-    let (_, found) = check(&one, &[]);
-    assert!(!found.iter().any(|own| text(own, "where") == "fmi2Instantiate"), "{found:#?}");
+    let (_, actual) = check(&one, &[]);
+    assert!(
+        !actual.iter().any(|finding| text(finding, "where") == "fmi2Instantiate"),
+        "{actual:#?}"
+    );
 }
 
 #[test]
@@ -152,9 +155,9 @@ fn a_write_beside_an_array_or_into_a_constant_one_is_an_error() {
             "changed its constant array of bytes",
         ),
     ] {
-        let (status, found) = new(behaviour, &[]);
-        assert_eq!(status, Some(1), "{found:#?}");
-        let error = found.iter().find(|own| text(own, "where") == function).unwrap();
+        let (status, actual) = new(behaviour, &[]);
+        assert_eq!(status, Some(1), "{actual:#?}");
+        let error = actual.iter().find(|finding| text(finding, "where") == function).unwrap();
         assert!(text(error, "what").contains(sentence), "{error:#?}");
     }
 }
@@ -169,9 +172,9 @@ fn what_an_fmu_changes_for_its_whole_process_is_a_warning() {
         ("join the group of the parent", "the process group from "),
     ] {
         for function in ["fmi2Instantiate", "fmi2DoStep"] {
-            let (_, found) = new(&format!("{deed} in {function}"), &[]);
-            let is_change = |own: &&Value| text(own, "where") == "process";
-            let finding = found.iter().find(is_change).unwrap_or_else(|| panic!("{found:#?}"));
+            let (_, actual) = new(&format!("{deed} in {function}"), &[]);
+            let is_change = |finding: &&Value| text(finding, "where") == "process";
+            let finding = actual.iter().find(is_change).unwrap_or_else(|| panic!("{actual:#?}"));
             assert_eq!(text(finding, "severity"), "warning");
             assert!(text(finding, "what").contains(change), "{finding:#?}");
         }
@@ -182,7 +185,7 @@ fn what_an_fmu_changes_for_its_whole_process_is_a_warning() {
 fn a_thorough_check_runs_the_default_experiment() {
     let late = CFmu::that("crash in fmi2DoStep").experiment("stopTime=\"1\" stepSize=\"0.015625\"");
     let (_, short) = check(&late, &[]);
-    let crash = |own: &Value| text(own, "what").contains("SIGSEGV");
+    let crash = |finding: &Value| text(finding, "what").contains("SIGSEGV");
     assert!(!short.iter().any(crash), "{short:#?}");
     let (status, long) = check(&late, &["--thorough"]);
     assert!(status == Some(1) && long.iter().any(crash), "{long:#?}");

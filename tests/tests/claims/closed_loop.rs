@@ -65,17 +65,17 @@ fn compensated() -> Table {
 
 #[test]
 fn the_first_5_s_are_those_of_scipy_at_a_communication_step_of_20_us() {
-    let found = differences(&paper(), &[], &Algorithm::new(2e-5), 5.0);
-    println!("paper: {found:?}");
-    assert!(largest(&found) < 1e-3, "{found:?}");
+    let actual = differences(&paper(), &[], &Algorithm::new(2e-5), 5.0);
+    println!("paper: {actual:?}");
+    assert!(largest(&actual) < 1e-3, "{actual:?}");
 }
 
 #[test]
 fn the_first_5_s_with_compensation_are_those_of_scipy_at_a_communication_step_of_20_us() {
     let settings = [("controller.t_on", "1.0")];
-    let found = differences(&compensated(), &settings, &Algorithm::new(2e-5), 5.0);
-    println!("compensated: {found:?}");
-    assert!(largest(&found) < 1e-3, "{found:?}");
+    let actual = differences(&compensated(), &settings, &Algorithm::new(2e-5), 5.0);
+    println!("compensated: {actual:?}");
+    assert!(largest(&actual) < 1e-3, "{actual:?}");
 }
 
 /// Differences of the cart's position from the reference over the first 5 s, for steps that are
@@ -158,11 +158,11 @@ fn mixed(plant: &str, controller: &str) -> System {
 fn the_residual_at_1_ms_is_the_same_with_fmi_3_where_intermediate_update_replaces_derivatives() {
     let known = residual(closed_loop(&[]), 1e-3);
     for (plant, controller) in [(".fmi3", ".fmi3"), ("", ".fmi3"), (".fmi3", "")] {
-        let found = residual(mixed(plant, controller), 1e-3);
-        println!("plant {plant}, controller {controller}: {found:?}, FMI 2.0 {known:?}");
+        let actual = residual(mixed(plant, controller), 1e-3);
+        println!("plant {plant}, controller {controller}: {actual:?}, FMI 2.0 {known:?}");
         // Cart, pendulum, error of the estimate.
-        for ((found, known), bound) in found.iter().zip(&known).zip([1e-4, 1e-4, 0.02]) {
-            assert!((found / known - 1.0).abs() < bound, "{found} {known}");
+        for ((actual, known), bound) in actual.iter().zip(&known).zip([1e-4, 1e-4, 0.02]) {
+            assert!((actual / known - 1.0).abs() < bound, "{actual} {known}");
         }
     }
 }

@@ -69,8 +69,8 @@ fn the_summary_certifies_the_design_by_theorem_1() {
     let mut observer: Vec<_> =
         design["observer_eigenvalues"].as_array().unwrap().iter().map(real).collect();
     observer.sort_by(f64::total_cmp);
-    for (found, wanted) in observer.iter().zip([-3000.0, -2100.0, -1800.0, -1500.0, -1200.0]) {
-        assert!((found / wanted - 1.0).abs() < 1e-6, "{found} {wanted}");
+    for (actual, required) in observer.iter().zip([-3000.0, -2100.0, -1800.0, -1500.0, -1200.0]) {
+        assert!((actual / required - 1.0).abs() < 1e-6, "{actual} {required}");
     }
     let theorem = &design["theorem_1"];
     assert_eq!(theorem["controllability_rank"], serde_json::json!([4, 4]));
@@ -95,9 +95,9 @@ fn with_the_printed_gains_the_nonlinear_pendulum_falls_and_the_report_says_so() 
     println!("{}", said(&output));
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
     assert!(said(&output).contains("expected: the printed gains lose the nonlinear plant"));
-    let found = summary(&folder)["design"]["observer_eigenvalues"].clone();
-    let slowest = found.as_array().unwrap().iter().map(|pair| pair[0].as_f64().unwrap());
-    assert!((slowest.fold(f64::NEG_INFINITY, f64::max) + 9.1).abs() < 0.1, "{found}");
+    let actual = summary(&folder)["design"]["observer_eigenvalues"].clone();
+    let slowest = actual.as_array().unwrap().iter().map(|pair| pair[0].as_f64().unwrap());
+    assert!((slowest.fold(f64::NEG_INFINITY, f64::max) + 9.1).abs() < 0.1, "{actual}");
 }
 
 #[test]

@@ -294,11 +294,11 @@ fn a_function_is_computed_between_the_steps_in_any_order_of_the_slaves() {
         for _ in 0..5 {
             simulation.step().unwrap();
             x += 0.5 * (x + 2.0);
-            let mut found = [0.0; 2];
-            simulation.system().slaves[1].1.get_real(&[2], &mut found[..1]).unwrap();
-            simulation.system().slaves[0].1.get_real(&[2], &mut found[1..]).unwrap();
+            let mut actual = [0.0; 2];
+            simulation.system().slaves[1].1.get_real(&[2], &mut actual[..1]).unwrap();
+            simulation.system().slaves[0].1.get_real(&[2], &mut actual[1..]).unwrap();
             // A function that lags by one step would give another x from the second step on.
-            assert_eq!(found, [x, x + 2.0], "{method:?}");
+            assert_eq!(actual, [x, x + 2.0], "{method:?}");
         }
     }
 }
@@ -319,9 +319,9 @@ fn a_function_of_a_slower_slave_gets_its_value_at_the_current_time() {
         if step % 2 == 1 {
             slow += 3.0;
         }
-        let mut found = [0.0];
-        simulation.system().slaves[1].1.get_real(&[2], &mut found).unwrap();
-        assert_eq!(found, [x], "{step}");
+        let mut actual = [0.0];
+        simulation.system().slaves[1].1.get_real(&[2], &mut actual).unwrap();
+        assert_eq!(actual, [x], "{step}");
     }
 }
 
@@ -330,12 +330,12 @@ fn a_function_of_extrapolated_inputs_reaches_their_end_values() {
     let mut simulation = start(with_sum(), (Method::GaussSeidel, Extrapolation::Linear), None);
     for _ in 0..3 {
         simulation.step().unwrap();
-        let mut found = [0.0; 3];
-        simulation.system().slaves[0].1.get_real(&[2], &mut found[..1]).unwrap();
-        simulation.system().slaves[1].1.get_real(&[2], &mut found[1..2]).unwrap();
-        simulation.system().slaves[2].1.get_real(&[2], &mut found[2..]).unwrap();
-        let sum: f64 = found[1] + found[2];
-        assert!((found[0] - sum).abs() <= 1e-12 * sum.abs(), "{found:?}");
+        let mut actual = [0.0; 3];
+        simulation.system().slaves[0].1.get_real(&[2], &mut actual[..1]).unwrap();
+        simulation.system().slaves[1].1.get_real(&[2], &mut actual[1..2]).unwrap();
+        simulation.system().slaves[2].1.get_real(&[2], &mut actual[2..]).unwrap();
+        let sum: f64 = actual[1] + actual[2];
+        assert!((actual[0] - sum).abs() <= 1e-12 * sum.abs(), "{actual:?}");
     }
 }
 

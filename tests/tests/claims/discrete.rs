@@ -192,7 +192,7 @@ fn messages_go_back_and_forth_within_one_instant() {
     let outcome = nodes.run(0.002, &request()).unwrap();
     // a sends 1, 3, 5, 7, 9 and b sends 2, 4, 6, 8, all at 0 s.
     let (_, start) = &outcome.rows[0];
-    let at_start = |name: &str| start.iter().find(|(own, _)| own == name).unwrap().1;
+    let at_start = |name: &str| start.iter().find(|(row, _)| row == name).unwrap().1;
     assert_eq!((at_start("b.received"), at_start("b.sum")), (5.0, 25.0));
     assert_eq!((at_start("a.received"), at_start("a.sum")), (4.0, 20.0));
     assert_eq!((outcome.last("b.received"), outcome.last("a.received")), (5.0, 4.0));

@@ -146,22 +146,22 @@ fn pendulum(linearised: &str) -> (Linearise, DMatrix<f64>) {
 fn directional_derivatives_of_the_upright_pendulum_equal_the_formulas_of_the_paper() {
     for linearised in ["true", "false"] {
         let (request, expected) = pendulum(linearised);
-        let found = linearise(&open("FrictionPendulum.fmu"), &request).unwrap();
-        expect_close(&found, &expected, 1e-12);
+        let actual = linearise(&open("FrictionPendulum.fmu"), &request).unwrap();
+        expect_close(&actual, &expected, 1e-12);
         let interface = Interface::ModelExchange;
         let method = Method::DirectionalDerivatives { interface, disagreement: None };
-        assert_eq!(found.method, method);
-        assert!(found.residual < 1e-10, "{}", found.residual);
-        let states: Vec<_> = found.states.iter().map(|state| state.name.as_str()).collect();
+        assert_eq!(actual.method, method);
+        assert!(actual.residual < 1e-10, "{}", actual.residual);
+        let states: Vec<_> = actual.states.iter().map(|state| state.name.as_str()).collect();
         assert_eq!(states, ["x_p", "theta", "v_p", "omega"]);
-        assert_eq!(found.states[3].unit.as_deref(), Some("rad/s"));
+        assert_eq!(actual.states[3].unit.as_deref(), Some("rad/s"));
 
         let fmu = changed("FrictionPendulum.fmu", |xml| without("ModelExchange", xml));
-        let found = linearise(&fmu, &request).unwrap();
-        expect_close(&found, &expected, 1e-12);
+        let actual = linearise(&fmu, &request).unwrap();
+        expect_close(&actual, &expected, 1e-12);
         let interface = Interface::CoSimulation;
         let method = Method::DirectionalDerivatives { interface, disagreement: None };
-        assert_eq!(found.method, method);
+        assert_eq!(actual.method, method);
     }
 }
 
@@ -171,10 +171,10 @@ fn differences_of_the_upright_pendulum_equal_the_formulas_within_their_error() {
         changed("FrictionPendulum.fmu", |xml| without_derivatives(&without("CoSimulation", xml)));
     for linearised in ["true", "false"] {
         let (request, expected) = pendulum(linearised);
-        let found = linearise(&fmu, &request).unwrap();
-        expect_close(&found, &expected, 1e-9);
-        expect_within_errors(&found, &expected);
-        assert!(found.relative_error().unwrap() < 1e-8, "{:e}", found.relative_error().unwrap());
+        let actual = linearise(&fmu, &request).unwrap();
+        expect_close(&actual, &expected, 1e-9);
+        expect_within_errors(&actual, &expected);
+        assert!(actual.relative_error().unwrap() < 1e-8, "{:e}", actual.relative_error().unwrap());
     }
 }
 
@@ -184,9 +184,9 @@ fn steps_of_the_upright_pendulum_give_the_formulas_within_their_error() {
     for linearised in ["true", "false"] {
         let (mut request, expected) = pendulum(linearised);
         request.states = names(&["x_p", "theta", "v_p", "omega"]);
-        let found = linearise(&fmu, &request).unwrap();
-        expect_close(&found, &expected, 1e-5);
-        expect_within_errors(&found, &expected);
+        let actual = linearise(&fmu, &request).unwrap();
+        expect_close(&actual, &expected, 1e-5);
+        expect_within_errors(&actual, &expected);
     }
 }
 
@@ -200,7 +200,8 @@ fn an_fmu_of_fmi_3_has_the_matrices_of_the_same_model_in_fmi_2_by_each_method() 
         request.states = names(&["x_p", "theta", "v_p", "omega"]);
         let [two, three] = ["FrictionPendulum.fmu", "FrictionPendulum.fmi3.fmu"]
             .map(|name| linearise(&changed(name, change), &request).unwrap());
-        let matrices = |found: &Linearisation| format!("{:?} {:?}", found.matrices, found.states);
+        let matrices =
+            |actual: &Linearisation| format!("{:?} {:?}", actual.matrices, actual.states);
         assert_eq!(matrices(&three), matrices(&two));
         assert_eq!(three.method, two.method);
     }
@@ -226,21 +227,21 @@ fn tank() -> (Linearise, DMatrix<f64>) {
 #[test]
 fn a_fault_at_the_limit_of_its_range_is_perturbed_to_one_side_only() {
     let (mut request, expected) = tank();
-    let found = linearise(&open("DrainedTank.fmu"), &request).unwrap();
-    expect_close(&found, &expected, 1e-15);
-    assert!(found.residual < 1e-15);
-    let values: Vec<f64> = found.outputs.iter().map(|output| output.value).collect();
-    assert_eq!((values, found.faults[0].name.as_str()), (vec![4.0, 1.0], "leak"));
+    let actual = linearise(&open("DrainedTank.fmu"), &request).unwrap();
+    expect_close(&actual, &expected, 1e-15);
+    assert!(actual.residual < 1e-15);
+    let values: Vec<f64> = actual.outputs.iter().map(|output| output.value).collect();
+    assert_eq!((values, actual.faults[0].name.as_str()), (vec![4.0, 1.0], "leak"));
 
-    let found = linearise(&changed("DrainedTank.fmu", without_derivatives), &request).unwrap();
-    expect_close(&found, &expected, 1e-9);
-    expect_within_errors(&found, &expected);
+    let actual = linearise(&changed("DrainedTank.fmu", without_derivatives), &request).unwrap();
+    expect_close(&actual, &expected, 1e-9);
+    expect_within_errors(&actual, &expected);
 
     // Below 0.05 s the steps of the tank's integration follow the communication step.
     (request.states, request.step) = (names(&["level", "flow"]), Some(0.0125));
-    let found = linearise(&changed("DrainedTank.fmu", steps_only), &request).unwrap();
-    expect_close(&found, &expected, 1e-5);
-    expect_within_errors(&found, &expected);
+    let actual = linearise(&changed("DrainedTank.fmu", steps_only), &request).unwrap();
+    expect_close(&actual, &expected, 1e-5);
+    expect_within_errors(&actual, &expected);
 }
 
 #[test]
@@ -252,12 +253,12 @@ fn steps_away_from_an_equilibrium_are_within_their_error_and_the_drift_is_report
     expected[(0, 0)] = -0.125;
     (expected[(0, 3)], expected[(0, 4)]) = (-0.5, -0.5);
     (expected[(3, 0)], expected[(3, 3)]) = (0.25, 1.0);
-    let found = linearise(&changed("DrainedTank.fmu", steps_only), &request).unwrap();
-    expect_close(&found, &expected, 1e-4);
-    expect_within_errors(&found, &expected);
-    assert!((found.rates[0] - 0.5).abs() < 1e-3, "{:?}", found.rates);
-    assert!((found.rates[1] + 0.5).abs() < 1e-3, "{:?}", found.rates);
-    assert!(found.residual > 0.1);
+    let actual = linearise(&changed("DrainedTank.fmu", steps_only), &request).unwrap();
+    expect_close(&actual, &expected, 1e-4);
+    expect_within_errors(&actual, &expected);
+    assert!((actual.rates[0] - 0.5).abs() < 1e-3, "{:?}", actual.rates);
+    assert!((actual.rates[1] + 0.5).abs() < 1e-3, "{:?}", actual.rates);
+    assert!(actual.residual > 0.1);
 }
 
 #[test]
@@ -274,15 +275,15 @@ fn steps_of_a_falling_pendulum_are_not_accurate_enough_and_refused() {
 fn wrong_directional_derivatives_are_detected_by_differences() {
     let (mut request, _) = tank();
     request.at = at(&[("lie", "0.25")]);
-    let found = linearise(&open("DrainedTank.fmu"), &request).unwrap();
-    let Method::DirectionalDerivatives { disagreement: Some(worst), .. } = &found.method else {
-        panic!("{}", found.method)
+    let actual = linearise(&open("DrainedTank.fmu"), &request).unwrap();
+    let Method::DirectionalDerivatives { disagreement: Some(worst), .. } = &actual.method else {
+        panic!("{}", actual.method)
     };
     let Disagreement { of, to, derivative, difference, relative } = worst;
     assert_eq!((of.as_str(), to.as_str()), ("der(level)", "level"));
     assert!((derivative - 0.1875).abs() < 1e-15 && (difference + 0.0625).abs() < 1e-9);
     assert!((relative - 1.0).abs() < 1e-3, "{relative}");
-    assert!(found.method.to_string().contains("contradict"));
+    assert!(actual.method.to_string().contains("contradict"));
 }
 
 #[test]
@@ -295,12 +296,12 @@ fn derivatives_of_the_van_der_pol_oscillator_equal_those_by_hand() {
     let expected = DMatrix::from_row_slice(3, 2, &[0.0, 1.0, 3.2, -2.5, 1.0, 0.0]);
     let fmu = changed("VanDerPol.fmu", without_derivatives);
     for (fmu, relative) in [(open("VanDerPol.fmu"), 1e-15), (fmu, 1e-9)] {
-        let found = linearise(&fmu, &request).unwrap();
-        expect_close(&found, &expected, relative);
-        for (rate, expected) in found.rates.iter().zip([-0.7, 0.25]) {
+        let actual = linearise(&fmu, &request).unwrap();
+        expect_close(&actual, &expected, relative);
+        for (rate, expected) in actual.rates.iter().zip([-0.7, 0.25]) {
             assert!((rate - expected).abs() < 1e-15);
         }
-        assert_eq!(found.states[0].value.to_bits(), 1.5_f64.to_bits());
+        assert_eq!(actual.states[0].value.to_bits(), 1.5_f64.to_bits());
     }
 }
 
@@ -316,10 +317,10 @@ fn outputs_that_are_stale_after_the_derivatives_have_their_own_derivatives() {
         at: at(&[("k", "2")]),
         ..Linearise::default()
     };
-    let found = linearise(&fmu, &request).unwrap().matrices;
+    let actual = linearise(&fmu, &request).unwrap().matrices;
     let expected = DMatrix::from_row_slice(2, 4, &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
-    assert!((found.c - expected).amax() < 1e-9);
-    assert!((found.a[(0, 0)] + 2.0).abs() < 1e-9 && (found.b[(0, 0)] - 2.0).abs() < 1e-9);
+    assert!((actual.c - expected).amax() < 1e-9);
+    assert!((actual.a[(0, 0)] + 2.0).abs() < 1e-9 && (actual.b[(0, 0)] - 2.0).abs() < 1e-9);
 }
 
 #[test]
@@ -328,10 +329,10 @@ fn states_have_the_order_of_the_request_and_one_that_nothing_depends_on_may_be_l
     request.outputs = names(&["theta"]);
     request.states = names(&["omega", "theta", "v_p"]);
     let fmu = open("FrictionPendulum.fmu");
-    let found = linearise(&fmu, &request).unwrap();
+    let actual = linearise(&fmu, &request).unwrap();
     let order = [3, 1, 2];
     let a = DMatrix::from_fn(3, 3, |i, j| expected[(order[i], order[j])]);
-    assert!((found.matrices.a - a).amax() < 1e-12);
+    assert!((actual.matrices.a - a).amax() < 1e-12);
     request.states = names(&["theta", "omega"]);
     let message = linearise(&fmu, &request).unwrap_err().to_string();
     assert_eq!(message, "the state v_p may not be left out: der(omega) depends on it");

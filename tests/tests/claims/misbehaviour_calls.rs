@@ -222,8 +222,8 @@ fn nan_and_infinity_are_passed_on_unchanged() {
     for (behaviour, expected) in [("not a number", f64::NAN), ("infinity", f64::NEG_INFINITY)] {
         let mut slave = ready(behaviour);
         slave.do_step(0.0, 0.5, true).unwrap();
-        let found = output(&mut slave);
-        assert!(found == expected || (found.is_nan() && expected.is_nan()), "{found}");
+        let actual = output(&mut slave);
+        assert!(actual == expected || (actual.is_nan() && expected.is_nan()), "{actual}");
     }
 }
 

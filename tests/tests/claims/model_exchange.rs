@@ -151,9 +151,9 @@ fn a_ball_bounces_where_it_reaches_the_ground() {
                 }
                 instance.steps(k, 1, size);
                 let (height, bounces) = ball(f64::from(k + 1) * size, 0.8);
-                let found = (instance.real(H), instance.integer(BOUNCES));
-                assert!((found.0 - height).abs() < 1e-6, "{method:?} {size} {k}: {found:?}");
-                assert_eq!(found.1, bounces, "{method:?} {size} {k}");
+                let actual = (instance.real(H), instance.integer(BOUNCES));
+                assert!((actual.0 - height).abs() < 1e-6, "{method:?} {size} {k}: {actual:?}");
+                assert_eq!(actual.1, bounces, "{method:?} {size} {k}");
             }
         }
     }

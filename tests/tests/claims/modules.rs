@@ -169,8 +169,8 @@ fn no_modules_use_each_other_but_parent_and_child() {
         .map(|name| root().join(name));
     for folder in crates.chain(others) {
         for (module, imports) in imports(&folder.join("src")) {
-            let found = circular(&imports);
-            assert!(found.is_empty(), "{}, {}: {found:#?}", folder.display(), module.join("::"));
+            let actual = circular(&imports);
+            assert!(actual.is_empty(), "{}, {}: {actual:#?}", folder.display(), module.join("::"));
         }
     }
 }
@@ -188,8 +188,8 @@ const LAYERS: [&[&str]; 6] = [
 #[test]
 fn a_layer_of_the_design_imports_earlier_layers_only() {
     let layer = |module: &str| {
-        let found = LAYERS.iter().position(|layer| layer.contains(&module));
-        found.unwrap_or_else(|| panic!("crates/design/src/{module}.rs is in no layer"))
+        let actual = LAYERS.iter().position(|layer| layer.contains(&module));
+        actual.unwrap_or_else(|| panic!("crates/design/src/{module}.rs is in no layer"))
     };
     let sources = root().join("crates/design/src");
     let mut all = BTreeMap::new();
@@ -220,10 +220,10 @@ fn a_circle_of_modules_is_seen() {
         "#[cfg(test)] mod tests { use crate::a::X; } fn f() { html! { (crate::c::g()) } }",
     );
     write("c.rs", "");
-    let found = imports(folder.path());
-    assert_eq!(found.keys().collect::<Vec<_>>(), [&Module::new()]);
-    assert_eq!(circular(&found[&Module::new()]), Vec::<&String>::new());
+    let actual = imports(folder.path());
+    assert_eq!(actual.keys().collect::<Vec<_>>(), [&Module::new()]);
+    assert_eq!(circular(&actual[&Module::new()]), Vec::<&String>::new());
     write("c.rs", "use crate::a::inner::f as g;");
-    let found = imports(folder.path());
-    assert_eq!(circular(&found[&Module::new()]).len(), 4);
+    let actual = imports(folder.path());
+    assert_eq!(circular(&actual[&Module::new()]).len(), 4);
 }

@@ -179,8 +179,8 @@ fn the_libraries_contain_no_path_of_the_building_machine() {
     for model in MODELS {
         let library = fs::read(unpacked(model).library(model).unwrap()).unwrap();
         for path in [root().display().to_string(), format!("{home}/.cargo")] {
-            let found = library.windows(path.len()).any(|bytes| bytes == path.as_bytes());
-            assert!(!found, "{model} contains {path}");
+            let actual = library.windows(path.len()).any(|bytes| bytes == path.as_bytes());
+            assert!(!actual, "{model} contains {path}");
         }
     }
 }

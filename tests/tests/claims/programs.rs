@@ -39,8 +39,8 @@ fn twenty_lines_load_and_step_an_fmu_as_the_command_does() {
     let plant_path = plant.display().to_string();
     command(&["run", &plant_path, "--stop-time", "10", "--step", "0.001", "--out", &out]);
     let x_p = last(&folder.path().join("results.csv"), "FrictionPendulum.x_p");
-    let found: f64 = printed("import", &[&plant]).parse().unwrap();
-    assert_eq!(found.to_bits(), x_p.parse::<f64>().unwrap().to_bits());
+    let actual: f64 = printed("import", &[&plant]).parse().unwrap();
+    assert_eq!(actual.to_bits(), x_p.parse::<f64>().unwrap().to_bits());
 }
 
 #[test]
@@ -57,8 +57,8 @@ fn thirty_lines_couple_two_fmus_as_the_command_does() {
     let rest = ["--step", "0.001", "--stop-time", "10", "--out", &out];
     command(&[&paths[..], &algorithm, &rest].concat());
     let x_p = last(&folder.path().join("results.csv"), "plant.x_p");
-    let found: f64 = printed("couple", &[&plant, &controller]).parse().unwrap();
-    assert_eq!(found.to_bits(), x_p.parse::<f64>().unwrap().to_bits());
+    let actual: f64 = printed("couple", &[&plant, &controller]).parse().unwrap();
+    assert_eq!(actual.to_bits(), x_p.parse::<f64>().unwrap().to_bits());
 }
 
 #[test]

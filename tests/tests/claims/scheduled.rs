@@ -30,10 +30,10 @@ fn model_partitions_run_at_the_ticks_of_their_clocks_by_priority() {
         let changes = |name: &str| {
             let (times, values) = (rows.column("time"), rows.column(name));
             let rounded = |time: f64| (1e9 * time).round() / 1e9;
-            let mut found: Vec<(f64, f64)> = times.into_iter().map(rounded).zip(values).collect();
-            found.retain(|(_, value)| !value.is_nan());
-            found.dedup_by_key(|(_, value)| *value);
-            found
+            let mut actual: Vec<(f64, f64)> = times.into_iter().map(rounded).zip(values).collect();
+            actual.retain(|(_, value)| !value.is_nan());
+            actual.dedup_by_key(|(_, value)| *value);
+            actual
         };
         let order = [(0.0, 1.0), (0.5, 121.0), (1.0, 1211.0), (1.2, 12_113.0), (1.5, 121_131.0)];
         assert_eq!(changes("a.order"), order);

@@ -95,8 +95,8 @@ fn the_base_step_is_the_communication_step_and_a_hint_gives_an_element_a_multipl
         let (time, y, said) = run(&path, &[]);
         assert_eq!((time.len(), time[1]), (17, 0.0625), "{said}");
         assert!(said.contains("sub.b steps every 2 communication steps"), "{said}");
-        let own: Vec<f64> = y.iter().copied().step_by(2).collect();
-        assert_eq!(own, expected(0.125, 8), "{said}");
+        let sampled: Vec<f64> = y.iter().copied().step_by(2).collect();
+        assert_eq!(sampled, expected(0.125, 8), "{said}");
     }
 }
 
@@ -106,8 +106,8 @@ fn settings_of_the_user_override_the_hints() {
     let (time, y, said) = run(&path, &["--every", "sub.b=4"]);
     assert_eq!(time.len(), 17);
     assert!(said.contains("sub.b steps every 4 communication steps"), "{said}");
-    let own: Vec<f64> = y.iter().copied().step_by(4).collect();
-    assert_eq!(own, expected(0.25, 4));
+    let sampled: Vec<f64> = y.iter().copied().step_by(4).collect();
+    assert_eq!(sampled, expected(0.25, 4));
     let (time, y, said) = run(&path, &["--step", "0.125"]);
     assert_eq!((time.len(), y), (9, expected(0.125, 8)), "{said}");
     assert!(!said.contains("steps every"), "{said}");

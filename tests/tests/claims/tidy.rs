@@ -225,7 +225,7 @@ fn is_allowed(expression: &str, allowed: &[&str]) -> bool {
 fn deny_toml_allows_the_licence_of_every_dependency() {
     let deny: toml::Table = fs::read_to_string(root().join("deny.toml")).unwrap().parse().unwrap();
     let allowed = deny["licenses"]["allow"].as_array().unwrap();
-    let allowed: Vec<&str> = allowed.iter().map(|own| own.as_str().unwrap()).collect();
+    let allowed: Vec<&str> = allowed.iter().map(|entry| entry.as_str().unwrap()).collect();
     let mut cargo =
         std::process::Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.current_dir(root()).args(["metadata", "--format-version", "1", "--all-features"]);

@@ -139,7 +139,7 @@ fn every_type_of_variable_and_large_data_are_transferred() {
     slave.set_string(&[0], std::slice::from_ref(&text)).unwrap();
     let mut texts = vec!["old".to_owned(); 3];
     slave.get_string(&[0, 0, 0], &mut texts).unwrap();
-    assert!(texts.iter().all(|found| *found == text));
+    assert!(texts.iter().all(|actual| *actual == text));
     slave.set_string(&[0], &[String::new()]).unwrap();
     slave.get_string(&[0], &mut texts[..1]).unwrap();
     assert_eq!(texts[0], "");
@@ -162,16 +162,16 @@ fn errors_and_early_ends_are_reported_as_without_isolation() {
     near.exit_initialization_mode().unwrap();
     let slaves: [&mut dyn Slave; 2] = [&mut near, &mut far];
     let [near, far] = slaves.map(|slave| {
-        let mut found = vec![
+        let mut actual = vec![
             slave.set_real(&[1], &[2.0]).unwrap_err(),
             slave.directional_derivative(&[1], &[0], &[1.0], &mut [0.0]).unwrap_err(),
             slave.restore_state(7).unwrap_err(),
             slave.deserialize_state(b"short").unwrap_err(),
         ];
         slave.set_integer(&[0], &[Trouble::Refuse as i64]).unwrap();
-        found.push(advance(slave, 1.0, 0.5).unwrap_err());
+        actual.push(advance(slave, 1.0, 0.5).unwrap_err());
         slave.set_integer(&[0], &[Trouble::StopEarly as i64]).unwrap();
-        (found, advance(slave, 4.0, 1.0).unwrap())
+        (actual, advance(slave, 4.0, 1.0).unwrap())
     });
     assert_eq!(near, far);
     let refused = near.0.last().unwrap();

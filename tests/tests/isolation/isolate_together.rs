@@ -131,10 +131,10 @@ fn the_crash_of_one_of_four_is_attributed_to_it_and_the_results_are_complete() {
         assert_eq!(run.status, Some(1), "{}", run.message);
         run.says(&[&format!("{name} at t = 0.5 s: fmi2DoStep crashed"), "SIGSEGV"]);
         let whole = outputs(&chain([WELL; 4], &[]));
-        let found = outputs(&run);
-        assert_eq!(found[0].len(), 9);
-        for (found, whole) in found.iter().zip(&whole) {
-            assert_eq!(found[..], whole[..9]);
+        let actual = outputs(&run);
+        assert_eq!(actual[0].len(), 9);
+        for (actual, whole) in actual.iter().zip(&whole) {
+            assert_eq!(actual[..], whole[..9]);
         }
     }
 }

@@ -15,15 +15,15 @@ fn designed() -> AsoDesign {
 #[test]
 fn the_error_dynamics_of_the_pendulum_have_the_required_eigenvalues() {
     let (plant, design) = (plant(), designed());
-    let mut wanted = OBSERVER_POLES;
-    wanted.sort_by(f64::total_cmp);
-    let found = eigenvalues(&design.gains.error_dynamics(&plant)).unwrap();
-    for (found, wanted) in found.iter().zip(wanted) {
-        assert!((found - wanted).norm() < 1e-6 * wanted.abs(), "{found}");
+    let mut required = OBSERVER_POLES;
+    required.sort_by(f64::total_cmp);
+    let actual = eigenvalues(&design.gains.error_dynamics(&plant)).unwrap();
+    for (actual, required) in actual.iter().zip(required) {
+        assert!((actual - required).norm() < 1e-6 * required.abs(), "{actual}");
     }
-    let found = eigenvalues(&design.gains.controlled_dynamics(&plant)).unwrap();
-    for (found, wanted) in found.iter().zip([-9.0, -7.5, -6.0, -4.5]) {
-        assert!((found - wanted).norm() < 1e-9, "{found}");
+    let actual = eigenvalues(&design.gains.controlled_dynamics(&plant)).unwrap();
+    for (actual, required) in actual.iter().zip([-9.0, -7.5, -6.0, -4.5]) {
+        assert!((actual - required).norm() < 1e-9, "{actual}");
     }
 }
 
@@ -59,17 +59,17 @@ fn the_printed_observer_with_two_signs_repaired_is_stable_and_without_is_not() {
         Complex::new(-16.312_979_61, 0.0),
         Complex::new(-9.124_598_87, 0.0),
     ];
-    let found = eigenvalues(&repaired_gains().error_dynamics(&plant)).unwrap();
-    for (found, expected) in found.iter().zip(expected) {
-        assert!((found - expected).norm() < 1e-7, "{found} {expected}");
+    let actual = eigenvalues(&repaired_gains().error_dynamics(&plant)).unwrap();
+    for (actual, expected) in actual.iter().zip(expected) {
+        assert!((actual - expected).norm() < 1e-7, "{actual} {expected}");
     }
     for sign in [1.0, -1.0] {
         let mut gains = repaired_gains();
         gains.l_x[(2, 1)] *= -1.0;
         gains.l_x[(3, 1)] *= -1.0;
         gains.l_f *= sign;
-        let found = eigenvalues(&gains.error_dynamics(&plant)).unwrap();
-        assert!(found.iter().any(|value| value.re > 1.0), "{found:?}");
+        let actual = eigenvalues(&gains.error_dynamics(&plant)).unwrap();
+        assert!(actual.iter().any(|value| value.re > 1.0), "{actual:?}");
     }
 }
 

@@ -28,10 +28,10 @@ fn an_integrator_has_the_bandwidth_as_its_gain() {
     let (zero, one) = (DMatrix::zeros(1, 1), DMatrix::from_element(1, 1, 1.0));
     for rate in [1e-3, 0.7, 40.0] {
         let units = DVector::repeat(1, 1.0);
-        let found = regulator(&zero, &one, &one, &units, rate, Domain::Continuous).unwrap();
-        assert!((found.result.gain[(0, 0)] / -rate - 1.0).abs() < 1e-5, "{rate}");
-        let found = filter(&zero, &one, &one, &units, rate, Domain::Continuous).unwrap();
-        assert!((found.result.gain[(0, 0)] / rate - 1.0).abs() < 1e-5, "{rate}");
+        let actual = regulator(&zero, &one, &one, &units, rate, Domain::Continuous).unwrap();
+        assert!((actual.result.gain[(0, 0)] / -rate - 1.0).abs() < 1e-5, "{rate}");
+        let actual = filter(&zero, &one, &one, &units, rate, Domain::Continuous).unwrap();
+        assert!((actual.result.gain[(0, 0)] / rate - 1.0).abs() < 1e-5, "{rate}");
     }
 }
 
@@ -40,8 +40,8 @@ fn the_loop_gain_is_one_at_the_bandwidth() {
     let StateSpace { a, b, c, .. } = carts();
     let q = c.tr_mul(&c);
     for rate in [0.3, 3.0, 30.0] {
-        let found = regulator(&a, &b, &q, &DVector::repeat(1, 5.0), rate, Domain::Continuous);
-        let ByBandwidth { result, loop_gain: stated, .. } = found.unwrap();
+        let actual = regulator(&a, &b, &q, &DVector::repeat(1, 5.0), rate, Domain::Continuous);
+        let ByBandwidth { result, loop_gain: stated, .. } = actual.unwrap();
         let gain = loop_gain(&a, &b, &result.gain, Complex::new(0.0, rate));
         assert!((gain - 1.0).abs() < 1e-5 && (gain - stated).abs() < 1e-9, "{rate}: {gain}");
     }
@@ -53,9 +53,9 @@ fn the_loop_gain_of_a_sampled_regulator_is_one_on_the_unit_circle() {
     let (period, rate): (f64, f64) = (0.01, 3.0);
     let (a, b) = control::hold::zero_order_hold(&a, &b, period).unwrap();
     let domain = Domain::Sampled { period };
-    let found = regulator(&a, &b, &c.tr_mul(&c), &DVector::repeat(1, 1.0), rate, domain).unwrap();
+    let actual = regulator(&a, &b, &c.tr_mul(&c), &DVector::repeat(1, 1.0), rate, domain).unwrap();
     let at = Complex::from_polar(1.0, rate * period);
-    let gain = loop_gain(&a, &b, &found.result.gain, at);
+    let gain = loop_gain(&a, &b, &actual.result.gain, at);
     assert!((gain - 1.0).abs() < 1e-5, "{gain}");
 }
 
@@ -64,10 +64,10 @@ fn unstable_modes_that_need_a_larger_bandwidth_are_named_by_the_loop_gain() {
     // x' = 5 x + u: no feedback that stabilises it has a gain below 10.
     let five = DMatrix::from_element(1, 1, 5.0);
     let one = DMatrix::from_element(1, 1, 1.0);
-    let found =
+    let actual =
         regulator(&five, &one, &one, &DVector::repeat(1, 1.0), 0.5, Domain::Continuous).unwrap();
-    assert!(found.result.gain[(0, 0)] <= -10.0);
-    assert!(found.loop_gain > 1.9, "{}", found.loop_gain);
+    assert!(actual.result.gain[(0, 0)] <= -10.0);
+    assert!(actual.loop_gain > 1.9, "{}", actual.loop_gain);
 }
 
 #[test]

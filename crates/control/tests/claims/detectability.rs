@@ -7,12 +7,12 @@ use nalgebra::{Complex, DMatrix};
 
 #[test]
 fn the_friction_of_the_pendulum_can_be_estimated() {
-    let found = detectability(&plant(), Domain::Continuous).unwrap();
+    let actual = detectability(&plant(), Domain::Continuous).unwrap();
     assert!(
-        found.observer_exists() && found.is_detectable() && found.invisible_faults().is_empty()
+        actual.observer_exists() && actual.is_detectable() && actual.invisible_faults().is_empty()
     );
-    assert!(found.hidden.is_empty() && found.unobservable.is_empty());
-    assert!(found.distance.lower > 0.0 && found.distance.upper < 1.0, "{:?}", found.distance);
+    assert!(actual.hidden.is_empty() && actual.unobservable.is_empty());
+    assert!(actual.distance.lower > 0.0 && actual.distance.upper < 1.0, "{:?}", actual.distance);
 }
 
 /// A constant force moves the cart for ever, but the angle at rest does not depend on it: the
@@ -37,15 +37,15 @@ fn chain() -> FaultyPlant {
 
 #[test]
 fn each_fault_is_seen_where_it_acts_with_its_gain_at_rest() {
-    let found = detectability(&chain(), Domain::Continuous).unwrap();
-    let row = &found.visibility[0];
+    let actual = detectability(&chain(), Domain::Continuous).unwrap();
+    let row = &actual.visibility[0];
     assert_eq!(row.iter().map(|entry| entry.visible).collect::<Vec<_>>(), [true, true, false]);
     for (entry, expected) in row.iter().zip([0.5, 0.5, 0.0]) {
         assert!((entry.dc_gain.unwrap() - expected).abs() < 1e-15, "{row:?}");
     }
-    assert_eq!(found.invisible_faults(), [2]);
-    let (mode, stable) = &found.unobservable[0];
-    assert!(*stable && found.is_detectable() && !found.observer_exists());
+    assert_eq!(actual.invisible_faults(), [2]);
+    let (mode, stable) = &actual.unobservable[0];
+    assert!(*stable && actual.is_detectable() && !actual.observer_exists());
     assert_eq!(mode.dominant, [2]);
     assert!((mode.eigenvalue + 3.0).norm() < 1e-14);
 }
@@ -53,11 +53,11 @@ fn each_fault_is_seen_where_it_acts_with_its_gain_at_rest() {
 /// y = x2 at rest is (f1 + f2) / 2: their difference is hidden, and so is f3.
 #[test]
 fn hidden_combinations_are_named_by_their_faults() {
-    let found = detectability(&chain(), Domain::Continuous).unwrap();
-    let mut faults: Vec<_> = found.hidden.iter().map(HiddenFault::faults).collect();
+    let actual = detectability(&chain(), Domain::Continuous).unwrap();
+    let mut faults: Vec<_> = actual.hidden.iter().map(HiddenFault::faults).collect();
     faults.sort_unstable();
     assert_eq!(faults, [vec![0, 1], vec![2]]);
-    let pair = found.hidden.iter().find(|hidden| hidden.faults().len() == 2).unwrap();
+    let pair = actual.hidden.iter().find(|hidden| hidden.faults().len() == 2).unwrap();
     assert!((pair.fault[0] + pair.fault[1]).norm() < 1e-13, "{pair:?}");
     assert_eq!(pair.states(), [0]);
     assert_eq!(pair.at, Complex::new(0.0, 0.0));
@@ -73,14 +73,14 @@ fn a_fault_is_hidden_when_its_model_has_the_eigenvalue_of_a_zero() {
         matrix(1, 2, &[1., 0.]),
         matrix(2, 1, &[1., 1.]),
     );
-    let found = detectability(&constant, Domain::Continuous).unwrap();
-    assert_eq!((found.zeros.finite.len(), found.hidden.len()), (1, 0));
-    assert!((found.zeros.finite[0] - 1.0).norm() < 1e-14);
-    assert!((found.visibility[0][0].dc_gain.unwrap() + 1.0).abs() < 1e-14);
+    let actual = detectability(&constant, Domain::Continuous).unwrap();
+    assert_eq!((actual.zeros.finite.len(), actual.hidden.len()), (1, 0));
+    assert!((actual.zeros.finite[0] - 1.0).norm() < 1e-14);
+    assert!((actual.visibility[0][0].dc_gain.unwrap() + 1.0).abs() < 1e-14);
     let growing = FaultyPlant { a_f: matrix(1, 1, &[1.0]), ..constant };
-    let found = detectability(&growing, Domain::Continuous).unwrap();
-    assert_eq!(found.hidden[0].faults(), [0]);
-    assert!((found.hidden[0].at - 1.0).norm() < 1e-14);
+    let actual = detectability(&growing, Domain::Continuous).unwrap();
+    assert_eq!(actual.hidden[0].faults(), [0]);
+    assert!((actual.hidden[0].at - 1.0).norm() < 1e-14);
     assert!(growing.check_observer_exists().is_err());
 }
 
@@ -96,10 +96,10 @@ fn a_swinging_fault_is_examined_at_its_own_frequency() {
         a_f: matrix(2, 2, &[0., frequency, -frequency, 0.]),
     };
     assert!(detectability(&swing(1.9), Domain::Continuous).unwrap().observer_exists());
-    let found = detectability(&swing(2.0), Domain::Continuous).unwrap();
-    assert_eq!(found.hidden.len(), 1);
-    assert!((found.hidden[0].at - Complex::new(0.0, 2.0)).norm() < 1e-14);
-    assert!(!found.observer_exists());
+    let actual = detectability(&swing(2.0), Domain::Continuous).unwrap();
+    assert_eq!(actual.hidden.len(), 1);
+    assert!((actual.hidden[0].at - Complex::new(0.0, 2.0)).norm() < 1e-14);
+    assert!(!actual.observer_exists());
 }
 
 /// A sampled integrator x[k+1] = x[k] + f: a constant fault appears in the measurement, and grows
@@ -116,11 +116,11 @@ fn sampled_faults_are_examined_at_one() {
         a_f: one.clone(),
     };
     let domain = Domain::Sampled { period: 0.1 };
-    let found = detectability(&plant(&one), domain).unwrap();
-    assert!(found.observer_exists());
-    assert_eq!(found.visibility[0][0].dc_gain, None);
-    let found = detectability(&plant(&half), domain).unwrap();
-    assert!((found.visibility[0][0].dc_gain.unwrap() - 2.0).abs() < 1e-15);
+    let actual = detectability(&plant(&one), domain).unwrap();
+    assert!(actual.observer_exists());
+    assert_eq!(actual.visibility[0][0].dc_gain, None);
+    let actual = detectability(&plant(&half), domain).unwrap();
+    assert!((actual.visibility[0][0].dc_gain.unwrap() - 2.0).abs() < 1e-15);
 }
 
 /// The rate of a ramp has no column of its own; it appears in the measurements through the fault.
@@ -132,7 +132,7 @@ fn the_rate_of_a_ramp_is_seen_through_the_fault() {
         a_f: matrix(2, 2, &[0., 1., 0., 0.]),
         ..constant
     };
-    let found = detectability(&ramp, Domain::Continuous).unwrap();
-    assert!(found.observer_exists() && found.invisible_faults().is_empty());
-    assert_eq!(found.visibility[0][1].dc_gain, Some(0.0));
+    let actual = detectability(&ramp, Domain::Continuous).unwrap();
+    assert!(actual.observer_exists() && actual.invisible_faults().is_empty());
+    assert_eq!(actual.visibility[0][1].dc_gain, Some(0.0));
 }

@@ -9,11 +9,11 @@ use nalgebra::{DMatrix, DVector};
 fn the_bounds_enclose_the_distance_that_a_search_in_scipy_finds() {
     for case in 0..5 {
         let of = |part: &str| reference(&format!("distance_{case}{part}"));
-        let found = from_uncontrollable(&of("_a"), &of("_b")).unwrap();
+        let actual = from_uncontrollable(&of("_a"), &of("_b")).unwrap();
         let expected = of("");
-        assert!((found.upper / expected[0] - 1.0).abs() < 1e-2, "{found:?} {expected}");
-        assert!(found.lower <= expected[0] && found.lower > 0.85 * expected[0], "{found:?}");
-        assert!((found.at.re - expected[1]).hypot(found.at.im - expected[2]) < 0.1, "{found:?}");
+        assert!((actual.upper / expected[0] - 1.0).abs() < 1e-2, "{actual:?} {expected}");
+        assert!(actual.lower <= expected[0] && actual.lower > 0.85 * expected[0], "{actual:?}");
+        assert!((actual.at.re - expected[1]).hypot(actual.at.im - expected[2]) < 0.1, "{actual:?}");
     }
 }
 
@@ -23,18 +23,18 @@ fn the_bounds_enclose_the_distance_that_a_search_in_scipy_finds() {
 fn a_nearly_uncontrollable_mode_is_found_with_its_eigenvalue() {
     let a = DMatrix::from_diagonal(&DVector::from_vec(vec![-1.0, -0.5, 0.25]));
     for weak in [1e-3, 1e-8] {
-        let found = from_uncontrollable(&a, &matrix(3, 1, &[1.0, weak, 1.0])).unwrap();
-        assert!(found.upper < weak && found.upper > 0.3 * weak, "{found:?}");
-        assert!((found.at + 0.5).norm() < 2.0 * weak.max(1e-9), "{found:?}");
-        assert!(found.lower <= found.upper);
+        let actual = from_uncontrollable(&a, &matrix(3, 1, &[1.0, weak, 1.0])).unwrap();
+        assert!(actual.upper < weak && actual.upper > 0.3 * weak, "{actual:?}");
+        assert!((actual.at + 0.5).norm() < 2.0 * weak.max(1e-9), "{actual:?}");
+        assert!(actual.lower <= actual.upper);
     }
 }
 
 #[test]
 fn a_lost_mode_has_the_distance_zero() {
     let a = DMatrix::from_diagonal(&DVector::from_vec(vec![-3.0, -1.0]));
-    let found = from_uncontrollable(&a, &matrix(2, 1, &[1.0, 0.0])).unwrap();
-    assert!(found.upper < 1e-15 && (found.at + 1.0).norm() < 1e-12, "{found:?}");
+    let actual = from_uncontrollable(&a, &matrix(2, 1, &[1.0, 0.0])).unwrap();
+    assert!(actual.upper < 1e-15 && (actual.at + 1.0).norm() < 1e-12, "{actual:?}");
 }
 
 /// With other units of states, time (ms) and measurements the result changes by a few per cent,

@@ -10,11 +10,11 @@ fn cyclic_permutations_have_the_roots_of_unity() {
     for n in 2..=9_u8 {
         let size = usize::from(n);
         let cycle = DMatrix::from_fn(size, size, |i, j| f64::from(u8::from((i + 1) % size == j)));
-        let found = eigenvalues(&cycle).unwrap();
+        let actual = eigenvalues(&cycle).unwrap();
         for k in 0..n {
             let root =
                 Complex::from_polar(1.0, std::f64::consts::TAU * f64::from(k) / f64::from(n));
-            let nearest = found.iter().map(|x| (x - root).norm()).fold(f64::INFINITY, f64::min);
+            let nearest = actual.iter().map(|x| (x - root).norm()).fold(f64::INFINITY, f64::min);
             assert!(nearest < 1e-13, "n = {n}, {root}: {nearest:e}");
         }
     }
@@ -22,10 +22,10 @@ fn cyclic_permutations_have_the_roots_of_unity() {
 
 #[test]
 fn complex_pairs_are_exact_conjugates_and_ordered() {
-    let found = eigenvalues(&matrix(3, 3, &[-1., 2., 0., -3., -1., 0., 5., 1., -4.])).unwrap();
-    assert!((found[0] - Complex::new(-4.0, 0.0)).norm() < 1e-14);
-    assert!((found[1] - Complex::new(-1.0, -6.0_f64.sqrt())).norm() < 1e-14);
-    assert_eq!(found[1], found[2].conj());
+    let actual = eigenvalues(&matrix(3, 3, &[-1., 2., 0., -3., -1., 0., 5., 1., -4.])).unwrap();
+    assert!((actual[0] - Complex::new(-4.0, 0.0)).norm() < 1e-14);
+    assert!((actual[1] - Complex::new(-1.0, -6.0_f64.sqrt())).norm() < 1e-14);
+    assert_eq!(actual[1], actual[2].conj());
 }
 
 /// A companion matrix in units that differ by up to 1e8 between states.
@@ -34,8 +34,8 @@ fn bad_units_cost_no_precision() {
     let companion = matrix(3, 3, &[0., 1., 0., 0., 0., 1., -6., -11., -6.]);
     let units = [1.0, 1e8, 1e-8];
     let scaled = DMatrix::from_fn(3, 3, |i, j| companion[(i, j)] * units[i] / units[j]);
-    for (found, expected) in eigenvalues(&scaled).unwrap().iter().zip([-3.0, -2.0, -1.0]) {
-        assert!((found - expected).norm() < 1e-13, "{found}");
+    for (actual, expected) in eigenvalues(&scaled).unwrap().iter().zip([-3.0, -2.0, -1.0]) {
+        assert!((actual - expected).norm() < 1e-13, "{actual}");
     }
 }
 
@@ -70,11 +70,11 @@ fn repeated_pairs_are_found() {
         if condition > 1e4 {
             continue;
         }
-        let found = eigenvalues(&(&t * &blocks * inverse)).unwrap();
+        let actual = eigenvalues(&(&t * &blocks * inverse)).unwrap();
         let pair = Complex::new(-1.5, 2.0);
         for (value, times) in [(pair, 3), (pair.conj(), 3), (Complex::from(-3.0), 3)] {
-            let near = found.iter().filter(|found| (*found - value).norm() < 1e-6).count();
-            assert_eq!(near, times, "{case}: {found:?}");
+            let near = actual.iter().filter(|actual| (*actual - value).norm() < 1e-6).count();
+            assert_eq!(near, times, "{case}: {actual:?}");
         }
     }
 }
@@ -110,13 +110,13 @@ fn a_large_matrix_with_a_cluster_has_the_eigenvalues_of_its_blocks() {
         DMatrix::identity(n, n) - &v * v.transpose() * (2.0 / v.norm_squared())
     };
     let q = reflection(-0.3) * reflection(0.4) * reflection(-1.0);
-    let found = eigenvalues(&(&q * &blocks * q.transpose())).unwrap();
+    let actual = eigenvalues(&(&q * &blocks * q.transpose())).unwrap();
     let near = |value: Complex<f64>, width: f64| {
-        found.iter().filter(|found| (*found - value).norm() < width).count()
+        actual.iter().filter(|actual| (*actual - value).norm() < width).count()
     };
-    assert_eq!(near(Complex::from(-9.745), 1e-6), 10, "{found:?}");
+    assert_eq!(near(Complex::from(-9.745), 1e-6), 10, "{actual:?}");
     for pair in 0..25 {
         let value = Complex::new(-0.02, imaginary(pair));
-        assert_eq!((near(value, 1e-9), near(value.conj(), 1e-9)), (1, 1), "{value} {found:?}");
+        assert_eq!((near(value, 1e-9), near(value.conj(), 1e-9)), (1, 1), "{value} {actual:?}");
     }
 }

@@ -66,8 +66,8 @@ fn a_measured_position_does_not_show_a_force_directly() {
         matrix(1, 2, &[1.0, 0.0]),
         matrix(2, 1, &[0.0, 1.0]),
     );
-    let found = DirectForm::new(&plant, Domain::Continuous);
-    assert_eq!(found.unwrap_err(), Error::FaultsNotDirect { rank: 0, faults: 1 });
+    let computed = DirectForm::new(&plant, Domain::Continuous);
+    assert_eq!(computed.unwrap_err(), Error::FaultsNotDirect { rank: 0, faults: 1 });
 }
 
 #[test]
@@ -97,12 +97,12 @@ fn its_zeros_are_the_invariant_zeros() {
         let plant =
             FaultyPlant::with_constant_faults(a.clone(), f_a.clone(), c.clone(), f_a.clone());
         let expected = zeros(&a, &f_a, &c).unwrap().finite;
-        let found = match DirectForm::new(&plant, Domain::Continuous) {
+        let computed = match DirectForm::new(&plant, Domain::Continuous) {
             Ok(form) => form.zeros,
             Err(Error::UnstableZeros { zeros }) => zeros,
             Err(error) => panic!("{error}"),
         };
-        for zero in &found {
+        for zero in &computed {
             let distance = expected.iter().map(|other| (other - zero).norm()).fold(9.0, f64::min);
             assert!(distance < 1e-9, "{p} {q}: {zero} of {expected:?}");
         }
@@ -142,8 +142,8 @@ fn a_fast_adaptive_estimate_is_the_fault_behind_a_first_order_lag() {
     let form = DirectForm::new(&plant, Domain::Continuous).unwrap();
     let law = FastAdaptive { sigma: 4.0, gamma: vec![10.0] };
     let gains = fast_adaptive(&plant, &form, &augmented(&plant), &law, 5.0).unwrap();
-    let found = sorted_real(&gains.error_dynamics(&plant));
-    close(&found, &[-10.0, -5.0 * 2_f64.sqrt(), -5.0, -4.0], 1e-8);
+    let computed = sorted_real(&gains.error_dynamics(&plant));
+    close(&computed, &[-10.0, -5.0 * 2_f64.sqrt(), -5.0, -4.0], 1e-8);
     let step =
         step_response(&fault_system(&plant, &gains, Domain::Continuous).unwrap(), 0).unwrap();
     for (k, time) in step.time.iter().enumerate() {
@@ -165,7 +165,7 @@ fn a_sampled_fast_adaptive_estimate_closes_the_same_part_of_its_error_in_each_sa
 
 #[test]
 fn a_proportional_part_removes_the_lag_and_leaves_the_error_dynamics() {
-    let (own, plain) = (plant(), augmented(&plant()));
+    let (with_law, plain) = (plant(), augmented(&plant()));
     let (discrete, _, domain) = sampled();
     let poles: Vec<_> = [-6.0_f64, -7.0, -8.0, -9.0].iter().map(|p| (p * T).exp()).collect();
     let extended = ExtendedPlant::without_filter(plant());
@@ -180,15 +180,15 @@ fn a_proportional_part_removes_the_lag_and_leaves_the_error_dynamics() {
     );
     let current = current.unwrap().gains;
     for (plant, gains, domain) in
-        [(&own, &plain, Domain::Continuous), (&discrete, &current, domain)]
+        [(&with_law, &plain, Domain::Continuous), (&discrete, &current, domain)]
     {
-        let found = proportional_integral(plant, gains, domain, 1.0).unwrap();
-        assert_eq!(found.error_dynamics(plant), gains.error_dynamics(plant));
+        let computed = proportional_integral(plant, gains, domain, 1.0).unwrap();
+        assert_eq!(computed.error_dynamics(plant), gains.error_dynamics(plant));
         let lag = |gains: &Gains| {
             let system = fault_rate_system(plant, gains, domain).unwrap();
             step_response(&system, 0).unwrap().final_value[6]
         };
-        assert!(lag(gains).abs() > 0.1 && lag(&found).abs() < 1e-10);
+        assert!(lag(gains).abs() > 0.1 && lag(&computed).abs() < 1e-10);
         let half = proportional_integral(plant, gains, domain, 0.5).unwrap();
         assert!((lag(&half) - 0.5 * lag(gains)).abs() < 1e-10);
     }
@@ -198,10 +198,10 @@ fn a_proportional_part_removes_the_lag_and_leaves_the_error_dynamics() {
 fn a_direct_term_leaves_feedback_and_observer_their_eigenvalues() {
     let plant = plant();
     let gains = proportional_integral(&plant, &augmented(&plant), Domain::Continuous, 1.0).unwrap();
-    let own = controller(&plant, &gains, Domain::Continuous).unwrap();
-    assert!(own.d.amax() > 0.1);
-    let found = sorted_real(&closed_loop(&plant, &own, &[1.0]).unwrap());
-    close(&found, &[-9.0, -8.0, -7.0, -6.0, -3.0, -2.0, -1.0], 1e-6);
+    let with_law = controller(&plant, &gains, Domain::Continuous).unwrap();
+    assert!(with_law.d.amax() > 0.1);
+    let computed = sorted_real(&closed_loop(&plant, &with_law, &[1.0]).unwrap());
+    close(&computed, &[-9.0, -8.0, -7.0, -6.0, -3.0, -2.0, -1.0], 1e-6);
 }
 
 #[test]
@@ -209,13 +209,13 @@ fn the_boundary_layer_leaves_one_part_in_a_hundred_of_a_small_fault() {
     let (mut plant, gains, domain) = sampled();
     let form = DirectForm::new(&plant, domain).unwrap();
     let law = SlidingMode { rho: vec![3.0], delta: None };
-    let (OwnModel { gains: found, a_f, .. }, delta) =
+    let (OwnModel { gains: computed, a_f, .. }, delta) =
         sliding_mode(&plant, &form, &gains, &law, 5.0).unwrap();
     plant.a_f = a_f;
     let fast = (-0.5_f64).exp();
-    let step = step_response(&fault_system(&plant, &found, domain).unwrap(), 0).unwrap();
+    let step = step_response(&fault_system(&plant, &computed, domain).unwrap(), 0).unwrap();
     assert!((step.final_value[6] + 0.01).abs() < 1e-4, "{}", step.final_value[6]);
-    let eigenvalues = sorted_real(&found.error_dynamics(&plant));
+    let eigenvalues = sorted_real(&computed.error_dynamics(&plant));
     // It is a double eigenvalue here, known to the root of the precision.
     assert!(eigenvalues.iter().any(|value| (value - fast).abs() < 1e-7), "{eigenvalues:?}");
     let law = SlidingMode { delta: Some(vec![delta[0] / 10.0]), ..law };
@@ -231,12 +231,13 @@ fn a_learning_observer_has_the_double_eigenvalue_that_its_gains_are_for() {
     let fast = (-0.5_f64).exp();
     for kept in [1.0, 0.9] {
         plant.a_f = DMatrix::identity(1, 1);
-        let found = learning(&plant, &form, &gains, &Learning { kept }, 5.0).unwrap();
-        plant.a_f = found.a_f;
-        let all = eigenvalues(&found.gains.error_dynamics(&plant)).unwrap();
+        let computed = learning(&plant, &form, &gains, &Learning { kept }, 5.0).unwrap();
+        plant.a_f = computed.a_f;
+        let all = eigenvalues(&computed.gains.error_dynamics(&plant)).unwrap();
         let near = all.iter().filter(|value| (*value - fast).norm() < 1e-5).count();
         assert!(near >= 2, "{all:?}");
-        let step = step_response(&fault_system(&plant, &found.gains, domain).unwrap(), 0).unwrap();
+        let step =
+            step_response(&fault_system(&plant, &computed.gains, domain).unwrap(), 0).unwrap();
         let lambda = fast * fast / kept;
         let g = lambda + kept - 2.0 * fast;
         let left = (1.0 - lambda) * (1.0 - kept);

@@ -27,10 +27,10 @@ fn a_common_p_exists_exactly_as_far_as_the_circle_criterion_says() {
         let vertices = [oscillator(1.0, 1.0), oscillator(b, 1.0)];
         certify_common(&vertices, &stable(), Domain::Continuous).unwrap()
     };
-    let Outcome::Optimal(found) = at(3.98) else { panic!("sqrt(3.98) - 1 is below 1") };
+    let Outcome::Optimal(actual) = at(3.98) else { panic!("sqrt(3.98) - 1 is below 1") };
     for k in [1.0, 2.0, 3.98] {
         let a = oscillator(k, 1.0);
-        let decay = -(a.transpose() * &found.p + &found.p * a);
+        let decay = -(a.transpose() * &actual.p + &actual.p * a);
         assert!(decay.symmetric_eigenvalues().min() > 0.0);
     }
     assert_eq!(at(4.02), Outcome::Infeasible { conflict: vec![0, 1] });
@@ -39,16 +39,16 @@ fn a_common_p_exists_exactly_as_far_as_the_circle_criterion_says() {
 #[test]
 fn a_member_outside_of_the_region_is_named() {
     let vertices = [oscillator(1.0, 1.0), oscillator(-1.0, 1.0), oscillator(2.0, 1.0)];
-    let found = certify_common(&vertices, &stable(), Domain::Continuous).unwrap();
-    assert_eq!(found, Outcome::Infeasible { conflict: vec![1] });
+    let actual = certify_common(&vertices, &stable(), Domain::Continuous).unwrap();
+    assert_eq!(actual, Outcome::Infeasible { conflict: vec![1] });
 }
 
 #[test]
 fn a_matrix_in_the_hull_keeps_region_and_decay() {
     let vertices = [oscillator(4.0, 4.0), oscillator(5.0, 4.5)];
     let region = Region { decay: Some(1.0), sector: Some(0.8), ..stable() };
-    let found = certify_common(&vertices, &region, Domain::Continuous).unwrap();
-    let p = found.optimal().expect("a common P").p;
+    let actual = certify_common(&vertices, &region, Domain::Continuous).unwrap();
+    let p = actual.optimal().expect("a common P").p;
     let mut x = DVector::from_vec(vec![1.0, -2.0]);
     let energy = |x: &DVector<f64>| (x.transpose() * &p * x)[(0, 0)];
     let (start, step) = (energy(&x), 1e-3);
@@ -79,13 +79,13 @@ fn one_gain_serves_all_springs_of_the_benchmark() {
     for (plants, domain) in
         [(springs.map(plant), Domain::Continuous), (springs.map(sampled), SAMPLED)]
     {
-        let found = common_feedback(&plants, &region, domain).unwrap().optimal().expect("a gain");
+        let actual = common_feedback(&plants, &region, domain).unwrap().optimal().expect("a gain");
         for Vertex { a, b } in &plants {
-            let worst = instability(&(a + b * &found.gain), domain).unwrap();
+            let worst = instability(&(a + b * &actual.gain), domain).unwrap();
             let limit = if domain == Domain::Continuous { -0.1 } else { (-0.01_f64).exp() - 1.0 };
             assert!(worst < limit, "{worst}");
         }
-        let p = &found.certificate.p;
+        let p = &actual.certificate.p;
         assert!(p.symmetric_eigenvalues().min() > 0.0);
     }
 }
@@ -96,8 +96,8 @@ fn members_in_conflict_and_the_largest_scaling_are_found() {
     let plant = |b: f64| Vertex { a: matrix(1, 1, &[0.0]), b: matrix(1, 1, &[b]) };
     let region = Region { decay: Some(1.0), ..stable() };
     let plants = [1.0, 2.0, -1.0].map(plant);
-    let found = common_feedback(&plants, &region, Domain::Continuous).unwrap();
-    let Outcome::Infeasible { conflict } = found else { panic!("{found:?}") };
+    let actual = common_feedback(&plants, &region, Domain::Continuous).unwrap();
+    let Outcome::Infeasible { conflict } = actual else { panic!("{actual:?}") };
     assert_eq!(conflict.len(), 2);
     assert_eq!(conflict[1], 2);
     // b = 1 - 2 s is above 0 below s = 1/2.
@@ -109,9 +109,9 @@ fn members_in_conflict_and_the_largest_scaling_are_found() {
 fn bernstein_coefficients_bound_a_polynomial() {
     // (1 - 2 t)^2 = 1, -1, 1 in Bernstein form.
     let value = |t: f64| matrix(1, 1, &[(1.0 - 2.0 * t).powi(2)]);
-    let found = bernstein(&[0.0, 0.5, 1.0].map(value)).unwrap();
-    for (found, expected) in found.iter().zip([1.0, -1.0, 1.0]) {
-        assert!((found[(0, 0)] - expected).abs() < 1e-14);
+    let actual = bernstein(&[0.0, 0.5, 1.0].map(value)).unwrap();
+    for (actual, expected) in actual.iter().zip([1.0, -1.0, 1.0]) {
+        assert!((actual[(0, 0)] - expected).abs() < 1e-14);
     }
 }
 
@@ -131,12 +131,12 @@ fn a_loop_that_a_jump_destabilises_is_stable_while_its_variable_changes_slowly()
     let interval = rotations();
     let jumps = certify_common(&[rotation(0.0), rotation(1.0)], &stable(), SAMPLED).unwrap();
     assert_eq!(jumps, Outcome::Infeasible { conflict: vec![0, 1] });
-    let found =
+    let actual =
         largest_change(std::slice::from_ref(&interval), SAMPLED).unwrap().expect("a certificate");
-    assert!(found.change > 0.01 && found.change < 2.0, "{}", found.change);
-    let again = certify_schedule(std::slice::from_ref(&interval), found.change, SAMPLED);
+    assert!(actual.change > 0.01 && actual.change < 2.0, "{}", actual.change);
+    let again = certify_schedule(std::slice::from_ref(&interval), actual.change, SAMPLED);
     assert!(again.unwrap().is_some());
-    let p = |theta: f64| &found.p[0] * (1.0 - theta / 2.0) + &found.p[1] * (theta / 2.0);
+    let p = |theta: f64| &actual.p[0] * (1.0 - theta / 2.0) + &actual.p[1] * (theta / 2.0);
     let a = |theta: f64| {
         let t = theta / 2.0;
         let c = &interval.coefficients;
@@ -151,7 +151,7 @@ fn a_loop_that_a_jump_destabilises_is_stable_while_its_variable_changes_slowly()
     for _ in 0..2000 {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let part = f64::from(u32::try_from(seed >> 33).unwrap()) / f64::from(1_u32 << 31);
-        let next = (theta + found.change * (2.0 * part - 1.0)).clamp(0.0, 2.0);
+        let next = (theta + actual.change * (2.0 * part - 1.0)).clamp(0.0, 2.0);
         let energy = |x: &DVector<f64>, at: f64| (x.transpose() * p(at) * x)[(0, 0)];
         let before = energy(&x, theta);
         x = a(theta) * x;
@@ -163,10 +163,10 @@ fn a_loop_that_a_jump_destabilises_is_stable_while_its_variable_changes_slowly()
 
 #[test]
 fn every_matrix_between_the_grid_points_is_stable_by_the_certificate() {
-    let found =
+    let actual =
         largest_change(&[rotations(), rotations_back()], SAMPLED).unwrap().expect("a certificate");
-    assert_eq!(found.p.len(), 3);
-    assert!(found.margin > 0.0);
+    assert_eq!(actual.p.len(), 3);
+    assert!(actual.margin > 0.0);
     for value in eigenvalues(&rotation(0.37)).unwrap() {
         assert!(value.norm() < 1.0);
     }
@@ -188,17 +188,17 @@ fn a_spring_that_no_common_p_serves_is_stable_while_it_changes_slowly() {
     let interval = spring();
     let jumps = certify_common(&interval.coefficients, &stable(), Domain::Continuous).unwrap();
     assert_eq!(jumps, Outcome::Infeasible { conflict: vec![0, 1] });
-    let found = largest_change(std::slice::from_ref(&interval), Domain::Continuous);
-    let found = found.unwrap().expect("a certificate");
+    let actual = largest_change(std::slice::from_ref(&interval), Domain::Continuous);
+    let actual = actual.unwrap().expect("a certificate");
     // V = x' P(k) x with rates up to this one decreases at each k: the residual at a grid of its own.
-    assert!(found.change > 0.1, "{}", found.change);
-    let slope = (&found.p[1] - &found.p[0]) / 8.0;
+    assert!(actual.change > 0.1, "{}", actual.change);
+    let slope = (&actual.p[1] - &actual.p[0]) / 8.0;
     for step in 0..=400 {
         let t = f64::from(step) / 400.0;
-        let p = &found.p[0] * (1.0 - t) + &found.p[1] * t;
+        let p = &actual.p[0] * (1.0 - t) + &actual.p[1] * t;
         assert!(p.clone().symmetric_eigenvalues().min() > 0.0);
         let a = oscillator(1.0 + 8.0 * t, 1.0);
-        for rate in [-found.change, 0.0, found.change] {
+        for rate in [-actual.change, 0.0, actual.change] {
             let change = a.transpose() * &p + &p * &a + &slope * rate;
             assert!(change.symmetric_eigenvalues().max() < 0.0, "{t} {rate}");
         }

@@ -145,8 +145,8 @@ fn two_constant_actuator_faults_at_once_are_estimated() {
     let truth = Truth { carts: &carts, f_a, f_s: DMatrix::zeros(2, 2), effect: [1.0; 2] };
     let (f_hat, _) = truth.run(&extended, &design.gains, (&[2.0, -3.0], &[0.0; 2]), [0.0; 2], 10);
     let bound = modal_bound(&design, 10.0, 4.0);
-    for (found, expected) in f_hat.iter().zip([2.0, -3.0]) {
-        assert!((found - expected).abs() < bound, "{f_hat:?} {bound:e}");
+    for (actual, expected) in f_hat.iter().zip([2.0, -3.0]) {
+        assert!((actual - expected).abs() < bound, "{f_hat:?} {bound:e}");
     }
 }
 
@@ -182,9 +182,9 @@ fn sensor_faults_constant_and_ramp_are_estimated_beside_an_actuator_fault() {
         let (f_hat, _) =
             truth.run(&extended, &design.gains, (&[0.3, -1.0], &[slope, 0.0]), [0.0; 2], 10);
         let bound = modal_bound(&design, 10.0, 1.5);
-        let found = (f_hat[0], f_hat[1]);
-        assert!((found.0 - (0.3 + 10.0 * slope)).abs() < bound, "{f_hat:?} {bound:e}");
-        assert!((found.1 + 1.0).abs() < bound, "{f_hat:?} {bound:e}");
+        let actual = (f_hat[0], f_hat[1]);
+        assert!((actual.0 - (0.3 + 10.0 * slope)).abs() < bound, "{f_hat:?} {bound:e}");
+        assert!((actual.1 + 1.0).abs() < bound, "{f_hat:?} {bound:e}");
     }
 }
 
@@ -208,8 +208,8 @@ fn the_loss_of_effectiveness_is_estimated_where_the_command_shows_it() {
     let truth = Truth { carts: &carts, f_a: nothing.0, f_s: nothing.1, effect: [0.7, 0.9] };
     let (f_hat, u) = truth.run(&extended, &design.gains, (&[0.0; 2], &[0.0; 2]), [3.0, -4.0], 60);
     for (at, expected) in [0.3, 0.1].into_iter().enumerate() {
-        let found = estimated_loss(u[at], f_hat[at], 1e-4 * u[at].abs()).unwrap();
-        assert!((found - expected).abs() < 1e-7, "{found} {u:?} {f_hat:?}");
+        let actual = estimated_loss(u[at], f_hat[at], 1e-4 * u[at].abs()).unwrap();
+        assert!((actual - expected).abs() < 1e-7, "{actual} {u:?} {f_hat:?}");
     }
     assert!(estimated_loss(1e-6, -0.5, 1.0).unwrap().abs() < 1e-6);
     assert!(matches!(estimated_loss(1.0, 1.0, 0.0), Err(Error::OutOfRange { name: "u_e", .. })));
@@ -230,13 +230,13 @@ fn the_loss_that_a_loop_survives_is_that_of_scipy() {
         integral: None,
     };
     let controller = controller(&plant, &gains, Domain::Continuous).unwrap();
-    let found = loss_tolerance(&plant, &controller, &[0, 1], 1.0).unwrap();
+    let actual = loss_tolerance(&plant, &controller, &[0, 1], 1.0).unwrap();
     let expected = reference("loss_limits");
-    let limits = [found.common, found.single[0], found.single[1]];
+    let limits = [actual.common, actual.single[0], actual.single[1]];
     for (limit, expected) in limits.iter().zip(expected.iter()) {
-        assert!((limit - expected).abs() < 1e-9, "{found:?} {expected}");
+        assert!((limit - expected).abs() < 1e-9, "{actual:?} {expected}");
     }
-    assert!(found.worst_instability > 0.0);
+    assert!(actual.worst_instability > 0.0);
     let small = loss_tolerance(&plant, &controller, &[0, 1], 0.3).unwrap();
     assert!(small.worst_instability < 0.0 && (small.common - 0.3).abs() < 1e-15, "{small:?}");
 }
@@ -262,10 +262,10 @@ fn the_loss_that_a_sampled_loop_survives_is_that_of_scipy() {
         integral: None,
     };
     let controller = controller(&plant, &gains, Domain::Sampled { period: 0.1 }).unwrap();
-    let found = loss_tolerance(&plant, &controller, &[0, 1], 1.0).unwrap();
-    let limits = [found.common, found.single[0], found.single[1]];
+    let actual = loss_tolerance(&plant, &controller, &[0, 1], 1.0).unwrap();
+    let limits = [actual.common, actual.single[0], actual.single[1]];
     for (limit, expected) in limits.iter().zip(of("limits").iter()) {
-        assert!((limit - expected).abs() < 1e-9, "{found:?} {expected}");
+        assert!((limit - expected).abs() < 1e-9, "{actual:?} {expected}");
     }
 }
 

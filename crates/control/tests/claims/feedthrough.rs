@@ -84,15 +84,15 @@ fn assert_same(actual: &ComplexMatrix, expected: &ComplexMatrix) {
 fn sensitivities_are_those_of_the_transfer_functions() {
     let identity = ComplexMatrix::identity(2, 2);
     for domain in [Domain::Continuous, SAMPLED] {
-        let own = controller(domain);
+        let controller_system = controller(domain);
         let model = match domain {
             Domain::Continuous => plant(),
             Domain::Sampled { period } => held_plant(&plant(), period).expect("a plant"),
         };
-        let closed = Loop::new(model, own.clone()).expect("a loop");
+        let closed = Loop::new(model, controller_system.clone()).expect("a loop");
         for s in points(domain) {
             let g = if domain == SAMPLED { held_response(s) } else { response(&plant(), s) };
-            let k = response(&own, s);
+            let k = response(&controller_system, s);
             for (at, product) in [(Point::Input, &k * &g), (Point::Output, &g * &k)] {
                 let expected = (&identity - product).try_inverse().expect("regular");
                 assert_same(&response(&closed.sensitivity(at), s), &expected);
@@ -100,7 +100,7 @@ fn sensitivities_are_those_of_the_transfer_functions() {
                 assert_same(&response(&closed.complementary(at), s), &expected);
             }
             // From noise of the measurements to the commands: K S_o.
-            let noise = closed.from_noise(&own).expect("fits");
+            let noise = closed.from_noise(&controller_system).expect("fits");
             let expected = &k * (&identity - &g * &k).try_inverse().expect("regular");
             assert_same(&response(&noise, s), &expected);
         }
@@ -112,31 +112,36 @@ fn sensitivities_are_those_of_the_transfer_functions() {
 fn a_controller_takes_its_own_commands_off_the_measurements() {
     let d = plant().d;
     for domain in [Domain::Continuous, SAMPLED] {
-        let own = controller(domain);
-        let found = with_feedthrough(&own, &own.c, &d).expect("fits");
+        let controller_system = controller(domain);
+        let computed =
+            with_feedthrough(&controller_system, &controller_system.c, &d).expect("fits");
         for s in points(domain) {
-            let k = response(&own, s);
+            let k = response(&controller_system, s);
             let fed = if domain == SAMPLED { complex(&d) / s } else { complex(&d) };
             let regular = ComplexMatrix::identity(2, 2) + &k * fed;
-            assert_same(&response(&found, s), &(regular.try_inverse().expect("regular") * k));
+            assert_same(&response(&computed, s), &(regular.try_inverse().expect("regular") * k));
         }
     }
-    let own = StateSpace { d: DMatrix::identity(2, 2), ..controller(SAMPLED) };
-    let refused = with_feedthrough(&own, &own.c, &d);
+    let controller_system = StateSpace { d: DMatrix::identity(2, 2), ..controller(SAMPLED) };
+    let refused = with_feedthrough(&controller_system, &controller_system.c, &d);
     assert!(matches!(refused, Err(Error::OutOfRange { .. })), "{refused:?}");
-    let refused = Loop::new(plant(), StateSpace { domain: Domain::Continuous, ..own });
+    let refused =
+        Loop::new(plant(), StateSpace { domain: Domain::Continuous, ..controller_system });
     assert!(matches!(refused, Err(Error::OutOfRange { .. })), "{refused:?}");
 }
 
 #[test]
 fn derivatives_of_the_peak_are_differences() {
     for domain in [Domain::Continuous, SAMPLED] {
-        let own = controller(domain);
+        let controller_system = controller(domain);
         for (point, scaled) in [(Point::Input, false), (Point::Output, true)] {
             let peak = SensitivityPeak { point, frequency: 2.3, scaled };
-            let value = |plant: &StateSpace| peak_derivatives(plant, &own, &peak).expect("a value");
-            let found = value(&plant());
-            for (which, slopes) in [&found.a, &found.b, &found.c, &found.d].into_iter().enumerate()
+            let value = |plant: &StateSpace| {
+                peak_derivatives(plant, &controller_system, &peak).expect("a value")
+            };
+            let computed = value(&plant());
+            for (which, slopes) in
+                [&computed.a, &computed.b, &computed.c, &computed.d].into_iter().enumerate()
             {
                 for at in 0..slopes.len() {
                     let moved = |change: f64| {
@@ -148,7 +153,7 @@ fn derivatives_of_the_peak_are_differences() {
                     };
                     let expected = (moved(1e-5) - moved(-1e-5)) / 2e-5;
                     let error = (slopes[at] - expected).abs();
-                    assert!(error < 1e-7 * found.value.max(1.0), "{which} {at}: {error:e}");
+                    assert!(error < 1e-7 * computed.value.max(1.0), "{which} {at}: {error:e}");
                 }
             }
         }
@@ -194,38 +199,38 @@ fn growth(controller: &StateSpace, hold: f64, delay: f64) -> f64 {
 
 #[test]
 fn hold_times_and_delays_are_the_limits_of_runs() {
-    let own = controller(Domain::Continuous);
-    let closed = Loop::new(plant(), own.clone()).expect("a loop");
+    let controller_system = controller(Domain::Continuous);
+    let closed = Loop::new(plant(), controller_system.clone()).expect("a loop");
     let longest = longest_hold(&closed).expect("a time");
-    assert!(growth(&own, 0.95 * longest, 0.0) < 1.0, "{longest}");
-    assert!(growth(&own, 1.05 * longest, 0.0) > 1.0, "{longest}");
-    let own = controller(SAMPLED);
-    let longest = longest_period(&plant(), &own).expect("a time");
-    assert!(growth(&own, 0.95 * longest, 0.0) < 1.0, "{longest}");
-    assert!(growth(&own, 1.05 * longest, 0.0) > 1.0, "{longest}");
-    let delay = sampled_delay_margin(&plant(), &own).expect("a time");
-    assert!(growth(&own, PERIOD, 0.95 * delay) < 1.0, "{delay}");
-    assert!(growth(&own, PERIOD, 1.05 * delay) > 1.0, "{delay}");
+    assert!(growth(&controller_system, 0.95 * longest, 0.0) < 1.0, "{longest}");
+    assert!(growth(&controller_system, 1.05 * longest, 0.0) > 1.0, "{longest}");
+    let controller_system = controller(SAMPLED);
+    let longest = longest_period(&plant(), &controller_system).expect("a time");
+    assert!(growth(&controller_system, 0.95 * longest, 0.0) < 1.0, "{longest}");
+    assert!(growth(&controller_system, 1.05 * longest, 0.0) > 1.0, "{longest}");
+    let delay = sampled_delay_margin(&plant(), &controller_system).expect("a time");
+    assert!(growth(&controller_system, PERIOD, 0.95 * delay) < 1.0, "{delay}");
+    assert!(growth(&controller_system, PERIOD, 1.05 * delay) > 1.0, "{delay}");
 }
 
 /// No vertex of C and D is worse than the one that the search found.
 #[test]
 fn the_worst_case_includes_the_feedthrough() {
     for domain in [Domain::Continuous, SAMPLED] {
-        let own = controller(domain);
+        let controller_system = controller(domain);
         let tolerances = Tolerances::unless_structural(&plant(), [0.0, 0.0, 0.05, 0.2]);
         let nominal = plant();
         let family = EntryFamily::new(&nominal, &tolerances).expect("fits");
-        let found = tolerance_test(&family, &own, 20, 3).expect("a test");
+        let computed = tolerance_test(&family, &controller_system, 20, 3).expect("a test");
         let value = |plant: &StateSpace| {
             let model = match domain {
                 Domain::Continuous => plant.clone(),
                 Domain::Sampled { period } => held_plant(plant, period).expect("a plant"),
             };
-            let closed = Loop::new(model, own.clone()).expect("a loop");
+            let closed = Loop::new(model, controller_system.clone()).expect("a loop");
             instability(&closed.dynamics(), domain).expect("a number")
         };
-        assert!((found.worst.d - &nominal.d).amax() > 0.0, "D varies");
+        assert!((computed.worst.d - &nominal.d).amax() > 0.0, "D varies");
         for bits in 0_u32..1 << 9 {
             let mut vertex = nominal.clone();
             let varied = vertex.c.iter_mut().zip(&tolerances.of[2]);
@@ -235,23 +240,23 @@ fn the_worst_case_includes_the_feedthrough() {
             {
                 *entry *= 1.0 + if bits >> at & 1 == 0 { *relative } else { -relative };
             }
-            assert!(value(&vertex) <= found.worst_instability + 1e-9, "{domain:?} {bits}");
+            assert!(value(&vertex) <= computed.worst_instability + 1e-9, "{domain:?} {bits}");
         }
     }
 }
 
 #[test]
 fn the_peak_of_s_is_that_of_a_grid() {
-    let own = controller(Domain::Continuous);
-    let closed = Loop::new(plant(), own.clone()).expect("a loop");
+    let controller_system = controller(Domain::Continuous);
+    let closed = Loop::new(plant(), controller_system.clone()).expect("a loop");
     let identity = ComplexMatrix::identity(2, 2);
     let largest = (1..4000_u32).map(|k| {
         let s = Complex::new(0.0, 0.005 * f64::from(k));
-        let product = response(&plant(), s) * response(&own, s);
+        let product = response(&plant(), s) * response(&controller_system, s);
         let s = (&identity - product).try_inverse().expect("regular");
         s.svd(false, false).singular_values.max()
     });
     let grid = largest.fold(0.0, f64::max);
-    let found = h_infinity(&closed.sensitivity(Point::Output), 1e-4).expect("a norm");
-    assert!((found.lower / grid - 1.0).abs() < 1e-3, "{} {grid}", found.lower);
+    let computed = h_infinity(&closed.sensitivity(Point::Output), 1e-4).expect("a norm");
+    assert!((computed.lower / grid - 1.0).abs() < 1e-3, "{} {grid}", computed.lower);
 }

@@ -128,8 +128,8 @@ fn a_wrong_length_is_refused_and_leaves_the_output_untouched() {
 fn holds_agree_with_scipy() {
     for case in cases(include_str!("../data/riccati.txt"), "hold") {
         let (a, b, c, h) = (case.get("A"), case.get("B"), case.get("C"), case.number("h"));
-        let near = |found: &DMatrix<f64>, name: &str| {
-            let error = (found - case.get(name)).amax() / case.get(name).amax();
+        let near = |computed: &DMatrix<f64>, name: &str| {
+            let error = (computed - case.get(name)).amax() / case.get(name).amax();
             assert!(error < 1e-12, "{} {name}: {error:e}", case.name);
         };
         let (phi, gamma) = zero_order_hold(a, b, h).unwrap();
@@ -159,8 +159,8 @@ fn the_continuous_plant_of_samples_is_the_one_that_was_sampled() {
     let b = matrix(3, 2, &[0.0, 1e4, 5.0, 0.0, 0.0, 1e-4]);
     for h in [1e-4, 0.05, 0.4] {
         let (phi, gamma) = zero_order_hold(&a, &b, h).unwrap();
-        let (found, input) = continuous(&phi, &gamma, h).unwrap();
-        assert!((&found - &a).amax() < 1e-10 * a.amax() / h, "{h}: {found}");
+        let (computed, input) = continuous(&phi, &gamma, h).unwrap();
+        assert!((&computed - &a).amax() < 1e-10 * a.amax() / h, "{h}: {computed}");
         assert!((&input - &b).amax() < 1e-10 * b.amax() / h, "{h}: {input}");
     }
 }
@@ -169,7 +169,7 @@ fn the_continuous_plant_of_samples_is_the_one_that_was_sampled() {
 fn samples_with_an_eigenvalue_that_is_negative_or_zero_have_no_continuous_plant() {
     for eigenvalue in [-0.3, 0.0] {
         let one = matrix(1, 1, &[1.0]);
-        let found = continuous(&matrix(1, 1, &[eigenvalue]), &one, 0.1);
-        assert_eq!(found, Err(Error::NoContinuousPlant));
+        let computed = continuous(&matrix(1, 1, &[eigenvalue]), &one, 0.1);
+        assert_eq!(computed, Err(Error::NoContinuousPlant));
     }
 }

@@ -90,12 +90,12 @@ fn residuals_are_decoupled_by_transfer_functions_and_have_the_prescribed_poles()
         let (plant, requirements) = (plant(domain), requirements(domain));
         let patterns = achievable_patterns(&plant, &requirements).unwrap();
         assert!(patterns.len() >= 6, "{patterns:?}");
-        for found in patterns.iter().filter(|found| found.strong) {
-            let residual = residual_generator(&plant, &found.pattern, &requirements).unwrap();
+        for actual in patterns.iter().filter(|actual| actual.strong) {
+            let residual = residual_generator(&plant, &actual.pattern, &requirements).unwrap();
             assert!(residual.generator.check().is_ok() && residual.decoupling_error < 1e-9);
             assert_eq!(
                 structure(std::slice::from_ref(&residual), 0.0, 1e-6).unwrap()[0],
-                found.pattern
+                actual.pattern
             );
             for (at, pole) in residual.generator.a.diagonal().iter().enumerate() {
                 let last = requirements.poles.len() - 1;
@@ -110,7 +110,7 @@ fn residuals_are_decoupled_by_transfer_functions_and_have_the_prescribed_poles()
                     |m: &ComplexMatrix| m.iter().map(|gain| gain.norm()).fold(0.0, f64::max);
                 assert!(largest(&known) < 1e-9 * size, "{} {size}", largest(&known));
                 assert!(largest(&(&form - &faults)) < 1e-9 * size);
-                for (fault, responds) in found.pattern.iter().enumerate() {
+                for (fault, responds) in actual.pattern.iter().enumerate() {
                     assert!(*responds || faults[fault].norm() < 1e-9 * size);
                 }
             }
@@ -257,9 +257,9 @@ fn bad_requirements_and_patterns_are_refused_and_a_plant_without_disturbances_is
 fn the_flight_actuator_case_study_has_the_published_structure_and_errors() {
     let nominal = actuators::plant(actuators::NOMINAL).unwrap();
     let residuals = actuators::residuals(&nominal).unwrap();
-    let found = structure(&residuals, 0.0, 1e-3).unwrap();
+    let actual = structure(&residuals, 0.0, 1e-3).unwrap();
     let expected = actuators::PATTERNS.map(|row| row.map(|entry| entry == 1));
-    assert!(found.iter().zip(&expected).all(|(row, expected)| row == expected), "{found:?}");
+    assert!(actual.iter().zip(&expected).all(|(row, expected)| row == expected), "{actual:?}");
     let norms = actuators::norms(&nominal, &residuals).unwrap();
     assert!(norms.iter().all(|norm| *norm < 1e-6), "{norms:?}");
     let orders: Vec<usize> = residuals.iter().map(|one| one.generator.a.nrows()).collect();
@@ -268,7 +268,7 @@ fn the_flight_actuator_case_study_has_the_published_structure_and_errors() {
     assert!(actuators::norms(&other, &residuals).unwrap()[0] > 1.0);
     let patterns = achievable_patterns(&nominal, &actuators::requirements()).unwrap();
     for row in &expected {
-        assert!(patterns.iter().any(|found| found.strong && found.pattern == row));
+        assert!(patterns.iter().any(|actual| actual.strong && actual.pattern == row));
     }
 }
 
@@ -283,7 +283,7 @@ fn the_air_data_sensor_case_study_has_the_published_errors() {
         assert!(sensors::error(plant, gain).unwrap() < 1e-7);
     }
     let error = |plant: usize, gain| sensors::error(&plants[plant], gain).unwrap();
-    let near = |found: f64, expected: f64| (found / expected - 1.0).abs() < 1e-6;
+    let near = |actual: f64, expected: f64| (actual / expected - 1.0).abs() < 1e-6;
     let nominal = &exact[sensors::NOMINAL];
     assert!(near(error(0, nominal), 643.560_281) && near(error(10, nominal), 365.504_564));
     let mean = exact.iter().skip(1).fold(exact[0].clone(), |sum, gain| sum + gain) / 11.0;

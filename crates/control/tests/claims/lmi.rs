@@ -195,8 +195,8 @@ fn an_unstable_system_has_no_bound() {
         d: one(0.0),
         domain: Domain::Continuous,
     };
-    let found = certify_gain(&system, Norm::HInfinity);
-    assert_eq!(conflict(found), ["stability"]);
+    let actual = certify_gain(&system, Norm::HInfinity);
+    assert_eq!(conflict(actual), ["stability"]);
 }
 
 fn wish(case: &Case, norm: Norm, gamma: Option<f64>) -> Performance {
@@ -223,15 +223,15 @@ fn state_feedback_is_close_to_the_best_bound_of_other_methods() {
             ("disc", Norm::HInfinity, disc(-3.0, 2.0), Domain::Continuous),
         ];
         for (name, norm, region, domain) in kinds {
-            let found =
+            let actual =
                 optimal(state_feedback(a, b, &region, Some(&wish(&case, norm, None)), domain));
-            let gamma = found.bound.unwrap().gamma;
+            let gamma = actual.bound.unwrap().gamma;
             assert!(gamma < 1.06 * case.number(name), "{} {name}: {gamma}", case.name);
             // The reference uses one P for region and bound, which is conservative for the disc.
             let least = if name == "disc" { "infinity" } else { name };
             assert!(gamma > 0.999 * case.number(least), "{} {name}: {gamma}", case.name);
             if let Some(disc) = region.disc {
-                assert_inside(&(a + b * found.gain), disc);
+                assert_inside(&(a + b * actual.gain), disc);
             }
         }
     }
@@ -243,11 +243,11 @@ fn a_bound_below_the_best_is_a_conflict_and_one_above_it_is_kept() {
     let (a, b) = (case.get("A"), case.get("B"));
     let best = case.number("infinity");
     let design = |part: f64, region: &Region| {
-        let wanted = wish(case, Norm::HInfinity, Some(best * part));
-        state_feedback(a, b, region, Some(&wanted), Domain::Continuous)
+        let required = wish(case, Norm::HInfinity, Some(best * part));
+        state_feedback(a, b, region, Some(&required), Domain::Continuous)
     };
-    let found = optimal(design(1.2, &Region::default()));
-    assert!(found.bound.unwrap().gamma <= 1.2 * best);
+    let actual = optimal(design(1.2, &Region::default()));
+    assert!(actual.bound.unwrap().gamma <= 1.2 * best);
     assert_eq!(conflict(design(0.9, &Region::default())), ["gain"]);
     assert_eq!(conflict(design(1.1, &disc(-3.0, 2.0))), ["disc", "gain"]);
 }
@@ -257,8 +257,8 @@ fn regions_without_a_common_point_are_a_conflict() {
     let a = matrix(2, 2, &[0., 1., 0., 0.]);
     let c = matrix(1, 2, &[1., 0.]);
     let region = Region { decay: Some(3.0), disc: disc(-1.0, 1.0).disc, sector: Some(FRAC_PI_4) };
-    let found = observer_gain(&a, &c, &region, None, Domain::Continuous);
-    assert_eq!(conflict(found), ["decay", "disc"]);
+    let actual = observer_gain(&a, &c, &region, None, Domain::Continuous);
+    assert_eq!(conflict(actual), ["decay", "disc"]);
     let region = Region { decay: Some(10.0), disc: disc(0.9, 0.05).disc, sector: None };
     assert_eq!(conflict(observer_gain(&a, &c, &region, None, SAMPLED)), ["decay", "disc"]);
 }
@@ -269,8 +269,8 @@ fn an_uncontrollable_eigenvalue_outside_of_the_region_is_a_conflict() {
     let a = matrix(2, 2, &[1., 0., 0., -1.]);
     let c = matrix(1, 2, &[1., 0.]);
     assert_eq!(conflict(observer_gain(&a, &c, &decay(2.0), None, Domain::Continuous)), ["decay"]);
-    let found = optimal(observer_gain(&a, &c, &decay(0.9), None, Domain::Continuous));
-    assert!(eigenvalues(&(a - found.gain * c)).unwrap().iter().all(|value| value.re < -0.9));
+    let actual = optimal(observer_gain(&a, &c, &decay(0.9), None, Domain::Continuous));
+    assert!(eigenvalues(&(a - actual.gain * c)).unwrap().iter().all(|value| value.re < -0.9));
 }
 
 #[test]
@@ -324,11 +324,11 @@ fn the_observer_of_the_paper_is_designed_by_inequalities() {
     let placed = placed.gains.error_dynamics(&plant);
     assert!(optimal(certify_region(&placed, &region, Domain::Continuous)).margin > 0.0);
     for norm in [Norm::HInfinity, Norm::EnergyToPeak] {
-        let wanted = fault_rate(norm, None);
-        let found = observer_gain(&a_0, &c_0, &region, Some(&wanted), Domain::Continuous);
-        let found = optimal(found);
-        assert_inside(&(&a_0 - &found.gain * &c_0), region.disc.unwrap());
-        let (b, c) = (wanted.disturbance, wanted.output);
+        let required = fault_rate(norm, None);
+        let actual = observer_gain(&a_0, &c_0, &region, Some(&required), Domain::Continuous);
+        let actual = optimal(actual);
+        assert_inside(&(&a_0 - &actual.gain * &c_0), region.disc.unwrap());
+        let (b, c) = (required.disturbance, required.output);
         let system = StateSpace {
             a: placed.clone(),
             b,
@@ -337,11 +337,11 @@ fn the_observer_of_the_paper_is_designed_by_inequalities() {
             domain: Domain::Continuous,
         };
         let before = optimal(certify_gain(&system, norm));
-        assert!(found.bound.unwrap().gamma < before.gamma);
+        assert!(actual.bound.unwrap().gamma < before.gamma);
     }
     let impossible = fault_rate(Norm::HInfinity, Some(1e-4));
-    let found = observer_gain(&a_0, &c_0, &region, Some(&impossible), Domain::Continuous);
-    assert_eq!(conflict(found), ["disc", "gain"]);
+    let actual = observer_gain(&a_0, &c_0, &region, Some(&impossible), Domain::Continuous);
+    assert_eq!(conflict(actual), ["disc", "gain"]);
 }
 
 #[test]
@@ -356,16 +356,16 @@ fn bad_arguments_are_refused_by_name() {
         (disc(0.0, 0.0), "disc radius"),
     ] {
         let refused = observer_gain(&a, &c, &wrong, None, Domain::Continuous);
-        assert!(matches!(refused, Err(Error::OutOfRange { name: found, .. }) if found == name));
+        assert!(matches!(refused, Err(Error::OutOfRange { name: actual, .. }) if actual == name));
     }
-    let wanted = Performance {
+    let required = Performance {
         disturbance: DMatrix::zeros(2, 1),
         output: DMatrix::zeros(1, 3),
         feedthrough: DMatrix::zeros(1, 1),
         norm: Norm::HInfinity,
         gamma: None,
     };
-    let refused = observer_gain(&a, &c, &region, Some(&wanted), Domain::Continuous);
+    let refused = observer_gain(&a, &c, &region, Some(&required), Domain::Continuous);
     assert!(matches!(refused, Err(Error::Shape { matrix: "output", .. })));
     let system =
         StateSpace { a: a.clone(), b: c.transpose(), c, d: one(1.0), domain: Domain::Continuous };
@@ -379,6 +379,6 @@ fn bad_arguments_are_refused_by_name() {
 fn rounding_errors_do_not_give_a_conflict() {
     let a = crate::integers(5, 5, |i, j| (7 * i * i + 3 * j + 5 * i * j) % 11 - 5);
     let c = crate::integers(1, 5, |_, j| (3 * j) % 5 - 1);
-    let found = observer_gain(&a, &c, &disc(-20000.0, 2000.0), None, Domain::Continuous).unwrap();
-    assert!(matches!(found, Outcome::Inconclusive(_)), "{found:?}");
+    let actual = observer_gain(&a, &c, &disc(-20000.0, 2000.0), None, Domain::Continuous).unwrap();
+    assert!(matches!(actual, Outcome::Inconclusive(_)), "{actual:?}");
 }

@@ -32,9 +32,9 @@ fn a_common_lyapunov_matrix_is_found_where_it_exists_and_only_there() {
     let family =
         |a: f64| [matrix(2, 2, &[-1.0, -1.0, 1.0, -1.0]), matrix(2, 2, &[-1.0, -a, 1.0 / a, -1.0])];
     let prove = |a: f64| certify_common(&family(a), &Region::default(), Domain::Continuous);
-    let Outcome::Optimal(found) = prove(5.75).unwrap() else { panic!() };
-    for own in family(5.75) {
-        let left = own.transpose() * &found.p + &found.p * own;
+    let Outcome::Optimal(actual) = prove(5.75).unwrap() else { panic!() };
+    for corner in family(5.75) {
+        let left = corner.transpose() * &actual.p + &actual.p * corner;
         assert!(left.symmetric_eigenvalues().max() < 0.0);
     }
     let Outcome::Infeasible { conflict } = prove(5.9).unwrap() else { panic!() };
@@ -51,8 +51,8 @@ fn bad_families_are_refused() {
     let mixed = common_reachable_set(&mixed, &one, &unit, 1.0, Domain::Continuous);
     assert!(matches!(mixed, Err(Error::Shape { .. })));
     let (plant, _) = carts_loop();
-    let found = LossyLoop::new(&plant.0, &plant.1, &[2]);
-    assert!(matches!(found, Err(Error::OutOfRange { .. })));
+    let actual = LossyLoop::new(&plant.0, &plant.1, &[2]);
+    assert!(matches!(actual, Err(Error::OutOfRange { .. })));
     let lossy = LossyLoop::new(&plant.0, &plant.1, &[0, 1]).unwrap();
     for largest in [[0.0, 0.0], [0.5, 1.5], [-0.1, 0.5]] {
         assert!(matches!(lossy.constant_limit(&largest, 1.0), Err(Error::OutOfRange { .. })));
@@ -65,17 +65,17 @@ fn the_reachable_set_of_a_scalar_family_is_that_of_its_slowest_member() {
     let one = DVector::from_element(1, 1.0);
     let peak = |family: &[f64], rate: f64, domain| {
         let family: Vec<_> = family.iter().map(|a| matrix(1, 1, &[*a])).collect();
-        let found = common_reachable_set(&family, &one, &DMatrix::identity(1, 1), rate, domain);
-        found.unwrap().optimal().map(|found| found.peak(&one))
+        let actual = common_reachable_set(&family, &one, &DMatrix::identity(1, 1), rate, domain);
+        actual.unwrap().optimal().map(|actual| actual.peak(&one))
     };
-    let found = peak(&[-2.0, -3.0], 2.0, Domain::Continuous).unwrap();
-    assert!((0.5..0.5001).contains(&found), "{found}");
+    let actual = peak(&[-2.0, -3.0], 2.0, Domain::Continuous).unwrap();
+    assert!((0.5..0.5001).contains(&actual), "{actual}");
     assert_eq!(peak(&[-2.0, -3.0], 4.1, Domain::Continuous), None);
     let period = 0.5;
     // r = 1 - 0.8 is the best choice.
     let rate = -0.8_f64.ln() / period;
-    let found = peak(&[0.8, 0.5], rate, Domain::Sampled { period }).unwrap();
-    assert!((5.0..5.001).contains(&found), "{found}");
+    let actual = peak(&[0.8, 0.5], rate, Domain::Sampled { period }).unwrap();
+    assert!((5.0..5.001).contains(&actual), "{actual}");
 }
 
 type Loop = (FaultyPlant, control::StateSpace);
@@ -97,8 +97,8 @@ fn the_certified_losses_are_below_the_limit_of_constant_losses() {
     let (_, lossy) = carts_loop();
     for largest in [[1.0, 1.0], [1.0, 0.0], [0.2, 0.8]] {
         let constant = lossy.constant_limit(&largest, 1.0).unwrap();
-        let found = lossy.certified(&largest, constant.factor).unwrap();
-        assert!(found.factor > 0.0 && found.factor <= constant.factor, "{found:?} {constant:?}");
+        let actual = lossy.certified(&largest, constant.factor).unwrap();
+        assert!(actual.factor > 0.0 && actual.factor <= constant.factor, "{actual:?} {constant:?}");
         // Beyond the limit the loop is unstable.
         if constant.factor < 1.0 {
             let beyond: Vec<_> = constant.loss.iter().map(|loss| loss * 1.001).collect();
@@ -107,13 +107,13 @@ fn the_certified_losses_are_below_the_limit_of_constant_losses() {
             );
         }
         // The certificate covers losses within the box, which the test chooses itself.
-        let p = &found.certificate.unwrap().p;
+        let p = &actual.certificate.unwrap().p;
         let root = p.clone().cholesky().unwrap().l().transpose();
         let inverse = root.clone().try_inverse().unwrap();
         for (i, j) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.3, 0.6), (0.5, 0.5)] {
-            let loss = [i * found.factor * largest[0], j * found.factor * largest[1]];
-            let own = &root * lossy.at(&loss) * &inverse;
-            let left = &own + own.transpose();
+            let loss = [i * actual.factor * largest[0], j * actual.factor * largest[1]];
+            let corner = &root * lossy.at(&loss) * &inverse;
+            let left = &corner + corner.transpose();
             assert!(left.symmetric_eigenvalues().max() < 0.0, "{loss:?}");
         }
     }
@@ -128,7 +128,7 @@ fn losses_that_jump_keep_the_proven_decay_rate_and_the_bounds_of_the_states() {
     let largest = [0.8 * lossy.certified(&[1.0, 1.0], most).unwrap().factor; 2];
     let rate = lossy.decay(&largest).unwrap().unwrap();
     let p = match lossy.certificate(&largest, &decay(rate)).unwrap() {
-        Outcome::Optimal(found) => found.p,
+        Outcome::Optimal(actual) => actual.p,
         other => panic!("{other:?}"),
     };
     let order = lossy.intact.nrows();
@@ -164,7 +164,7 @@ fn losses_that_jump_keep_the_proven_decay_rate_and_the_bounds_of_the_states() {
             corner * from
         };
         let outward = if coin() > 0.5 { 1.0 } else { -1.0 };
-        let moved = corners.iter().flat_map(|own| [next(own, 1.0), next(own, -1.0)]);
+        let moved = corners.iter().flat_map(|corner| [next(corner, 1.0), next(corner, -1.0)]);
         driven = moved.max_by(|a, b| (outward * a[0]).total_cmp(&(outward * b[0]))).unwrap();
         for (state, seen) in seen.iter_mut().enumerate() {
             *seen = seen.max(driven[state].abs());
@@ -181,8 +181,8 @@ fn losses_that_jump_keep_the_proven_decay_rate_and_the_bounds_of_the_states() {
 fn the_largest_certified_loss_of_the_pendulum_is_near_the_necessary_one() {
     let plant = plant();
     let observer = real_poles(&[-12.0, -15.0, -18.0, -21.0, -30.0]);
-    let found = design(&plant, &real_poles(&CONTROLLER_POLES), &observer, None).unwrap();
-    let controller = controller(&plant, &found.gains, Domain::Continuous).unwrap();
+    let actual = design(&plant, &real_poles(&CONTROLLER_POLES), &observer, None).unwrap();
+    let controller = controller(&plant, &actual.gains, Domain::Continuous).unwrap();
     let lossy = LossyLoop::new(&plant, &controller, &[0]).unwrap();
     let constant = lossy.constant_limit(&[1.0], 1.0).unwrap();
     let certified = lossy.certified(&[1.0], constant.factor).unwrap();

@@ -59,11 +59,11 @@ fn an_indefinite_matrix_is_refused() {
 #[test]
 fn discrete_equations_agree_with_high_precision_as_well_as_scipy() {
     for case in cases(include_str!("../data/riccati.txt"), "lyapunov") {
-        let found = discrete_lyapunov(case.get("A"), case.get("Q")).unwrap();
-        let error = distance(&found.p, case.get("P"));
+        let actual = discrete_lyapunov(case.get("A"), case.get("Q")).unwrap();
+        let error = distance(&actual.p, case.get("P"));
         let allowed = (2.0 * case.number("scipy")).max(1e-12);
         assert!(error < allowed, "{}: {error:e}", case.name);
-        assert!(found.residual < 1e-13, "{}: {:e}", case.name, found.residual);
+        assert!(actual.residual < 1e-13, "{}: {:e}", case.name, actual.residual);
     }
 }
 

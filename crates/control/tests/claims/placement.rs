@@ -76,8 +76,8 @@ fn with_one_input_and_pairs_the_closed_loop_has_the_required_polynomial() {
     let b = matrix(5, 1, &[0.0, 0.0, 0.0, 0.0, 1.0]);
     let poles = [&pair(-3.0, 4.0)[..], &real_poles(&[-1.0]), &pair(-1.0, 0.25)].concat();
     let placement = place(&a, &b, &poles).unwrap();
-    let wanted = [26.5625, 82.9375, 94.4375, 46.0625, 9.0];
-    let expected = DMatrix::from_fn(1, 5, |_, j| -wanted[j] - a[(4, j)]);
+    let asked = [26.5625, 82.9375, 94.4375, 46.0625, 9.0];
+    let expected = DMatrix::from_fn(1, 5, |_, j| -asked[j] - a[(4, j)]);
     assert!(entry_error(&placement.gain, &expected) < 1e-11, "{}", placement.gain);
 }
 
@@ -143,8 +143,8 @@ fn the_multiplicity_of_an_eigenvalue_may_equal_the_number_of_inputs() {
     assert_assigned(&a, &b, &place(&a, &b, &twice).unwrap(), &twice);
     let [p, q] = pair(-1.0, 3.0);
     let placement = place(&a, &b, &[p, q, p, q]).unwrap();
-    let found = eigenvalues(&(&a + &b * &placement.gain)).unwrap();
-    assert!(found.iter().all(|value| (value - p).norm().min((value - q).norm()) < 1e-12));
+    let actual = eigenvalues(&(&a + &b * &placement.gain)).unwrap();
+    assert!(actual.iter().all(|value| (value - p).norm().min((value - q).norm()) < 1e-12));
     assert!(placement.quality.condition < 100.0, "{:?}", placement.quality);
 }
 
@@ -238,8 +238,8 @@ fn the_sampled_observer_of_the_pendulum_is_placed_at_every_sample_time() {
             let a = exponential(&(&a * sample_time)).unwrap();
             let placement = place_discrete(&a, &c, &poles).unwrap();
             let radius = poles[0].re;
-            let found = eigenvalues(&(a + &c * &placement.gain)).unwrap();
-            assert!(found.iter().all(|value| value.norm() < radius + 1e-2), "{found:?}");
+            let actual = eigenvalues(&(a + &c * &placement.gain)).unwrap();
+            assert!(actual.iter().all(|value| value.norm() < radius + 1e-2), "{actual:?}");
             assert!(outputs == 1 || placement.quality.pole_error < 1e-3);
         }
     }
@@ -264,8 +264,8 @@ fn a_slow_eigenvalue_in_discrete_time_is_judged_by_its_distance_from_one() {
     let b = matrix(2, 1, &[5e-7, 1e-3]);
     let poles = pair(1.0 - 1e-5, 1e-5);
     let placement = place_discrete(&a, &b, &poles).unwrap();
-    let found = eigenvalues(&(a + b * &placement.gain)).unwrap();
-    let far = (found[0] - poles[1]).norm() / (poles[1] - 1.0).norm();
+    let actual = eigenvalues(&(a + b * &placement.gain)).unwrap();
+    let far = (actual[0] - poles[1]).norm() / (poles[1] - 1.0).norm();
     assert!((placement.quality.pole_error - far).abs() < 1e-13, "{far:e}");
     assert!(far < 1e-9, "{far:e}");
 }
@@ -299,9 +299,9 @@ fn fifty_eigenvalues_of_a_chain_of_masses_are_moved_to_the_left() {
     let poles: Vec<_> = eigenvalues(&a).unwrap().iter().map(|pole| pole - 0.3).collect();
     let placement = place(&a, &b, &poles).unwrap();
     assert!(placement.quality.pole_error < 1e-11, "{:?}", placement.quality);
-    let found = eigenvalues(&(&a + &b * &placement.gain)).unwrap();
+    let actual = eigenvalues(&(&a + &b * &placement.gain)).unwrap();
     let far = |pole: &Complex<f64>| {
-        found.iter().map(|found| (found - pole).norm()).fold(f64::INFINITY, f64::min)
+        actual.iter().map(|actual| (actual - pole).norm()).fold(f64::INFINITY, f64::min)
     };
     assert!(poles.iter().map(far).fold(0.0, f64::max) < 1e-11);
 }
@@ -314,9 +314,12 @@ fn an_eigenvalue_error_that_rounding_leaves_is_stated() {
     let placement = place(&a, &b, &real_poles(&poles)).unwrap();
     let stated = placement.quality.pole_error;
     assert!(1e-8 < stated && stated < 1e-2, "{stated:e}");
-    let found = eigenvalues(&(&a + &b * &placement.gain)).unwrap();
+    let actual = eigenvalues(&(&a + &b * &placement.gain)).unwrap();
     let error = |pole: &f64| {
-        found.iter().map(|found| (found - pole).norm() / pole.abs()).fold(f64::INFINITY, f64::min)
+        actual
+            .iter()
+            .map(|actual| (actual - pole).norm() / pole.abs())
+            .fold(f64::INFINITY, f64::min)
     };
     assert!(poles.iter().map(error).fold(0.0, f64::max) <= stated * (1.0 + 1e-9));
 }

@@ -8,9 +8,9 @@ fn the_pendulum_is_controllable_and_its_augmented_pair_observable() {
     let plant = plant();
     assert!(controllability(&plant.a, &plant.b).unwrap().is_full());
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-    let found = observability(&a_0, &c_0).unwrap();
-    assert_eq!((found.rank, found.n), (5, 5));
-    assert!(found.margin > 1e6 * found.tolerance);
+    let actual = observability(&a_0, &c_0).unwrap();
+    assert_eq!((actual.rank, actual.n), (5, 5));
+    assert!(actual.margin > 1e6 * actual.tolerance);
 }
 
 /// The position of a cart does not follow from its velocity.
@@ -54,8 +54,8 @@ fn a_long_chain_is_controllable_from_its_end_only() {
 
 #[test]
 fn without_an_effective_input_nothing_is_reached() {
-    let found = controllability(&DMatrix::identity(3, 3), &DMatrix::zeros(3, 2)).unwrap();
-    assert_eq!((found.rank, found.margin.to_bits()), (0, 0));
+    let actual = controllability(&DMatrix::identity(3, 3), &DMatrix::zeros(3, 2)).unwrap();
+    assert_eq!((actual.rank, actual.margin.to_bits()), (0, 0));
 }
 
 /// The input and output decoupling zeros of the example of `AB08ND` in SLICOT 5.

@@ -142,8 +142,8 @@ fn entries_near_the_ends_of_the_range_end_in_an_answer_or_an_error() {
         let (a, b, f_a) = (wild(4, 4, 0), wild(4, 2, 1), wild(4, 1, 2));
         let finite = |m: DMatrix<f64>| assert!(m.iter().all(|entry| entry.is_finite()), "{m}");
         let identity = DMatrix::identity(4, 4);
-        let _ =
-            eigenvalues(&a).map(|found| assert!(found.iter().all(|value| value.re.is_finite())));
+        let _ = eigenvalues(&a)
+            .map(|computed| assert!(computed.iter().all(|value| value.re.is_finite())));
         let _ = exponential(&a).map(finite);
         let _ = FirstOrderHold::new(&a, &b, 0.1).map(|hold| finite(hold.gamma_1));
         let _ = lyapunov(&a, &identity).map(|solution| finite(solution.p));
@@ -154,9 +154,9 @@ fn entries_near_the_ends_of_the_range_end_in_an_answer_or_an_error() {
             design(&plant, &real_poles(&CONTROLLER_POLES), &real_poles(&OBSERVER_POLES), None);
         let _ = designed.map(|design| finite(design.gains.l_x));
         let _ = detectability(&plant, Domain::Continuous)
-            .map(|found| assert!(found.zeros.finite.iter().all(|zero| zero.re.is_finite())));
+            .map(|computed| assert!(computed.zeros.finite.iter().all(|zero| zero.re.is_finite())));
         let _ = from_uncontrollable(&plant.a, &plant.b)
-            .map(|found| assert!(found.lower <= found.upper, "{found:?}"));
+            .map(|computed| assert!(computed.lower <= computed.upper, "{computed:?}"));
         let _ = sample(&ExtendedPlant::without_filter(plant), 0.1).map(|plant| finite(plant.b));
     }
 }

@@ -54,28 +54,28 @@ fn sampled_equations_agree_with_high_precision_as_well_as_scipy() {
 fn solutions_satisfy_the_printed_equation_and_stabilise() {
     for case in cases(RECORDED, "continuous") {
         let (a, b, w) = (case.get("A"), case.get("B"), weights(&case));
-        let found = lqr(a, b, &w, Domain::Continuous).unwrap();
+        let computed = lqr(a, b, &w, Domain::Continuous).unwrap();
         let n = w.n.unwrap();
-        let cross = &found.p * b + &n;
+        let cross = &computed.p * b + &n;
         let feedback = &cross * w.r.clone().try_inverse().unwrap() * cross.transpose();
-        let left = a.transpose() * &found.p + &found.p * a - &feedback + &w.q;
-        let terms = (a.abs().transpose() * found.p.abs()) * 2.0 + feedback.abs() + w.q.abs();
+        let left = a.transpose() * &computed.p + &computed.p * a - &feedback + &w.q;
+        let terms = (a.abs().transpose() * computed.p.abs()) * 2.0 + feedback.abs() + w.q.abs();
         assert!(left.norm() < 1e-9 * terms.norm(), "{}", case.name);
-        assert!(found.residual < 1e-9);
-        let closed = eigenvalues(&(a + b * &found.gain)).unwrap();
+        assert!(computed.residual < 1e-9);
+        let closed = eigenvalues(&(a + b * &computed.gain)).unwrap();
         assert!(closed.iter().all(|x| x.re < 0.0), "{}: {closed:?}", case.name);
     }
     for case in cases(RECORDED, "sampled") {
         let (a, b, w) = (case.get("A"), case.get("B"), weights(&case));
-        let found = lqr(a, b, &w, SAMPLED).unwrap();
-        let cross = a.transpose() * &found.p * b + w.n.unwrap();
-        let size = &w.r + b.transpose() * &found.p * b;
+        let computed = lqr(a, b, &w, SAMPLED).unwrap();
+        let cross = a.transpose() * &computed.p * b + w.n.unwrap();
+        let size = &w.r + b.transpose() * &computed.p * b;
         let feedback = &cross * size.try_inverse().unwrap() * cross.transpose();
-        let moved = a.transpose() * &found.p * a;
-        let left = &moved - &found.p - &feedback + &w.q;
-        let terms = moved.abs() + found.p.abs() + feedback.abs() + w.q.abs();
+        let moved = a.transpose() * &computed.p * a;
+        let left = &moved - &computed.p - &feedback + &w.q;
+        let terms = moved.abs() + computed.p.abs() + feedback.abs() + w.q.abs();
         assert!(left.norm() < 1e-9 * terms.norm(), "{}", case.name);
-        let closed = eigenvalues(&(a + b * &found.gain)).unwrap();
+        let closed = eigenvalues(&(a + b * &computed.gain)).unwrap();
         assert!(closed.iter().all(|x| x.norm() < 1.0), "{}: {closed:?}", case.name);
     }
 }
@@ -213,7 +213,7 @@ fn the_cost_is_the_quadratic_form_of_the_solution() {
     let b = matrix(2, 1, &[0.1, 1.0]);
     let n = matrix(2, 1, &[0.2, -0.1]);
     let w = Weights { n: Some(n.clone()), ..identity_weights(2, 1) };
-    let found = lqr(&a, &b, &w, SAMPLED).unwrap();
+    let computed = lqr(&a, &b, &w, SAMPLED).unwrap();
     let start = matrix(2, 1, &[1.0, -2.0]);
     let cost = |gain: &DMatrix<f64>| {
         let (mut x, mut sum) = (start.clone(), 0.0);
@@ -224,10 +224,10 @@ fn the_cost_is_the_quadratic_form_of_the_solution() {
         }
         sum
     };
-    let best = cost(&found.gain);
-    let form = (start.transpose() * &found.p * &start)[0];
+    let best = cost(&computed.gain);
+    let form = (start.transpose() * &computed.p * &start)[0];
     assert!((best / form - 1.0).abs() < 1e-13, "{best} {form}");
     for change in [[0.01, 0.0], [-0.01, 0.0], [0.0, 0.01], [0.0, -0.01]] {
-        assert!(cost(&(&found.gain + matrix(1, 2, &change))) > best);
+        assert!(cost(&(&computed.gain + matrix(1, 2, &change))) > best);
     }
 }

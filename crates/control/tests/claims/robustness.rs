@@ -135,14 +135,14 @@ fn assert_derivatives(
 fn derivatives_of_the_peaks_are_those_of_the_peaks_of_changed_plants() {
     for case in cases(RECORDED, "loop") {
         for (_, point) in POINTS {
-            let norm = |own: &Loop| h_infinity(&own.sensitivity(point), 1e-8).unwrap();
+            let norm = |closed: &Loop| h_infinity(&closed.sensitivity(point), 1e-8).unwrap();
             let frequency = norm(&closed(&case)).frequency;
             let at = SensitivityPeak { point, frequency, scaled: false };
-            assert_derivatives(&case, at, 1e-4, 1e-3, |own| norm(own).lower);
-            let scaled = |own: &Loop| scaled_peak(&own.sensitivity(point)).unwrap();
+            assert_derivatives(&case, at, 1e-4, 1e-3, |closed| norm(closed).lower);
+            let scaled = |closed: &Loop| scaled_peak(&closed.sensitivity(point)).unwrap();
             let frequency = scaled(&closed(&case)).frequency;
             let at = SensitivityPeak { point, frequency, scaled: true };
-            assert_derivatives(&case, at, 5e-3, 5e-2, |own| scaled(own).value);
+            assert_derivatives(&case, at, 5e-3, 5e-2, |closed| scaled(closed).value);
         }
     }
 }
@@ -152,10 +152,12 @@ fn disk_margins_agree_with_slicot_and_are_certified() {
     for case in cases(RECORDED, "loop") {
         let closed = closed(&case);
         for (name, point) in POINTS {
-            let found = disk_margin(&closed, point, None).expect("a margin");
+            let computed = disk_margin(&closed, point, None).expect("a margin");
             let expected = case.number(&format!("disk_{name}"));
-            assert_near(found.alpha, expected, 1e-3, case.name);
-            assert!(found.certified <= found.alpha && found.certified > 0.9 * found.alpha);
+            assert_near(computed.alpha, expected, 1e-3, case.name);
+            assert!(
+                computed.certified <= computed.alpha && computed.certified > 0.9 * computed.alpha
+            );
             let whole = h_infinity(&closed.sensitivity(point), 1e-6).expect("a norm").upper;
             let scaled = scaled_peak(&closed.sensitivity(point)).expect("a peak");
             assert!(scaled.value <= whole * 1.0001, "{} {scaled:?} {whole}", case.name);
@@ -169,13 +171,13 @@ fn margins_of_single_channels_agree_with_python_control() {
         let closed = closed(&case);
         for (name, point) in POINTS {
             for (channel, row) in case.get(&format!("channels_{name}")).row_iter().enumerate() {
-                let found = channel_margins(&closed, point, channel).expect("margins");
+                let computed = channel_margins(&closed, point, channel).expect("margins");
                 let disk = disk_margin(&closed, point, Some(channel)).expect("a margin").alpha;
-                let what = format!("{} {name} {channel} {found:?}", case.name);
-                assert_near(found.gain[0], row[0], 1e-4, &what);
-                assert_near(found.gain[1], row[1], 1e-4, &what);
-                assert_near(found.phase, row[2], 1e-4, &what);
-                assert_near(found.delay, row[3], 1e-4, &what);
+                let what = format!("{} {name} {channel} {computed:?}", case.name);
+                assert_near(computed.gain[0], row[0], 1e-4, &what);
+                assert_near(computed.gain[1], row[1], 1e-4, &what);
+                assert_near(computed.phase, row[2], 1e-4, &what);
+                assert_near(computed.delay, row[3], 1e-4, &what);
                 assert_near(disk, row[4], 1e-3, &what);
             }
         }
@@ -204,14 +206,14 @@ fn noise_hold_and_delay_agree_with_python_control_and_scipy() {
 #[test]
 fn the_margins_of_a_servo_are_the_closed_form() {
     for k in [0.2, 1.0, 30.0] {
-        let found = channel_margins(&servo(k), Point::Output, 0).expect("margins");
+        let computed = channel_margins(&servo(k), Point::Output, 0).expect("margins");
         let frequency = (0.5 * ((1.0 + 4.0 * k * k).sqrt() - 1.0)).sqrt();
         let phase = 0.5 * PI - frequency.atan();
-        assert_near(found.phase, phase, 1e-9, "phase");
-        assert_near(found.phase_frequency, frequency, 1e-9, "frequency");
-        assert_near(found.delay, phase / frequency, 1e-9, "delay");
+        assert_near(computed.phase, phase, 1e-9, "phase");
+        assert_near(computed.phase_frequency, frequency, 1e-9, "frequency");
+        assert_near(computed.delay, phase / frequency, 1e-9, "delay");
         assert_near(delay_margin(&servo(k)).expect("a delay"), phase / frequency, 1e-9, "delay");
-        assert!(found.gain[0] <= 0.0 && found.gain[1] == f64::INFINITY, "{found:?}");
+        assert!(computed.gain[0] <= 0.0 && computed.gain[1] == f64::INFINITY, "{computed:?}");
     }
 }
 
@@ -225,15 +227,15 @@ fn a_loop_of_more_than_one_at_half_of_the_sample_rate_bears_no_delay() {
     let gain = |gain| StateSpace { a: one(0.0), b: one(0.0), c: one(0.0), d: one(gain), domain };
     for (k, delay) in [(1.2, 0.0), (0.2, f64::INFINITY), (-0.45, f64::INFINITY)] {
         let closed = Loop::new(plant.clone(), gain(k)).unwrap();
-        let found = [
+        let computed = [
             delay_margin(&closed).unwrap(),
             channel_margins(&closed, Point::Output, 0).unwrap().delay,
             sampled_delay_margin(&plant, &gain(k)).unwrap(),
         ];
         assert_eq!(
-            found.map(|found| found.total_cmp(&delay)),
+            computed.map(|computed| computed.total_cmp(&delay)),
             [std::cmp::Ordering::Equal; 3],
-            "{found:?}"
+            "{computed:?}"
         );
     }
 }
@@ -260,18 +262,18 @@ fn the_worst_plant_of_two_parameters_is_a_vertex() {
     let family = EntryFamily::new(&plant, &tolerances).expect("fits");
     assert_eq!(tolerances.entries().count(), 2, "C is one");
     let test = |k: f64| tolerance_test(&family, &gain(&one(-k), domain), 200, 1);
-    let found = test(3.0).expect("a test");
-    assert_eq!((found.cases, found.stable), (200, 200));
+    let computed = test(3.0).expect("a test");
+    assert_eq!((computed.cases, computed.stable), (200, 200));
     // The idle state of the controller has -1.
-    assert_near(found.worst_instability, -1.0, 1e-12, "worst");
-    let found = test(1.7).expect("a test");
-    assert_near(found.worst_instability, 3.3 - 1.8 * 1.7, 1e-12, "worst");
-    assert_near(found.worst.a[(0, 0)], 3.3, 1e-12, "a");
-    assert_near(found.worst.b[(0, 0)], 1.8, 1e-12, "b");
-    assert_near(found.first_unstable.expect("unstable"), 0.4 / 6.4 / 0.1, 1e-9, "limit");
+    assert_near(computed.worst_instability, -1.0, 1e-12, "worst");
+    let computed = test(1.7).expect("a test");
+    assert_near(computed.worst_instability, 3.3 - 1.8 * 1.7, 1e-12, "worst");
+    assert_near(computed.worst.a[(0, 0)], 3.3, 1e-12, "a");
+    assert_near(computed.worst.b[(0, 0)], 1.8, 1e-12, "b");
+    assert_near(computed.first_unstable.expect("unstable"), 0.4 / 6.4 / 0.1, 1e-9, "limit");
     // P(a + b k > 0) for independent uniform deviations: 0.3 x + 0.34 y > 0.4.
     let corner = 0.5 * (0.24 / 0.3) * (0.24 / 0.34) / 4.0;
-    let part = f64::from(found.cases - found.stable) / 200.0;
+    let part = f64::from(computed.cases - computed.stable) / 200.0;
     assert!((part - corner).abs() < 0.06, "{part} {corner}");
 }
 
@@ -282,7 +284,7 @@ fn the_worst_case_is_at_least_as_bad_as_random_vertices() {
     for case in cases(RECORDED, "loop") {
         let (plant, controller) = parts(&case);
         let tolerances = Tolerances::unless_structural(&plant, [0.03; 4]);
-        let found = EntryFamily::new(&plant, &tolerances)
+        let computed = EntryFamily::new(&plant, &tolerances)
             .and_then(|family| tolerance_test(&family, &controller, 40, 7))
             .expect("a test");
         let value = |plant: &StateSpace| {
@@ -294,7 +296,7 @@ fn the_worst_case_is_at_least_as_bad_as_random_vertices() {
             let closed = Loop::new(plant, controller.clone()).expect("a loop");
             instability(&closed.dynamics(), controller.domain).expect("a number")
         };
-        assert_near(value(&found.worst), found.worst_instability, 1e-9, case.name);
+        assert_near(value(&computed.worst), computed.worst_instability, 1e-9, case.name);
         let mut bits = 12345_u64;
         for _ in 0..100 {
             let mut vertex = plant.clone();
@@ -306,7 +308,7 @@ fn the_worst_case_is_at_least_as_bad_as_random_vertices() {
                     *entry *= 1.0 + if bits >> 63 == 0 { *relative } else { -relative };
                 }
             }
-            assert!(value(&vertex) <= found.worst_instability + 1e-9, "{}", case.name);
+            assert!(value(&vertex) <= computed.worst_instability + 1e-9, "{}", case.name);
         }
     }
 }
@@ -316,15 +318,15 @@ fn the_regulator_of_the_same_speed_has_the_same_sum_of_eigenvalues() {
     let a = matrix(3, 3, &[0.2, 1.0, 0.0, -2.0, 0.1, 0.5, 0.0, 0.3, -1.0]);
     let b = matrix(3, 2, &[0.0, 1.0, 1.0, 0.0, 0.2, 0.3]);
     let k = matrix(2, 3, &[-1.0, -5.0, 0.0, -4.0, 0.0, -1.0]);
-    let found = regulator_of_same_speed(&a, &b, &k, Domain::Continuous).expect("no error");
-    let found = found.expect("a regulator");
-    assert_near((&a + &b * &found).trace(), (&a + &b * &k).trace(), 1e-3, "trace");
+    let computed = regulator_of_same_speed(&a, &b, &k, Domain::Continuous).expect("no error");
+    let computed = computed.expect("a regulator");
+    assert_near((&a + &b * &computed).trace(), (&a + &b * &k).trace(), 1e-3, "trace");
     let (phi, gamma) = zero_order_hold(&a, &b, 0.1).expect("a plant");
     let domain = Domain::Sampled { period: 0.1 };
-    let found = regulator_of_same_speed(&phi, &gamma, &k, domain).expect("no error");
-    let found = found.expect("a regulator");
+    let computed = regulator_of_same_speed(&phi, &gamma, &k, domain).expect("no error");
+    let computed = computed.expect("a regulator");
     let log = |k: &DMatrix<f64>| (&phi + &gamma * k).determinant().abs().ln();
-    assert_near(log(&found), log(&k), 1e-3, "determinant");
+    assert_near(log(&computed), log(&k), 1e-3, "determinant");
 }
 
 #[test]

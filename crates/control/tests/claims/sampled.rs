@@ -86,10 +86,10 @@ fn the_filter_runs_on_the_samples() {
 fn the_pendulum_is_stable_at_every_sample_time() {
     for period in PERIODS {
         for estimator in [Estimator::Prediction, Estimator::Current] {
-            let found = pendulum(period, estimator);
+            let actual = pendulum(period, estimator);
             let slowest = (-4.5 * period).exp();
-            assert!((found.radius - slowest).abs() < 1e-6 * (1.0 - slowest) + 1e-9, "{found:?}");
-            assert!(found.observer.pole_error < 1e-6 && found.observer.balanced_condition < 1e6);
+            assert!((actual.radius - slowest).abs() < 1e-6 * (1.0 - slowest) + 1e-9, "{actual:?}");
+            assert!(actual.observer.pole_error < 1e-6 && actual.observer.balanced_condition < 1e6);
         }
     }
 }
@@ -138,10 +138,10 @@ fn a_step_of_the_fault_leaves_an_impulse_unless_the_model_is_a_ramp() {
 #[test]
 fn the_pendulum_with_a_ramp_model_is_stable_at_every_sample_time() {
     for period in PERIODS {
-        let found = pendulum_with_ramp(period);
-        assert!((found.radius - (-4.5 * period).exp()).abs() < 1e-7, "{found:?}");
-        assert!((found.gains.k_f[(0, 1)] - 0.5 * period).abs() < 1e-15, "{found:?}");
-        assert!(found.observer.pole_error < 1e-6, "{found:?}");
+        let actual = pendulum_with_ramp(period);
+        assert!((actual.radius - (-4.5 * period).exp()).abs() < 1e-7, "{actual:?}");
+        assert!((actual.gains.k_f[(0, 1)] - 0.5 * period).abs() < 1e-15, "{actual:?}");
+        assert!(actual.observer.pole_error < 1e-6, "{actual:?}");
     }
 }
 
@@ -149,14 +149,17 @@ fn the_pendulum_with_a_ramp_model_is_stable_at_every_sample_time() {
 #[test]
 fn the_estimation_error_has_the_required_eigenvalues() {
     for period in [1e-4, 1e-3, 1e-2] {
-        let found = pendulum(period, Estimator::Current);
-        let (a_0, c_0) = (found.plant.augmented_dynamics(), found.plant.augmented_output());
-        let m = found.gains.observer_gain();
+        let actual = pendulum(period, Estimator::Current);
+        let (a_0, c_0) = (actual.plant.augmented_dynamics(), actual.plant.augmented_output());
+        let m = actual.gains.observer_gain();
         let error = (DMatrix::identity(5, 5) - m * c_0) * a_0;
-        let mut wanted = on_real_axis(&OBSERVER_POLES, period);
-        wanted.sort_by(f64::total_cmp);
-        for (reached, wanted) in eigenvalues(&error).unwrap().iter().zip(wanted) {
-            assert!((reached - wanted).norm() < 1e-5 * wanted, "{period}: {reached} {wanted}");
+        let mut required = on_real_axis(&OBSERVER_POLES, period);
+        required.sort_by(f64::total_cmp);
+        for (reached, required) in eigenvalues(&error).unwrap().iter().zip(required) {
+            assert!(
+                (reached - required).norm() < 1e-5 * required,
+                "{period}: {reached} {required}"
+            );
         }
     }
 }
@@ -202,7 +205,7 @@ fn constant_and_ramp_faults_are_estimated_in_the_sampled_loop() {
             let period = 2e-3;
             let observer: Vec<f64> =
                 [-50., -60., -70., -80., -90., -100.][..4 + extended.plant.f_a.ncols()].into();
-            let found = design(
+            let actual = design(
                 &extended,
                 period,
                 estimator,
@@ -210,7 +213,7 @@ fn constant_and_ramp_faults_are_estimated_in_the_sampled_loop() {
                 &in_z(&observer, period),
                 None,
             );
-            let (error, state) = run(&extended, &found.unwrap(), (&b, &f_a), (5.0, slope), 2500);
+            let (error, state) = run(&extended, &actual.unwrap(), (&b, &f_a), (5.0, slope), 2500);
             assert!(error < 1e-6, "{kind:?} {estimator:?}: {error:e}");
             assert!(state < 1e-4, "{kind:?} {estimator:?}: {state:e}");
         }
@@ -220,10 +223,10 @@ fn constant_and_ramp_faults_are_estimated_in_the_sampled_loop() {
 /// Poles that would all be zero in double precision keep enough distance to be placed.
 #[test]
 fn fast_poles_are_slowed_in_order_and_slow_ones_are_not() {
-    let found = on_real_axis(&[-1e6, -1e5, -2e3, -50.0, -1.0], 1e-2);
-    assert!(found.windows(2).all(|pair| pair[0] < 0.99 * pair[1]), "{found:?}");
-    assert!((found[0] - (-4.0_f64).exp()).abs() < 1e-15);
-    assert!((found[3] - (-0.5_f64).exp()).abs() < 1e-15);
+    let actual = on_real_axis(&[-1e6, -1e5, -2e3, -50.0, -1.0], 1e-2);
+    assert!(actual.windows(2).all(|pair| pair[0] < 0.99 * pair[1]), "{actual:?}");
+    assert!((actual[0] - (-4.0_f64).exp()).abs() < 1e-15);
+    assert!((actual[3] - (-0.5_f64).exp()).abs() < 1e-15);
     let turning = sampled_poles(&[Complex::new(-1.0, 100.0)], 1e-2).unwrap();
     assert!((turning[0] - Complex::new(-0.01, 1.0).exp()).norm() < 1e-15);
     let aliased = sampled_poles(&[Complex::new(-1.0, 400.0)], 1e-2);

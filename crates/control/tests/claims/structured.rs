@@ -86,8 +86,8 @@ fn a_constant_matrix_of_rank_one_has_its_closed_form() {
         for domain in [CONTINUOUS, Domain::Sampled { period: 0.1 }] {
             let mut system = StateSpace { domain, ..system.clone() };
             system.a *= 0.5;
-            let found = structured_bound(&system, &[block; 4], 1e-3, &|| false).expect("a bound");
-            let part = found.expect("in time").upper / exact;
+            let actual = structured_bound(&system, &[block; 4], 1e-3, &|| false).expect("a bound");
+            let part = actual.expect("in time").upper / exact;
             assert!((1.0..1.02).contains(&part), "{block:?} {domain:?}: {part}");
         }
     }
@@ -108,12 +108,12 @@ fn a_damped_oscillator_is_proven_up_to_the_limit_of_routh_and_hurwitz() {
             };
             let mut tolerances = Tolerances::unless_structural(&plant, [0.0; 4]);
             (tolerances.of[0][(1, 0)], tolerances.of[0][(1, 1)]) = (of_k, of_d);
-            let found = proven(&plant, &idle(1, 1), &tolerances);
-            let part = found.fraction * f64::max(of_k, of_d);
+            let actual = proven(&plant, &idle(1, 1), &tolerances);
+            let part = actual.fraction * f64::max(of_k, of_d);
             // Where both vanish together, the best scales are beyond all bounds.
             let least = if of_k.to_bits() == of_d.to_bits() { 0.75 } else { 0.97 };
-            assert!((least..1.0).contains(&part), "{k} {d} {of_k} {of_d}: {part} {found:?}");
-            assert_eq!((found.deviations, found.channels), (2, 2));
+            assert!((least..1.0).contains(&part), "{k} {d} {of_k} {of_d}: {part} {actual:?}");
+            assert_eq!((actual.deviations, actual.channels), (2, 2));
         }
     }
 }
@@ -165,11 +165,11 @@ fn the_spring_of_the_two_mass_benchmark_is_proven_up_to_its_limit() {
         let plant = two_masses(1.25);
         let controller = quadratic(&plant, price);
         let tolerances = spring(&plant, 0.1);
-        let found = proven(&plant, &controller, &tolerances);
+        let actual = proven(&plant, &controller, &tolerances);
         let exact = limit(&EntryFamily::new(&plant, &tolerances).expect("fits"), &controller);
-        assert_eq!((found.deviations, found.channels), (1, 1), "four entries of rank one");
-        let part = found.fraction / exact.min(16.0);
-        assert!((0.97..1.0).contains(&part), "{price}: {found:?} {exact}");
+        assert_eq!((actual.deviations, actual.channels), (1, 1), "four entries of rank one");
+        let part = actual.fraction / exact.min(16.0);
+        assert!((0.97..1.0).contains(&part), "{price}: {actual:?} {exact}");
     }
 }
 
@@ -182,10 +182,10 @@ fn a_sampled_loop_is_proven_up_to_its_limit() {
         let domain = Domain::Sampled { period };
         let controller = quadratic(&StateSpace { a, b, domain, ..plant.clone() }, 1.0);
         let tolerances = spring(&plant, 0.1);
-        let found = proven(&plant, &controller, &tolerances);
+        let actual = proven(&plant, &controller, &tolerances);
         let exact = limit(&EntryFamily::new(&plant, &tolerances).expect("fits"), &controller);
-        let part = found.fraction / exact.min(16.0);
-        assert!((0.9..1.0).contains(&part), "{period}: {found:?} {exact}");
+        let part = actual.fraction / exact.min(16.0);
+        assert!((0.9..1.0).contains(&part), "{period}: {actual:?} {exact}");
     }
 }
 
@@ -223,17 +223,17 @@ fn no_plant_within_the_proven_fraction_is_unstable() {
         };
         let controller = quadratic(&model, 1.0);
         let tolerances = Tolerances::unless_structural(&plant, [0.05; 4]);
-        let found = proven(&plant, &controller, &tolerances);
+        let actual = proven(&plant, &controller, &tolerances);
         let family = EntryFamily::new(&plant, &tolerances).expect("fits");
         let tested = tolerance_test(&family, &controller, 50, 3).expect("a test");
         let first = tested.first_unstable.unwrap_or(16.0);
-        assert!(found.fraction <= first, "{seed}: {found:?} {first}");
-        parts.push(found.fraction / first);
+        assert!(actual.fraction <= first, "{seed}: {actual:?} {first}");
+        parts.push(actual.fraction / first);
         for case in random_deviations(family.count(), 100, at(4)) {
             let vertex: Vec<f64> = case.iter().map(|part| part.signum()).collect();
             for deviations in [case, vertex] {
-                let inside: Vec<f64> = deviations.iter().map(|d| d * found.fraction).collect();
-                assert!(is_stable(&family, &controller, &inside), "{seed} {found:?}");
+                let inside: Vec<f64> = deviations.iter().map(|d| d * actual.fraction).collect();
+                assert!(is_stable(&family, &controller, &inside), "{seed} {actual:?}");
             }
         }
     }
@@ -272,9 +272,9 @@ fn the_bound_over_all_frequencies_is_the_peak_of_slicot() {
             .iter()
             .map(|kind| if *kind < 1.5 { Block::Real(1) } else { Block::Full(1) })
             .collect();
-        let found = structured_bound(&system, &blocks, 1e-3, &|| false).expect("a bound");
-        let part = found.expect("in time").upper / case.number("peak");
-        assert!((0.995..1.02).contains(&part), "{}: {found:?} {part}", case.name);
+        let actual = structured_bound(&system, &blocks, 1e-3, &|| false).expect("a bound");
+        let part = actual.expect("in time").upper / case.number("peak");
+        assert!((0.995..1.02).contains(&part), "{}: {actual:?} {part}", case.name);
     }
 }
 
@@ -345,12 +345,12 @@ fn a_stiff_drive_is_proven_to_near_the_instability_that_is_found() {
             5078700.0,
         ],
     );
-    let mut own = plant.a.clone().resize(6, 6, 0.0);
-    own[(4, 5)] = 1000.0;
+    let mut extended = plant.a.clone().resize(6, 6, 0.0);
+    extended[(4, 5)] = 1000.0;
     let (b, c) =
         (plant.b.clone().resize_vertically(6, 0.0), plant.c.clone().resize_horizontally(6, 0.0));
     let controller = StateSpace {
-        a: own + b * &k_x - &l * c,
+        a: extended + b * &k_x - &l * c,
         b: l,
         c: k_x,
         d: matrix(1, 1, &[0.0]),
@@ -359,8 +359,8 @@ fn a_stiff_drive_is_proven_to_near_the_instability_that_is_found() {
     let tolerances = Tolerances::unless_structural(&plant, [0.1; 4]);
     let family = EntryFamily::new(&plant, &tolerances).expect("fits");
     for most in [16.0, 0.922_669_4] {
-        let found = proven_tolerance(&family, &controller, most, &|| false);
-        let found = found.expect("no error").expect("a proof");
-        assert!((0.8..0.923).contains(&found.fraction), "{most}: {found:?}");
+        let actual = proven_tolerance(&family, &controller, most, &|| false);
+        let actual = actual.expect("no error").expect("a proof");
+        assert!((0.8..0.923).contains(&actual.fraction), "{most}: {actual:?}");
     }
 }

@@ -97,8 +97,8 @@ mod free {
     #[test]
     fn the_smallest_radius_is_that_of_a_semidefinite_program_stated_elsewhere() {
         for case in cases(DATA, "radius") {
-            let found = smallest_radius(case.get("F"), case.get("G"), 1.0).unwrap();
-            let delta = found.optimal().unwrap().delta;
+            let actual = smallest_radius(case.get("F"), case.get("G"), 1.0).unwrap();
+            let delta = actual.optimal().unwrap().delta;
             let ratio = delta / case.number("free");
             assert!(ratio > 1.0 - 1e-6 && ratio < 1.001, "{}: {ratio}", case.name);
             assert!(delta < case.number("printed") * 1.000_01);
@@ -113,13 +113,13 @@ mod free {
         for (gains, factor) in [(gains(), 6.0), (repaired_gains(), 3.0)] {
             let printed = certify(&plant, &gains, 1.0, 30.0).unwrap().delta;
             let f = gains.error_dynamics(&plant);
-            let found = smallest_radius(&f, &plant.augmented_fault(), 30.0).unwrap();
-            let found = found.optimal().unwrap();
-            assert!(found.delta * factor < printed, "{} {printed}", found.delta);
-            let left = &found.p * &f + f.transpose() * &found.p + DMatrix::identity(5, 5);
+            let actual = smallest_radius(&f, &plant.augmented_fault(), 30.0).unwrap();
+            let actual = actual.optimal().unwrap();
+            assert!(actual.delta * factor < printed, "{} {printed}", actual.delta);
+            let left = &actual.p * &f + f.transpose() * &actual.p + DMatrix::identity(5, 5);
             let root = left.diagonal().map(|entry| (-entry).sqrt());
             let scaled = DMatrix::from_fn(5, 5, |i, j| -left[(i, j)] / (root[i] * root[j]));
-            assert!(scaled.symmetric_eigenvalues().min() > 0.0 && found.margin > 0.0);
+            assert!(scaled.symmetric_eigenvalues().min() > 0.0 && actual.margin > 0.0);
         }
     }
 
@@ -170,8 +170,8 @@ mod free {
         let (f, g) = (matrix(1, 1, &[0.5]), matrix(1, 1, &[1.0]));
         let expected = vec!["stability"];
         assert_eq!(largest_decay(&f), Ok(Outcome::Infeasible { conflict: expected.clone() }));
-        let found = smallest_radius(&f, &g, 1.0);
-        assert_eq!(found, Ok(Outcome::Infeasible { conflict: expected.clone() }));
+        let actual = smallest_radius(&f, &g, 1.0);
+        assert_eq!(actual, Ok(Outcome::Infeasible { conflict: expected.clone() }));
         assert_eq!(ultimate_bound(&f, &g, 1.0), Ok(Outcome::Infeasible { conflict: expected }));
     }
 }

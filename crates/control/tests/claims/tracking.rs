@@ -164,39 +164,45 @@ fn distance(actual: &[Complex<f64>], expected: &[Complex<f64>]) -> f64 {
 
 #[test]
 fn the_loop_has_the_eigenvalues_of_feedback_with_integrals_observer_and_filter() {
-    for own in all_designs() {
-        let complete =
-            complete_controller(&own.plant, &own.gains, own.filter.as_deref(), own.domain).unwrap();
-        let whole = physical(&own);
-        let m = own.plant.b.ncols();
+    for design in all_designs() {
+        let complete = complete_controller(
+            &design.plant,
+            &design.gains,
+            design.filter.as_deref(),
+            design.domain,
+        )
+        .unwrap();
+        let whole = physical(&design);
+        let m = design.plant.b.ncols();
         let alone = StateSpace {
             b: whole.b.columns(0, m).into(),
             d: DMatrix::zeros(whole.c.nrows(), m),
             ..whole
         };
-        let found = Loop::new(alone, complete.commands).unwrap().dynamics();
-        let mut wanted = own.feedback.clone();
-        wanted.extend(eigenvalues(&own.gains.error_dynamics(&own.plant)).unwrap());
-        let filtered = own.filter.iter().flatten().map(|w| match own.domain {
+        let computed = Loop::new(alone, complete.commands).unwrap().dynamics();
+        let mut required = design.feedback.clone();
+        required.extend(eigenvalues(&design.gains.error_dynamics(&design.plant)).unwrap());
+        let filtered = design.filter.iter().flatten().map(|w| match design.domain {
             Domain::Continuous => Complex::new(-w, 0.0),
             Domain::Sampled { .. } => Complex::new(1.0 - w, 0.0),
         });
-        wanted.extend(filtered);
+        required.extend(filtered);
         // A current estimator with a filter predicts y_f from x: no eigenvalue is lost.
-        let found = eigenvalues(&found).unwrap();
-        let away = distance(&wanted, &found);
-        assert!(away < 2e-4, "{:?} {:?} {away}", own.domain, own.gains.estimator);
+        let computed = eigenvalues(&computed).unwrap();
+        let away = distance(&required, &computed);
+        assert!(away < 2e-4, "{:?} {:?} {away}", design.domain, design.gains.estimator);
     }
 }
 
 #[test]
 fn the_loop_of_faults_and_errors_is_that_of_plant_and_complete_controller() {
-    for own in all_designs() {
-        let Designed { plant, gains, domain, .. } = &own;
-        let complete = complete_controller(plant, gains, own.filter.as_deref(), *domain).unwrap();
+    for design in all_designs() {
+        let Designed { plant, gains, domain, .. } = &design;
+        let complete =
+            complete_controller(plant, gains, design.filter.as_deref(), *domain).unwrap();
         let control = &complete.commands;
-        let whole = physical(&own);
-        let (n, m, q) = (own.extended.states, plant.b.ncols(), plant.f_a.ncols());
+        let whole = physical(&design);
+        let (n, m, q) = (design.extended.states, plant.b.ncols(), plant.f_a.ncols());
         let (b, f) = (whole.b.columns(0, m).into_owned(), whole.b.columns(m, q).into_owned());
         let seen = whole.d.columns(m, q).into_owned();
         let k = control.a.nrows();
@@ -219,41 +225,44 @@ fn the_loop_of_faults_and_errors_is_that_of_plant_and_complete_controller() {
         let all = plant.a.nrows();
         let mut rows: Vec<_> = (0..n).collect();
         rows.extend(2 * all..2 * all + q);
-        let mut found = fault_system(plant, gains, *domain).unwrap();
-        (found.c, found.d) = (found.c.select_rows(&rows), found.d.select_rows(&rows));
+        let mut computed = fault_system(plant, gains, *domain).unwrap();
+        (computed.c, computed.d) = (computed.c.select_rows(&rows), computed.d.select_rows(&rows));
         let grid = [0.03, 0.3, 1.0, 3.0, 10.0];
         let responses =
-            [&found, &expected].map(|system| frequency_response(system, &grid).unwrap());
-        for (found, expected) in responses[0].iter().zip(&responses[1]) {
-            let error = (&found.gain - &expected.gain).norm();
+            [&computed, &expected].map(|system| frequency_response(system, &grid).unwrap());
+        for (computed, expected) in responses[0].iter().zip(&responses[1]) {
+            let error = (&computed.gain - &expected.gain).norm();
             assert!(error < 1e-9 * expected.gain.norm(), "{domain:?} {error}");
         }
         // f' acts on the same loop.
         let rates = fault_rate_system(plant, gains, *domain).unwrap();
-        assert!((rates.a - found.a).amax() <= 0.0);
+        assert!((rates.a - computed.a).amax() <= 0.0);
     }
 }
 
 #[test]
 fn with_one_part_the_bounds_between_samples_are_those_of_the_samples() {
-    for own in all_designs().into_iter().filter(|own| own.domain != Domain::Continuous) {
-        let Designed { plant, gains, extended, domain, .. } = &own;
+    for design in all_designs().into_iter().filter(|design| design.domain != Domain::Continuous) {
+        let Designed { plant, gains, extended, domain, .. } = &design;
         let rows: Vec<_> = (0..2 * plant.f_a.nrows() + plant.f_a.ncols()).collect();
         let closed = SampledLoop { extended, plant, gains, period: PERIOD };
         let [of_faults, ..] = gains_between_samples(&closed, 1, &rows, 1e-4).unwrap();
         let at_samples =
             peak_gain(&fault_system(plant, gains, *domain).unwrap(), 1e-4).unwrap().upper;
-        for (found, expected) in of_faults.iter().zip(at_samples.iter()) {
-            assert!((found - expected).abs() < 1e-3 * expected.max(1e-6), "{found} {expected}");
+        for (computed, expected) in of_faults.iter().zip(at_samples.iter()) {
+            assert!(
+                (computed - expected).abs() < 1e-3 * expected.max(1e-6),
+                "{computed} {expected}"
+            );
         }
     }
 }
 
 #[test]
 fn a_constant_sensor_fault_and_a_constant_actuator_fault_leave_no_error_of_the_reference() {
-    for own in all_designs() {
-        let system = fault_system(&own.plant, &own.gains, own.domain).unwrap();
-        let n = own.extended.states;
+    for design in all_designs() {
+        let system = fault_system(&design.plant, &design.gains, design.domain).unwrap();
+        let n = design.extended.states;
         let tracked = h() * &plant()[2] * at_constant_signals(&system).rows(0, n);
         assert!(tracked.amax() < 1e-10, "{tracked}");
     }
@@ -273,11 +282,11 @@ fn the_extended_plant_of_one_state_has_the_printed_matrices() {
 fn the_feedforward_of_one_state_is_its_closed_form() {
     // x' = a x + b u, u = k x + n r, y = c x: n = -(a + b k) / (b c).
     let (a, b, c, k) = (0.5, 3.0, 2.0, -1.0);
-    let found = feedforward(&one(a), &one(b), &one(c), &one(k), Domain::Continuous).unwrap();
-    assert!((found[(0, 0)] + (a + b * k) / (b * c)).abs() < 1e-15);
+    let computed = feedforward(&one(a), &one(b), &one(c), &one(k), Domain::Continuous).unwrap();
+    assert!((computed[(0, 0)] + (a + b * k) / (b * c)).abs() < 1e-15);
     let domain = Domain::Sampled { period: 0.1 };
-    let found = feedforward(&one(a), &one(b), &one(c), &one(0.1), domain).unwrap();
-    assert!((found[(0, 0)] - (1.0 - a - b * 0.1) / (b * c)).abs() < 1e-15);
+    let computed = feedforward(&one(a), &one(b), &one(c), &one(0.1), domain).unwrap();
+    assert!((computed[(0, 0)] - (1.0 - a - b * 0.1) / (b * c)).abs() < 1e-15);
 }
 
 #[test]
@@ -291,12 +300,12 @@ fn references_are_reached_without_error_by_both_actions() {
     let (k_x, k_i) = (whole.columns(0, 3).into_owned(), whole.columns(3, 2).into_owned());
     let integral = Action::Integral { output: &output, gain: &k_i, feedforward: None };
     for (k_x, action) in [(&k, Action::Feedforward(&n_r)), (&k_x, integral)] {
-        let own = reference_system(&a, &b, k_x, &action, Domain::Continuous).unwrap();
-        let found = at_constant_signals(&own);
-        let error = &output * found.rows(0, 3) - DMatrix::identity(2, 2);
+        let design = reference_system(&a, &b, k_x, &action, Domain::Continuous).unwrap();
+        let computed = at_constant_signals(&design);
+        let error = &output * computed.rows(0, 3) - DMatrix::identity(2, 2);
         assert!(error.amax() < 1e-13, "{error}");
         // The commands hold the plant there: A x + B u = 0.
-        assert!((&a * found.rows(0, 3) + &b * found.rows(3, 2)).amax() < 1e-13);
+        assert!((&a * computed.rows(0, 3) + &b * computed.rows(3, 2)).amax() < 1e-13);
     }
 }
 
@@ -350,21 +359,22 @@ fn feedforward_beside_integrals_leaves_the_slowest_modes_at_rest_and_the_constan
     let output = h() * c;
     for domain in [Domain::Continuous, Domain::Sampled { period: PERIOD }] {
         let poles = real_poles(&[-1.0, -1.2, -3.0, -3.3, -3.6]);
-        let (own, poles) = match domain {
+        let (design, poles) = match domain {
             Domain::Continuous => ((a.clone(), b.clone()), poles),
             Domain::Sampled { period } => (
                 control::hold::zero_order_hold(&a, &b, period).unwrap(),
                 sampled::sampled_poles(&poles, period).unwrap(),
             ),
         };
-        let (a_e, b_e) = extended_pair(&own.0, &own.1, &output, domain).unwrap();
+        let (a_e, b_e) = extended_pair(&design.0, &design.1, &output, domain).unwrap();
         let assign = if domain == Domain::Continuous { place } else { place_discrete };
         let k = assign(&a_e, &b_e, &poles).unwrap().gain;
-        let found = integral_feedforward(&own.0, &own.1, &output, &k, domain).unwrap().unwrap();
+        let computed =
+            integral_feedforward(&design.0, &design.1, &output, &k, domain).unwrap().unwrap();
         let (k_x, k_i) = (k.columns(0, 3).into_owned(), k.columns(3, 2).into_owned());
         let action =
-            Action::Integral { output: &output, gain: &k_i, feedforward: Some(&found.gain) };
-        let system = reference_system(&own.0, &own.1, &k_x, &action, domain).unwrap();
+            Action::Integral { output: &output, gain: &k_i, feedforward: Some(&computed.gain) };
+        let system = reference_system(&design.0, &design.1, &k_x, &action, domain).unwrap();
         // The constant response: H C x = r.
         let at_rest = match domain {
             Domain::Continuous => -&system.a,
@@ -381,8 +391,8 @@ fn feedforward_beside_integrals_leaves_the_slowest_modes_at_rest_and_the_constan
         let values = reached.clone().svd(false, false).singular_values;
         assert!(values[3] < 1e-9 * values[0] && values[2] > 1e-6 * values[0], "{values}");
         let slow: Vec<_> = poles.iter().take(2).map(|value| value.re).collect();
-        for value in &found.silent {
-            assert!(slow.iter().any(|own| (own - value.re).abs() < 1e-7), "{value}");
+        for value in &computed.silent {
+            assert!(slow.iter().any(|design| (design - value.re).abs() < 1e-7), "{value}");
         }
     }
 }
@@ -409,28 +419,29 @@ fn a_slow_mode_that_no_command_moves_leaves_the_feedforward_beside_integrals_as_
     let (wide, b, output) = (&inverse * wide * &m, &inverse * b, output * &m);
     let k_x = k.columns(0, 4) * &m;
     let k = DMatrix::from_fn(k.nrows(), 6, |i, j| if j < 4 { k_x[(i, j)] } else { k[(i, j)] });
-    let found = integral_feedforward(&wide, &b, &output, &k, Domain::Continuous).unwrap().unwrap();
-    assert!((&found.gain - &alone.gain).amax() < 1e-9 * alone.gain.amax(), "{}", found.gain);
-    assert!(found.silent.iter().all(|value| value.re < -0.9), "{:?}", found.silent);
+    let computed =
+        integral_feedforward(&wide, &b, &output, &k, Domain::Continuous).unwrap().unwrap();
+    assert!((&computed.gain - &alone.gain).amax() < 1e-9 * alone.gain.amax(), "{}", computed.gain);
+    assert!(computed.silent.iter().all(|value| value.re < -0.9), "{:?}", computed.silent);
 }
 
 #[test]
 fn half_of_a_pair_is_no_silent_mode_and_a_faster_one_does_not_take_its_place() {
     // One state, one integral, two complex eigenvalues.
     let k = matrix(1, &[-1.0, 4.0]);
-    let found = integral_feedforward(&one(-1.0), &one(1.0), &one(1.0), &k, Domain::Continuous);
-    assert!(found.unwrap().unwrap_err().contains("half of a complex pair"));
+    let computed = integral_feedforward(&one(-1.0), &one(1.0), &one(1.0), &k, Domain::Continuous);
+    assert!(computed.unwrap().unwrap_err().contains("half of a complex pair"));
     // x'' = u with the eigenvalues -1 ± i and -3, of which the real one is the fastest.
     let [a, b, output] = double_integrator();
     let k = matrix(1, &[-8.0, -5.0, 6.0]);
-    let found = integral_feedforward(&a, &b, &output, &k, Domain::Continuous);
-    assert!(found.unwrap().unwrap_err().contains("half of a complex pair"));
+    let computed = integral_feedforward(&a, &b, &output, &k, Domain::Continuous);
+    assert!(computed.unwrap().unwrap_err().contains("half of a complex pair"));
     // With -0.5 in place of -3 the real one is the slowest: N_r = -W_i / (W_x' B) by its left eigenvector.
     let k = matrix(1, &[-3.0, -2.5, 1.0]);
-    let found = integral_feedforward(&a, &b, &output, &k, Domain::Continuous).unwrap().unwrap();
+    let computed = integral_feedforward(&a, &b, &output, &k, Domain::Continuous).unwrap().unwrap();
     // s^3 + 2.5 s^2 + 3 s + 1 over s + 0.5: (s^2 + 2 s + 2); x = y responds by 2 / (s^2 + 2 s + 2).
-    assert!((found.silent[0].re + 0.5).abs() < 1e-12 && found.silent.len() == 1);
-    assert!((found.gain[(0, 0)] - 2.0).abs() < 1e-12, "{}", found.gain);
+    assert!((computed.silent[0].re + 0.5).abs() < 1e-12 && computed.silent.len() == 1);
+    assert!((computed.gain[(0, 0)] - 2.0).abs() < 1e-12, "{}", computed.gain);
 }
 
 fn double_integrator() -> [DMatrix<f64>; 3] {
@@ -533,22 +544,22 @@ fn commands_in_one_direction_and_commands_without_integral_do_not_hinder_the_pro
     let k_1 = matrix(3, &[1.2, 0.5, 2.4, 1.0, 0.0, 0.0]);
     let ranges = [Some(1.0), Some(2.0), Some(1.0)];
     for domain in [SAMPLED, Domain::Continuous] {
-        let (_, found) = calculations([&k_0, &k_1], &ranges, 0.3, domain).unwrap();
-        assert_eq!(found, InterpolatedWindup::Stable);
+        let (_, computed) = calculations([&k_0, &k_1], &ranges, 0.3, domain).unwrap();
+        assert_eq!(computed, InterpolatedWindup::Stable);
     }
     // Half of the way K_i is zero, and L_w is not.
-    let (_, found) = calculations([&one(1.0), &one(-1.0)], &[Some(1.0)], 0.3, SAMPLED).unwrap();
-    assert!(matches!(found, InterpolatedWindup::Undecided { .. }), "{found:?}");
+    let (_, computed) = calculations([&one(1.0), &one(-1.0)], &[Some(1.0)], 0.3, SAMPLED).unwrap();
+    assert!(matches!(computed, InterpolatedWindup::Undecided { .. }), "{computed:?}");
     // K_i changes by a factor of 100: near the middle L_w K_i = f 101^2 / 400 > 2.
     let far = [&one(1.0), &one(100.0)];
-    let (_, found) = calculations(far, &[Some(1.0)], 0.3, SAMPLED).unwrap();
-    assert!(matches!(found, InterpolatedWindup::Unstable { .. }), "{found:?}");
+    let (_, computed) = calculations(far, &[Some(1.0)], 0.3, SAMPLED).unwrap();
+    assert!(matches!(computed, InterpolatedWindup::Unstable { .. }), "{computed:?}");
     // In continuous time this is only fast.
-    let (_, found) = calculations(far, &[Some(1.0)], 0.3, Domain::Continuous).unwrap();
-    assert_eq!(found, InterpolatedWindup::Stable);
+    let (_, computed) = calculations(far, &[Some(1.0)], 0.3, Domain::Continuous).unwrap();
+    assert_eq!(computed, InterpolatedWindup::Stable);
     let many = DMatrix::from_element(11, 1, 1.0);
-    let (_, found) = calculations([&many, &many], &[Some(1.0); 11], 0.3, SAMPLED).unwrap();
-    assert!(matches!(found, InterpolatedWindup::Undecided { limited } if limited.len() == 11));
+    let (_, computed) = calculations([&many, &many], &[Some(1.0); 11], 0.3, SAMPLED).unwrap();
+    assert!(matches!(computed, InterpolatedWindup::Undecided { limited } if limited.len() == 11));
 }
 
 /// Reproducible numbers between 0 and 1.

@@ -27,9 +27,9 @@ fn assert_zeros(zeros: &[Complex<f64>], expected: &[Complex<f64>], allowed: f64)
 #[test]
 fn the_example_of_slicot_has_its_published_zeros() {
     let (a, b, c) = slicot();
-    let found = zeros(&a, &b, &c).unwrap();
-    assert_zeros(&found.finite, &[Complex::new(-1.0, 0.0), Complex::new(2.0, 0.0)], 1e-12);
-    assert_eq!(found.rank, 2);
+    let actual = zeros(&a, &b, &c).unwrap();
+    assert_zeros(&actual.finite, &[Complex::new(-1.0, 0.0), Complex::new(2.0, 0.0)], 1e-12);
+    assert_eq!(actual.rank, 2);
     let dual = zeros(&a.transpose(), &c.transpose(), &b.transpose()).unwrap();
     assert_zeros(&dual.finite, &[Complex::new(-1.0, 0.0), Complex::new(2.0, 0.0)], 1e-12);
 }
@@ -38,11 +38,11 @@ fn the_example_of_slicot_has_its_published_zeros() {
 fn square_systems_have_the_zeros_that_scipy_finds() {
     for case in 0..3 {
         let of = |part: &str| reference(&format!("zeros_{case}{part}"));
-        let found = zeros(&of("_a"), &of("_b"), &of("_c")).unwrap();
+        let actual = zeros(&of("_a"), &of("_b"), &of("_c")).unwrap();
         let expected: Vec<_> =
             of("").column_iter().map(|zero| Complex::new(zero[0], zero[1])).collect();
-        assert_zeros(&found.finite, &expected, 1e-9);
-        assert_eq!(found.rank, of("_b").ncols());
+        assert_zeros(&actual.finite, &expected, 1e-9);
+        assert_eq!(actual.rank, of("_b").ncols());
     }
 }
 
@@ -52,11 +52,11 @@ fn units_do_not_move_the_zeros() {
     let units = DMatrix::from_diagonal(&DVector::from_vec(vec![1., 1e6, 1e-9, 1e12, 1e3, 1.]));
     let inverse = units.map(|unit| if unit > 0.0 { 1.0 / unit } else { 0.0 });
     let of = |part: &str| reference(&format!("zeros_1{part}"));
-    let found =
+    let actual =
         zeros(&(&units * of("_a") * &inverse), &(&units * of("_b") * 1e7), &(of("_c") * inverse));
     let expected: Vec<_> =
         of("").column_iter().map(|zero| Complex::new(zero[0], zero[1])).collect();
-    assert_zeros(&found.unwrap().finite, &expected, 1e-9);
+    assert_zeros(&actual.unwrap().finite, &expected, 1e-9);
 }
 
 /// With two copies of one input, combinations that cancel have no effect; the zeros are those of

@@ -30,8 +30,8 @@ fn values_convert_between_units_of_one_quantity_only() {
         ("N.m", "J", 3.0, 3.0),
     ] {
         let (factor, offset) = base(from).conversion(&base(to)).unwrap();
-        let found = factor * value + offset;
-        assert!((found - expected).abs() <= 1e-12 * expected, "{from} to {to}: {found}");
+        let actual = factor * value + offset;
+        assert!((actual - expected).abs() <= 1e-12 * expected, "{from} to {to}: {actual}");
     }
     for (from, to) in [("N", "kg"), ("rad", "1"), ("K", "mol")] {
         assert_eq!(base(from).conversion(&base(to)), None, "{from} to {to}");
@@ -113,8 +113,8 @@ fn conversions_have_the_published_factors() {
         ("kW.h", 3.6e6),
         ("g/cm3", 1000.0),
     ] {
-        let found = base(expression).factor;
-        assert!((found - factor).abs() <= 3e-16 * factor, "{expression}: {found} {factor}");
+        let actual = base(expression).factor;
+        assert!((actual - factor).abs() <= 3e-16 * factor, "{expression}: {actual} {factor}");
     }
 }
 
@@ -166,7 +166,7 @@ fn an_unknown_unit_is_refused_with_its_position() {
     {
         let error = Unit::parse(expression).unwrap_err();
         assert!(
-            matches!(error, UnitError::UnknownName { column: found, .. } if found == column),
+            matches!(error, UnitError::UnknownName { column: actual, .. } if actual == column),
             "{error}"
         );
     }
@@ -189,7 +189,7 @@ fn an_unknown_unit_is_refused_with_its_position() {
     ] {
         let error = Unit::parse(expression).unwrap_err();
         assert!(
-            matches!(error, UnitError::Syntax { column: found, .. } if found == column),
+            matches!(error, UnitError::Syntax { column: actual, .. } if actual == column),
             "{expression}: {error}"
         );
     }

@@ -260,7 +260,7 @@ mod tests {
         let call = calls(address).next().unwrap();
         assert_eq!((&*call.instance, call.function, call.time), ("one", "fmi2DoStep", 0.5));
         assert_eq!(calls(address).count(), 1);
-        assert!(calls(1).any(|found| found == call));
+        assert!(calls(1).any(|actual| actual == call));
         one.leave();
         assert!(calls(address).all(|call| &*call.instance != "one"));
         one.enter(&"fmi2GetReal");

@@ -226,10 +226,10 @@ mod tests {
         let failure = Failure::Panicked("é".repeat(TEXT));
         let error =
             CallError { function: "another", failure, messages: vec!["x".repeat(TEXT + 1)] };
-        let found = through(&error);
-        assert_eq!(found.function, "fmi2DoStep");
-        assert_eq!(found.failure, Failure::Panicked("é".repeat(TEXT / 2)));
-        assert_eq!(found.messages, ["x".repeat(TEXT)]);
+        let actual = through(&error);
+        assert_eq!(actual.function, "fmi2DoStep");
+        assert_eq!(actual.failure, Failure::Panicked("é".repeat(TEXT / 2)));
+        assert_eq!(actual.messages, ["x".repeat(TEXT)]);
     }
 
     fn requests<'a>() -> [Request<'a>; 5] {

@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn each_write_beside_or_into_a_constant_array_is_named() {
-        let found = |list_at: Option<isize>, array_at: Option<isize>, constant: bool| {
+        let actual = |list_at: Option<isize>, array_at: Option<isize>, constant: bool| {
             let call = |list: *mut u32, array: *mut f64| {
                 // SAFETY: within the margins.
                 unsafe {
@@ -258,19 +258,19 @@ mod tests {
             };
             done.1.unwrap_or_default()
         };
-        assert_eq!(found(None, None, true), "");
-        assert_eq!(found(None, Some(1), false), "");
-        assert_eq!(found(None, Some(2), false), "wrote past the end of its array of values");
-        assert_eq!(found(None, Some(-1), false), "wrote before the start of its array of values");
-        assert_eq!(found(None, Some(1), true), "changed its constant array of values");
+        assert_eq!(actual(None, None, true), "");
+        assert_eq!(actual(None, Some(1), false), "");
+        assert_eq!(actual(None, Some(2), false), "wrote past the end of its array of values");
+        assert_eq!(actual(None, Some(-1), false), "wrote before the start of its array of values");
+        assert_eq!(actual(None, Some(1), true), "changed its constant array of values");
         let references = "changed its constant array of value references";
-        assert_eq!(found(Some(0), None, true), references);
-        assert_eq!(found(Some(1), None, false), references);
+        assert_eq!(actual(Some(0), None, true), references);
+        assert_eq!(actual(Some(1), None, false), references);
     }
 
     #[test]
     fn each_of_several_arrays_has_its_name() {
-        let found = |orders_at: Option<isize>, text_at: Option<isize>| {
+        let actual = |orders_at: Option<isize>, text_at: Option<isize>| {
             let done = constant(true, ORDERS, &[1_i32, 2], |orders| {
                 constants(true, STRING, &[b"one\0", b"three\0"], |texts| {
                     // SAFETY: within the margins.
@@ -284,12 +284,12 @@ mod tests {
             });
             done.1.unwrap_or_default()
         };
-        assert_eq!(found(None, None), "");
-        assert_eq!(found(Some(1), None), "changed its constant array of orders");
-        assert_eq!(found(Some(2), None), "wrote past the end of its array of orders");
-        assert_eq!(found(None, Some(0)), "changed its constant array of characters of a string");
+        assert_eq!(actual(None, None), "");
+        assert_eq!(actual(Some(1), None), "changed its constant array of orders");
+        assert_eq!(actual(Some(2), None), "wrote past the end of its array of orders");
+        assert_eq!(actual(None, Some(0)), "changed its constant array of characters of a string");
         assert_eq!(
-            found(None, Some(6)),
+            actual(None, Some(6)),
             "wrote past the end of its array of characters of a string"
         );
     }

@@ -137,10 +137,10 @@ mod tests {
         }
 
         fn variables(&self) -> Vec<Variable<Self>> {
-            let v = Variable::real_array("v", "", &[LENGTH], |own: &mut Self| &mut own.v[..]);
+            let v = Variable::real_array("v", "", &[LENGTH], |slave: &mut Self| &mut slave.v[..]);
             let by = |k| if OTHER && k + 1 == LENGTH { "m" } else { "n" };
             let v = v.enumerate().map(|(k, element)| element.parameter().sized_by(&[by(k)]));
-            let n = Variable::structural("n", "", |own: &mut Self| &mut own.n);
+            let n = Variable::structural("n", "", |slave: &mut Self| &mut slave.n);
             std::iter::once(n).chain(v).collect()
         }
     }

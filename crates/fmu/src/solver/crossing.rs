@@ -200,16 +200,16 @@ mod tests {
 
     #[test]
     fn the_first_of_several_crossings_is_found() {
-        let found = with_roots(1.0, [0.2, 0.3, 0.6, 0.7]).first_negative().unwrap();
-        assert!((found - 0.2).abs() < 2e-6 && found >= 0.2, "{found}");
-        let found = with_roots(-1.0, [-0.5, 0.35, 1.5, 2.0]).first_negative().unwrap();
-        assert!((found - 0.35).abs() < 2e-6 && found >= 0.35, "{found}");
+        let actual = with_roots(1.0, [0.2, 0.3, 0.6, 0.7]).first_negative().unwrap();
+        assert!((actual - 0.2).abs() < 2e-6 && actual >= 0.2, "{actual}");
+        let actual = with_roots(-1.0, [-0.5, 0.35, 1.5, 2.0]).first_negative().unwrap();
+        assert!((actual - 0.35).abs() < 2e-6 && actual >= 0.35, "{actual}");
     }
 
     #[test]
     fn a_narrow_dip_between_positive_ends_is_found() {
-        let found = with_roots(1.0, [0.4, 0.400_1, -1.0, -2.0]).first_negative().unwrap();
-        assert!((0.4..0.400_1).contains(&found), "{found}");
+        let actual = with_roots(1.0, [0.4, 0.400_1, -1.0, -2.0]).first_negative().unwrap();
+        assert!((0.4..0.400_1).contains(&actual), "{actual}");
     }
 
     #[test]
@@ -221,16 +221,16 @@ mod tests {
 
     #[test]
     fn a_fall_from_zero_is_found_at_the_start() {
-        let found = Quartic([0.0, -0.1, -0.2, -0.3, -0.4]).first_negative().unwrap();
-        assert!(found < 2e-6);
+        let actual = Quartic([0.0, -0.1, -0.2, -0.3, -0.4]).first_negative().unwrap();
+        assert!(actual < 2e-6);
     }
 
     #[test]
     fn five_values_determine_the_polynomial() {
         let value = |s: f64| 3.0 - s * (2.0 + s * (1.5 - s * (4.0 - 0.7 * s)));
-        let found = Quartic::interpolate([0.0, 0.25, 0.5, 0.75, 1.0].map(value));
+        let actual = Quartic::interpolate([0.0, 0.25, 0.5, 0.75, 1.0].map(value));
         for part in [0.0, 0.1, 0.33, 0.5, 0.8, 1.0] {
-            assert!((found.value(part) - value(part)).abs() < 1e-13);
+            assert!((actual.value(part) - value(part)).abs() < 1e-13);
         }
     }
 
@@ -242,21 +242,21 @@ mod tests {
             (1.0 - s * s).exp_m1() - 0.9
         };
         let root = (1.0 - 1.9_f64.ln()).sqrt();
-        let found = locate(margin(0.0), (1.0, margin(1.0)), WIDTH, margin);
-        assert!((found - root).abs() < 2e-15 && margin(found) < 0.0);
+        let actual = locate(margin(0.0), (1.0, margin(1.0)), WIDTH, margin);
+        assert!((actual - root).abs() < 2e-15 && margin(actual) < 0.0);
         assert!(count.get() < 20, "{} evaluations", count.get());
     }
 
     #[test]
     fn a_crossing_at_the_very_start_is_located_there() {
-        let found = locate(0.0, (1e-6, -1e-6), WIDTH, |s| -s);
-        assert!((0.0..=1e-14).contains(&found), "{found}");
+        let actual = locate(0.0, (1e-6, -1e-6), WIDTH, |s| -s);
+        assert!((0.0..=1e-14).contains(&actual), "{actual}");
     }
 
     #[test]
     fn an_estimate_before_the_crossing_is_extended_up_to_the_end() {
         assert_eq!(search(0.1, 1.0, WIDTH, |_| 1.0), Crossing::NoneUpTo(1.0));
-        let Crossing::At(found) = search(0.1, 1.0, WIDTH, |s| 0.75 - s) else { panic!("none") };
-        assert!((found - 0.75).abs() < 1e-14);
+        let Crossing::At(actual) = search(0.1, 1.0, WIDTH, |s| 0.75 - s) else { panic!("none") };
+        assert!((actual - 0.75).abs() < 1e-14);
     }
 }

@@ -79,7 +79,8 @@ fn dependencies(description: &ModelDescription, name: &str) -> Vec<String> {
 #[test]
 fn the_fields_are_the_variables_in_their_order() {
     let description = description();
-    let names: Vec<_> = description.variables.iter().map(|own| own.name.as_str()).collect();
+    let names: Vec<_> =
+        description.variables.iter().map(|variable| variable.name.as_str()).collect();
     let expected = "time force[1] force[2] position[1] position[2] der(position[1]) \
                     der(position[2]) gain[1,1] gain[1,2] gain[2,1] gain[2,2] gain[3,1] gain[3,2] \
                     table[1,1] table[2,1] mass mode count power enabled label inverse guess limit type";
@@ -111,7 +112,7 @@ fn roles_types_and_attributes_are_described() {
     assert_eq!(real("der(position[2])").derivative, Some(5));
     assert_eq!(real("mass").quantity.as_deref(), Some("Mass"));
     assert_eq!((real("mass").min, real("mass").max), (Some(1e-3), None));
-    assert!(matches!(&find("mode").kind, Kind::Enumeration(own) if own.start == Some(1)));
+    assert!(matches!(&find("mode").kind, Kind::Enumeration(kind) if kind.start == Some(1)));
     assert_eq!(description.types[0].items[1], ("on and off".to_owned(), 1));
     assert_eq!(find("count").description, None);
     assert_eq!(find("enabled").kind, Kind::Boolean(Some(true)));
@@ -168,8 +169,8 @@ impl Model for Misspelt {}
 
 #[test]
 fn an_unknown_unit_is_an_error_of_the_first_test_with_its_section() {
-    let found = crate::problems::<Misspelt>(Path::new("")).unwrap_err().to_string();
+    let actual = crate::problems::<Misspelt>(Path::new("")).unwrap_err().to_string();
     for part in ["variable level", "\"meter\"", "column 1", "section 2.2.2"] {
-        assert!(found.contains(part), "{found}");
+        assert!(actual.contains(part), "{actual}");
     }
 }

@@ -32,8 +32,8 @@ fn the_error_of_a_long_run_follows_the_tolerance() {
     let circle = |_: f64, y: &[f64], slope: &mut [f64]| (slope[0], slope[1]) = (y[1], -y[0]);
     for method in [Method::Explicit, Method::Stiff, Method::Automatic] {
         for tolerance in [1e-4, 1e-6, 1e-8] {
-            let (found, ..) = run(method, tolerance, circle, &[0.0, 1.0], 10.0);
-            let error = (found[0] - 10.0_f64.sin()).abs() + (found[1] - 10.0_f64.cos()).abs();
+            let (actual, ..) = run(method, tolerance, circle, &[0.0, 1.0], 10.0);
+            let error = (actual[0] - 10.0_f64.sin()).abs() + (actual[1] - 10.0_f64.cos()).abs();
             assert!(error < 50.0 * tolerance, "{method:?} {tolerance}: {error}");
         }
     }
@@ -53,10 +53,10 @@ fn stiff_reactions_are_noticed_and_integrated() {
     let known = [(40.0, [7.158e-1, 9.185e-6, 2.842e-1]), (4e5, [4.939e-3, 1.985e-8, 9.951e-1])];
     for (end, expected) in known {
         for method in [Method::Automatic, Method::Stiff] {
-            let (found, steps, stepper) = run(method, 1e-6, robertson, &start, end);
+            let (actual, steps, stepper) = run(method, 1e-6, robertson, &start, end);
             assert!(stepper.memory.is_stiff && steps < 400, "{method:?} {steps}");
-            for (found, expected) in found.iter().zip(expected) {
-                assert!((found / expected - 1.0).abs() < 1e-3, "{end}: {found} {expected}");
+            for (actual, expected) in actual.iter().zip(expected) {
+                assert!((actual / expected - 1.0).abs() < 1e-3, "{end}: {actual} {expected}");
             }
         }
     }
@@ -71,9 +71,9 @@ fn equations_that_are_no_longer_stiff_return_to_the_explicit_method() {
         slope[1] = 20.0 * y[2];
         slope[2] = -20.0 * y[1];
     };
-    let (found, _, stepper) = run(Method::Automatic, 1e-6, equations, &[0.0, 0.0, 1.0], 5.0);
+    let (actual, _, stepper) = run(Method::Automatic, 1e-6, equations, &[0.0, 0.0, 1.0], 5.0);
     assert!(!stepper.memory.is_stiff);
-    assert!((found[1] - 100.0_f64.sin()).abs() < 1e-3, "{}", found[1]);
+    assert!((actual[1] - 100.0_f64.sin()).abs() < 1e-3, "{}", actual[1]);
 }
 
 #[test]

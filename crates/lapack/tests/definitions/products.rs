@@ -191,8 +191,8 @@ fn products_in_single_precision_are_right_to_its_rounding() {
     }
     let near = |x: f32, y: f32| assert!((x - y).abs() < 1e-6, "{x} {y}");
     // A = [1, 0.2; 0.1, 3], B = [2, 0.3; -1, 0.7].
-    for (found, expected) in c.iter().zip([1.8, -2.8, 0.44, 2.13]) {
-        near(*found, expected);
+    for (computed, expected) in c.iter().zip([1.8, -2.8, 0.44, 2.13]) {
+        near(*computed, expected);
     }
     near(y[0], 1.8);
     near(y[1], -2.8);

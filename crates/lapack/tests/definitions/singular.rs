@@ -104,17 +104,18 @@ fn the_singular_value_decomposition_is_one_for_any_shape_and_rank() {
     for a in general_cases() {
         for divide in [true, false] {
             for job in [b'S', b'A'] {
-                let found = svd(divide, job, &a);
-                assert_eq!(found.info, 0);
+                let actual = svd(divide, job, &a);
+                assert_eq!(actual.info, 0);
                 assert!(
-                    found.values.iter().rev().is_sorted() && found.values.iter().all(|&s| s >= 0.0)
+                    actual.values.iter().rev().is_sorted()
+                        && actual.values.iter().all(|&s| s >= 0.0)
                 );
-                assert_orthonormal(&found.u);
-                assert_orthonormal(&found.vt.transpose());
-                let s = DMatrix::from_fn(found.u.ncols(), found.vt.nrows(), |i, j| {
-                    if i == j { found.values[i] } else { 0.0 }
+                assert_orthonormal(&actual.u);
+                assert_orthonormal(&actual.vt.transpose());
+                let s = DMatrix::from_fn(actual.u.ncols(), actual.vt.nrows(), |i, j| {
+                    if i == j { actual.values[i] } else { 0.0 }
                 });
-                let rebuilt = &found.u * s * &found.vt;
+                let rebuilt = &actual.u * s * &actual.vt;
                 assert!((rebuilt - &a).amax() <= 1e-14 * size(&a));
             }
         }

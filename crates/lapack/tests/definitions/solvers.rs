@@ -17,11 +17,11 @@ fn potrf_factors_either_triangle_and_leaves_the_other() {
             // SAFETY: the array has the size given.
             unsafe { lapack::dpotrf(letter, int(n), &mut stored, int(n + 2), &mut info) };
             assert_eq!(info, 0);
-            let found = matrix(n, n, 2, &stored);
+            let actual = matrix(n, n, 2, &stored);
             let (factor, kept, before) = if letter == b'U' {
-                (found.upper_triangle().transpose(), found.lower_triangle(), a.lower_triangle())
+                (actual.upper_triangle().transpose(), actual.lower_triangle(), a.lower_triangle())
             } else {
-                (found.lower_triangle(), found.upper_triangle(), a.upper_triangle())
+                (actual.lower_triangle(), actual.upper_triangle(), a.upper_triangle())
             };
             assert!((&factor * factor.transpose() - &a).amax() < 1e-14);
             let without = |m: &DMatrix<f64>| m - DMatrix::from_diagonal(&m.diagonal());

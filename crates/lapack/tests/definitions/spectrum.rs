@@ -75,15 +75,15 @@ fn syevr_finds_ascending_eigenvalues_and_orthonormal_eigenvectors() {
     for a in symmetric_cases() {
         let n = a.nrows();
         for (triangle, half) in [(b'U', a.upper_triangle()), (b'L', a.lower_triangle())] {
-            let found = syevr(b'V', triangle, &half);
-            assert_eq!(found.count, int(n));
-            assert!(found.values.is_sorted());
-            let v = matrix(n, n, 1, &found.vectors);
+            let actual = syevr(b'V', triangle, &half);
+            assert_eq!(actual.count, int(n));
+            assert!(actual.values.is_sorted());
+            let v = matrix(n, n, 1, &actual.vectors);
             assert_orthonormal(&v);
-            let values = DMatrix::from_fn(n, n, |i, j| if i == j { found.values[i] } else { 0.0 });
+            let values = DMatrix::from_fn(n, n, |i, j| if i == j { actual.values[i] } else { 0.0 });
             assert!((&a * &v - &v * values).amax() <= 1e-14 * size(&a));
             let alone = syevr(b'N', triangle, &half);
-            assert_eq!(alone.values, found.values);
+            assert_eq!(alone.values, actual.values);
             assert!(alone.vectors.iter().all(|&entry| entry == GUARD));
         }
     }
@@ -100,8 +100,8 @@ fn syevr_finds_the_eigenvalues_of_the_second_difference() {
         _ => 0.0,
     });
     let step = std::f64::consts::PI / 13.0;
-    let found = syevr(b'N', b'U', &a);
-    for (k, value) in (1..).zip(&found.values) {
+    let actual = syevr(b'N', b'U', &a);
+    for (k, value) in (1..).zip(&actual.values) {
         assert!((value - (2.0 - 2.0 * (f64::from(k) * step).cos())).abs() < 1e-14);
     }
 }

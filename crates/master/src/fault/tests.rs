@@ -30,8 +30,8 @@ fn series(line: &mut FaultChain, values: &[(f64, f64)]) -> Vec<f64> {
 #[test]
 fn a_bias_acts_from_its_start_to_before_its_end() {
     let mut line = single(Fault::Bias(0.5), 1.0, Some(3.0));
-    let found = series(&mut line, &[(0.0, 1.0), (1.0, 2.0), (2.0, 4.0), (3.0, 8.0)]);
-    assert_eq!(found, [1.0, 2.5, 4.5, 8.0]);
+    let actual = series(&mut line, &[(0.0, 1.0), (1.0, 2.0), (2.0, 4.0), (3.0, 8.0)]);
+    assert_eq!(actual, [1.0, 2.5, 4.5, 8.0]);
 }
 
 #[test]
@@ -67,8 +67,8 @@ fn added_values_keep_the_curvature_and_values_that_jump_have_none() {
 #[test]
 fn a_drift_grows_from_its_start_and_vanishes_at_its_end() {
     let mut line = single(Fault::Drift(0.25), 2.0, Some(6.0));
-    let found = series(&mut line, &[(0.0, 1.0), (2.0, 1.0), (4.0, 1.0), (5.0, 3.0), (6.0, 1.0)]);
-    assert_eq!(found, [1.0, 1.0, 1.5, 3.75, 1.0]);
+    let actual = series(&mut line, &[(0.0, 1.0), (2.0, 1.0), (4.0, 1.0), (5.0, 3.0), (6.0, 1.0)]);
+    assert_eq!(actual, [1.0, 1.0, 1.5, 3.75, 1.0]);
     let arrived = line.apply_sample(4.0, Sample { value: 0.0, slope: 1.0 });
     assert_eq!(arrived, Sample { value: 0.5, slope: 1.25 });
 }
@@ -143,10 +143,10 @@ fn integers_and_booleans_have_faults_too() {
     assert_eq!(bias.apply_integer(0.0, largest), largest);
     assert_eq!(bias.apply_integer(0.0, largest + 2), largest + 5);
     let inversion = single(Fault::Inversion, 1.0, Some(2.0));
-    let found: Vec<_> = [(0.0, 1), (1.0, 1), (1.5, 0), (1.5, 7), (2.0, 0)]
+    let actual: Vec<_> = [(0.0, 1), (1.0, 1), (1.5, 0), (1.5, 7), (2.0, 0)]
         .map(|(time, value)| inversion.apply_boolean(time, value))
         .into();
-    assert_eq!(found, [1, 0, 1, 0, 0]);
+    assert_eq!(actual, [1, 0, 1, 0, 0]);
 }
 
 #[test]
@@ -155,11 +155,11 @@ fn breaks_are_start_end_and_the_edges_of_a_periodic_dropout() {
     let dropout = Fault::Dropout { lost, instead: None };
     let faults = vec![(window(1.0, Some(5.2)), dropout), (window(3.2, None), Fault::Bias(1.0))];
     let line = FaultChain::new(faults, 0.1).unwrap();
-    let mut found = vec![0.0];
-    while let Some(next) = line.next_break(found[found.len() - 1]) {
-        found.push(next);
+    let mut actual = vec![0.0];
+    while let Some(next) = line.next_break(actual[actual.len() - 1]) {
+        actual.push(next);
     }
-    assert_eq!(found, [0.0, 1.0, 1.5, 3.0, 3.2, 3.5, 5.0, 5.2]);
+    assert_eq!(actual, [0.0, 1.0, 1.5, 3.0, 3.2, 3.5, 5.0, 5.2]);
     // A time that differs by rounding counts as past.
     assert_eq!(line.next_break(1.0 - 1e-12), Some(1.5));
 }

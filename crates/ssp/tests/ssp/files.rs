@@ -161,8 +161,8 @@ fn one_system_is_used_twice_by_its_id() {
 #[test]
 fn systems_that_contain_themselves_are_refused_soon() {
     let bench = Bench::new();
-    let own = r##"<ssd:System name="s" id="it"><ssd:Elements><ssd:Component name="a" source="#it"/><ssd:Component name="b" source="#it"/></ssd:Elements></ssd:System>"##;
-    let text = bench.refusal(&root(own, ""), "");
+    let body = r##"<ssd:System name="s" id="it"><ssd:Elements><ssd:Component name="a" source="#it"/><ssd:Component name="b" source="#it"/></ssd:Elements></ssd:System>"##;
+    let text = bench.refusal(&root(body, ""), "");
     assert!(text.ends_with("systems are nested in each other 64 times"), "{text}");
     // 2 x 2 x ... 2 systems, 40 levels.
     let level = |k: usize| {

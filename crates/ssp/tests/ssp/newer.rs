@@ -136,10 +136,12 @@ fn an_undeclared_prefix_and_empty_elements_are_read_with_a_warning() {
     let bench = Bench::new();
     fmus(&bench);
     let step = r#"<ssd:DefaultExperiment><ssd:Annotations><ssc:Annotation type="com.opensimulationplatform"><osp:Algorithm><osp:FixedStepAlgorithm baseStepSize="1e-3"/></osp:Algorithm></ssc:Annotation></ssd:Annotations></ssd:DefaultExperiment>"#;
-    let own = r#"<ssd:Connectors><ssd:Connector name="out" kind="output"/></ssd:Connectors>"#;
+    let connectors =
+        r#"<ssd:Connectors><ssd:Connector name="out" kind="output"/></ssd:Connectors>"#;
     let connections =
         r#"<ssd:Connection startElement="a" startConnector="y" endElement="" endConnector="out"/>"#;
-    let system = own.to_owned() + &root(&component("a", "a.fmu", "y output", ""), connections);
+    let system =
+        connectors.to_owned() + &root(&component("a", "a.fmu", "y output", ""), connections);
     let text = ssd(&system, step);
     let text =
         text.replace(" xmlns:osp=\"http://opensimulationplatform.com/SSP/OSPAnnotations\"", "");

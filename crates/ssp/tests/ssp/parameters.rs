@@ -70,9 +70,9 @@ fn later_bindings_win_over_earlier_ones_and_outer_ones_over_inner_ones() {
         format!("{head}{}<ssd:Elements>{tail}", bindings(&[binding("", &real("c.u", "3"), "")]));
     let outer = bindings(&[binding("", &real("m.c.sub.p", "4"), "")]);
     let opened = bench.open(&(outer + &root(&middle, "")), "").unwrap();
-    let mut found = settings(&opened.assembly);
-    found.sort();
-    assert_eq!(found, ["m.c.p = 1.0", "m.c.q = 2.0", "m.c.sub.p = 4.0", "m.c.u = 3.0"]);
+    let mut actual = settings(&opened.assembly);
+    actual.sort();
+    assert_eq!(actual, ["m.c.p = 1.0", "m.c.q = 2.0", "m.c.sub.p = 4.0", "m.c.u = 3.0"]);
     let outermost = bindings(&[binding("", &real("m.c.u", "5"), "")]);
     let opened = bench.open(&(outermost + &root(&middle, "")), "").unwrap();
     assert!(settings(&opened.assembly).contains(&"m.c.u = 5.0".to_owned()));
@@ -132,8 +132,8 @@ fn with_a_mapping_only_what_it_maps_is_applied_converted_then_transformed() {
     let mapping = entry("p", "", linear)
         + &entry("u", r#"suppressUnitConversion="true""#, linear)
         + &entry("sub.p", "", "");
-    let (found, warnings) = of_component(&[binding("", &parameters, &mapping)]).unwrap();
-    assert_eq!(found, ["c.p = 2.0", "c.u = 1001.0", "c.sub.p = 250.0"]);
+    let (actual, warnings) = of_component(&[binding("", &parameters, &mapping)]).unwrap();
+    assert_eq!(actual, ["c.p = 2.0", "c.u = 1001.0", "c.sub.p = 250.0"]);
     assert_eq!(warnings, [""; 0]);
 }
 
@@ -147,8 +147,8 @@ fn values_take_the_type_of_their_variable() {
         + &parameter("b", "Boolean", "1")
         + &parameter("s", "String", "a &amp; b")
         + &parameter("g", "Enumeration", "high");
-    let (found, _) = of_component(&[binding("", &all, "")]).unwrap();
-    assert_eq!(found, ["c.p = 3", "c.n = -4", "c.b = true", "c.s = a & b", "c.g = 2"]);
+    let (actual, _) = of_component(&[binding("", &all, "")]).unwrap();
+    assert_eq!(actual, ["c.p = 3", "c.n = -4", "c.b = true", "c.s = a & b", "c.g = 2"]);
     for (name, kind, value, expected) in [
         ("n", "Real", "4.5", "expected a value of type Integer, found 4.5"),
         ("p", "Boolean", "true", "expected a value of type Real, found true"),
@@ -167,19 +167,19 @@ fn values_take_the_type_of_their_variable() {
 fn names_of_items_are_mapped_without_their_numbers() {
     let parameter = r#"<ssv:Parameter name="g"><ssv:Enumeration value="schnell"/></ssv:Parameter>"#;
     let mapping = r#"<ssm:MappingEntry source="g" target="g"><ssc:EnumerationMappingTransformation><ssc:MapEntry source="schnell" target="high"/></ssc:EnumerationMappingTransformation></ssm:MappingEntry>"#;
-    let (found, _) = of_component(&[binding("", parameter, mapping)]).unwrap();
-    assert_eq!(found, ["c.g = 2"]);
+    let (actual, _) = of_component(&[binding("", parameter, mapping)]).unwrap();
+    assert_eq!(actual, ["c.g = 2"]);
 }
 
 #[test]
 fn variables_without_a_start_value_are_left_alone_with_a_word() {
-    let (found, warnings) = of_component(&[binding(
+    let (actual, warnings) = of_component(&[binding(
         "",
         &["y", "z", "w", "k"].map(|name| real(name, "2")).concat(),
         "",
     )])
     .unwrap();
-    assert_eq!(found, ["c.z = 2.0"]);
+    assert_eq!(actual, ["c.z = 2.0"]);
     assert_eq!(
         warnings,
         [
@@ -213,10 +213,10 @@ fn a_connector_of_a_system_passes_its_value_on_to_what_it_is_connected_to() {
             + &real("s.out", "7");
     let outer = bindings(&[binding("", &parameters, "")]);
     let opened = bench.open(&(outer + &root(&inner, "")), "").unwrap();
-    let mut found = settings(&opened.assembly);
-    found.sort();
+    let mut actual = settings(&opened.assembly);
+    actual.sort();
     // 500 mm are 0.5 m and 500 mm, the latter doubled.
-    assert_eq!(found, ["s.c.u = 0.5", "s.c.z = 2.0", "s.d.u = 1000.0"]);
+    assert_eq!(actual, ["s.c.u = 0.5", "s.c.z = 2.0", "s.d.u = 1000.0"]);
 }
 
 #[test]
@@ -242,8 +242,8 @@ fn values_and_mappings_may_stand_in_files_of_their_own_and_inside_the_fmu() {
 #[test]
 fn many_unknown_names_are_one_warning() {
     let many: String = (0..30).map(|k| real(&format!("x{k}"), "1")).collect();
-    let (found, warnings) = of_component(&[binding("", &many, "")]).unwrap();
-    assert_eq!(found, [""; 0]);
+    let (actual, warnings) = of_component(&[binding("", &many, "")]).unwrap();
+    assert_eq!(actual, [""; 0]);
     assert_eq!(
         warnings,
         ["parameter set \"set\": c has no x0, x1, x2, x3, x4 and 25 more: ignored"]

@@ -39,11 +39,11 @@ fn units_of_the_fmus_are_converted() {
 fn the_transformation_comes_after_the_conversion_or_instead_of_it() {
     // 5 (0.001 x) + 1 in m; and 5 x + 1 where the conversion is suppressed.
     let linear = r#"<ssc:LinearTransformation factor="5" offset="1"/>"#;
-    let found = connected(&real("mm"), &real("m"), linear, "").unwrap();
-    assert_eq!(found, ["a.y -> b.u * 0.005 + 1.0"]);
+    let actual = connected(&real("mm"), &real("m"), linear, "").unwrap();
+    assert_eq!(actual, ["a.y -> b.u * 0.005 + 1.0"]);
     let suppressed = r#"suppressUnitConversion="true""#;
-    let found = connected(&real("mm"), &real("m"), linear, suppressed).unwrap();
-    assert_eq!(found, ["a.y -> b.u * 5.0 + 1.0"]);
+    let actual = connected(&real("mm"), &real("m"), linear, suppressed).unwrap();
+    assert_eq!(actual, ["a.y -> b.u * 5.0 + 1.0"]);
     assert_eq!(connected(&real("mm"), &real("m"), "", suppressed).unwrap(), ["a.y -> b.u"]);
     assert_eq!(connected(&real("mm"), &real("K"), "", suppressed).unwrap(), ["a.y -> b.u"]);
 }
@@ -92,10 +92,10 @@ fn a_system_connector_converts_if_it_states_a_unit_and_passes_on_if_not() {
     let connections =
         connection("inner.cm", "b.u", "", "") + &connection("inner.plain", "b.v", "", "");
     let opened = bench.open(&root(&elements, &connections), units).unwrap();
-    let found = links(&opened.assembly);
-    assert_eq!(found[0], "inner.a.y -> b.u * 0.001 + 0.02");
+    let actual = links(&opened.assembly);
+    assert_eq!(actual[0], "inner.a.y -> b.u * 0.001 + 0.02");
     // There the value is still in mm when 2 is added.
-    assert_eq!(found[1], "inner.a.y -> b.v * 0.001 + 0.002");
+    assert_eq!(actual[1], "inner.a.y -> b.v * 0.001 + 0.002");
 }
 
 /// A mapping with these sources and targets.
@@ -109,12 +109,13 @@ fn map(kind: &str, pairs: &[(&str, &str)]) -> String {
 
 #[test]
 fn mappings_keep_what_they_do_not_name() {
-    let found = connected("Boolean", "Boolean", &map("Boolean", &[("true", "false")]), "").unwrap();
-    assert_eq!(found, ["a.y -> b.u false false"]);
+    let actual =
+        connected("Boolean", "Boolean", &map("Boolean", &[("true", "false")]), "").unwrap();
+    assert_eq!(actual, ["a.y -> b.u false false"]);
     let swapped = map("Boolean", &[("1", "0"), ("0", "1")]);
     assert_eq!(connected("Boolean", "Boolean", &swapped, "").unwrap(), ["a.y -> b.u true false"]);
-    let found = connected("Integer", "Integer", &map("Integer", &[("3", "-4"), ("5", "6")]), "");
-    assert_eq!(found.unwrap(), ["a.y -> b.u [(3, -4), (5, 6)]"]);
+    let actual = connected("Integer", "Integer", &map("Integer", &[("3", "-4"), ("5", "6")]), "");
+    assert_eq!(actual.unwrap(), ["a.y -> b.u [(3, -4), (5, 6)]"]);
     let (gear, speed) =
         (r#"Enumeration declaredType="Gear""#, r#"Enumeration declaredType="Speed""#);
     let items = map("Enumeration", &[("low", "slow"), ("high", "fast")]);
@@ -241,9 +242,9 @@ fn a_connector_of_a_nested_file_has_the_units_of_both_files() {
         component("a", "a.fmu", "y output", "") + &nested + &component("c", "c.fmu", "u input", "");
     let connections = connection("a.y", "s.u", "", "") + &connection("s.x", "c.u", "", "");
     let opened = bench.open(&root(&elements, &connections), DEG).unwrap();
-    let found = links(&opened.assembly);
+    let actual = links(&opened.assembly);
     assert_eq!(
-        found,
+        actual,
         ["s.b.x -> c.u * 57.29577951308232 + 0.0", "a.y -> s.b.u * 0.017453292519943295 + 0.0"]
     );
     assert_eq!(opened.warnings, [""; 0]);

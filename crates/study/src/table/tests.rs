@@ -68,23 +68,23 @@ fn an_invalid_table_is_refused_with_its_line() {
     ] {
         assert_eq!(refused(text), expected, "{text:?}");
     }
-    let found = parse(b"time,u\n0,1\n1,\xff\n").unwrap_err().to_string();
-    assert_eq!(found, "line 3: expected UTF-8 text, found other bytes");
+    let actual = parse(b"time,u\n0,1\n1,\xff\n").unwrap_err().to_string();
+    assert_eq!(actual, "line 3: expected UTF-8 text, found other bytes");
 }
 
 #[test]
 fn a_quotation_that_does_not_end_gives_a_short_message() {
     let text = format!("time,u\n0,\"{}", "1,2\n".repeat(100_000));
-    let found = refused(&text);
-    assert!(found.starts_with("line 2, column \"u\": expected a finite number"), "{found}");
-    assert!(found.len() < 150, "{found}");
+    let actual = refused(&text);
+    assert!(actual.starts_with("line 2, column \"u\": expected a finite number"), "{actual}");
+    assert!(actual.len() < 150, "{actual}");
 }
 
 #[test]
 fn a_missing_file_is_named() {
     let folder = tempfile::tempdir().unwrap();
-    let found = read(&folder.path().join("none.csv")).unwrap_err();
-    assert!(matches!(found, TableError::Unreadable(_)), "{found}");
+    let actual = read(&folder.path().join("none.csv")).unwrap_err();
+    assert!(matches!(actual, TableError::Unreadable(_)), "{actual}");
 }
 
 proptest! {

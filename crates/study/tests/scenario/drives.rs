@@ -123,19 +123,22 @@ fn values_are_converted_from_the_unit_stated() {
         variable = "plant.temperature"
         unit = "K"
         constant = 300"#;
-    let found = calls(text, here(), &[0.0, 1.0]);
+    let actual = calls(text, here(), &[0.0, 1.0]);
     let numbers = |line: &str| -> Vec<f64> {
         let inside = line.rsplit_once('[').unwrap().1.trim_end_matches(']');
         inside.split(", ").map(|number| number.parse().unwrap()).collect()
     };
-    assert!(found[0].1[0].starts_with("real [8, 2, 12] "), "{found:?}");
-    let values = numbers(&found[0].1[0]);
+    assert!(actual[0].1[0].starts_with("real [8, 2, 12] "), "{actual:?}");
+    let values = numbers(&actual[0].1[0]);
     assert_eq!(values[..2], [2000.0, 0.0]);
     assert!((values[2] - 26.85).abs() < 1e-12, "{values:?}");
-    assert!(found[0].1[1].starts_with("derivative [2, 12] "), "{found:?}");
-    let slopes = numbers(&found[0].1[1]);
+    assert!(actual[0].1[1].starts_with("derivative [2, 12] "), "{actual:?}");
+    let slopes = numbers(&actual[0].1[1]);
     assert!((slopes[0] - std::f64::consts::PI).abs() < 1e-14 && slopes[1] == 0.0, "{slopes:?}");
-    assert!((numbers(&found[1].1[0])[0] - std::f64::consts::FRAC_PI_2).abs() < 1e-15, "{found:?}");
+    assert!(
+        (numbers(&actual[1].1[0])[0] - std::f64::consts::FRAC_PI_2).abs() < 1e-15,
+        "{actual:?}"
+    );
 }
 
 #[test]
@@ -257,6 +260,6 @@ fn steps_can_end_at_breaks_of_signals_and_settings() {
         bias = { value = 1, from = 0.7, until = 2 }"#;
     let prepared = scenario(text).resolve(&system().0, &setup(here())).unwrap();
     let next = |&last: &f64| prepared.scenario.drives.next_break(last);
-    let found: Vec<_> = std::iter::successors(next(&0.0), next).collect();
-    assert_eq!(found, [0.3, 0.7, 1.25, 2.0, 5.0]);
+    let actual: Vec<_> = std::iter::successors(next(&0.0), next).collect();
+    assert_eq!(actual, [0.3, 0.7, 1.25, 2.0, 5.0]);
 }

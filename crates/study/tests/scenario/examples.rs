@@ -18,8 +18,8 @@ fn every_example_of_the_document_is_read_and_fits_its_system() {
     let blocks = blocks();
     assert!(blocks.len() > 15, "{}", blocks.len());
     for block in blocks {
-        let found = scenario(&block).resolve(&system().0, &setup(folder.path()));
-        assert!(found.is_ok(), "{block}\n{}", found.err().unwrap());
+        let actual = scenario(&block).resolve(&system().0, &setup(folder.path()));
+        assert!(actual.is_ok(), "{block}\n{}", actual.err().unwrap());
     }
 }
 

@@ -81,9 +81,9 @@ fn values_of_faults_are_in_the_unit_stated() {
 fn a_connection_is_named_by_its_input_or_by_both_ends() {
     for name in ["ctrl.force", "plant.y=ctrl.force", " plant.y = ctrl.force "] {
         let text = format!("scenario.fault = [{{ connection = \"{name}\", stuck = {{}} }}]");
-        let found = lines(&text);
-        assert_eq!(found.len(), 1);
-        assert_eq!(found[0].0, "ctrl.force");
+        let actual = lines(&text);
+        assert_eq!(actual.len(), 1);
+        assert_eq!(actual[0].0, "ctrl.force");
     }
 }
 
@@ -99,10 +99,10 @@ fn faults_of_one_connection_act_in_the_order_of_the_file() {
         [[scenario.fault]]
         connection = "ctrl.force"
         gain = { factor = 10 }"#;
-    let mut found = lines(text);
-    assert_eq!(found.len(), 2);
-    assert_eq!(found.remove(0).1.apply(0.0, 2.0), 30.0);
-    assert_eq!(found.remove(0).1.apply(0.0, 2.0), 102.0);
+    let mut actual = lines(text);
+    assert_eq!(actual.len(), 2);
+    assert_eq!(actual.remove(0).1.apply(0.0, 2.0), 30.0);
+    assert_eq!(actual.remove(0).1.apply(0.0, 2.0), 102.0);
 }
 
 #[test]
@@ -132,13 +132,13 @@ fn integers_are_disturbed_as_integers() {
         connection = "ctrl.count"
         bias = { value = -2 }"#;
     let mut line = lines(text).remove(0).1;
-    let found = [4, 8, 16, 32].map(|value| {
+    let actual = [4, 8, 16, 32].map(|value| {
         let time = 0.5 * f64::from(value).log2() - 1.0;
         let arrived = line.apply_integer(time, value.into());
         line.commit(time, f64::from(value));
         arrived
     });
-    assert_eq!(found, [2, 2, 2, 6]);
+    assert_eq!(actual, [2, 2, 2, 6]);
 }
 
 /// Serialises and deserialises the state of the drives.
@@ -152,8 +152,8 @@ fn a_checkpoint_of_another_scenario_is_refused() {
     let of = |scenario: &str| resolve(scenario).unwrap();
     let mut other = of("[scenario]");
     let one = of("scenario.signal = [{ variable = \"plant.force\", constant = 1 }]");
-    let found = other.scenario.drives.restore(checkpoint(&one)).unwrap_err().to_string();
-    assert_eq!(found, "the checkpoint is of 1 driven variables, expected 0 as in the scenario");
+    let actual = other.scenario.drives.restore(checkpoint(&one)).unwrap_err().to_string();
+    assert_eq!(actual, "the checkpoint is of 1 driven variables, expected 0 as in the scenario");
 }
 
 #[test]
@@ -172,12 +172,12 @@ fn a_signal_can_have_a_fault_and_continue_from_a_checkpoint() {
         prepared.scenario.drives.commit(time);
         (sample.value, sample.slope)
     };
-    let found = [1.0, 2.0, 3.0].map(|time| arrived(&mut prepared, time));
-    assert_eq!(found, [(1.0, 1.0), (2.0, 0.0), (2.0, 0.0)]);
+    let actual = [1.0, 2.0, 3.0].map(|time| arrived(&mut prepared, time));
+    assert_eq!(actual, [(1.0, 1.0), (2.0, 0.0), (2.0, 0.0)]);
     let mut resumed = resolve(text).unwrap();
     resumed.scenario.drives.restore(checkpoint(&prepared)).unwrap();
-    let found = [3.5, 4.0].map(|time| arrived(&mut resumed, time));
-    assert_eq!(found, [(2.0, 0.0), (4.0, 1.0)]);
+    let actual = [3.5, 4.0].map(|time| arrived(&mut resumed, time));
+    assert_eq!(actual, [(2.0, 0.0), (4.0, 1.0)]);
 }
 
 #[test]

@@ -178,8 +178,8 @@ fn files_that_do_not_fit_are_refused() {
     ] {
         assert_eq!(refused(&text, folder.path()).0, message);
     }
-    let (found, _) = refused("scenario.table = [{ csv = \"none.csv\" }]", folder.path());
-    assert!(found.starts_with(&format!("scenario.table[1]: {}: ", path("none.csv"))), "{found}");
+    let (actual, _) = refused("scenario.table = [{ csv = \"none.csv\" }]", folder.path());
+    assert!(actual.starts_with(&format!("scenario.table[1]: {}: ", path("none.csv"))), "{actual}");
 }
 
 /// Checks that a fault on the connection is refused with the message.

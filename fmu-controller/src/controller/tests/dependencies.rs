@@ -44,7 +44,7 @@ fn begin(model: &mut AsoController, time: f64) -> Vec<f64> {
 fn initial_influences(design: Shape) -> BTreeMap<String, BTreeSet<String>> {
     let model = sized(design);
     let names: Vec<_> = unknowns(&model).into_iter().map(|unknown| unknown.name).collect();
-    let mut found: BTreeMap<_, _> =
+    let mut actual: BTreeMap<_, _> =
         names.iter().map(|name| (name.clone(), BTreeSet::new())).collect();
     for situation in SITUATIONS {
         let model = in_situation(design, situation);
@@ -53,7 +53,7 @@ fn initial_influences(design: Shape) -> BTreeMap<String, BTreeSet<String>> {
             let after = begin(&mut moved, time);
             for ((name, before), after) in names.iter().zip(&before).zip(after) {
                 if before.to_bits() != after.to_bits() {
-                    found.get_mut(name).unwrap().insert(known.to_owned());
+                    actual.get_mut(name).unwrap().insert(known.to_owned());
                 }
             }
         };
@@ -70,13 +70,13 @@ fn initial_influences(design: Shape) -> BTreeMap<String, BTreeSet<String>> {
         compare("monitor", switched, situation.0);
         compare("time", model.clone(), 1.0 - situation.0);
     }
-    found
+    actual
 }
 
 #[test]
 fn initial_values_depend_on_what_is_listed_and_on_nothing_else() {
     for of in [&FREE[..], &LIMITED, &SAMPLED].concat() {
-        let found = initial_influences(of);
+        let actual = initial_influences(of);
         let controller = sized(of);
         let design = &controller.design;
         let [_, m, _, q] = of.0;
@@ -100,7 +100,7 @@ fn initial_values_depend_on_what_is_listed_and_on_nothing_else() {
             let name = channel("E_hat", loss.fault, q);
             list(name, dependencies::of_initial_loss(design, loss));
         }
-        assert_eq!(found, listed, "{of:?}");
+        assert_eq!(actual, listed, "{of:?}");
     }
 }
 
@@ -189,14 +189,14 @@ fn at_a_point_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed
             let name = channel("E_hat", loss.fault, of.0[3]);
             list(&name, &dependencies::of_loss(design, loss));
         }
-        let found: BTreeMap<_, _> = factors(of)
+        let actual: BTreeMap<_, _> = factors(of)
             .into_iter()
             .filter_map(|(pair, factors)| {
                 let kind = kind(&factors, is_bent(of, &pair.0))?;
                 Some((pair, kind))
             })
             .collect();
-        assert_eq!(found, listed, "{of:?}");
+        assert_eq!(actual, listed, "{of:?}");
     }
 }
 

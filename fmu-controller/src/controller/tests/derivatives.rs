@@ -67,7 +67,7 @@ fn is_the_quotient(
         values(&moved, &unknowns(model))
     };
     let (ahead, behind) = (at_distance(step), at_distance(-step));
-    let found = values(&direction, &unknowns(model));
+    let actual = values(&direction, &unknowns(model));
     for (k, unknown) in unknowns(model).iter().enumerate() {
         let quotient = (ahead[k] - behind[k]) / (2.0 * step);
         let size = 1.0 + ahead[k].abs().max(quotient.abs());
@@ -77,7 +77,7 @@ fn is_the_quotient(
         let nonlinear = name.starts_with("E_hat") || model.design.sliding_mode.is_some();
         let bent = if nonlinear { 1e3 * step * step } else { 0.0 };
         let allowed = (tolerance + bent) * size;
-        assert!((found[k] - quotient).abs() < allowed, "{name}: {} {quotient}", found[k]);
+        assert!((actual[k] - quotient).abs() < allowed, "{name}: {} {quotient}", actual[k]);
     }
 }
 
@@ -88,8 +88,8 @@ fn is_the_quotient_everywhere(
     knowns: &[Real],
     evaluate: impl Fn(&mut AsoController),
 ) {
-    for own in 0..knowns.len() {
-        let along: Vec<_> = (0..knowns.len()).map(|k| f64::from(u8::from(k == own))).collect();
+    for column in 0..knowns.len() {
+        let along: Vec<_> = (0..knowns.len()).map(|k| f64::from(u8::from(k == column))).collect();
         is_the_quotient(model, (at, knowns), &along, (1e-3, 1e-11), &evaluate);
     }
     let along: Vec<_> = (0..knowns.len()).map(number).collect();

@@ -113,8 +113,8 @@ fn the_residuals_of_a_continuous_controller_do_not_depend_on_the_communication_s
         let expected = reference(range);
         let [time, onset] = expected.alarm.unwrap();
         for sizes in [&[1.0][..], &[0.25], &[0.01], &[0.05], &[0.03, 0.011, 0.17]] {
-            let mut found = run(ready(with_design(&continuous(limits)).unwrap()), sizes, 1.0);
-            let detector = found.detector_mut();
+            let mut actual = run(ready(with_design(&continuous(limits)).unwrap()), sizes, 1.0);
+            let detector = actual.detector_mut();
             let (residual, last) = (detector.residuals[0], expected.residuals[19]);
             assert!((residual - last).abs() < 1e-5, "{limits} {sizes:?}: {residual} {last}");
             assert!((detector.statistics[0] - expected.statistic).abs() < 1e-4);
@@ -232,7 +232,7 @@ fn a_window_of_several_residuals_is_tested_at_its_end() {
 
 #[test]
 fn the_fault_is_the_one_to_which_exactly_the_tests_with_an_alarm_react() {
-    let own = aso_controller::design::detection::DetectionDesign {
+    let isolation = aso_controller::design::detection::DetectionDesign {
         faults: ["a", "b", "c"].map(str::to_owned).to_vec(),
         tests: [[true, false, true], [false, true, true]]
             .map(|reacts| aso_controller::design::detection::TestDesign {
@@ -250,10 +250,10 @@ fn the_fault_is_the_one_to_which_exactly_the_tests_with_an_alarm_react() {
         [([true, false], 1), ([false, true], 2), ([true, true], 3), ([false, false], -1)]
     {
         let mut decision = crate::detection::Decision::default();
-        decision.isolate(&own, |at| alarms[at]);
+        decision.isolate(&isolation, |at| alarms[at]);
         assert_eq!(decision.isolated, 0, "without an alarm");
         decision.detected = true;
-        decision.isolate(&own, |at| alarms[at]);
+        decision.isolate(&isolation, |at| alarms[at]);
         assert_eq!(decision.isolated, isolated);
     }
 }

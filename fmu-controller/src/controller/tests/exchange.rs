@@ -83,7 +83,7 @@ fn a_limit_is_reached_and_left_at_events_only_and_each_shows_in_one_indicator() 
         (u, signs, controller.values.u[0], restarted)
     };
     let (inside, above, below) = (vec![true, true], vec![true, false], vec![false, true]);
-    let close = |u: f64, wanted: f64| assert!((u - wanted).abs() < 1e-12, "{u} {wanted}");
+    let close = |u: f64, required: f64| assert!((u - required).abs() < 1e-12, "{u} {required}");
     for (command, signs, before, after) in [
         (0.2, &inside, 0.2, 0.2),
         (0.7, &above, 0.7, 0.3),
@@ -92,10 +92,10 @@ fn a_limit_is_reached_and_left_at_events_only_and_each_shows_in_one_indicator() 
         (-1.6, &below, -1.6, -1.5),
         (0.4, &above, -1.5, 0.3),
     ] {
-        let (u, found, u_after, restarted) = at(command);
+        let (u, actual, u_after, restarted) = at(command);
         close(u, before);
         close(u_after, after);
-        assert_eq!((&found, &restarted), (signs, signs), "{command}");
+        assert_eq!((&actual, &restarted), (signs, signs), "{command}");
     }
 }
 
@@ -125,9 +125,9 @@ fn a_command_on_its_limit_is_an_event_once() {
 fn indicators_are_scaled_by_the_range_and_come_with_limits_only() {
     let (mut controller, _) = exchanged("limits = [-1.5, 0.3]");
     rates(&mut controller, 0.0, [-0.2, 0.0, 0.0]);
-    let wanted = [(0.6 + 1.5) / 1.8, (0.3 - 0.6) / 1.8];
-    for (found, wanted) in indicators(&controller).iter().zip(wanted) {
-        assert!((found - wanted).abs() < 1e-8, "{found} {wanted}");
+    let required = [(0.6 + 1.5) / 1.8, (0.3 - 0.6) / 1.8];
+    for (actual, required) in indicators(&controller).iter().zip(required) {
+        assert!((actual - required).abs() < 1e-8, "{actual} {required}");
     }
     let (controller, _) = exchanged("");
     assert_eq!(controller.model_exchange(), Some(ModelExchange { event_indicators: 0 }));

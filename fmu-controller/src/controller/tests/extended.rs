@@ -55,18 +55,21 @@ fn at_its_operating_point_a_controller_rests() {
             actuator.limits = actuator.limits.map(|_| [-9.0, 9.0]);
         }
         let design = &model.design;
-        model.x_hat_0 = design.states.iter().map(|own| own.operating.unwrap()).collect();
+        model.x_hat_0 = design.states.iter().map(|state| state.operating.unwrap()).collect();
         model.f_hat_0.fill(0.0);
         model.x_i_0.fill(0.0);
-        model.values.r = design.references.iter().map(|own| own.operating.unwrap()).collect();
-        model.values.y = design.measurements.iter().map(|own| own.operating.unwrap()).collect();
-        let wanted: Vec<_> = design.actuators.iter().map(|own| own.operating.unwrap()).collect();
+        model.values.r =
+            design.references.iter().map(|reference| reference.operating.unwrap()).collect();
+        model.values.y =
+            design.measurements.iter().map(|measurement| measurement.operating.unwrap()).collect();
+        let required: Vec<_> =
+            design.actuators.iter().map(|actuator| actuator.operating.unwrap()).collect();
         let y = model.values.y.clone();
         let mut model = ready(model);
         let before = model.values.z.clone();
         for k in 0..10_u32 {
             step(&mut model, f64::from(k), 1.0, &y, &vec![0.0; y.len()]);
-            assert_eq!((&model.values.z, &model.values.u), (&before, &wanted));
+            assert_eq!((&model.values.z, &model.values.u), (&before, &required));
         }
     }
 }
@@ -105,8 +108,8 @@ fn the_slopes_of_all_outputs_are_the_limits_of_their_differences() {
         assert!(agree(&rate(&model.values.u, &u), &slopes.1, 1e-5), "{of:?}");
         assert!(agree(&rate(&model.deviations.f_hat, &faults), &slopes.2, 1e-5), "{of:?}");
         for (after, before) in model.losses.iter().zip(&losses) {
-            let found = (after.estimate - before.estimate) / h;
-            assert!((found - before.slope).abs() < 1e-5 * before.slope.abs().max(1.0), "{of:?}");
+            let actual = (after.estimate - before.estimate) / h;
+            assert!((actual - before.slope).abs() < 1e-5 * before.slope.abs().max(1.0), "{of:?}");
         }
     }
 }
@@ -115,7 +118,7 @@ fn the_slopes_of_all_outputs_are_the_limits_of_their_differences() {
 fn a_loss_is_the_fault_by_the_command_where_that_is_large_enough() {
     let (model, _) = tamed(([2, 2, 1, 2], "--", "e"));
     let loss = &model.losses[0];
-    for (u, f_hat, wanted) in [
+    for (u, f_hat, required) in [
         (1e6, -0.4e6, 0.4),
         (-1e6, 0.4e6, 0.4),
         (0.7, -0.7, 0.5),
@@ -123,8 +126,8 @@ fn a_loss_is_the_fault_by_the_command_where_that_is_large_enough() {
         (1e-3, -1e-3, 1e-6 / (1e-6 + 0.49)),
         (1e200, 1.0, 0.0),
     ] {
-        let found = loss.effectiveness_lost(u, f_hat);
-        assert!((found - wanted).abs() < 1e-12, "{u} {f_hat}: {found}");
+        let actual = loss.effectiveness_lost(u, f_hat);
+        assert!((actual - required).abs() < 1e-12, "{u} {f_hat}: {actual}");
     }
 }
 

@@ -87,7 +87,11 @@ impl Oracle {
                 n_r: stated(&design.n_r, m, t),
             },
             transfer: design.transfer,
-            r_op: all(design.references.iter().map(|own| operating(own.operating)).collect()),
+            r_op: all(design
+                .references
+                .iter()
+                .map(|reference| operating(reference.operating))
+                .collect()),
             period: design.sample_time,
             a: dense(&design.a),
             b: dense(&design.b),
@@ -102,13 +106,21 @@ impl Oracle {
             l_x: dense(&design.l_x),
             l_f: dense(&design.l_f),
             filter: design.filter.clone().map(all),
-            x_op: all(design.states.iter().map(|own| operating(own.operating)).collect()),
-            u_op: all(design.actuators.iter().map(|own| operating(own.operating)).collect()),
-            y_op: all(design.measurements.iter().map(|own| operating(own.operating)).collect()),
+            x_op: all(design.states.iter().map(|state| operating(state.operating)).collect()),
+            u_op: all(design
+                .actuators
+                .iter()
+                .map(|actuator| operating(actuator.operating))
+                .collect()),
+            y_op: all(design
+                .measurements
+                .iter()
+                .map(|measurement| operating(measurement.operating))
+                .collect()),
             limits: design
                 .actuators
                 .iter()
-                .map(|own| own.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]))
+                .map(|signal| signal.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]))
                 .collect(),
         }
     }
@@ -222,15 +234,15 @@ impl Oracle {
     ) -> (Estimate, Vector, Estimate) {
         let y = self.inputs(inputs).0 - &self.d * (previous - &self.u_op);
         let e = self.innovation(z, &y);
-        let gain = |wanted: bool| if wanted { &e * 1.0 } else { &e * 0.0 };
+        let gain = |applies: bool| if applies { &e * 1.0 } else { &e * 0.0 };
         let (before, after) = (gain(current), gain(!current));
         let on_number = f64::from(u8::from(on));
         let seen = &self.l_f * &before;
         let mut used = Estimate {
             x: &z.x + &self.l_x * &before,
             f: match &self.sliding_mode {
-                Some(own) if on => Vector::from_fn(seen.len(), |i, _| {
-                    own.rho[i] * seen[i] / (seen[i].abs() + own.delta[i])
+                Some(injection) if on => Vector::from_fn(seen.len(), |i, _| {
+                    injection.rho[i] * seen[i] / (seen[i].abs() + injection.delta[i])
                 }),
                 _ => &z.f + seen * on_number,
             },
@@ -279,7 +291,7 @@ pub(super) fn tamed(of: Shape) -> (AsoController, Oracle) {
 }
 
 /// Whether all numbers agree to `tolerance`, relative to the larger of the number and 1.
-pub(super) fn agree(found: &[f64], wanted: &[f64], tolerance: f64) -> bool {
-    found.len() == wanted.len()
-        && found.iter().zip(wanted).all(|(a, b)| (a - b).abs() <= tolerance * b.abs().max(1.0))
+pub(super) fn agree(actual: &[f64], required: &[f64], tolerance: f64) -> bool {
+    actual.len() == required.len()
+        && actual.iter().zip(required).all(|(a, b)| (a - b).abs() <= tolerance * b.abs().max(1.0))
 }

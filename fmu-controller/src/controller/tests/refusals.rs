@@ -112,10 +112,10 @@ fn each_optional_entry_is_refused_where_it_does_not_fit() {
     let sampled = "sample_time = 0.001\nestimator = \"current\"\n";
     let text = sampled.to_owned()
         + &small("").replace(measured, &format!("{measured}\nlongest_hold = 1e9"));
-    let found = with_design(&text).err().unwrap().to_string();
+    let actual = with_design(&text).err().unwrap().to_string();
     assert!(
-        found.contains("longest_hold of x = 1000000000, expected fewer than 2^32 samples"),
-        "{found}"
+        actual.contains("longest_hold of x = 1000000000, expected fewer than 2^32 samples"),
+        "{actual}"
     );
     let limits = "limits = [1.0, 2.0]";
     let message = message(limits, "name = \"v\"", "name = \"v\"\noperating = 1.0");
@@ -147,10 +147,10 @@ fn a_reconfiguration_that_does_not_fit_is_refused_by_its_actuator() {
     for (entry, expected) in wrong {
         let mut entries = vec!["gone = \"u\"", "K_s = [0.0]", "K_x = [[0.0, 0.0]]"];
         let key = entry.split(' ').next().unwrap();
-        entries.retain(|own| !own.starts_with(key));
+        entries.retain(|entry| !entry.starts_with(key));
         entries.push(entry);
         if expected.contains("expected K_x") {
-            entries.retain(|own| !own.starts_with("K_x"));
+            entries.retain(|entry| !entry.starts_with("K_x"));
             entries.push("K_x = [[0.0]]");
         }
         let fault = "[[faults]]\nname = \"f\"";

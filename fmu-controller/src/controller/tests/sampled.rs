@@ -39,7 +39,7 @@ fn for_every_communication_step_it_acts_at_its_samples_and_holds_in_between() {
             let (mut model, oracle) = tamed(of);
             model.design.t_on = 7.35;
             let (start, y) = oracle.start(&model);
-            let wanted = samples(&oracle, (start, y.clone()), of.2.contains('c'), 40);
+            let required = samples(&oracle, (start, y.clone()), of.2.contains('c'), 40);
             model.initialize(&Experiment { start_time: 7.0, ..Experiment::default() }).unwrap();
             let slopes = vec![SLOPE; y.len()];
             let mut time = 0.0;
@@ -53,7 +53,8 @@ fn for_every_communication_step_it_acts_at_its_samples_and_holds_in_between() {
                     step(&mut model, 7.0 + time, size, begun.as_slice(), &slopes);
                 }
                 let instants = (0..41).map(|k| f64::from(k) * T);
-                let (z, u) = &wanted[instants.filter(|instant| *instant < end + 1e-9).count() - 1];
+                let (z, u) =
+                    &required[instants.filter(|instant| *instant < end + 1e-9).count() - 1];
                 assert!(agree(&model.values.z, z, 1e-9), "{of:?} {size} {end}");
                 assert!(agree(&model.values.u, u.as_slice(), 1e-9), "{of:?} {size} {end}");
                 time = end;
@@ -74,8 +75,8 @@ fn ten_steps_of_a_tenth_of_the_sample_time_take_one_sample_a_million_times() {
             model.step(&Step { start: time, size }).unwrap();
             time += size;
             let next = model.sampler.as_ref().unwrap().next_instant();
-            let wanted = start + f64::from(k / 10 + 1) * period;
-            assert_eq!(next.to_bits(), wanted.to_bits(), "{period} {k}");
+            let required = start + f64::from(k / 10 + 1) * period;
+            assert_eq!(next.to_bits(), required.to_bits(), "{period} {k}");
         }
     }
 }
@@ -99,10 +100,10 @@ fn in_model_exchange_each_sample_is_a_time_event() {
         let (mut model, oracle) = tamed(of);
         model.design.t_on = 0.35;
         let (start, y) = oracle.start(&model);
-        let wanted = samples(&oracle, (start, y.clone()), of.2.contains('c'), 20);
+        let required = samples(&oracle, (start, y.clone()), of.2.contains('c'), 20);
         let mut model = ready(model);
         assert_eq!(model.model_exchange(), Some(ModelExchange { event_indicators: 0 }));
-        for (k, (z, u)) in (0..).zip(&wanted) {
+        for (k, (z, u)) in (0..).zip(&required) {
             let time = f64::from(k) * T;
             let inputs = model.values.y.iter_mut().chain(&mut model.values.r);
             inputs.zip(&y).for_each(|(input, y)| *input = y + SLOPE * time);

@@ -181,16 +181,16 @@ fn real(name: String, field: impl Fn(&mut AsoController) -> &mut f64 + 'static) 
 pub(super) fn inputs(controller: &AsoController) -> Vec<Real> {
     let Design { measurements, references, .. } = &*controller.design;
     let measured = measurements.iter().enumerate();
-    let measured = measured.map(|(k, y)| real(y.name.clone(), move |own| &mut own.values.y[k]));
+    let measured = measured.map(|(k, y)| real(y.name.clone(), move |model| &mut model.values.y[k]));
     let referred = references.iter().enumerate();
-    let referred = referred.map(|(k, r)| real(r.name.clone(), move |own| &mut own.values.r[k]));
+    let referred = referred.map(|(k, r)| real(r.name.clone(), move |model| &mut model.values.r[k]));
     measured.chain(referred).collect()
 }
 
 /// Estimates and filtered measurements.
 fn estimates(controller: &AsoController) -> Vec<Real> {
     let names = names::estimates(&controller.design).enumerate();
-    names.map(|(k, name)| real(name, move |own| &mut own.values.z[k])).collect()
+    names.map(|(k, name)| real(name, move |model| &mut model.values.z[k])).collect()
 }
 
 /// The continuous states: the estimates, unless the controller is sampled.
@@ -202,20 +202,20 @@ pub(super) fn states(controller: &AsoController) -> Vec<Real> {
 pub(super) fn unknowns(controller: &AsoController) -> Vec<Real> {
     let design = &controller.design;
     let command = |(j, actuator): (usize, &Actuator)| {
-        real(actuator.name.clone(), move |own| &mut own.values.u[j])
+        real(actuator.name.clone(), move |model| &mut model.values.u[j])
     };
     let mut all: Vec<_> = design.actuators.iter().enumerate().map(command).collect();
     all.extend(estimates(controller));
     for (i, name) in channels("f_hat", controller.deviations.f_hat.len()).enumerate() {
-        all.push(real(name, move |own| &mut own.deviations.f_hat[i]));
+        all.push(real(name, move |model| &mut model.deviations.f_hat[i]));
     }
     for (position, loss) in controller.losses.iter().enumerate() {
         let name = channel("E_hat", loss.fault, design.faults.len());
-        all.push(real(name, move |own| &mut own.losses[position].estimate));
+        all.push(real(name, move |model| &mut model.losses[position].estimate));
     }
     for (k, state) in states(controller).into_iter().enumerate() {
-        all.push(real(format!("der({})", state.name), move |own| {
-            &mut own.with_slopes().z_slopes[k]
+        all.push(real(format!("der({})", state.name), move |model| {
+            &mut model.with_slopes().z_slopes[k]
         }));
     }
     all
@@ -226,20 +226,20 @@ fn shared(design: &Design) -> Vec<Real> {
     let mut all = Vec::new();
     let filters = design.filter.as_ref().map_or(0, Vec::len);
     for (k, name) in channels("filter", filters).enumerate() {
-        all.push(real(name, move |own| &mut own.design.filter.as_mut().unwrap()[k]));
+        all.push(real(name, move |model| &mut model.design.filter.as_mut().unwrap()[k]));
     }
     let (n, m, p) = (design.states.len(), design.actuators.len(), design.measurements.len());
     for (k, name) in names::operating(design, "x_op", n).enumerate() {
-        all.push(real(name, move |own| own.design.states[k].operating.as_mut().unwrap()));
+        all.push(real(name, move |model| model.design.states[k].operating.as_mut().unwrap()));
     }
     for (k, name) in names::operating(design, "u_op", m).enumerate() {
-        all.push(real(name, move |own| own.design.actuators[k].operating.as_mut().unwrap()));
+        all.push(real(name, move |model| model.design.actuators[k].operating.as_mut().unwrap()));
     }
     for (k, name) in names::operating(design, "y_op", p).enumerate() {
-        all.push(real(name, move |own| own.design.measurements[k].operating.as_mut().unwrap()));
+        all.push(real(name, move |model| model.design.measurements[k].operating.as_mut().unwrap()));
     }
     for (k, name) in names::operating(design, "r_op", design.references.len()).enumerate() {
-        all.push(real(name, move |own| own.design.references[k].operating.as_mut().unwrap()));
+        all.push(real(name, move |model| model.design.references[k].operating.as_mut().unwrap()));
     }
     all
 }
@@ -273,33 +273,35 @@ pub(super) fn initial_knowns(controller: &AsoController) -> Vec<Real> {
     let design = &controller.design;
     let (n, q) = (design.states.len(), design.faults.len());
     let mut all = inputs(controller);
-    all.push(real("t_on".to_owned(), |own| &mut own.design.t_on));
+    all.push(real("t_on".to_owned(), |model| &mut model.design.t_on));
     all.extend(shared(design));
     for (k, name) in names::starts(design).enumerate() {
-        all.push(real(name, move |own| match k {
-            k if k < n => &mut own.x_hat_0[k],
-            k if k < n + q => &mut own.f_hat_0[k - n],
-            k => &mut own.x_i_0[k - n - q],
+        all.push(real(name, move |model| match k {
+            k if k < n => &mut model.x_hat_0[k],
+            k if k < n + q => &mut model.f_hat_0[k - n],
+            k => &mut model.x_i_0[k - n - q],
         }));
     }
     for (j, actuator) in design.actuators.iter().enumerate() {
         for side in 0..actuator.limits.map_or(0, |limits| limits.len()) {
-            all.push(real(names::limit(design, side, j), move |own| {
-                &mut own.design.actuators[j].limits.as_mut().unwrap()[side]
+            all.push(real(names::limit(design, side, j), move |model| {
+                &mut model.design.actuators[j].limits.as_mut().unwrap()[side]
             }));
         }
     }
-    for bound in 0..2 * design.sliding_mode.as_ref().map_or(0, |own| own.rho.len()) {
+    for bound in 0..2 * design.sliding_mode.as_ref().map_or(0, |model| model.rho.len()) {
         let (i, count) = (bound / 2, design.faults.len());
         let name = channel(["rho", "delta"][bound % 2], i, count);
-        all.push(real(name, move |own| {
-            let own = own.design.sliding_mode.as_mut().unwrap();
-            &mut [&mut own.rho, &mut own.delta].into_iter().nth(bound % 2).unwrap()[i]
+        all.push(real(name, move |model| {
+            let model = model.design.sliding_mode.as_mut().unwrap();
+            &mut [&mut model.rho, &mut model.delta].into_iter().nth(bound % 2).unwrap()[i]
         }));
     }
     for (name, matrix) in design.matrices() {
         all.extend((0..matrix.values.len()).map(|k| {
-            real(matrix.element(name, k), move |own| &mut place(&mut own.design, name).values[k])
+            real(matrix.element(name, k), move |model| {
+                &mut place(&mut model.design, name).values[k]
+            })
         }));
     }
     all

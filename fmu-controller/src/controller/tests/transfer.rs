@@ -54,9 +54,9 @@ fn reached(controller: &AsoController) -> [f64; 4] {
     [z[0], z[1], z[2], controller.values.u[0]]
 }
 
-fn assert_close(found: [f64; 4], expected: [f64; 4], what: &str) {
-    for (found, expected) in found.into_iter().zip(expected) {
-        assert!((found - expected).abs() < 2e-5, "{what}: {found} {expected}");
+fn assert_close(actual: [f64; 4], expected: [f64; 4], what: &str) {
+    for (actual, expected) in actual.into_iter().zip(expected) {
+        assert!((actual - expected).abs() < 2e-5, "{what}: {actual} {expected}");
     }
 }
 

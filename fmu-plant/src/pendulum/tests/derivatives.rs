@@ -38,10 +38,10 @@ fn quotient(size: f64, moved: impl Fn(f64) -> [f64; 7]) -> [f64; 7] {
     std::array::from_fn(|k| (8.0 * (ahead[k] - back[k]) - (beyond[k] - before[k])) / (12.0 * step))
 }
 
-fn assert_close(found: &[f64; 7], expected: &[f64; 7], known: &str) {
-    for ((name, found), expected) in UNKNOWNS.iter().zip(found).zip(expected) {
+fn assert_close(actual: &[f64; 7], expected: &[f64; 7], known: &str) {
+    for ((name, actual), expected) in UNKNOWNS.iter().zip(actual).zip(expected) {
         let bound = 1e-7 * expected.abs().max(1.0);
-        assert!((found - expected).abs() < bound, "d {name} / d {known}: {found} {expected}");
+        assert!((actual - expected).abs() < bound, "d {name} / d {known}: {actual} {expected}");
     }
 }
 
@@ -91,10 +91,10 @@ fn without_friction_the_derivatives_at_rest_are_those_of_a_free_cart() {
             ("v_p", pair(-p.cart_damping, 0.0)),
             ("omega", pair(0.0, -p.pendulum_damping)),
         ] {
-            let found = column(&model, &NOW, known);
+            let actual = column(&model, &NOW, known);
             for (name, expected) in [("der(v_p)", v), ("der(omega)", omega), ("f_fric", 0.0)] {
                 let at = UNKNOWNS.iter().position(|unknown| *unknown == name).unwrap();
-                let error = (found[at] - expected).abs();
+                let error = (actual[at] - expected).abs();
                 assert!(error < 1e-12 * expected.abs().max(1.0), "d {name} / d {known}: {error}");
             }
         }
@@ -113,8 +113,8 @@ fn at_initialization_they_are_the_difference_quotients_in_every_known() {
                 }
                 let size = *field(&mut model.clone(), &known);
                 let moved = |shift| moved_at_initialization(&model, &known, shift);
-                let found = column(&model, &At::Initialization, &known);
-                assert_close(&found, &quotient(size, moved), &known);
+                let actual = column(&model, &At::Initialization, &known);
+                assert_close(&actual, &quotient(size, moved), &known);
             }
         }
     }
@@ -126,12 +126,12 @@ fn a_direction_of_several_knowns_gives_the_sum_of_their_columns() {
     for model in everywhere() {
         let mut sum = [0.0; 7];
         for (known, component) in direction {
-            let own = column(&model, &NOW, known);
-            sum = std::array::from_fn(|k| sum[k] + component * own[k]);
+            let of_known = column(&model, &NOW, known);
+            sum = std::array::from_fn(|k| sum[k] + component * of_known[k]);
         }
-        let found = along(&model, &NOW, &direction).unwrap();
-        for (found, sum) in found.iter().zip(sum) {
-            assert!((found - sum).abs() < 1e-13 * sum.abs().max(1.0), "{found} {sum}");
+        let actual = along(&model, &NOW, &direction).unwrap();
+        for (actual, sum) in actual.iter().zip(sum) {
+            assert!((actual - sum).abs() < 1e-13 * sum.abs().max(1.0), "{actual} {sum}");
         }
     }
 }
@@ -139,8 +139,8 @@ fn a_direction_of_several_knowns_gives_the_sum_of_their_columns() {
 #[test]
 fn with_respect_to_time_all_are_zero() {
     for model in everywhere() {
-        let found = along(&model, &At::Point { time: 0.0, delta_time: 1.0 }, &[]).unwrap();
-        assert!(found.iter().all(|part| *part == 0.0), "{found:?}");
+        let actual = along(&model, &At::Point { time: 0.0, delta_time: 1.0 }, &[]).unwrap();
+        assert!(actual.iter().all(|part| *part == 0.0), "{actual:?}");
     }
 }
 
@@ -178,8 +178,8 @@ fn of_a_cart_that_breaks_away_they_are_those_of_the_side_it_slides_to() {
             model.parameters.stribeck_exponent = exponent;
         });
         assert_eq!(model.motion.regime().sign().to_bits(), u.signum().to_bits());
-        let found = column(&model, &NOW, "v_p")[0];
-        assert!((found - slope).abs() < 1e-12, "{found} {slope}");
+        let actual = column(&model, &NOW, "v_p")[0];
+        assert!((actual - slope).abs() < 1e-12, "{actual} {slope}");
         let step = 1e-9 * u.signum();
         let ahead = (moved_at_a_point(&model, "v_p", step)[0] - model.f_fric) / step;
         assert!((ahead - slope).abs() < 0.02, "{ahead} {slope}");

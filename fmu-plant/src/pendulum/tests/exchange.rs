@@ -7,10 +7,10 @@ const REST: f64 = 1e-9;
 const NOMINAL: f64 = 0.1;
 
 fn indicators(model: &mut FrictionPendulum) -> [f64; INDICATORS] {
-    let mut found = [f64::NAN; INDICATORS];
+    let mut actual = [f64::NAN; INDICATORS];
     model.update(0.0).unwrap();
-    model.event_indicators(0.0, &mut found);
-    found
+    model.event_indicators(0.0, &mut actual);
+    actual
 }
 
 /// A time step of the classical Runge-Kutta method, as an importer takes it.
@@ -70,17 +70,17 @@ fn compare(linearised: bool, initial: [f64; 4], forces: &[f64]) -> Vec<(i32, i32
             (model.parameters.linearised, model.initial) = (linearised, initial);
         })
     };
-    let (mut imported, mut own, mut time) = (fresh(), fresh(), 0.0);
+    let (mut imported, mut stepped, mut time) = (fresh(), fresh(), 0.0);
     let mut events = Vec::new();
     for &u in forces {
-        (imported.u, own.u) = (u, u);
+        (imported.u, stepped.u) = (u, u);
         assert!(!imported.event(time).unwrap().values_of_continuous_states_changed);
         events.extend(integrate(&mut imported, 0.1, 2e-4));
-        own.step(&Step { start: time, size: 0.1 }).unwrap();
+        stepped.step(&Step { start: time, size: 0.1 }).unwrap();
         time += 0.1;
         imported.update(time).unwrap();
-        assert_eq!(imported.regime, own.regime, "after {u} N");
-        for (one, other) in imported.motion.state().iter().zip(own.motion.state()) {
+        assert_eq!(imported.regime, stepped.regime, "after {u} N");
+        for (one, other) in imported.motion.state().iter().zip(stepped.motion.state()) {
             let bound = 1e-8 * other.abs().max(1.0);
             assert!((one - other).abs() < bound, "after {u} N: {one} {other}");
         }

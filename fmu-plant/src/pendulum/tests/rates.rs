@@ -18,9 +18,9 @@ fn assert_rate(model: &FrictionPendulum, duration: f64) {
         moved.f_fric
     };
     let quotient = (friction(apart) - friction(-apart)) / (2.0 * apart);
-    let found = *after(model, duration).friction_rate();
+    let actual = *after(model, duration).friction_rate();
     let bound = 1e-6 * quotient.abs().max(1.0);
-    assert!((found - quotient).abs() < bound, "regime {}: {found} {quotient}", model.regime);
+    assert!((actual - quotient).abs() < bound, "regime {}: {actual} {quotient}", model.regime);
 }
 
 #[test]

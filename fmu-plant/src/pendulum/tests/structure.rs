@@ -12,18 +12,18 @@ use crate::pendulum::variables::{ACCELERATION_INITIALLY, DEPENDS, FRICTION_INITI
 type Found = [BTreeSet<String>; 7];
 
 /// Notes which unknowns are other than before.
-fn note(found: &mut Found, known: &str, before: &[f64; 7], after: &[f64; 7]) {
-    for (k, names) in found.iter_mut().enumerate() {
+fn note(actual: &mut Found, known: &str, before: &[f64; 7], after: &[f64; 7]) {
+    for (k, names) in actual.iter_mut().enumerate() {
         if before[k].to_bits() != after[k].to_bits() {
             names.insert(known.to_owned());
         }
     }
 }
 
-fn assert_stated(found: &Found, stated: [&[&str]; 7]) {
-    for ((unknown, found), stated) in UNKNOWNS.iter().zip(found).zip(stated) {
+fn assert_stated(actual: &Found, stated: [&[&str]; 7]) {
+    for ((unknown, actual), stated) in UNKNOWNS.iter().zip(actual).zip(stated) {
         let stated: BTreeSet<String> = stated.iter().map(|name| (*name).to_owned()).collect();
-        assert_eq!(*found, stated, "{unknown}");
+        assert_eq!(*actual, stated, "{unknown}");
     }
 }
 
@@ -37,24 +37,24 @@ fn no_rule_of_the_description_is_broken() {
 
 #[test]
 fn between_events_each_unknown_depends_on_what_is_stated_and_on_nothing_else() {
-    let mut found = Found::default();
+    let mut actual = Found::default();
     for model in everywhere() {
         for known in AT_A_POINT {
             for shift in SHIFTS {
                 let after = moved_at_a_point(&model, known, shift);
-                note(&mut found, known, &unknowns(&model), &after);
+                note(&mut actual, known, &unknowns(&model), &after);
             }
         }
     }
-    let own = ["x_p"; 1];
-    let states: [&[&str]; 4] = [&own, &["theta"], &["v_p"], &["omega"]];
+    let position = ["x_p"; 1];
+    let states: [&[&str]; 4] = [&position, &["theta"], &["v_p"], &["omega"]];
     let [x, angle, velocity, rate] = states;
-    assert_stated(&found, [&DEPENDS, &DEPENDS, &DEPENDS, x, angle, velocity, rate]);
+    assert_stated(&actual, [&DEPENDS, &DEPENDS, &DEPENDS, x, angle, velocity, rate]);
 }
 
 #[test]
 fn at_initialization_each_unknown_depends_on_what_is_stated_and_on_nothing_else() {
-    let mut found = Found::default();
+    let mut actual = Found::default();
     for model in everywhere() {
         for known in at_initialization() {
             for shift in SHIFTS {
@@ -63,18 +63,18 @@ fn at_initialization_each_unknown_depends_on_what_is_stated_and_on_nothing_else(
                 *field(&mut moved, &known) += shift * size;
                 if moved.check().is_ok() {
                     let after = moved_at_initialization(&model, &known, shift * size);
-                    note(&mut found, &known, &unknowns(&model), &after);
+                    note(&mut actual, &known, &unknowns(&model), &after);
                 }
             }
         }
         let mut other = model.clone();
         other.parameters.linearised = !model.parameters.linearised;
         other.initialize(&Experiment::default()).unwrap();
-        note(&mut found, "linearised", &unknowns(&model), &unknowns(&other));
+        note(&mut actual, "linearised", &unknowns(&model), &unknowns(&other));
     }
     let accelerations = &ACCELERATION_INITIALLY;
     assert_stated(
-        &found,
+        &actual,
         [
             &FRICTION_INITIALLY,
             accelerations,

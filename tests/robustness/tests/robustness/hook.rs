@@ -133,27 +133,30 @@ fn a_panic_outside_goes_to_the_hook_of_the_process() {
         let all = ["elsewhere", "between two calls", "the importer's logger"];
         let expected = if HEARS { &all[..] } else { &all[..2] };
         assert_eq!(heard.len(), expected.len(), "{heard:?}");
-        assert!(heard.iter().zip(expected).all(|(found, own)| found.contains(own)), "{heard:?}");
+        assert!(
+            heard.iter().zip(expected).all(|(actual, token)| actual.contains(token)),
+            "{heard:?}"
+        );
     });
 }
 
 #[test]
 fn the_hook_of_the_process_is_restored_when_the_last_instance_is_freed() {
     alone("the_hook_of_the_process_is_restored_when_the_last_instance_is_freed", || {
-        let (own, _) = listen();
+        let (token, _) = listen();
         let one = started();
         let other = started();
         panic_in_a_step(&one);
-        assert_ne!(installed(), own);
+        assert_ne!(installed(), token);
         drop(one);
-        assert_ne!(installed(), own);
+        assert_ne!(installed(), token);
         drop(other);
-        assert_eq!(installed(), own, "after the last instance");
+        assert_eq!(installed(), token, "after the last instance");
         let plan = Some((Place::New, Misbehaviour::Panic));
         assert!(!with_plan(plan, || Importer::new(&order(1))).0.exists());
-        assert_eq!(installed(), own, "after an instance that could not be made");
+        assert_eq!(installed(), token, "after an instance that could not be made");
         robustness::importer::describe().unwrap();
-        assert_eq!(installed(), own, "after a description");
+        assert_eq!(installed(), token, "after a description");
     });
 }
 
@@ -161,26 +164,26 @@ fn the_hook_of_the_process_is_restored_when_the_last_instance_is_freed() {
 fn a_hook_that_the_importer_installs_meanwhile_stays() {
     alone("a_hook_that_the_importer_installs_meanwhile_stays", || {
         let importer = started();
-        let (own, _) = listen();
+        let (token, _) = listen();
         drop(importer);
-        assert_eq!(installed(), own);
+        assert_eq!(installed(), token);
         let importer = started();
         panic_in_a_step(&importer);
         drop(importer);
-        assert_eq!(installed(), own);
+        assert_eq!(installed(), token);
     });
 }
 
 #[test]
 fn threads_that_make_and_free_instances_restore_the_hook() {
     alone("threads_that_make_and_free_instances_restore_the_hook", || {
-        let (own, heard) = listen();
+        let (token, heard) = listen();
         thread::scope(|scope| {
             for _ in 0..8 {
                 scope.spawn(|| (0..200).for_each(|_| panic_in_a_step(&started())));
             }
         });
-        assert_eq!(installed(), own);
+        assert_eq!(installed(), token);
         assert_eq!(*heard.lock().unwrap(), [""; 0]);
     });
 }

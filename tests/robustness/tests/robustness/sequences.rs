@@ -107,21 +107,21 @@ fn failures_and_panics_anywhere_are_answered_and_reported_while_another_instance
         let misbehaviour =
             if is_fallible(Place::EVERY[place]) { 0..Misbehaviour::EVERY.len() } else { 0..1 };
         misbehaviour.map(move |misbehaviour| {
-            [0xff, place, misbehaviour].map(|own| u8::try_from(own).unwrap())
+            [0xff, place, misbehaviour].map(|way| u8::try_from(way).unwrap())
         })
     });
     for plan in plans {
         reached |= run(&call(0, 0, plan)).unwrap();
-        for (exchange, function) in every.clone().flat_map(|own| [(true, own), (false, own)]) {
+        for (exchange, function) in every.clone().flat_map(|way| [(true, way), (false, way)]) {
             for way in ways(exchange) {
                 number += 1;
                 if cfg!(miri) && !number.is_multiple_of(2999) {
                     continue;
                 }
                 let mut calls = vec![instantiate(0, exchange), instantiate(1, exchange)];
-                calls.extend(way.iter().map(|own| plain(0, *own, [0; 3])));
+                calls.extend(way.iter().map(|way| plain(0, *way, [0; 3])));
                 calls.push(plain(0, function, plan));
-                calls.extend(ways(exchange)[3].iter().map(|own| plain(1, *own, [0; 3])));
+                calls.extend(ways(exchange)[3].iter().map(|way| plain(1, *way, [0; 3])));
                 match run(&calls.concat()) {
                     Ok(places) => reached |= places,
                     Err(what) => panic!("{what}: {plan:?}, {function:?} after {way:?}"),

@@ -61,5 +61,5 @@ fn instances_in_many_threads_give_the_bits_of_each_alone() {
 fn two_thousand_instances_exist_at_once() {
     let count = if cfg!(miri) { 10 } else { 2000 };
     let importers: Vec<_> = (0..count).map(|_| started()).collect();
-    assert!(importers.iter().rev().all(|own| own.do_step(0.0, 0.5) == OK));
+    assert!(importers.iter().rev().all(|importer| importer.do_step(0.0, 0.5) == OK));
 }

@@ -67,8 +67,8 @@ fn a_variable_and_its_alias_have_one_value_and_one_setting() {
         for (name, value) in [("u", "5"), ("also p", "6"), (input, "7"), (parameter, "8")] {
             system.set(&format!("b.{name}"), value).unwrap();
         }
-        let found = values(system, &["u", "also u", "p", "also p"]);
-        assert_eq!(found, [7.0, 7.0, 8.0, 8.0], "{input}");
+        let actual = values(system, &["u", "also u", "p", "also p"]);
+        assert_eq!(actual, [7.0, 7.0, 8.0, 8.0], "{input}");
     }
 }
 

@@ -46,9 +46,9 @@ fn all_slaves_of_a_group_start_before_the_first_is_finished() {
         // then with threads.
         for _ in 0..40 {
             simulation.step().unwrap();
-            let found = std::mem::take(&mut *record.lock().unwrap());
+            let actual = std::mem::take(&mut *record.lock().unwrap());
             assert_eq!(
-                found,
+                actual,
                 ["begin a", "begin b", "begin c", "finish a", "finish b", "finish c"]
             );
         }
@@ -60,9 +60,9 @@ fn gauss_seidel_does_not_start_connected_slaves_together() {
     let algorithm = Algorithm { method: Method::GaussSeidel, ..jacobi(1) };
     let (system, record) = ahead(typed::ring(), all);
     Simulation::new(system, &algorithm, &until(1.0)).unwrap().step().unwrap();
-    let found = record.lock().unwrap().join(", ");
+    let actual = record.lock().unwrap().join(", ");
     let pairs = ["begin a, finish a", "begin b, finish b", "begin c, finish c"];
-    assert!(pairs.iter().all(|pair| found.contains(pair)), "{found}");
+    assert!(pairs.iter().all(|pair| actual.contains(pair)), "{actual}");
 }
 
 /// The bits of all connected outputs after each step.
@@ -115,7 +115,7 @@ fn values_of_all_types_and_multiples_are_the_same_in_the_background() {
             let algorithm = Algorithm { multiples: multiples.clone(), extrapolation, ..jacobi(1) };
             let (system, _) = ahead(typed::ring(), fails);
             let mut simulation = Simulation::new(system, &algorithm, &until(10.0)).unwrap();
-            let mut found = Vec::new();
+            let mut actual = Vec::new();
             while !simulation.is_finished() {
                 simulation.step().unwrap();
                 for (_, slave) in &mut simulation.system().slaves {
@@ -123,10 +123,10 @@ fn values_of_all_types_and_multiples_are_the_same_in_the_background() {
                     slave.get_real(&[1], &mut real).unwrap();
                     slave.get_integer(&[1], &mut integer).unwrap();
                     slave.get_boolean(&[1], &mut boolean).unwrap();
-                    found.push((real[0].to_bits(), integer, boolean));
+                    actual.push((real[0].to_bits(), integer, boolean));
                 }
             }
-            found
+            actual
         };
         assert_eq!(run(all), run(none));
         assert_eq!(run(all).len(), 120);
@@ -197,9 +197,9 @@ fn the_reported_error_is_that_of_the_first_slave_in_order_wherever_it_fails() {
             (InBegin, "fmi2DoStep", "begin a, begin b, finish a"),
             (InSet, "fmi2SetInteger", "begin a, finish a"),
         ] {
-            let (message, found) = failed(jobs, only_b(fails));
+            let (message, actual) = failed(jobs, only_b(fails));
             assert_eq!(message, format!("b at t = 5 s: {function} returned fmi2Error"));
-            assert!(jobs > 1 || found == begun, "{found}");
+            assert!(jobs > 1 || actual == begun, "{actual}");
         }
         let (message, _) = failed(jobs, |name| Some(if name == "a" { InFinish } else { InBegin }));
         assert_eq!(message, "a at t = 5 s: fmi2DoStep returned fmi2Error");

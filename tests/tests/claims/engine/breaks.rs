@@ -40,8 +40,8 @@ fn chosen_steps_end_at_the_start_and_the_end_of_a_fault() {
             times.push(simulation.time());
         }
         for edge in [0.3333, 0.6667] {
-            let found = times.iter().any(|time| (time - edge).abs() < 1e-12);
-            assert!(found, "{}: {edge} is not in {times:?}", control.name());
+            let actual = times.iter().any(|time| (time - edge).abs() < 1e-12);
+            assert!(actual, "{}: {edge} is not in {times:?}", control.name());
         }
     }
 }

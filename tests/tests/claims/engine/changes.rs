@@ -92,9 +92,9 @@ fn a_run_with_a_change_is_that_with_the_change_from_the_start_bit_for_bit() {
             for number in [0, 1, 3, 8, 21, 40] {
                 let (points, text) = changed(algorithm, added, number);
                 let mut again = simulation(&text, algorithm);
-                for found in &points {
+                for actual in &points {
                     again.step().unwrap();
-                    assert_eq!(*found, point(&mut again), "{algorithm:?}, {text}");
+                    assert_eq!(*actual, point(&mut again), "{algorithm:?}, {text}");
                 }
                 compared += usize::from(text.len() > FIRST.len());
             }
@@ -119,12 +119,12 @@ fn what_the_run_has_cannot_be_taken_away_or_changed() {
 #[test]
 fn there_is_no_next_change_in_the_last_step() {
     let mut simulation = simulation(FIRST, &Algorithm::new(0.25));
-    let mut found = Vec::new();
+    let mut actual = Vec::new();
     while !simulation.is_finished() {
-        found.push(simulation.next_change());
+        actual.push(simulation.next_change());
         simulation.step().unwrap();
     }
     // The first step ends at 0.11 s, where the fault starts.
-    assert_eq!(found, [Some(0.25), Some(0.25), Some(0.5), Some(0.75), None]);
+    assert_eq!(actual, [Some(0.25), Some(0.25), Some(0.5), Some(0.75), None]);
     assert_eq!(simulation.next_change(), None);
 }

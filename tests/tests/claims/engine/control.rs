@@ -49,10 +49,10 @@ fn repeated_steps_keep_the_error_near_the_tolerance() {
     let network = problems::transient();
     for (control, exponent) in [(StepControl::Doubling, 2.0 / 3.0), (StepControl::Embedded, 1.0)] {
         for tolerance in [1e-3, 1e-4, 1e-5, 1e-6] {
-            let found = run(&network, &chosen(control, tolerance));
-            let label = format!("{} {tolerance}: {found:?}", control.name());
-            assert!(found.error < 5.0 * f64::powf(tolerance, exponent), "{label}");
-            assert!(found.error > 0.01 * tolerance, "{label}");
+            let actual = run(&network, &chosen(control, tolerance));
+            let label = format!("{} {tolerance}: {actual:?}", control.name());
+            assert!(actual.error < 5.0 * f64::powf(tolerance, exponent), "{label}");
+            assert!(actual.error > 0.01 * tolerance, "{label}");
         }
     }
 }
@@ -62,11 +62,11 @@ fn repeated_steps_are_fewer_than_fixed_ones_at_the_same_error() {
     let network = problems::transient();
     for control in [StepControl::Doubling, StepControl::Embedded] {
         for tolerance in [1e-4, 1e-5] {
-            let found = run(&network, &chosen(control, tolerance));
-            let fixed = fixed_of(&network, found.error);
-            let label = format!("{} {tolerance}: {found:?}, {fixed:?}", control.name());
-            assert!(2 * found.points < fixed.points, "{label}");
-            assert!(found.calls < fixed.calls, "{label}");
+            let actual = run(&network, &chosen(control, tolerance));
+            let fixed = fixed_of(&network, actual.error);
+            let label = format!("{} {tolerance}: {actual:?}, {fixed:?}", control.name());
+            assert!(2 * actual.points < fixed.points, "{label}");
+            assert!(actual.calls < fixed.calls, "{label}");
         }
     }
 }
@@ -114,9 +114,9 @@ fn increment_and_energy_need_fewer_steps_than_fixed_steps_at_the_same_error() {
     for (control, tolerance) in [(StepControl::Increment, 0.03), (StepControl::Energy, 1e-5)] {
         let bonds = vec![bond(&network)];
         let algorithm = Algorithm { bonds, step: 1e-4, ..chosen(control, tolerance) };
-        let found = run(&network, &algorithm);
-        let fixed = fixed_of(&network, found.error);
-        assert!(3 * found.points < 2 * fixed.points, "{found:?}, {fixed:?}");
+        let actual = run(&network, &algorithm);
+        let fixed = fixed_of(&network, actual.error);
+        assert!(3 * actual.points < 2 * fixed.points, "{actual:?}, {fixed:?}");
     }
 }
 
@@ -148,10 +148,10 @@ fn doubling_keeps_the_tolerance_with_slaves_that_hold_their_inputs() {
         (Extrapolation::Quadratic, 2.0 / 3.0),
     ] {
         let algorithm = Algorithm { extrapolation, ..chosen(StepControl::Doubling, 1e-5) };
-        let found = network.run(able, &algorithm, STOP).unwrap();
+        let actual = network.run(able, &algorithm, STOP).unwrap();
         assert!(
-            found.error < 5.0 * f64::powf(1e-5, exponent),
-            "{}: {found:?}",
+            actual.error < 5.0 * f64::powf(1e-5, exponent),
+            "{}: {actual:?}",
             extrapolation.name()
         );
     }

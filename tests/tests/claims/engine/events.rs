@@ -74,10 +74,10 @@ fn a_change_of_sign_ends_a_step_within_1e_9_of_its_size() {
         let times = times(&mut simulation);
         for event in [0.4321, 0.8] {
             let near = |time: &&f64| (*time - event).abs() <= 0.15e-9;
-            let found: Vec<_> = times.iter().filter(near).collect();
-            assert_eq!(found.len(), 1, "{}: {event} in {times:?}", control.name());
+            let actual: Vec<_> = times.iter().filter(near).collect();
+            assert_eq!(actual.len(), 1, "{}: {event} in {times:?}", control.name());
             // At the end of the step the sign has changed.
-            assert!((crosses(*found[0]) > 0.0) != (crosses(event - 1e-6) > 0.0));
+            assert!((crosses(*actual[0]) > 0.0) != (crosses(event - 1e-6) > 0.0));
         }
     }
 }

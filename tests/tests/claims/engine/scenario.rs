@@ -61,8 +61,8 @@ fn an_unconnected_input_follows_its_signal() {
     for control in [StepControl::Fixed, StepControl::Doubling, StepControl::Embedded] {
         let algorithm =
             Algorithm { control, ..Algorithm::fixed(Method::Jacobi, Extrapolation::Linear, 0.125) };
-        let found = result(&mut simulate(text, &algorithm));
-        assert!((found - 6.0).abs() < 1e-12, "{}: {found}", control.name());
+        let actual = result(&mut simulate(text, &algorithm));
+        assert!((actual - 6.0).abs() < 1e-12, "{}: {actual}", control.name());
     }
 }
 
@@ -86,7 +86,7 @@ fn chosen_steps_end_where_the_slope_of_a_signal_changes() {
             times.push(simulation.time());
         }
         assert!(times.contains(&0.7), "{}: {times:?}", control.name());
-        let found = result(&mut simulation);
-        assert!((found - 5.3).abs() < 1e-9, "{}: {found}", control.name());
+        let actual = result(&mut simulation);
+        assert!((actual - 5.3).abs() < 1e-9, "{}: {actual}", control.name());
     }
 }

@@ -39,8 +39,8 @@ fn a_connection_is_held_while_its_output_derivative_is_not_finite_and_named_once
         }
         assert_eq!(rows.len(), ALL);
         let mut expected = 0.0;
-        for (row, found) in rows.iter().enumerate() {
-            assert_eq!(found.parse::<f64>().ok(), Some(expected), "{start}, row {row}");
+        for (row, actual) in rows.iter().enumerate() {
+            assert_eq!(actual.parse::<f64>().ok(), Some(expected), "{start}, row {row}");
             let time = STEP * f64::from(u8::try_from(row).unwrap_or_default());
             expected += STEP * if time < 0.5 { time } else { time + STEP / 2.0 };
         }

@@ -33,7 +33,7 @@ fn an_fmu_without_co_simulation_runs_and_the_explanation_says_how() {
     let names: Vec<&str> = results.lines().next().unwrap().split(',').collect();
     let last: Vec<&str> = results.lines().last().unwrap().split(',').collect();
     let at = |name: &str| {
-        let column = names.iter().position(|own| own.trim_matches('"') == name);
+        let column = names.iter().position(|column_name| column_name.trim_matches('"') == name);
         last[column.unwrap_or_else(|| panic!("{name} in {names:?}"))]
     };
     let decay: f64 = at("equations.x").parse().unwrap();

@@ -45,7 +45,7 @@ fn a_structural_parameter_changes_the_size_of_arrays() {
     loaded.set_real("a[4]", 1.5);
     assert_eq!(loaded.step(0.0, 0.1), Ok(StepResult::Whole));
     assert_eq!(loaded.real("b[4]"), 3.0);
-    let names = loaded.slave.description().variables.iter().map(|own| own.name.as_str());
+    let names = loaded.slave.description().variables.iter().map(|variable| variable.name.as_str());
     assert_eq!(names.filter(|name| name.starts_with("b[")).count(), 4);
 }
 
@@ -237,7 +237,10 @@ fn an_fmu_of_fmi_3_explains_its_errors_although_logging_is_off() {
     slave.enter_initialization_mode().unwrap();
     let error = slave.get_real(&[1 << 30], &mut [0.0]).unwrap_err();
     assert_eq!(error.function, "fmi3GetFloat64");
-    assert!(error.messages.iter().any(|own| own.contains("value reference 1073741824")), "{error}");
+    assert!(
+        error.messages.iter().any(|message| message.contains("value reference 1073741824")),
+        "{error}"
+    );
 }
 
 #[test]

@@ -118,11 +118,14 @@ mod tests {
                     goal = scales.bound * 1.001;
                 }
             };
-            let (found, both) = (bound(Block::Full(1)), [count, 1]);
-            assert!((1.0..1.01).contains(&(found / complex)), "{both:?} {found} {complex}");
-            let found = bound(Block::Real(1));
-            assert!(found >= real.max(1e-3 * complex) * 0.999_999, "{both:?} {found} {real}");
-            assert!(found <= real.max(1e-3 * complex) * 1.02, "{both:?} {found} {real} {complex}");
+            let (actual, both) = (bound(Block::Full(1)), [count, 1]);
+            assert!((1.0..1.01).contains(&(actual / complex)), "{both:?} {actual} {complex}");
+            let actual = bound(Block::Real(1));
+            assert!(actual >= real.max(1e-3 * complex) * 0.999_999, "{both:?} {actual} {real}");
+            assert!(
+                actual <= real.max(1e-3 * complex) * 1.02,
+                "{both:?} {actual} {real} {complex}"
+            );
         }
     }
 

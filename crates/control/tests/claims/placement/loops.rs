@@ -47,16 +47,16 @@ fn the_peaks_of_sensitivity_of_whole_loops_are_at_most_a_twentieth_above_the_bes
     for line in lines {
         let fields: Vec<&str> = line.split(';').collect();
         let (plant, gains, domain) = designed(&fields);
-        let own = controller(&plant, &gains, domain).unwrap();
+        let of_gains = controller(&plant, &gains, domain).unwrap();
         let FaultyPlant { a, b, c, .. } = plant;
         let d = DMatrix::zeros(c.nrows(), b.ncols());
-        let closed = Loop::new(StateSpace { a, b, c, d, domain }, own).unwrap();
+        let closed = Loop::new(StateSpace { a, b, c, d, domain }, of_gains).unwrap();
         for (point, scipy) in [(Point::Input, fields[13]), (Point::Output, fields[14])] {
-            let found = h_infinity(&closed.sensitivity(point), 1e-4).unwrap().lower;
+            let actual = h_infinity(&closed.sensitivity(point), 1e-4).unwrap().lower;
             let scipy: f64 = scipy.parse().expect("a number");
             assert!(
-                found < 1.05 * scipy,
-                "{} {}, {point:?}: {found} {scipy}",
+                actual < 1.05 * scipy,
+                "{} {}, {point:?}: {actual} {scipy}",
                 fields[0],
                 fields[1]
             );

@@ -120,8 +120,8 @@ fn condition_gain_and_sensitivity_are_at_most_a_tenth_above_the_best_of_scipy_in
 fn alternatives_have_condition_and_gain_at_most_a_tenth_above_the_best_of_scipy_with_one_exception()
 {
     let (mut count, mut exceptions) = (0, vec![]);
-    for (system, found) in SYSTEMS.iter() {
-        let largest = found.others.iter().map(|placement| {
+    for (system, actual) in SYSTEMS.iter() {
+        let largest = actual.others.iter().map(|placement| {
             let [condition, gain, _] = system.ratios(placement);
             condition.max(gain)
         });
@@ -129,7 +129,7 @@ fn alternatives_have_condition_and_gain_at_most_a_tenth_above_the_best_of_scipy_
         if largest >= ALLOWED {
             exceptions.push((system.kind, system.b.shape(), largest));
         }
-        count += found.others.len();
+        count += actual.others.len();
     }
     let known = [("real", (9, 4))];
     let is_known = |kind, shape, largest| known.contains(&(kind, shape)) && largest < 1.25;
@@ -144,12 +144,12 @@ fn alternatives_have_condition_and_gain_at_most_a_tenth_above_the_best_of_scipy_
 #[test]
 fn the_standard_methods_have_condition_and_gain_of_scipy_with_few_exceptions() {
     let (mut count, mut exceptions) = (0, vec![]);
-    for (system, found) in SYSTEMS.iter() {
+    for (system, actual) in SYSTEMS.iter() {
         let [condition, gain, _] = system.figures;
         if condition > 1e4 || gain < 1e-6 || system.kind == "repeated" {
             continue;
         }
-        let standard = found.standard.iter().flatten().map(|own| system.ratios(own));
+        let standard = actual.standard.iter().flatten().map(|chosen| system.ratios(chosen));
         let least = standard.reduce(|x, y| [0, 1, 2].map(|k: usize| x[k].min(y[k])));
         let [condition, gain, _] = least.expect("a method");
         count += 1;
@@ -163,8 +163,8 @@ fn the_standard_methods_have_condition_and_gain_of_scipy_with_few_exceptions() {
 
 #[test]
 fn placement_with_alternatives_chooses_the_gain_of_placement_alone() {
-    for (system, found) in SYSTEMS.iter().step_by(9) {
-        assert_eq!(system.place(system.ways()[0].1), found.chosen, "{}", system.kind);
+    for (system, actual) in SYSTEMS.iter().step_by(9) {
+        assert_eq!(system.place(system.ways()[0].1), actual.chosen, "{}", system.kind);
     }
 }
 
@@ -177,8 +177,8 @@ fn systems_with_a_choice_are_better_conditioned_by_a_tenth_on_average() {
         1 < inputs && inputs < states
     });
     let (mut sum, mut count) = (0.0, 0.0);
-    for (System { figures, .. }, found) in with_a_choice {
-        sum += (found.chosen.quality.condition / figures[0]).ln();
+    for (System { figures, .. }, actual) in with_a_choice {
+        sum += (actual.chosen.quality.condition / figures[0]).ln();
         count += 1.0;
     }
     assert!(sum / count < 0.9_f64.ln(), "{}", (sum / count).exp());
@@ -188,22 +188,22 @@ fn systems_with_a_choice_are_better_conditioned_by_a_tenth_on_average() {
 /// which for an eigenvalue requested twice are larger than the condition number states.
 #[test]
 fn the_eigenvalues_are_as_exact_as_those_of_scipy() {
-    for (System { kind, b, figures, pole_error, .. }, found) in SYSTEMS.iter() {
+    for (System { kind, b, figures, pole_error, .. }, actual) in SYSTEMS.iter() {
         let allowed = 10.0 * pole_error.max(1e-14 * figures[0]);
-        let found = found.chosen.quality;
-        assert!(found.pole_error < allowed, "{kind}, {:?}: {found:?}", b.shape());
+        let actual = actual.chosen.quality;
+        assert!(actual.pole_error < allowed, "{kind}, {:?}: {actual:?}", b.shape());
     }
 }
 
 /// KNV0 and YT of scipy reach 3.24746e7 on the observer of the pendulum.
 #[test]
 fn the_observer_of_the_pendulum_is_better_conditioned_than_scipy_makes_it() {
-    let (scipy, found) = SYSTEMS.iter().find(|(system, _)| system.kind == "pendulum").unwrap();
-    let ([condition, ..], Quality { condition: own, pole_error, .. }) =
-        (scipy.figures, found.chosen.quality);
+    let (scipy, actual) = SYSTEMS.iter().find(|(system, _)| system.kind == "pendulum").unwrap();
+    let ([condition, ..], Quality { condition: chosen, pole_error, .. }) =
+        (scipy.figures, actual.chosen.quality);
     assert!((condition / 3.247_46e7 - 1.0).abs() < 1e-5, "{condition}");
-    assert!(own < 0.99 * condition, "{found:?}");
-    assert!(pole_error < scipy.pole_error, "{found:?}");
+    assert!(chosen < 0.99 * condition, "{actual:?}");
+    assert!(pole_error < scipy.pole_error, "{actual:?}");
 }
 
 #[test]

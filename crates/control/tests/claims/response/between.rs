@@ -69,16 +69,19 @@ fn gains_between_samples_are_those_of_a_simulation_in_small_steps() {
         let period = 1e-3 * f64::from(milliseconds);
         let (extended, plant, gains) = sampled(period, estimator).unwrap();
         let domain = Domain::Sampled { period };
-        let own = controller(&plant, &gains, domain).unwrap();
+        let sampled_controller = controller(&plant, &gains, domain).unwrap();
         let closed = SampledLoop { extended: &extended, plant: &plant, gains: &gains, period };
         let [of_faults, of_rates, _] = gains_between_samples(&closed, 8, &ALL, WIDTH).unwrap();
         let samples = 4000 / milliseconds;
         let pulse = |at: u32| f64::from(u8::from(at == 0));
-        let same = simulated(&extended, (&own, period), (8, samples), pulse).unwrap();
-        let finer = simulated(&extended, (&own, period), (32, samples), pulse).unwrap();
+        let same =
+            simulated(&extended, (&sampled_controller, period), (8, samples), pulse).unwrap();
+        let finer =
+            simulated(&extended, (&sampled_controller, period), (32, samples), pulse).unwrap();
         let part = period / 8.0;
         let ramp = |at: u32| if at == 0 { 0.0 } else { part };
-        let rates = simulated(&extended, (&own, period), (8, samples), ramp).unwrap();
+        let rates =
+            simulated(&extended, (&sampled_controller, period), (8, samples), ramp).unwrap();
         for state in 0..4 {
             let gain = of_faults[(state, 0)];
             assert!(
@@ -109,10 +112,11 @@ fn with_one_part_the_gains_are_those_at_the_samples() {
         let expected_of_rates =
             peak_gain(&fault_rate_system(&plant, &gains, domain).unwrap(), WIDTH).unwrap();
         for row in 0..9 {
-            let [own, other] = [of_faults[(row, 0)], expected.upper[(row, 0)]];
-            assert!((own / other - 1.0).abs() < 3.0 * WIDTH, "{row}: {own} {other}");
-            let [own, other] = [of_rates[(row, 0)], period * expected_of_rates.upper[(row, 0)]];
-            assert!((own / other - 1.0).abs() < 3.0 * WIDTH, "{row}: {own} {other}");
+            let [one_part, other] = [of_faults[(row, 0)], expected.upper[(row, 0)]];
+            assert!((one_part / other - 1.0).abs() < 3.0 * WIDTH, "{row}: {one_part} {other}");
+            let [one_part, other] =
+                [of_rates[(row, 0)], period * expected_of_rates.upper[(row, 0)]];
+            assert!((one_part / other - 1.0).abs() < 3.0 * WIDTH, "{row}: {one_part} {other}");
         }
     }
 }
@@ -141,12 +145,15 @@ fn a_slow_sampled_closedhas_the_gains_that_adding_all_samples_gives() {
         d: DMatrix::from_element(1, 1, 0.25),
         domain: Domain::Sampled { period: 1.0 },
     };
-    let found = peak_gain(&system, WIDTH).unwrap();
+    let actual = peak_gain(&system, WIDTH).unwrap();
     let (mut sum, mut x) = (0.25, system.b.clone());
     for _ in 0..4_000_000 {
         sum += (&system.c * &x)[0].abs();
         x = &system.a * x;
     }
-    assert!(found.lower[0] <= sum * (1.0 + 1e-9), "{found:?} {sum}");
-    assert!(sum <= found.upper[0] && found.upper[0] < sum * (1.0 + 2.0 * WIDTH), "{found:?} {sum}");
+    assert!(actual.lower[0] <= sum * (1.0 + 1e-9), "{actual:?} {sum}");
+    assert!(
+        sum <= actual.upper[0] && actual.upper[0] < sum * (1.0 + 2.0 * WIDTH),
+        "{actual:?} {sum}"
+    );
 }

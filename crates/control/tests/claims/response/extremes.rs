@@ -31,10 +31,10 @@ fn riccati_equations_end_in_an_answer_or_an_error() {
         let n = (case % 2 == 0).then(|| wild(case, 4, 2, 9) * 1e-30);
         let weights = Weights { q: q.clone(), r: r.clone(), n };
         for domain in [CONTINUOUS, Domain::Sampled { period: 0.1 }] {
-            let _ = lqr(&a, &b, &weights, domain).map(|found| assert_finite(&found.gain));
+            let _ = lqr(&a, &b, &weights, domain).map(|actual| assert_finite(&actual.gain));
             let _ = kalman(&a, &b.transpose(), &q, &r, domain).map(|f| assert_finite(&f.gain));
         }
-        let _ = discrete_lyapunov(&a, &q).map(|found| assert_finite(&found.p));
+        let _ = discrete_lyapunov(&a, &q).map(|actual| assert_finite(&actual.p));
     }
 }
 
@@ -53,8 +53,8 @@ fn responses_end_in_an_answer_or_an_error() {
             let _ = peak_gain(&system, 1e-2).map(|gain| {
                 assert!(gain.lower.iter().zip(gain.upper.iter()).all(|(low, up)| low <= up));
             });
-            let _ = energy(&system).map(|found| assert!(found.h2.is_finite()));
-            let _ = h_infinity(&system, 1e-6).map(|found| assert!(found.lower < f64::INFINITY));
+            let _ = energy(&system).map(|actual| assert!(actual.h2.is_finite()));
+            let _ = h_infinity(&system, 1e-6).map(|actual| assert!(actual.lower < f64::INFINITY));
             let _ = step_response(&system, 0).map(|trace| assert_finite(&trace.output));
             let _ = frequency_grid(&system, 5).and_then(|grid| frequency_response(&system, &grid));
         }

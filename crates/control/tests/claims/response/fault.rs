@@ -62,9 +62,9 @@ fn the_gains_of_the_loop_agree_with_modal_decomposition_in_high_precision() {
         let alone = from_rate.upper.column(column);
         assert!((together - alone).amax() <= 1e-12 * from_rate.upper.amax(), "input {column}");
     }
-    for (name, found) in [("gain_f", from_fault), ("gain_r", from_rate)] {
+    for (name, computed) in [("gain_f", from_fault), ("gain_r", from_rate)] {
         for (output, &exact) in case.get(name).iter().enumerate() {
-            let (lower, upper) = (found.lower[(output, 0)], found.upper[(output, 0)]);
+            let (lower, upper) = (computed.lower[(output, 0)], computed.upper[(output, 0)]);
             assert!(lower <= exact * 1.0001 && upper >= exact * 0.9999, "{name} {output}");
             assert!(upper <= lower * 1.0011, "{name} {output}: {lower:e} to {upper:e}");
         }
@@ -76,8 +76,9 @@ fn the_reversal_agrees_with_modal_decomposition_in_high_precision() {
     let (plant, gains, case) = paper();
     let jump = reversal(&plant, &gains, CONTINUOUS, 0, 1.0, None, 0.02).unwrap();
     let ramp = reversal(&plant, &gains, CONTINUOUS, 0, 60.0, Some(RATE), 0.02).unwrap();
-    for (name, found) in [("step", jump), ("ramp", ramp)] {
-        let all = found.states.iter().chain(&found.state_errors).chain(&found.fault_errors);
+    for (name, computed) in [("step", jump), ("ramp", ramp)] {
+        let all =
+            computed.states.iter().chain(&computed.state_errors).chain(&computed.fault_errors);
         for (output, (transient, exact)) in all.zip(case.get(name).iter()).enumerate() {
             let error = (transient.peak.abs() / exact - 1.0).abs();
             assert!(error < 1e-4, "{name} {output}: {transient:?} {exact}");
@@ -178,10 +179,10 @@ fn a_fast_sampled_loop_tends_to_the_continuous_one() {
     };
     let trace = step_response(&sampled, 0).unwrap();
     for output in 0..3 {
-        let found = trace.transient(output, 0.05);
+        let computed = trace.transient(output, 0.05);
         let exact = [slow.states[0], slow.state_errors[0], slow.fault_errors[0]][output];
-        assert!((found.peak * 2.0 / exact.peak - 1.0).abs() < 2e-3, "{found:?} {exact:?}");
-        assert!((found.settling_time / exact.settling_time - 1.0).abs() < 5e-2);
+        assert!((computed.peak * 2.0 / exact.peak - 1.0).abs() < 2e-3, "{computed:?} {exact:?}");
+        assert!((computed.settling_time / exact.settling_time - 1.0).abs() < 5e-2);
     }
 }
 
@@ -190,11 +191,11 @@ fn a_fast_sampled_loop_tends_to_the_continuous_one() {
 fn the_sampled_loop_of_either_estimator_is_that_of_plant_and_controller() {
     let extended = ExtendedPlant::without_filter(crate::paper::plant());
     let period = 2e-3;
-    let in_z = |wanted: &[f64]| sampled_poles(&real_poles(wanted), period).unwrap();
+    let in_z = |required: &[f64]| sampled_poles(&real_poles(required), period).unwrap();
     for estimator in [Estimator::Prediction, Estimator::Current] {
         let (k, l) = (in_z(&CONTROLLER_POLES), in_z(&[-50., -60., -70., -80., -90.]));
-        let found = design(&extended, period, estimator, &k, &l, None).unwrap();
-        let (plant, gains) = (&found.plant, &found.gains);
+        let computed = design(&extended, period, estimator, &k, &l, None).unwrap();
+        let (plant, gains) = (&computed.plant, &computed.gains);
         let domain = Domain::Sampled { period };
         let controller = controller(plant, gains, domain).unwrap();
         let whole = closed_loop(plant, &controller, &[1.0]).unwrap();

@@ -70,8 +70,8 @@ fn sampled_peak_gains_are_the_sums_of_the_absolute_samples() {
 fn a_system_without_effect_has_the_gain_of_its_feedthrough() {
     let mut idle = single(-DMatrix::identity(2, 2), &[1.0, 0.0], &[0.0, 1.0], CONTINUOUS);
     idle.d[(0, 0)] = -2.0;
-    let found = peak_gain(&idle, 1e-3).unwrap();
-    assert_eq!((found.lower[(0, 0)], found.upper[(0, 0)]), (2.0, 2.0));
+    let computed = peak_gain(&idle, 1e-3).unwrap();
+    assert_eq!((computed.lower[(0, 0)], computed.upper[(0, 0)]), (2.0, 2.0));
     assert_eq!(h_infinity(&idle, 1e-6).unwrap().lower.to_bits(), 2.0_f64.to_bits());
 }
 
@@ -174,19 +174,19 @@ fn the_grid_reaches_from_a_tenth_of_the_slowest_to_ten_times_the_fastest() {
 fn the_energy_to_peak_norm_is_reached_by_the_reversed_impulse_response() {
     // 1 / (s + a): the energy of the impulse response is 1 / (2 a).
     let lag = single(matrix(1, 1, &[-4.0]), &[3.0], &[2.0], CONTINUOUS);
-    let found = energy(&lag).unwrap();
-    assert!((found.peak - (36.0_f64 / 8.0).sqrt()).abs() < 1e-14);
+    let computed = energy(&lag).unwrap();
+    assert!((computed.peak - (36.0_f64 / 8.0).sqrt()).abs() < 1e-14);
     // Two outputs of one state: the Euclidean peak is the longer diagonal.
     let two = StateSpace { c: matrix(2, 1, &[2.0, -1.5]), d: DMatrix::zeros(2, 1), ..lag };
-    let found = energy(&two).unwrap();
-    assert!((found.peak - 2.5 * (9.0_f64 / 8.0).sqrt()).abs() < 1e-14);
-    assert!((found.peaks[1] - 1.5 * (9.0_f64 / 8.0).sqrt()).abs() < 1e-14);
+    let computed = energy(&two).unwrap();
+    assert!((computed.peak - 2.5 * (9.0_f64 / 8.0).sqrt()).abs() < 1e-14);
+    assert!((computed.peaks[1] - 1.5 * (9.0_f64 / 8.0).sqrt()).abs() < 1e-14);
     let sampled = StateSpace {
         a: matrix(1, 1, &[0.5]),
         d: matrix(2, 1, &[1.0, 0.0]),
         domain: Domain::Sampled { period: 0.1 },
         ..two
     };
-    let found = energy(&sampled).unwrap();
-    assert!((found.peaks[0] - (1.0 + 36.0_f64 / 0.75).sqrt()).abs() < 1e-14);
+    let computed = energy(&sampled).unwrap();
+    assert!((computed.peaks[0] - (1.0 + 36.0_f64 / 0.75).sqrt()).abs() < 1e-14);
 }

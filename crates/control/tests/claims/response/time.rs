@@ -20,10 +20,10 @@ fn an_oscillator_overshoots_as_the_textbook_says() {
         let trace = step_response(&oscillator(w, zeta), 0).unwrap();
         let damped = w * f64::sqrt(1.0 - zeta * zeta);
         let overshoot = (-zeta * w * std::f64::consts::PI / damped).exp();
-        let found = trace.transient(0, 0.02);
-        assert!((found.peak - 1.0 - overshoot).abs() < 1e-6, "{zeta}: {found:?}");
-        assert!((found.peak_time * damped / std::f64::consts::PI - 1.0).abs() < 1e-3);
-        assert!((found.final_value - 1.0).abs() < 1e-14);
+        let actual = trace.transient(0, 0.02);
+        assert!((actual.peak - 1.0 - overshoot).abs() < 1e-6, "{zeta}: {actual:?}");
+        assert!((actual.peak_time * damped / std::f64::consts::PI - 1.0).abs() < 1e-3);
+        assert!((actual.final_value - 1.0).abs() < 1e-14);
         for (k, &t) in trace.time.iter().enumerate() {
             let (cosine, sine) = ((damped * t).cos(), (damped * t).sin());
             let exact = 1.0 - (-zeta * w * t).exp() * (cosine + zeta * w / damped * sine);
@@ -35,9 +35,9 @@ fn an_oscillator_overshoots_as_the_textbook_says() {
 #[test]
 fn a_lag_settles_after_the_logarithm_of_the_band() {
     let lag = single(matrix(1, 1, &[-5.0]), &[10.0], &[1.0], CONTINUOUS);
-    let found = step_response(&lag, 0).unwrap().transient(0, 0.02);
-    assert!((found.settling_time - 50.0_f64.ln() / 5.0).abs() < 2e-4, "{found:?}");
-    assert!((found.final_value - 2.0).abs() < 1e-15);
+    let actual = step_response(&lag, 0).unwrap().transient(0, 0.02);
+    assert!((actual.settling_time - 50.0_f64.ln() / 5.0).abs() < 2e-4, "{actual:?}");
+    assert!((actual.final_value - 2.0).abs() < 1e-15);
 }
 
 /// 1 - e^-t + 1 - e^(-1e5 t): both parts are resolved, with a few hundred points.
@@ -123,7 +123,7 @@ fn an_oscillation_that_hardly_decays_has_exact_points_that_do_not_follow_it() {
         let exact = 1.0 - (-zeta * time).exp() * (cos + zeta / w * sin);
         assert!((y - exact).abs() < 1e-6, "{time}: {y} {exact}");
     }
-    let found = trace.transient(0, 0.02);
-    assert!((1.99..2.0).contains(&found.peak), "{found:?}");
-    assert!((found.settling_time * zeta / 50_f64.ln() - 1.0).abs() < 0.01, "{found:?}");
+    let actual = trace.transient(0, 0.02);
+    assert!((1.99..2.0).contains(&actual.peak), "{actual:?}");
+    assert!((actual.settling_time * zeta / 50_f64.ln() - 1.0).abs() < 0.01, "{actual:?}");
 }

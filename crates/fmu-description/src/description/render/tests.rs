@@ -23,7 +23,8 @@ fn an_alias_is_rendered_in_its_variable() {
     assert_eq!(xml.matches("<Alias ").count(), 2);
     assert!(xml.contains("<Alias name=\"phi\"/>"), "{xml}");
     // The order of the variables does not matter.
-    let position = description.variables.iter().position(|own| own.name == "phi").unwrap();
+    let position =
+        description.variables.iter().position(|variable| variable.name == "phi").unwrap();
     let alias = description.variables.remove(position);
     description.variables.push(alias);
     let again = ModelDescription::parse(description.to_xml()).unwrap();
@@ -33,13 +34,17 @@ fn an_alias_is_rendered_in_its_variable() {
 #[test]
 fn single_precision_has_the_digits_of_its_own() {
     let mut description = sample::complete_3();
-    let gains = description.variables.iter_mut().find(|own| own.name == "gains").unwrap();
+    let gains = description.variables.iter_mut().find(|variable| variable.name == "gains").unwrap();
     gains.kind = Kind::Float32(RealType { start: Some(f64::from(0.1_f32)), ..RealType::default() });
     let xml = description.to_xml();
     assert!(xml.contains("name=\"gains\"") && xml.contains(" start=\"0.1\""), "{xml}");
     let elements = Elements::Real(vec![f64::INFINITY, f64::NEG_INFINITY, 0.5]);
-    description.variables.iter_mut().find(|own| own.name == "gains").unwrap().start_elements =
-        Some(elements);
+    description
+        .variables
+        .iter_mut()
+        .find(|variable| variable.name == "gains")
+        .unwrap()
+        .start_elements = Some(elements);
     assert!(description.to_xml().contains(" start=\"INF -INF 0.5\""));
 }
 

@@ -27,8 +27,8 @@ fn a_library_is_in_the_folder_of_its_platform_tuple() {
     assert_eq!(tuple.split('-').count(), 2, "{tuple}");
     let (_folder, target) = packed(&[&library(tuple)]).unwrap();
     let unpacked = Unpacked::open(&target).unwrap();
-    let found = unpacked.library("M").unwrap();
-    assert!(found.ends_with(library(tuple)) && found.is_absolute(), "{}", found.display());
+    let actual = unpacked.library("M").unwrap();
+    assert!(actual.ends_with(library(tuple)) && actual.is_absolute(), "{}", actual.display());
 
     let Some(old) = platforms().iter().find(|name| !name.contains('-')) else { return };
     let (_folder, target) = packed(&[&library(old)]).unwrap();

@@ -67,8 +67,8 @@ fn entries_that_share_their_bytes_are_refused() {
         [(DESCRIPTION, XML, FILE), ("resources/a", "text", FILE), ("resources/b", "text", FILE)];
     let mut bytes = raw::archive(&entries);
     let find = |name: &[u8], bytes: &[u8]| {
-        let found = bytes.windows(name.len()).enumerate().filter(|(_, part)| *part == name);
-        found.map(|(at, _)| at).collect::<Vec<_>>()
+        let actual = bytes.windows(name.len()).enumerate().filter(|(_, part)| *part == name);
+        actual.map(|(at, _)| at).collect::<Vec<_>>()
     };
     let (first, second) = (find(b"resources/a", &bytes), find(b"resources/b", &bytes));
     let offset: [u8; 4] = bytes[first[1] - 4..first[1]].try_into().unwrap();

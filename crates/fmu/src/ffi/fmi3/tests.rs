@@ -130,14 +130,15 @@ fn an_error_and_a_failed_instantiation_are_explained_although_logging_is_off() {
         }
     };
     assert!(make(c"another").is_null());
-    let own = make(&token);
+    let instance = make(&token);
     let a = reference("a");
     // SAFETY: an instance, freed once, and one value each.
     unsafe {
-        let set = |value: f32| c::set_float32::<Types>(own, &raw const a, 1, &raw const value, 1);
+        let set =
+            |value: f32| c::set_float32::<Types>(instance, &raw const a, 1, &raw const value, 1);
         assert_eq!(set(9.0), DISCARD, "which is no error");
-        assert_eq!(c::set_uint8::<Types>(own, &raw const a, 1, &1, 1), ERROR);
-        c::free_instance::<Types>(own);
+        assert_eq!(c::set_uint8::<Types>(instance, &raw const a, 1, &1, 1), ERROR);
+        c::free_instance::<Types>(instance);
     }
     let parts = ["another", "a of type Float32, expected a UInt8"];
     assert_eq!(messages.len(), parts.len(), "{messages:?}");
@@ -150,45 +151,57 @@ fn an_error_and_a_failed_instantiation_are_explained_although_logging_is_off() {
 macro_rules! set_and_get {
     ($instance:expr, $set:ident, $get:ident, $name:literal, $values:expr) => {{
         let (given, reference) = ($values, [reference($name)]);
-        let mut found = given.map(|_| Default::default());
+        let mut actual = given.map(|_| Default::default());
         // SAFETY: an instance, and arrays with the lengths that are passed.
         unsafe {
             let status =
                 c::$set::<Types>($instance, reference.as_ptr(), 1, given.as_ptr(), given.len());
             assert_eq!(status, OK, $name);
-            let status =
-                c::$get::<Types>($instance, reference.as_ptr(), 1, found.as_mut_ptr(), found.len());
+            let status = c::$get::<Types>(
+                $instance,
+                reference.as_ptr(),
+                1,
+                actual.as_mut_ptr(),
+                actual.len(),
+            );
             assert_eq!(status, OK, $name);
         }
-        assert_eq!(found, given, $name);
+        assert_eq!(actual, given, $name);
     }};
 }
 
 #[test]
 fn every_type_keeps_the_extremes_of_its_values() {
-    let own = instance();
-    set_and_get!(own, set_float32, get_float32, "a", [1.1_f32]);
-    set_and_get!(own, set_int8, get_int8, "b", [i8::MAX]);
-    set_and_get!(own, set_uint8, get_uint8, "c", [u8::MAX]);
-    set_and_get!(own, set_int16, get_int16, "d", [i16::MIN]);
-    set_and_get!(own, set_uint16, get_uint16, "e", [u16::MAX]);
-    set_and_get!(own, set_uint32, get_uint32, "f", [u32::MAX]);
-    set_and_get!(own, set_int64, get_int64, "g", [i64::MIN]);
-    set_and_get!(own, set_uint64, get_uint64, "h", [u64::MAX]);
-    set_and_get!(own, set_uint16, get_uint16, "row", [7_u16, 8, 9]);
+    let instance = instance();
+    set_and_get!(instance, set_float32, get_float32, "a", [1.1_f32]);
+    set_and_get!(instance, set_int8, get_int8, "b", [i8::MAX]);
+    set_and_get!(instance, set_uint8, get_uint8, "c", [u8::MAX]);
+    set_and_get!(instance, set_int16, get_int16, "d", [i16::MIN]);
+    set_and_get!(instance, set_uint16, get_uint16, "e", [u16::MAX]);
+    set_and_get!(instance, set_uint32, get_uint32, "f", [u32::MAX]);
+    set_and_get!(instance, set_int64, get_int64, "g", [i64::MIN]);
+    set_and_get!(instance, set_uint64, get_uint64, "h", [u64::MAX]);
+    set_and_get!(instance, set_uint16, get_uint16, "row", [7_u16, 8, 9]);
     // SAFETY: an instance, freed once.
-    unsafe { c::free_instance::<Types>(own) };
+    unsafe { c::free_instance::<Types>(instance) };
 }
 
 #[test]
 fn a_binary_is_copied_with_its_zeros_and_may_be_empty() {
-    let own = instance();
+    let instance = instance();
     let reference = reference("bytes");
     let get = || {
         let (mut size, mut bytes) = (usize::MAX, null());
         // SAFETY: an instance, and places for one value.
         let status = unsafe {
-            c::get_binary::<Types>(own, &raw const reference, 1, &raw mut size, &raw mut bytes, 1)
+            c::get_binary::<Types>(
+                instance,
+                &raw const reference,
+                1,
+                &raw mut size,
+                &raw mut bytes,
+                1,
+            )
         };
         assert_eq!(status, OK);
         // SAFETY: the bytes are valid until the next call.
@@ -205,7 +218,7 @@ fn a_binary_is_copied_with_its_zeros_and_may_be_empty() {
         // SAFETY: an instance, and one value.
         let status = unsafe {
             c::set_binary::<Types>(
-                own,
+                instance,
                 &raw const reference,
                 1,
                 &raw const size,
@@ -217,22 +230,23 @@ fn a_binary_is_copied_with_its_zeros_and_may_be_empty() {
         assert_eq!(get(), value);
     }
     // SAFETY: an instance, freed once.
-    unsafe { c::free_instance::<Types>(own) };
+    unsafe { c::free_instance::<Types>(instance) };
 }
 
 #[test]
 fn enumerations_and_64_bit_integers_are_set_together_or_not_at_all() {
-    let own = instance();
+    let instance = instance();
     let references = [reference("mode"), reference("g")];
     let set = |values: [i64; 2]| {
         // SAFETY: an instance, and two values.
-        unsafe { c::set_int64::<Types>(own, references.as_ptr(), 2, values.as_ptr(), 2) }
+        unsafe { c::set_int64::<Types>(instance, references.as_ptr(), 2, values.as_ptr(), 2) }
     };
     let get = || {
         let mut values = [0; 2];
         // SAFETY: an instance, and two places.
-        let status =
-            unsafe { c::get_int64::<Types>(own, references.as_ptr(), 2, values.as_mut_ptr(), 2) };
+        let status = unsafe {
+            c::get_int64::<Types>(instance, references.as_ptr(), 2, values.as_mut_ptr(), 2)
+        };
         assert_eq!(status, OK);
         values
     };
@@ -240,36 +254,36 @@ fn enumerations_and_64_bit_integers_are_set_together_or_not_at_all() {
     assert_eq!((set([1, i64::MAX]), get()), (OK, [1, i64::MAX]));
     assert_eq!((set([5, 3]), get()), (DISCARD, [1, i64::MAX]));
     // SAFETY: an instance, freed once.
-    unsafe { c::free_instance::<Types>(own) };
+    unsafe { c::free_instance::<Types>(instance) };
 }
 
 #[test]
 fn a_value_outside_the_limits_is_discarded_and_another_type_is_an_error() {
-    let own = instance();
+    let instance = instance();
     let (a, b) = (reference("a"), reference("b"));
     // SAFETY: an instance, and one value each.
     unsafe {
         for value in [2.1_f32, f32::NAN, f32::INFINITY] {
-            let set = c::set_float32::<Types>(own, &raw const a, 1, &raw const value, 1);
+            let set = c::set_float32::<Types>(instance, &raw const a, 1, &raw const value, 1);
             assert_eq!(set, DISCARD, "{value}");
         }
-        assert_eq!(c::set_int8::<Types>(own, &raw const b, 1, &-6, 1), DISCARD);
-        assert_eq!(c::set_uint8::<Types>(own, &raw const b, 1, &1, 1), ERROR);
-        c::free_instance::<Types>(own);
+        assert_eq!(c::set_int8::<Types>(instance, &raw const b, 1, &-6, 1), DISCARD);
+        assert_eq!(c::set_uint8::<Types>(instance, &raw const b, 1, &1, 1), ERROR);
+        c::free_instance::<Types>(instance);
     }
 }
 
 #[test]
 fn the_description_of_every_type_breaks_no_rule_and_reads_back_equal() {
     assert_eq!(problems::<Types>(Path::new("")).unwrap(), vec![]);
-    let own = description();
-    let (read, warnings) = ModelDescription::read(own.to_xml().as_bytes()).unwrap();
+    let instance = description();
+    let (read, warnings) = ModelDescription::read(instance.to_xml().as_bytes()).unwrap();
     assert!(warnings.is_empty(), "{warnings:?}");
-    assert_eq!(read.variables, own.variables);
-    let row = own.variable("row").unwrap();
+    assert_eq!(read.variables, instance.variables);
+    let row = instance.variable("row").unwrap();
     assert_eq!(row.dimensions, [Dimension::Fixed(3)]);
     assert_eq!(row.start_elements, Some(Elements::Integer(vec![1, 2, 3])));
-    let Kind::UInt64(h) = &own.variable("h").unwrap().kind else { panic!() };
+    let Kind::UInt64(h) = &instance.variable("h").unwrap().kind else { panic!() };
     assert_eq!(h.start, Some(u64::MAX.into()));
 }
 

@@ -199,7 +199,7 @@ fn a_warning_of_the_model_is_the_status_of_its_call_and_a_message_is_not() {
 #[test]
 fn the_log_categories_of_the_model_are_described_and_may_be_chosen() {
     let description = crate::describe::<Sampled>(Path::new("")).unwrap();
-    let names = description.log_categories.iter().map(|own| own.name.as_str());
+    let names = description.log_categories.iter().map(|category| category.name.as_str());
     assert!(names.clone().any(|name| name == "logSamples"));
     assert!(names.clone().any(|name| name == "logStatusWarning"));
     let mut instance = initialized();

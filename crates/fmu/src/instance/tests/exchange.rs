@@ -18,8 +18,8 @@ fn ok(
     function: Function,
     body: impl FnOnce(&mut Instance<Pendulum>),
 ) {
-    let status = instance.call(function, |own| {
-        body(own);
+    let status = instance.call(function, |inner| {
+        body(inner);
         Ok(())
     });
     assert_eq!(status, Status::OK, "{function:?}");
@@ -41,21 +41,21 @@ fn continuous() -> Instance<Pendulum> {
 }
 
 fn set(instance: &mut Instance<Pendulum>, reference: u32, value: f64) -> Status {
-    instance.call(Function::SetReal, |own| own.set_real(&[reference], &[value]))
+    instance.call(Function::SetReal, |inner| inner.set_real(&[reference], &[value]))
 }
 
 fn set_time(instance: &mut Instance<Pendulum>, time: f64) -> Status {
-    instance.call(Function::SetTime, |own| own.set_time(time))
+    instance.call(Function::SetTime, |inner| inner.set_time(time))
 }
 
 fn set_side(instance: &mut Instance<Pendulum>, value: i32) -> Status {
-    instance.call(Function::SetInteger, |own| own.set_integer(&[0], &[value]))
+    instance.call(Function::SetInteger, |inner| inner.set_integer(&[0], &[value]))
 }
 
 fn directional(instance: &mut Instance<Pendulum>, unknown: u32, known: u32) -> Result<f64, Status> {
     let mut value = [f64::NAN];
-    let status = instance.call(Function::GetDirectionalDerivative, |own| {
-        own.get_directional_derivative(&[unknown], &[known], &[2.0], room_of(&mut value))
+    let status = instance.call(Function::GetDirectionalDerivative, |inner| {
+        inner.get_directional_derivative(&[unknown], &[known], &[2.0], room_of(&mut value))
     });
     if status == Status::OK { Ok(value[0] / 2.0) } else { Err(status) }
 }
@@ -63,49 +63,49 @@ fn directional(instance: &mut Instance<Pendulum>, unknown: u32, known: u32) -> R
 #[test]
 fn the_description_with_states_aliases_and_enumerations_breaks_no_rule() {
     assert_eq!(problems::<Pendulum>(Path::new("")), Ok(Vec::new()));
-    let (_, own) = Interface::new(&mut Pendulum::new(Path::new("")).unwrap()).unwrap();
-    let speed = own.variable("speed").unwrap();
-    assert_eq!(speed.value_reference, own.variable("der(angle)").unwrap().value_reference);
+    let (_, inner) = Interface::new(&mut Pendulum::new(Path::new("")).unwrap()).unwrap();
+    let speed = inner.variable("speed").unwrap();
+    assert_eq!(speed.value_reference, inner.variable("der(angle)").unwrap().value_reference);
     assert_eq!((speed.causality, speed.variability), (Causality::Output, Variability::Continuous));
     assert_eq!(speed.initial, Some(Initial::Calculated));
-    let Kind::Real(real) = &own.variable("der(speed)").unwrap().kind else { panic!("no Real") };
+    let Kind::Real(real) = &inner.variable("der(speed)").unwrap().kind else { panic!("no Real") };
     assert_eq!(real.derivative, Some(5));
-    let row = &own.structure.outputs[1];
+    let row = &inner.structure.outputs[1];
     assert_eq!((row.index, row.dependencies.as_deref()), (4, Some(&[5][..])), "alias of a state");
-    let row = &own.structure.derivatives[1];
+    let row = &inner.structure.derivatives[1];
     assert_eq!(row.dependencies.as_deref(), Some(&[2, 3, 5][..]));
     let kinds = [DependencyKind::Fixed, DependencyKind::Dependent, DependencyKind::Tunable];
     assert_eq!(row.kinds.as_deref(), Some(&kinds[..]));
-    let unknowns: Vec<_> = own.structure.initial_unknowns.iter().map(|row| row.index).collect();
+    let unknowns: Vec<_> = inner.structure.initial_unknowns.iter().map(|row| row.index).collect();
     assert_eq!(unknowns, [4, 6, 7, 12], "speed, der(speed), height, half");
-    assert_eq!(own.types[0].items[1], ("right".to_owned(), 2));
-    assert_eq!(own.number_of_event_indicators, Some(1));
+    assert_eq!(inner.types[0].items[1], ("right".to_owned(), 2));
+    assert_eq!(inner.number_of_event_indicators, Some(1));
 }
 
 #[test]
 fn an_importer_integrates_the_states_it_was_given() {
     let mut instance = continuous();
     let (mut x, mut slopes, mut nominals) = ([0.0; 2], [0.0; 2], [0.0; 2]);
-    ok(&mut instance, Function::GetContinuousStates, |own| {
-        own.get_continuous_states(room_of(&mut x)).unwrap();
+    ok(&mut instance, Function::GetContinuousStates, |inner| {
+        inner.get_continuous_states(room_of(&mut x)).unwrap();
     });
     assert_eq!(x, [0.5, 0.0]);
-    ok(&mut instance, Function::GetNominalsOfContinuousStates, |own| {
-        own.get_nominals(room_of(&mut nominals)).unwrap();
+    ok(&mut instance, Function::GetNominalsOfContinuousStates, |inner| {
+        inner.get_nominals(room_of(&mut nominals)).unwrap();
     });
     assert_eq!(nominals, [0.25, 1.0]);
-    ok(&mut instance, Function::SetTime, |own| own.set_time(0.5).unwrap());
-    ok(&mut instance, Function::SetContinuousStates, |own| {
-        own.set_continuous_states(&[0.25, -2.0]).unwrap();
+    ok(&mut instance, Function::SetTime, |inner| inner.set_time(0.5).unwrap());
+    ok(&mut instance, Function::SetContinuousStates, |inner| {
+        inner.set_continuous_states(&[0.25, -2.0]).unwrap();
     });
     assert_eq!(set(&mut instance, TORQUE, 3.0), Status::OK);
-    ok(&mut instance, Function::GetDerivatives, |own| {
-        own.get_derivatives(room_of(&mut slopes)).unwrap();
+    ok(&mut instance, Function::GetDerivatives, |inner| {
+        inner.get_derivatives(room_of(&mut slopes)).unwrap();
     });
     assert_eq!(slopes, [-2.0, 2.0 * 3.0 - 0.25_f64.sin() + 0.1 * 2.0]);
     let mut indicator = [0.0];
-    ok(&mut instance, Function::GetEventIndicators, |own| {
-        own.get_event_indicators(room_of(&mut indicator)).unwrap();
+    ok(&mut instance, Function::GetEventIndicators, |inner| {
+        inner.get_event_indicators(room_of(&mut indicator)).unwrap();
     });
     assert_eq!(indicator, [0.75]);
 }
@@ -113,25 +113,25 @@ fn an_importer_integrates_the_states_it_was_given() {
 #[test]
 fn an_event_may_change_states_announce_the_next_one_and_end_the_simulation() {
     let mut instance = continuous();
-    ok(&mut instance, Function::SetContinuousStates, |own| {
-        own.set_continuous_states(&[1.0, 4.0]).unwrap();
+    ok(&mut instance, Function::SetContinuousStates, |inner| {
+        inner.set_continuous_states(&[1.0, 4.0]).unwrap();
     });
-    ok(&mut instance, Function::EnterEventMode, |own| own.enter_event_mode().unwrap());
-    ok(&mut instance, Function::NewDiscreteStates, |own| {
-        let info = own.new_discrete_states().unwrap();
+    ok(&mut instance, Function::EnterEventMode, |inner| inner.enter_event_mode().unwrap());
+    ok(&mut instance, Function::NewDiscreteStates, |inner| {
+        let info = inner.new_discrete_states().unwrap();
         assert_eq!((info.values_of_continuous_states_changed, info.terminate_simulation), (1, 0));
         assert_eq!((info.next_event_time_defined, info.next_event_time), (1, 3.0));
     });
     let mut x = [0.0; 2];
-    ok(&mut instance, Function::GetContinuousStates, |own| {
-        own.get_continuous_states(room_of(&mut x)).unwrap();
+    ok(&mut instance, Function::GetContinuousStates, |inner| {
+        inner.get_continuous_states(room_of(&mut x)).unwrap();
     });
     assert_eq!(x, [1.0, -4.0]);
     ok(&mut instance, Function::EnterContinuousTimeMode, Instance::enter_continuous_time_mode);
-    ok(&mut instance, Function::SetTime, |own| own.set_time(9.5).unwrap());
-    ok(&mut instance, Function::EnterEventMode, |own| own.enter_event_mode().unwrap());
-    ok(&mut instance, Function::NewDiscreteStates, |own| {
-        let info = own.new_discrete_states().unwrap();
+    ok(&mut instance, Function::SetTime, |inner| inner.set_time(9.5).unwrap());
+    ok(&mut instance, Function::EnterEventMode, |inner| inner.enter_event_mode().unwrap());
+    ok(&mut instance, Function::NewDiscreteStates, |inner| {
+        let info = inner.new_discrete_states().unwrap();
         assert_eq!((info.values_of_continuous_states_changed, info.terminate_simulation), (0, 1));
         assert_eq!(info.next_event_time_defined, 0);
     });
@@ -141,29 +141,29 @@ fn an_event_may_change_states_announce_the_next_one_and_end_the_simulation() {
 fn wrong_lengths_times_and_states_are_refused() {
     type Body = fn(&mut Instance<Pendulum>) -> Result<(), Failure>;
     let refusals: [(Function, Body, Status); 7] = [
-        (Function::SetContinuousStates, |own| own.set_continuous_states(&[1.0]), Status::Error),
+        (Function::SetContinuousStates, |inner| inner.set_continuous_states(&[1.0]), Status::Error),
         (
             Function::SetContinuousStates,
-            |own| own.set_continuous_states(&[1.0, f64::NAN]),
+            |inner| inner.set_continuous_states(&[1.0, f64::NAN]),
             Status::Discard,
         ),
         (
             Function::GetDerivatives,
-            |own| own.get_derivatives(room_of(&mut [0.0; 3])),
+            |inner| inner.get_derivatives(room_of(&mut [0.0; 3])),
             Status::Error,
         ),
         (
             Function::GetEventIndicators,
-            |own| own.get_event_indicators(room_of(&mut [])),
+            |inner| inner.get_event_indicators(room_of(&mut [])),
             Status::Error,
         ),
-        (Function::SetTime, |own| own.set_time(f64::NAN), Status::Error),
-        (Function::SetTime, |own| own.set_time(-1.0), Status::Error),
+        (Function::SetTime, |inner| inner.set_time(f64::NAN), Status::Error),
+        (Function::SetTime, |inner| inner.set_time(-1.0), Status::Error),
         (
             Function::GetDerivatives,
-            |own| {
-                own.set_continuous_states(&[101.0, 0.0])?;
-                own.get_derivatives(room_of(&mut [0.0; 2]))
+            |inner| {
+                inner.set_continuous_states(&[101.0, 0.0])?;
+                inner.get_derivatives(room_of(&mut [0.0; 2]))
             },
             Status::Discard,
         ),
@@ -240,7 +240,7 @@ fn a_model_that_requests_the_end_returns_discard_and_terminated() {
     instance.call(Function::EnterInitializationMode, Instance::enter_initialization_mode);
     instance.call(Function::ExitInitializationMode, Instance::exit_initialization_mode);
     assert!(!instance.is_terminated());
-    let status = instance.call(Function::DoStep, |own| own.do_step(0.0, 0.25));
+    let status = instance.call(Function::DoStep, |inner| inner.do_step(0.0, 0.25));
     assert_eq!((status, instance.core.state), (Status::Discard, State::StepFailed));
     assert!(instance.is_terminated());
     assert_eq!(instance.last_successful_time(), 0.0);
@@ -250,9 +250,9 @@ fn a_model_that_requests_the_end_returns_discard_and_terminated() {
 fn a_state_of_one_interface_is_refused_by_the_other() {
     let snapshot = started().snapshot();
     let mut other = pendulum(InterfaceType::CoSimulation);
-    assert_eq!(other.call(Function::SetFMUstate, |own| own.restore(&snapshot)), Status::Error);
+    assert_eq!(other.call(Function::SetFMUstate, |inner| inner.restore(&snapshot)), Status::Error);
     let mut same = pendulum(InterfaceType::ModelExchange);
-    assert_eq!(same.call(Function::SetFMUstate, |own| own.restore(&snapshot)), Status::OK);
+    assert_eq!(same.call(Function::SetFMUstate, |inner| inner.restore(&snapshot)), Status::OK);
     assert_eq!(same.core.state, State::EventMode);
 }
 
@@ -264,13 +264,15 @@ fn the_loop_of_an_integrator_does_not_allocate() {
         let (mut slopes, mut indicator) = ([0.0; 2], [0.0]);
         for k in 0..20 {
             let time = 0.5 * f64::from(k);
-            instance.call(Function::SetTime, |own| own.set_time(time));
-            instance
-                .call(Function::SetContinuousStates, |own| own.set_continuous_states(&[0.1, time]));
-            instance
-                .call(Function::GetDerivatives, |own| own.get_derivatives(room_of(&mut slopes)));
-            instance.call(Function::GetEventIndicators, |own| {
-                own.get_event_indicators(room_of(&mut indicator))
+            instance.call(Function::SetTime, |inner| inner.set_time(time));
+            instance.call(Function::SetContinuousStates, |inner| {
+                inner.set_continuous_states(&[0.1, time])
+            });
+            instance.call(Function::GetDerivatives, |inner| {
+                inner.get_derivatives(room_of(&mut slopes))
+            });
+            instance.call(Function::GetEventIndicators, |inner| {
+                inner.get_event_indicators(room_of(&mut indicator))
             });
             directional(&mut instance, HEIGHT, ANGLE).unwrap();
         }
@@ -282,17 +284,17 @@ fn the_loop_of_an_integrator_does_not_allocate() {
 #[test]
 fn an_integrator_may_look_past_stop_time_but_complete_no_step_there() {
     type Body = fn(&mut Instance<Pendulum>) -> Result<(), Failure>;
-    let completed: Body = |own| own.completed_integrator_step();
+    let completed: Body = |inner| inner.completed_integrator_step();
     for (function, body) in [
         (Function::CompletedIntegratorStep, completed),
-        (Function::EnterEventMode, |own| own.enter_event_mode()),
+        (Function::EnterEventMode, |inner| inner.enter_event_mode()),
     ] {
         for (time, expected) in [(2.0, Status::OK), (2.5, Status::Error)] {
             let mut instance = continuous();
             instance.core.experiment.stop_time = Some(2.0);
-            ok(&mut instance, Function::SetTime, |own| own.set_time(time).unwrap());
-            ok(&mut instance, Function::GetDerivatives, |own| {
-                own.get_derivatives(room_of(&mut [0.0; 2])).unwrap();
+            ok(&mut instance, Function::SetTime, |inner| inner.set_time(time).unwrap());
+            ok(&mut instance, Function::GetDerivatives, |inner| {
+                inner.get_derivatives(room_of(&mut [0.0; 2])).unwrap();
             });
             assert_eq!(instance.call(function, body), expected, "{function:?} at {time}");
         }
@@ -303,14 +305,14 @@ fn an_integrator_may_look_past_stop_time_but_complete_no_step_there() {
 fn an_importer_goes_back_to_the_second_last_completed_step_and_never_over_an_event() {
     let complete = |instance: &mut Instance<Pendulum>, time: f64| {
         assert_eq!(set_time(instance, time), Status::OK);
-        ok(instance, Function::CompletedIntegratorStep, |own| {
-            own.completed_integrator_step().unwrap();
+        ok(instance, Function::CompletedIntegratorStep, |inner| {
+            inner.completed_integrator_step().unwrap();
         });
     };
     let back = |instance: &Instance<Pendulum>, time: f64| {
         let mut other = pendulum(InterfaceType::ModelExchange);
         let snapshot = instance.snapshot();
-        ok(&mut other, Function::SetFMUstate, |own| own.restore(&snapshot).unwrap());
+        ok(&mut other, Function::SetFMUstate, |inner| inner.restore(&snapshot).unwrap());
         set_time(&mut other, time)
     };
     let mut instance = continuous();
@@ -319,7 +321,7 @@ fn an_importer_goes_back_to_the_second_last_completed_step_and_never_over_an_eve
     complete(&mut instance, 1.0);
     assert_eq!([back(&instance, 0.5), back(&instance, 0.4)], [Status::OK, Status::Error]);
     assert_eq!(set_time(&mut instance, 0.75), Status::OK);
-    ok(&mut instance, Function::EnterEventMode, |own| own.enter_event_mode().unwrap());
+    ok(&mut instance, Function::EnterEventMode, |inner| inner.enter_event_mode().unwrap());
     ok(&mut instance, Function::EnterContinuousTimeMode, Instance::enter_continuous_time_mode);
     assert_eq!([back(&instance, 0.75), back(&instance, 0.74)], [Status::OK, Status::Error]);
     instance.reset().unwrap();

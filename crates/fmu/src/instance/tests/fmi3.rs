@@ -248,27 +248,29 @@ fn a_step_without_event_mode_handles_its_events_and_is_complete() {
 fn an_adjoint_derivative_is_the_product_with_the_transposed_matrix() {
     let mut instance = initialized(InterfaceType::ModelExchange, false);
     instance.core.model.a = vec![1.0, 2.0, 3.0, 4.0];
-    let own = Jacobian {
+    let jacobian = Jacobian {
         unknowns: &[reference("der(x)")],
         knowns: &[reference("x"), reference("u")],
         unknown_count: 2,
         known_count: 3,
     };
-    let mut found = [f64::NAN; 3];
+    let mut actual = [f64::NAN; 3];
     let status = instance.call(Function::GetAdjointDerivative, |i| {
-        i.jacobian(&own, |i, unknowns, knowns| {
-            i.get_adjoint_derivative(unknowns, &[10.0, 1.0], knowns, room_of(&mut found))
+        i.jacobian(&jacobian, |i, unknowns, knowns| {
+            i.get_adjoint_derivative(unknowns, &[10.0, 1.0], knowns, room_of(&mut actual))
         })
     });
-    assert_eq!((status, found), (Status::OK, [13.0, 24.0, 1.0]));
+    assert_eq!((status, actual), (Status::OK, [13.0, 24.0, 1.0]));
 }
 
 #[test]
 fn dependencies_are_given_for_each_element() {
     let instance = initialized(InterfaceType::ModelExchange, false);
-    let found = instance.dependencies(reference("der(x)")).unwrap();
+    let actual = instance.dependencies(reference("der(x)")).unwrap();
     let on = |element: usize, name: &str, of: usize| {
-        found.iter().any(|own| (own.0, own.1, own.2) == (element, reference(name), of))
+        actual
+            .iter()
+            .any(|jacobian| (jacobian.0, jacobian.1, jacobian.2) == (element, reference(name), of))
     };
     assert!(on(1, "x", 1) && on(1, "x", 2) && !on(1, "u", 0));
     assert!(on(2, "x", 1) && on(2, "u", 0) && on(2, "A", 4));

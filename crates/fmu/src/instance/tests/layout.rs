@@ -37,7 +37,7 @@ macro_rules! build {
                 }
 
                 fn variables(&self) -> Vec<Variable<Self>> {
-                    vec![Variable::real("y", "", |own: &mut Self| &mut own.y).output(&[])]
+                    vec![Variable::real("y", "", |slave: &mut Self| &mut slave.y).output(&[])]
                 }
 
                 fn step(&mut self, _: &Step) -> Result<(), Failure> {

@@ -21,7 +21,7 @@ fn reference<M: Model>(name: &str) -> u32 {
 
 fn refusal(required: &[u32], intermediate: Option<IntermediateUpdate>) -> Option<String> {
     let token = describe_3::<Decay>(Path::new("")).unwrap().guid;
-    let own = Instantiation {
+    let inner = Instantiation {
         interface_type: InterfaceType::CoSimulation,
         token: &token,
         resources: Path::new(""),
@@ -31,7 +31,7 @@ fn refusal(required: &[u32], intermediate: Option<IntermediateUpdate>) -> Option
         intermediate,
         required,
     };
-    let instance = Instance::<Decay>::new_3(&own, Callbacks::silent());
+    let instance = Instance::<Decay>::new_3(&inner, Callbacks::silent());
     instance.err().map(|failure| failure.to_string())
 }
 
@@ -53,12 +53,12 @@ fn a_calculated_variable_is_not_set_although_the_variable_with_its_value_is() {
     let set = |name: &str| {
         let mut instance =
             instantiate::<Pendulum>(InterfaceType::CoSimulation, false, false).unwrap();
-        let status = instance.call(Function::SetFloat64, |own| {
-            own.set_located(
+        let status = instance.call(Function::SetFloat64, |inner| {
+            inner.set_located(
                 NativeType::Float64,
                 &[reference::<Pendulum>(name)],
                 1,
-                |own, places| own.set_float64(places, &[0.25]),
+                |inner, places| inner.set_float64(places, &[0.25]),
             )
         });
         (status, instance.core.state)
@@ -81,8 +81,9 @@ fn a_state_is_set_in_event_mode_of_model_exchange_only() {
 #[test]
 fn derivatives_of_a_model_without_them_are_an_error_for_empty_lists_too() {
     type Body = fn(&mut Instance<Decay>) -> Result<(), Failure>;
-    let adjoint: Body = |own| own.get_adjoint_derivative(&[], &[], &[], room_of(&mut []));
-    let directional: Body = |own| own.get_directional_derivative(&[], &[], &[], room_of(&mut []));
+    let adjoint: Body = |inner| inner.get_adjoint_derivative(&[], &[], &[], room_of(&mut []));
+    let directional: Body =
+        |inner| inner.get_directional_derivative(&[], &[], &[], room_of(&mut []));
     for (function, body) in [
         (Function::GetAdjointDerivative, adjoint),
         (Function::GetDirectionalDerivative, directional),

@@ -226,6 +226,6 @@ mod tests {
     fn elements_with_other_attributes_are_scalars() {
         let mut all = variables(&["x[1]", "x[2]"]);
         all[1].kind = Kind::Real(RealType { unit: Some("m".to_owned()), ..RealType::default() });
-        assert!(blocks(&all, |_| false).iter().all(|own| own.extents.is_empty()));
+        assert!(blocks(&all, |_| false).iter().all(|block| block.extents.is_empty()));
     }
 }

@@ -15,8 +15,8 @@ fn delay(seconds: f64) -> Fault {
 #[test]
 fn a_dropout_holds_the_last_value_that_was_not_lost() {
     let mut line = single(dropout(LossPattern::All, None), 1.0, Some(3.0));
-    let found = series(&mut line, &[(0.0, 5.0), (1.0, 6.0), (2.0, 7.0), (3.0, 8.0)]);
-    assert_eq!(found, [5.0, 5.0, 5.0, 8.0]);
+    let actual = series(&mut line, &[(0.0, 5.0), (1.0, 6.0), (2.0, 7.0), (3.0, 8.0)]);
+    assert_eq!(actual, [5.0, 5.0, 5.0, 8.0]);
 }
 
 #[test]
@@ -69,8 +69,8 @@ fn a_held_delay_gives_the_value_of_the_communication_point_before() {
 #[test]
 fn before_the_delay_is_over_the_first_value_arrives_or_the_one_given() {
     let mut line = single(delay(0.2), 0.0, None);
-    let found = series(&mut line, &[(0.0, 4.0), (0.1, 5.0), (0.2, 6.0)]);
-    assert_eq!(found, [4.0, 4.0, 4.0]);
+    let actual = series(&mut line, &[(0.0, 4.0), (0.1, 5.0), (0.2, 6.0)]);
+    assert_eq!(actual, [4.0, 4.0, 4.0]);
     let initial = Fault::Delay { seconds: 0.2, hold: false, initial: Some(1.0) };
     let mut line = single(initial, 0.0, None);
     assert_eq!(series(&mut line, &[(0.0, 4.0), (0.1, 5.0), (0.2, 6.0)]), [1.0, 1.0, 4.0]);
@@ -88,8 +88,8 @@ fn a_delay_below_the_step_interpolates_to_the_value_on_trial() {
 fn a_delay_uses_values_from_before_its_window() {
     let mut line = single(delay(1.0), 5.0, Some(7.0));
     let values: Vec<_> = (0..9).map(|step| (f64::from(step), 10.0 * f64::from(step))).collect();
-    let found = series(&mut line, &values);
-    assert_eq!(found, [0.0, 10.0, 20.0, 30.0, 40.0, 40.0, 50.0, 70.0, 80.0]);
+    let actual = series(&mut line, &values);
+    assert_eq!(actual, [0.0, 10.0, 20.0, 30.0, 40.0, 40.0, 50.0, 70.0, 80.0]);
 }
 
 #[test]
@@ -110,9 +110,9 @@ fn a_delay_of_a_straight_line_is_exact_for_steps_of_any_size() {
 
 #[test]
 fn a_delay_beyond_memory_is_refused() {
-    let found = FaultChain::new(vec![(window(0.0, None), delay(1e9))], 1e-3).unwrap_err();
-    assert!(matches!(found, FaultError::Delay { steps, .. } if steps == 1e12), "{found}");
-    assert!(found.to_string().contains("a delay of 1000000000 s is 1000000000000"), "{found}");
+    let actual = FaultChain::new(vec![(window(0.0, None), delay(1e9))], 1e-3).unwrap_err();
+    assert!(matches!(actual, FaultError::Delay { steps, .. } if steps == 1e12), "{actual}");
+    assert!(actual.to_string().contains("a delay of 1000000000 s is 1000000000000"), "{actual}");
 }
 
 /// A chain of one fault of each kind.

@@ -4,9 +4,9 @@ use super::*;
 fn times_that_are_not_stated_are_the_next_ones_exactly() {
     let from = 0.1 + 0.2;
     let text = "[[set]]\nvariable = \"a.b\"\nvalue = 1\n[[fault]]\nconnection = \"a.c\"\nbias = { value = 2 }";
-    let (found, complete) = entries(text, 0.2, from).unwrap();
-    assert!(found.set[0].get_ref().at.total_cmp(&from).is_eq());
-    let bias = found.fault[0].get_ref().bias.as_ref().unwrap().get_ref();
+    let (actual, complete) = entries(text, 0.2, from).unwrap();
+    assert!(actual.set[0].get_ref().at.total_cmp(&from).is_eq());
+    let bias = actual.fault[0].get_ref().bias.as_ref().unwrap().get_ref();
     assert!(bias.from.unwrap().total_cmp(&from).is_eq());
     assert_eq!(entries(&complete, 0.2, from).unwrap().0.set.len(), 1);
 }
@@ -24,8 +24,8 @@ fn a_later_time_is_kept_and_an_earlier_one_refused() {
 fn a_delay_starts_when_the_run_has_kept_all_values_that_it_needs() {
     let start = |seconds: &str| {
         let text = format!("[[fault]]\nconnection = \"a.b\"\ndelay = {{ seconds = {seconds} }}");
-        let (found, _) = entries(&text, 4.0, 4.5)?;
-        Ok::<_, Error>(found.fault[0].get_ref().delay.as_ref().unwrap().get_ref().from)
+        let (actual, _) = entries(&text, 4.0, 4.5)?;
+        Ok::<_, Error>(actual.fault[0].get_ref().delay.as_ref().unwrap().get_ref().from)
     };
     assert_eq!(start("2").unwrap(), Some(6.0));
     assert_eq!(start("0.25").unwrap(), Some(4.5));

@@ -37,7 +37,7 @@ fn encodings_that_other_importers_read_are_read_with_a_warning() {
     // In windows-1252 the byte 0x80 is the euro sign.
     let windows = with(X, "").replace("UTF-8", "windows-1252").replace("\"M\"", "\"#\"");
     let windows: Vec<u8> =
-        windows.bytes().map(|own| if own == b'#' { 0x80 } else { own }).collect();
+        windows.bytes().map(|byte| if byte == b'#' { 0x80 } else { byte }).collect();
     assert_eq!(named(&windows), ("\u{20ac}".to_owned(), "encoding \"windows-1252\"".to_owned()));
 
     let wide = xml.replace("UTF-8", "UTF-16");
@@ -49,8 +49,8 @@ fn encodings_that_other_importers_read_are_read_with_a_warning() {
         (&[], &little, "UTF-16LE"),
         (&[], &big, "UTF-16BE"),
     ] {
-        let found = format!("encoding {name:?}");
-        assert_eq!(named(&[mark, bytes].concat()), ("K\u{f6}rper".to_owned(), found));
+        let computed = format!("encoding {name:?}");
+        assert_eq!(named(&[mark, bytes].concat()), ("K\u{f6}rper".to_owned(), computed));
     }
     let marked = [b"\xef\xbb\xbf".as_slice(), xml.as_bytes()].concat();
     assert_eq!(named(&marked), ("K\u{f6}rper".to_owned(), "a byte order mark".to_owned()));
@@ -106,7 +106,7 @@ fn hostile_files_end_in_an_error() {
 
 #[test]
 fn xml_that_strict_parsers_refuse_is_read() {
-    for (ordered, found) in [
+    for (ordered, computed) in [
         (" guid=", " xsi:noNamespaceSchemaLocation='fmi2ModelDescription.xsd' guid="),
         (" guid=", " description='a < b'guid="),
         (" guid=", " description='bell \u{7} &#1;' guid="),
@@ -118,9 +118,9 @@ fn xml_that_strict_parsers_refuse_is_read() {
         ),
         ("</fmiModelDescription>", "</fmiModelDescription> end of file"),
     ] {
-        let xml = with(X, "").replace(ordered, found);
+        let xml = with(X, "").replace(ordered, computed);
         let description = ModelDescription::parse(&xml);
-        assert_eq!(description.map(|own| own.variables.len()), Ok(1), "{found}");
+        assert_eq!(description.map(|byte| byte.variables.len()), Ok(1), "{computed}");
     }
 }
 

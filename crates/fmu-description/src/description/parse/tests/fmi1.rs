@@ -47,8 +47,8 @@ fn read(xml: &str) -> ModelDescription {
 fn roles_of_variables_become_those_of_later_versions() {
     let description = read(COUPLING);
     let role = |name: &str| {
-        let own = description.variable(name).unwrap();
-        (own.causality, own.variability, own.initial)
+        let variable = description.variable(name).unwrap();
+        (variable.causality, variable.variability, variable.initial)
     };
     assert_eq!(role("k"), (Causality::Parameter, Variability::Fixed, None));
     assert_eq!(role("2k"), (Causality::CalculatedParameter, Variability::Fixed, None));
@@ -64,8 +64,8 @@ fn roles_of_variables_become_those_of_later_versions() {
 fn an_alias_names_its_variable_and_whether_the_sign_differs() {
     let description = read(COUPLING);
     let alias = |name: &str| {
-        let own = description.variable(name).unwrap();
-        (own.alias_of.as_deref(), own.negated)
+        let variable = description.variable(name).unwrap();
+        (variable.alias_of.as_deref(), variable.negated)
     };
     assert_eq!(alias("tau1"), (None, false));
     assert_eq!(alias("tau2"), (Some("tau1"), true));

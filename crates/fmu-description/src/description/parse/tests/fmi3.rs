@@ -55,15 +55,15 @@ fn each_type_has_its_own_range_of_start_values() {
         ("UInt64", 0, u64::MAX.into()),
     ] {
         for start in [low, high] {
-            let own = variable(&format!(
+            let variable = variable(&format!(
                 r#"<{element} name="i" valueReference="1" start="{start}" min="{low}" max="{high}"/>"#
             ));
-            let integer = own.kind.as_integer().expect(element);
+            let integer = variable.kind.as_integer().expect(element);
             assert_eq!(
                 (integer.start, integer.min, integer.max),
                 (Some(start), Some(low), Some(high))
             );
-            assert_eq!(own.kind.element_in(Version::V3), element);
+            assert_eq!(variable.kind.element_in(Version::V3), element);
         }
         for wrong in [low - 1, high + 1] {
             let error = refused(
@@ -99,8 +99,8 @@ fn other_types_have_start_values_of_their_own() {
     assert_eq!(kind(text), Kind::Binary(binary));
     let text =
         r#"<Enumeration name="x" valueReference="1" declaredType="Mode" start="-5000000000"/>"#;
-    let own = kind(text);
-    assert_eq!(own.as_integer().and_then(|own| own.start), Some(-5_000_000_000));
+    let variable = kind(text);
+    assert_eq!(variable.as_integer().and_then(|variable| variable.start), Some(-5_000_000_000));
     let (description, _) = read(text, "");
     assert_eq!(description.types[1].items, [("off".to_owned(), -5_000_000_000)]);
 }
@@ -117,11 +117,15 @@ fn a_variable_has_the_defaults_of_its_causality_and_type() {
     ] {
         let text = format!(r#"<{element} name="x" valueReference="1" causality="{causality}"/>"#);
         let (description, _) = read(&text, "");
-        let own = &description.variables[1];
-        assert_eq!((own.variability, own.initial), (expected, None), "{element} {causality}");
+        let variable = &description.variables[1];
+        assert_eq!(
+            (variable.variability, variable.initial),
+            (expected, None),
+            "{element} {causality}"
+        );
     }
-    let own = variable(r#"<Float64 name="x" valueReference="1" declaredType="Length"/>"#);
-    let real = own.kind.as_real().unwrap();
+    let variable = variable(r#"<Float64 name="x" valueReference="1" declaredType="Length"/>"#);
+    let real = variable.kind.as_real().unwrap();
     assert_eq!((real.min, real.max, real.unit.as_deref()), (Some(0.0), None, Some("m")));
 }
 
@@ -138,18 +142,18 @@ fn an_array_has_extents_and_start_values() {
         "",
     );
     assert_eq!(warnings, Vec::<String>::new());
-    let own = |name: &str| description.variable(name).unwrap();
-    assert_eq!(own("A").dimensions, [Dimension::Fixed(2), Dimension::Variable(1)]);
-    assert_eq!(own("A").extents(&description), [2, 3]);
-    let sizes = ["n", "A", "k", "s"].map(|name| own(name).size(&description));
+    let variable = |name: &str| description.variable(name).unwrap();
+    assert_eq!(variable("A").dimensions, [Dimension::Fixed(2), Dimension::Variable(1)]);
+    assert_eq!(variable("A").extents(&description), [2, 3]);
+    let sizes = ["n", "A", "k", "s"].map(|name| variable(name).size(&description));
     assert_eq!(sizes, [1, 6, 3, 2]);
-    let starts = |name: &str| own(name).start_values(&description, 10).unwrap();
+    let starts = |name: &str| variable(name).start_values(&description, 10).unwrap();
     assert_eq!(starts("n"), Elements::Integer(vec![3]));
     assert_eq!(starts("A"), Elements::Real(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
     assert_eq!(starts("k"), Elements::Integer(vec![7, 7, 7]));
     assert_eq!(starts("s"), Elements::String(vec![String::new(), "b".to_owned()]));
-    assert_eq!(own("k").start_values(&description, 2), None);
-    assert_eq!(own("A").kind, Kind::Real(RealType::default()));
+    assert_eq!(variable("k").start_values(&description, 2), None);
+    assert_eq!(variable("A").kind, Kind::Real(RealType::default()));
 }
 
 #[test]
@@ -169,12 +173,13 @@ fn value_references_become_indices() {
            <EventIndicator valueReference="10"/>"#,
     );
     assert_eq!(warnings, Vec::<String>::new());
-    let names: Vec<_> = description.variables.iter().map(|own| own.name.as_str()).collect();
+    let names: Vec<_> =
+        description.variables.iter().map(|variable| variable.name.as_str()).collect();
     assert_eq!(names, ["time", "x", "y", "der(x)", "tick", "v", "pre(v)"]);
-    let own = |name: &str| description.variable(name).unwrap();
-    assert_eq!(own("der(x)").kind.as_real().unwrap().derivative, Some(2));
-    assert_eq!((own("v").previous, own("v").clocks.as_slice()), (Some(7), &[5][..]));
-    let Kind::Clock(clock) = &own("tick").kind else { panic!("a clock") };
+    let variable = |name: &str| description.variable(name).unwrap();
+    assert_eq!(variable("der(x)").kind.as_real().unwrap().derivative, Some(2));
+    assert_eq!((variable("v").previous, variable("v").clocks.as_slice()), (Some(7), &[5][..]));
+    let Kind::Clock(clock) = &variable("tick").kind else { panic!("a clock") };
     assert_eq!(clock.interval_variability, IntervalVariability::Constant);
     assert_eq!(clock.interval_decimal, Some(0.1));
     let row = |index, dependencies: Option<&[u32]>| Unknown {
@@ -203,7 +208,7 @@ fn an_alias_is_a_variable_after_the_one_that_contains_it() {
     assert_eq!((x.alias_of.as_ref(), y.alias_of.as_deref()), (None, Some("x")));
     assert_eq!((y.value_reference, y.causality), (1, Causality::Output));
     assert_eq!(y.kind.as_real().unwrap().display_unit.as_deref(), Some("mm"));
-    let descriptions = [x, y, z].map(|own| own.description.as_deref());
+    let descriptions = [x, y, z].map(|variable| variable.description.as_deref());
     assert_eq!(descriptions, [Some("length"), Some("length"), Some("other")]);
     assert_eq!(description.structure.outputs.len(), 1);
 }
@@ -267,9 +272,9 @@ fn a_model_exchange_interface_states_whether_it_needs_completed_steps() {
 fn a_clock_has_the_attributes_of_its_declared_type() {
     let types = r#"<ClockType name="Periodic" intervalVariability="fixed" intervalDecimal="0.2"
         canBeDeactivated="true" supportsFraction="true" resolution="10"/>"#;
-    let own = r#"<Clock name="c" valueReference="1" causality="input" declaredType="Periodic"
+    let variable = r#"<Clock name="c" valueReference="1" causality="input" declaredType="Periodic"
         intervalCounter="2" canBeDeactivated="false"/>"#;
-    let (description, warnings) = ModelDescription::read(around(types, own, "")).unwrap();
+    let (description, warnings) = ModelDescription::read(around(types, variable, "")).unwrap();
     assert_eq!(warnings, []);
     let Kind::Clock(clock) = &description.variables[1].kind else { panic!("a clock") };
     assert_eq!(clock.interval_variability, IntervalVariability::Fixed);
