@@ -2,7 +2,6 @@
 
 use super::bracket::Bracket;
 use crate::balance::{Balance, divide_rows, multiply_columns};
-use crate::svd::norm_2;
 use crate::{Error, StateSpace};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
@@ -30,9 +29,12 @@ pub(super) fn impulse_sums(
 ) -> Result<Option<Bracket>, Error> {
     let Balance { matrix: a, scale } = Balance::of_system(&system.a, &system.b, &system.c);
     let (mut states, c) = (divide_rows(&system.b, &scale), multiply_columns(&system.c, &scale));
-    // After `block` samples the state has at most half of its norm.
+    // After `block` samples the state has at most half of its norm, by the root of the product of the largest sums of
+    // rows and of columns, which is not below the norm.
     let (mut block, mut power) = (1_u32, a.clone());
-    while norm_2(&power)? > 0.5 {
+    let largest_sum =
+        |m: &DMatrix<f64>| m.column_iter().map(|column| column.lp_norm(1)).fold(0.0, f64::max);
+    while (largest_sum(&power) * largest_sum(&power.transpose())).sqrt().min(power.norm()) > 0.5 {
         if block == 1 << LONGEST || f64::from(block) > affordable(system, eigenvalues) {
             return Ok(None);
         }

@@ -3,13 +3,15 @@
 use crate::balance::{Balance, divide_rows, multiply_columns, power_of_two};
 use crate::hold::zero_order_hold;
 use crate::{Domain, Error, StateSpace};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 use std::rc::Rc;
 
 /// The shortest interval of continuous time, relative to the norm of A; h is nearly linear over it.
 const SHORTEST: f64 = 1.0 / 4096.0;
 /// Relative rounding error of a quadratic form, for some ten states.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// A rounding error below this part of a quadratic form need not be known better.
+const NEGLIGIBLE: f64 = 1e-6;
 /// Largest number of doublings of the length.
 const LENGTHS: usize = 120;
 
@@ -23,14 +25,23 @@ pub(super) struct Length {
     pub(super) sum: DMatrix<f64>,
     /// x' X x: the integral of h^2.
     pub(super) gram: DMatrix<f64>,
-    /// |X|, entry by entry.
-    gram_size: DMatrix<f64>,
+    /// The roots of the diagonal of X.
+    scales: DVector<f64>,
+}
+
+/// Bounds of the integral of |h| over one interval.
+#[derive(Clone, Copy)]
+pub(super) struct Bounds {
+    pub(super) lower: f64,
+    pub(super) upper: f64,
+    /// A bound of the rounding error of `upper`.
+    pub(super) rounding: f64,
 }
 
 impl Length {
     fn new(time: f64, phi: Rc<DMatrix<f64>>, sum: DMatrix<f64>, gram: DMatrix<f64>) -> Self {
-        let gram_size = gram.abs();
-        Self { time, phi, sum, gram, gram_size }
+        let scales = gram.diagonal().map(|entry| entry.max(0.0).sqrt());
+        Self { time, phi, sum, gram, scales }
     }
 
     /// The interval of twice the length, whose `phi` is given.
@@ -41,16 +52,29 @@ impl Length {
         Self::new(2.0 * self.time, phi, &self.sum + &self.sum * half, &self.gram + later)
     }
 
-    /// Bounds of the integral of |h|: |integral of h|, and by Cauchy and Schwarz the root of the
-    /// length times the integral of h^2. The third number bounds the rounding error of the second.
-    pub(super) fn bounds(&self, state: &DVector<f64>) -> [f64; 3] {
-        let lower = (&self.sum * state)[0].abs();
-        let square = (&self.gram * state).dot(state).max(0.0);
-        let size = state.abs();
-        let error = ROUNDING * (&self.gram_size * &size).dot(&size);
-        let (upper, blurred) = (square.sqrt(), (square + error).sqrt());
+    /// Bounds of the integral of |h| from each column of `states` on: |integral of h|, and by Cauchy and Schwarz the root
+    /// of the length times the integral of h^2.
+    pub(super) fn bounds(&self, states: &DMatrix<f64>) -> Vec<Bounds> {
+        let (sums, grams) = (&self.sum * states, &self.gram * states);
         let root = self.time.sqrt();
-        [lower, (root * upper).max(lower), root * (blurred - upper)]
+        let one = |at: usize| {
+            let (state, lower) = (states.column(at), sums[at].abs());
+            let square = grams.column(at).dot(&state).max(0.0);
+            let (upper, blurred) = (square.sqrt(), (square + self.error(&state, square)).sqrt());
+            Bounds { lower, upper: (root * upper).max(lower), rounding: root * (blurred - upper) }
+        };
+        (0..states.ncols()).map(one).collect()
+    }
+
+    /// A bound of the rounding error of `square`, x' X x: `ROUNDING` |x|' |X| |x|, or what is above it as X is positive
+    /// semidefinite, |`X_ij`|^2 <= `X_ii` `X_jj`, if that is small enough.
+    fn error(&self, state: &DVectorView<'_, f64>, square: f64) -> f64 {
+        let size = state.abs();
+        let above = ROUNDING * self.scales.dot(&size).powi(2);
+        if above <= NEGLIGIBLE * square {
+            return above;
+        }
+        ROUNDING * (self.gram.abs() * &size).dot(&size)
     }
 
     /// A bound of the integral of |h| over all intervals from here on; infinite unless this one at
@@ -100,7 +124,7 @@ impl Intervals {
         let mut before = 0.0_f64;
         for count in 1..=LENGTHS {
             let longest = &lengths[count - 1];
-            before = before.max(longest.bounds(&start)[0]);
+            before = before.max((&longest.sum * &start)[0].abs());
             if longest.tail(&(&*longest.phi * &start)) <= part * before {
                 return Ok(count);
             }

@@ -2,9 +2,9 @@
 
 use super::bracket::Bracket;
 use super::impulse_sum::impulse_sums;
-use super::interval::{Intervals, Length};
+use super::interval::{Bounds, Intervals, Length};
 use crate::{Domain, Error, StateSpace, check};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// Largest number of rounds; each round halves the intervals with the widest bounds.
 const ROUNDS: usize = 200;
@@ -27,8 +27,8 @@ const MOST_INTERVALS: usize = 1 << 18;
 /// halved where the two differ most, so that fast and slow modes get the steps they need; the
 /// contraction of the state bounds the integral after the last interval. In sampled time all samples are
 /// added where that needs fewer operations. The bracket is proven up to rounding; it is not narrowed below
-/// the rounding error of the integral of h^2. Cost: for each output about 100 n^3, and for each time
-/// constant or oscillation some 50 intervals of 3 n^2 multiplications.
+/// the rounding error of the integral of h^2. Cost: for each output, or each input if there are fewer, about 100 n^3, and for
+/// each pair and each time constant or oscillation some 50 intervals of 3 n^2 multiplications.
 ///
 /// Source: M. A. Dahleh and J. B. Pearson, L1-optimal compensators for continuous-time systems,
 /// IEEE Trans. Autom. Control 32 (1987), for the gain; the bracket is elementary.
@@ -68,6 +68,16 @@ pub fn peak_gain(system: &StateSpace, width: f64) -> Result<Bracket, Error> {
     {
         return Ok(sums);
     }
+    // h_ij is the response of the dual system from output i to input j, too.
+    if system.b.ncols() < system.c.nrows() {
+        let Bracket { lower, upper } = by_intervals(&system.dual(), width)?;
+        return Ok(Bracket { lower: lower.transpose(), upper: upper.transpose() });
+    }
+    by_intervals(system, width)
+}
+
+/// The peak gains by intervals, for each output its own.
+fn by_intervals(system: &StateSpace, width: f64) -> Result<Bracket, Error> {
     let mut intervals = Intervals::new(system)?;
     let mut lower = system.d.abs();
     let mut upper = lower.clone();
@@ -84,23 +94,15 @@ pub fn peak_gain(system: &StateSpace, width: f64) -> Result<Bracket, Error> {
     Ok(Bracket { lower, upper })
 }
 
-/// A part of the time axis: its length as an index, the state at its start, [`Length::bounds`].
+/// A part of the time axis: the state at its start, and the bounds over it.
 struct Piece {
-    length: usize,
     state: DVector<f64>,
-    lower: f64,
-    upper: f64,
-    rounding: f64,
+    bounds: Bounds,
 }
 
 impl Piece {
-    fn new(lengths: &[Length], length: usize, state: DVector<f64>) -> Self {
-        let [lower, upper, rounding] = lengths[length].bounds(&state);
-        Self { length, state, lower, upper, rounding }
-    }
-
     fn open(&self) -> f64 {
-        self.upper - self.lower
+        self.bounds.upper - self.bounds.lower
     }
 }
 
@@ -108,33 +110,47 @@ impl Piece {
 fn integral(lengths: &[Length], start: DVector<f64>, width: f64) -> Result<(f64, f64), Error> {
     let longest = lengths.len() - 1;
     let tail = lengths[longest].tail(&(&*lengths[longest].phi * &start));
-    let mut pieces = vec![Piece::new(lengths, longest, start)];
+    // The pieces of each length: products with all of their states at once are fast.
+    let mut pieces: Vec<Vec<Piece>> = lengths.iter().map(|_| Vec::new()).collect();
+    pieces[longest] = of_states(&lengths[longest], &DMatrix::from_columns(&[start]));
     for _ in 0..ROUNDS {
-        let lower: f64 = pieces.iter().map(|piece| piece.lower).sum();
-        let upper: f64 = pieces.iter().map(|piece| piece.upper).sum();
-        let allowed = width * lower + pieces.iter().map(|piece| piece.rounding).sum::<f64>();
+        let sum = |part: fn(&Bounds) -> f64| -> f64 {
+            pieces.iter().flatten().map(|piece| part(&piece.bounds)).sum()
+        };
+        let (lower, upper) = (sum(|bounds| bounds.lower), sum(|bounds| bounds.upper));
+        let allowed = width * lower + sum(|bounds| bounds.rounding);
+        let count: usize = pieces.iter().map(Vec::len).sum();
         #[expect(clippy::cast_precision_loss, reason = "at most 2^19 pieces")]
-        let share = allowed / pieces.len() as f64;
-        let splittable = pieces.iter().filter(|piece| piece.length > 0).map(Piece::open);
-        let widest = splittable.fold(0.0, f64::max);
+        let share = allowed / count as f64;
+        let widest = pieces[1..].iter().flatten().map(Piece::open).fold(0.0, f64::max);
         if upper - lower <= allowed || widest <= share {
             return Ok((lower, upper + tail));
         }
-        if pieces.len() > MOST_INTERVALS {
+        if count > MOST_INTERVALS {
             break;
         }
         let least = share.max(widest / WIDEST);
-        let is_wide = |piece: &Piece| piece.length > 0 && piece.open() > least;
-        pieces = pieces
-            .into_iter()
-            .flat_map(|piece| if is_wide(&piece) { halves(lengths, piece) } else { vec![piece] })
-            .collect();
+        for length in 1..=longest {
+            let wide = |piece: &mut Piece| piece.open() > least;
+            let wide: Vec<_> =
+                pieces[length].extract_if(.., wide).map(|piece| piece.state).collect();
+            if !wide.is_empty() {
+                pieces[length - 1].extend(halves(&lengths[length - 1], &wide));
+            }
+        }
     }
     Err(Error::NotConverged { what: "the peak-to-peak gain", iterations: ROUNDS })
 }
 
-fn halves(lengths: &[Length], piece: Piece) -> Vec<Piece> {
-    let half = piece.length - 1;
-    let middle = &*lengths[half].phi * &piece.state;
-    vec![Piece::new(lengths, half, piece.state), Piece::new(lengths, half, middle)]
+/// The pieces of one length from these states on.
+fn of_states(length: &Length, states: &DMatrix<f64>) -> Vec<Piece> {
+    let pieces = states.column_iter().zip(length.bounds(states));
+    pieces.map(|(state, bounds)| Piece { state: state.into(), bounds }).collect()
+}
+
+/// Both halves of pieces that begin at `states`; `half`: their length.
+fn halves(half: &Length, states: &[DVector<f64>]) -> Vec<Piece> {
+    let first = DMatrix::from_columns(states);
+    let second = &*half.phi * &first;
+    [first, second].iter().flat_map(|states| of_states(half, states)).collect()
 }

@@ -18,8 +18,8 @@ const WIDTH: f64 = 1e-3;
 /// The parts of a sampling interval in which a fault may change and at which the states are read.
 const PARTS: u32 = 16;
 const POINTS_PER_DECADE: u32 = 20;
-/// Number of outputs for each thread between two looks at the clock, in continuous time.
-const OUTPUTS_AT_ONCE: usize = 16;
+/// Number of outputs for each thread between two looks at the clock.
+const OUTPUTS_AT_ONCE: usize = 64;
 
 /// The outputs of the loop: states, state estimation errors, fault estimation errors.
 pub(crate) struct Outputs {
@@ -108,22 +108,25 @@ impl<'a> Loops<'a> {
     /// the faults come first, as long as the time of `budget` allows.
     fn peak_gains(&self, budget: &Budget) -> Result<Vec<Result<PeakGains, Missing>>, Error> {
         let positions = &self.outputs.positions;
-        let outputs_at_once = match self.designed.domain {
-            Domain::Continuous => OUTPUTS_AT_ONCE,
-            // Each state is read at all parts: about as many rows as the loop has states.
-            Domain::Sampled { .. } => 1 + self.of_faults.a.nrows() / PARTS as usize,
-        };
         let mut peaks = vec![Err(Missing::Time); positions.len()];
-        let mut rest = positions.len();
-        while rest > 0 && !budget.is_over() {
-            let first = rest.saturating_sub(outputs_at_once * rayon::current_num_threads());
-            let at_once = peaks[first..rest].par_chunks_mut(outputs_at_once);
-            let rows = positions[first..rest].par_chunks(outputs_at_once);
-            at_once.zip(rows).try_for_each(|(places, rows)| {
+        // The errors are those of a smaller system.
+        let states = self.designed.linear.plant_states().len();
+        let (of_states, of_errors) = peaks.split_at_mut(states);
+        let (states, errors) = positions.split_at(states);
+        let mut parts: Vec<_> = [(of_errors, errors), (of_states, states)]
+            .into_iter()
+            .flat_map(|(places, rows)| {
+                places.rchunks_mut(OUTPUTS_AT_ONCE).zip(rows.rchunks(OUTPUTS_AT_ONCE))
+            })
+            .collect();
+        for at_once in parts.chunks_mut(rayon::current_num_threads()) {
+            if budget.is_over() {
+                break;
+            }
+            at_once.par_iter_mut().try_for_each(|(places, rows)| {
                 places.clone_from_slice(&self.gains_of(rows)?);
                 Ok::<_, Error>(())
             })?;
-            rest = first;
         }
         Ok(peaks)
     }
