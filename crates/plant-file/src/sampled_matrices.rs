@@ -86,11 +86,18 @@ impl SampledMatrices {
 
 /// What follows where no continuous plant has the samples; zero eigenvalues are mostly those of a delay.
 fn only_samples(a: &DMatrix<f64>, period: f64) -> String {
-    let zeros = eigenvalues(a).map_or(0, |all| all.iter().filter(|one| one.norm() < ZERO).count());
+    let eigenvalues = eigenvalues(a).unwrap_or_default();
+    let zeros = eigenvalues.iter().filter(|value| value.norm() < ZERO).count();
+    let reason = if zeros > 0 {
+        "A has an eigenvalue that is zero"
+    } else if eigenvalues.iter().any(|value| value.im == 0.0 && value.re < 0.0) {
+        "A has an eigenvalue that is negative"
+    } else {
+        "rounding hides the logarithm of A"
+    };
     let fact = format!(
-        "no continuous plant has these samples every {period} s, as A has an eigenvalue that is {}: nothing is said about \
-         the time between the samples",
-        if zeros > 0 { "zero" } else { "negative" }
+        "no continuous plant has these samples every {period} s, as {reason}: nothing is said about the time between the \
+         samples"
     );
     if zeros == 0 {
         return fact;
