@@ -252,7 +252,7 @@ fn controls(other: Option<&str>) -> Markup {
     html! {
         form #controls {
             label { "signals " input #filter type="search" placeholder="filter by name" autocomplete="off"; }
-            span.said #actual role="status" {}
+            span.said #found role="status" {}
             label { "from " input #from type="number" step="any"; " s" }
             label { "to " input #to type="number" step="any"; " s" }
             button type="submit" { "Show" }
