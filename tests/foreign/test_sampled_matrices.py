@@ -231,3 +231,19 @@ def test_peak_delay_margin_bounds_and_worst_plant_of_samples_alone_are_those_of_
     changed = [nominal[name] + limit * (worst[name] - nominal[name]) for name in "ABC"]
     np.testing.assert_allclose(radius_of(own, *changed), 1, rtol=1e-6)
     assert 0.9 * limit < robustness["tolerance_proof"]["fraction"] <= limit
+
+
+def test_residuals_of_a_wrong_model_need_a_plant_that_is_stable_in_its_samples(aso_ftc, tmp_path):
+    detection = """faults = [{ name = "f", actuator = "u1", bound = 1 }]
+actuators = [{ name = "u1", limits = [-1, 1] }]
+[detection]
+method = "cusum"
+noise = 0.01
+false_alarm_interval = 100
+model_error = 1
+"""
+    refused, message = made(aso_ftc, tmp_path, only_samples(UNSTABLE, detection))
+    assert refused is None and "bounded only if the plant is stable without the controller" in message, message
+    stable = ([[0.9, 0.2], [0, -0.5]], *([[0.1], [1.0]], [[1, 0]], 0.05))
+    design, report = made(aso_ftc, tmp_path, only_samples(stable, detection))
+    assert design is not None and report["detection"]["tests"], message

@@ -6,9 +6,9 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use control::Domain;
 use control::detection::UncertainPlant;
 use control::robustness::{PlantFamily, Tolerances, random_deviations};
+use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
 use crate::assess::detection::decoupling::Decoupling;
@@ -174,7 +174,7 @@ impl<'a> ModelErrors<'a> {
         filter.b_u = filter.b_u.resize_horizontally(inputs, 0.0);
         filter.d_u = filter.d_u.resize_horizontally(inputs, 0.0);
         let bound = plant.largest_mean(&filter, rows, bounds).map_err(|error| match error {
-            error @ control::Error::NotHurwitz { .. } => refuse(format!(
+            error @ (Error::NotHurwitz { .. } | Error::NotSchur { .. }) => refuse(format!(
                 "the residuals of a wrong model are bounded only if the plant is stable without the \
                  controller: {error}"
             )),
