@@ -84,7 +84,7 @@ pub struct FaultChannel {
 /// user.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtendedPlant {
-    /// The plant, with the filter's states after its own.
+    /// The plant; the states of the measurement filter follow its own.
     pub plant: FaultyPlant,
     /// The time domain of the plant.
     pub domain: Domain,

@@ -228,11 +228,11 @@ mod tests {
     /// The states that a name of the standard means, for an interface.
     fn states(name: &str, interface: InterfaceType) -> Vec<State> {
         use State as S;
-        let own_states = match interface {
+        let of_interface = match interface {
             InterfaceType::ModelExchange => S::ContinuousTimeMode,
             InterfaceType::CoSimulation => S::StepComplete,
         };
-        let initialized = [S::EventMode, own_states, S::ReconfigurationMode];
+        let initialized = [S::EventMode, of_interface, S::ReconfigurationMode];
         match name {
             "FMUStateSettable" => {
                 let others =
@@ -259,7 +259,7 @@ mod tests {
                 assert!(!states.is_empty(), "{line}");
                 for name in functions.split(' ').flat_map(named) {
                     assert!(
-                        Function::EVERY.iter().any(|own_states| own_states.name() == name),
+                        Function::EVERY.iter().any(|function| function.name() == name),
                         "{name}"
                     );
                     listed.extend(states.iter().map(|state| (name.clone(), *state)));

@@ -405,7 +405,7 @@ mod tests {
         let description = sample::complete();
         let page = page(&description, "<p id=\"own\">x' = u</p>");
         let texts = texts(&page);
-        let shows = |text: &str| texts.iter().any(|text_shown| text_shown == text);
+        let shows = |text: &str| texts.iter().any(|shown| shown == text);
         for variable in &description.variables {
             assert!(shows(&variable.name), "{}", variable.name);
         }
@@ -449,7 +449,7 @@ mod tests {
             "needsCompletedIntegratorStep",
             "00ff1a",
         ] {
-            assert!(texts.iter().any(|text_shown| text_shown == text), "{text:?}");
+            assert!(texts.iter().any(|shown| shown == text), "{text:?}");
         }
         // Two states in an array.
         assert!(page.contains("<td><code>continuous states</code></td><td>2</td>"), "{page}");

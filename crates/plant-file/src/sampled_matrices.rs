@@ -26,7 +26,7 @@ pub struct SampledMatrices {
     pub domain: Domain,
     /// Why no continuous plant has the samples, in a sentence.
     pub only_samples: Option<String>,
-    /// The integral of e^(A s) over a sample, n x n; in sampled time the identity.
+    /// The integral of e^(A s) over a sample, n x n; the identity if `a` is in sampled time.
     held: DMatrix<f64>,
 }
 

@@ -21,7 +21,8 @@ pub trait PlantFamily {
     /// The number of parameters.
     fn count(&self) -> usize;
 
-    /// The plant, in continuous time or in the samples of the controller, whose parameters deviate by these parts of their tolerances.
+    /// The plant whose parameters deviate by these parts of their tolerances, in continuous time or in the samples of the
+    /// controller.
     ///
     /// # Errors
     ///

@@ -75,7 +75,7 @@ impl LinearPlant {
         }
     }
 
-    /// A of A x + B u = 0, the condition of rest.
+    /// The matrix of the states in the condition of rest: A in A x + B u = 0, in sampled time A - I.
     pub(crate) fn a_at_rest(&self) -> DMatrix<f64> {
         match self.domain {
             Domain::Continuous => self.a.clone(),
@@ -83,7 +83,8 @@ impl LinearPlant {
         }
     }
 
-    /// The states after `time` under held `inputs`, columns like those of B: Phi and Gamma. In sampled time those after a sample.
+    /// Phi and Gamma: the states after `time` are Phi x + Gamma u, with u held and `inputs`, columns like those of B. In
+    /// sampled time those after a sample.
     pub(crate) fn held(
         &self,
         inputs: &DMatrix<f64>,

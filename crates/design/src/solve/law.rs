@@ -176,12 +176,14 @@ impl LawProblem<'_> {
         let q = self.linear.faults.len();
         #[expect(clippy::cast_precision_loss, reason = "a number of faults is far below 2^52")]
         let rank = q as f64;
+        let acts_on = match self.extended.domain {
+            Domain::Continuous => "the derivatives",
+            Domain::Sampled { .. } => "the next sample",
+        };
         conditions.push(check(
             "rank C F_a is the number of faults",
             Some(rank),
-            format!(
-                "rank {q} of {q}; the faults act on the derivatives of the measurements directly"
-            ),
+            format!("rank {q} of {q}; the faults act on {acts_on} of the measurements directly"),
         ));
         if self.extended.domain == Domain::Continuous {
             let name = "the invariant zeros of (A, F_a, C) are in the left half plane";

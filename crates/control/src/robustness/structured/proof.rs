@@ -59,8 +59,8 @@ pub enum Unproven {
 /// deviations, exact for products of B, C and the controller's D too; the fraction is 1 / [`structured_bound`] of M.
 /// `most`: the largest fraction of interest; one at which instability was found ends the search.
 ///
-/// For a sampled controller and a continuous plant the deviations act on the exponential of [A, B; 0, 0] h. It is that of the nominal plant
-/// plus the change of a step of the Gauss method, linear fractional in the deviations with 1 to 3
+/// For a sampled controller and a continuous plant the deviations act on the exponential of [A, B; 0, 0] h. It is that
+/// of the nominal plant plus the change of a step of the Gauss method, linear fractional in the deviations with 1 to 3
 /// channels for each, plus the change of the error of that method. The last part is bounded entry by entry by its
 /// power series and is one more block, of any matrix. It is small if the sample time is short against the time
 /// constants of the plant.
@@ -90,7 +90,7 @@ pub fn proven_tolerance(
     }
 }
 
-/// The change of [A, B; C, D] of a sampled plant in its `held` form, see [`held_plant`].
+/// A change of [A, B; C, D] of a sampled plant as the change of these matrices of `held`, its [`held_plant`].
 fn held_change(change: &DMatrix<f64>, held: &StateSpace) -> DMatrix<f64> {
     let (n, (p, m)) = (held.a.nrows(), held.d.shape());
     let states = change.nrows() - p;

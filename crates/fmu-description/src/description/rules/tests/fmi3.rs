@@ -202,7 +202,7 @@ fn clocks_and_clocked_variables_are_checked() {
     problem_of("tick", "2.4.7.4", "a clock must be discrete", |variable| {
         (variable.causality, variable.variability) = (Causality::Local, Variability::Tunable);
         match &mut variable.kind {
-            Kind::Clock(variable) => variable.priority = None,
+            Kind::Clock(clock) => clock.priority = None,
             other => panic!("{other:?}"),
         }
     });
@@ -225,8 +225,8 @@ fn clocks_and_clocked_variables_are_checked() {
     );
     let changing = IntervalVariability::Changing;
     let mut description = sample::complete_3();
-    if let Kind::Clock(description) = &mut variable(&mut description, "alarm").kind {
-        description.interval_variability = changing;
+    if let Kind::Clock(clock) = &mut variable(&mut description, "alarm").kind {
+        clock.interval_variability = changing;
     }
     assert_eq!(description.problems(), []);
 }
